@@ -41,7 +41,7 @@ def runs_of(
     times = np.arange(1, round(seconds / 0.02) + 1) * 0.02
     rows = []
     for seed in seeds:
-        values = Fit(**{**vars(TRUE[law]), **other}).at(times)
+        values = TRUE[law]._replace(**other).at(times)
         values = values + np.random.default_rng(seed).normal(0, noise, len(times))
         history = History(times=times, values=values, active=seconds)
         for name, found in {"packing_history": history, "while_shaken": history, "timed_row": {"seed": seed}}.items():

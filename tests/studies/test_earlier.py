@@ -98,7 +98,7 @@ def copy(tmp_path: Path) -> Path:
         ("provenance.json", '{"runs": [1]}', "cannot read .*provenance.json: it is no provenance"),
     ],
 )
-def test_damaged_tables_are_told(
+def test_damaged_tables_are_reported(
     copy: Path, wanted: dict[str, Wanted], file: str, text: str | None, cause: str
 ) -> None:
     if text is None:
@@ -123,7 +123,7 @@ def test_a_study_that_draws_from_its_runs_says_so(tmp_path: Path, capsys: pytest
     assert "--earlier" in capsys.readouterr().err
 
 
-def test_tables_of_other_scenes_are_refused_before_anything_runs(
+def test_tables_of_other_scenes_are_rejected_before_anything_runs(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     arguments = ["study", "procedures", "--quick", "--out", str(tmp_path / "p"), "--earlier", str(RESULTS)]

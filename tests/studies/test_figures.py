@@ -1,6 +1,6 @@
 """What all figures of studies have in common: a short footer, one kind of error bars, and nothing that is cut unsaid.
 
-Every figure that any test of a study draws is held against the same, see `conftest.looked_at`.
+Every figure that any test of a study draws is checked, see `conftest.checked_figures`.
 """
 
 from __future__ import annotations
@@ -24,9 +24,9 @@ LOOK = {**marker("o", figures.BLUE, "white"), "linestyle": "none"}
 ORIGIN = ("Study toy: 2 of 2 runs.", "More: toy.md.")
 
 
-def footer(figure: Figure, tmp_path: Path, *, told: Sequence[str] = (), bars: str = BARS) -> str:
+def footer(figure: Figure, tmp_path: Path, *, notes: Sequence[str] = (), bars: str = BARS) -> str:
     """Finish a figure and return what stands below it."""
-    finish(figure, tmp_path / "figure", told, ORIGIN, bars=bars)
+    finish(figure, tmp_path / "figure", notes, ORIGIN, bars=bars)
     return figure.texts[-1].get_text().replace("\n", " ")
 
 
@@ -41,7 +41,7 @@ def test_error_bars_are_named_once_and_only_where_there_are_any(tmp_path: Path) 
     figure, axes = figures.new_figure()
     points(axes, [1.0, 2.0], [0.1, np.nan])
     points(axes, [1.5, 2.5], [0.1, 0.1])
-    assert footer(figure, tmp_path, told=["Told."]) == f"Told. {BARS}. {' '.join(ORIGIN)}"
+    assert footer(figure, tmp_path, notes=["Note."]) == f"Note. {BARS}. {' '.join(ORIGIN)}"
     figure, axes = figures.new_figure()
     points(axes, [1.0, 2.0], [np.nan, np.nan])
     draw_bounds(axes, [0.0, 1.0], [1.0, np.nan], 0.2, look=LOOK)
@@ -78,22 +78,22 @@ def test_limits_are_widened_to_what_is_drawn(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("half_widths", "told"),
+    ("half_widths", "stated"),
     [
         ([0.1, 1.0, 3.0], "1 error bar reaches to 0 or below: cut by the axis."),
         ([2.0, 3.0, 3.0], "3 error bars reach to 0 or below: cut by the axis."),
         ([0.1, 0.1, 0.1], None),
     ],
 )
-def test_what_a_logarithmic_axis_cannot_show_is_told(
-    half_widths: list[float], told: str | None, tmp_path: Path
+def test_what_a_logarithmic_axis_cannot_show_is_stated(
+    half_widths: list[float], stated: str | None, tmp_path: Path
 ) -> None:
     figure, axes = figures.new_figure()
     points(axes, [1.0, 1.5, 2.0], half_widths)
     axes.set_yscale("log")
     axes.set_ylim(1.4, 1.6)
     said = footer(figure, tmp_path)
-    assert (told in said) if told else "cut" not in said
+    assert (stated in said) if stated else "cut" not in said
     assert axes.get_ylim()[1] > 2 + half_widths[2]
 
 
@@ -108,6 +108,6 @@ def test_references_tell_where_they_have_no_point() -> None:
     assert gravish_note([0.4, 0.5, 0.55]).endswith("no φ_0 at l/w = 0.5, 0.55; no φ_f at l/w = 0.55.")
 
 
-def test_seeds_that_follow_each_other_are_told_as_a_range() -> None:
+def test_seeds_that_follow_each_other_are_a_range() -> None:
     assert format_numbers([3, 1, 2, 2]) == "1 2 3"
     assert format_numbers([*range(1, 21), 30]) == "1 to 20 30"

@@ -89,7 +89,7 @@ def test_the_bias_of_the_papers_pile_has_its_sign_or_none(slope: float, verdict:
 @pytest.mark.parametrize(
     ("power", "slope", "verdict"), [(1 / 3, -0.3, "found"), (1.0, -3.0, "not found"), (1 / 3, 0, "not resolved")]
 )
-def test_the_law_is_told_from_others_refused_or_left_open(power: float, slope: float, verdict: str) -> None:
+def test_the_law_is_found_rejected_or_left_open(power: float, slope: float, verdict: str) -> None:
     found = judged(table(power=power, slope=slope), "phi-f-surface-over-volume")
     assert found.verdict == verdict, found.ours
 

@@ -202,7 +202,7 @@ def test_what_takes_too_long_is_left_out_but_never_the_scene(scene: Scene) -> No
         (SCENE, (), ["control"], "--knobs: control turns nothing: no phase of scene.yaml actuates"),
     ],
 )
-def test_a_scene_that_makes_no_ladder_is_refused(
+def test_a_scene_that_makes_no_ladder_is_rejected(
     text: str, settings: tuple[str, ...], knobs: list[str] | None, message: str, tmp_path: Path
 ) -> None:
     with pytest.raises(InputError, match=message) as error:

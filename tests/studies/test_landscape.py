@@ -162,7 +162,7 @@ def table(strength: Callable[[pd.DataFrame, np.random.Generator], Any]) -> pd.Da
     return runs
 
 
-def told(runs: pd.DataFrame, scope: str, *, part: str = EVERY) -> tuple[pd.DataFrame, pd.DataFrame]:
+def correlations(runs: pd.DataFrame, scope: str, *, part: str = EVERY) -> tuple[pd.DataFrame, pd.DataFrame]:
     first, second = (
         one[(one[STRENGTH] == PEAK) & (one[SCOPE] == scope) & (one[PART] == part)].reset_index()
         for one in predicted(runs)
@@ -178,7 +178,7 @@ def judged(runs: pd.DataFrame, *, correlated: bool = True) -> dict[str, Judged]:
 
 def test_the_measure_that_strength_follows_from_is_found() -> None:
     runs = table(lambda t, random: 0.2 * t[CROSSINGS] - 0.02 * t[PHI] + 0.05 * random.normal(size=len(t)))
-    ranked, compared = told(runs, WITHIN)
+    ranked, compared = correlations(runs, WITHIN)
     first = ranked.iloc[0]
     assert first[PREDICTOR] == CROSSINGS
     assert first[LOW] < first[RHO] < first[HIGH]
@@ -191,11 +191,11 @@ def test_the_measure_that_strength_follows_from_is_found() -> None:
     assert {verdicts[name].verdict for name in names} == {"found"}
 
 
-def test_where_nothing_tells_strength_nothing_is_found() -> None:
+def test_where_nothing_predicts_strength_nothing_is_found() -> None:
     runs = table(lambda t, random: random.normal(size=len(t)))
     verdicts = judged(runs)
     assert verdicts["best-strength-over"].verdict == verdicts["best-strength-within"].verdict == "not resolved"
-    ranked, _ = told(runs, ALL)
+    ranked, _ = correlations(runs, ALL)
     assert ((ranked[LOW] > 0) | (ranked[HIGH] < 0)).sum() <= 2
 
 
@@ -208,8 +208,8 @@ def test_runs_of_one_trajectory_are_one_block() -> None:
 
     runs = table(by_trajectory)
     assert runs.groupby(trajectories(runs))[[ASPECT, SEED]].nunique().max().max() == 1
-    # Ten times the same runs tell no more.
-    (once, _), (often, _) = told(runs, WITHIN), told(pd.concat([runs] * 10, ignore_index=True), WITHIN)
+    # Ten times as many equal runs say no more.
+    (once, _), (often, _) = correlations(runs, WITHIN), correlations(pd.concat([runs] * 10, ignore_index=True), WITHIN)
     blocks = 2 * len(RATIOS) * (1 + len(THETAS))
     assert set(once["trajectories [-]"]) == set(often["trajectories [-]"]) == {blocks}
     widths = [one.set_index(PREDICTOR)[HIGH] - one.set_index(PREDICTOR)[LOW] for one in (once, often)]

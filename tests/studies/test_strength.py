@@ -61,7 +61,7 @@ def test_measures_are_those_put_in(tmp_path: Path) -> None:
     assert (row[HELD_FAST], row[LIMIT], row[KEPT]) == (0, math.inf, pytest.approx(1))
 
 
-def test_a_pile_that_is_held_fast_is_told(tmp_path: Path) -> None:
+def test_a_pile_that_is_held_fast_is_counted(tmp_path: Path) -> None:
     free = write(tmp_path / "free", SHAPE)
     held = write(tmp_path / "held", SHAPE, seed=2, limit=0.01, stops=0.6)
     report = STUDY.analyse([free, held], tmp_path / "out", **ORIGIN)
