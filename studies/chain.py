@@ -185,7 +185,7 @@ def rises(name: str, says: str, quantity: str, rows: Rows) -> Finding:
             own = part[part[COUNT] == count]
             slope = slope_within(own[CONFINEMENT].tolist(), own[quantity].tolist(), own[SEED].tolist())
             walls = f" per unit of h/H, force on the walls up to {own[WALL].max():.2g} N"
-            effects.append(Effect(label=f"n = {count}:", value=slope, note=walls))
+            effects.append(Effect(label=f"n = {count}: slope", value=slope, note=walls))
             # A slope of nothing at all has no scatter: walls that are never touched change no bit.
             untouched |= slope.count > 1 and slope.value <= 0 and not slope.half_width > 0
         return Outcome(effects=effects, verdict=Verdict.NOT_FOUND if untouched else None)
@@ -205,7 +205,13 @@ def _more(base: pd.DataFrame) -> list[Effect]:
 _INSIDE = f"rises about linearly with confinement, h/H {RANGE[0]:g} to {RANGE[1]:g} as in the paper"
 _OVER = "rises with confinement, linearly or not, over our range"
 FINDINGS = (
-    Finding(id="force-linear", says="Force starts linear in strain", outcome=_straight, rows=baseline),
+    Finding(
+        id="force-linear",
+        says="Force starts linear in strain",
+        outcome=_straight,
+        rows=baseline,
+        found_if=f"the slopes of the lower and the upper half of the first rise differ by less than {STRAIGHT:.0%}",
+    ),
     *map(yields, YIELDS),
     Finding(id="widens", says="The chain widens while strained (auxetic)", outcome=_widens, rows=baseline),
     rises("peak-rises-in-range", f"Peak force {_INSIDE}", PEAK, in_range),

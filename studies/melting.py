@@ -195,6 +195,7 @@ FINDINGS = (
         says="Internal oscillation lowers the pile and keeps its width",
         outcome=_low_and_wide,
         rows=at_once,
+        found_if=f"com height below that of static, radius within {SAME_WIDTH:.0%} of it, paired by l/w and seed",
     ),
     above(
         "more-stable",

@@ -341,8 +341,13 @@ PACKING = (
         "0.12 (a steady descent would take 0.5)",
     ),
     with_aspect("internal-falls", "Internal oscillation: φ_f falls with l/w", only(INTERNAL), PHI_ACTIVE, -1),
-    with_aspect(
-        "internal-gains-more", "Internal oscillation: Δφ = φ_f − φ_0 grows with l/w", gains(INTERNAL), PHI_ACTIVE
+    slope(
+        "internal-gains-more",
+        "Internal oscillation: Δφ = φ_f − φ_0 grows with l/w",
+        PHI_ACTIVE,
+        ASPECT,
+        rows=gains(INTERNAL),
+        label="Δφ",
     ),
     with_amplitude("tighter-at-low-theta", "Internal oscillation: lower θ packs tighter", PHI_ACTIVE, -1),
     Finding(

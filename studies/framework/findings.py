@@ -273,12 +273,13 @@ def slope(
     sign: int = 1,
     within: Sequence[str] = (),
     rows: Rows = lambda table: table,
+    label: str = "",
 ) -> Finding:
     """Judge whether a quantity rises (sign 1) or falls (−1) with a variable, by a straight line within blocks.
 
     Columns `within` make a block, which has its own level; without them there is one line through all rows.
     """
-    label = f"{symbol(quantity)} against {symbol(against)}"
+    label = f"{label or symbol(quantity)} against {symbol(against)}"
 
     def outcome(table: pd.DataFrame) -> Outcome:
         value = slope_within(table[against], table[quantity], blocks(table, within))
