@@ -95,7 +95,8 @@ def fit(law: str, times: Array, packing: Array) -> Fit:
     tries = (least_squares(lambda x: solved(x)[1], start, bounds=(low, high)) for start in starts)
     best = min(tries, key=lambda found: float(found.cost))
     (begin, end), left = solved(best.x)
-    return Fit(law, float(begin), float(end), *map(float, np.exp(best.x)), float(np.sqrt(np.mean(left**2))))
+    tau, power = map(float, np.exp(best.x))
+    return Fit(law, float(begin), float(end), tau, power, float(np.sqrt(np.mean(left**2))))
 
 
 def spread_out(times: Array, packing: Array) -> tuple[Array, Array]:
