@@ -50,8 +50,6 @@ class Analysis:
     """What figures are drawn from.
 
     Attributes:
-        tables: Tables of the study by name.
-        manifests: Finished runs by name.
         footer: Origin, one statement each.
     """
 
@@ -115,14 +113,9 @@ class Means:
     """Means with their error bars against a variable: a panel for each quantity and each value of a column.
 
     Attributes:
-        x: Column of the variable.
-        split: Makes the series.
-        rows: Selects what is drawn.
         panels: Column with a column of panels for each value; empty: none.
         panel: Title of a panel, with `{}` for its value.
         transform: What is drawn of x.
-        log: Whether y is logarithmic where all means are above 0.
-        marks: Values of x with a vertical line.
         ticks: Whether the x axis has ticks at the values of x alone.
         levels: Horizontal lines of a panel's rows, by label.
         bounds: Lower bounds for the quantities without a mean, by column.
@@ -222,7 +215,6 @@ class Rows:
         rows: Selects what is drawn, in the order of the rows.
         ends: Columns of the ends of the intervals; empty: means with half-widths.
         margin: Column with the half-width of a band about 0.
-        levels: Value of a vertical line by column.
     """
 
     name: str
@@ -279,13 +271,11 @@ class Histories:
         history: Reads the history of a run; an InputError leaves the run out. None: the table `times`.
         x: Column of the time in the table `times`.
         split: Makes the series of the runs; its look has a colour.
-        rows: Selects the runs that are drawn.
         panels: Column with a panel for each value; empty: none.
         panel: Title of a panel, with `{}` for its value times `panel_scale`.
         width: Of the intervals that are averaged over; 0: a hundredth of the longest activity.
         unit: Of that width.
         log: Whether x and its intervals are logarithmic.
-        level: Horizontal line.
     """
 
     name: str
@@ -358,11 +348,8 @@ class Scatter:
     """A quantity against others, a panel each: every run as a small marker, means over seeds as large ones.
 
     Attributes:
-        xs: Quantities across.
-        y: Quantity upwards.
         split: Makes the series of runs and of points; its look has a marker and a colour.
         bounds: Column that is above 0 where y is a lower bound, drawn as an arrow.
-        means: Whether means are drawn.
     """
 
     name: str

@@ -147,9 +147,7 @@ class Judged:
     """A finding with its verdict.
 
     Attributes:
-        finding: The finding.
         ours: Our numbers; errors are standard errors.
-        verdict: The verdict.
         more: How many times as many runs would resolve it; NaN where that does not apply.
         criterion: What makes the finding true.
     """

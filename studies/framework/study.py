@@ -43,14 +43,11 @@ class Report:
     """Results of a study.
 
     Attributes:
-        header: Columns of the short table.
-        rows: Of that table.
         lines: Below it: what the numbers are, and every finding with its verdict.
         tables: All tables by name, `runs`, `points` and `findings` among them.
         missing: Runs that were given and are not in the tables.
         footer: Origin of the results, one statement each.
         files: Everything that was written, by name.
-        output: Folder of the files.
     """
 
     header: Sequence[str]
@@ -70,13 +67,11 @@ class Study:
 
     Attributes:
         name: For the command line, and in provenance.
-        title: Of its text.
         measure: Measures one finished run: its row of the table of runs, several rows, or a `MeasuredRun` with a
             history. An InputError lists the run as missing.
         keys: Columns that name a point: one combination of the sweep's variables.
         quantities: Columns that are averaged over seeds.
         findings: What is judged, in the paper's order.
-        figures: What is drawn.
         samples: Makes the table that is averaged and judged from the table of runs of one engine.
         extra: Makes further tables by name from the table of runs; one called `points` replaces the means over seeds.
         shown: Selects the points of the short table.
