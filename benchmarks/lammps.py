@@ -36,21 +36,14 @@ STRETCH, STRETCHES = 10, 8  # steps, and how many such
 
 
 def scene_data(engine: str, seed: int, count: int, fidelity: str, *phases: dict[str, Any]) -> dict[str, Any]:
-    """A pile of the paper's smarticles, l/w = 0.7."""
-    return {
-        "schema_version": 1,
-        "name": "lammps",
-        "engine": engine,
-        "fidelity": fidelity,
-        "seed": seed,
-        "count": count,
-        "phases": list(phases),
-        "recording": {"frame_interval_s": 0.04, "checkpoint_interval_s": None},
-    }
+    """Return the data of a pile of the paper's smarticles, l/w = 0.7."""
+    keys = {"name": "lammps", "engine": engine, "fidelity": fidelity, "seed": seed, "count": count}
+    recording = {"frame_interval_s": 0.04, "checkpoint_interval_s": None}
+    return {"schema_version": 1, **keys, "phases": list(phases), "recording": recording}
 
 
-def told(run: Path) -> dict[str, float]:
-    """Means at rest and over the second half of the shaking."""
+def measured(run: Path) -> dict[str, float]:
+    """Average at rest and over the second half of the shaking."""
     planned, series = Run(run).phases, read_series(run)
     times, phases, phi = series["time_s"], series["phase"], series["packing_fraction"]
     rest = phi[(phases == 1) & (times > (planned[1].end_s or 0.0) - 0.1)]
@@ -74,7 +67,7 @@ def agree(folder: Path, given: argparse.Namespace) -> None:
         taken = {"type": "take-over", "run": str((folder / pour).absolute())}
         shake = {"type": "shake", "duration_s": given.shake}
         run_child(folder, f"{engine}-{seed}", scene_data(engine, seed, given.count, given.fidelity, taken, rest, shake))
-        rows.append({"engine": engine, "seed": seed, **told(folder / f"{engine}-{seed}")})
+        rows.append({"engine": engine, "seed": seed, **measured(folder / f"{engine}-{seed}")})
         print(rows[-1], flush=True)
     table = pd.DataFrame(rows)
     table.to_csv(folder / "agree.csv", index=False)
@@ -87,7 +80,7 @@ def agree(folder: Path, given: argparse.Namespace) -> None:
 
 
 def pile(count: int, fidelity: str, fall: float) -> tuple[dict[str, Any], Saved]:
-    """Smarticles that have come down for a time [s], saved."""
+    """Let smarticles come down for a time [s], and save them."""
     widening = (count / PAPER_COUNT) ** 0.5
     data = scene_data("lammps", 1, count, fidelity, {"type": "deposit"}, {"type": "shake", "duration_s": 1.0})
     data["container"] = {"radius_m": PAPER_RADIUS * widening, "height_m": 0.4}
@@ -110,7 +103,7 @@ def pile(count: int, fidelity: str, fall: float) -> tuple[dict[str, Any], Saved]
 
 
 def ranks(folder: Path, counts: list[int], repeats: int, fidelity: str, fall: float) -> None:
-    """Least wall times of the same steps on one rank and on two."""
+    """Find the least wall times of the same steps on one rank and on two."""
     rows = []
     for count in counts:
         data, saved = pile(count, fidelity, fall)

@@ -51,8 +51,8 @@ def run_child(folder: Path, name: str, data: dict[str, Any]) -> resource.struct_
 
 def phase_cost(run: Path, phase: int = -1) -> float:
     """Return the processor seconds per simulated second of a phase of a finished run."""
-    told = json.loads((run / "done.json").read_text())["phases"][phase]
-    cost: float = told["cpu_s"] / (told["end_s"] - told["start_s"])
+    timed = json.loads((run / "done.json").read_text())["phases"][phase]
+    cost: float = timed["cpu_s"] / (timed["end_s"] - timed["start_s"])
     return cost
 
 

@@ -1,8 +1,8 @@
 """What accuracy costs in time: variants of one scene, each with one knob turned, against the knob's finest rung.
 
+A knob has rungs from coarse to fine; the scene itself, the setting `base`, is a rung of every knob, and is run once.
 Errors are relative to the knob's reference: its finest rung with finished runs, or the scene itself for what is no
 accuracy but a sensitivity. An error within the scatter between seeds is not resolved, which is not the same as none.
-`ladder.py` makes the variants.
 """
 
 from __future__ import annotations
@@ -10,32 +10,100 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any
 
 import numpy as np
 import pandas as pd
-from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
+import yaml
 
-from dem.errors import InputError
+from dem.errors import InputError, nearest
 from dem.record.run import Run
+from dem.scene.reading import parse_scene
+from dem.scene.scene import Scene
+from dem.setting.fidelity import Fidelity, fidelities
 from postprocess.measures.packing import DEFINITIONS
 from postprocess.measures.pull import PULL, has_pull, peak, read_pull, weight_of_one
 from postprocess.measures.table import LAST_FRAMES, summarise_run
-from postprocess.report import figures as style
 from postprocess.statistics.columns import ASPECT, SEED, SEEDS
 from postprocess.statistics.points import marked, seeds_of, told_number
 from postprocess.statistics.seeds import Scatter, mean_over_seeds, pooled_scatter, relative_difference
-from studies.framework.figures import Analysis, Drawing
-from studies.framework.findings import Finding, Outcome, Verdict
-from studies.framework.plots import draw_means, finished, marker
+from studies.framework.figures import POOLED, Means, one_by_one
+from studies.framework.findings import Finding, Outcome, Verdict, decide
 from studies.framework.provenance import Reference
-from studies.framework.quantities import Key, Quantity
-from studies.framework.runs import DEFINITION, ENGINE, Row, duration
+from studies.framework.runs import DEFINITION, ENGINE, Key, Quantity, Row, duration, last_columns
 from studies.framework.study import Study
-from studies.ladder import ACTIVITIES, BASE, Rung
+from templates.sweep.render import Value, render_yaml
+from templates.sweep.sweep_file import Sweep, SweepFile
+
+BASE = "base"
+"""Setting of the scene as it stands, which the others are variants of."""
+
+KNOBS = ("time-step", "stiffness", "section", "restitution", "control", "hinge", "fidelity", "engine")
+"""Knobs in order; `smarticles accuracy --help` says what they are."""
+
+ACTUATED = frozenset({"actuate", "shape-change", "internal-oscillation"})
+"""Types of phase in which barbs move."""
+
+ACTIVITIES = ACTUATED | {"shake"}
+"""Types of phase that do something to the pile in its container; packing is compared before and after them."""
+
+_OF_MOTORS = frozenset({"control", "hinge"})
+_ENGINES = ("yade", "links")
+"""From coarse to fine: links have neither beads nor facets, so that all are compared with their converged answer."""
+# Left as the scene has them: facets, since no knob turns them; a step by hand is rejected.
+_FIXED = frozenset({"wall_facets", "time_step_s"})
+_STIFFNESSES = (125.0, 250.0, 500.0, 1000.0, 2000.0, 4000.0)
+_CONVERGED = {"rows": 3, "stiffness_N_per_m": 2000.0}
+"""Finer than the finest name on links, in what was found to matter: what the names are compared with."""
+_ROWS = {2: "two", 3: "three", 4: "four"}
+_MOST_SEEDS = 1000
+_TEMPLATE = Path("accuracy.yaml.j2")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Rung:
+    """One value of one knob; `setting` names the variant of the scene that has it, whose runs are SETTING_seedN."""
+
+    knob: str
+    value: str
+    unit: str
+    setting: str
+
+    @property
+    def label(self) -> str:
+        """Value and unit."""
+        return f"{self.value} {self.unit}".rstrip()
+
+    @property
+    def sensitivity(self) -> bool:
+        """Whether the knob belongs to what is modelled: its rungs differ from the scene itself, and do not err."""
+        return self.knob == "restitution"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Ladder:
+    """Rungs of all knobs, each knob's from coarse to fine, and variables and scene of each setting, `BASE` first.
+
+    What could not be made is in `left_out`, one line each.
+    """
+
+    rungs: tuple[Rung, ...]
+    settings: Mapping[str, Mapping[str, Value]] = field(repr=False)
+    left_out: tuple[str, ...] = ()
+    scenes: Mapping[str, Scene] = field(repr=False)
+
+    @property
+    def knobs(self) -> tuple[str, ...]:
+        """The knobs that have rungs, in order."""
+        return tuple(dict.fromkeys(rung.knob for rung in self.rungs))
+
+    def references(self) -> dict[str, Rung]:
+        """What each knob's rungs are compared with: its finest rung, or the scene itself for a sensitivity."""
+        return {rung.knob: rung for rung in self.rungs if not rung.sensitivity or rung.setting == BASE}
+
 
 VARIANT, KNOB, VALUE, UNIT, REFERENCE, VERDICT = "variant", "knob", "value", "unit", "reference", "verdict"
 ACTIVITY, COUNT = "activity", "smarticles [-]"
@@ -69,12 +137,243 @@ _OF_SETTING = (ENGINE, TIME_STEP, SPHERES, ASPECT, COUNT, ACTIVITY)
 _NAMED = re.compile(r"(?P<variant>.+)_seed(?P<seed>\d+)")
 
 
-def measure(run: Run, expected_s: Mapping[str, float]) -> Row:
-    """Measure what a run cost, and what is compared.
+def default_seeds(scene: Scene) -> tuple[int, ...]:
+    """Give the seeds of a ladder: twenty where they are cheap, three on YADE."""
+    return tuple(range(1, 21 if scene.smooth else 4))
 
-    Args:
-        run: A finished run, named SETTING_seedN.
-        expected_s: Expected wall time by name of the run directory, where it is known [s].
+
+def parse_seeds(text: str) -> tuple[int, ...]:
+    """Parse seeds from `1,2,3` or `1-20`.
+
+    Raises:
+        InputError: there is none, one is no whole number from 0, or one is given twice.
+    """
+    words = [word.strip() for word in text.split(",") if word.strip()]
+    if not words or not all(re.fullmatch(r"[0-9]{1,9}(-[0-9]{1,9})?", word) for word in words):
+        msg = f"--seeds {text!r}: must be whole numbers from 0, such as 1,2,3 or 1-20"
+        raise InputError(msg)
+    seeds: list[int] = []
+    for word in words:
+        first, _, last = word.partition("-")
+        if last and not 0 <= int(last) - int(first) < _MOST_SEEDS:
+            msg = f"--seeds {text}: {word} must go up, by fewer than {_MOST_SEEDS}"
+            raise InputError(msg)
+        seeds += range(int(first), int(last or first) + 1)
+    twice = next((seed for seed in seeds if seeds.count(seed) > 1), None)
+    if twice is not None:
+        msg = f"--seeds {text}: {twice} is given twice, and would count twice; leave one out"
+        raise InputError(msg)
+    return tuple(seeds)
+
+
+def parse_knobs(text: str) -> tuple[str, ...]:
+    """Parse knobs from `time-step,section`, in the order of `KNOBS`.
+
+    Raises:
+        InputError: there is none, or one is unknown.
+    """
+    words = [word.strip() for word in text.split(",") if word.strip()]
+    for word in words:
+        if word not in KNOBS:
+            msg = f"--knobs: {word!r} is no knob; {nearest(word, KNOBS)}"
+            raise InputError(msg)
+    if not words:
+        msg = f"--knobs {text!r}: names none; known: {', '.join(KNOBS)}"
+        raise InputError(msg)
+    return tuple(knob for knob in KNOBS if knob in words)
+
+
+def build_ladder(scene: Scene, *, source: str, knobs: Sequence[str] | None = None) -> Ladder:
+    """Make the ladder of a scene; a rung that it cannot have, such as two rows in a square section, is left out.
+
+    `source` is the scene's file, for messages; without `knobs` there are all that the scene calls for.
+
+    Raises:
+        InputError: the scene has no activity, a time step by hand, or nothing that a knob asked for could turn.
+    """
+    types = [phase.type for phase in scene.phases]
+    driven = bool(ACTUATED & set(types))
+    idle = next((knob for knob in knobs or () if knob in _OF_MOTORS and not driven), None)
+    msg = ""
+    if not ACTIVITIES & set(types):
+        msg = (
+            f"{source}: phases: {', '.join(types)}: no activity whose result could be compared; "
+            f"add a phase of type {', '.join(sorted(ACTIVITIES))}"
+        )
+    elif scene.fidelity.time_step_s is not None:
+        msg = (
+            f"{source}: fidelity.time_step_s: a step of {scene.fidelity.time_step_s:g} s by hand does not follow the "
+            "knobs; leave it out and give time_step_fraction"
+        )
+    elif idle is not None:
+        msg = f"--knobs: {idle} turns nothing: no phase of {source} actuates ({', '.join(types)}); leave it out"
+    elif scene.smooth and "hinge" in (knobs or ()):
+        msg = f"--knobs: hinge turns nothing: the engine {scene.engine} has no pins; leave it out"
+    if msg:
+        raise InputError(msg)
+    useless = {"engine", *(() if driven else _OF_MOTORS), *(["hinge"] if scene.smooth else [])}
+    turned = {key: getattr(scene.fidelity, key) for key in Fidelity.model_fields if key not in _FIXED}
+    base = {"engine": scene.engine, **turned, "restitution": scene.contact.restitution}
+    template = _template(scene)
+    settings: dict[str, Mapping[str, Value]] = {BASE: base}
+    scenes: dict[str, Scene] = {BASE: scene}
+    rungs: list[Rung] = []
+    left_out: list[str] = []
+    for knob in knobs or [knob for knob in KNOBS if knob not in useless]:
+        for value, unit, name, changes in _rungs(knob, base, smooth=scene.smooth):
+            values = {**base, **changes}
+            # The name of a fidelity decides nothing by itself.
+            decisive = {key: one for key, one in values.items() if key != "base"}
+            setting = next((known for known, there in settings.items() if _same(decisive, there)), name)
+            if setting not in settings:
+                data = {**values, "title": scene.name, SEED: scene.seed}
+                try:
+                    scenes[setting] = parse_scene(render_yaml(template, data, source), source=source)
+                except InputError as error:
+                    left_out.append(f"{knob} {value}: {error}")
+                    continue
+                settings[setting] = values
+            rungs.append(Rung(knob=knob, value=value, unit=unit, setting=setting))
+    return Ladder(rungs=tuple(rungs), settings=settings, left_out=tuple(left_out), scenes=scenes)
+
+
+def affordable(ladder: Ladder, expected_s: Mapping[str, float], most_s: float) -> Ladder:
+    """Leave out settings whose run is expected to take longer than so many seconds; the scene itself always stays."""
+    dear = {setting for setting, wall in expected_s.items() if wall > most_s and setting != BASE}
+    lines = [
+        f"{rung.knob} {rung.label}: a run is expected to take {expected_s[rung.setting] / 3600:.2g} h, "
+        f"more than {most_s / 3600:.2g} h"
+        for rung in ladder.rungs
+        if rung.setting in dear
+    ]
+    return replace(
+        ladder,
+        rungs=tuple(rung for rung in ladder.rungs if rung.setting not in dear),
+        settings={name: values for name, values in ladder.settings.items() if name not in dear},
+        left_out=(*ladder.left_out, *lines),
+        scenes={name: scene for name, scene in ladder.scenes.items() if name not in dear},
+    )
+
+
+def ladder_sweep(scene: Scene, ladder: Ladder, seeds: Sequence[int]) -> Sweep:
+    """Make the sweep of a ladder: every setting once per seed, all settings with the first seed first."""
+    data = {
+        "schema_version": 1,
+        "name": "accuracy",
+        "template": str(_TEMPLATE),
+        "run_name": "{{ setting }}_seed{{ seed }}",
+        "constants": {"title": scene.name},
+        "points": {"list": [{"setting": name, **values} for name, values in ladder.settings.items()]},
+        "repeats": {"seeds": list(seeds), "seed_by_seed": True},
+    }
+    return Sweep(
+        path=Path("accuracy.yaml"),
+        text=yaml.safe_dump(data, sort_keys=False, allow_unicode=True),
+        content=SweepFile.model_validate(data),
+        template=_TEMPLATE,
+        template_text=_template(scene),
+    )
+
+
+def _template(scene: Scene) -> str:
+    """The scene as a template: all that the knobs turn is a variable."""
+    data = scene.model_dump(mode="json")
+    data |= {"name": "{{ title }}", SEED: "{{ seed }}", "engine": "{{ engine }}"}
+    data["contact"]["restitution"] = "{{ restitution }}"
+    data["fidelity"] |= {key: f"{{{{ {key} }}}}" for key in data["fidelity"] if key not in _FIXED}
+    text = str(yaml.safe_dump(data, sort_keys=False, allow_unicode=True))
+    # A variable that stands alone keeps its type.
+    return re.sub(r"'(\{\{ \w+ \}\})'", r"\1", text)
+
+
+def _same(one: Mapping[str, Value], other: Mapping[str, Value]) -> bool:
+    return all(_equal(value, other[name]) for name, value in one.items())
+
+
+def _equal(one: Value, other: Value) -> bool:
+    if isinstance(one, float | int) and isinstance(other, float | int):
+        return math.isclose(one, other, rel_tol=1e-9)
+    return bool(one == other)
+
+
+_Point = tuple[str, str, str, dict[str, Value]]
+"""Value and unit as text, name of the setting, and the variables that differ from the base."""
+
+
+def _rungs(knob: str, base: Mapping[str, Value], *, smooth: bool) -> list[_Point]:
+    """All rungs of a knob, coarse to fine; `smooth`: of links that are no chains of spheres."""
+    if knob == "section":
+        return _strands(base) if smooth else _sections(base)
+    if knob == "fidelity":
+        engine = str(base["engine"])
+        return [(name, "", f"{engine}-{name}" if smooth else name, all_) for name, all_ in _names(engine).items()]
+    if knob == "engine":
+        return [(f"{one} {name}", "", f"{one}-{name}", all_) for one in _ENGINES for name, all_ in _names(one).items()]
+    key, unit, values, fine = {
+        "time-step": ("time_step_fraction", "", (0.9, 0.45, 0.225), "small"),
+        "restitution": ("restitution", "", (0.2, 0.5, 0.7, 0.9), "large"),
+        "control": ("control_interval_s", "s", (4e-4, 2e-4, 1e-4), "small"),
+        "stiffness": ("stiffness_N_per_m", "N/m", _STIFFNESSES if smooth else (), "large"),
+        "hinge": ("hinge_stiffness_N_per_m", "N/m", (), "large"),
+    }[knob]
+    own = base[key]
+    if not values:
+        return [(f"{own * n:g}", unit, f"{knob}-x{n}", {key: own * n}) for n in (1, 2, 4)]
+    every = sorted([*(value for value in values if not _equal(value, own)), own], reverse=fine == "small")
+    return [(f"{value:g}", unit, f"{knob}-{value:g}", {key: value}) for value in every]
+
+
+def _names(engine: str) -> dict[str, dict[str, Value]]:
+    """What each named fidelity of an engine sets, coarse to fine; on links what is finer yet comes last."""
+    shared: dict[str, Value] = {"engine": engine, "diameter_m": None}
+    found = {name: {**shared, "base": name, **knobs} for name, knobs in fidelities(engine).items()}
+    if engine == _ENGINES[-1]:
+        found["converged"] = {**list(found.values())[-1], **_CONVERGED}
+    return found
+
+
+def _sections(base: Mapping[str, Value]) -> list[_Point]:
+    """Rows of spheres by the scene's own rule of their diameter, the true section last.
+
+    A scene of several rows is compared with what is finer yet: its pitch halved, its rows doubled.
+    """
+    shapes: list[dict[str, Value]] = [{"rows": 1, "pitch": pitch, "diameter_m": None} for pitch in (1.3, 1.0, 0.5)]
+    shapes.append({"rows": 2, "pitch": 1.0, "diameter_m": None})
+    own = {key: base[key] for key in shapes[0]}
+    if own["rows"] > 1:
+        finer = [{**own, "pitch": own["pitch"] / 2}, {**own, "rows": min(2 * own["rows"], max(_ROWS))}]
+        shapes += [shape for shape in finer if not _same(shape, own)]
+    if not any(_same(own, shape) for shape in shapes):
+        shapes.append(own)
+    points = []
+    for shape in sorted(shapes, key=lambda shape: (shape["rows"], -shape["pitch"])):
+        name = f"pitch {shape['pitch']:g}"
+        if shape["rows"] > 1:
+            name = f"{_ROWS[shape['rows']]} rows" + (f" of {name}" if shape["pitch"] != 1 else "")
+        points.append(_shaped(name, shape))
+    return points
+
+
+def _strands(base: Mapping[str, Value]) -> list[_Point]:
+    """Strands of a smooth link, by the scene's own rule of their diameter."""
+    shapes: list[dict[str, Value]] = [{"rows": rows, "diameter_m": None} for rows in (1, 2, 3)]
+    own = {key: base[key] for key in shapes[0]}
+    if not any(_same(own, shape) for shape in shapes):
+        shapes.append(own)
+    shapes.sort(key=lambda shape: shape["rows"] or 0)
+    return [_shaped(f"{shape['rows']} strand{'' if shape['rows'] == 1 else 's'}", shape) for shape in shapes]
+
+
+def _shaped(name: str, shape: dict[str, Value]) -> _Point:
+    """A rung of the section, with its diameter where that is set by hand."""
+    name += "" if shape["diameter_m"] is None else f" d {1e3 * shape['diameter_m']:g} mm"
+    return name, "", re.sub(r"[^A-Za-z0-9.]+", "-", name), shape
+
+
+def measure(run: Run, expected_s: Mapping[str, float]) -> Row:
+    """Measure what a run, named SETTING_seedN, cost, and what is compared.
+
+    The expected wall time is given by name of the run directory, where it is known [s].
     """
     active = [phase for phase in run.phases if phase.type in ACTIVITIES]
     if not active or active[0].index == 0:
@@ -117,8 +416,7 @@ def measure(run: Run, expected_s: Mapping[str, float]) -> Row:
         **_of_series(run),
         "escaped at the end [-]": after["escaped [-]"],
         "frames averaged [-]": int(table["frames averaged"].min()),
-        "scene_sha256": run.manifest.scene_sha256,
-        "run": run.path.name,
+        **last_columns(run),
     }
 
 
@@ -148,17 +446,12 @@ def _of_series(run: Run) -> dict[str, float]:
 
 
 def work_precision(runs: pd.DataFrame, rungs: Sequence[Rung]) -> pd.DataFrame:
-    """Compare each rung with its knob's reference: cost, means over seeds, errors.
+    """Compare each rung with its knob's reference: cost, means over seeds, errors; rungs go from coarse to fine.
 
-    Args:
-        runs: Table of runs.
-        rungs: Each knob's from coarse to fine; one without runs has NaN.
-
-    Returns:
-        One row per rung. `… SE` is a standard error over seeds. `… error [%]` is relative to the reference's mean, `…
-        error 95 % [%]` its seed-to-seed band: the half-width of the interval of confidence by Student's t, with the
-        scatter pooled over all settings. The error of the reference itself is 0 by definition, its band that of its
-        own mean. `… resolved` says whether the error is beyond the band, `verdict` whether any is.
+    `… SE` is a standard error over seeds. `… error [%]` is relative to the reference's mean, `… error 95 % [%]` its
+    seed-to-seed band: the half-width of the interval of confidence by Student's t, with the scatter pooled over all
+    settings. The error of the reference itself is 0 by definition, its band that of its own mean. `… resolved` says
+    whether the error is beyond the band, `verdict` whether any is. A rung without runs has NaN.
     """
     groups = {rung.setting: runs[runs[VARIANT] == rung.setting] for rung in rungs}
     scatters = {name: pooled_scatter(group[column] for group in groups.values()) for name, column in COMPARED.items()}
@@ -229,7 +522,7 @@ def advise(table: pd.DataFrame, knob: str) -> Outcome:
     if reference["sensitivity"]:
         clear = [f"{_label(row)} ({_errors(row)})" for _, row in judged[judged[VERDICT] == RESOLVED].iterrows()]
         note = f"a matter of what is modelled; against {_label(reference)} resolved: {', '.join(clear) or 'none'}"
-        return Outcome(note=note, verdict=Verdict.FOUND if clear else Verdict.NOT_RESOLVED)
+        return Outcome(note=note, verdict=decide(bool(clear)))
     cheap = judged[judged[COST] < reference[COST]].sort_values(COST)
     enough = cheap[cheap[VERDICT] == NOT_RESOLVED]
     if enough.empty:
@@ -258,52 +551,6 @@ def _finding(knob: str, *, sensitivity: bool) -> Finding:
     )
 
 
-def _draw(path: Path, analysis: Analysis) -> list[Path]:
-    """Draw errors against costs, a panel for each quantity, a series for each knob."""
-    table = analysis.tables["work_precision"]
-    names = [name for name, column in COMPARED.items() if name != "hook_force" or table[column].notna().any()]
-    figure = style.blank_figure(2 * style.COLUMN_WIDTH, 4.6)
-    panels = list(figure.subplots(-(-len(names) // 2), 2, sharex=True).flat)
-    for axes in panels[len(names) :]:
-        axes.remove()
-    for axes, name in zip(panels, names, strict=False):
-        _draw_panel(axes, name, table)
-    handles, labels = panels[0].get_legend_handles_labels()
-    if handles:
-        figure.legend(handles, labels, loc="outside upper center", ncols=4)
-    told = "Hollow: references. Band: median of the error bars."
-    return finished(figure, path, [told], analysis.footer, pooled=True)
-
-
-def _draw_panel(axes: Any, name: str, table: pd.DataFrame) -> None:
-    errors, bands = f"{name} error [%]", f"{name} error 95 % [%]"
-    typical = table.loc[table[VERDICT] != IS_REFERENCE, bands].median()
-    if math.isfinite(typical):
-        axes.axhspan(-typical, typical, color=style.SKY, alpha=0.25, linewidth=0, label="seed-to-seed band, 95 %")
-    axes.axhline(0.0, color=style.GREY, linewidth=0.6)
-    knobs = list(dict.fromkeys(table[KNOB]))
-    colours = style.sequence(len(knobs), last=0.85)
-    for place, (knob, colour, shape) in enumerate(zip(knobs, colours, "os^vPDX<", strict=False)):
-        rows = table[(table[KNOB] == knob) & table[COST].notna() & table[errors].notna()]
-        # The scene itself is a rung of every knob: knobs stand side by side, by a factor in the cost.
-        cost = rows[COST] * 1.05 ** (place - (len(knobs) - 1) / 2)
-        axes.plot(cost, rows[errors], color=colour, linewidth=0.5, alpha=0.6)
-        own = rows[VERDICT] == IS_REFERENCE
-        for part, face, label in ((~own, colour, knob), (own, "white", "_nolegend_")):
-            if part.any():
-                look = marker(shape, colour, face) | {"linestyle": "none"}
-                # A reference has no error of its own: its scatter is in the bands of the others.
-                high = rows.loc[part, bands].where(~own[part]).to_numpy()
-                wide = rows.loc[part, marked(COST, "95 %")].to_numpy()
-                draw_means(axes, cost[part], rows.loc[part, errors], high, across=wide, look=look, label=label)
-    axes.set_xscale("log")
-    axes.xaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
-    axes.xaxis.set_major_formatter(FuncFormatter(lambda cost, _: f"{cost:g}"))
-    axes.xaxis.set_minor_formatter(NullFormatter())
-    axes.set_xlabel("processor time per simulated time [s/s]")
-    axes.set_ylabel(f"error of {SYMBOLS[name]} [%]")
-
-
 def study(rungs: Sequence[Rung], expected_s: Mapping[str, float] = MappingProxyType({})) -> Study:
     """Make the study of a ladder.
 
@@ -317,6 +564,17 @@ def study(rungs: Sequence[Rung], expected_s: Mapping[str, float] = MappingProxyT
         table = work_precision(runs, rungs)
         return {"points": table, "work_precision": table}
 
+    errors = [
+        Quantity(
+            column=f"{name} error [%]",
+            label=f"{symbol} error % (95 %)",
+            form="+.1f",
+            bar="95 %",
+            axis=f"error of {symbol} [%]",
+            meaning=f"of {symbol} against the knob's reference",
+        )
+        for name, symbol in SYMBOLS.items()
+    ]
     return Study(
         name="accuracy",
         title="What accuracy costs in time",
@@ -329,19 +587,22 @@ def study(rungs: Sequence[Rung], expected_s: Mapping[str, float] = MappingProxyT
         ),
         quantities=(
             Quantity(column=COST, label="cpu s per s", meaning="processor time of the last activity, one thread"),
-            *(
-                Quantity(
-                    column=f"{name} error [%]",
-                    label=f"{symbol} error % (95 %)",
-                    form="+.1f",
-                    bar="95 %",
-                    meaning=f"of {symbol} against the knob's reference",
-                )
-                for name, symbol in SYMBOLS.items()
-            ),
+            *errors,
         ),
         findings=[_finding(knob, sensitivity=sensitivity) for knob, sensitivity in knobs.items()],
-        figures=(Drawing(name="accuracy", of=_draw),),
+        figures=(
+            Means(
+                name="accuracy",
+                table="work_precision",
+                quantities=errors,
+                x=COST,
+                x_label="processor time per simulated time [s/s]",
+                log_x=True,
+                split=one_by_one(KNOB, str),
+                levels=lambda _: {"reference": 0.0},
+                bars=POOLED,
+            ),
+        ),
         extra=tables,
         order=(),
         same_count=(),

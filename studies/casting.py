@@ -7,9 +7,7 @@ and Goldman, "Amorphous Entangled Active Matter", Soft Matter 2023, section "Cas
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
 from functools import partial
-from pathlib import Path
 
 import numpy as np
 import pandas as pd
@@ -19,17 +17,13 @@ from dem.record.run import Run
 from postprocess.geometry.outline import BALL
 from postprocess.measures.heights import heights
 from postprocess.measures.mould import cast, read_tiers
-from postprocess.report import figures as style
 from postprocess.statistics.columns import SEED
-from postprocess.statistics.points import marked
 from postprocess.statistics.seeds import mean_over_seeds
-from studies.framework import plots
-from studies.framework.figures import Analysis, Drawing
+from studies.framework.figures import PROCEDURE_LABELS, Rows, by_procedure
 from studies.framework.findings import Effect, Finding, Outcome, above, mean, means_by
-from studies.framework.procedures import INTERNAL, PROCEDURE, SHAPE, STATIC, of_procedure, paired
-from studies.framework.quantities import Key, declare
+from studies.framework.procedures import INTERNAL, PROCEDURE, SHAPE, STATIC, of_procedure
 from studies.framework.release import ORDER, Pictures, around, named_columns, removal
-from studies.framework.runs import Row, duration
+from studies.framework.runs import Key, Row, declare, duration, last_columns
 from studies.framework.study import Study
 
 AFTER = 1.0  # s after the walls went, as in the paper
@@ -64,11 +58,7 @@ QUANTITIES = declare(
             for columns, label, meaning in _BY_TIER
             for tier, column in columns.items()
         },
-        NECK: (
-            "in the neck",
-            ".3f",
-            "share of the material above the mould, in the neck it came through, before",
-        ),
+        NECK: ("in the neck", ".3f", "share of the material above the mould, in the neck it came through, before"),
         WHOLE: ("whole", ".3f", "share of the volume of the whole mould inside the pile before"),
         WHOLE_AFTER: ("whole after", ".3f", "share of the volume of the whole mould inside the pile after"),
         WHOLE_KEPT: ("kept whole", ".3f", "of what was inside the pile in the mould, the share that still is"),
@@ -97,7 +87,7 @@ def measure(run: Run) -> Row:
     found = cast(one, other, tiers, thickness=run.manifest.sphere_diameter_m, ball=ball)
     volumes = np.array([tier.volume for tier in tiers])
     filled = found.filled_before * volumes
-    # Of less than the ball that tells inside from outside, a share says nothing.
+    # A share of less than the ball that separates inside from outside means nothing.
     kept = np.where(filled > 4 / 3 * math.pi * ball**3, found.kept, math.nan)
     row = named_columns(run)
     for k, tier in enumerate(TIERS):
@@ -122,13 +112,8 @@ def measure(run: Run) -> Row:
         CENTRE: levels[1].mean_com / levels[0].mean_com,
         "time after [s]": after.time - start,
         "time without the wall [s]": duration(removal(run)),
-        "scene_sha256": run.manifest.scene_sha256,
-        "run": run.path.name,
+        **last_columns(run),
     }
-
-
-def _note(*quantities: str) -> Callable[[pd.DataFrame], str]:
-    return lambda runs: "; ".join(f"{name} {means_by(runs, name, PROCEDURE, '.3f')}" for name in quantities)
 
 
 def _pour_fills(runs: pd.DataFrame) -> Outcome:
@@ -137,26 +122,11 @@ def _pour_fills(runs: pd.DataFrame) -> Outcome:
         Effect(label=f"filled as poured, {tier},", value=mean_over_seeds(part[column]), threshold=FULL)
         for tier, column in FILLED.items()
     ]
-    return Outcome(effects=effects, note=_note(NECK)(part))
-
-
-def _fills_less(runs: pd.DataFrame) -> list[Effect]:
-    filled, height = (partial(paired, runs, quantity, SHAPE) for quantity in (FILLED["lower"], HEIGHT))
-    return [
-        Effect(label="filled share of the lower tier less internal", value=filled(INTERNAL), sign=-1),
-        Effect(label="height of 95 % less internal", value=height(INTERNAL), unit=" m"),
-        Effect(label="filled less static", value=filled(STATIC), sign=0),
-        Effect(label="height less static", value=height(STATIC), sign=0, unit=" m"),
-    ]
+    return Outcome(effects=effects, note=f"in the neck: {means_by(part, NECK, PROCEDURE, '.3f')}")
 
 
 FINDINGS = (
-    Finding(
-        id="pour-fills",
-        says="The mould is filled by pouring (shown in a picture)",
-        outcome=_pour_fills,
-        found_if=f"more than {FULL:g} of each tier is inside the pile as poured",
-    ),
+    Finding(id="pour-fills", says="The mould is filled by pouring (shown in a picture)", outcome=_pour_fills),
     # A pile that packs denser sinks, and leaves the upper tier; the lower one is where it has enough to fill with.
     above(
         "internal-fills",
@@ -164,15 +134,15 @@ FINDINGS = (
         FILLED["lower"],
         INTERNAL,
         (STATIC, SHAPE),
-        of=of_procedure,
-        note=_note(FILLED["lower"], WHOLE),
-        found_if="the filled share of the lower tier above that of static and of shape change, paired by seed",
+        shown=(FILLED["lower"], WHOLE),
     ),
-    Finding(
-        id="shape-change-fills-less",
-        says="Shape change grows inward and upward rather than outward: it does not fill the mould",
-        outcome=_fills_less,
-        found_if="filled share of the lower tier below and height above those of internal oscillation, paired by seed",
+    above(
+        "shape-change-fills-less",
+        "Shape change grows inward and upward rather than outward: it does not fill the mould",
+        {FILLED["lower"]: -1, HEIGHT: 1},
+        SHAPE,
+        (INTERNAL,),
+        beside=(STATIC,),
     ),
     mean(
         "internal-falls-apart",
@@ -181,8 +151,7 @@ FINDINGS = (
         "lost of what was filled",
         rows=lambda runs: of_procedure(runs, INTERNAL),
         threshold=LOST,
-        note=_note(*KEPT.values()),
-        found_if=f"more than {LOST:g} of the filled volume of the mould is lost in 1 s",
+        shown=[*KEPT.values()],
     ),
     above(
         "shape-change-keeps",
@@ -190,9 +159,7 @@ FINDINGS = (
         OVERLAP,
         SHAPE,
         (INTERNAL,),
-        of=of_procedure,
-        note=_note(OVERLAP, WHOLE_KEPT),
-        found_if="overlap of the pile before and after above that of internal oscillation, paired by seed",
+        shown=(OVERLAP, WHOLE_KEPT),
     ),
     above(
         "internal-sculpts",
@@ -200,34 +167,13 @@ FINDINGS = (
         LIKENESS_BEFORE,
         INTERNAL,
         (SHAPE,),
-        of=of_procedure,
-        note=_note(LIKENESS_BEFORE, LIKENESS, IN_MOULD),
-        found_if="likeness of pile and mould before the walls go above that of shape change, paired by seed",
+        shown=(LIKENESS_BEFORE, LIKENESS, IN_MOULD),
     ),
 )
 
-_LABELS = {STATIC: "static", INTERNAL: r"internal oscillation, $\theta$ = 10°", SHAPE: "shape change"}
-_PLACES = [*TIERS, "whole"]
-
-
-def _draw(path: Path, analysis: Analysis, panels: Mapping[str, Sequence[str]], places: Sequence[str]) -> list[Path]:
-    """Draw columns of the points side by side, a panel for each label."""
-    figure = style.blank_figure(style.COLUMN_WIDTH * min(len(panels), 2), 2.6)
-    grid = figure.subplots(1, len(panels), squeeze=False)[0]
-    for axes, (label, columns) in zip(grid, panels.items(), strict=True):
-        for k, (procedure, name) in enumerate(_LABELS.items()):
-            for _, point in of_procedure(analysis.points, procedure).iterrows():
-                x = np.arange(len(columns)) + 0.16 * (k - 1)  # error bars side by side
-                look = {**plots.procedure_marker(procedure), "linestyle": "none"}
-                errors = [float(point[marked(column, "95 %")]) for column in columns]
-                plots.draw_means(axes, x, [float(point[column]) for column in columns], errors, look=look, label=name)
-        # Error bars of a share may reach beyond 0 and 1; they are shown whole.
-        axes.set_ylim(min(1.05 * axes.dataLim.y0, 0.0), max(1.02 * axes.dataLim.y1, 1.05))
-        axes.set_xticks(range(len(columns)), labels=places)
-        axes.set_ylabel(label)
-    figure.legend(*grid[0].get_legend_handles_labels(), loc="outside upper center", ncols=3)
-    return plots.finished(figure, path, (), analysis.footer)
-
+_LABELS = {name: PROCEDURE_LABELS[name] for name in (STATIC, INTERNAL, SHAPE)}
+_TIERS = [*FILLED.values(), WHOLE, *FILLED_AFTER.values(), WHOLE_AFTER, *KEPT.values(), WHOLE_KEPT]
+_rows = partial(Rows, row=lambda point: _LABELS[point[PROCEDURE]], split=by_procedure(_LABELS, line=False))
 
 STUDY = Study(
     name="casting",
@@ -237,25 +183,9 @@ STUDY = Study(
     quantities=tuple(QUANTITIES.values()),
     findings=FINDINGS,
     figures=(
-        Drawing(
-            name="tiers",
-            of=partial(
-                _draw,
-                panels={
-                    "inside the pile before\n[share of the tier]": [*FILLED.values(), WHOLE],
-                    f"inside the pile {AFTER:g} s after\n[share of the tier]": [*FILLED_AFTER.values(), WHOLE_AFTER],
-                    "kept of what was filled\n[-]": [*KEPT.values(), WHOLE_KEPT],
-                },
-                places=_PLACES,
-            ),
-        ),
-        Drawing(
-            name="overlap",
-            of=partial(
-                _draw,
-                panels={"common volume over that of both [-]": [LIKENESS_BEFORE, LIKENESS, OVERLAP]},
-                places=["pile and mould,\nbefore", "pile and mould,\nafter", "pile before\nand after"],
-            ),
+        _rows(name="tiers", quantities=[QUANTITIES[name] for name in _TIERS], columns=4),
+        _rows(
+            name="overlap", quantities=[QUANTITIES[name] for name in (LIKENESS_BEFORE, LIKENESS, OVERLAP)], columns=3
         ),
         Pictures(labels=_LABELS, after=AFTER),
     ),

@@ -1,13 +1,13 @@
 """Strain test of a chain of two or six robots between two walls: force, yield, width and fracture against confinement.
 
 Against Savoie, Tuazon, Bhamla and Goldman, "Amorphous Entangled Active Matter", Soft Matter 2023, "Robophysical
-experiment", and what friction, servos and strings matter, which the paper does not tell. In `chain-bodies` robots have
+experiment", and what friction, servos and strings matter, which the paper omits. In `chain-bodies` robots have
 bodies 2.1 cm thick. Runs of one seed have the same servos. --quick takes minutes.
 """
 
 from __future__ import annotations
 
-from pathlib import Path
+from functools import partial
 
 import numpy as np
 import pandas as pd
@@ -32,15 +32,13 @@ from postprocess.measures.strain import (
     read_strain_test,
 )
 from postprocess.measures.strain import QUANTITIES as MEANINGS
-from postprocess.report import figures as style
 from postprocess.statistics.columns import SEED, SEEDS
 from postprocess.statistics.points import averaged
 from postprocess.statistics.seeds import SeedMean, mean_over_seeds, slope_within
-from studies.framework import plots
-from studies.framework.figures import Analysis, Drawing, Histories, Means, one_by_one
+from studies.framework import figures
+from studies.framework.figures import Histories, History, Means, one_by_one
 from studies.framework.findings import Effect, Finding, Outcome, Rows, Verdict
-from studies.framework.quantities import Key, declare
-from studies.framework.runs import Row
+from studies.framework.runs import Key, Quantity, Row, declare, last_columns
 from studies.framework.study import Study
 
 RANGE = (0.52, 0.65)  # h/H of the paper
@@ -83,8 +81,7 @@ def measure(run: Run) -> Row:
         SPEED: strained[0]["speed_m_per_s"],
         START: float(pull.widths[0]),
         **measured(pull),
-        "scene_sha256": run.manifest.scene_sha256,
-        "run": run.path.name,
+        **last_columns(run),
     }
 
 
@@ -188,18 +185,12 @@ def rises(name: str, says: str, quantity: str, rows: Rows) -> Finding:
             own = part[part[COUNT] == count]
             slope = slope_within(own[CONFINEMENT].tolist(), own[quantity].tolist(), own[SEED].tolist())
             walls = f" per unit of h/H, force on the walls up to {own[WALL].max():.2g} N"
-            effects.append(Effect(label=f"n = {count}:", value=slope, note=walls))
+            effects.append(Effect(label=f"n = {count}: slope", value=slope, note=walls))
             # A slope of nothing at all has no scatter: walls that are never touched change no bit.
             untouched |= slope.count > 1 and slope.value <= 0 and not slope.half_width > 0
         return Outcome(effects=effects, verdict=Verdict.NOT_FOUND if untouched else None)
 
-    return Finding(
-        id=name,
-        says=says,
-        outcome=outcome,
-        rows=rows,
-        found_if="slope against h/H > 0, trials with the same seed compared with each other",
-    )
+    return Finding(id=name, says=says, outcome=outcome, rows=rows)
 
 
 def _more(base: pd.DataFrame) -> list[Effect]:
@@ -222,67 +213,29 @@ FINDINGS = (
         found_if=f"the slopes of the lower and the upper half of the first rise differ by less than {STRAIGHT:.0%}",
     ),
     *map(yields, YIELDS),
-    Finding(
-        id="widens",
-        says="The chain widens while strained (auxetic)",
-        outcome=_widens,
-        rows=baseline,
-        found_if="largest width before the fracture over that at the start > 1, for n = 2 and 6",
-    ),
+    Finding(id="widens", says="The chain widens while strained (auxetic)", outcome=_widens, rows=baseline),
     rises("peak-rises-in-range", f"Peak force {_INSIDE}", PEAK, in_range),
     rises("fracture-rises-in-range", f"Strain at fracture {_INSIDE}", FRACTURE, in_range),
     rises("peak-rises", f"Peak force {_OVER}", PEAK, baseline),
     rises("fracture-rises", f"Strain at fracture {_OVER}", FRACTURE, baseline),
     Finding(
-        id="more-robots",
-        says="As n increases, force increases but elongation decreases",
-        outcome=_more,
-        rows=baseline,
-        found_if="peak force of n = 6 above, strain at fracture below that of n = 2, paired by h/H and seed, means "
-        "over h/H of each seed",
+        id="more-robots", says="As n increases, force increases but elongation decreases", outcome=_more, rows=baseline
     ),
 )
 
 
-def force_history(run: Run) -> plots.History:
-    """Read the force of the pulled string against strain, up to the fracture."""
+def history(run: Run, *, width: bool = False) -> History:
+    """Read the force of the pulled string, or the width over that at the start, against strain up to the fracture."""
     pull = read_strain_test(run)
     end = pull.fracture + 1
-    return plots.History(times=np.maximum.accumulate(pull.strains[:end]), values=pull.forces[:end], active=0.0)
-
-
-def width_history(run: Run) -> plots.History:
-    """Read the width over that at the start against strain, up to the fracture."""
-    pull = read_strain_test(run)
-    end = pull.fracture + 1
-    widths = pull.widths[:end] / pull.widths[0]
-    return plots.History(times=np.maximum.accumulate(pull.strains[:end]), values=widths, active=0.0)
+    values = pull.widths / pull.widths[0] if width else pull.forces
+    return History(times=np.maximum.accumulate(pull.strains[:end]), values=values[:end])
 
 
 _HISTORIES = (
-    ("force_strain", force_history, "force of the pulled string [N]"),
-    ("width_strain", width_history, "width over that at the start [-]"),
+    ("force_strain", history, "force of the pulled string [N]"),
+    ("width_strain", partial(history, width=True), "width over that at the start [-]"),
 )
-
-
-def _draw_sensitivity(path: Path, analysis: Analysis) -> list[Path]:
-    """Draw what each variant changes in peak force and strain at fracture."""
-    changes = analysis.tables["sensitivity"]
-    if changes.empty:
-        return []
-    names = list(dict.fromkeys(changes[VARIANT]))
-    figure, axes = style.new_figure(width=2 * style.COLUMN_WIDTH, height=1.8 + 0.27 * len(names))
-    for shift, quantity, colour in ((0.14, PEAK, style.BLUE), (-0.14, FRACTURE, style.ORANGE)):
-        part = changes[changes["quantity"] == quantity].set_index(VARIANT).loc[names]
-        look = {**plots.marker("o", colour, colour), "linestyle": "none"}
-        rows, bars, label = -np.arange(len(names)) + shift, part["change 95 % [%]"], quantity.rpartition(" [")[0]
-        plots.draw_means(axes, part["change [%]"], rows, None, across=bars, look=look, label=label)
-    axes.axvline(0, color=style.GREY, linewidth=0.6)
-    axes.set_yticks(-np.arange(len(names)), names)
-    axes.set_xlabel("change against the baseline [%]")
-    axes.legend(loc="best")
-    return plots.finished(figure, path, ["Means over pairs of runs with the same servos, n = 2."], analysis.footer)
-
 
 STUDY = Study(
     name="chain",
@@ -300,7 +253,7 @@ STUDY = Study(
         *(
             Histories(
                 name=name,
-                history=history,
+                history=read,
                 rows=baseline,
                 split=one_by_one(CONFINEMENT, "h/H = {:g}".format),
                 panels=COUNT,
@@ -308,10 +261,10 @@ STUDY = Study(
                 width=0.005,
                 unit="of strain",
                 x_label="strain [-]",
-                y_label=label,
-                told=["Up to the first fracture."],
+                quantities={"": label},
+                notes=["Up to the first fracture."],
             )
-            for name, history, label in _HISTORIES
+            for name, read, label in _HISTORIES
         ),
         Means(
             name="confinement",
@@ -320,9 +273,18 @@ STUDY = Study(
             x_label="confinement h/H [-]",
             split=lambda points: one_by_one(COUNT, "n = {:g}".format)(baseline(points)),
             marks=RANGE,
-            told=["Means over trials, each with a seed of its own. Broken lines: the paper's range."],
+            notes=["Means over trials, each with a seed of its own. Broken lines: the paper's range."],
         ),
-        Drawing(name="sensitivity", of=_draw_sensitivity),
+        figures.Rows(
+            name="sensitivity",
+            table="sensitivity",
+            quantities=[Quantity(column="change [%]", axis="change against the baseline [%]")],
+            row=VARIANT,
+            rows=lambda table: table[table["quantity"].isin([PEAK, FRACTURE])],
+            split=one_by_one("quantity", str),
+            levels={"change [%]": 0.0},
+            notes=["Means over pairs of runs with the same servos, n = 2."],
+        ),
     ),
     extra=tabulate,
     same_count=(COUNT,),

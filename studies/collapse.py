@@ -12,11 +12,9 @@ from __future__ import annotations
 
 import hashlib
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from importlib.resources import files
-from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -24,7 +22,6 @@ import pandas as pd
 from dem.record.run import Run
 from postprocess.measures.collapse import (
     COM,
-    CORE,
     HEIGHTS,
     LEAST_FALL,
     REMAINING,
@@ -35,16 +32,13 @@ from postprocess.measures.collapse import (
     height_with_the_wall,
     vibration,
 )
-from postprocess.report import figures as style
 from postprocess.statistics.columns import ASPECT, SEED, SEEDS
 from postprocess.statistics.points import marked, mean_columns, told_number
 from postprocess.statistics.seeds import SeedMean, Slope, difference, mean_over_seeds, slope_within
-from studies.framework.figures import Analysis, Drawing, Histories, one_by_one
-from studies.framework.findings import Effect, Finding, Outcome, Verdict, all_of, within
-from studies.framework.plots import ASPECT_LABEL, History, draw_bounds, draw_means, finished, marker
+from studies.framework.figures import ASPECT_LABEL, Histories, History, Means, one_by_one
+from studies.framework.findings import Effect, Finding, Outcome, Verdict, all_of, decide, within
 from studies.framework.provenance import Reference
-from studies.framework.quantities import Key, Quantity, sort_rows
-from studies.framework.runs import Row, duration
+from studies.framework.runs import ASPECT_KEY, Key, Quantity, Row, duration, last_columns, sort_rows
 from studies.framework.study import Study
 
 GAMMA, FREQUENCY, WATCHED = "peak acceleration [g]", "frequency [Hz]", "time vibrated [s]"
@@ -66,15 +60,19 @@ CLOSE = 0.20
 _DIGITISED = files("postprocess") / "reference" / "gravish2012_collapse.csv"
 KEYS = (
     Key(column=DEFINITION, label="height", order=tuple(HEIGHTS)),
-    Key(column=ASPECT, label="l/w", form="g"),
+    ASPECT_KEY,
     Key(column=GAMMA, label="Γ", form="g"),
 )
 
 
-def read_gravish() -> pd.DataFrame:
-    """Read Gravish's digitised points: columns `l_over_w` [-] and `delta` [-]; compared at equal l/w only."""
-    with _DIGITISED.open(encoding="utf-8") as file:
-        return pd.read_csv(file)
+_GRAVISH = pd.read_csv(str(_DIGITISED))  # `l_over_w` [-] and `delta` [-]; compared at equal l/w only
+DELTA_OF_POINT = Quantity(
+    column=ACTIVATION,
+    label="Δ",
+    form=".2f",
+    axis=r"activation $\Delta$ [-]",
+    meaning="slope of ln(fτ) against 1/Γ through the origin",
+)
 
 
 def measure(run: Run) -> Sequence[Row]:
@@ -113,8 +111,7 @@ def measure(run: Run) -> Sequence[Row]:
                 "fall [-]": found.fall,
                 LOG: logarithm,
                 DELTA: shaken.acceleration * logarithm,
-                "scene_sha256": run.manifest.scene_sha256,
-                "run": run.path.name,
+                **last_columns(run),
             }
         )
     return rows
@@ -123,19 +120,11 @@ def measure(run: Run) -> Sequence[Row]:
 def times(runs: pd.DataFrame) -> pd.DataFrame:
     """Average ln(fτ) over seeds by definition, l/w and Γ; a mean with a bound in it is a bound, and has no error."""
     found = []
-    for (definition, aspect, gamma), group in runs.groupby([DEFINITION, ASPECT, GAMMA], sort=False):
+    for point, group in runs.groupby([DEFINITION, ASPECT, GAMMA], sort=False):
         bounds, mean = int(group[TIME].isna().sum()), mean_over_seeds(group[LOG])
-        found.append(
-            {
-                DEFINITION: definition,
-                ASPECT: aspect,
-                GAMMA: gamma,
-                SEEDS: len(group),
-                CENSORED: bounds,
-                **mean_columns(LOG, replace(mean, standard_error=math.nan, half_width=math.nan) if bounds else mean),
-                DELTA: gamma * mean.value,
-            }
-        )
+        row = dict(zip((DEFINITION, ASPECT, GAMMA), point, strict=True)) | {SEEDS: len(group), CENSORED: bounds}
+        row |= mean_columns(LOG, replace(mean, standard_error=math.nan, half_width=math.nan) if bounds else mean)
+        found.append(row | {DELTA: float(group[GAMMA].iloc[0]) * mean.value})
     return sort_rows(pd.DataFrame(found), [DEFINITION, ASPECT, GAMMA], KEYS)
 
 
@@ -147,7 +136,7 @@ def activations(runs: pd.DataFrame) -> pd.DataFrame:
     not hold. Where there is no such acceleration Δ is empty, and there is only what it is at least.
     """
     found = []
-    every, gravish = times(runs), read_gravish().set_index("l_over_w")["delta"]
+    every, gravish = times(runs), _GRAVISH.set_index("l_over_w")["delta"]
     for (definition, aspect), group in runs.groupby([DEFINITION, ASPECT], sort=False):
         own = every[(every[DEFINITION] == definition) & (every[ASPECT] == aspect)]
         used = own.loc[own[CENSORED] == 0, GAMMA].tolist()
@@ -171,9 +160,9 @@ def activations(runs: pd.DataFrame) -> pd.DataFrame:
     return sort_rows(pd.DataFrame(found), [DEFINITION, ASPECT], KEYS)
 
 
-def _used(runs: pd.DataFrame, definition: str) -> pd.DataFrame:
-    """Rows of one definition at those l/w and Γ at which every run collapsed."""
-    own = runs[runs[DEFINITION] == definition]
+def _used(runs: pd.DataFrame) -> pd.DataFrame:
+    """Select the rows by `REMAINING` at those l/w and Γ at which every run collapsed."""
+    own = runs[runs[DEFINITION] == REMAINING]
     return own[own[TIME].notna().groupby([own[ASPECT], own[GAMMA]]).transform("all")]
 
 
@@ -191,58 +180,32 @@ def change(used: pd.DataFrame) -> Slope:
     return slope_within(list(used[GAMMA] / span), list(relative), list(zip(used[ASPECT], used[SEED], strict=True)))
 
 
-def _by_definition(runs: pd.DataFrame, label: str, effect: Callable[[pd.DataFrame], Slope]) -> list[Effect]:
-    """The effect by `REMAINING`, which is judged, and by the other definitions."""
-    return [
-        Effect(label=f"{label}{' by ' + name if name != REMAINING else ''}", value=effect(_used(runs, name)), sign=sign)
-        for name, sign in ((REMAINING, 1), (COM, 0), (CORE, 0))
-    ]
+def _gentler(runs: pd.DataFrame) -> list[Effect]:
+    return [Effect(label="slope of ln(fτ) against 1/Γ", value=rise(_used(runs)))]
 
 
 def _law(runs: pd.DataFrame) -> Outcome:
-    effects = _by_definition(runs, "Γ ln(fτ) from the least Γ to the greatest, over its mean", change)
-    first = effects[0].value
-    return Outcome(
-        effects=[replace(one, sign=0) for one in effects], verdict=within(first.value, first.half_width, CONSTANT)
-    )
-
-
-def _cell(row: pd.Series) -> str:
-    """Δ with its standard error, or what it is at least."""
-    if math.isnan(row[ACTIVATION]):
-        return f"≥ {row[AT_LEAST]:.1f}"
-    return told_number(row[ACTIVATION], ".2f", row[marked(ACTIVATION, "SE")])
+    found = change(_used(runs))
+    effect = Effect(label="Γ ln(fτ) from the least Γ to the greatest, over its mean", value=found, sign=0)
+    return Outcome(effects=[effect], verdict=within(found.value, found.half_width, CONSTANT))
 
 
 def _greatest_between(table: pd.DataFrame) -> Outcome:
     own = table[table[DEFINITION] == REMAINING].set_index(ASPECT)
+    columns = own[[ACTIVATION, marked(ACTIVATION, "SE"), marked(ACTIVATION, "95 %"), SEEDS]]
     means = {
-        aspect: SeedMean(
-            value=row[ACTIVATION],
-            standard_error=row[marked(ACTIVATION, "SE")],
-            half_width=row[marked(ACTIVATION, "95 %")],
-            count=int(row[SEEDS]),
-        )
-        for aspect, row in own.iterrows()
+        aspect: SeedMean(value=value, standard_error=error, half_width=half_width, count=int(count))
+        for aspect, value, error, half_width, count in columns.itertuples()
     }
     verdict = Verdict.NO_DATA
     if INTERMEDIATE in list(means)[1:-1]:
         gaps = [difference(means[INTERMEDIATE], means[end]) for end in (min(means), max(means))]
-        verdict = all_of(
-            Verdict.NO_DATA
-            if math.isnan(gap.value)
-            else Verdict.NOT_RESOLVED
-            if not gap.clear
-            else Verdict.FOUND
-            if gap.value > 0
-            else Verdict.NOT_FOUND
-            for gap in gaps
-        )
-    parts = [
-        f"by {name}: " + ", ".join(f"{row[ASPECT]:g}: {_cell(row)}" for _, row in part.iterrows())
-        for name, part in table.groupby(DEFINITION, sort=False)
+        verdict = all_of(decide(gap.clear and gap.value > 0, gap.clear, data=not math.isnan(gap.value)) for gap in gaps)
+    cells = [
+        f"{aspect:g}: " + (told_number(mean.value, ".2f", mean.standard_error) if mean.count else "a bound")
+        for aspect, mean in means.items()
     ]
-    return Outcome(note=f"Δ {'; '.join(parts)}", verdict=verdict)
+    return Outcome(note=f"Δ by {REMAINING}: {', '.join(cells)}", verdict=verdict)
 
 
 def _as_gravish(table: pd.DataFrame) -> Outcome:
@@ -257,8 +220,7 @@ FINDINGS = (
     Finding(
         id="gentler-is-later",
         says="Columns collapse the later the gentler the vibration",
-        found_if="slope of ln(fτ) against 1/Γ > 0, within runs of the same l/w and seed",
-        outcome=lambda runs: _by_definition(runs, "slope of ln(fτ) against 1/Γ", rise),
+        outcome=_gentler,
     ),
     Finding(
         id="law",
@@ -297,54 +259,14 @@ _HISTORIES = Histories(
     panel=r"$l/w$ = {:g}",
     level=1 / math.e,
     x_label="time since the vibration began [s]",
-    y_label=r"height remaining $h/h_0$ [-]",
-    told=["Level: 1/e, which a stretched exponential to 0 crosses at τ whatever its exponent."],
+    quantities={"": r"height remaining $h/h_0$ [-]"},
+    notes=["Level: 1/e, which a stretched exponential to 0 crosses at τ whatever its exponent."],
 )
 
 
-def _draw_open(axes: Any, x: pd.Series, least: pd.Series, look: Mapping[str, Any]) -> None:
-    """Draw lower bounds: open markers with an arrow upwards."""
-    draw_bounds(axes, x, least, 0.05 * least.abs() + 0.2, look={"markersize": 3.4, **look, "markerfacecolor": "white"})
-
-
-def _draw_law(path: Path, analysis: Analysis) -> list[Path]:
-    """Draw ln(fτ) against 1/Γ, with the law's line for each l/w that has a Δ."""
-    figure, axes = style.new_figure(height=2.9)
-    levels, deltas = (table[table[DEFINITION] == REMAINING] for table in (analysis.tables["times"], analysis.points))
-    end = 1.12 / levels[GAMMA].min()
-    slopes = deltas.set_index(ASPECT)[ACTIVATION]
-    for series in one_by_one(ASPECT, lambda aspect: rf"$l/w$ = {aspect:g}")(levels):
-        part, look = series.rows, {**series.look, "linestyle": "none"}
-        seen = part[part[CENSORED] == 0]
-        draw_means(axes, 1 / seen[GAMMA], seen[LOG], seen[marked(LOG, "95 %")], look=look, label=series.label)
-        _draw_open(axes, 1 / part[GAMMA], part[LOG].where(part[CENSORED] > 0), look)
-        axes.plot([0, end], [0, slopes[part[ASPECT].iloc[0]] * end], color=look["color"], linewidth=0.7)
-    axes.set_xlim(0, end)
-    axes.set_ylim(0, None)
-    axes.set_xlabel(r"inverse peak acceleration $1/\Gamma$ [-]")
-    axes.set_ylabel(r"collapse time $\ln(f\tau)$ [-]")
-    axes.legend(loc="upper left")
-    told = "By the height `remaining`. Lines: τ = (1/f) exp(Δ/Γ). Open, with an arrow: a run did not collapse, a bound."
-    return finished(figure, path, [told], analysis.footer)
-
-
-def _draw_activations(path: Path, analysis: Analysis) -> list[Path]:
-    """Draw Δ against l/w by each definition, on Gravish's points."""
-    figure, axes = style.new_figure(height=2.9)
-    gravish = read_gravish()
-    axes.plot(gravish["l_over_w"], gravish["delta"], "D", color=style.BLACK, markerfacecolor="white", label="Gravish")
-    looks = {REMAINING: ("o", style.BLUE), COM: ("s", style.ORANGE), CORE: ("^", style.SKY)}
-    for number, (name, (shape, colour)) in enumerate(looks.items()):
-        part = analysis.points[analysis.points[DEFINITION] == name]
-        x, look = part[ASPECT] + 0.012 * (number - 1), marker(shape, colour, colour)
-        draw_means(axes, x, part[ACTIVATION], part[marked(ACTIVATION, "95 %")], look=look, label=name)
-        _draw_open(axes, x, part[AT_LEAST].where(part[ACTIVATION].isna()), look)
-    axes.set_ylim(0, None)
-    axes.set_xlabel(ASPECT_LABEL)
-    axes.set_ylabel(r"activation $\Delta$ [-]")
-    axes.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=2)
-    told = "Open, with an arrow: no acceleration at which all runs collapsed, a bound."
-    return finished(figure, path, [told, f"{STUDY.reference.statement}."], analysis.footer)
+def _with_bounds(table: pd.DataFrame) -> pd.DataFrame:
+    own = table[table[DEFINITION] == REMAINING]
+    return own.assign(**{LOG: own[LOG].where(own[CENSORED] == 0), AT_LEAST: own[LOG]})
 
 
 STUDY = Study(
@@ -352,14 +274,35 @@ STUDY = Study(
     title="Collapse of columns against the findings of Gravish et al.",
     measure=measure,
     keys=KEYS,
-    quantities=(
-        Quantity(column=ACTIVATION, label="Δ", form=".2f", meaning="slope of ln(fτ) against 1/Γ through the origin"),
-    ),
+    quantities=(DELTA_OF_POINT,),
     findings=FINDINGS,
     figures=(
         _HISTORIES,
-        Drawing(name="time_acceleration", of=_draw_law),
-        Drawing(name="delta_aspect", of=_draw_activations),
+        Means(
+            name="time_acceleration",
+            table="times",
+            quantities=[Quantity(column=LOG, axis=r"collapse time $\ln(f\tau)$ [-]")],
+            x=GAMMA,
+            transform=lambda gamma: 1 / gamma,
+            x_label=r"inverse peak acceleration $1/\Gamma$ [-]",
+            rows=_with_bounds,
+            bounds={LOG: AT_LEAST},
+            split=one_by_one(ASPECT, lambda aspect: rf"$l/w$ = {aspect:g}"),
+            notes=["By the height `remaining`. Open, with an arrow: a run did not collapse, a bound."],
+        ),
+        Means(
+            name="delta_aspect",
+            quantities=[DELTA_OF_POINT],
+            x=ASPECT,
+            x_label=ASPECT_LABEL,
+            split=one_by_one(DEFINITION, str),
+            bounds={ACTIVATION: AT_LEAST},
+            reference={ACTIVATION: (_GRAVISH["l_over_w"], _GRAVISH["delta"])},
+            notes=[
+                "Open, with an arrow: no acceleration at which all runs collapsed, a bound.",
+                "Experiment: Gravish et al., PRL 108, 208001 (2012), digitised.",
+            ],
+        ),
     ),
     extra=lambda runs: {"times": times(runs), "points": activations(runs)},
     order=(ASPECT, GAMMA, SEED),

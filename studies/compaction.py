@@ -9,34 +9,36 @@ what they leave can be compared.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from itertools import product
-from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
-from dem.errors import InputError
 from dem.record.run import Run
-from postprocess.report import figures as style
 from postprocess.statistics.columns import ASPECT, SEED
 from postprocess.statistics.points import told_number
 from postprocess.statistics.seeds import mean_over_seeds
-from studies.framework.figures import Analysis, Drawing
+from studies.framework.figures import Histories, one_by_one
 from studies.framework.findings import Effect, Finding
-from studies.framework.plots import BAND, finished
-from studies.framework.provenance import GRAVISH, SHAKE_TIME
-from studies.framework.quantities import Key, Quantity
-from studies.framework.runs import Row
-from studies.framework.shaken import FRICTION, common_friction, packing_history, timed_row, while_shaken
+from studies.framework.runs import ASPECT_KEY, Key, Quantity, Row
+from studies.framework.shaken import (
+    FRICTION,
+    GRAVISH,
+    SHAKE_TIME,
+    common_friction,
+    packing_history,
+    timed_row,
+    while_shaken,
+)
 from studies.framework.study import Study
 
 Array = NDArray[np.float64]
 
 TIMES = (1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0)  # s; φ is a mean over the last fifth of each
-EARLY = 0.25  # share of the time that a law is fitted to, to see whether it tells the rest
+EARLY = 0.25  # share of the time that a law is fitted to, to see whether it predicts the rest
 FIRST, INTERVALS = 0.1, 40  # s, three periods of shaking: where fits begin; and in how many intervals
 STRETCHED, LOGARITHMIC = "stretched exponential", "inverse logarithm"
 
@@ -59,17 +61,10 @@ _MEANINGS = {
 }
 
 
-@dataclass(frozen=True, kw_only=True)
-class Fit:
-    """A law fitted to a history.
+class Fit(NamedTuple):
+    """A law fitted to a history: φ as shaking begins and in the end [-], τ [s], β or B, and the root mean square left.
 
-    Attributes:
-        law: Its name.
-        begin: φ as shaking begins [-].
-        end: φ in the end [-]; of a law that has not come near its end as uncertain as it looks.
-        tau: τ [s].
-        power: β or B [1].
-        residual: Root mean square of what the law leaves [-].
+    The end of a law that has not come near it is uncertain.
     """
 
     law: str
@@ -100,9 +95,8 @@ def fit(law: str, times: Array, packing: Array) -> Fit:
     tries = (least_squares(lambda x: solved(x)[1], start, bounds=(low, high)) for start in starts)
     best = min(tries, key=lambda found: float(found.cost))
     (begin, end), left = solved(best.x)
-    tau, power = np.exp(best.x)
-    residual = float(np.sqrt(np.mean(left**2)))
-    return Fit(law=law, begin=float(begin), end=float(end), tau=float(tau), power=float(power), residual=residual)
+    tau, power = map(float, np.exp(best.x))
+    return Fit(law, float(begin), float(end), tau, power, float(np.sqrt(np.mean(left**2))))
 
 
 def spread_out(times: Array, packing: Array) -> tuple[Array, Array]:
@@ -139,29 +133,20 @@ def measure(run: Run) -> Row:
     whole, early = spread_out(times, values), spread_out(times[first], values[first])
     for law in LAWS:
         found = fit(law, *whole)
-        numbers = (found.begin, found.end, found.tau, found.power, found.residual)
-        row |= {of(law, name): number for name, number in zip(_MEANINGS, numbers, strict=False)}
+        row |= {of(law, name): number for name, number in zip(_MEANINGS, found[1:], strict=False)}
         row[of(law, MISSED)] = float(np.mean(fit(law, *early).at(times[last]))) - float(np.mean(values[last]))
     return row
 
 
-def positive(name: str, says: str, values: Callable[[pd.DataFrame], pd.Series], told: str) -> Finding:
+def positive(name: str, says: str, values: Callable[[pd.DataFrame], pd.Series], form: str) -> Finding:
     """Make the finding that a number of each run is above 0 in the mean."""
 
     def outcome(runs: pd.DataFrame) -> list[Effect]:
         mean = mean_over_seeds(values(runs).dropna().tolist())
-        text = told.format(told_number(mean.value, "+.2f", mean.half_width))
+        text = form.format(told_number(mean.value, "+.2f", mean.half_width))
         return [Effect(label="mean over runs, ± 95 %:", value=mean, text=f"{text} (n = {mean.count})")]
 
-    return Finding(id=name, says=says, outcome=outcome, found_if="mean over runs > 0")
-
-
-def _residuals(runs: pd.DataFrame) -> pd.Series:
-    return -100 * np.log(runs[of(STRETCHED, RESIDUAL)] / runs[of(LOGARITHMIC, RESIDUAL)])
-
-
-def _misses(runs: pd.DataFrame) -> pd.Series:
-    return 1e3 * (runs[of(LOGARITHMIC, MISSED)].abs() - runs[of(STRETCHED, MISSED)].abs())
+    return Finding(id=name, says=says, outcome=outcome)
 
 
 FINDINGS = (
@@ -180,61 +165,23 @@ FINDINGS = (
     positive(
         "stretched-leaves-less",
         "A stretched exponential leaves less than an inverse logarithm",
-        _residuals,
+        lambda runs: -100 * np.log(runs[of(STRETCHED, RESIDUAL)] / runs[of(LOGARITHMIC, RESIDUAL)]),
         "ln of the ratio of what they leave {} %",
     ),
     positive(
         "stretched-predicts",
         f"It tells the end better, fitted to the first {100 * EARLY:g} % of the time",
-        _misses,
+        lambda runs: 1e3 * (runs[of(LOGARITHMIC, MISSED)].abs() - runs[of(STRETCHED, MISSED)].abs()),
         "nearer by {}e-3",
     ),
 )
-
-
-def _draw(path: Path, analysis: Analysis) -> list[Path]:
-    """Draw φ against time with both laws, and what these leave."""
-    figure = style.blank_figure(6.4, 2.9)
-    left, right = figure.subplots(1, 2)
-    lines = {STRETCHED: "solid", LOGARITHMIC: (0, (4, 2))}
-    colours = (style.BLUE, style.ORANGE, style.GREEN)
-    for (friction, runs), colour in zip(analysis.runs.groupby(FRICTION), colours, strict=False):
-        piles = []
-        for name in runs["run"]:
-            try:
-                shaken = while_shaken(analysis.manifests[name])
-            except (InputError, KeyError):
-                continue
-            piles.append(spread_out(shaken.times, shaken.values))
-        if not piles:
-            continue
-        times, values = piles[0][0], np.stack([packing for _, packing in piles])
-        mean = values.mean(axis=0)
-        left.fill_between(times, values.min(axis=0), values.max(axis=0), color=colour, alpha=0.2, linewidth=0)
-        left.plot(times, mean, "o", color=colour, markersize=2.2, label=rf"$\mu = {friction:g}$")
-        for law, line in lines.items():
-            found = fit(law, times, mean).at(times)
-            left.plot(times, found, color=colour, linestyle=line, linewidth=0.9, label=f"{law}, {friction:g}")
-            right.plot(times, 1e3 * (mean - found), color=colour, linestyle=line, linewidth=0.9)
-    if not left.lines:
-        return []
-    left.axvline(SHAKE_TIME, color=style.GREY, linewidth=0.6, linestyle=":")
-    right.axhline(0.0, color=style.GREY, linewidth=0.6)
-    left.set_ylabel(r"packing fraction $\phi$ [-]")
-    right.set_ylabel(r"$\phi$ less the law [$10^{-3}$]")
-    for axes in (left, right):
-        axes.set_xscale("log")
-        axes.set_xlabel("time since shaking began [s]")
-    figure.legend(*left.get_legend_handles_labels(), loc="outside upper center", ncols=3)
-    told = f"Points: mean over seeds, {BAND}; lines: laws fitted to it; dotted: Gravish's {SHAKE_TIME:g} s."
-    return finished(figure, path, [told], analysis.footer)
 
 
 STUDY = Study(
     name="compaction",
     title="Piles that are shaken for long",
     measure=measure,
-    keys=(Key(column=ASPECT, label="l/w", form="g"), Key(column=FRICTION, label="friction", form="g")),
+    keys=(ASPECT_KEY, Key(column=FRICTION, label="friction", form="g")),
     quantities=(
         *(
             Quantity(column=at(time), label=f"φ {time:g} s", form=".4f", meaning=f"φ after {time:g} s of shaking")
@@ -243,7 +190,16 @@ STUDY = Study(
         *(Quantity(column=of(law, name), meaning=f"{law}: {_MEANINGS[name]}") for law in LAWS for name in _MEANINGS),
     ),
     findings=FINDINGS,
-    figures=(Drawing(name="phi_time", of=_draw),),
+    figures=(
+        Histories(
+            name="phi_time",
+            history=while_shaken,
+            split=one_by_one(FRICTION, r"$\mu$ = {:g}".format),
+            log=True,
+            x_label="time since shaking began [s]",
+            quantities={"": r"packing fraction $\phi$ [-]"},
+        ),
+    ),
     order=(ASPECT, FRICTION, SEED),
     one_engine=True,
     remarks=(

@@ -17,14 +17,22 @@ from dem.record.run import Run
 from postprocess.geometry.links import centres_of_mass
 from postprocess.statistics.columns import ASPECT, SEED, SEEDS
 from postprocess.statistics.factorial import paired_differences
-from postprocess.statistics.points import averaged, marked, mean_columns, seeds_of, told_number
-from postprocess.statistics.seeds import SeedMean, mean_over_seeds
-from studies.framework.figures import Combinations
-from studies.framework.findings import Effect, Finding, Outcome, Rows, Verdict
-from studies.framework.provenance import DIGITISING_ERROR, GRAVISH, read_reference, reference_at
-from studies.framework.quantities import Key, Quantity, declare
-from studies.framework.runs import DEFINITION, Row
-from studies.framework.shaken import FRICTION, WHEN, WINDOW, contact_of, phi, timed_row
+from postprocess.statistics.points import marked, mean_columns, told_number
+from postprocess.statistics.seeds import mean_over_seeds
+from studies.framework.figures import Rows, one_by_one
+from studies.framework.findings import Effect, Finding, Outcome, Verdict, decide
+from studies.framework.runs import ASPECT_KEY, DEFINITION, Key, Quantity, Row, declare
+from studies.framework.shaken import (
+    DIGITISING_ERROR,
+    FRICTION,
+    GRAVISH,
+    WHEN,
+    WINDOW,
+    contact_of,
+    gravish_at,
+    phi,
+    timed_row,
+)
 from studies.framework.study import Study
 
 MARGIN = 5.0  # % from Gravish's points
@@ -32,11 +40,7 @@ WALL, RESTITUTION = "friction at the container [-]", "restitution [-]"
 FACTORS: dict[str, tuple[float, float]] = {FRICTION: (0.4, 0.8), WALL: (0.4, 0.8), RESTITUTION: (0.7, 0.3)}
 """From the paper's values to others."""
 
-CALLED = {
-    FRICTION: "friction between smarticles",
-    WALL: "friction at the container",
-    RESTITUTION: "restitution",
-}
+CALLED = {FRICTION: "friction between smarticles", WALL: "friction at the container", RESTITUTION: "restitution"}
 RISEN, CROSSED = "lowest tenth after less before shaking [w]", "crossings after [-]"
 PHI_0, PHI_F, PHI_RELAXED = (phi(stage) for stage in ("phi_0", "phi_f", "phi_f relaxed"))
 QUANTITIES = declare(
@@ -89,15 +93,11 @@ def _lowest_tenth(heights: NDArray[np.float64]) -> float:
 
 def points(runs: pd.DataFrame) -> pd.DataFrame:
     """Average over seeds, and set φ_f against Gravish's, errors of both included."""
-    reference, rows = read_reference(), []
-    for key, group in runs.groupby([*FACTORS, ASPECT], sort=True):
-        combination = dict(zip((*FACTORS, ASPECT), key, strict=True))
-        row = {**combination, **seeds_of(group), **averaged(group, QUANTITIES)}
-        value = reference_at(reference, float(combination[ASPECT]), "phi_f")
-        row[DEVIATION] = 100 * (row[PHI_F] / value - 1)
-        row[marked(DEVIATION, "95 %")] = 100 * math.hypot(row[marked(PHI_F, "95 %")], DIGITISING_ERROR) / value
-        rows.append(row)
-    return pd.DataFrame(rows)
+    means = STUDY.points(runs)
+    values = means[ASPECT].map(lambda aspect: gravish_at(aspect, "phi_f"))
+    error = np.hypot(means[marked(PHI_F, "95 %")], DIGITISING_ERROR)
+    changes = {DEVIATION: 100 * (means[PHI_F] / values - 1), marked(DEVIATION, "95 %"): 100 * error / values}
+    return means.assign(**changes)
 
 
 def by_seed(runs: pd.DataFrame, quantity: str, *changed: str) -> pd.DataFrame:
@@ -124,32 +124,22 @@ def effects(runs: pd.DataFrame) -> pd.DataFrame:
     return pd.DataFrame(rows)
 
 
-def lowers(name: str, says: str, quantity: str, *changed: str, sign: int = -1) -> Finding:
-    """Make the finding that changing factors lowers (sign −1) or raises a quantity."""
-    return _judged(name, says, quantity, lambda runs: by_seed(runs, quantity, *changed), sign)
-
-
-def _judged(name: str, says: str, quantity: str, differences: Rows, sign: int = -1) -> Finding:
-    form = QUANTITIES[quantity].form
-
-    def text(mean: SeedMean) -> str:
-        return told_number(mean.value, f"+{form}", mean.half_width)
+def lowers(name: str, says: str, quantity: str, *changed: str, sign: int = -1, less: str = "") -> Finding:
+    """Make the finding that changing factors lowers (sign −1) or raises a quantity, or does so more than another."""
 
     def outcome(runs: pd.DataFrame) -> Outcome:
-        table = differences(runs)
-        value = mean_over_seeds(table[quantity])
-        groups = table.groupby(ASPECT)[quantity]
-        places = ", ".join(f"{ratio:g}: {text(mean_over_seeds(group))}" for ratio, group in groups)
-        effect = Effect(label="effect, ± 95 %,", value=value, sign=sign, text=f"{text(value)} (n = {value.count})")
-        return Outcome(effects=[effect], note=f"by l/w {places}")
+        table = by_seed(runs, quantity, *changed)
+        if less:
+            both = table.merge(by_seed(runs, quantity, less), on=[ASPECT, SEED], suffixes=("", " other"))
+            table = both.assign(**{quantity: both[quantity] - both[f"{quantity} other"]})
+        form, groups = QUANTITIES[quantity].form, {"": table, **dict(iter(table.groupby(ASPECT)))}
+        means = {place: mean_over_seeds(group[quantity]) for place, group in groups.items()}
+        texts = {place: told_number(one.value, f"+{form}", one.half_width) for place, one in means.items()}
+        text = f"{texts.pop('')} (n = {means[''].count})"
+        effect = Effect(label="effect, ± 95 %,", value=means[""], sign=sign, text=text)
+        return Outcome(effects=[effect], note="by l/w " + ", ".join(f"{one:g}: {text}" for one, text in texts.items()))
 
-    found_if = f"mean of paired differences {'<' if sign < 0 else '>'} 0"
-    return Finding(id=name, says=says, outcome=outcome, found_if=found_if)
-
-
-def _friction_less_wall(runs: pd.DataFrame) -> pd.DataFrame:
-    both = by_seed(runs, PHI_F, FRICTION).merge(by_seed(runs, PHI_F, WALL), on=[ASPECT, SEED], suffixes=("", " wall"))
-    return both.assign(**{PHI_F: both[PHI_F] - both[f"{PHI_F} wall"]})
+    return Finding(id=name, says=says, outcome=outcome)
 
 
 def _near_gravish(means: pd.DataFrame) -> Outcome:
@@ -158,19 +148,18 @@ def _near_gravish(means: pd.DataFrame) -> Outcome:
     if known.empty:
         return Outcome(note="no points of Gravish's at these l/w", verdict=Verdict.NOT_RESOLVED)
     off, error = known[DEVIATION].abs(), known[marked(DEVIATION, "95 %")]
-    told = known.assign(_inside=off + error <= MARGIN, _outside=off - error > MARGIN, _off=off)
-    each = told.groupby(list(FACTORS)).agg({"_inside": "all", "_outside": "any", "_off": ["max", "size"]})
+    judged = known.assign(_inside=off + error <= MARGIN, _outside=off - error > MARGIN, _off=off)
+    each = judged.groupby(list(FACTORS)).agg({"_inside": "all", "_outside": "any", "_off": ["max", "size"]})
     each.columns = pd.Index(["inside", "outside", "off", "places"])
-    # A combination that lacks an aspect ratio can be refused by another one, and not accepted.
+    # A combination that lacks an aspect ratio can be rejected by another one, and not accepted.
     whole = each[each["places"] == each["places"].max()]
-    verdict = Verdict.NOT_FOUND if each["outside"].all() else Verdict.NOT_RESOLVED
     best = pd.Series(dict(zip(FACTORS, whole["off"].idxmin(), strict=True)))
-    rows = told[np.all([told[name] == best[name] for name in FACTORS], axis=0)]
+    rows = judged[np.all([judged[name] == best[name] for name in FACTORS], axis=0)]
     places = ", ".join(
         f"{row[ASPECT]:g}: {told_number(row[DEVIATION], '+.1f', row[marked(DEVIATION, '95 %')])} %"
         for _, row in rows.iterrows()
     )
-    verdict = Verdict.FOUND if whole["inside"].any() else verdict
+    verdict = decide(whole["inside"].any(), each["outside"].all())
     return Outcome(note=f"nearest: {named(best)}; by l/w {places}", verdict=verdict)
 
 
@@ -190,11 +179,12 @@ FINDINGS = (
         for stage, quantity in (("phi-0", PHI_0), ("phi-f", PHI_F), ("phi-f-relaxed", PHI_RELAXED))
         for factor, (column, (low, high)) in zip(("friction", "container", "restitution"), FACTORS.items(), strict=True)
     ),
-    _judged(
+    lowers(
         "friction-more-than-container",
         "Friction between smarticles lowers phi_f more than friction at the container",
         PHI_F,
-        _friction_less_wall,
+        FRICTION,
+        less=WALL,
     ),
     lowers(
         "frictions-together",
@@ -219,25 +209,19 @@ FINDINGS = (
     ),
 )
 
-STUDY = Study(
+STUDY: Study = Study(
     name="contacts",
     title="Friction between smarticles, friction at the container, restitution",
     measure=measure,
-    keys=(
-        *(Key(column=name, label=called, form="g") for name, called in CALLED.items()),
-        Key(column=ASPECT, label="l/w", form="g"),
-    ),
+    keys=(*(Key(column=name, label=called, form="g") for name, called in CALLED.items()), ASPECT_KEY),
     quantities=tuple(QUANTITIES.values()),
     findings=FINDINGS,
     figures=(
-        Combinations(
+        Rows(
             name="contacts",
-            quantities=[
-                Quantity(column=DEVIATION, meaning="", axis=r"$\phi_\mathrm{f}$ less Gravish's [%]"),
-                QUANTITIES[RISEN],
-            ],
-            factors=FACTORS,
+            quantities=[Quantity(column=DEVIATION, axis=r"$\phi_\mathrm{f}$ less Gravish's [%]"), QUANTITIES[RISEN]],
             row=named,
+            split=one_by_one(ASPECT, "l/w = {:g}".format),
         ),
     ),
     extra=lambda runs: {"points": points(runs), "effects": effects(runs)},

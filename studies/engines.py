@@ -9,9 +9,8 @@ And YADE's chains of spheres ever finer: pitch 1.3, 1.0, 0.5, 0.25, links being 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from functools import partial
-from pathlib import Path
+from typing import NamedTuple
 
 import pandas as pd
 
@@ -20,18 +19,25 @@ from dem.record.run import Run
 from postprocess.measures import strain
 from postprocess.measures.collapse import REMAINING, collapse_of, column_history, vibration
 from postprocess.measures.pull import PULL, peak, read_pull, weight_of_one
-from postprocess.report import figures as style
-from postprocess.statistics.columns import ASPECT, SEED
+from postprocess.statistics.columns import SEED
 from postprocess.statistics.points import mean_columns
 from postprocess.statistics.seeds import difference, mean_over_seeds
-from studies.framework.activity import ENERGY, HEIGHT, PHI_ACTIVE, procedure_row
-from studies.framework.figures import Analysis, Drawing
+from studies.framework.figures import Means, Rows, one_by_one
 from studies.framework.findings import Finding, Outcome, Verdict, within
-from studies.framework.plots import draw_means, finished, marker
-from studies.framework.procedures import CROSSINGS, EXTERNAL, INTERNAL, PHI, SHAPE, STATIC
+from studies.framework.procedures import (
+    CROSSINGS,
+    ENERGY,
+    EXTERNAL,
+    HEIGHT,
+    INTERNAL,
+    PHI,
+    PHI_ACTIVE,
+    SHAPE,
+    STATIC,
+    procedure_row,
+)
 from studies.framework.provenance import Reference
-from studies.framework.quantities import Key, Quantity
-from studies.framework.runs import ENGINE, Row
+from studies.framework.runs import ENGINE, Key, Quantity, Row, declare, last_columns, run_columns
 from studies.framework.study import Study
 
 CASE, VARIANT, PITCH = "case", "variant", "pitch [-]"
@@ -41,31 +47,27 @@ ACTIVE = (EXTERNAL, SHAPE, INTERNAL)
 
 PHI_0, CROSSINGS_0 = f"{STATIC} {PHI}", f"{STATIC} {CROSSINGS}"
 PEAK, TAU, FORCE = "peak force over n W_s [-]", "tau [s]", "peak force [N]"
-QUANTITIES = (
-    Quantity(column=PHI_0, label="φ_0", meaning="packing fraction at rest after the pour"),
-    Quantity(column=CROSSINGS_0, label="⟨N⟩_0", meaning="⟨N⟩ at rest after the pour"),
-    Quantity(column=PHI_ACTIVE, label="φ_f", meaning="packing fraction at the end of the activity, in motion"),
-    Quantity(column=PHI, meaning="packing fraction at rest after the activity"),
-    Quantity(column=CROSSINGS, label="⟨N⟩", meaning="⟨N⟩ at rest after the activity"),
-    Quantity(column=HEIGHT, label="h/h0", meaning="height of the centre of mass after the activity, over that before"),
-    Quantity(column=ENERGY, meaning="work of the motors, or of the shaken container, on the smarticles"),
-    Quantity(column=PEAK, label="hook", meaning="largest force that raises the hook, over the weight of all"),
-    Quantity(
-        column=TAU,
-        label="τ [s]",
-        meaning="time in which a free column on a shaking floor collapses, by those that remain; empty where it stood",
-    ),
-    Quantity(column=FORCE, label="chain [N]", meaning="largest force of the string that pulls the chain"),
+QUANTITIES = declare(
+    {
+        PHI_0: ("φ_0", "", "packing fraction at rest after the pour"),
+        CROSSINGS_0: ("⟨N⟩_0", "", "⟨N⟩ at rest after the pour"),
+        PHI_ACTIVE: ("φ_f", "", "packing fraction at the end of the activity, in motion"),
+        PHI: ("", "", "packing fraction at rest after the activity"),
+        CROSSINGS: ("⟨N⟩", "", "⟨N⟩ at rest after the activity"),
+        HEIGHT: ("h/h0", "", "height of the centre of mass after the activity, over that before"),
+        ENERGY: ("", "", "work of the motors, or of the shaken container, on the smarticles"),
+        PEAK: ("hook", "", "largest force that raises the hook, over the weight of all"),
+        TAU: ("τ [s]", "", "time in which a free column on a shaking floor collapses; empty where it stood"),
+        FORCE: ("chain [N]", "", "largest force of the string that pulls the chain"),
+    }
 )
 """What is measured; a case leaves empty what it does not have."""
 
 
-@dataclass(frozen=True, kw_only=True)
-class Compared:
+class Compared(NamedTuple):
     """A quantity that both engines give.
 
     Attributes:
-        label: What it is called.
         cases: Cases whose runs give it; several where all begin with the same pile: a seed's mean counts once.
         column: Of the table of runs.
         margin: By how much the engines may differ, in per cent of YADE's mean; chosen before the first run.
@@ -82,12 +84,14 @@ class Compared:
 _PHI_WHY = "half of the 10 % within which the study gravish calls φ near Gravish's"
 _CROSSINGS_WHY = "⟨N⟩ of procedures differ by tens of per cent; it is a count of few"
 _ENERGY_WHY = "the paper compares energies by factors, and the account closes within 1 %"
+_PEAK_WHY = "a largest value, which scatters by a third between seeds; the paper's procedures differ by factors"
+_TAU_WHY = "τ = exp(Δ/Γ)/f: at Γ = 2.5, 30 % of τ are 0.66 of Δ, 5 % of Gravish's 15"
 
 COMPARED: tuple[Compared, ...] = (
-    Compared(label="φ_0", cases=ACTIVE, column=PHI_0, margin=5.0, why=_PHI_WHY),
-    Compared(label="⟨N⟩ as poured", cases=ACTIVE, column=CROSSINGS_0, margin=10.0, why=_CROSSINGS_WHY),
+    Compared("φ_0", ACTIVE, PHI_0, 5.0, _PHI_WHY),
+    Compared("⟨N⟩ as poured", ACTIVE, CROSSINGS_0, 10.0, _CROSSINGS_WHY),
     *(
-        Compared(label=f"{label}, {case}", cases=(case,), column=column, margin=margin, why=why)
+        Compared(f"{label}, {case}", (case,), column, margin, why)
         for case in ACTIVE
         for label, column, margin, why in (
             ("φ_f in motion", PHI_ACTIVE, 5.0, _PHI_WHY),
@@ -97,27 +101,9 @@ COMPARED: tuple[Compared, ...] = (
             ("energy", ENERGY, 10.0, _ENERGY_WHY),
         )
     ),
-    Compared(
-        label="hook force",
-        cases=(HOOK,),
-        column=PEAK,
-        margin=20.0,
-        why="a largest value, which scatters by a third between seeds; the paper's procedures differ by factors",
-    ),
-    Compared(
-        label="collapse time",
-        cases=(COLLAPSE,),
-        column=TAU,
-        margin=30.0,
-        why="τ = exp(Δ/Γ)/f: at Γ = 2.5, 30 % of τ are 0.66 of Δ, 5 % of Gravish's 15",
-    ),
-    Compared(
-        label="chain force",
-        cases=(CHAIN,),
-        column=FORCE,
-        margin=10.0,
-        why="the servos of a chain differ from each other by 10 %",
-    ),
+    Compared("hook force", (HOOK,), PEAK, 20.0, _PEAK_WHY),
+    Compared("collapse time", (COLLAPSE,), TAU, 30.0, _TAU_WHY),
+    Compared("chain force", (CHAIN,), FORCE, 10.0, "the servos of a chain differ from each other by 10 %"),
 )
 """What is compared, in the order of tables and figures."""
 
@@ -141,16 +127,12 @@ def measure(run: Run) -> Row:
         CASE: case,
         VARIANT: variant,
         ENGINE: run.manifest.engine,
-        ASPECT: round(run.manifest.aspect_ratio, 6),
-        SEED: run.manifest.seed,
-        "smarticles [-]": run.manifest.count,
-        "fidelity": run.manifest.fidelity,
-        **dict.fromkeys((one.column for one in QUANTITIES), math.nan),
+        **run_columns(run),
+        **dict.fromkeys(QUANTITIES, math.nan),
         **_measured(run, case),
         "processor time [s]": sum(phase.cpu_s or math.nan for phase in run.phases),
         "simulated [s]": run.status.time_s,
-        "scene_sha256": run.manifest.scene_sha256,
-        "run": run.path.name,
+        **last_columns(run),
     }
 
 
@@ -219,27 +201,20 @@ def pitch_of(variant: str) -> float:
 def refinement(runs: pd.DataFrame) -> pd.DataFrame:
     """Average the shaken pile by pitch of YADE's spheres, links as pitch 0, with differences to links, paired by seed.
 
-    Only the shaken runs count, so that every pitch has the same ones.
+    Only the shaken runs count, so that every pitch has equal ones.
     """
     shaken = runs[runs[CASE] == EXTERNAL]
     rows: list[dict[str, object]] = []
     for one in REFINED:
         limit = by_seed(shaken, one, LINKS)
-        base = abs(float(limit.mean())) if len(limit) else 0.0
-        scale = 100 / base if base else math.nan
+        scale = 100 / abs(float(limit.mean())) if len(limit) and limit.mean() else math.nan
         for variant in sorted(set(shaken[VARIANT]), key=pitch_of):
             values = by_seed(shaken, one, str(variant))
             effect = mean_over_seeds([] if variant == LINKS else (values - limit).dropna().tolist())
+            row = {"quantity": one.label, VARIANT: variant, PITCH: pitch_of(str(variant)), "seeds [-]": len(values)}
+            row |= mean_columns("mean [-]", mean_over_seeds(values.to_numpy()))
             rows.append(
-                {
-                    "quantity": one.label,
-                    VARIANT: variant,
-                    PITCH: pitch_of(str(variant)),
-                    "seeds [-]": len(values),
-                    **mean_columns("mean [-]", mean_over_seeds(values.to_numpy())),
-                    "less links [%]": scale * effect.value,
-                    "less links 95 % [%]": scale * effect.half_width,
-                }
+                row | {"less links [%]": scale * effect.value, "less links 95 % [%]": scale * effect.half_width}
             )
     return pd.DataFrame(rows)
 
@@ -263,52 +238,6 @@ def _finding(one: Compared) -> Finding:
     )
 
 
-def _draw_differences(path: Path, analysis: Analysis) -> list[Path]:
-    """Draw a row per quantity: the difference with its error over the band of its margin."""
-    table = analysis.tables["equivalence"]
-    shown = table[table["pairs [-]"] > 0] if len(table) else table
-    colours = {"equivalent": style.GREEN, "different": style.ORANGE}
-    figure, axes = style.new_figure(height=0.8 + 0.19 * len(shown))
-    for place, (_, row) in enumerate(shown.iterrows()):
-        margin, colour = row["margin [%]"], colours.get(row["verdict"], style.GREY)
-        axes.barh(place, 2 * margin, left=-margin, height=0.62, color=style.SKY, alpha=0.3, linewidth=0)
-        look = {**marker("o", colour, colour), "linestyle": "none"}
-        across = [row["difference 95 % [%]"]]
-        draw_means(axes, [row["difference [%]"]], [place], None, across=across, look=look, label="_nolegend_")
-    for verdict in shown["verdict"].unique() if len(shown) else ():
-        axes.plot([], [], "o", color=colours.get(verdict, style.GREY), markersize=3.4, label=verdict)
-    axes.axvline(0.0, color=style.BLACK, linewidth=0.6)
-    axes.set_yticks(range(len(shown)), shown["quantity"] if len(shown) else [])
-    axes.set_ylim(len(shown) - 0.4, -0.6)
-    axes.set_xlabel("links less YADE over YADE [%]")
-    if len(shown):
-        axes.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=3, columnspacing=1.0)
-    return finished(figure, path, ["Bands: margins, chosen beforehand."], analysis.footer)
-
-
-def _draw_pitch(path: Path, analysis: Analysis) -> list[Path]:
-    """Draw means against pitch over those of links, which stand at 0."""
-    figure, axes = style.new_figure(height=2.6)
-    table = analysis.tables["pitch"]
-    colours = style.sequence(len(REFINED), last=0.85)
-    for place, (one, shape, colour) in enumerate(zip(REFINED, "oDs^v", colours, strict=True)):
-        part = table[(table["quantity"] == one.label) & table["mean [-]"].notna()] if len(table) else table
-        if part.empty or not (part[PITCH] == 0).any():
-            continue
-        part = part.sort_values(PITCH)
-        limit = float(part["mean [-]"].iloc[0])
-        x, values, errors = part[PITCH] + 0.012 * (place - 2), part["mean [-]"] / limit, part["mean 95 % [-]"] / limit
-        draw_means(axes, x, values, errors.to_numpy(), look=marker(shape, colour, colour), label=one.label)
-    axes.axhline(1.0, color=style.GREY, linewidth=0.6)
-    axes.set_xlabel("pitch over sphere diameter; links at 0 [-]")
-    axes.set_ylabel("mean over that of links [-]")
-    if axes.get_legend_handles_labels()[1]:
-        axes.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=3, columnspacing=1.0)
-    return finished(
-        figure, path, ["Set apart sideways; the error bar of links' own mean stands at 0."], analysis.footer
-    )
-
-
 STUDY: Study = Study(
     name="engines",
     title="Two engines, the same seeds",
@@ -317,9 +246,27 @@ STUDY: Study = Study(
         Key(column=CASE, label="case", order=(*ACTIVE, HOOK, COLLAPSE, CHAIN)),
         Key(column=VARIANT, label="variant"),
     ),
-    quantities=QUANTITIES,
+    quantities=tuple(QUANTITIES.values()),
     findings=tuple(map(_finding, COMPARED)),
-    figures=(Drawing(name="differences", of=_draw_differences), Drawing(name="pitch", of=_draw_pitch)),
+    figures=(
+        Rows(
+            name="differences",
+            table="equivalence",
+            quantities=[Quantity(column="difference [%]", axis="links less YADE over YADE [%]")],
+            row="quantity",
+            rows=lambda table: table[table["pairs [-]"] > 0],
+            margin="margin [%]",
+            notes=["Bands: margins, chosen beforehand."],
+        ),
+        Means(
+            name="pitch",
+            table="pitch",
+            quantities=[Quantity(column="less links [%]", axis="less that of links, over it [%]")],
+            x=PITCH,
+            x_label="pitch over sphere diameter [-]",
+            split=one_by_one("quantity", str),
+        ),
+    ),
     extra=lambda runs: {
         "points": STUDY.points(runs),
         "equivalence": equivalence(runs),

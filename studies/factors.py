@@ -16,12 +16,10 @@ from dem.record.run import Run
 from postprocess.statistics.columns import ASPECT, SEED
 from postprocess.statistics.factorial import paired_differences
 from postprocess.statistics.seeds import mean_over_seeds
-from studies.framework.activity import ENERGY, HEIGHT, PHI_ACTIVE, procedure_row
-from studies.framework.figures import Combinations
+from studies.framework.figures import Rows, one_by_one
 from studies.framework.findings import Effect, Finding, Outcome, means_by
-from studies.framework.procedures import CROSSINGS, PROCEDURE, SHAPE
-from studies.framework.quantities import Key, Quantity
-from studies.framework.runs import Row
+from studies.framework.procedures import CROSSINGS, ENERGY, HEIGHT, PHI_ACTIVE, PROCEDURE, SHAPE, procedure_row
+from studies.framework.runs import ASPECT_KEY, Key, Row, declare
 from studies.framework.study import Study
 
 LAW, FRICTION, RADIUS = "law", "friction [-]", "wall radius [m]"
@@ -33,25 +31,14 @@ NAMES = {
     FRICTION: ("friction", "friction (0.2, for 0.4)"),
     RADIUS: ("radius", "the wall's radius (22.4 mm, for 23.4)"),
 }
-QUANTITIES = (
-    Quantity(
-        column=CROSSINGS,
-        label="⟨N⟩",
-        form=".2f",
-        axis=r"$\langle N \rangle$ after the shape change [-]",
-        meaning="⟨N⟩ at rest after the shape change",
-    ),
-    Quantity(
-        column=HEIGHT,
-        label="h/h0",
-        form=".3f",
-        axis=r"height over $h_0$ after it [-]",
-        meaning="height of the centre of mass at rest after it, over that before",
-    ),
-    Quantity(
-        column=PHI_ACTIVE, label="φ_f", form=".4f", meaning="packing fraction over the last frames of the activity"
-    ),
-    Quantity(column=ENERGY, label="energy [J]", form=".2e", meaning="work of the motors"),
+QUANTITIES = declare(
+    {
+        CROSSINGS: ("⟨N⟩", ".2f", "⟨N⟩ at rest after the shape change"),
+        HEIGHT: ("h/h0", ".3f", "height of the centre of mass at rest after it, over that before"),
+        PHI_ACTIVE: ("φ_f", ".4f", "packing fraction over the last frames of the activity"),
+        ENERGY: ("energy [J]", ".2e", "work of the motors"),
+    },
+    axes={CROSSINGS: r"$\langle N \rangle$ after the shape change [-]", HEIGHT: r"height over $h_0$ after it [-]"},
 )
 SIGNS = {CROSSINGS: ("⟨N⟩", 1), HEIGHT: ("h/h0", 1), PHI_ACTIVE: ("φ_f", -1), ENERGY: ("energy per smarticle [J]", 1)}
 
@@ -72,18 +59,13 @@ def measure(run: Run) -> Row:
     }
 
 
-def differences(runs: pd.DataFrame, quantity: str, factor: str) -> pd.DataFrame:
-    """Paired differences of a quantity, by the code's rule less by the text's, all else alike."""
-    others = [name for name in (*FACTORS, ASPECT, SEED) if name != factor]
-    return paired_differences(runs, quantity, factor, FACTORS[factor], others)
-
-
 def effect(quantity: str, factor: str) -> Finding:
     """Make the finding that a difference pushes a quantity in the sense of the paper's findings."""
     (symbol, sign), (name, text) = SIGNS[quantity], NAMES[factor]
 
     def outcome(runs: pd.DataFrame) -> Outcome:
-        found = differences(runs, quantity, factor)
+        others = [name for name in (*FACTORS, ASPECT, SEED) if name != factor]
+        found = paired_differences(runs, quantity, factor, FACTORS[factor], others)
         value = mean_over_seeds(found[quantity])
         note = f"by l/w {means_by(found, quantity, ASPECT, '+.3g')}"
         return Outcome(effects=[Effect(label="code less text", value=value, sign=sign)], note=note)
@@ -92,7 +74,6 @@ def effect(quantity: str, factor: str) -> Finding:
         id=f"{quantity.split(maxsplit=1)[0]}-{name}",
         says=f"(ours) {symbol} after a shape change is {'raised' if sign > 0 else 'lowered'} by {text}",
         outcome=outcome,
-        found_if=f"mean of paired differences {'>' if sign > 0 else '<'} 0",
     )
 
 
@@ -104,16 +85,16 @@ STUDY = Study(
         Key(column=LAW, label="law"),
         Key(column=FRICTION, label="friction", form="g"),
         Key(column=RADIUS, label="wall [mm]", form=".1f", scale=1e3),
-        Key(column=ASPECT, label="l/w", form="g"),
+        ASPECT_KEY,
     ),
-    quantities=QUANTITIES,
+    quantities=tuple(QUANTITIES.values()),
     findings=tuple(effect(quantity, factor) for quantity, factor in product(SIGNS, FACTORS)),
     figures=(
-        Combinations(
+        Rows(
             name="factors",
-            quantities=QUANTITIES[:2],
-            factors=FACTORS,
+            quantities=[QUANTITIES[CROSSINGS], QUANTITIES[HEIGHT]],
             row=lambda point: f"{point[LAW]}, μ = {point[FRICTION]:g}, r = {1e3 * point[RADIUS]:.1f} mm",
+            split=one_by_one(ASPECT, "l/w = {:g}".format),
         ),
     ),
     order=(*FACTORS, ASPECT, SEED),

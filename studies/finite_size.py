@@ -10,10 +10,7 @@ pile counts as spanned where a cluster joins floor and top, and one wall and wal
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
 from functools import partial
-from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -25,19 +22,16 @@ from postprocess.measures.clusters import entanglement_clusters, spans_height, s
 from postprocess.measures.entanglement import entanglement
 from postprocess.measures.packing import packing_of
 from postprocess.measures.spread import escaped
-from postprocess.report import figures as style
 from postprocess.statistics.columns import ASPECT, SEED
 from postprocess.statistics.findings import judge, negative
 from postprocess.statistics.points import told_number
 from postprocess.statistics.seeds import slope_within
 from postprocess.statistics.size_law import POWER, POWERS, SizeLaw, size_law
 from postprocess.statistics.threshold import Profile, alike, profiles
-from studies.framework.figures import Analysis, Drawing, one_by_one
-from studies.framework.findings import Effect, Finding, Outcome, Verdict
-from studies.framework.plots import CROSSINGS_LABEL, draw_means, finished, marker
+from studies.framework.figures import Means, one_by_one
+from studies.framework.findings import Effect, Finding, Outcome, Verdict, decide
 from studies.framework.provenance import NOTHING
-from studies.framework.quantities import Key, Quantity
-from studies.framework.runs import DEFINITION, Row, duration
+from studies.framework.runs import ASPECT_KEY, DEFINITION, Key, Row, declare, duration, last_columns
 from studies.framework.study import Study
 
 COUNT, RADIUS = "smarticles [-]", "container radius over w [-]"
@@ -63,46 +57,42 @@ AT_THRESHOLD = -0.155
 """Power of N with which the largest cluster's share falls just at the threshold of percolation in three dimensions,
 β/(νd) with β = 0.41 and ν = 0.88: Stauffer & Aharony, Introduction to Percolation Theory (1994), table 2."""
 
-_REFUSED = 0.05
-_TOLD_APART = (1 / 6, 2 / 3)  # within half of 1/3 and twice it the law is told from others
+_REJECTED = 0.05
+_DISTINCT = (1 / 6, 2 / 3)  # within half of 1/3 and twice it the law is distinguished from others
 
 
 def phi(stage: str, definition: str = DEFINITION) -> str:
-    """Column of φ of a pile at rest."""
+    """Name the column of φ of a pile at rest."""
     return f"{STAGES[stage]} {definition} [-]"
 
 
 def crossings(stage: str) -> str:
-    """Column of ⟨N⟩."""
+    """Name the column of ⟨N⟩."""
     return f"crossings {stage} [-]"
 
 
 def share(stage: str) -> str:
-    """Column of the share of the smarticles in the largest entangled cluster."""
+    """Name the column of the share of the smarticles in the largest entangled cluster."""
     return f"largest cluster {stage} [-]"
 
 
 def spans(stage: str, what: str = "pile") -> str:
-    """Column of whether a cluster spans the height, the width or, both of them, the pile."""
+    """Name the column of whether a cluster spans the height, the width or, both of them, the pile."""
     return f"spans {what} {stage} [-]"
 
 
-def _quantities() -> dict[str, tuple[str, str]]:
-    """Meaning and label of every column that is averaged; labels are those of the short table."""
-    rows: dict[str, tuple[str, str]] = {}
-    for stage, end in zip(STAGES, "0f", strict=True):
-        for one in DEFINITIONS:
-            rows[phi(stage, one)] = (f"φ {stage} the shake, at rest, by {one}", f"φ_{end}" * (one == DEFINITION))
-    rows[MOVING] = (f"φ over the last {WINDOW:g} s of the shake", "")
-    rows |= {crossings(stage): (f"⟨N⟩ {stage} the shake, at rest", f"⟨N⟩ {stage}") for stage in STAGES}
-    rows |= {share(stage): (f"share of the largest entangled cluster {stage}", f"cluster {stage}") for stage in STAGES}
-    rows |= {spans(stage, "height"): (f"1 where a cluster joins floor and top {stage}", "") for stage in STAGES}
-    rows |= {spans(stage, "width"): (f"1 where one joins wall and wall {stage}", "") for stage in STAGES}
-    return rows | {spans(stage): (f"1 where both is so {stage}", f"spanned {stage}") for stage in STAGES}
-
-
-QUANTITIES = tuple(
-    Quantity(column=column, meaning=meaning, label=label) for column, (meaning, label) in _quantities().items()
+QUANTITIES = declare(
+    {
+        phi(stage, one): (f"φ_{end}" * (one == DEFINITION), "", f"φ {stage} the shake, at rest, by {one}")
+        for stage, end in zip(STAGES, "0f", strict=True)
+        for one in DEFINITIONS
+    }
+    | {MOVING: ("", "", f"φ over the last {WINDOW:g} s of the shake")}
+    | {crossings(stage): (f"⟨N⟩ {stage}", "", f"⟨N⟩ {stage} the shake, at rest") for stage in STAGES}
+    | {share(stage): (f"cluster {stage}", "", f"share of the largest entangled cluster {stage}") for stage in STAGES}
+    | {spans(stage, "height"): ("", "", f"1 where a cluster joins floor and top {stage}") for stage in STAGES}
+    | {spans(stage, "width"): ("", "", f"1 where one joins wall and wall {stage}") for stage in STAGES}
+    | {spans(stage): (f"spanned {stage}", "", f"1 where both is so {stage}") for stage in STAGES}
 )
 SCALED = (
     *(phi(stage, one) for stage in STAGES for one in DEFINITIONS),
@@ -143,8 +133,7 @@ def measure(run: Run) -> Row:
     return row | {
         "escaped at the end [-]": escaped(frames[-1], run),
         "frames averaged [-]": len(late),
-        "scene_sha256": run.manifest.scene_sha256,
-        "run": run.path.name,
+        **last_columns(run),
     }
 
 
@@ -179,39 +168,35 @@ def fitted(runs: pd.DataFrame, aspect: float, quantity: str) -> SizeLaw | None:
 
 def laws(runs: pd.DataFrame) -> pd.DataFrame:
     """Fit the law of every quantity at every l/w, whether it holds, and which power does."""
-    rows = []
-    for aspect in sorted(runs[ASPECT].unique()):
-        for quantity in SCALED:
-            law = fitted(runs, aspect, quantity)
-            if law is None:
-                continue
-            rows.append(
-                {
-                    ASPECT: aspect,
-                    "quantity": quantity,
-                    "sizes [-]": law.sizes,
-                    "runs [-]": law.runs,
-                    "bulk [-]": law.bulk,
-                    "bulk 95 % [-]": law.error(1, 0),
-                    "a [-]": law.slope,
-                    "a 95 % [-]": law.error(0, 1),
-                    "left over scatter [-]": law.excess,
-                    "p of the law [-]": law.refused,
-                    **dict(zip(("power [-]", "power from [-]", "power to [-]"), law.powers, strict=True)),
-                    "scatter falls as N to the [-]": law.scatter.fall,
-                }
-            )
-    return pd.DataFrame(rows)
+    return pd.DataFrame(
+        {
+            ASPECT: aspect,
+            "quantity": quantity,
+            "sizes [-]": law.sizes,
+            "runs [-]": law.runs,
+            "bulk [-]": law.bulk,
+            "bulk 95 % [-]": law.error(1, 0),
+            "a [-]": law.slope,
+            "a 95 % [-]": law.error(0, 1),
+            "left over scatter [-]": law.excess,
+            "p of the law [-]": law.refused,
+            **dict(zip(("power [-]", "power from [-]", "power to [-]"), law.powers, strict=True)),
+            "scatter falls as N to the [-]": law.scatter.fall,
+        }
+        for aspect in sorted(runs[ASPECT].unique())
+        for quantity in SCALED
+        if (law := fitted(runs, aspect, quantity)) is not None
+    )
 
 
-def _axes(stage: str) -> Mapping[str, str]:
-    """What spanning is set against: names and columns."""
-    return {"l/w": ASPECT, "⟨N⟩": crossings(stage)}
+def _column(stage: str, axis: str) -> str:
+    """Name the column that spanning is set against."""
+    return ASPECT if axis == "l/w" else crossings(stage)
 
 
 def _profiles(runs: pd.DataFrame, stage: str, axis: str) -> dict[int, Profile]:
-    """Where piles near the threshold begin to be spanned, by size."""
-    column = _axes(stage)[axis]
+    """Fit where piles near the threshold begin to be spanned, by size."""
+    column = _column(stage, axis)
     part = runs[(runs[ASPECT] <= LARGEST) & np.isfinite(runs[column])]
     if part.empty:
         return {}
@@ -234,7 +219,7 @@ def thresholds(runs: pd.DataFrame) -> pd.DataFrame:
             "width [-]": one.width,
         }
         for stage in STAGES
-        for axis in _axes(stage)
+        for axis in ("l/w", "⟨N⟩")
         for size, one in _profiles(runs, stage, axis).items()
     )
 
@@ -246,17 +231,9 @@ def growth(runs: pd.DataFrame) -> pd.DataFrame:
         for aspect, part in runs.groupby(ASPECT):
             size, cluster = (np.log(part[name].to_numpy(dtype=np.float64)).tolist() for name in (COUNT, share(stage)))
             slope = slope_within(size, cluster, [0] * len(part))
-            rows.append(
-                {
-                    "stage": stage,
-                    ASPECT: aspect,
-                    "runs [-]": slope.count,
-                    "power of N [-]": slope.value,
-                    "power of N 95 % [-]": slope.half_width,
-                    "falls as piles grow": str(judge(negative(slope))),
-                }
-            )
-    return pd.DataFrame(rows)
+            rows.append((stage, aspect, slope.count, slope.value, slope.half_width, str(judge(negative(slope)))))
+    powers = ["power of N [-]", "power of N 95 % [-]"]
+    return pd.DataFrame(rows, columns=["stage", ASPECT, "runs [-]", *powers, "falls as piles grow"])
 
 
 def _bias(runs: pd.DataFrame, quantity: str) -> Outcome:
@@ -277,14 +254,11 @@ def _law(runs: pd.DataFrame, quantity: str) -> Outcome:
     if law is None or math.isnan(law.refused):
         return Outcome(verdict=Verdict.NO_DATA)
     best, low, high = law.powers
-    verdict = Verdict.NOT_RESOLVED
-    if law.refused < _REFUSED:
-        verdict = Verdict.NOT_FOUND
-    elif low >= _TOLD_APART[0] and high <= _TOLD_APART[1]:
-        verdict = Verdict.FOUND
+    wrong = law.refused < _REJECTED
+    right = low >= _DISTINCT[0] and high <= _DISTINCT[1]
     note = f"it leaves {law.excess:.2g} times what scatter explains, p = {law.refused:.2g}; power {best:.2f} "
     ends = "" if POWERS[0] < low and high < POWERS[-1] else ", the end of what is tried"
-    return Outcome(note=f"{note}({low:.2f} to {high:.2f}{ends})", verdict=verdict)
+    return Outcome(note=f"{note}({low:.2f} to {high:.2f}{ends})", verdict=decide(right and not wrong, wrong))
 
 
 def _whole(runs: pd.DataFrame) -> Outcome:
@@ -296,7 +270,7 @@ def _whole(runs: pd.DataFrame) -> Outcome:
     listed = ", ".join(f"{size} {before:.3f} and {after:.3f}" for size, before, after in shares.itertuples())
     return Outcome(
         note=f"{spanned.sum()} of {len(part)} runs before and after; share of the largest one: {listed}",
-        verdict=Verdict.FOUND if spanned.all() else Verdict.NOT_FOUND,
+        verdict=decide(spanned.all(), not spanned.all()),
     )
 
 
@@ -305,19 +279,13 @@ def _shift(runs: pd.DataFrame, table: pd.DataFrame, stage: str, axis: str) -> Ou
     if rows.empty:
         return Outcome(verdict=Verdict.NO_DATA)
     chance = alike(_profiles(runs, stage, axis).values())
-    seen = runs.loc[runs[ASPECT] <= LARGEST, _axes(stage)[axis]]
-    cells = []
-    for _, row in rows.iterrows():
-        low, place, high = row[["from [-]", "half of piles span at [-]", "to [-]"]]
-        ends = [f"{end:.3f}" if math.isfinite(end) else "open" for end in (low, high)]
-        known = f"{place:.3f} ({ends[0]} to {ends[1]})"
-        cell = f"{row['spanned [-]']} of {row['runs [-]']} spanned" if math.isnan(place) else known
-        cells.append(f"{row[COUNT]}: {cell}")
-    return Outcome(
-        note=f"N = {'; '.join(cells)}; all alike: p = {told_number(chance, '.2g')}; {axis} of {seen.min():.2g} to "
-        f"{seen.max():.2g}",
-        verdict=Verdict.FOUND if chance < _REFUSED else Verdict.NOT_RESOLVED,
+    seen = runs.loc[runs[ASPECT] <= LARGEST, _column(stage, axis)]
+    cells = ", ".join(
+        f"{row[COUNT]}: {row['half of piles span at [-]']:.3f} ({row['from [-]']:.3f} to {row['to [-]']:.3f})"
+        for _, row in rows.iterrows()
     )
+    note = f"N = {cells}; all alike: p = {told_number(chance, '.2g')}; {axis} of {seen.min():.2g} to {seen.max():.2g}"
+    return Outcome(note=note, verdict=decide(chance < _REJECTED))
 
 
 def _falls(table: pd.DataFrame, stage: str) -> Outcome:
@@ -329,16 +297,11 @@ def _falls(table: pd.DataFrame, stage: str) -> Outcome:
         for _, row in rows.iterrows()
     )
     verdicts = rows["falls as piles grow"]
-    verdict = Verdict.NOT_RESOLVED
-    if (verdicts == "found").any():
-        verdict = Verdict.FOUND
-    elif (verdicts == "not found").all():
-        verdict = Verdict.NOT_FOUND
     surely = ", ".join(f"{ratio:g}" for ratio in rows.loc[verdicts == "found", ASPECT])
     return Outcome(
         note=f"share as N to the power, at l/w = {listed}; surely falling at {surely or 'none'}; percolation in three "
         f"dimensions has {AT_THRESHOLD:g} at its threshold",
-        verdict=verdict,
+        verdict=decide(bool(surely), (verdicts == "not found").all()),
     )
 
 
@@ -372,7 +335,7 @@ FINDINGS = (
         Finding(
             id=f"threshold-moves-{name}-{stage}",
             says=f"(ours) the {axis} at which clusters span half of the piles {stage} the shake goes with their size",
-            found_if="one place for all sizes is refused, p < 0.05",
+            found_if="one place for all sizes is rejected, p < 0.05",
             outcome=partial(_shift, stage=stage, axis=axis),
             tables=["runs", "thresholds"],
         )
@@ -391,88 +354,38 @@ FINDINGS = (
     ),
 )
 
-_NAMES = {BEFORE: "poured", AFTER: "shaken"}
-
-
-def _draw_scaling(path: Path, analysis: Analysis) -> list[Path]:
-    """Draw φ by the paper's definition, φ of the inside, and ⟨N⟩ at the paper's l/w, with the law fitted to each."""
-    here = analysis.points[analysis.points[ASPECT] == PAPER_ASPECT]
-    if here.empty:
-        return []
-    figure = style.blank_figure(2 * style.COLUMN_WIDTH, 2.7)
-    panels = figure.subplots(1, 3)
-    labels = (r"packing fraction $\phi$ [-]", r"$\phi$ of the inside, by voxels [-]", CROSSINGS_LABEL)
-    columns: list[Callable[[str], str]] = [phi, partial(phi, definition="voxel"), crossings]
-    for axes, label, column in zip(panels, labels, columns, strict=True):
-        for stage, shape, colour in ((BEFORE, "o", style.BLUE), (AFTER, "s", style.ORANGE)):
-            law = fitted(analysis.runs, PAPER_ASPECT, column(stage))
-            _draw_law(axes, here, column(stage), law, look=marker(shape, colour, colour), label=_NAMES[stage])
-        axes.axvline(PAPER_COUNT**-POWER, color=style.GREY, linewidth=0.6, linestyle=":")
-        axes.set_xlim(left=0)
-        axes.set_xlabel(r"$N^{-1/3}$ [-]")
-        axes.set_ylabel(label)
-    figure.legend(*panels[0].get_legend_handles_labels(), loc="outside upper center", ncols=2)
-    told = (
-        f"l/w = {PAPER_ASPECT:g}; lines: fits of q_∞ + a N^(-1/3), bands: 95 % of them; 0 is a pile without end; "
-        f"dotted: the paper's {PAPER_COUNT} smarticles."
-    )
-    return finished(figure, path, [told], analysis.footer, pooled=True)
-
-
-def _draw_law(axes: Any, here: pd.DataFrame, column: str, law: SizeLaw | None, **shown: Any) -> None:
-    """Draw means over seeds of one quantity at every size, and the law."""
-    shown["look"] |= {"linestyle": "none"}
-    places = here[COUNT].to_numpy(dtype=np.float64) ** -POWER
-    if law is None:
-        draw_means(axes, places, here[column], None, **shown)
-        return
-    errors = [law.scatter.error(count, number) for count, number in here[[COUNT, "seeds [-]"]].to_numpy().tolist()]
-    draw_means(axes, places, here[column], errors, **shown)
-    along = np.linspace(0, places.max() * 1.05, 60)
-    line, band = law.bulk + law.slope * along, np.array([law.error(1, float(one)) for one in along])
-    axes.plot(along, line, color=shown["look"]["color"], linewidth=0.9)
-    if np.isfinite(band).all():
-        axes.fill_between(along, line - band, line + band, color=shown["look"]["color"], alpha=0.15, linewidth=0)
-
-
-def _draw_percolation(path: Path, analysis: Analysis) -> list[Path]:
-    """Draw the share of spanned piles against l/w, and of smarticles in the largest cluster against ⟨N⟩."""
-    points, runs = (table[table[ASPECT] <= LARGEST] for table in (analysis.points, analysis.runs))
-    if points.empty:
-        return []
-    figure = style.blank_figure(2 * style.COLUMN_WIDTH, 4.6)
-    grid = figure.subplots(2, len(STAGES), sharex="row", sharey="row", squeeze=False)
-    split = one_by_one(COUNT, lambda count: f"N = {count}")
-    for (upper, lower), stage in zip(grid.T, STAGES, strict=True):
-        for series in split(points):
-            draw_means(
-                upper, series.rows[ASPECT], series.rows[spans(stage)], None, look=series.look, label=series.label
-            )
-        for series in split(runs):
-            look = {name: series.look[name] for name in ("marker", "color")}
-            lower.plot(series.rows[crossings(stage)], series.rows[share(stage)], ls="none", markersize=3, **look)
-        upper.set_title(_NAMES[stage], fontsize=8)
-        upper.set_xlabel(r"$l/w$ [-]")
-        lower.set_xlabel(CROSSINGS_LABEL)
-    grid[0][0].set_ylabel("share of the piles that are spanned [-]")
-    grid[1][0].set_ylabel("share of the largest cluster [-]")
-    figure.legend(*grid[0][0].get_legend_handles_labels(), loc="outside upper center", ncols=5)
-    told = "Spanned: entangled clusters join floor and top, and wall and wall. Above: shares of seeds; below: each run."
-    return finished(figure, path, [told], analysis.footer)
-
+_SCALING = [column(stage) for column in (phi, partial(phi, definition="voxel"), crossings) for stage in STAGES]
+FIGURES = (
+    Means(
+        name="scaling",
+        quantities=[QUANTITIES[name] for name in _SCALING],
+        x=COUNT,
+        transform=lambda count: count**-POWER,
+        x_label=r"$N^{-1/3}$ [-]",
+        rows=lambda points: points[points[ASPECT] == PAPER_ASPECT],
+        split=one_by_one(ASPECT, "l/w = {:g}".format),
+        marks=[PAPER_COUNT**-POWER],
+        notes=[f"0 is a pile without end; broken line: the paper's {PAPER_COUNT} smarticles. Fits: laws.csv."],
+    ),
+    Means(
+        name="percolation",
+        quantities=[QUANTITIES[name(stage)] for name in (spans, share) for stage in STAGES],
+        x=ASPECT,
+        x_label=r"$l/w$ [-]",
+        rows=lambda points: points[points[ASPECT] <= LARGEST],
+        split=one_by_one(COUNT, "N = {:g}".format),
+        notes=["Spanned: entangled clusters join floor and top, and wall and wall."],
+    ),
+)
 
 STUDY = Study(
     name="finite-size",
     title="Finite size: 100 to 10 000 smarticles",
     measure=measure,
-    keys=(
-        Key(column=ASPECT, label="l/w", form="g"),
-        Key(column=COUNT, label="N", form="g"),
-        Key(column=RADIUS, label="radius / w", form=".2f"),
-    ),
-    quantities=QUANTITIES,
+    keys=(ASPECT_KEY, Key(column=COUNT, label="N", form="g"), Key(column=RADIUS, label="radius / w", form=".2f")),
+    quantities=tuple(QUANTITIES.values()),
     findings=FINDINGS,
-    figures=(Drawing(name="scaling", of=_draw_scaling), Drawing(name="percolation", of=_draw_percolation)),
+    figures=FIGURES,
     extra=lambda runs: {"laws": laws(runs), "thresholds": thresholds(runs), "growth": growth(runs)},
     order=(ASPECT, COUNT, SEED),
     same_count=(ASPECT, COUNT),
@@ -485,7 +398,7 @@ STUDY = Study(
         "Laws q_∞ + a N^(-1/3): least squares, weights by a scatter that is a power of N, fitted within sizes; where "
         "the law leaves more than scatter, errors are larger by the square root of the ratio.",
         "Thresholds: logistic function of its own width at each size, profile likelihood, 95 %; one for all sizes "
-        "against one for each by the ratio of likelihoods, refused below p = 0.05.",
+        "against one for each by the ratio of likelihoods, rejected below p = 0.05.",
     ),
     reference=NOTHING,
     pictured={"l_over_w": 0.7, "count": 1000},

@@ -19,29 +19,49 @@ from postprocess.geometry.links import centres_of_mass
 from postprocess.measures.pull import END, FREE, PULL, WINDOW, freed, held_at, held_fast, peak, read_pull, weight_of_one
 from postprocess.measures.table import summarise_run
 from postprocess.statistics.columns import ASPECT, SEED
-from studies.framework.figures import Histories, Means, Scatter, Series, Split, by_procedure, one_by_one
-from studies.framework.findings import Effect, Finding, Rows, above, ranks
-from studies.framework.plots import ASPECT_LABEL, CROSSINGS_LABEL, THETA_LABEL, History, procedure_marker
+from studies.framework.figures import (
+    ASPECT_LABEL,
+    CROSSINGS_LABEL,
+    THETA_LABEL,
+    Histories,
+    History,
+    Means,
+    Scatter,
+    Series,
+    Split,
+    by_procedure,
+    one_by_one,
+    procedure_marker,
+)
+from studies.framework.findings import Rows
 from studies.framework.procedures import (
     ACTIVE,
     AMPLITUDE,
-    BY_RANKS,
     CROSSINGS,
-    EXTERNAL,
     INTERNAL,
+    ORDER,
     PHI,
     PROCEDURE,
     SHAPE,
-    STATIC,
     THETA,
+    compared,
     of_procedure,
-    paired,
     prepared_by,
 )
-from studies.framework.quantities import Key, declare
-from studies.framework.runs import DEFINITION, Row, duration
+from studies.framework.runs import ASPECT_KEY, DEFINITION, THETA_KEY, Key, Row, declare, last_columns
 from studies.framework.study import Study
-from studies.strength import ABOVE, BEFORE, HELD_FAST, LIMIT, PEAK, RAISED, WORK, harder_but_brittle, other_order
+from studies.strength import (
+    ABOVE,
+    BEFORE,
+    HELD_FAST,
+    LIMIT,
+    PEAK,
+    RAISED,
+    WORK,
+    order_findings,
+    strongest,
+    with_crossings,
+)
 
 SHOWN_ASPECT = 0.7  # at which procedures and amplitudes are compared, as in the paper
 
@@ -81,9 +101,8 @@ QUANTITIES = declare(
 
 def measure(run: Run) -> Row:
     """Measure the pile before the pull, and the forces on the hooks."""
-    procedure, pulled = prepared_by(run, PULL), run.phases[-1]
-    rest, settings = pulled.index - 1, run.scene["phases"]
-    asked, series = settings[pulled.index], run.series
+    pile, pulled, series = prepared_by(run, PULL), run.phases[-1], run.series
+    rest, asked = pulled.index - 1, run.scene["phases"][pulled.index]
     table = summarise_run(run, definitions=[DEFINITION], phases={rest, pulled.index}).set_index("phase")
     if rest not in table.index:
         msg = f"{run.path}: no frame of the rest before the pull; run it again"
@@ -95,13 +114,7 @@ def measure(run: Run) -> Row:
     total, highest, free = run.manifest.count * one, peak(pull), freed(pull)
     unlimited = asked.get("force_limit_N") is None
     return {
-        PROCEDURE: procedure,
-        THETA: settings[2]["theta_deg"] if procedure == INTERNAL else math.nan,
-        ASPECT: round(run.manifest.aspect_ratio, 6),
-        SEED: run.manifest.seed,
-        "smarticles [-]": run.manifest.count,
-        "fidelity": run.manifest.fidelity,
-        ACTIVE: duration(run.phases[2]) if procedure != STATIC else 0.0,
+        **pile,
         PHI: before[PHI],
         CROSSINGS: before["crossings mean [-]"],
         ABOVE: int((centres_of_mass(frame.vertices)[:, 2] > hook).sum()) / run.manifest.count,
@@ -121,8 +134,7 @@ def measure(run: Run) -> Row:
         LIMIT: math.inf if unlimited else asked["force_limit_N"] / run.manifest.count / one,
         "escaped at the end [-]": table["escaped [-]"].iloc[-1],
         "frames averaged [-]": int(before["frames averaged"]),
-        "scene_sha256": run.manifest.scene_sha256,
-        "run": run.path.name,
+        **last_columns(run),
     }
 
 
@@ -138,10 +150,9 @@ def at_shown_aspect(table: pd.DataFrame) -> pd.DataFrame:
     return table[np.isclose(table[ASPECT], SHOWN_ASPECT)]
 
 
-def compared(table: pd.DataFrame) -> pd.DataFrame:
+def at_one_theta(table: pd.DataFrame) -> pd.DataFrame:
     """Select what is compared: one l/w, of the internal oscillation one θ."""
-    part = at_shown_aspect(table)
-    return pd.concat([of_procedure(part, name) for name in part[PROCEDURE].unique()]) if len(part) else part
+    return compared(at_shown_aspect(table))
 
 
 def amplitudes(table: pd.DataFrame) -> pd.DataFrame:
@@ -156,90 +167,12 @@ def aspects(table: pd.DataFrame) -> pd.DataFrame:
     return part if part[ASPECT].nunique() > 1 else part.iloc[:0]
 
 
-def _net(runs: pd.DataFrame) -> str:
-    held = ", ".join(
-        f"{name} {int(part[HELD_FAST].sum())} of {len(part)}" for name, part in runs.groupby(PROCEDURE, sort=False)
-    )
-    others = [name for name in (EXTERNAL, INTERNAL, STATIC) if len(of_procedure(runs, name))]
-    less = [str(Effect(label=f"less {name}", value=paired(runs, NET, SHAPE, name), sign=0)) for name in others]
-    return f"peak less the lower hook's force, of shape-change, {', '.join(less)}; held fast: {held}"
-
-
-FINDINGS = (
-    above(
-        "shape-change-strongest",
-        f"Shape change has the highest peak force of the three procedures, l/w = {SHOWN_ASPECT:g}",
-        PEAK,
-        SHAPE,
-        (EXTERNAL, INTERNAL),
-        of=of_procedure,
-        beside=(STATIC,),
-        bounds=HELD_FAST,
-        rows=compared,
-        label="peak",
-        note=_net,
-        found_if=f"peak force above those of external and of internal oscillation at θ = {AMPLITUDE:g}°, seed by seed",
-    ),
-    above(
-        "internal-weakest",
-        f"Internal oscillation has the least peak force of the three procedures, l/w = {SHOWN_ASPECT:g}",
-        PEAK,
-        INTERNAL,
-        (EXTERNAL, SHAPE),
-        of=of_procedure,
-        sign=-1,
-        beside=(STATIC,),
-        bounds=HELD_FAST,
-        rows=compared,
-        label="peak",
-        found_if=f"peak force at θ = {AMPLITUDE:g}° below that of external oscillation and of shape change, by seed",
-    ),
-    Finding(
-        id="other-order-than-crossings",
-        says="Over the three procedures, peak force and ⟨N⟩ do not keep the same order",
-        outcome=other_order,
-        rows=compared,
-        found_if="two procedures differ clearly in both, in opposite senses; not found if all three pairs differ "
-        "clearly in the same sense",
-    ),
-    ranks(
-        "strength-with-crossings-over-theta",
-        "Internal oscillation: over θ, the peak force goes with ⟨N⟩",
-        CROSSINGS,
-        PEAK,
-        within=(SEED,),
-        bounds=HELD_FAST,
-        rows=lambda table: at_shown_aspect(table[table[PROCEDURE] == INTERNAL]),
-        unit="n W_s per link",
-        found_if=f"over θ within seeds, l/w = {SHOWN_ASPECT:g}: {BY_RANKS}",
-    ),
-    ranks(
-        "strength-with-crossings",
-        "Tensile strength and number of entanglements are connected",
-        CROSSINGS,
-        PEAK,
-        within=(ASPECT, SEED),
-        bounds=HELD_FAST,
-        unit="n W_s per link",
-        found_if=f"over all procedures and θ, within runs of one l/w and seed: {BY_RANKS}",
-    ),
-    Finding(
-        id="harder-but-brittle",
-        says="Like a metal cooled fast, a pile after shape change is harder but more brittle than after internal "
-        "oscillation",
-        outcome=harder_but_brittle,
-        rows=compared,
-        found_if="peak force above, and reached at a smaller displacement of the hook, seed by seed; the paper says "
-        "that its fracture tests support this, not by which measure",
-    ),
+FIRST, LAST = strongest(at_one_theta, f", l/w = {SHOWN_ASPECT:g}"), order_findings(at_one_theta)
+CONNECTED, OVER_THETA = with_crossings(
+    lambda table: table, (ASPECT, SEED), lambda table: at_shown_aspect(table[table[PROCEDURE] == INTERNAL]), (SEED,)
 )
+FINDINGS = (*FIRST, LAST[0], OVER_THETA, CONNECTED, LAST[1])
 
-_LABELS = {
-    SHAPE: "shape change",
-    EXTERNAL: "external",
-    INTERNAL: rf"internal, $\theta$ = {AMPLITUDE:g}°",
-    STATIC: "static",
-}
 _BY_THETA = one_by_one(THETA, lambda theta: rf"$\theta$ = {theta:g}°")
 _BY_ASPECT = one_by_one(ASPECT, lambda aspect: rf"$l/w$ = {aspect:g}")
 
@@ -254,13 +187,13 @@ def _all_points(table: pd.DataFrame) -> list[Series]:
     """Make series of the procedures, and of the internal oscillation at each other θ and l/w."""
     others = amplitudes(table), aspects(table)
     return [
-        *by_procedure(_LABELS, line=False)(at_shown_aspect(table)),
+        *by_procedure(line=False)(at_shown_aspect(table)),
         *_BY_THETA(others[0][others[0][THETA] != AMPLITUDE]),
         *_BY_ASPECT(others[1][others[1][ASPECT] != SHOWN_ASPECT]),
     ]
 
 
-def _forces(name: str, rows: Rows, split: Split, told: str, *, net: bool = False) -> Histories:
+def _forces(name: str, rows: Rows, split: Split, note: str, *, net: bool = False) -> Histories:
     return Histories(
         name=name,
         history=partial(force_history, net=net),
@@ -269,37 +202,31 @@ def _forces(name: str, rows: Rows, split: Split, told: str, *, net: bool = False
         width=WINDOW,
         level=1.0,
         x_label="time since the hook began to rise [s]",
-        y_label=r"upper less lower hook, $F/(n W_\mathrm{s})$ [-]"
-        if net
-        else r"force on the hook $F/(n W_\mathrm{s})$ [-]",
-        told=[f"{told} Level: weight of all smarticles."],
+        quantities={"": rf"{'upper less lower' if net else 'force on the'} hook, $F/(n W_\mathrm{{s}})$ [-]"},
+        notes=[f"{note} Level: weight of all smarticles."],
     )
 
 
-def _peaks(name: str, x: str, x_label: str, split: Split, told: str) -> Means:
-    return Means(name=name, quantities=[QUANTITIES[PEAK]], x=x, x_label=x_label, split=split, told=[told])
+def _peaks(name: str, x: str, x_label: str, split: Split, note: str) -> Means:
+    return Means(name=name, quantities=[QUANTITIES[PEAK]], x=x, x_label=x_label, split=split, notes=[note])
 
 
 _AT_ASPECT, _AT_THETA = f"l/w = {SHOWN_ASPECT:g}.", f"θ = {AMPLITUDE:g}°."
 FIGURES = (
-    _forces("force_time", at_shown_aspect, by_procedure(_LABELS), _AT_ASPECT),
-    _forces("net_time", at_shown_aspect, by_procedure(_LABELS), _AT_ASPECT, net=True),
+    _forces("force_time", at_shown_aspect, by_procedure(), _AT_ASPECT),
+    _forces("net_time", at_shown_aspect, by_procedure(), _AT_ASPECT, net=True),
     _forces("force_time_theta", amplitudes, _BY_THETA, f"Internal oscillation, {_AT_ASPECT}"),
     _peaks("peak_theta", THETA, THETA_LABEL, _line(amplitudes), _AT_ASPECT),
     _forces("force_time_aspect", aspects, _BY_ASPECT, f"Internal oscillation, {_AT_THETA}"),
     _peaks("peak_aspect", ASPECT, ASPECT_LABEL, _line(aspects), _AT_THETA),
-    Scatter(name="peak_crossings", x=QUANTITIES[CROSSINGS], y=QUANTITIES[PEAK], split=_all_points, bounds=HELD_FAST),
+    Scatter(name="peak_crossings", xs=[QUANTITIES[CROSSINGS]], y=QUANTITIES[PEAK], split=_all_points, bounds=HELD_FAST),
 )
 
 STUDY = Study(
     name="fracture",
     title="A hook pulled out of a pile, against the findings of Savoie et al.",
     measure=measure,
-    keys=(
-        Key(column=PROCEDURE, label="procedure", order=(STATIC, EXTERNAL, SHAPE, INTERNAL)),
-        Key(column=THETA, label="θ", form="g", unit="°"),
-        Key(column=ASPECT, label="l/w", form="g"),
-    ),
+    keys=(Key(column=PROCEDURE, label="procedure", order=ORDER), THETA_KEY, ASPECT_KEY),
     quantities=tuple(QUANTITIES.values()),
     findings=FINDINGS,
     figures=FIGURES,

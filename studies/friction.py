@@ -12,7 +12,6 @@ import itertools
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 import pandas as pd
@@ -20,32 +19,26 @@ from numpy.typing import NDArray
 from scipy.special import stdtr, stdtrit
 
 from dem.record.run import Run
-from postprocess.report import figures as style
 from postprocess.statistics.columns import ASPECT, SEED, SEEDS
 from postprocess.statistics.points import marked, seeds_of, told_number
 from postprocess.statistics.seeds import CONFIDENCE as LEVEL
 from postprocess.statistics.seeds import Scatter, mean_over_seeds, pooled_scatter, slope_within
-from studies.framework import plots
-from studies.framework.figures import Analysis, Drawing, Histories, one_by_one
-from studies.framework.findings import Effect, Finding, Outcome, Verdict
-from studies.framework.provenance import (
+from studies.framework.figures import POOLED, Histories, Means, one_by_one
+from studies.framework.findings import Effect, Finding, Outcome, Verdict, decide
+from studies.framework.runs import ASPECT_KEY, DEFINITION, Key, Quantity, Row
+from studies.framework.shaken import (
     DIGITISING_ERROR,
+    FRICTION,
     GRAVISH,
     SHAKE_TIME,
-    read_reference,
-    reference_at,
-    told_reference,
-)
-from studies.framework.quantities import Key, Quantity
-from studies.framework.runs import DEFINITION, Row
-from studies.framework.shaken import (
-    FRICTION,
     STAGES,
     TIMES,
     WHEN,
     WINDOW,
     at_time,
     common_friction,
+    gravish_at,
+    gravish_note,
     phi,
     timed_row,
     while_shaken,
@@ -91,7 +84,10 @@ LARGEST, MEAN, SIGNED = "largest deviation [%]", "mean absolute deviation [%]", 
 VERDICT, WHAT, COUNTED = "within 5 %", "what", "points compared [-]"
 LOW, HIGH, FIRST, LAST = "from [-]", "to [-]", "measured from [-]", "measured to [-]"
 GROWTHS = tuple(f"growth from {one:g} to {other:g} s [%]" for one, other in itertools.pairwise(TIMES))
-_VERDICTS = {"yes": Verdict.FOUND, "no": Verdict.NOT_FOUND, "undetermined": Verdict.NOT_RESOLVED}
+_SURELY = f"confidence of {SURE:.0%} that all points are; not found where a point is surely farther off"
+PHI_QUANTITY = Quantity(
+    column=PHI, label="φ_f", form=".4f", meaning="packing fraction at a stage", axis=r"packing fraction $\phi$ [-]"
+)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -137,17 +133,14 @@ class Curve:
         Where scatter makes φ cross it more than once: the middle between the first crossing and the last. The interval
         has all friction at which φ is not clearly another than Gravish's; ±inf beyond what was measured.
         """
-        off, found = self.packing - self.reference, []
-        for left in range(len(off)):
-            if off[left] == 0:
-                found.append(float(self.friction[left]))
-            elif left + 1 < len(off) and off[left] * off[left + 1] < 0:
-                part = off[left] / (off[left] - off[left + 1])
-                found.append(float(self.friction[left] + part * (self.friction[left + 1] - self.friction[left])))
+        off = self.packing - self.reference
+        left = np.nonzero(off[:-1] * off[1:] < 0)[0]
+        between = self.friction[left] + off[left] / (off[left] - off[left + 1]) * np.diff(self.friction)[left]
+        found = np.sort([*self.friction[off == 0], *between])
         above = bool(off[0] > 0)
-        place = "within the range" if found else "above the range" if above else "below the range"
-        value = (found[0] + found[-1]) / 2 if found else math.inf if above else -math.inf
-        grid = np.unique(np.concatenate([self.grid(), found]))
+        place = "within the range" if len(found) else "above the range" if above else "below the range"
+        value = float(found[0] + found[-1]) / 2 if len(found) else math.inf if above else -math.inf
+        grid = np.unique([*self.grid(), *found])
         errors = self.error(grid)
         if not np.isfinite(errors).all():
             return value, math.nan, math.nan, place
@@ -204,7 +197,7 @@ def tabulate(runs: pd.DataFrame) -> dict[str, pd.DataFrame]:
 
 def points(runs: pd.DataFrame, scatters: Mapping[str, Scatter]) -> pd.DataFrame:
     """Average φ by stage, l/w and friction, and set it against Gravish's, whose reading error counts as well."""
-    reference, rows = read_reference(), []
+    rows = []
     for stage, scatter in scatters.items():
         for (aspect, friction), group in runs.groupby([ASPECT, FRICTION]):
             known = group[group[phi(stage)].notna()]
@@ -212,7 +205,7 @@ def points(runs: pd.DataFrame, scatters: Mapping[str, Scatter]) -> pd.DataFrame:
                 continue
             mean = float(known[phi(stage)].mean())
             half_width = _per_error(scatter) * scatter.value * mean / math.sqrt(len(known))
-            value = reference_at(reference, aspect, COMPARED[stage])
+            value = gravish_at(aspect, COMPARED[stage])
             row = {STAGE: stage, ASPECT: aspect, FRICTION: friction, **seeds_of(known), PHI: mean}
             row |= {marked(PHI, "95 %"): half_width, REFERENCE: value, DEVIATION: 100 * (mean / value - 1)}
             rows.append(row | {marked(DEVIATION, "95 %"): 100 * math.hypot(half_width, DIGITISING_ERROR) / value})
@@ -266,7 +259,7 @@ def nearness(found: Curves, friction: float) -> dict[str, float | int | str]:
 
 
 def verdict(near: Mapping[str, float | int | str], *, whole: bool) -> str:
-    """Tell whether all points are near Gravish's.
+    """Judge whether all points are near Gravish's.
 
     Yes: the confidence that all are, errors taken as independent, is at least `SURE`, and all points are there. No: a
     point is surely farther off, by Bonferroni's rule for as many points as were compared.
@@ -332,23 +325,12 @@ def growth(runs: pd.DataFrame) -> pd.DataFrame:
     return pd.DataFrame(rows)
 
 
-def told_crossing(row: pd.Series) -> str:
-    """Format `0.61 (0.52 to 0.74)`, `above 0.8 (from 0.71)`, `below 0.2 (clearly)`: with the 95 % interval."""
-    value, low, high = float(row[FRICTION]), float(row[LOW]), float(row[HIGH])
-    ends = "no error" if math.isnan(low) else f"{low:.2f} to {high:.2f}"
-    if math.isinf(low):
-        ends = "anything measured" if math.isinf(high) else f"up to {high:.2f}"
-    elif math.isinf(high):
-        ends = f"from {low:.2f}"
-    if math.isinf(value):
-        if low == row[LAST] or high == row[FIRST]:
-            ends = "clearly"
-        return f"{'above' if value > 0 else 'below'} {row[LAST if value > 0 else FIRST]:g} ({ends})"
-    return f"{value:.2f} ({ends})"
-
-
-def _told_all(found: pd.DataFrame) -> str:
-    return "; ".join(f"{row[STAGE]} at l/w = {row[ASPECT]:g}: {told_crossing(row)}" for _, row in found.iterrows())
+def _crossings_note(found: pd.DataFrame) -> str:
+    """Format `phi_f at l/w = 0.7: 0.61 (0.52 to 0.74)` for each crossing, with its 95 % interval."""
+    return "; ".join(
+        f"{row[STAGE]} at l/w = {row[ASPECT]:g}: {row[FRICTION]:.2f} ({row[LOW]:.2f} to {row[HIGH]:.2f})"
+        for _, row in found.iterrows()
+    )
 
 
 def _of(table: pd.DataFrame, what: str) -> pd.DataFrame:
@@ -362,22 +344,19 @@ def one_friction(what: str) -> Finding:
         tried, best = _of(tried, what), _of(best, what)
         if tried.empty or best.empty:
             return Outcome(note="no points of Gravish's at these l/w", verdict=Verdict.NOT_RESOLVED)
-        one, found = best.iloc[0], Verdict.NOT_RESOLVED
-        if (tried[VERDICT] == "yes").any():
-            found = Verdict.FOUND
-        elif (tried[VERDICT] == "no").all() and one[VERDICT] == "no":
-            found = Verdict.NOT_FOUND
+        one, verdicts = best.iloc[0], tried[VERDICT]
         note = f"nearest at {one[FRICTION]:.2f} (between measured points): {one[MEAN]:.1f} % on average over "
         note += f"{one[COUNTED]} points, at most {one[LARGEST]:+.1f} %, {one['largest at']}; confidence that all are "
         note += f"within {MARGIN:g} %: {told_number(one[CONFIDENCE], '.0f')} %"
-        return Outcome(note=note, verdict=found)
+        wrong = (verdicts == "no").all() and one[VERDICT] == "no"
+        return Outcome(note=note, verdict=decide((verdicts == "yes").any(), wrong))
 
     return Finding(
         id=f"one-friction-{what.replace(' ', '-').replace('_', '-')}",
         says=f"One friction brings {what} within {MARGIN:g} % of Gravish's at every l/w measured",
         outcome=outcome,
         tables=("verdicts", "nearest"),
-        found_if=f"confidence of {SURE:.0%} that all points are; not found where a point is surely farther off",
+        found_if=_SURELY,
     )
 
 
@@ -388,17 +367,14 @@ def _papers(tried: pd.DataFrame) -> Outcome:
         return Outcome(note="no runs at it", verdict=Verdict.NOT_RESOLVED)
     row = found.iloc[0]
     note = f"{row[MEAN]:.1f} % off on average over {row[COUNTED]} points, at most {row[LARGEST]:+.1f} %"
-    return Outcome(note=note, verdict=_VERDICTS[str(row[VERDICT])])
+    return Outcome(note=note, verdict=decide(row[VERDICT] == "yes", row[VERDICT] == "no"))
 
 
 def _common(found: pd.DataFrame) -> Outcome:
     found = found[found[STAGE].isin(["phi_0", "phi_f"])]
-    if found.empty or found[[LOW, HIGH]].isna().any(axis=None):
-        return Outcome(note="no errors", verdict=Verdict.NOT_RESOLVED)
-    low, high = float(found[LOW].max()), float(found[HIGH].min())
-    common = low <= high
-    note = f"from {low:.2f} to {high:.2f}; " if common else ""
-    return Outcome(note=note + _told_all(found), verdict=Verdict.FOUND if common else Verdict.NOT_FOUND)
+    known = len(found) > 0 and not found[[LOW, HIGH]].isna().any(axis=None)
+    common = known and float(found[LOW].max()) <= float(found[HIGH].min())
+    return Outcome(note=_crossings_note(found), verdict=decide(common, known and not common))
 
 
 def of_steel(surface: str) -> Finding:
@@ -406,13 +382,11 @@ def of_steel(surface: str) -> Finding:
     least, most = STEEL[surface]
 
     def outcome(found: pd.DataFrame) -> Outcome:
-        found, judged = found[found[STAGE] == "phi_f"], Verdict.NOT_RESOLVED
-        if len(found) and found[[LOW, HIGH]].notna().all(axis=None):
-            if ((found[LOW] >= least) & (found[HIGH] <= most)).all():
-                judged = Verdict.FOUND
-            elif ((found[LOW] > most) | (found[HIGH] < least)).any():
-                judged = Verdict.NOT_FOUND
-        return Outcome(note=_told_all(found), verdict=judged)
+        found = found[found[STAGE] == "phi_f"]
+        known = len(found) > 0 and found[[LOW, HIGH]].notna().all(axis=None)
+        inside = known and ((found[LOW] >= least) & (found[HIGH] <= most)).all()
+        beyond = known and ((found[LOW] > most) | (found[HIGH] < least)).any()
+        return Outcome(note=_crossings_note(found), verdict=decide(inside, beyond))
 
     return Finding(
         id=f"{surface.replace(',', '').replace(' ', '-')}",
@@ -439,7 +413,7 @@ def _grows_more(grown: pd.DataFrame) -> list[Effect]:
 
 
 def _growing(name: str, says: str, outcome: Callable[[pd.DataFrame], list[Effect]]) -> Finding:
-    return Finding(id=name, says=says, outcome=outcome, tables=("growth",), found_if="beyond the scatter over points")
+    return Finding(id=name, says=says, outcome=outcome, tables=("growth",))
 
 
 _LATE = f"between {TIMES[-2]:g} and {TIMES[-1]:g} s"
@@ -450,7 +424,7 @@ FINDINGS = (
         says=f"The paper's friction, {PAPERS:g}, brings phi_f within {MARGIN:g} % of Gravish's at every l/w measured",
         outcome=_papers,
         tables=("verdicts",),
-        found_if=f"confidence of {SURE:.0%} that all points are; not found where a point is surely farther off",
+        found_if=_SURELY,
     ),
     Finding(
         id="common-friction",
@@ -465,63 +439,47 @@ FINDINGS = (
 )
 
 
-def _draw(path: Path, analysis: Analysis) -> list[Path]:
-    """Draw φ against friction, a panel for each l/w, with Gravish's values."""
-    means, found, reference = analysis.points, analysis.tables["crossings"], read_reference()
-    ratios = sorted(means[ASPECT].unique())
-    figure = style.blank_figure(max(2.05 * len(ratios) + 0.4, 4.8), 2.75)
-    panels = figure.subplots(1, len(ratios), sharey=True, squeeze=False)[0]
-    shapes = {"phi_0": ("D", style.BLUE, "white"), "phi_f relaxed": ("^", style.SKY, style.SKY)}
-    shapes["phi_f"] = ("D", style.BLUE, style.BLUE)
-    for axes, ratio in zip(panels, ratios, strict=True):
-        for stage, shape in shapes.items():
-            part = means[(means[ASPECT] == ratio) & (means[STAGE] == stage)]
-            look = {**plots.marker(*shape), "linestyle": "-"}
-            label = f"{stage} {STAGES[stage].replace(' that follows shaking', '')}"
-            plots.draw_means(axes, part[FRICTION], part[PHI], part[marked(PHI, "95 %")], look=look, label=label)
-        for stage, line in (("phi_0", (0, (4, 2))), ("phi_f", "solid")):
-            value = reference_at(reference, ratio, stage)
-            if math.isfinite(value):
-                edges = value - DIGITISING_ERROR, value + DIGITISING_ERROR
-                axes.axhspan(*edges, color=style.ORANGE, alpha=0.18, linewidth=0)
-                axes.axhline(value, color=style.ORANGE, linewidth=0.9, linestyle=line, label=f"Gravish, {stage}")
-        for _, row in found[(found[ASPECT] == ratio) & found[STAGE].isin(["phi_0", "phi_f"])].iterrows():
-            if math.isfinite(row[FRICTION]):
-                ends = np.clip([row[LOW], row[HIGH]], row[FIRST], row[LAST])
-                axes.plot(ends, [row[REFERENCE]] * 2, color=style.BLACK, linewidth=0.8, zorder=4)
-                axes.plot(row[FRICTION], row[REFERENCE], "x", color=style.BLACK, markersize=4.5, zorder=5)
-        axes.set_title(f"$l/w = {ratio:g}$", fontsize=8)
-        axes.set_xlabel(r"coefficient of friction $\mu$ [-]")
-    panels[0].set_ylabel(r"packing fraction $\phi$ [-]")
-    panels[0].set_ylim(bottom=0)
-    figure.legend(*panels[0].get_legend_handles_labels(), loc="outside upper center", ncols=3 if len(ratios) > 2 else 2)
-    told = "Crosses: friction at which φ is Gravish's, with its 95 % interval as far as it was measured."
-    below = [told, told_reference(ratios, ("phi_0", "phi_f"))]
-    return plots.finished(figure, path, below, analysis.footer, pooled=True)
+def _shown(points: pd.DataFrame) -> pd.DataFrame:
+    return points[points[STAGE].isin(STAGES)]
+
+
+def _gravish(points: pd.DataFrame) -> dict[str, float]:
+    values = {stage: gravish_at(points[ASPECT].iloc[0], stage) for stage in ("phi_0", "phi_f")}
+    return {f"Gravish, {stage}": value for stage, value in values.items() if math.isfinite(value)}
 
 
 STUDY = Study(
     name="friction",
     title="Friction that packs smarticles as Gravish et al. 2012 found",
     measure=measure,
-    keys=(Key(column=ASPECT, label="l/w", form="g"), Key(column=FRICTION, label="friction", form="g")),
+    keys=(ASPECT_KEY, Key(column=FRICTION, label="friction", form="g")),
     quantities=(
-        Quantity(column=PHI, label="φ_f", form=".4f", meaning="packing fraction at a stage"),
+        PHI_QUANTITY,
         Quantity(column=DEVIATION, label="from Gravish [%]", form="+.1f", meaning="less Gravish's, over it"),
     ),
     findings=FINDINGS,
     figures=(
-        Drawing(name="phi_friction", of=_draw),
+        Means(
+            name="phi_friction",
+            quantities=[PHI_QUANTITY],
+            x=FRICTION,
+            x_label=r"coefficient of friction $\mu$ [-]",
+            split=one_by_one(STAGE, str),
+            rows=_shown,
+            panels=ASPECT,
+            levels=_gravish,
+            share_y=True,
+            bars=POOLED,
+            notes=[gravish_note((0.4, 0.7, 1.0))],
+        ),
         Histories(
             name="phi_time",
             history=while_shaken,
             split=one_by_one(FRICTION, r"$\mu$ = {:g}".format),
             panels=ASPECT,
-            panel="l/w = {:g}",
-            width=WINDOW,
             log=True,
             x_label="time since shaking began [s]",
-            y_label=r"packing fraction $\phi$ [-]",
+            quantities={"": r"packing fraction $\phi$ [-]"},
         ),
     ),
     extra=tabulate,

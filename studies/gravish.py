@@ -18,62 +18,57 @@ from dem.record.run import Run
 from postprocess.measures.packing import DEFINITIONS
 from postprocess.statistics.columns import ASPECT, SEED, SEEDS
 from postprocess.statistics.seeds import SeedMean, mean_over_seeds
-from studies.framework.engines import by_engine
-from studies.framework.figures import Histories, Means, Series, one_by_one
-from studies.framework.findings import Effect, Finding, Outcome, Verdict
-from studies.framework.plots import ASPECT_LABEL, CROSSINGS_LABEL, procedure_marker
+from studies.framework.figures import (
+    ASPECT_LABEL,
+    CROSSINGS_LABEL,
+    Histories,
+    Means,
+    Series,
+    one_by_one,
+    procedure_marker,
+)
+from studies.framework.findings import Effect, Finding, Outcome, Verdict, decide
 from studies.framework.procedures import EXTERNAL
-from studies.framework.provenance import (
-    COLUMNS,
+from studies.framework.runs import ASPECT_KEY, DEFINITION, Key, Row, by_engine, declare
+from studies.framework.shaken import (
     DIGITISING_ERROR,
     GRAVISH,
+    GRAVISH_COLUMNS,
     SHAKE_TIME,
-    read_reference,
-    reference_at,
-    told_reference,
+    SHAKEN,
+    STAGES,
+    WHEN,
+    gravish_at,
+    gravish_note,
+    measured_row,
+    packing_history,
+    phi,
+    read_gravish,
 )
-from studies.framework.quantities import Key, Quantity
-from studies.framework.runs import DEFINITION, Row
-from studies.framework.shaken import SHAKEN, STAGES, WHEN, measured_row, packing_history, phi
 from studies.framework.study import Study
 
 ACCEPTED = 10.0  # % of mean absolute deviation from Gravish's points
 COSTLY = "voronoi"  # takes seconds per frame, and is left out of drafts
 
-_SYMBOLS = {
-    "phi_0": ("φ_0", "$\\phi_0$ before shaking [-]"),
-    "phi_f": ("φ_f", "$\\phi_\\mathrm{f}$ at the end [-]"),
-    "phi_f relaxed": ("φ_f at rest again", ""),
-}
-
-
-QUANTITIES = {
-    quantity.column: quantity
-    for quantity in (
-        *(
-            Quantity(
-                column=phi(stage, definition),
-                label=_SYMBOLS[stage][0] if definition == DEFINITION else "",
-                form=".4f",
-                axis=_SYMBOLS[stage][1],
-                meaning=f"packing fraction {meaning}, by {definition}",
-            )
-            for definition in DEFINITIONS
-            for stage, meaning in STAGES.items()
-            if stage != "phi_f relaxed" or definition in (DEFINITION, "top-percentile")
-        ),
-        *(
-            Quantity(
-                column=f"crossings {when} [-]",
-                label=f"⟨N⟩ {when}",
-                form=".2f",
-                axis=f"{CROSSINGS_LABEL}\n{meaning}",
-                meaning=f"links through a smarticle's plane {meaning}",
-            )
-            for when, meaning in zip(("before", "after", "relaxed"), STAGES.values(), strict=True)
-        ),
-    )
-}
+_SYMBOLS = {"phi_0": "φ_0", "phi_f": "φ_f", "phi_f relaxed": "φ_f at rest again"}
+QUANTITIES = declare(
+    {
+        phi(stage, one): (_SYMBOLS[stage] * (one == DEFINITION), ".4f", f"packing fraction {meaning}, by {one}")
+        for one in DEFINITIONS
+        for stage, meaning in STAGES.items()
+        if stage != "phi_f relaxed" or one in (DEFINITION, "top-percentile")
+    }
+    | {
+        f"crossings {when} [-]": (f"⟨N⟩ {when}", ".2f", f"links through a smarticle's plane {meaning}")
+        for when, meaning in zip(("before", "after", "relaxed"), STAGES.values(), strict=True)
+    },
+    axes={
+        phi("phi_0"): r"$\phi_0$ before shaking [-]",
+        phi("phi_f"): r"$\phi_\mathrm{f}$ at the end [-]",
+        "crossings before [-]": f"{CROSSINGS_LABEL}\nbefore shaking",
+        "crossings after [-]": f"{CROSSINGS_LABEL}\nat the end of shaking",
+    },
+)
 
 
 def measure(run: Run) -> Row:
@@ -91,27 +86,17 @@ def phi_by_aspect(runs: pd.DataFrame, stage: str) -> Mapping[float, SeedMean]:
 
 def deviations(runs: pd.DataFrame) -> pd.DataFrame:
     """Set φ against Gravish's points, one row per stage and l/w at which there is one."""
-    reference, rows = read_reference(), []
+    rows = []
     for stage in STAGES:
         for aspect, mean in phi_by_aspect(runs, stage).items():
-            known = reference_at(reference, aspect, stage)
+            known = gravish_at(aspect, stage)
             if math.isnan(known):
                 continue
-            rows.append(
-                {
-                    "stage": stage,
-                    "definition": DEFINITION,
-                    ASPECT: aspect,
-                    SEEDS: mean.count,
-                    "phi [-]": mean.value,
-                    "phi 95 % [-]": mean.half_width,
-                    "phi Gravish [-]": known,
-                    "digitising error [-]": DIGITISING_ERROR,
-                    "deviation [-]": mean.value - known,
-                    "deviation [%]": 100 * (mean.value / known - 1),
-                    "deviation 95 % [%]": 100 * mean.half_width / known,
-                }
-            )
+            row = {"stage": stage, "definition": DEFINITION, ASPECT: aspect, SEEDS: mean.count}
+            row |= {"phi [-]": mean.value, "phi 95 % [-]": mean.half_width, "phi Gravish [-]": known}
+            row |= {"digitising error [-]": DIGITISING_ERROR, "deviation [-]": mean.value - known}
+            row["deviation [%]"] = 100 * (mean.value / known - 1)
+            rows.append(row | {"deviation 95 % [%]": 100 * mean.half_width / known})
     return pd.DataFrame(rows)
 
 
@@ -124,23 +109,9 @@ def steps(runs: pd.DataFrame) -> pd.DataFrame:
             way = "falls" if difference < 0 else "rises"
             if not abs(difference) > half_width:
                 way = "no error bar" if math.isnan(half_width) else "within error bars"
-            rows.append(
-                {
-                    "stage": stage,
-                    "definition": DEFINITION,
-                    "from aspect ratio [-]": low,
-                    "to aspect ratio [-]": high,
-                    "difference [-]": difference,
-                    "combined 95 % [-]": half_width,
-                    "phi": way,
-                }
-            )
-    return pd.DataFrame(rows)
-
-
-def tabulate(runs: pd.DataFrame) -> dict[str, pd.DataFrame]:
-    """Make `deviations` and `steps`, engine by engine."""
-    return {"deviations": by_engine(runs, deviations), "steps": by_engine(runs, steps)}
+            rows.append((stage, DEFINITION, low, high, difference, half_width, way))
+    ends = ["from aspect ratio [-]", "to aspect ratio [-]"]
+    return pd.DataFrame(rows, columns=["stage", "definition", *ends, "difference [-]", "combined 95 % [-]", "phi"])
 
 
 def falls(stage: str) -> Finding:
@@ -151,30 +122,20 @@ def falls(stage: str) -> Finding:
         if len(means) < 2:
             return Outcome(note="fewer than two aspect ratios", verdict=Verdict.NOT_RESOLVED)
         found = steps(runs)
-        found = found[found["stage"] == stage]
-        ways = found["phi"].value_counts()
-        fall, rise, within, bare = (
-            ways.get(name, 0) for name in ("falls", "rises", "within error bars", "no error bar")
-        )
+        ways = found.loc[found["stage"] == stage, "phi"].value_counts()
         (low, first), (high, last) = means[0], means[-1]
         half_width = math.hypot(first.half_width, last.half_width)
         total = SeedMean(value=last.value - first.value, standard_error=math.nan, half_width=half_width, count=2)
-        effect = Effect(
-            label=f"change from l/w = {low:g} to {high:g}",
-            value=total,
-            sign=-1,
-            text=f"{total.value:+.4f} ± {half_width:.4f} (95 %)",
-        )
-        note = f"of {len(found)} steps {fall} fall and {rise} rise by more than the combined 95 % half-width, {within} "
-        note += f"lie within it, {bare} have no error bar; means fall at {(found['difference [-]'] < 0).sum()}"
+        text = f"{total.value:+.4f} ± {half_width:.4f} (95 %)"
+        effect = Effect(label=f"change from l/w = {low:g} to {high:g}", value=total, sign=-1, text=text)
+        note = f"steps: {', '.join(f'{count} {way}' for way, count in ways.items())}"
         # A flat line with wide error bars is not monotone: the whole change must be beyond them.
-        clear = effect.verdict == Verdict.FOUND and not bare
-        verdict = Verdict.NOT_FOUND if rise else Verdict.FOUND if clear else Verdict.NOT_RESOLVED
-        return Outcome(effects=[effect], note=note, verdict=verdict)
+        rises, clear = "rises" in ways, effect.verdict == Verdict.FOUND and "no error bar" not in ways
+        return Outcome(effects=[effect], note=note, verdict=decide(clear and not rises, rises))
 
     return Finding(
         id=f"{_id(stage)}-falls",
-        says=f"{_SYMBOLS[stage][0]} falls monotonically with l/w within error bars",
+        says=f"{_SYMBOLS[stage]} falls monotonically with l/w within error bars",
         outcome=outcome,
         found_if="no step between neighbouring l/w rises by more than its 95 % half-width, and the whole change is "
         "beyond its own",
@@ -197,12 +158,12 @@ def near(stage: str) -> Finding:
         note = f"the largest {worst['deviation [%]']:+.1f} % at l/w = {worst[ASPECT]:g}; reading Gravish's points is "
         note += f"uncertain by about {100 * DIGITISING_ERROR / found['phi Gravish [-]'].mean():.1f} %"
         effect = Effect(label="mean absolute deviation", value=value, sign=0, text=f"{value.value:.1f} % {error}")
-        verdict = Verdict.FOUND if value.value <= ACCEPTED else Verdict.NOT_FOUND
-        return Outcome(effects=[effect], note=note, verdict=verdict)
+        near = value.value <= ACCEPTED
+        return Outcome(effects=[effect], note=note, verdict=decide(near, not near))
 
     return Finding(
         id=f"{_id(stage)}-near",
-        says=f"The mean absolute deviation of {_SYMBOLS[stage][0]} from Gravish is at most {ACCEPTED:g} %",
+        says=f"The mean absolute deviation of {_SYMBOLS[stage]} from Gravish is at most {ACCEPTED:g} %",
         outcome=outcome,
         found_if="mean over the l/w at which Gravish has a point",
     )
@@ -216,27 +177,22 @@ def _compacts(runs: pd.DataFrame) -> Outcome:
     gain = runs[phi("phi_f")] - runs[phi("phi_0")]
     means = [mean_over_seeds(part) for _, part in gain.groupby(runs[ASPECT])]
     clear = sum(mean.value > mean.half_width for mean in means)
-    least = min((mean.value for mean in means if not math.isnan(mean.value)), default=math.nan)
-    verdict = Verdict.FOUND if clear == len(means) else Verdict.NOT_RESOLVED
-    if any(mean.value <= 0 for mean in means):
-        verdict = Verdict.NOT_FOUND
-    note = f"gain paired by seed: above 0 by more than its 95 % half-width at {clear} of {len(means)} l/w, and in "
-    return Outcome(
-        note=f"{note}{(gain > 0).sum()} of {len(gain)} runs; the least mean is {least:+.4f}", verdict=verdict
-    )
+    note = f"gain paired by seed: above 0 by more than its 95 % half-width at {clear} of {len(means)} l/w"
+    falls = any(mean.value <= 0 for mean in means)
+    return Outcome(note=note, verdict=decide(clear == len(means) and not falls, falls))
 
 
 def _line(points: pd.DataFrame) -> list[Series]:
     return [Series(rows=points, label="simulation", look=procedure_marker(EXTERNAL))]
 
 
-_PUBLISHED = read_reference()
+_PUBLISHED = read_gravish()
 
 STUDY = Study(
     name="gravish",
     title="Packing of shaken smarticles against Gravish et al. 2012",
     measure=measure,
-    keys=(Key(column=ASPECT, label="l/w", form="g"), Key(column=SHAKEN, label="shaken [s]", form="g")),
+    keys=(ASPECT_KEY, Key(column=SHAKEN, label="shaken [s]", form="g")),
     quantities=tuple(QUANTITIES.values()),
     findings=(
         *map(falls, STAGES),
@@ -257,9 +213,9 @@ STUDY = Study(
             split=_line,
             share_y=True,
             reference={
-                phi(stage): (_PUBLISHED["l_over_w"], _PUBLISHED[COLUMNS[stage]]) for stage in ("phi_0", "phi_f")
+                phi(stage): (_PUBLISHED["l_over_w"], _PUBLISHED[GRAVISH_COLUMNS[stage]]) for stage in ("phi_0", "phi_f")
             },
-            told=[told_reference(sorted(_PUBLISHED["l_over_w"]), ("phi_0", "phi_f"))],
+            notes=[gravish_note(sorted(_PUBLISHED["l_over_w"]))],
         ),
         Means(
             name="crossings",
@@ -274,10 +230,10 @@ STUDY = Study(
             history=packing_history,
             split=one_by_one(ASPECT, "l/w = {:g}".format, last=0.9),
             x_label="time since shaking began [s]",
-            y_label=r"packing fraction $\phi$ [-]",
+            quantities={"": r"packing fraction $\phi$ [-]"},
         ),
     ),
-    extra=tabulate,
+    extra=lambda runs: {name: by_engine(runs, made) for name, made in (("deviations", deviations), ("steps", steps))},
     order=(ASPECT, SEED),
     from_tables=True,
     remarks=(

@@ -71,7 +71,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser = argparse.ArgumentParser(prog="python -m studies.hours", description="Hours of studies, planned and taken.")
     parser.add_argument("folder", type=Path, help="whose folders are those of studies")
     parser.add_argument("studies", nargs="*", help="names of the folders wanted (default: all)")
-    parser.add_argument("--out", type=Path, help="folder for hours.csv (default: the same)")
+    parser.add_argument("--out", type=Path, help="folder for hours.csv (default: FOLDER)")
     given = parser.parse_args(arguments)
     try:
         table = hours(given.folder, given.studies)

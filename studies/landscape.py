@@ -17,15 +17,11 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from functools import partial
-from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pandas as pd
-from matplotlib.cm import ScalarMappable
-from matplotlib.colors import Normalize
 
 from dem.errors import InputError
 from dem.record.run import Run
@@ -35,7 +31,7 @@ from postprocess.measures.table import summarise_run
 from postprocess.report import figures as style
 from postprocess.statistics.columns import ASPECT, SEED
 from postprocess.statistics.findings import judge, told
-from postprocess.statistics.points import marked, mean_columns, told_number
+from postprocess.statistics.points import averaged, told_number
 from postprocess.statistics.ranks import (
     Floats,
     Interval,
@@ -47,12 +43,12 @@ from postprocess.statistics.ranks import (
     resampled,
 )
 from postprocess.statistics.seeds import mean_over_seeds
-from studies.framework.figures import Analysis, Drawing, one_by_one
-from studies.framework.findings import Finding, Outcome, Verdict
-from studies.framework.plots import CROSSINGS_LABEL, draw_means, finished, procedure_marker
+from studies.framework.figures import Means, Rows, Scatter, Series, marker, one_by_one, procedure_marker
+from studies.framework.findings import Finding, Outcome, Verdict, decide
 from studies.framework.procedures import (
     ACTIVE,
     CROSSINGS,
+    ENERGY,
     EXTERNAL,
     INTERNAL,
     PHI,
@@ -60,18 +56,18 @@ from studies.framework.procedures import (
     SHAPE,
     STATIC,
     THETA,
+    gained,
     prepared_by,
 )
 from studies.framework.provenance import NOTHING
-from studies.framework.quantities import Key, Quantity
-from studies.framework.runs import DEFINITION, Row, duration
+from studies.framework.runs import ASPECT_KEY, DEFINITION, THETA_KEY, Key, Quantity, Row, declare, last_columns
 from studies.framework.study import Study
 
 PLANNED = "time planned [s]"
 LINKING, CONTACTS = "linking number per smarticle [-]", "contacts per smarticle [-]"
 TOUCHING, ENTANGLED = "largest cluster in contact [-]", "largest entangled cluster [-]"
 HEIGHT, ABOVE = "com height [m]", "smarticles above the hook [-]"
-ENERGY, LIFTS = "energy per smarticle [J]", "energy per smarticle over W_s w [-]"
+LIFTS = "energy per smarticle over W_s w [-]"
 PEAK, BEYOND = "strength over n W_s [-]", "strength beyond the weight above over n W_s [-]"
 RAISED, WORK, HELD_FAST = "hook raised at the peak [m]", "work over n W_s w [-]", "held fast [-]"
 
@@ -86,48 +82,29 @@ PREDICTORS = {
     ABOVE: "share above the hook",
     ENERGY: "energy spent",
 }
-"""What may tell strength, all at rest before the pull, and what it is called."""
+"""What may predict strength, all at rest before the pull, and what it is called."""
 
 STRENGTHS = {PEAK: "strength", BEYOND: "strength beyond the weight above the hook"}
 
-QUANTITIES = (
-    Quantity(column=PHI, label="φ", form=".4f", meaning="packing fraction"),
-    Quantity(column=CROSSINGS, label="⟨N⟩", form=".2f", meaning="⟨N⟩: links of others through a smarticle's plane"),
-    Quantity(
-        column=LINKING,
-        label="linking",
-        meaning="Gauss's linking integral with all others, closed barb tip to barb tip, absolute values added up",
-    ),
-    Quantity(column=CONTACTS, meaning="other smarticles that a smarticle touches"),
-    Quantity(column=TOUCHING, meaning="share of the smarticles in the largest cluster of touching ones"),
-    Quantity(column=ENTANGLED, meaning="share of the smarticles in the largest cluster of entangled ones"),
-    Quantity(column=HEIGHT, meaning="of the centre of mass above the floor"),
-    Quantity(
-        column=ABOVE,
-        label="above the hook",
-        form=".2f",
-        meaning="share of the smarticles whose centre of mass is above the hook",
-    ),
-    Quantity(
-        column=ENERGY,
-        label="energy [J]",
-        form=".2e",
-        meaning="work of the motors, or of the shaken floor, up to the pull; static: none",
-    ),
-    Quantity(
-        column=PEAK,
-        label="strength",
-        form=".3f",
-        meaning=f"largest mean over {WINDOW:g} s of the force that raises the hook, over n W_s; at least, where the "
-        "pile held fast",
-    ),
-    Quantity(
-        column=BEYOND, meaning="strength less the share of the smarticles above the hook, their weight over n W_s"
-    ),
-    Quantity(column=LIFTS, meaning="the energy over the work that lifts a smarticle by w"),
-    Quantity(column=RAISED, meaning="how far the hook had been raised at the peak"),
-    Quantity(column=WORK, meaning="∫ F dz over the whole pull, over n W_s w"),
-    Quantity(column=HELD_FAST, meaning="1 where the hook was stopped by its force limit on the way, 0 elsewhere"),
+QUANTITIES = declare(
+    {
+        PHI: ("φ", ".4f", "packing fraction"),
+        CROSSINGS: ("⟨N⟩", ".2f", "⟨N⟩: links of others through a smarticle's plane"),
+        LINKING: ("linking", "", "Gauss's linking integral with all others, closed tip to tip, absolute values added"),
+        CONTACTS: ("", "", "other smarticles that a smarticle touches"),
+        TOUCHING: ("", "", "share of the smarticles in the largest cluster of touching ones"),
+        ENTANGLED: ("", "", "share of the smarticles in the largest cluster of entangled ones"),
+        HEIGHT: ("", "", "of the centre of mass above the floor"),
+        ABOVE: ("above the hook", ".2f", "share of the smarticles whose centre of mass is above the hook"),
+        ENERGY: ("energy [J]", ".2e", "work of the motors, or of the shaken floor, up to the pull; static: none"),
+        PEAK: ("strength", ".3f", f"largest mean over {WINDOW:g} s of the force on the hook; at least, where it held"),
+        BEYOND: ("", "", "strength less the share of the smarticles above the hook, their weight over n W_s"),
+        LIFTS: ("", "", "the energy over the work that lifts a smarticle by w"),
+        RAISED: ("", "", "how far the hook had been raised at the peak"),
+        WORK: ("", "", "∫ F dz over the whole pull, over n W_s w"),
+        HELD_FAST: ("", "", "1 where the hook was stopped by its force limit on the way, 0 elsewhere"),
+    },
+    axes={PEAK: r"strength $F/(n W_\mathrm{s})$ [-]"},
 )
 
 _MEASURED = {
@@ -144,46 +121,39 @@ _NAMED = re.compile(r"[^_]+_(?P<time>\d+(?:\.\d+)?)s_.+")
 
 def measure(run: Run) -> Row:
     """Measure the pile before the pull, the energy spent on it, and its strength."""
-    procedure = prepared_by(run, PULL)
-    pulled, named = run.phases[-1], _NAMED.fullmatch(run.path.name)
+    pile = prepared_by(run, PULL)
+    active, pulled, named = pile.pop(ACTIVE), run.phases[-1], _NAMED.fullmatch(run.path.name)
     rest = pulled.index - 1
-    settings, series = run.scene["phases"], run.series
-    hooks, frames = run.scene.get("hooks"), run.frames.in_phase(rest)
+    settings, hooks, frames = run.scene["phases"][pulled.index], run.scene.get("hooks"), run.frames.in_phase(rest)
     if named is None:  # the run's own time is rounded to whole swings
         msg = f"{run.path}: not named like a run of this study, such as internal10_2s_lw0.70_seed1"
         raise InputError(msg)
-    if hooks is None or not frames or settings[pulled.index]["type"] != PULL:
+    if hooks is None or not frames or settings["type"] != PULL:
         msg = f"{run.path}: no hooks or pull in scene.yaml, or no frame of the rest before the pull; run it again"
         raise InputError(msg)
     before = summarise_run(run, definitions=[DEFINITION], phases={rest}).set_index("phase").loc[rest]
     heights = centres_of_mass(frames[-1].vertices)[:, 2] - frames[-1].floor_z
     above = float((heights > hooks["upper_height_m"]).mean())
-    weight = weight_of_one(run)
-    total, energy = run.manifest.count * weight, _spent(run, procedure, rest) / run.manifest.count
-    pull = read_pull(run, series, pulled.index)
+    weight, width = weight_of_one(run), run.manifest.middle_length_m
+    total, energy = run.manifest.count * weight, _spent(run, str(pile[PROCEDURE]), rest) / run.manifest.count
+    pull = read_pull(run, run.series, pulled.index)
     highest = peak(pull)
     return {
-        PROCEDURE: procedure,
-        THETA: settings[2]["theta_deg"] if procedure == INTERNAL else math.nan,
-        ASPECT: round(run.manifest.aspect_ratio, 6),
-        SEED: run.manifest.seed,
-        "smarticles [-]": run.manifest.count,
-        "fidelity": run.manifest.fidelity,
+        **pile,
         PLANNED: float(named["time"]),
-        ACTIVE: duration(run.phases[2]) if procedure != STATIC else 0.0,
+        ACTIVE: active,
         **{column: before[measured] for column, measured in _MEASURED.items()},
         ABOVE: above,
         ENERGY: energy,
-        LIFTS: energy / weight / run.manifest.middle_length_m,
+        LIFTS: energy / weight / width,
         PEAK: highest.force / total,
         BEYOND: highest.force / total - above,
         RAISED: highest.raised,
-        WORK: pull.work / total / run.manifest.middle_length_m,
-        HELD_FAST: float(held_fast(pull, settings[pulled.index])),
+        WORK: pull.work / total / width,
+        HELD_FAST: float(held_fast(pull, settings)),
         "escaped at the end [-]": before["escaped [-]"],
         "frames averaged [-]": int(before["frames averaged"]),
-        "scene_sha256": run.manifest.scene_sha256,
-        "run": run.path.name,
+        **last_columns(run),
     }
 
 
@@ -193,13 +163,11 @@ def _spent(run: Run, procedure: str, rest: int) -> float:
         return 0.0
     series = run.series
     name = "container_work_J" if procedure == EXTERNAL else "motor_work_J"
-    work = series.data.get(name)
-    if work is None:
+    if name not in series.data:
         msg = f"{series.path}: no {name} of {run.path}; run it with recording.energy"
         raise InputError(msg)
-    known = np.isfinite(work)
-    start, end = (work[known & (series["phase"] <= phase)] for phase in (1, rest))
-    return float(end[-1] - (start[-1] if len(start) else 0.0)) if len(end) else math.nan
+    until = series["phase"] <= rest
+    return gained(series[name][until], series["phase"][until] <= 1)
 
 
 # Which measure goes with strength
@@ -228,11 +196,8 @@ def predicted(runs: pd.DataFrame) -> tuple[pd.DataFrame, pd.DataFrame]:
     """
     each: list[dict[str, object]] = []
     against: list[dict[str, object]] = []
-    parts = {
-        EVERY: runs,
-        FREE: runs[runs[HELD_FAST] == 0],
-        SWUNG: runs[runs[PROCEDURE].isin([STATIC, INTERNAL])],
-    }
+    internal = runs[runs[PROCEDURE].isin([STATIC, INTERNAL])]
+    parts = {EVERY: runs, FREE: runs[runs[HELD_FAST] == 0], SWUNG: internal}
     for strength in STRENGTHS:
         for name, part in parts.items():
             if name != EVERY and len(part) == len(runs):
@@ -269,32 +234,29 @@ def _correlated(
     drawn = resampled(measures, blocks, strata, count=RESAMPLES, seed=DRAW)
     if few_blocks(blocks, strata):
         drawn[:] = np.nan
-    rho, slopes = values[: len(names)], values[len(names) :]
+    rho = values[: len(names)]
+    ends = [interval(float(value), column.tolist()) for value, column in zip(values, drawn.T, strict=True)]
     sizes = drawn[:, : len(names)] * np.sign(rho)
-    # Columns that are the same throughout have no correlation, and none is first.
+    # Columns that are constant have no correlation, and none is first.
     order = [int(k) for k in np.argsort(-np.abs(np.where(np.isfinite(rho), rho, 0)), kind="stable")]
     first = np.bincount(np.nanargmax(np.where(np.isfinite(sizes), sizes, -np.inf), axis=1), minlength=len(names))
     unknown = ~np.isfinite(sizes).any()
     spread = (table[names] - table[names].groupby(levels).transform("mean")).to_numpy(dtype=np.float64).std(axis=0)
-    found = []
-    for k in order:
-        ends = interval(float(rho[k]), drawn[:, k].tolist())
-        tilt = interval(float(slopes[k]), drawn[:, len(names) + k].tolist())
-        found.append(
-            {
-                PREDICTOR: names[k],
-                "runs [-]": len(table),
-                "trajectories [-]": len(np.unique(blocks)),
-                RHO: ends.value,
-                LOW: ends.low,
-                HIGH: ends.high,
-                "slope per unit of the measure": tilt.value,
-                "slope per SD [-]": tilt.value * spread[k],
-                "slope from [-]": tilt.low * spread[k],
-                "slope to [-]": tilt.high * spread[k],
-                FIRST: np.nan if unknown else first[k] / RESAMPLES,
-            }
-        )
+    found = [
+        {
+            PREDICTOR: names[k],
+            "runs [-]": len(table),
+            "trajectories [-]": len(np.unique(blocks)),
+            **dict(zip((RHO, LOW, HIGH), (own.value, own.low, own.high), strict=True)),
+            "slope per unit of the measure": tilt.value,
+            "slope per SD [-]": tilt.value * spread[k],
+            "slope from [-]": tilt.low * spread[k],
+            "slope to [-]": tilt.high * spread[k],
+            FIRST: np.nan if unknown else first[k] / RESAMPLES,
+        }
+        for k in order
+        for own, tilt in [(ends[k], ends[len(names) + k])]
+    ]
     best, *others = order
     compared = []
     for k in others:
@@ -341,17 +303,9 @@ def costs(runs: pd.DataFrame) -> pd.DataFrame:
         rows = []
         for point, group in part.groupby(_POINT, dropna=False):
             ratio = _drawn_ratio(group[[GAIN, LIFTS]].to_numpy(dtype=np.float64))
-            rows.append(
-                {
-                    SCOPE: scope,
-                    **dict(zip(_POINT, point, strict=True)),
-                    PAIRS: len(group),
-                    **{key: cell for name in (GAIN, ENERGY, LIFTS) for key, cell in _mean(group, name).items()},
-                    YIELD: ratio.value,
-                    LOW: ratio.low,
-                    HIGH: ratio.high,
-                }
-            )
+            row = {SCOPE: scope, **dict(zip(_POINT, point, strict=True)), PAIRS: len(group)}
+            row |= averaged(group, (GAIN, ENERGY, LIFTS))
+            rows.append(row | {YIELD: ratio.value, LOW: ratio.low, HIGH: ratio.high})
         table = pd.DataFrame(rows)
         if len(table):
             best = [
@@ -362,12 +316,8 @@ def costs(runs: pd.DataFrame) -> pd.DataFrame:
     return pd.concat(tables, ignore_index=True) if tables else pd.DataFrame()
 
 
-def _mean(group: pd.DataFrame, name: str) -> Mapping[str, float]:
-    return mean_columns(name, mean_over_seeds(group[name]))
-
-
 def _drawn_ratio(values: Floats) -> Interval:
-    """Divide means of pairs, gain over energy, and where there are four columns that by the same of the others.
+    """Divide means of pairs, gain over energy, and where there are four columns that by the ratio of the others.
 
     With the 95 % interval by drawing pairs anew; NaN ends below three pairs.
     """
@@ -432,13 +382,12 @@ def _best(predictors: pd.DataFrame, comparisons: pd.DataFrame, strength: str, sc
         return Outcome(verdict=Verdict.NO_DATA)
     first = found.iloc[0]
     rivals = against[against[VERDICT] == "not resolved"]
-    surely = rivals.empty and len(against) > 0 and math.isfinite(first[LOW])
     listed = ", ".join(f"{PREDICTORS[row[PREDICTOR]]} {_rho(row)}" for _, row in found.iloc[:4].iterrows())
     open_ = f"; not resolved against {', '.join(PREDICTORS[name] for name in rivals[OTHER])}" if len(rivals) else ""
     share = told_number(100 * first[FIRST], ".0f")
     return Outcome(
         note=f"{PREDICTORS[first[PREDICTOR]]}, first in {share} % of resamples; rank correlations {listed}{open_}",
-        verdict=Verdict.FOUND if surely else Verdict.NOT_RESOLVED,
+        verdict=decide(rivals.empty and len(against) > 0 and math.isfinite(first[LOW])),
     )
 
 
@@ -448,32 +397,28 @@ def _sign(predictors: pd.DataFrame, measure: str, part: str) -> Outcome:
     if rows.empty:
         return Outcome(verdict=Verdict.NO_DATA)
     row = rows.iloc[0]
-    verdict = Verdict.FOUND if row[LOW] > 0 else Verdict.NOT_FOUND if row[HIGH] < 0 else Verdict.NOT_RESOLVED
-    return Outcome(note=f"rank correlation {_rho(row)}", verdict=verdict)
+    return Outcome(note=f"rank correlation {_rho(row)}", verdict=decide(row[LOW] > 0, row[HIGH] < 0))
 
 
 def _cheapest(runs: pd.DataFrame, table: pd.DataFrame) -> Outcome:
     best = best_points(table)
     if best.empty:
         return Outcome(note="no procedure surely gains strength", verdict=Verdict.NOT_RESOLVED)
-    gained = gains(runs)
-    gained = gained[gained[ASPECT].isin(common_aspects(runs))]
+    bought = gains(runs)
+    bought = bought[bought[ASPECT].isin(common_aspects(runs))]
     ratios = {}
     for _, row in best.iloc[1:].iterrows():
         # Over the l/w and seeds that both have, drawn together.
-        pair = [_at_point(gained, point)[[GAIN, LIFTS]] for point in (best.iloc[0], row)]
+        pair = [_at_point(bought, point)[[GAIN, LIFTS]] for point in (best.iloc[0], row)]
         both = pd.concat(pair, axis=1, join="inner").to_numpy(dtype=np.float64)
         ratios[row[PROCEDURE]] = _drawn_ratio(both)
     listed = "; ".join(
         f"{_named(row)} {_interval(row[YIELD], row[LOW], row[HIGH], '.3g')}" for _, row in best.iterrows()
     )
     times = ", ".join(f"{_interval(one.value, one.low, one.high, '.3g')} times {name}" for name, one in ratios.items())
-    without = sorted(set(map(str, table[PROCEDURE])) - set(best[PROCEDURE]))
-    note = f"n W_s gained per W_s w of energy and smarticle: {listed}" + (f"; the first {times}" if times else "")
-    surely = bool(ratios) and all(ratio.low > 1 for ratio in ratios.values())
     return Outcome(
-        note=note + (f"; no sure gain: {', '.join(without)}" if without else ""),
-        verdict=Verdict.FOUND if surely else Verdict.NOT_RESOLVED,
+        note=f"n W_s gained per W_s w of energy and smarticle: {listed}; the first {times or 'alone'}",
+        verdict=decide(bool(ratios) and all(ratio.low > 1 for ratio in ratios.values())),
     )
 
 
@@ -482,23 +427,19 @@ def _as_strong(runs: pd.DataFrame, costs: pd.DataFrame) -> Outcome:
     shape, swung = (table[table[PROCEDURE] == name] if len(table) else table for name in (SHAPE, INTERNAL))
     if shape.empty or swung.empty:
         return Outcome(verdict=Verdict.NO_DATA)
-    gained = gains(runs)
-    gained = gained[gained[ASPECT].isin(common_aspects(runs))]
-    by_shape = _at_point(gained, shape.iloc[0])[GAIN]
+    bought = gains(runs)
+    bought = bought[bought[ASPECT].isin(common_aspects(runs))]
+    by_shape = _at_point(bought, shape.iloc[0])[GAIN]
     lacks = {
-        _named(row): mean_over_seeds((by_shape - _at_point(gained, row)[GAIN]).dropna().tolist())
+        _named(row): mean_over_seeds((by_shape - _at_point(bought, row)[GAIN]).dropna().tolist())
         for _, row in swung.iterrows()
     }
     nearest = min(lacks, key=lambda name: math.inf if math.isnan(lacks[name].value) else lacks[name].value)
-    verdict = Verdict.NOT_RESOLVED
-    if judge(lacks[nearest]) == "not found":
-        verdict = Verdict.FOUND
-    elif all(judge(effect) == "found" for effect in lacks.values()):
-        verdict = Verdict.NOT_FOUND
+    stronger = all(judge(effect) == "found" for effect in lacks.values())
     return Outcome(
         note=f"shape change less the strongest, {nearest}: {told(lacks[nearest], 3)} n W_s over l/w and seeds; it "
         f"spends {shape.iloc[0][LIFTS]:.3g} W_s w per smarticle",
-        verdict=verdict,
+        verdict=decide(judge(lacks[nearest]) == "not found", stronger),
     )
 
 
@@ -548,155 +489,92 @@ FINDINGS = (
 
 # Figures
 
-_STRENGTH = r"strength $F/(n W_\mathrm{s})$ [-]"
-_ENERGY = "energy per smarticle [J]"
-_MAPPED = {
-    PHI: r"$\phi$ [-]",
-    CROSSINGS: r"$\langle N\rangle$ [-]",
-    LINKING: "linking\nnumber [-]",
-    PEAK: "strength [-]",
-}
-_NAMES = {STATIC: "poured", SHAPE: "shape change", EXTERNAL: "shaken", INTERNAL: "oscillation"}
-_PAGE = 2 * style.COLUMN_WIDTH
-_CELL = 2.0**0.5  # cells of the maps reach by this factor of energy to either side, where no other one is nearer
-_by_theta = one_by_one(THETA, lambda theta: rf"oscillation, $\theta$ = {theta:g}°")
+_MAPPED = (PHI, CROSSINGS, LINKING, PEAK)
+_by_aspect = one_by_one(ASPECT, "l/w = {:g}".format)
 
 
-def _draw_maps(path: Path, analysis: Analysis) -> list[Path]:
-    """Draw a row of maps for each quantity, a column for each θ; a strip on the left for piles as poured."""
-    points = analysis.points
-    swung = points[(points[PROCEDURE] == INTERNAL) & (points[ENERGY] > 0)]
-    poured = points[points[PROCEDURE] == STATIC]
-    thetas, ratios = sorted(swung[THETA].unique()), sorted(pd.concat([swung, poured])[ASPECT].unique())
-    if not thetas:
-        return []
-    half = min(np.diff(ratios), default=0.1) / 2
-    left, right = float(swung[ENERGY].min()) / _CELL, float(swung[ENERGY].max()) * _CELL
-    figure = style.blank_figure(_PAGE, 1.35 * len(_MAPPED) + 0.5)
-    grid = figure.subplots(len(_MAPPED), len(thetas), sharex=True, sharey=True, squeeze=False)
-    for panels, (quantity, label) in zip(grid, _MAPPED.items(), strict=True):
-        shown = pd.concat([swung, poured])[quantity]
-        norm = Normalize(float(shown.min()), float(shown.max()))
-        for axes, theta in zip(panels, thetas, strict=True):
-            for aspect, row in swung[swung[THETA] == theta].groupby(ASPECT):
-                cells = row.sort_values(ENERGY)
-                energies = cells[ENERGY].to_numpy(dtype=np.float64)
-                edges = [energies[0] / _CELL, *np.sqrt(energies[:-1] * energies[1:]), energies[-1] * _CELL]
-                at_rest = poured.loc[poured[ASPECT] == aspect, quantity]
-                strips = [(edges, cells[quantity]), *(([left / 4, left / 2], [value]) for value in at_rest)]
-                for along, values in strips:
-                    axes.pcolormesh(
-                        along, [aspect - half, aspect + half], np.array([values]), norm=norm, cmap="viridis"
-                    )
-            axes.set_xscale("log")
-            axes.set_xlim(left / 5, right * 1.05)
-            axes.grid(visible=False)
-            axes.set_yticks(ratios)
-            axes.axvline(left / 1.4, color=style.GREY, linewidth=0.6, linestyle=(0, (4, 3)))
-        figure.colorbar(ScalarMappable(norm, "viridis"), ax=list(panels), pad=0.01, aspect=12).set_label(label)
-        panels[0].set_ylabel(r"$l/w$ [-]")
-    for axes, theta in zip(grid[0], thetas, strict=True):
-        axes.set_title(rf"$\theta$ = {theta:g}°", fontsize=8)
-    grid[-1][len(thetas) // 2].set_xlabel(_ENERGY)
-    told = "Left of the broken line: poured, no energy spent. Each cell is a point, a mean over its seeds."
-    return finished(figure, path, [told], analysis.footer)
+def _swung(table: pd.DataFrame) -> pd.DataFrame:
+    """Select the internal oscillation, from little energy to much."""
+    return table[(table[PROCEDURE] == INTERNAL) & (table[ENERGY] > 0)].sort_values(ENERGY)
 
 
-def _draw_bought(axes: Any, table: pd.DataFrame, x: str, y: str) -> None:
-    """Draw what each procedure buys for its energy: a line for each θ of the oscillation, markers for the others."""
-    bought = table[table[x] > 0].sort_values(x)
-    for series in _by_theta(bought[bought[PROCEDURE] == INTERNAL]):
-        rows = series.rows
-        draw_means(axes, rows[x], rows[y], rows[marked(y, "95 %")], look=series.look, label=series.label)
-    for name in (EXTERNAL, SHAPE):
-        rows = bought[bought[PROCEDURE] == name]
-        if len(rows):
-            look = {**procedure_marker(name), "linestyle": "none"}
-            draw_means(axes, rows[x], rows[y], rows[marked(y, "95 %")], look=look, label=_NAMES[name])
-    axes.set_xscale("log")
+def _bought(table: pd.DataFrame) -> list[Series]:
+    """Make a line of each θ of the internal oscillation, and markers of the other procedures."""
+    others = [
+        Series(rows=table[table[PROCEDURE] == name], label=name, look={**procedure_marker(name), "linestyle": "none"})
+        for name in (EXTERNAL, SHAPE)
+    ]
+    return [*one_by_one(THETA, "internal, θ = {:g}°".format)(_swung(table)), *others]
 
 
-def _draw_energies(path: Path, analysis: Analysis) -> list[Path]:
-    """Draw strength against energy, a panel for each l/w; the poured pile as a level."""
-    groups = list(analysis.points.groupby(ASPECT))
-    columns = min(len(groups), 4)
-    lines = -(-len(groups) // columns)
-    figure = style.blank_figure(_PAGE, 1.75 * lines + 0.5)
-    grid = figure.subplots(lines, columns, sharex=True, sharey=True, squeeze=False)
-    for axes in grid.flat[len(groups) :]:
-        axes.set_visible(False)
-    for axes, (ratio, here) in zip(grid.flat, groups, strict=False):
-        _draw_bought(axes, here, ENERGY, PEAK)
-        for level in here.loc[here[PROCEDURE] == STATIC, PEAK]:
-            axes.axhline(level, color=style.GREY, linewidth=0.8, linestyle=(0, (4, 3)), label="poured")
-        axes.set_ylim(bottom=0)
-        axes.set_title(f"l/w = {ratio:g}", fontsize=8)
-    for axes in grid[:, 0]:
-        axes.set_ylabel(_STRENGTH)
-    for axes in grid[-1]:
-        axes.set_xlabel(_ENERGY)
-    fullest = max(grid.flat, key=lambda axes: len(axes.get_legend_handles_labels()[1]))
-    figure.legend(*fullest.get_legend_handles_labels(), loc="outside upper center", ncols=4)
-    return finished(figure, path, [], analysis.footer)
+def _poured(points: pd.DataFrame) -> dict[str, float]:
+    return {"poured": float(points.loc[points[PROCEDURE] == STATIC, PEAK].mean())}
 
 
-def _draw_measures(path: Path, analysis: Analysis) -> list[Path]:
-    """Draw the strength of every run against each measure, coloured by l/w."""
-    runs = analysis.runs
-    figure = style.blank_figure(_PAGE, 6.0)
-    grid = figure.subplots(3, 3, sharey=True)
-    norm = Normalize(float(runs[ASPECT].min()), float(runs[ASPECT].max()))
-    for axes, name in zip(grid.flat, PREDICTORS, strict=True):
-        known = runs[runs[name] > 0] if name == ENERGY else runs
-        for procedure, mark in ((INTERNAL, "o"), (STATIC, "^"), (EXTERNAL, "D"), (SHAPE, "s")):
-            part = known[known[PROCEDURE] == procedure]
-            look = {"norm": norm, "cmap": "viridis", "linewidths": 0.3, "edgecolors": style.BLACK}
-            if len(part):
-                axes.scatter(part[name], part[PEAK], s=9, c=part[ASPECT], marker=mark, label=_NAMES[procedure], **look)
-        axes.set_xscale("log" if name == ENERGY else "linear")
-        axes.set_xlabel(CROSSINGS_LABEL if name == CROSSINGS else name)
-        axes.set_ylim(bottom=0)
-    for axes in grid[:, 0]:
-        axes.set_ylabel(_STRENGTH)
-    figure.colorbar(ScalarMappable(norm, "viridis"), ax=grid, label=r"$l/w$ [-]", pad=0.01, aspect=40)
-    figure.legend(*grid[0, 0].get_legend_handles_labels(), loc="outside upper center", ncols=4)
-    return finished(figure, path, ["Every run; energy: without piles as poured."], analysis.footer)
+def _correlations(table: pd.DataFrame) -> pd.DataFrame:
+    rows = table[(table[STRENGTH] == PEAK) & (table[PART] == EVERY)]
+    return pd.concat([rows[rows[SCOPE] == scope] for scope in (WITHIN, ALL)])
 
 
-def _draw_correlations(path: Path, analysis: Analysis) -> list[Path]:
-    """Draw rank correlations of strength with each measure, over all l/w and within l/w, with their intervals."""
-    predictors = analysis.tables["predictors"]
-    if predictors.empty:
-        return []
-    figure, axes = style.new_figure(width=1.5 * style.COLUMN_WIDTH, height=2.9)
-    names = _at(predictors, PEAK, EVERY, WITHIN)[PREDICTOR].tolist()[::-1]
-    for scope, mark, colour, beside in ((WITHIN, "o", style.ORANGE, 0.14), (ALL, "D", style.BLUE, -0.14)):
-        rows = _at(predictors, PEAK, EVERY, scope).set_index(PREDICTOR).loc[names]
-        places = np.arange(len(names)) + beside
-        axes.hlines(places, rows[LOW], rows[HIGH], color=colour, linewidth=1.0)
-        axes.plot(rows[RHO], places, mark, color=colour, markersize=4, label=scope)
-    axes.axvline(0, color=style.GREY, linewidth=0.6)
-    axes.set_xlim(-1, 1)
-    axes.set_yticks(range(len(names)), [PREDICTORS[name] for name in names])
-    axes.set_xlabel("rank correlation with strength [-]")
-    axes.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=2)
-    told = "Lines: 95 % by resampling whole trajectories within each l/w. Within l/w: of ranks among runs of one l/w."
-    return finished(figure, path, [told], analysis.footer)
+def _scopes(table: pd.DataFrame) -> list[Series]:
+    styles = {WITHIN: marker("o", style.ORANGE, style.ORANGE), ALL: marker("D", style.BLUE, style.BLUE)}
+    return [Series(rows=table[table[SCOPE] == scope], label=scope, look=look) for scope, look in styles.items()]
 
 
-def _draw_costs(path: Path, analysis: Analysis) -> list[Path]:
-    """Draw strength gained against energy, means over the l/w where everything was run."""
-    table = analysis.tables["cost"]
-    if table.empty:
-        return []
-    figure, axes = style.new_figure(width=1.3 * style.COLUMN_WIDTH, height=2.9)
-    _draw_bought(axes, table[table[SCOPE] == COMMON], LIFTS, GAIN)
-    axes.axhline(0, color=style.GREY, linewidth=0.6)
-    axes.set_xlabel(r"energy per smarticle over $W_\mathrm{s} w$ [-]")
-    axes.set_ylabel(r"strength gained, over $n W_\mathrm{s}$ [-]")
-    axes.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=3)
-    told = "Means over pairs of one l/w and seed, at the l/w at which everything was run; error bars count pairs."
-    return finished(figure, path, [told], analysis.footer)
+FIGURES = (
+    Means(
+        name="maps",
+        quantities=[QUANTITIES[name] for name in _MAPPED],
+        x=ENERGY,
+        x_label="energy per\nsmarticle [J]",
+        log_x=True,
+        rows=_swung,
+        split=_by_aspect,
+        panels=THETA,
+        panel="θ = {:g}°",
+        share_y=True,
+    ),
+    Means(
+        name="strength_energy",
+        quantities=[QUANTITIES[PEAK]],
+        x=ENERGY,
+        x_label="energy per\nsmarticle [J]",
+        log_x=True,
+        split=_bought,
+        panels=ASPECT,
+        levels=_poured,
+        share_y=True,
+    ),
+    Scatter(
+        name="strength_measures",
+        xs=[QUANTITIES[name] for name in PREDICTORS],
+        y=QUANTITIES[PEAK],
+        split=_by_aspect,
+        bounds=HELD_FAST,
+        means=False,
+    ),
+    Rows(
+        name="correlations",
+        table="predictors",
+        quantities=[Quantity(column=RHO, axis="rank correlation with strength [-]")],
+        rows=_correlations,
+        row=lambda row: PREDICTORS[row[PREDICTOR]],
+        split=_scopes,
+        ends=(LOW, HIGH),
+        bars="Error bars: 95 % confidence by resampling whole trajectories within each l/w",
+    ),
+    Means(
+        name="cost",
+        table="cost",
+        quantities=[Quantity(column=GAIN)],
+        x=LIFTS,
+        x_label=LIFTS,
+        log_x=True,
+        rows=lambda table: table[table[SCOPE] == COMMON],
+        split=_bought,
+        notes=["Pairs of one l/w and seed, at the l/w at which everything was run; error bars count pairs."],
+    ),
+)
 
 
 def _extra(runs: pd.DataFrame) -> Mapping[str, pd.DataFrame]:
@@ -707,7 +585,7 @@ def _extra(runs: pd.DataFrame) -> Mapping[str, pd.DataFrame]:
 def _shown(points: pd.DataFrame) -> pd.DataFrame:
     """Select at each l/w the poured pile, those after a shape change, and the strongest oscillation."""
     swung = points[points[PROCEDURE] == INTERNAL]
-    strongest: Sequence[Any] = swung.loc[swung[PEAK].notna()].groupby(ASPECT)[PEAK].idxmax()
+    strongest = swung.loc[swung[PEAK].notna()].groupby(ASPECT)[PEAK].idxmax()
     return points[points[PROCEDURE].isin([STATIC, SHAPE]) | points.index.isin(strongest)]
 
 
@@ -716,20 +594,14 @@ STUDY = Study(
     title="Packing, entanglement, linking and strength over l/w, θ and the energy spent",
     measure=measure,
     keys=(
-        Key(column=ASPECT, label="l/w", form="g"),
+        ASPECT_KEY,
         Key(column=PROCEDURE, label="procedure"),
-        Key(column=THETA, label="θ", form="g", unit="°"),
+        THETA_KEY,
         Key(column=PLANNED, label="for", form="g", unit=" s"),
     ),
-    quantities=QUANTITIES,
+    quantities=tuple(QUANTITIES.values()),
     findings=FINDINGS,
-    figures=(
-        Drawing(name="maps", of=_draw_maps),
-        Drawing(name="strength_energy", of=_draw_energies),
-        Drawing(name="strength_measures", of=_draw_measures),
-        Drawing(name="correlations", of=_draw_correlations),
-        Drawing(name="cost", of=_draw_costs),
-    ),
+    figures=FIGURES,
     extra=_extra,
     shown=_shown,
     order=(ASPECT, PROCEDURE, THETA, PLANNED, SEED),

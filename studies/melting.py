@@ -7,8 +7,6 @@ are compared pair by pair.
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 import numpy as np
 import pandas as pd
 
@@ -18,12 +16,11 @@ from postprocess.measures.spread import OUTSIDE, TOUCHING, centre_of_mass, free_
 from postprocess.statistics.columns import ASPECT, SEED
 from postprocess.statistics.pairs import mean_difference, pairs
 from postprocess.statistics.seeds import mean_over_seeds
-from studies.framework.figures import Times, by_procedure
-from studies.framework.findings import Effect, Finding, Outcome, Verdict, above, mean, means_by
-from studies.framework.procedures import EXTERNAL, INTERNAL, PROCEDURE, SHAPE, STATIC, of_procedure, paired
-from studies.framework.quantities import Key, declare
+from studies.framework.figures import PROCEDURE_LABELS, Histories, by_procedure
+from studies.framework.findings import Effect, Finding, Outcome, Verdict, above, decide, mean, means_by
+from studies.framework.procedures import INTERNAL, PROCEDURE, SHAPE, STATIC, of_procedure, paired
 from studies.framework.release import ORDER, Pictures, around, named_columns, removal
-from studies.framework.runs import MeasuredRun, duration
+from studies.framework.runs import ASPECT_KEY, Key, MeasuredRun, declare, duration, last_columns
 from studies.framework.study import Study
 
 WHOLE = 0.95  # of the smarticles in one cluster: of 60, no more than 2 apart
@@ -90,8 +87,7 @@ def measure(run: Run) -> MeasuredRun:
         CENTRE: levels.mean_com,
         **rows[-1],
         TOPPLED: float(has_toppled(rows[-1][OFFSET] * base, base)),
-        "scene_sha256": run.manifest.scene_sha256,
-        "run": run.path.name,
+        **last_columns(run),
     }
     history = {SINCE: np.array([start, *(frame.time for frame in after)]) - start}
     return MeasuredRun(
@@ -104,25 +100,13 @@ def at_once(runs: pd.DataFrame) -> pd.DataFrame:
     return runs[runs[LIFT] == 0]
 
 
-def _note(*quantities: str, form: str = ".3f") -> Callable[[pd.DataFrame], str]:
-    """Make the note with the means of each procedure."""
-    return lambda runs: "; ".join(means_by(runs, quantity, PROCEDURE, form) for quantity in quantities)
-
-
-def _narrow_and_high(runs: pd.DataFrame) -> list[Effect]:
-    return [
-        Effect(label="radius of 95 % less static", value=paired(runs, BASE, SHAPE, STATIC), sign=-1, unit=" m"),
-        Effect(label="height of 95 % less static", value=paired(runs, TOP, SHAPE, STATIC), unit=" m"),
-    ]
-
-
 def _low_and_wide(runs: pd.DataFrame) -> list[Effect]:
     both = pairs(of_procedure(runs, INTERNAL), of_procedure(runs, STATIC), BASE)
     width = mean_over_seeds(both["one"] / both["other"] - 1)
     return [
         Effect(label="com height less static", value=paired(runs, CENTRE, INTERNAL, STATIC), sign=-1, unit=" m"),
         Effect(label="radius of 95 % over that of static, less 1,", value=width, threshold=-SAME_WIDTH),
-        Effect(label="the same", value=width, sign=-1, threshold=SAME_WIDTH),
+        Effect(label="which is also below", value=width, sign=-1, threshold=SAME_WIDTH),
     ]
 
 
@@ -136,7 +120,7 @@ def _topples(runs: pd.DataFrame) -> Outcome:
     offsets = means_by(runs, OFFSET, PROCEDURE, ".3f")
     return Outcome(
         note=f"{fallen} of {total} fell over{most}; com offset over the base's radius {offsets}",
-        verdict=Verdict.FOUND if fallen else Verdict.NOT_RESOLVED,
+        verdict=decide(fallen > 0),
     )
 
 
@@ -163,7 +147,7 @@ FINDINGS = (
         "largest cluster by contact in the end, after shape change,",
         rows=at_once,
         threshold=WHOLE,
-        note=_note(CONTACT),
+        shown=[CONTACT],
     ),
     above(
         "entangled",
@@ -171,10 +155,8 @@ FINDINGS = (
         ENTANGLED,
         SHAPE,
         (INTERNAL, STATIC),
-        of=of_procedure,
         rows=at_once,
-        note=_note(ENTANGLED),
-        found_if="share in one cluster by crossings in the end above that of each, paired by l/w and seed",
+        shown=[ENTANGLED],
     ),
     above(
         "keeps-its-edge",
@@ -182,18 +164,17 @@ FINDINGS = (
         SLOUGHED,
         SHAPE,
         (INTERNAL,),
-        of=of_procedure,
         sign=-1,
         rows=at_once,
-        note=_note(SLOUGHED),
-        found_if="the sloughed share is below that after internal oscillation, paired by l/w and seed",
+        shown=[SLOUGHED],
     ),
-    Finding(
-        id="narrow-and-high",
-        says="Shape change narrows the base and raises the pile",
-        outcome=_narrow_and_high,
+    above(
+        "narrow-and-high",
+        "Shape change narrows the base and raises the pile",
+        {BASE: -1, TOP: 1},
+        SHAPE,
+        (STATIC,),
         rows=at_once,
-        found_if="radius < and height > those of static before the wall goes, paired by l/w and seed",
     ),
     Finding(
         id="topples",
@@ -222,10 +203,8 @@ FINDINGS = (
         HEIGHT,
         INTERNAL,
         (STATIC,),
-        of=of_procedure,
         rows=at_once,
-        note=_note(HEIGHT),
-        found_if="share of the com height kept in the end above that of static, paired by l/w and seed",
+        shown=[HEIGHT],
     ),
     Finding(
         id="lifting-differs",
@@ -235,16 +214,9 @@ FINDINGS = (
     ),
 )
 
-_LABELS = {
-    STATIC: "static",
-    EXTERNAL: "external oscillation",
-    INTERNAL: r"internal oscillation, $\theta$ = 10°",
-    SHAPE: "shape change",
-}
 
-
-def _against_time(aspect: float, lift: float) -> Times:
-    return Times(
+def _against_time(aspect: float, lift: float) -> Histories:
+    return Histories(
         name=f"time_lw{aspect:.2f}" + ("_lifted" if lift else ""),
         quantities={
             CONTACT: "largest cluster\nby contact [-]",
@@ -257,16 +229,8 @@ def _against_time(aspect: float, lift: float) -> Times:
         x=SINCE,
         x_label="time since the wall went [s]",
         rows=lambda runs: runs[(runs[ASPECT] == aspect) & (runs[LIFT] == lift)],
-        split=by_procedure(_LABELS),
-        spans={
-            CONTACT: (0.8, 1.02),
-            ENTANGLED: (0.8, 1.02),
-            HEIGHT: (0.8, 1.02),
-            SPREAD: (0.98, 1.2),
-            SLOUGHED: (-0.002, 0.1),
-            TILT: (0.0, 10.0),
-        },
-        told=[f"l/w = {aspect:g}, wall {f'lifted at {lift:g} m/s' if lift else 'gone at once'}."],
+        split=by_procedure(),
+        notes=[f"l/w = {aspect:g}, wall {f'lifted at {lift:g} m/s' if lift else 'gone at once'}."],
     )
 
 
@@ -276,14 +240,14 @@ STUDY = Study(
     measure=measure,
     keys=(
         Key(column=LIFT, label="lift [m/s]", form="g"),
-        Key(column=ASPECT, label="l/w", form="g"),
+        ASPECT_KEY,
         Key(column=PROCEDURE, label="procedure", order=ORDER),
     ),
     quantities=tuple(QUANTITIES.values()),
     findings=FINDINGS,
     figures=(
         *(_against_time(*point) for point in ((0.7, 0.0), (0.7, 0.1), (0.4, 0.0), (1.0, 0.0))),
-        Pictures(labels=_LABELS, select=(LIFT,)),
+        Pictures(labels=PROCEDURE_LABELS, select=(LIFT,)),
     ),
     order=(LIFT, ASPECT, SEED, PROCEDURE),
     remarks=(

@@ -11,7 +11,8 @@ Runs of the same aspect ratio and seed begin with the same pile, so they are com
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
+from functools import partial
 
 import numpy as np
 import pandas as pd
@@ -19,41 +20,49 @@ import pandas as pd
 from dem.record.run import Run
 from postprocess.measures.motors import APART
 from postprocess.measures.packing import DEFINITIONS
-from postprocess.report import figures as style
 from postprocess.statistics.columns import ASPECT, SEED
 from postprocess.statistics.pairs import pairs
-from postprocess.statistics.seeds import CONFIDENCE, Slope, difference, mean_over_seeds, parabola, slope_within
-from studies.framework.activity import (
-    ENERGY,
-    HALF,
-    HEIGHT,
-    LOWEST,
-    PHI_ACTIVE,
-    QUANTITIES,
-    SAMPLED,
-    STRAIGHT,
-    height_history,
-    procedure_row,
-    samples,
+from postprocess.statistics.seeds import CONFIDENCE, difference, mean_over_seeds, parabola, slope_within
+from studies.framework.figures import (
+    ASPECT_LABEL,
+    CROSSINGS_LABEL,
+    PROCEDURE_LABELS,
+    THETA_LABEL,
+    Histories,
+    History,
+    Means,
+    Series,
+    Split,
+    by_procedure,
+    one_by_one,
 )
-from studies.framework.figures import Histories, Means, Series, Split, by_procedure, one_by_one
-from studies.framework.findings import Effect, Finding, Outcome, Rows, Verdict, above, mean, means_by, slope
-from studies.framework.plots import ASPECT_LABEL, CROSSINGS_LABEL, THETA_LABEL, History, marker
+from studies.framework.findings import Effect, Finding, Outcome, Rows, Verdict, above, decide, mean, means_by, slope
 from studies.framework.procedures import (
     ACTIVE,
     AMPLITUDE,
     CROSSINGS,
+    ENERGY,
     EXTERNAL,
+    HALF,
+    HEIGHT,
     INTERNAL,
+    LOWEST,
+    ORDER,
     PHI,
+    PHI_ACTIVE,
     PROCEDURE,
+    SAMPLED,
     SHAPE,
     STATIC,
+    STRAIGHT,
     THETA,
+    activity,
+    height_history,
     of_procedure,
+    procedure_row,
+    samples,
 )
-from studies.framework.quantities import Key, Quantity
-from studies.framework.runs import DEFINITION
+from studies.framework.runs import ASPECT_KEY, DEFINITION, THETA_KEY, Key, declare, duration
 from studies.framework.study import Study
 
 FLAT = 0.2  # of the mean of ⟨N⟩: by less it does not change with l/w
@@ -63,23 +72,24 @@ MARGINAL = 0.5  # of the gain in φ at θ = 10°: a gain below is marginal
 FACTOR = 10.0  # energy of the shape change over that of the internal oscillation, at least
 PEAK = 0.9  # l/w of the energy's local maximum
 
-_SHOWN = {
-    PHI_ACTIVE: ("φ_f", ".4f", "packing fraction $\\phi_\\mathrm{f}$\nat the end of the activity [-]", 1.0),
-    PHI: ("φ at rest again", ".4f", "", 1.0),
-    CROSSINGS: ("⟨N⟩", ".2f", CROSSINGS_LABEL, 1.0),
-    ENERGY: ("energy [J]", ".2e", "energy per smarticle,\nevery step [µJ]", 1e6),
-    SAMPLED: ("", ".2e", f"energy per smarticle,\nsummed every {APART:g} s [µJ]", 1e6),
-    HEIGHT: ("h/h0", ".3f", r"height over $h_0$ [-]", 1.0),
-}
-COLUMNS = {
-    column: Quantity(column=column, meaning=meaning, label=label, form=form, axis=axis, axis_scale=scale)
-    for column, meaning in QUANTITIES.items()
-    for label, form, axis, scale in [_SHOWN.get(column, ("", ".3g", "", 1.0))]
-}
-KEYS = (
-    Key(column=PROCEDURE, label="procedure", order=(STATIC, EXTERNAL, SHAPE, INTERNAL)),
-    Key(column=THETA, label="θ", form="g", unit="°"),
-    Key(column=ASPECT, label="l/w", form="g"),
+QUANTITIES = declare(
+    {
+        PHI_ACTIVE: ("φ_f", ".4f", "packing fraction over the last frames of the activity; static: at rest"),
+        PHI: ("φ at rest again", ".4f", "packing fraction at rest: after the activity, or of the static state"),
+        CROSSINGS: ("⟨N⟩", ".2f", "⟨N⟩ at rest: links of others through a smarticle's plane"),
+        ENERGY: ("energy [J]", ".2e", "work of the motors, or of the shaken container, on the smarticles"),
+        SAMPLED: ("", "", "of the motors, torque times angle over moments so far apart, as the paper's code could"),
+        HEIGHT: ("h/h0", ".3f", "height of the centre of mass at rest after the activity, over that before it"),
+        STRAIGHT: ("", "", "height of the centre of mass over h0 at the end of the straight state of the shape change"),
+        LOWEST: ("", "", "least height over h0, means over 0.1 s, while barbs close in the shape change"),
+        HALF: ("", "", "share of the activity after which half of the final compaction is reached; empty without any"),
+    },
+    axes={
+        PHI_ACTIVE: "packing fraction $\\phi_\\mathrm{f}$\nat the end of the activity [-]",
+        CROSSINGS: CROSSINGS_LABEL,
+        ENERGY: "energy per smarticle,\nevery step [J]",
+        SAMPLED: f"energy per smarticle,\nsummed every {APART:g} s [J]",
+    },
 )
 
 
@@ -99,7 +109,7 @@ def pairs_of(table: pd.DataFrame, quantity: str, one: str, other: str) -> pd.Dat
 
 
 def gains(procedure: str) -> Rows:
-    """φ_f less that of the static state of the same aspect ratio and seed, in the column of φ_f."""
+    """Subtract from φ_f that of the static state of the same aspect ratio and seed."""
 
     def rows(table: pd.DataFrame) -> pd.DataFrame:
         both = pairs_of(table, PHI_ACTIVE, procedure, STATIC)
@@ -108,40 +118,14 @@ def gains(procedure: str) -> Rows:
     return rows
 
 
-def with_aspect(
-    name: str, says: str, rows: Rows, quantity: str, *, label: str, sign: int, form: str, unit: str = "", when: str = ""
-) -> Finding:
+def with_aspect(name: str, says: str, rows: Rows, quantity: str, sign: int = 1) -> Finding:
     """Make a finding that a quantity rises (sign 1) or falls (−1) with the aspect ratio."""
-    return slope(
-        name,
-        says,
-        quantity,
-        ASPECT,
-        sign=sign,
-        label=f"{label} against l/w",
-        means=form,
-        rows=rows,
-        unit=unit,
-        found_if=f"slope of {label} against l/w {'>' if sign > 0 else '<'} 0{when}",
-    )
+    return slope(name, says, quantity, ASPECT, sign=sign, rows=rows)
 
 
-def with_amplitude(
-    name: str, says: str, quantity: str, *, label: str, sign: int, of: str, unit: str = "", rows: Rows = amplitudes
-) -> Finding:
+def with_amplitude(name: str, says: str, quantity: str, sign: int = 1, rows: Rows = amplitudes) -> Finding:
     """Make a finding that a quantity rises (sign 1) or falls (−1) with θ within runs that begin with one pile."""
-    return slope(
-        name,
-        says,
-        quantity,
-        THETA,
-        sign=sign,
-        within=(ASPECT, SEED),
-        label=f"{label} against θ",
-        rows=rows,
-        unit=f"{unit} per degree",
-        found_if=f"slope of {of} against θ {'>' if sign > 0 else '<'} 0, within runs of the same l/w and seed",
-    )
+    return slope(name, says, quantity, THETA, sign=sign, within=(ASPECT, SEED), rows=rows)
 
 
 def _bend(table: pd.DataFrame) -> list[Effect]:
@@ -204,22 +188,18 @@ def _little_less(table: pd.DataFrame) -> list[Effect]:
             sign=-1,
             text=text if value.count > 1 else "no data",
         ),
-        Effect(label="the same", value=value, threshold=-math.log(2), text="above 1/2"),
+        Effect(label="it is also", value=value, threshold=-math.log(2), text="above 1/2"),
     ]
 
 
-def _local_maximum(quantity: str) -> Callable[[pd.DataFrame], Sequence[Effect]]:
-    def effects(table: pd.DataFrame) -> list[Effect]:
-        wide = table.pivot_table(index=SEED, columns=ASPECT, values=quantity)
-        around = [aspect for aspect in wide.columns if 0.05 < abs(aspect - PEAK) < 0.15] if PEAK in wide else []
-        if len(around) != 2:
-            return []
-        return [
-            Effect(label=f"at {PEAK:g} less at {aspect:g}", value=mean_over_seeds(wide[PEAK] - wide[aspect]), unit=" J")
-            for aspect in around
-        ]
-
-    return effects
+def _local_maximum(table: pd.DataFrame, quantity: str) -> list[Effect]:
+    wide = table.pivot_table(index=SEED, columns=ASPECT, values=quantity)
+    around = [aspect for aspect in wide.columns if 0.05 < abs(aspect - PEAK) < 0.15] if PEAK in wide else []
+    return [
+        Effect(label=f"at {PEAK:g} less at {aspect:g}", value=mean_over_seeds(wide[PEAK] - wide[aspect]), unit=" J")
+        for aspect in around
+        if len(around) == 2
+    ]
 
 
 def _static_flat(table: pd.DataFrame) -> Outcome:
@@ -227,18 +207,12 @@ def _static_flat(table: pd.DataFrame) -> Outcome:
     average = float(table[CROSSINGS].mean())
     scale = float(np.ptp(table[ASPECT])) / average if len(table) and average else math.nan
     change, half_width = abs(scale * line.value), abs(scale) * line.half_width
-    verdict = Verdict.NOT_RESOLVED
-    if math.isnan(change):
-        verdict = Verdict.NO_DATA
-    elif change + half_width <= FLAT:
-        verdict = Verdict.FOUND
-    elif change - half_width > FLAT:
-        verdict = Verdict.NOT_FOUND
-    ends = "" if math.isnan(change) else f", from end to end {100 * scale * line.value:+.0f} % of the mean"
+    known = not math.isnan(change)
+    ends = f", from end to end {100 * scale * line.value:+.0f} % of the mean" if known else ""
     return Outcome(
         effects=[Effect(label="⟨N⟩ against l/w", value=line, sign=0, note=ends)],
         note=f"by l/w {means_by(table, CROSSINGS, ASPECT, '.2f')}",
-        verdict=verdict,
+        verdict=decide(change + half_width <= FLAT, change - half_width > FLAT, data=known),
     )
 
 
@@ -262,7 +236,9 @@ def _near_one(table: pd.DataFrame) -> Outcome:
     if len(means) < 2 or abs(near - 1) > 0.1:
         return Outcome(note=note, verdict=Verdict.NO_DATA)
     part = table[table[ASPECT] <= near]
-    rise = Effect(label=f"⟨N⟩ against l/w up to {near:g}", value=_line(part))
+    rise = Effect(
+        label=f"⟨N⟩ against l/w up to {near:g}", value=slope_within(part[ASPECT], part[CROSSINGS], ["all"] * len(part))
+    )
     others = [difference(mean, means[near]) for aspect, mean in means.items() if aspect != near]
     verdict = rise.verdict
     if any(other.value > other.half_width for other in others):
@@ -270,10 +246,6 @@ def _near_one(table: pd.DataFrame) -> Outcome:
     elif verdict == Verdict.FOUND and any(other.value > 0 for other in others):
         verdict = Verdict.NOT_RESOLVED
     return Outcome(effects=[rise], note=note, verdict=verdict)
-
-
-def _line(part: pd.DataFrame) -> Slope:
-    return slope_within(part[ASPECT], part[CROSSINGS], ["all"] * len(part))
 
 
 def _peaks_with_amplitude(table: pd.DataFrame) -> list[Effect]:
@@ -287,62 +259,31 @@ def _peaks_with_amplitude(table: pd.DataFrame) -> list[Effect]:
     ]
 
 
-def _energies(suffix: str, how: str, quantity: str) -> dict[str, Finding]:
-    """Findings on the energy of the internal oscillation, by one of its two readings."""
-    part = only(INTERNAL)
-    return {
-        "theta": with_amplitude(
-            f"energy-grows-with-theta{suffix}",
-            f"Internal oscillation: energy grows with θ{how}",
-            quantity,
-            label="energy per smarticle",
-            sign=1,
-            of="the energy",
-            unit=" J",
-        ),
-        "aspect": with_aspect(
-            f"energy-grows-with-aspect{suffix}",
-            f"Internal oscillation: energy grows with l/w{how}",
-            part,
-            quantity,
-            label="energy per smarticle",
-            sign=1,
-            form=".3g",
-            unit=" J",
-            when=f", θ = {AMPLITUDE:g}°",
-        ),
-        "peak": Finding(
+def _energies(suffix: str, how: str, quantity: str) -> tuple[Finding, Finding, Finding]:
+    """Make findings on the energy of the internal oscillation, by one of its two readings."""
+    part, says = only(INTERNAL), "Internal oscillation: "
+    return (
+        with_amplitude(f"energy-grows-with-theta{suffix}", f"{says}energy grows with θ{how}", quantity),
+        with_aspect(f"energy-grows-with-aspect{suffix}", f"{says}energy grows with l/w{how}", part, quantity),
+        Finding(
             id=f"energy-maximum{suffix}",
-            says=f"Internal oscillation: the energy has a local maximum at l/w = {PEAK:g}{how}",
-            outcome=_local_maximum(quantity),
+            says=f"{says}the energy has a local maximum at l/w = {PEAK:g}{how}",
+            outcome=partial(_local_maximum, quantity=quantity),
             rows=part,
-            found_if="above that at either neighbouring l/w, seed by seed, mean over seeds",
         ),
-    }
+    )
 
 
 BY_SAMPLES = f", summed every {APART:g} s"
-STEPS, SUMS = _energies("", "", ENERGY), _energies("-sampled", BY_SAMPLES, SAMPLED)
 
 PACKING = (
-    with_aspect(
-        "poured-falls", "φ_0 of the poured pile falls with l/w", only(STATIC), PHI, label="φ_0", sign=-1, form=".4f"
-    ),
-    with_aspect(
-        "shaken-falls",
-        "External oscillation: φ_f falls with l/w",
-        only(EXTERNAL),
-        PHI_ACTIVE,
-        label="φ_f",
-        sign=-1,
-        form=".4f",
-    ),
+    with_aspect("poured-falls", "φ_0 of the poured pile falls with l/w", only(STATIC), PHI, -1),
+    with_aspect("shaken-falls", "External oscillation: φ_f falls with l/w", only(EXTERNAL), PHI_ACTIVE, -1),
     Finding(
         id="shaken-bends",
         says="External oscillation: φ changes with l/w faster than linearly",
         outcome=_bend,
         rows=only(EXTERNAL, PHI_ACTIVE),
-        found_if="φ_f against l/w is convex: bend > 0, that is a fall that is steeper at small l/w",
     ),
     mean(
         "shaken-compacts",
@@ -357,8 +298,8 @@ PACKING = (
         lambda table: table[STRAIGHT] - 1,
         "h/h0 − 1 while straight",
         rows=only(SHAPE),
-        note=lambda table: f"h/h0 by l/w {means_by(table, STRAIGHT, ASPECT, '.3f')}",
-        found_if="h/h0 − 1 at the end of the straight state > 0, mean over runs",
+        shown=[STRAIGHT],
+        by=ASPECT,
     ),
     mean(
         "sinks-while-closing",
@@ -373,8 +314,8 @@ PACKING = (
         lambda table: table[HEIGHT] - 1,
         "h/h0 − 1 at rest again",
         rows=only(SHAPE),
-        note=lambda table: f"h/h0 by l/w {means_by(table, HEIGHT, ASPECT, '.3f')}",
-        found_if="h/h0 − 1 at rest after the shape change > 0, mean over runs",
+        shown=[HEIGHT],
+        by=ASPECT,
     ),
     mean(
         "rises-after-the-drop",
@@ -383,15 +324,7 @@ PACKING = (
         "h/h0 at rest again less the lowest while closing",
         rows=only(SHAPE),
     ),
-    with_aspect(
-        "shape-change-falls",
-        "Shape change: φ_f falls with l/w",
-        only(SHAPE),
-        PHI_ACTIVE,
-        label="φ_f",
-        sign=-1,
-        form=".4f",
-    ),
+    with_aspect("shape-change-falls", "Shape change: φ_f falls with l/w", only(SHAPE), PHI_ACTIVE, -1),
     mean(
         "internal-sinks",
         "Internal oscillation: the pile becomes lower than it was poured",
@@ -407,37 +340,20 @@ PACKING = (
         found_if=f"the centre of mass comes down, by half of it within {EARLY:g} of the activity, twice the paper's "
         "0.12 (a steady descent would take 0.5)",
     ),
-    with_aspect(
-        "internal-falls",
-        "Internal oscillation: φ_f falls with l/w",
-        only(INTERNAL),
-        PHI_ACTIVE,
-        label="φ_f",
-        sign=-1,
-        form=".4f",
-    ),
-    with_aspect(
+    with_aspect("internal-falls", "Internal oscillation: φ_f falls with l/w", only(INTERNAL), PHI_ACTIVE, -1),
+    slope(
         "internal-gains-more",
         "Internal oscillation: Δφ = φ_f − φ_0 grows with l/w",
-        gains(INTERNAL),
         PHI_ACTIVE,
+        ASPECT,
+        rows=gains(INTERNAL),
         label="Δφ",
-        sign=1,
-        form=".4f",
     ),
-    with_amplitude(
-        "tighter-at-low-theta",
-        "Internal oscillation: lower θ packs tighter",
-        PHI_ACTIVE,
-        label="φ_f",
-        sign=-1,
-        of="φ_f",
-    ),
+    with_amplitude("tighter-at-low-theta", "Internal oscillation: lower θ packs tighter", PHI_ACTIVE, -1),
     Finding(
         id="largest-theta-gains-little",
         says="Internal oscillation: the largest amplitude packs only marginally denser than static",
         outcome=_largest_gains_little,
-        found_if=f"below {MARGINAL:g}, within runs of the same l/w and seed",
     ),
     above(
         "internal-densest",
@@ -445,12 +361,8 @@ PACKING = (
         PHI_ACTIVE,
         INTERNAL,
         (STATIC, EXTERNAL, SHAPE),
-        of=of_procedure,
-        label="φ_f",
         beside=(EXTERNAL,),
         beside_quantity=PHI,
-        found_if=f"φ_f at θ = {AMPLITUDE:g}°, at the end of the activity as in the paper, above that of each other "
-        "procedure, paired by l/w and seed",
     ),
     above(
         "shape-change-loosest",
@@ -458,38 +370,24 @@ PACKING = (
         PHI_ACTIVE,
         SHAPE,
         (EXTERNAL, INTERNAL),
-        of=of_procedure,
         sign=-1,
-        label="φ_f",
         beside=(STATIC,),
-        found_if="φ_f at the end of the activity below those of external and internal oscillation, paired by l/w and "
-        "seed",
     ),
 )
 
 ENERGIES = (
     above(
-        "shape-change-costs-most",
-        "Shape change needs the most energy, at any l/w",
-        ENERGY,
-        SHAPE,
-        (EXTERNAL, INTERNAL),
-        of=of_procedure,
-        label="energy per smarticle [J]",
-        found_if="energy above that of each other activity, paired by l/w and seed",
+        "shape-change-costs-most", "Shape change needs the most energy, at any l/w", ENERGY, SHAPE, (EXTERNAL, INTERNAL)
     ),
     Finding(
         id="shape-change-costs-ten-times",
         says="Shape change costs more than 10 times the energy of internal oscillation",
         outcome=_shape_change_costs,
-        found_if=f"geometric mean of the ratio > {FACTOR:g}, paired by l/w and seed, θ = {AMPLITUDE:g}°",
     ),
     Finding(
         id="shape-change-costs-ten-times-sampled",
         says=f"Shape change costs more than 10 times the energy of internal oscillation{BY_SAMPLES}",
         outcome=_costs_by_samples,
-        found_if="the mean of the difference > 0, paired by l/w and seed; no ratio, since a sum over samples can be "
-        "zero or negative",
     ),
     above(
         "internal-costs-least",
@@ -497,31 +395,23 @@ ENERGIES = (
         ENERGY,
         INTERNAL,
         (EXTERNAL, SHAPE),
-        of=of_procedure,
         sign=-1,
-        label="energy per smarticle [J]",
-        found_if=f"energy at θ = {AMPLITUDE:g}° below that of each other activity, paired by l/w and seed",
     ),
-    *(findings[kind] for kind in ("theta", "aspect", "peak") for findings in (STEPS, SUMS)),
+    *(
+        one
+        for both in zip(_energies("", "", ENERGY), _energies("-sampled", BY_SAMPLES, SAMPLED), strict=True)
+        for one in both
+    ),
     Finding(
         id="internal-costs-a-little-less",
         says="External and internal oscillation need similar energies, internal slightly less",
         outcome=_little_less,
-        found_if="geometric mean of the ratio between 1/2 and 1, paired by l/w and seed",
     ),
 )
 
 ENTANGLEMENT = (
     above(
-        "static-least-entangled",
-        "⟨N⟩ is lowest for static",
-        CROSSINGS,
-        STATIC,
-        (EXTERNAL, INTERNAL, SHAPE),
-        of=of_procedure,
-        sign=-1,
-        label="⟨N⟩",
-        found_if="⟨N⟩ below that of each activity, paired by l/w and seed",
+        "static-least-entangled", "⟨N⟩ is lowest for static", CROSSINGS, STATIC, (EXTERNAL, INTERNAL, SHAPE), sign=-1
     ),
     Finding(
         id="static-flat",
@@ -531,24 +421,9 @@ ENTANGLEMENT = (
         found_if=f"the straight line through all runs changes by less than {FLAT:.0%} of the mean, at 95 %",
     ),
     above(
-        "shape-change-most-entangled",
-        "⟨N⟩ is highest for shape change",
-        CROSSINGS,
-        SHAPE,
-        (STATIC, EXTERNAL, INTERNAL),
-        of=of_procedure,
-        label="⟨N⟩",
-        found_if="⟨N⟩ above that of each other procedure, paired by l/w and seed",
+        "shape-change-most-entangled", "⟨N⟩ is highest for shape change", CROSSINGS, SHAPE, (STATIC, EXTERNAL, INTERNAL)
     ),
-    with_aspect(
-        "shape-change-rises",
-        "⟨N⟩ of shape change rises with l/w",
-        only(SHAPE),
-        CROSSINGS,
-        label="⟨N⟩",
-        sign=1,
-        form=".2f",
-    ),
+    with_aspect("shape-change-rises", "⟨N⟩ of shape change rises with l/w", only(SHAPE), CROSSINGS),
     *(
         Finding(
             id=f"{procedure}-near-one",
@@ -566,16 +441,13 @@ ENTANGLEMENT = (
         "crossings-fall-with-theta",
         "Internal oscillation: ⟨N⟩ falls with θ at l/w = 0.4 to 0.5",
         CROSSINGS,
-        label="⟨N⟩",
-        sign=-1,
-        of="⟨N⟩",
+        -1,
         rows=lambda table: table[(table[PROCEDURE] == INTERNAL) & (table[ASPECT] < 0.51)],
     ),
     Finding(
         id="crossings-peak-with-theta",
         says="Internal oscillation: ⟨N⟩ peaks at θ = 10° to 15° at larger l/w",
         outcome=_peaks_with_amplitude,
-        found_if="both differences > 0, within runs of the same l/w and seed, l/w > 0.5",
     ),
 )
 
@@ -583,9 +455,7 @@ ENTANGLEMENT = (
 def heights(run: Run) -> History:
     """Read h/h0 against the time since the activity began."""
     values, times = height_history(run)
-    active = next(phase for phase in run.phases if phase.type not in ("deposit", "relax"))
-    end = 0.0 if active.start_s is None or active.end_s is None else active.end_s - active.start_s
-    return History(times=times, values=values, active=end)
+    return History(times=times, values=values, active=duration(activity(run)))
 
 
 def nearest_aspect(runs: pd.DataFrame) -> pd.DataFrame:
@@ -594,19 +464,10 @@ def nearest_aspect(runs: pd.DataFrame) -> pd.DataFrame:
 
 
 def _energy_series(points: pd.DataFrame) -> list[Series]:
-    """Make series of the procedures that move smarticles, and of the internal oscillation at its other amplitudes."""
+    """Make series of the procedures, and of the internal oscillation at its other amplitudes."""
     internal = amplitudes(points)
-    others = sorted(theta for theta in internal[THETA].unique() if theta != AMPLITUDE)
-    thin = {"markersize": 2.2, "linewidth": 0.5, "linestyle": (0, (2, 1.5))}
-    colours = style.sequence(len(others), last=0.85)
-    return by_procedure({name: label for name, label in _LABELS.items() if name != STATIC})(points) + [
-        Series(
-            rows=internal[internal[THETA] == theta],
-            label=rf"internal, $\theta$ = {theta:g}°",
-            look={**marker("o", colour, "white"), **thin},
-        )
-        for theta, colour in zip(others, colours, strict=True)
-    ]
+    others = one_by_one(THETA, lambda theta: rf"internal, $\theta$ = {theta:g}°")
+    return by_procedure(apart=0.004)(points) + others(internal[internal[THETA] != AMPLITUDE])
 
 
 def _aspect_series(points: pd.DataFrame) -> list[Series]:
@@ -616,59 +477,48 @@ def _aspect_series(points: pd.DataFrame) -> list[Series]:
     return one_by_one(ASPECT, lambda aspect: rf"$l/w$ = {aspect:g}")(several)
 
 
-_LABELS = {
-    SHAPE: "shape change",
-    EXTERNAL: "external oscillation",
-    INTERNAL: rf"internal oscillation, $\theta$ = {AMPLITUDE:g}°",
-    STATIC: r"static ($\phi_0$)",
-}
-
-
-def _means(name: str, columns: Sequence[str], x: str, split: Split, *, log: bool = False, mark: float = 0.0) -> Means:
+def _means(name: str, columns: Sequence[str], x: str, split: Split, *, mark: bool = False) -> Means:
     return Means(
         name=name,
-        quantities=[COLUMNS[column] for column in columns],
+        quantities=[QUANTITIES[column] for column in columns],
         x=x,
         x_label=ASPECT_LABEL if x == ASPECT else THETA_LABEL,
         split=split,
-        log=log,
-        marks=[mark] if mark else [],
+        log=ENERGY in columns and not mark,
+        marks=[PEAK] if mark else [],
         share_y=len(columns) > 1,
-        told=[f"Broken line: l/w = {mark:g}, where the paper's energies have a local maximum."] if mark else [],
+        notes=[f"Broken line: l/w = {PEAK:g}, where the paper's energies have a local maximum."] if mark else [],
     )
 
+
+_PROCEDURES = by_procedure(apart=0.004)
+_READINGS = by_procedure({name: PROCEDURE_LABELS[name] for name in (SHAPE, INTERNAL)})
 
 STUDY = Study(
     name="procedures",
     title="Procedures of smarticles against the findings of Savoie et al.",
     measure=procedure_row,
-    keys=KEYS,
-    quantities=tuple(COLUMNS.values()),
+    keys=(Key(column=PROCEDURE, label="procedure", order=ORDER), THETA_KEY, ASPECT_KEY),
+    quantities=tuple(QUANTITIES.values()),
     findings=(*PACKING, *ENERGIES, *ENTANGLEMENT),
     figures=(
         Histories(
             name="height_time",
             history=heights,
             rows=nearest_aspect,
-            split=by_procedure(_LABELS),
+            split=by_procedure(),
             x_label="time since the activity began [s]",
-            y_label=r"height of the centre of mass $h/h_0$ [-]",
+            quantities={"": r"height of the centre of mass $h/h_0$ [-]"},
             level=1.0,
-            told=["l/w = 0.7, or the nearest one. Each activity begins and ends at the broken lines."],
+            notes=["l/w = 0.7, or the nearest one. Each activity begins and ends at the broken lines."],
         ),
-        _means("phi_aspect", [PHI_ACTIVE], ASPECT, by_procedure(_LABELS, apart=0.004)),
-        _means("crossings_aspect", [CROSSINGS], ASPECT, by_procedure(_LABELS, apart=0.004)),
-        _means("energy_aspect", [ENERGY], ASPECT, _energy_series, log=True),
+        _means("phi_aspect", [PHI_ACTIVE], ASPECT, _PROCEDURES),
+        _means("crossings_aspect", [CROSSINGS], ASPECT, _PROCEDURES),
+        _means("energy_aspect", [ENERGY], ASPECT, _energy_series),
         _means("phi_theta", [PHI_ACTIVE], THETA, _aspect_series),
         _means("crossings_theta", [CROSSINGS], THETA, _aspect_series),
-        _means("energy_theta", [ENERGY], THETA, _aspect_series, log=True),
-        _means(
-            "energy_readings",
-            [ENERGY, SAMPLED],
-            ASPECT,
-            by_procedure({name: _LABELS[name] for name in (SHAPE, INTERNAL)}),
-            mark=PEAK,
-        ),
+        _means("energy_theta", [ENERGY], THETA, _aspect_series),
+        _means("energy_readings", [ENERGY, SAMPLED], ASPECT, _READINGS, mark=True),
     ),
     samples=samples,
     order=(PROCEDURE, THETA, ASPECT, SEED),

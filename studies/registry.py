@@ -28,14 +28,7 @@ QUICK = "quick"
 
 @dataclass(frozen=True)
 class Script:
-    """A study that is a script and a sweep file.
-
-    Attributes:
-        name: For the command line.
-        module: Name of the script.
-        variants: Of the sweep, all but `quick` where there is a quick variant.
-        quick: Whether there is a quick variant.
-    """
+    """A study: a script and its sweep file with some variants, and whether there is a quick one besides."""
 
     name: str
     module: str
@@ -94,7 +87,7 @@ STUDIES: Mapping[str, Script] = MappingProxyType({study.name: study for study in
 
 
 def shipped(name: str) -> Script:
-    """A shipped study.
+    """Find a shipped study.
 
     Raises:
         InputError: There is none of this name.
@@ -106,9 +99,5 @@ def shipped(name: str) -> Script:
 
 
 def study_file(name: str, *, quick: bool = False) -> Path:
-    """Sweep file of a study.
-
-    Raises:
-        InputError: There is no such study, or it has no quick variant.
-    """
+    """Name the sweep file of a study, see `Script.sweep_file`."""
     return shipped(name).sweep_file(quick=quick)

@@ -14,6 +14,8 @@ from __future__ import annotations
 
 import itertools
 import math
+from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -25,14 +27,10 @@ from postprocess.measures.heights import heights
 from postprocess.measures.pull import PULL, WINDOW, held_at, held_fast, moving_mean, peak, read_pull, weight_of_one
 from postprocess.measures.table import summarise_run
 from postprocess.statistics.columns import ASPECT, SEED
-from postprocess.statistics.pairs import mean_difference
-from postprocess.statistics.seeds import SeedMean, slope_within
-from studies.framework.figures import Histories, Means, Scatter, by_procedure
-from studies.framework.findings import Effect, Finding, Outcome, Verdict, above, blocks, ranked, ranks
-from studies.framework.plots import CROSSINGS_LABEL, History
+from studies.framework.figures import CROSSINGS_LABEL, Histories, History, Means, Scatter, by_procedure
+from studies.framework.findings import Effect, Finding, Outcome, Rows, above, decide, means_by, ranks, symbol
 from studies.framework.procedures import (
     ACTIVE,
-    AMPLITUDE,
     BY_RANKS,
     CROSSINGS,
     EXTERNAL,
@@ -41,11 +39,12 @@ from studies.framework.procedures import (
     SHAPE,
     STATIC,
     THETA,
+    compared,
     of_procedure,
+    paired,
     prepared_by,
 )
-from studies.framework.quantities import Key, declare
-from studies.framework.runs import DEFINITION, Row, duration
+from studies.framework.runs import ASPECT_KEY, DEFINITION, THETA_KEY, Key, Row, declare, duration, last_columns
 from studies.framework.study import Study
 
 UPPER = "hook above the floor [m]"
@@ -58,22 +57,14 @@ TOP, KEPT = "height of 95 % [m]", "com height without over with the wall [-]"
 
 QUANTITIES = declare(
     {
-        PEAK: (
-            "peak",
-            ".3f",
-            f"largest mean over {WINDOW:g} s of the force on the hook; at least, where it held",
-        ),
+        PEAK: ("peak", ".3f", f"largest mean over {WINDOW:g} s of the force on the hook; at least, where it held"),
         RAISED: ("raised at it [mm]", ".1f", "how far the hook had been raised then"),
         WORK: ("work / n W_s w", ".3f", "∫ F dz over the whole pull: to fracture, and to carry off what comes along"),
         THROUGH: ("through to the grid", ".3f", "upwards on the grid at the peak less that before the pull"),
         BEFORE: ("before", ".3f", "force on the hook before the pull: what rests on it, and a pile that is braced"),
         HELD_FAST: ("held fast", ".2f", "1 where the hook was stopped by its force limit, 0 where it arrived"),
         CARRIED: ("carried off", ".3f", "share that rose by more than half of the hook's way; empty where held"),
-        BREAK: (
-            "broke at [mm]",
-            ".1f",
-            "mean height of the lowest points of those before the pull",
-        ),
+        BREAK: ("broke at [mm]", ".1f", "mean height of the lowest points of those before the pull"),
         ABOVE: ("above the hook", ".2f", "share with the centre of mass above the hook before the pull"),
         TOP: ("height [mm]", ".1f", "height below which 95 % of the material lies before the pull"),
         KEPT: ("kept without wall", ".3f", "height of the centre of mass before the pull over that with the wall"),
@@ -92,35 +83,27 @@ QUANTITIES = declare(
 
 def measure(run: Run) -> Row:
     """Measure the pile before it is torn, the force on the hook, and what came off."""
-    procedure = prepared_by(run, "remove-container", PULL)
-    pulled = run.phases[-1]
+    pile, pulled = prepared_by(run, "remove-container", PULL), run.phases[-1]
     rest, free = pulled.index - 2, pulled.index - 1
-    settings = run.scene["phases"]
-    hooks = run.scene.get("hooks")
+    settings, hooks = run.scene["phases"][pulled.index], run.scene.get("hooks")
     table = summarise_run(run, definitions=[DEFINITION], phases={rest}).set_index("phase")
-    frames = run.frames
-    phases = [frames.in_phase(index) for index in (rest, free, pulled.index)]
+    phases = [run.frames.in_phase(index) for index in (rest, free, pulled.index)]
     if hooks is None or rest not in table.index or not all(phases):
         msg = f"{run.path}: no hooks, or no frame of the rest, of remove-container or of {PULL}; run it again"
         raise InputError(msg)
     walled, before, torn = (phase[-1] for phase in phases)
     upper = hooks["upper_height_m"]
     pull = read_pull(run, run.series, pulled.index)
-    weight, highest, held = run.manifest.count * weight_of_one(run), peak(pull), held_fast(pull, settings[pulled.index])
-    limit = settings[pulled.index].get("force_limit_N")
+    weight, highest, held = run.manifest.count * weight_of_one(run), peak(pull), held_fast(pull, settings)
+    limit = settings.get("force_limit_N")
     centres = centres_of_mass(before.vertices)[:, 2]
     level = heights(before.vertices, floor_z=before.floor_z)
     rose = centres_of_mass(torn.vertices)[:, 2] - centres > float(pull.raised[-1]) / 2
     lowest = float(before.vertices[rose, :, 2].min(axis=1).mean()) - before.floor_z if rose.any() else math.nan
     return {
-        PROCEDURE: procedure,
-        THETA: settings[2]["theta_deg"] if procedure == INTERNAL else math.nan,
-        ASPECT: round(run.manifest.aspect_ratio, 6),
+        **{name: pile[name] for name in (PROCEDURE, THETA, ASPECT)},
         UPPER: upper,
-        SEED: run.manifest.seed,
-        "smarticles [-]": run.manifest.count,
-        "fidelity": run.manifest.fidelity,
-        ACTIVE: duration(run.phases[2]) if procedure != STATIC else 0.0,
+        **pile,
         CROSSINGS: table.loc[rest]["crossings mean [-]"],
         ABOVE: float((centres - before.floor_z > upper).mean()),
         TOP: level.top,
@@ -131,12 +114,11 @@ def measure(run: Run) -> Row:
         BEFORE: pull.before / weight,
         THROUGH: (held_at(pull, highest.time) - pull.held[0]) / weight,
         HELD_FAST: float(held),
-        LIMIT: (float(limit) if isinstance(limit, int | float) else math.inf) / run.manifest.count / weight_of_one(run),
+        LIMIT: math.inf if limit is None else float(limit) / run.manifest.count / weight_of_one(run),
         CARRIED: math.nan if held else float(rose.mean()),
         BREAK: math.nan if held else lowest,
         "time without the wall [s]": duration(run.phases[free]),
-        "scene_sha256": run.manifest.scene_sha256,
-        "run": run.path.name,
+        **last_columns(run),
     }
 
 
@@ -148,11 +130,6 @@ def force_history(run: Run) -> History:
     return History(times=way, values=force / run.manifest.count / weight_of_one(run), active=0.0)
 
 
-def compared(runs: pd.DataFrame) -> pd.DataFrame:
-    """Select the runs of procedures that are compared: of the internal oscillation those of one θ."""
-    return pd.concat([of_procedure(runs, name) for name in runs[PROCEDURE].unique()]) if len(runs) else runs
-
-
 def over_heights(runs: pd.DataFrame) -> pd.DataFrame:
     """Average over the heights of the hook, by procedure, l/w and seed, where there are runs at all heights."""
     columns = [PEAK, RAISED, WORK, THROUGH, CARRIED, ABOVE, CROSSINGS, HELD_FAST]
@@ -160,213 +137,143 @@ def over_heights(runs: pd.DataFrame) -> pd.DataFrame:
     return grouped[columns].mean()[grouped[UPPER].nunique() == runs[UPPER].nunique()].reset_index()
 
 
-def of(table: pd.DataFrame, procedure: str) -> pd.DataFrame:
-    """Select the rows of one procedure."""
-    return table[table[PROCEDURE] == procedure]
-
-
-def less(table: pd.DataFrame, quantity: str, one: str, other: str) -> SeedMean:
-    """Subtract one procedure from another, seed by seed."""
-    return mean_difference(of(table, one), of(table, other), quantity)
-
-
-def _ranked(table: pd.DataFrame, quantity: str, names: tuple[str, ...]) -> str:
-    return ranked({name: float(of(table, name)[quantity].mean()) for name in names})
-
-
-def _peaks(table: pd.DataFrame) -> str:
-    held = int((table[HELD_FAST] > 0).sum())
-    return f"{_ranked(table, PEAK, ALL)}; held fast: {held} of {len(table)} seeds and procedures"
-
-
-def _works(table: pd.DataFrame) -> str:
-    names = {WORK: "work", THROUGH: "through to the grid at the peak", CARRIED: "carried off", ABOVE: "above the hook"}
-    return "; ".join(f"{name} {_ranked(table, quantity, ALL)}" for quantity, name in names.items())
+def order_findings(rows: Rows) -> tuple[Finding, Finding]:
+    """Make the findings that compare peak force with ⟨N⟩ and with the way to it."""
+    return (
+        Finding(
+            id="other-order-than-crossings",
+            says="Over the three procedures, peak force and ⟨N⟩ do not keep the same order",
+            outcome=other_order,
+            rows=rows,
+            found_if="two procedures differ clearly in both, in opposite senses; not found if all three pairs differ "
+            "clearly in the same sense",
+        ),
+        above(
+            "harder-but-brittle",
+            "Like a metal cooled fast, a pile after shape change is harder but more brittle than after internal "
+            "oscillation",
+            {PEAK: 1, RAISED: -1},
+            SHAPE,
+            (INTERNAL,),
+            bounds=HELD_FAST,
+            rows=rows,
+            found_if="peak force above, and reached at a smaller displacement of the hook, seed by seed; the paper "
+            "says that its fracture tests support this, not by which measure",
+        ),
+    )
 
 
 def other_order(table: pd.DataFrame) -> Outcome:
     """Find pairs of procedures that differ clearly both in ⟨N⟩ and in peak force, in one sense or in opposite ones."""
     pairs: dict[bool, list[str]] = {True: [], False: []}
-    effects = []
+    known = True
     for one, other in itertools.combinations(THREE, 2):
-        bounded = bool(of(table, one)[HELD_FAST].any() or of(table, other)[HELD_FAST].any())
-        both = [Effect(label="", value=less(table, quantity, one, other)) for quantity in (CROSSINGS, PEAK)]
-        signs = [(one.verdict == "found") - (one.verdict == "not found") for one in both]
-        if all(signs) and not bounded:
-            pairs[signs[0] == signs[1]].append(f"{one} and {other}")
-        effects += both
-    verdict = Verdict.NOT_RESOLVED
-    if pairs[False]:
-        verdict = Verdict.FOUND
-    elif any(effect.verdict == Verdict.NO_DATA for effect in effects):
-        verdict = Verdict.NO_DATA
-    elif len(pairs[True]) == len(THREE):
-        verdict = Verdict.NOT_FOUND
-    note = f"by ⟨N⟩: {_ranked(table, CROSSINGS, THREE)}; by peak: {_ranked(table, PEAK, THREE)}; clearly apart in the "
-    note += f"opposite sense: {', '.join(pairs[False]) or 'none'}, in the same: {', '.join(pairs[True]) or 'none'}"
-    return Outcome(note=note, verdict=verdict)
+        bounded = any(of_procedure(table, name)[HELD_FAST].any() for name in (one, other))
+        both = [Effect(label="", value=paired(table, quantity, one, other)).verdict for quantity in (CROSSINGS, PEAK)]
+        known &= "no data" not in both
+        if not bounded and set(both) <= {"found", "not found"}:
+            pairs[both[0] == both[1]].append(f"{one} and {other}")
+    note = f"⟨N⟩: {means_by(table, CROSSINGS, PROCEDURE, '.3g')}; peak: {means_by(table, PEAK, PROCEDURE, '.3g')}; "
+    note += f"clearly apart in opposite senses: {', '.join(pairs[False]) or 'none'}, in one: {', '.join(pairs[True])}"
+    found, same = bool(pairs[False]), len(pairs[True]) == len(THREE)
+    return Outcome(note=note, verdict=decide(found, same, data=known or found))
 
 
-def harder_but_brittle(table: pd.DataFrame) -> list[Effect]:
-    """Compare peak force and displacement at the peak after shape change with those after internal oscillation."""
-    one, other = (bool(of(table, name)[HELD_FAST].any()) for name in (SHAPE, INTERNAL))
-    harder, sooner = (less(table, quantity, SHAPE, INTERNAL) for quantity in (PEAK, RAISED))
-    unknown = one or other
-    return [
-        Effect(label="peak of shape-change less internal", value=harder, may_be_higher=one, may_be_lower=other),
-        Effect(
-            label="hook raised at the peak",
-            value=sooner,
-            sign=-1,
-            unit=" m",
-            may_be_higher=unknown,
-            may_be_lower=unknown,
+def strongest(rows: Rows, suffix: str = "") -> tuple[Finding, Finding]:
+    """Make the findings that shape change is the strongest and internal oscillation the weakest of the procedures."""
+    keys: dict[str, Any] = {"beside": (STATIC,), "bounds": HELD_FAST, "rows": rows}
+    most, least = (f"has the {one} peak force of the three procedures{suffix}" for one in ("highest", "least"))
+    return (
+        above(
+            "shape-change-strongest", f"Shape change {most}", PEAK, SHAPE, (EXTERNAL, INTERNAL), shown=[PEAK], **keys
         ),
-    ]
+        above("internal-weakest", f"Internal oscillation {least}", PEAK, INTERNAL, (EXTERNAL, SHAPE), sign=-1, **keys),
+    )
+
+
+def with_crossings(
+    rows: Rows, within: Sequence[str], theta: Rows, within_theta: Sequence[str]
+) -> tuple[Finding, Finding]:
+    """Make the findings that peak force goes with ⟨N⟩, over all procedures and over θ."""
+    keys: dict[str, Any] = {"bounds": HELD_FAST, "unit": "n W_s per link"}
+    where, where_theta = (", ".join(map(symbol, columns)) for columns in (within, within_theta))
+    return (
+        ranks(
+            "strength-with-crossings",
+            "Tensile strength and number of entanglements are connected",
+            CROSSINGS,
+            PEAK,
+            within=within,
+            rows=rows,
+            found_if=f"over all procedures, within runs of equal {where}: {BY_RANKS}",
+            **keys,
+        ),
+        ranks(
+            "strength-with-crossings-over-theta",
+            "Internal oscillation: over θ, the peak force goes with ⟨N⟩",
+            CROSSINGS,
+            PEAK,
+            within=within_theta,
+            rows=theta,
+            found_if=f"over θ, within runs of equal {where_theta}: {BY_RANKS}",
+            **keys,
+        ),
+    )
 
 
 def several_amplitudes(runs: pd.DataFrame) -> pd.DataFrame:
     """Select runs of the internal oscillation, where there are several θ."""
-    internal = of(runs, INTERNAL)
+    internal = runs[runs[PROCEDURE] == INTERNAL]
     return internal[internal.groupby([ASPECT, UPPER])[THETA].transform("nunique") > 1]
 
 
-def _slopes(table: pd.DataFrame) -> list[Effect]:
-    return [
-        Effect(
-            label=f"{name} against θ",
-            value=slope_within(table[THETA], table[quantity], blocks(table, PILE)),
-            sign=0,
-            unit=" per degree",
-        )
-        for quantity, name in ((PEAK, "peak"), (CROSSINGS, "⟨N⟩"))
-    ]
-
-
-THREE, ALL = (EXTERNAL, INTERNAL, SHAPE), (EXTERNAL, INTERNAL, SHAPE, STATIC)
+THREE = (EXTERNAL, INTERNAL, SHAPE)
 PILE = (UPPER, ASPECT, SEED)
 
 FINDINGS = (
-    above(
-        "shape-change-strongest",
-        "Shape change has the highest peak force of the three procedures",
-        PEAK,
-        SHAPE,
-        (EXTERNAL, INTERNAL),
-        of=of,
-        beside=(STATIC,),
-        bounds=HELD_FAST,
-        rows=over_heights,
-        label="peak",
-        note=_peaks,
-        found_if="peak force above those of external and of internal oscillation, seed by seed, mean over the heights",
-    ),
-    above(
-        "internal-weakest",
-        "Internal oscillation has the least peak force of the three procedures",
-        PEAK,
-        INTERNAL,
-        (EXTERNAL, SHAPE),
-        of=of,
-        sign=-1,
-        beside=(STATIC,),
-        bounds=HELD_FAST,
-        rows=over_heights,
-        label="peak",
-        found_if="peak force below those of external oscillation and of shape change, seed by seed, mean "
-        "over the heights",
-    ),
-    Finding(
-        id="other-order-than-crossings",
-        says="Over the three procedures, peak force and ⟨N⟩ do not keep the same order",
-        outcome=other_order,
-        rows=over_heights,
-        found_if="two procedures differ clearly in both, in opposite senses; not found if all three pairs differ "
-        "clearly in the same sense",
-    ),
-    Finding(
-        id="harder-but-brittle",
-        says="Like a metal cooled fast, a pile after shape change is harder but more brittle than after internal "
-        "oscillation",
-        outcome=harder_but_brittle,
-        rows=over_heights,
-        found_if="peak force above, and reached at a smaller displacement of the hook, seed by seed; the paper says "
-        "that its fracture tests support this, not by which measure",
-    ),
+    *strongest(over_heights),
+    *order_findings(over_heights),
     above(
         "tougher",
         "(ours, not the paper's) shape change takes the most work to tear",
         WORK,
         SHAPE,
         (EXTERNAL, INTERNAL),
-        of=of,
         bounds=HELD_FAST,
         rows=over_heights,
-        label="work",
-        note=_works,
-        found_if="∫ F dz over the whole pull above those of external and of internal oscillation, seed by seed, mean "
-        "over the heights",
+        shown=(WORK, THROUGH, CARRIED, ABOVE),
     ),
-    ranks(
-        "strength-with-crossings",
-        "Tensile strength and number of entanglements are connected",
-        CROSSINGS,
-        PEAK,
-        within=PILE,
-        bounds=HELD_FAST,
-        rows=compared,
-        unit="n W_s per link",
-        found_if=f"over all procedures, within runs of one height and seed: {BY_RANKS}",
-    ),
-    ranks(
-        "strength-with-crossings-over-theta",
-        "Internal oscillation: over θ, the peak force goes with ⟨N⟩",
-        CROSSINGS,
-        PEAK,
-        within=PILE,
-        bounds=HELD_FAST,
-        rows=several_amplitudes,
-        unit="n W_s per link",
-        beside=_slopes,
-        found_if=f"over θ, within runs of one height and seed: {BY_RANKS}",
-    ),
+    *with_crossings(compared, PILE, several_amplitudes, PILE),
 )
-
-_LABELS = {
-    STATIC: "static",
-    EXTERNAL: "external",
-    INTERNAL: rf"internal, $\theta$ = {AMPLITUDE:g}°",
-    SHAPE: "shape change",
-}
 
 FIGURES = (
     Histories(
         name="force_raised",
         history=force_history,
         rows=compared,
-        split=by_procedure(_LABELS),
+        split=by_procedure(),
         panels=UPPER,
         panel="hook {:g} mm above the floor",
         panel_scale=1e3,
         width=0.5,  # the side of the hook's bars
         unit="mm",
         x_label="hook raised by [mm]",
-        y_label=r"force on the hook $F/(n W_\mathrm{s})$ [-]",
+        quantities={"": r"force on the hook $F/(n W_\mathrm{s})$ [-]"},
     ),
     Means(
         name="strength",
         quantities=[QUANTITIES[name] for name in (PEAK, RAISED, WORK, CARRIED)],
         x=UPPER,
-        x_scale=1e3,
+        transform=lambda x: 1e3 * x,
         x_label="hook above the floor [mm]",
         ticks=True,
-        split=by_procedure(_LABELS, apart=0.3, line=False),
+        split=by_procedure(apart=0.3, line=False),
     ),
     Scatter(
         name="peak_crossings",
-        x=QUANTITIES[CROSSINGS],
+        xs=[QUANTITIES[CROSSINGS]],
         y=QUANTITIES[PEAK],
-        split=by_procedure(_LABELS, line=False),
+        split=by_procedure(line=False),
         bounds=HELD_FAST,
     ),
 )
@@ -376,10 +283,10 @@ STUDY = Study(
     title="Piles torn between a grip on the floor and a hook, against the findings of Savoie et al.",
     measure=measure,
     keys=(
-        Key(column=ASPECT, label="l/w", form="g"),
+        ASPECT_KEY,
         Key(column=UPPER, label="hook [mm]", form="g", scale=1e3),
         Key(column=PROCEDURE, label="procedure", order=(STATIC, EXTERNAL, INTERNAL, SHAPE)),
-        Key(column=THETA, label="θ", form="g", unit="°"),
+        THETA_KEY,
     ),
     quantities=tuple(QUANTITIES.values()),
     findings=FINDINGS,

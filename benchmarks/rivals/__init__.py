@@ -1,1 +1,1 @@
-"""Our engines beside others that could do the same: cost against overlap, from the same poses, in one run."""
+"""Our engines beside others: cost against overlap, from equal poses, in one run."""

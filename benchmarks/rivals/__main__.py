@@ -17,6 +17,7 @@ import resource
 import subprocess
 import sys
 from collections.abc import Iterator, Sequence
+from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -25,10 +26,9 @@ import pandas as pd
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from benchmarks.rivals.given import CREEP, Given
-from benchmarks.rivals.ours import RESIDUAL
 from benchmarks.rivals.overlap import deepest, solid_of
 from benchmarks.rivals.settings import ACTIVITIES, ENGINES, SETTINGS, Setting
+from benchmarks.rivals.task import CREEP, Task
 from benchmarks.runs import PAPER_PER_LAYER, folder_of, pile, run_child
 from dem.body.state import State
 from dem.run.run import versions
@@ -38,16 +38,14 @@ from postprocess import packing_fraction
 
 Array = NDArray[np.float64]
 
-LOOK = 0.01  # s between two looks at the poses; at 30 Hz ten phases of the shaking
+SAMPLE = 0.01  # s between two samples of the poses; at 30 Hz three in a period of the shaking
 REST = 0.3  # s before the activity
 # A round bar as thick as the section's diagonal: only corners at the barbs' tips reach out of it, so that the pile
 # overlaps in no engine by much, whatever its shapes. Thinner ones settle a little before anything is measured.
 POUR = {"engine": "links", "fidelity": {"base": "standard", "diameter_m": 1.37e-3}}
-# Engines that keep an account of energies; it costs time, and is kept in a run of its own, of the first seed.
-ACCOUNTED, ACCOUNTED_AT = ("links", "yade"), "standard"
 KEYS = ["activity", "engine", "setting"]
 COST, STEP, MEMORY = "cost [s/s]", "dt [s]", "peak memory [MiB]"
-DEPTH, MEAN_DEPTH, BOX_DEPTH = "deepest overlap [m]", "deepest overlap, mean of looks [m]", "of the true boxes [m]"
+DEPTH, MEAN_DEPTH, BOX_DEPTH = "deepest overlap [m]", "deepest overlap, mean of samples [m]", "of the true boxes [m]"
 PHI_REST, PHI_END, SINKING = "phi at rest [1]", "phi at the end [1]", "sinks at rest [m/s]"
 SAME, TENTH = "links at this overlap are cheaper by [1]", "links at a tenth of it are cheaper by [1]"
 
@@ -60,12 +58,10 @@ def data_of(count: int, seed: int, *phases: dict[str, Any], **keys: Any) -> dict
 
 
 def scene_of(
-    setting: Setting, activity: str, poured: Path, *, count: int, seed: int, seconds: float, look: float, account: bool
+    setting: Setting, activity: str, poured: Path, *, count: int, seed: int, seconds: float, sample: float
 ) -> dict[str, Any]:
     """Return the scene of a setting: take over, rest, act."""
-    recording = {"frame_interval_s": look, "series_interval_s": look, "checkpoint_interval_s": None}
-    if account:
-        recording["dissipation_interval_s"] = look
+    recording = {"frame_interval_s": sample, "series_interval_s": sample, "checkpoint_interval_s": None}
     data = {**data_of(count, seed, recording=recording), "engine": "links", **setting.scene}
     data["phases"] = [
         {"type": "take-over", "run": str(poured.absolute())},
@@ -77,19 +73,19 @@ def scene_of(
 
 def perform(task: Path) -> None:
     """Simulate a task in this process: YADE and PyVista never meet in one, and peak memory is that of one engine."""
-    told = json.loads(task.read_text(encoding="utf-8"))
-    given = Given(parse_scene(told["scene"], source=str(task)), task.parent, told["look_s"])
-    module = importlib.import_module(f"benchmarks.rivals.{ENGINES[told['engine']].module}")
-    outcome = module.simulate(given, told["knobs"])
+    asked = json.loads(task.read_text(encoding="utf-8"))
+    module = importlib.import_module(f"benchmarks.rivals.{ENGINES[asked['engine']].module}")
+    scene = parse_scene(asked["scene"], source=str(task))
+    outcome = module.simulate(Task(scene, task.parent, asked["sample_s"]), asked["knobs"])
     np.savez(task.with_suffix(".npz"), positions=outcome.positions, frames=outcome.frames)
     used = [resource.getrusage(who).ru_maxrss for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)]
     # A program that was started has the engine; this process, what feeds it.
     row = {"processor_s": outcome.processor_s, STEP: outcome.time_step, MEMORY: (used[1] or used[0]) / 1024}
-    row |= {"version": outcome.version, **outcome.more}
+    row["version"] = outcome.version
     task.with_suffix(".row.json").write_text(json.dumps(row), encoding="utf-8")
 
 
-def run(folder: Path, setting: Setting, activity: str, seed: int, given: argparse.Namespace, *, account: bool) -> Any:
+def run(folder: Path, setting: Setting, activity: str, seed: int, given: argparse.Namespace) -> Any:
     """Simulate in a process of its own and measure; return a row of the table.
 
     Raises:
@@ -98,24 +94,24 @@ def run(folder: Path, setting: Setting, activity: str, seed: int, given: argpars
     count, seconds, poured = given.count, given.seconds, folder / f"pile-{given.count}-{seed}"
     if not (poured / "done.json").exists():
         run_child(folder, poured.name, data_of(count, seed, {"type": "relax", "duration_s": 0.3}, **POUR))
-    place = folder / (f"{setting.key}-{activity}-{count}-{seed}" + ("-account" if account else ""))
+    place = folder / f"{setting.key}-{activity}-{count}-{seed}"
     place.mkdir(exist_ok=True)
-    scene = scene_of(setting, activity, poured, count=count, seed=seed, seconds=seconds, look=LOOK, account=account)
+    scene = scene_of(setting, activity, poured, count=count, seed=seed, seconds=seconds, sample=SAMPLE)
     task = place / "task.json"
-    asked = {"engine": setting.engine, "knobs": dict(setting.knobs), "scene": scene, "look_s": LOOK}
+    asked = {"engine": setting.engine, "knobs": dict(setting.knobs), "scene": scene, "sample_s": SAMPLE}
     task.write_text(json.dumps(asked), encoding="utf-8")
     one_thread = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "RAYON_NUM_THREADS"), "1")
     command = [sys.executable, "-m", "benchmarks.rivals", "--task", str(task)]
     subprocess.run(command, check=True, env={**os.environ, **one_thread})
-    told = json.loads(task.with_suffix(".row.json").read_text(encoding="utf-8"))
+    row = json.loads(task.with_suffix(".row.json").read_text(encoding="utf-8"))
     with np.load(task.with_suffix(".npz")) as poses:
         found = measured(parse_scene(scene, source=str(place)), setting.shape, poses["positions"], poses["frames"])
-    cost = told.pop("processor_s") / seconds
-    return {"N [1]": count, "activity [s]": seconds, COST: cost, **found, **told}
+    cost = row.pop("processor_s") / seconds
+    return {"N [1]": count, "activity [s]": seconds, COST: cost, **found, **row}
 
 
 def measured(scene: Scene, shape: str, positions: Array, frames: Array) -> dict[str, float]:
-    """Measure overlaps and packing of a simulation, see `benchmarks.rivals.given.Outcome`."""
+    """Measure overlaps and packing of a simulation, see `benchmarks.rivals.task.Outcome`."""
     before, rested, *acting = zip(positions, frames, strict=True)
     depths = np.array(
         [[deepest(solid_of(kind, scene.particle, *pose)) for kind in (shape, "boxes")] for pose in acting]
@@ -139,34 +135,18 @@ def measured(scene: Scene, shape: str, positions: Array, frames: Array) -> dict[
 
 def planned(engines: Sequence[str], given: argparse.Namespace) -> Iterator[tuple[Setting, dict[str, Any]]]:
     """Yield each setting, with the columns that identify a run."""
-    first = given.seeds[0]
-    for seed in given.seeds:
-        for setting in SETTINGS:
-            if setting.engine not in engines or (setting.costly and seed != first):
-                continue
-            accounts = setting.engine in ACCOUNTED and seed == first and setting.name == ACCOUNTED_AT
+    for seed, setting in product(given.seeds, SETTINGS):
+        if setting.engine in engines and not (setting.costly and seed != given.seeds[0]):
             for activity in filter(given.activities.__contains__, setting.activities):
-                for account in (False, True) if accounts else (False,):
-                    yield (
-                        setting,
-                        {
-                            "engine": ENGINES[setting.engine].title,
-                            "setting": setting.name,
-                            "activity": activity,
-                            "seed": seed,
-                            "account": account,
-                        },
-                    )
+                title = ENGINES[setting.engine].title
+                yield setting, {"engine": title, "setting": setting.name, "activity": activity, "seed": seed}
 
 
 def medians(rows: pd.DataFrame) -> pd.DataFrame:
     """Return one line per activity, engine and setting, and what links cost at its overlap and at a tenth of it."""
     columns = [COST, STEP, DEPTH, MEAN_DEPTH, BOX_DEPTH, PHI_REST, PHI_END, SINKING, MEMORY]
-    groups = rows[~rows["account"]].groupby(KEYS, sort=False)
-    table = groups[columns].median().assign(**{"seeds [1]": groups["seed"].nunique()})
-    if RESIDUAL in rows:
-        table[RESIDUAL] = rows[rows["account"]].groupby(KEYS)[RESIDUAL].median()
-    table = table.reset_index()
+    groups = rows.groupby(KEYS, sort=False)
+    table = groups[columns].median().assign(**{"seeds [1]": groups["seed"].nunique()}).reset_index()
     links = table[table["engine"] == "links"]
     for column, share in ((SAME, 1.0), (TENTH, 0.1)):
         table[column] = [
@@ -212,7 +192,7 @@ def main() -> int:
         if any(all(row[key] == value for key, value in keys.items()) for row in rows):
             continue
         try:
-            found = run(folder, setting, keys["activity"], keys["seed"], given, account=keys["account"])
+            found = run(folder, setting, keys["activity"], keys["seed"], given)
         except subprocess.CalledProcessError as error:
             print(f"{keys}: failed, status {error.returncode}")
             continue

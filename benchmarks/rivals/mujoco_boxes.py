@@ -1,4 +1,4 @@
-"""MuJoCo: boxes of the true size, welded or hinged with position servos of limited torque; in the container's frame."""
+"""MuJoCo: boxes of the true size, welded or hinged with position servos of limited torque."""
 
 from __future__ import annotations
 
@@ -9,78 +9,64 @@ from typing import Any
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from benchmarks.rivals.given import Array, Given, Knobs, Outcome, simulated
 from benchmarks.rivals.overlap import halves_of
+from benchmarks.rivals.task import Array, Knobs, Outcome, Task, World, simulated
 
 MIDDLE = 1  # the link that carries the two others
 SERVO = 0.02  # rad behind its target at which a servo has its full torque
 
 
-def simulate(given: Given, knobs: Knobs) -> Outcome:
+def simulate(task: Task, knobs: Knobs) -> Outcome:
     """Simulate with `time_step` [s], `solver`, `iterations`, `cone` and `solref` of contacts, named as there."""
-    return simulated(given, InMujoco(given, **knobs))
+    return simulated(task, InMujoco(task, **knobs))
 
 
-class InMujoco:
+class InMujoco(World):
     """A model of free bodies, each with its barbs welded on or hinged to it."""
 
     def __init__(
-        self,
-        given: Given,
-        *,
-        time_step: float,
-        solver: str,
-        iterations: int,
-        cone: str,
-        solref: Sequence[float],
-        impratio: float = 1.0,
+        self, task: Task, *, time_step: float, solver: str, iterations: int, cone: str, solref: Sequence[float]
     ) -> None:
-        self._given, self._mujoco = given, importlib.import_module("mujoco")
-        mujoco = self._mujoco
-        self.version, self.time_step = f"mujoco {mujoco.__version__}", time_step
-        self._hinged = given.actuates
+        mujoco = self._mujoco = importlib.import_module("mujoco")
+        super().__init__(task, time_step, f"mujoco {mujoco.__version__}")
+        self._hinged = task.actuates
         spec = mujoco.MjSpec()
         spec.option.timestep, spec.option.iterations = time_step, iterations
         spec.option.solver = getattr(mujoco.mjtSolver, f"mjSOL_{solver.upper()}")
         spec.option.cone = getattr(mujoco.mjtCone, f"mjCONE_{cone.upper()}")
-        spec.option.impratio = impratio
         spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
-        spec.option.gravity = [0.0, 0.0, -given.scene.gravity_m_per_s2]
+        spec.option.gravity = [0.0, 0.0, -task.scene.gravity_m_per_s2]
         spec.compiler.boundmass = spec.compiler.boundinertia = 0.0
         spec.memory = 2**30
-        self._surface = {
-            "friction": [given.scene.contact.friction_smarticle, 0.0, 0.0],
-            "solref": list(solref),
-            "condim": 3,
-        }
+        friction = [task.scene.contact.friction_smarticle, 0.0, 0.0]
+        self._surface = {"friction": friction, "solref": list(solref), "condim": 3}
         self._around(spec)
-        for k in range(given.scene.count):
+        for k in range(task.scene.count):
             self._smarticle(spec, k)
         self._model = spec.compile()
         self._data = mujoco.MjData(self._model)
         mujoco.mj_forward(self._model, self._data)
-        self._since: float | None = None
 
     def _around(self, spec: Any) -> None:
         plane = self._mujoco.mjtGeom.mjGEOM_PLANE
         spec.worldbody.add_geom(type=plane, size=[1, 1, 1], **self._surface)
-        for point, inward in zip(*self._given.walls(), strict=True):
+        for point, inward in zip(*self.task.walls(), strict=True):
             side = np.cross([0.0, 0.0, 1.0], inward)
             frame = np.column_stack([side, np.cross(inward, side), inward])
             spec.worldbody.add_geom(type=plane, size=[1, 1, 1], pos=point, quat=_quaternion(frame), **self._surface)
 
     def _smarticle(self, spec: Any, k: int) -> None:
-        given, boxes, joint = self._given, self._given.boxes, self._mujoco.mjtJoint
+        task, boxes, joint = self.task, self.task.boxes, self._mujoco.mjtJoint
         if not self._hinged:
             body = spec.worldbody.add_body(
-                pos=given.state.positions[k], quat=_quaternion(given.turns[k]), mass=boxes.mass, inertia=boxes.inertia,
+                pos=task.state.positions[k], quat=_quaternion(task.turns[k]), mass=boxes.mass, inertia=boxes.inertia,
                 ipos=[0, 0, 0], explicitinertial=True,
             )  # fmt: skip
             body.add_freejoint()
             for link in range(3):
                 self._box(body, link, boxes.link_centres[link], boxes.link_rotations[link])
             return
-        places, frames = given.state.link_positions[k], given.state.link_rotations[k]
+        places, frames = task.state.link_positions[k], task.state.link_rotations[k]
         middle = spec.worldbody.add_body(pos=places[MIDDLE], quat=_quaternion(frames[MIDDLE]), **self._inertial(MIDDLE))
         middle.add_freejoint()
         self._box(middle, MIDDLE, np.zeros(3), np.eye(3))
@@ -97,7 +83,7 @@ class InMujoco:
             self._servo(spec, hinge.name, barb)
 
     def _inertial(self, link: int) -> dict[str, Any]:
-        boxes = self._given.boxes
+        boxes = self.task.boxes
         return {
             "mass": boxes.link_masses[link],
             "inertia": boxes.link_inertias[link],
@@ -107,12 +93,12 @@ class InMujoco:
 
     def _box(self, body: Any, link: int, centre: Array, frame: Array) -> None:
         geom = self._mujoco.mjtGeom.mjGEOM_BOX
-        sides = halves_of(self._given.boxes)[link]
+        sides = halves_of(self.task.boxes)[link]
         body.add_geom(type=geom, size=sides, pos=centre, quat=_quaternion(frame), mass=0.0, **self._surface)
 
     def _servo(self, spec: Any, hinge: str, barb: int) -> None:
-        """Critically damped for the barb alone."""
-        limit, boxes = self._given.torque_limit, self._given.boxes
+        """Add a servo that is critically damped for the barb alone."""
+        limit, boxes = float(self.task.scene.torque_limit), self.task.boxes
         inertia = boxes.link_inertias[barb][2] + boxes.link_masses[barb] * (boxes.barb_length / 2) ** 2
         gain = limit / SERVO
         servo = spec.add_actuator(
@@ -120,29 +106,24 @@ class InMujoco:
         )
         servo.set_to_position(kp=gain, kv=2 * float(np.sqrt(gain * inertia)))
 
-    def begin(self) -> None:
-        """See `Stepped.begin`."""
-        self._since = 0.0
+    def kick(self, speed: float) -> None:
+        """Add a vertical velocity [m/s] to all smarticles that are welded."""
         free = self._model.jnt_dofadr[self._model.jnt_type == self._mujoco.mjtJoint.mjJNT_FREE]
         if not self._hinged:
-            self._data.qvel[free + 2] -= self._given.kick
+            self._data.qvel[free + 2] += speed
 
-    def advance(self, seconds: float) -> None:
-        """See `Stepped.advance`."""
-        model, data, given = self._model, self._data, self._given
-        start = given.gait.start if self._hinged else None
-        for _ in range(round(seconds / self.time_step)):
-            if self._since is not None:
-                self._since += self.time_step
-                if start is None:
-                    model.opt.gravity[2] = -given.pull(self._since - self.time_step / 2)
-                else:
-                    data.ctrl[:] = (given.gait.targets(self._since) - start).ravel()
-            self._mujoco.mj_step(model, data)
+    def step(self, gravity: float, time_s: float) -> None:
+        """Take one step at a gravity [m/s²], or with the motors' targets at a time [s]."""
+        if not self._hinged:
+            self._model.opt.gravity[2] = -gravity
+        elif time_s:
+            self._data.ctrl[:] = (self.task.gait.targets(time_s) - self.task.gait.start).ravel()
+        self._mujoco.mj_step(self._model, self._data)
 
     def links(self) -> tuple[Array, Array]:
-        """See `Stepped.links`: geoms come by threes, after floor and walls; where hinged, the middle link first."""
-        count = 3 * self._given.scene.count
+        """Return centres and axes of the links."""
+        # Geoms come by threes, after floor and walls; where hinged, the middle link first.
+        count = 3 * self.task.scene.count
         self._mujoco.mj_kinematics(self._model, self._data)
         places = self._data.geom_xpos[-count:].reshape(-1, 3, 3)
         frames = self._data.geom_xmat[-count:].reshape(-1, 3, 3, 3)
@@ -151,6 +132,6 @@ class InMujoco:
 
 
 def _quaternion(frame: Array) -> list[float]:
-    """(w, x, y, z) of a rotation matrix."""
+    """Return (w, x, y, z) of a rotation matrix."""
     quaternion: list[float] = Rotation.from_matrix(frame).as_quat()[[3, 0, 1, 2]].tolist()
     return quaternion

@@ -1,4 +1,4 @@
-"""How deep smarticles are in each other, from poses alone: one measure for all engines, whatever their shapes.
+"""How deep smarticles overlap, from poses alone: one measure for all engines, whatever their shapes.
 
 Boxes are taken as deep in each other as the shortest push that parts them is long, swept segments (and spheres, which
 are segments of no length) as far as their axes are nearer than a diameter. Links of one smarticle are left out.
@@ -7,7 +7,6 @@ are segments of no length) as far as their axes are nearer than a diameter. Link
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -25,14 +24,7 @@ PARALLEL = 1e-9  # squared sine of an angle below which two edges have no common
 
 @dataclass(frozen=True, eq=False)
 class Bars:
-    """Boxes.
-
-    Args:
-        centres: (B, 3) [m].
-        frames: (B, 3, 3) axes of each as columns [1].
-        halves: (B, 3) half its lengths along them [m].
-        owners: (B,) number of the smarticle that it belongs to.
-    """
+    """Boxes: (B, 3) centres [m], (B, 3, 3) axes as columns, (B, 3) half lengths [m], (B,) numbers of smarticles."""
 
     centres: Array
     frames: Array
@@ -40,11 +32,11 @@ class Bars:
     owners: Indices
 
     def candidates(self) -> Indices:
-        """(P, 2) pairs of parts that may be in each other."""
+        """Find (P, 2) pairs of parts that may overlap."""
         return _near(self.centres, np.linalg.norm(self.halves, axis=1))
 
     def depths(self, pairs: Indices) -> Array:
-        """(P,) least overlap [m] over the fifteen axes on which convex boxes can be told apart."""
+        """Compute (P,) least overlaps [m] over the fifteen axes that may separate convex boxes."""
         one, other = pairs.T
         between = self.centres[other] - self.centres[one]
         frames = np.concatenate([self.frames[one], self.frames[other]], axis=2)
@@ -63,14 +55,7 @@ class Bars:
 
 @dataclass(frozen=True, eq=False)
 class Swept:
-    """Segments swept by a sphere.
-
-    Args:
-        starts: (S, 3) [m].
-        ends: (S, 3) [m].
-        radius: of the sphere [m].
-        owners: (S,) number of the smarticle that it belongs to.
-    """
+    """Segments swept by a sphere: (S, 3) starts and ends [m], radius [m], (S,) numbers of smarticles."""
 
     starts: Array
     ends: Array
@@ -78,18 +63,18 @@ class Swept:
     owners: Indices
 
     def candidates(self) -> Indices:
-        """(P, 2) pairs of parts that may be in each other."""
+        """Find (P, 2) pairs of parts that may overlap."""
         reaches = np.linalg.norm(self.ends - self.starts, axis=1) / 2 + self.radius
         return _near((self.starts + self.ends) / 2, reaches)
 
     def depths(self, pairs: Indices) -> Array:
-        """(P,) how deep pairs of parts are in each other [m]; not positive where they are apart."""
+        """Compute (P,) overlaps of pairs of parts [m]; not positive where they are apart."""
         one, other = pairs.T
         return 2 * self.radius - distances(self.starts[one], self.ends[one], self.starts[other], self.ends[other])
 
 
 def distances(starts: Array, ends: Array, others: Array, other_ends: Array) -> Array:
-    """(P,) distances [m] of pairs of segments, (P, 3) [m] each; segments may be points.
+    """Compute (P,) distances [m] of pairs of segments, (P, 3) [m] each; segments may be points.
 
     The least is between the points that the infinite lines have nearest, where both are on their segments, or at one of
     the four ends.
@@ -111,7 +96,7 @@ def distances(starts: Array, ends: Array, others: Array, other_ends: Array) -> A
 
 
 def deepest(solid: Bars | Swept) -> float:
-    """How deep the deepest two parts of different smarticles are in each other [m]; 0 where none are."""
+    """Compute the deepest overlap of two parts of different smarticles [m]; 0 where there is none."""
     pairs = solid.candidates()
     pairs = pairs[solid.owners[pairs[:, 0]] != solid.owners[pairs[:, 1]]]
     return max(0.0, float(solid.depths(pairs).max())) if len(pairs) else 0.0
@@ -127,7 +112,7 @@ def _to_segment(points: Array, starts: Array, ends: Array) -> Array:
 
 
 def _near(centres: Array, reaches: Array) -> Indices:
-    """(P, 2) pairs whose spheres about their centres meet."""
+    """Find (P, 2) pairs whose spheres about their centres meet."""
     pairs = cKDTree(centres).query_pairs(2 * float(reaches.max()), output_type="ndarray").astype(np.int64)
     one, other = pairs.T
     meet = np.linalg.norm(centres[one] - centres[other], axis=1) < reaches[one] + reaches[other]
@@ -135,21 +120,18 @@ def _near(centres: Array, reaches: Array) -> Indices:
     return near
 
 
-SHAPES = ("boxes", "strands", "spheres")
-
-
 def solid_of(shape: str, particle: Particle, positions: Array, frames: Array) -> Bars | Swept:
     """Return what an engine keeps apart: boxes, strands of links, or spheres of YADE and LAMMPS.
 
     Positions are (N, 3, 3), the centres of the links [m]; frames (N, 3, 3, 3), their axes as columns [1].
     """
-    parts: Mapping[str, Callable[[Particle, Array, Array], Bars | Swept]]
-    parts = {"boxes": _boxes, "strands": _strands, "spheres": _spheres}
-    return parts[shape](particle, positions, frames)
+    if shape == "boxes":
+        return _boxes(particle, positions, frames)
+    return (_strands if shape == "strands" else _spheres)(particle, positions, frames)
 
 
 def halves_of(boxes: Boxes) -> Array:
-    """(3, 3) half the sides of the links, along the axes of their frames [m]."""
+    """Compute (3, 3) halves of the sides of the links, along the axes of their frames [m]."""
     sections = np.tile([boxes.thickness_in_plane, boxes.thickness_normal], (LINKS, 1))
     return np.column_stack([boxes.lengths, sections]) / 2
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import importlib.util
 import re
 import shutil
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -16,7 +16,7 @@ ACTIVITIES: Mapping[str, Mapping[str, Any]] = {
 }
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True)
 class Setting:
     """One row of the table.
 
@@ -44,16 +44,9 @@ class Setting:
         return re.sub(r"[^0-9a-z.-]+", "_", f"{self.engine}-{self.name}".lower())
 
 
-@dataclass(frozen=True, kw_only=True)
-class Peer:
-    """An engine.
-
-    Args:
-        title: in tables.
-        module: of `benchmarks.rivals` that has its `simulate`.
-        needs: package of Python, or program, that it needs.
-        package: Debian's, that has that program; empty: it is no program.
-    """
+@dataclass(frozen=True)
+class Rival:
+    """An engine: title in tables, module, and the Python package or, of a Debian package, the program that it needs."""
 
     title: str
     module: str
@@ -63,74 +56,68 @@ class Peer:
     @property
     def missing(self) -> str | None:
         """What is missing, and the way out; None: nothing."""
-        if self.package:
-            found, way = shutil.which(self.needs) is not None, f"apt-get install {self.package}"
-        else:
-            found, way = importlib.util.find_spec(self.needs) is not None, "make rivals"
+        found = shutil.which(self.needs) if self.package else importlib.util.find_spec(self.needs)
+        way = f"apt-get install {self.package}" if self.package else "make rivals"
         return None if found else f"{self.title}: left out, {self.needs} is not installed ({way})"
 
 
-ENGINES: Mapping[str, Peer] = {
-    "links": Peer(title="links", module="ours", needs="numba"),
-    "yade": Peer(title="YADE", module="ours", needs="dem"),
-    "lammps": Peer(title="LAMMPS", module="lammps", needs="lmp", package="lammps"),
-    "mujoco": Peer(title="MuJoCo", module="mujoco_boxes", needs="mujoco"),
-    "bullet": Peer(title="Bullet", module="bullet", needs="pybullet"),
-    "rapier": Peer(title="Rapier", module="rapier", needs="rapier3d"),
+ENGINES: Mapping[str, Rival] = {
+    "links": Rival("links", "ours", "numba"),
+    "yade": Rival("YADE", "ours", "dem"),
+    "lammps": Rival("LAMMPS", "lammps", "lmp", "lammps"),
+    "mujoco": Rival("MuJoCo", "mujoco_boxes", "mujoco"),
+    "bullet": Rival("Bullet", "bullet", "pybullet"),
+    "rapier": Rival("Rapier", "rapier", "rapier3d"),
 }
 
 BOTH = (SHAKE, OSCILLATE)
+NAMES = ("draft", "standard", "reference")
 STIFFNESSES = (2e3, 4e3, 3.2e4, 2.56e5, 2.048e6)  # N/m
 
 
-def _ours() -> Iterator[Setting]:
-    """The named fidelities, and links at ever stiffer contacts: what less overlap costs."""
-    for name in ("draft", "standard", "reference"):
-        yield Setting(
-            engine="links", name=name, shape="strands", activities=BOTH, scene={"engine": "links", "fidelity": name}
+def _links(name: str, fidelity: Any, *, costly: bool = False) -> Setting:
+    return Setting("links", name, "strands", BOTH, {"engine": "links", "fidelity": fidelity}, costly=costly)
+
+
+def _mujoco(name: str, time_step: float, contact: float) -> Setting:
+    """A contact's time constant is 0.02 s as shipped, and 2 dt at least."""
+    solver = {"time_step": time_step, "solver": "CG", "iterations": 50, "cone": "pyramidal"}
+    return Setting("mujoco", name, activities=BOTH, knobs={**solver, "solref": [contact, 1.0]}, costly=True)
+
+
+def _bullet(name: str, time_step: float, iterations: int, recovery: float) -> Setting:
+    knobs = {"time_step": time_step, "iterations": iterations, "recovery": recovery}
+    return Setting("bullet", name, knobs=knobs, costly=time_step < 5e-4)
+
+
+def _rapier(name: str, time_step: float, frequency: float, damping: float) -> Setting:
+    knobs = {"time_step": time_step, "iterations": 4, "frequency": frequency, "damping": damping}
+    return Setting("rapier", name, knobs=knobs)
+
+
+# The named fidelities, and links at ever stiffer contacts: what less overlap costs. Others as shipped or as tried
+# first; and better: chosen on piles of 60 and 270 for little overlap at little cost.
+SETTINGS: Sequence[Setting] = (
+    *(_links(name, name) for name in NAMES),
+    *(
+        _links(
+            f"{stiffness / 1e3:g} N/mm", {"base": "standard", "stiffness_N_per_m": stiffness}, costly=stiffness > 1e6
         )
-    for stiffness in STIFFNESSES:
-        stiffer = {"base": "standard", "stiffness_N_per_m": stiffness}
-        yield Setting(
-            engine="links", name=f"{stiffness / 1e3:g} N/mm", shape="strands", activities=BOTH, costly=stiffness > 1e6,
-            scene={"engine": "links", "fidelity": stiffer},
-        )  # fmt: skip
-    for name in ("draft", "standard", "reference"):
-        told = {"engine": "yade", "fidelity": name}
-        yield Setting(engine="yade", name=name, shape="spheres", scene=told, costly=name == "reference")
-    told = {"engine": "yade", "fidelity": "standard"}
-    yield Setting(engine="lammps", name="standard", shape="spheres", scene=told, costly=True)
-
-
-def _mujoco(time_step: float, contact: float) -> Mapping[str, Any]:
-    """Return the solver of the trials; a contact's time constant is 0.02 s as shipped, and 2 dt at least."""
-    solver = {"solver": "CG", "iterations": 50, "cone": "pyramidal"}
-    return {"time_step": time_step, **solver, "solref": [contact, 1.0]}
-
-
-def _theirs() -> Iterator[Setting]:
-    """As shipped or as tried first; and better: chosen on piles of 60 and 270 for little overlap at little cost."""
-    for name, step, contact in (
-        ("2e-4 s, CG 50, soft", 2e-4, 0.02),
-        ("2e-4 s, CG 50, stiff", 2e-4, 4e-4),
-        ("5e-4 s, CG 50, stiff", 5e-4, 1e-3),
-    ):
-        yield Setting(engine="mujoco", name=name, activities=BOTH, knobs=_mujoco(step, contact), costly=True)
-    for name, step, iterations, recovery in (
-        ("1e-3 s", 1e-3, 50, 0.2),
-        ("1e-3 s, 200 iterations", 1e-3, 200, 0.8),
-        ("2e-4 s", 2e-4, 50, 0.2),
-    ):
-        knobs = {"time_step": step, "iterations": iterations, "recovery": recovery}
-        yield Setting(engine="bullet", name=name, knobs=knobs, costly=step < 5e-4)
-    for name, step, frequency, damping in (
-        ("1e-3 s, as shipped", 1e-3, 30.0, 10.0),
-        ("2e-4 s, as shipped", 2e-4, 30.0, 10.0),
-        ("1e-3 s, stiff", 1e-3, 1000.0, 5.0),
-        ("2e-4 s, stiff", 2e-4, 1000.0, 5.0),
-    ):
-        knobs = {"time_step": step, "iterations": 4, "frequency": frequency, "damping": damping}
-        yield Setting(engine="rapier", name=name, knobs=knobs)
-
-
-SETTINGS: Sequence[Setting] = (*_ours(), *_theirs())
+        for stiffness in STIFFNESSES
+    ),
+    *(
+        Setting("yade", name, "spheres", scene={"engine": "yade", "fidelity": name}, costly=name == "reference")
+        for name in NAMES
+    ),
+    Setting("lammps", "standard", "spheres", scene={"engine": "yade", "fidelity": "standard"}, costly=True),
+    _mujoco("2e-4 s, CG 50, soft", 2e-4, 0.02),
+    _mujoco("2e-4 s, CG 50, stiff", 2e-4, 4e-4),
+    _mujoco("5e-4 s, CG 50, stiff", 5e-4, 1e-3),
+    _bullet("1e-3 s", 1e-3, 50, 0.2),
+    _bullet("1e-3 s, 200 iterations", 1e-3, 200, 0.8),
+    _bullet("2e-4 s", 2e-4, 50, 0.2),
+    _rapier("1e-3 s, as shipped", 1e-3, 30.0, 10.0),
+    _rapier("2e-4 s, as shipped", 2e-4, 30.0, 10.0),
+    _rapier("1e-3 s, stiff", 1e-3, 1000.0, 5.0),
+    _rapier("2e-4 s, stiff", 2e-4, 1000.0, 5.0),
+)

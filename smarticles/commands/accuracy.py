@@ -15,7 +15,7 @@ from smarticles.commands.study import compute_and_analyse
 from smarticles.sweeps import expected_wall_s, folder_of
 
 if TYPE_CHECKING:
-    from studies.ladder import Ladder
+    from studies.accuracy import Ladder
 
 
 def add(commands: Commands) -> None:
@@ -75,8 +75,7 @@ DIR gets the runs, and results/ with table, figure and advice; its work_precisio
 def run_accuracy(arguments: argparse.Namespace) -> int:
     """Show a ladder; run and analyse it."""
     from dem.scene.reading import load_scene  # noqa: PLC0415
-    from studies.accuracy import study  # noqa: PLC0415
-    from studies.ladder import (  # noqa: PLC0415
+    from studies.accuracy import (  # noqa: PLC0415
         BASE,
         affordable,
         build_ladder,
@@ -84,6 +83,7 @@ def run_accuracy(arguments: argparse.Namespace) -> int:
         ladder_sweep,
         parse_knobs,
         parse_seeds,
+        study,
     )
     from templates.sweep.expand import expand  # noqa: PLC0415
 

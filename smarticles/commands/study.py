@@ -125,7 +125,7 @@ def compute_and_analyse(
         report = load().analyse(runs, results, note=note, command=arguments.command_line, earlier=earlier)
         figures = [f"figure: {path}" for path in report.files.values() if path.suffix == ".png"]
         origin = f"tables, and the origin of every number: {report.output}"
-        print(columns(report.header, report.rows), "", *report.told, "", *figures, origin, sep="\n", flush=True)
+        print(columns(report.header, report.rows), "", *report.lines, "", *figures, origin, sep="\n", flush=True)
         _draw(folder, finished, pictured, results / "run.png")
     # Last, so that what is there is shown before what is missing.
     raise_failures(folder, outcomes)
@@ -150,7 +150,7 @@ def _earlier(results: Path, folder: Folder, study: Study) -> Mapping[str, Measur
     Raises:
         InputError: its tables are not enough for this study, cannot be read, or are of other scenes.
     """
-    from studies.framework.earlier import Wanted, earlier_runs  # noqa: PLC0415
+    from studies.framework.runs import Wanted, earlier_runs  # noqa: PLC0415
 
     if not study.from_tables:
         msg = f"--earlier {results}: study {study.name} draws from the runs themselves; leave --earlier out"

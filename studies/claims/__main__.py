@@ -5,110 +5,86 @@ from __future__ import annotations
 import argparse
 from collections import Counter
 from collections.abc import Sequence
+from itertools import groupby
 from pathlib import Path
 
 import pandas as pd
 
-from studies.claims.verdicts import Claim, Engines, Tested, claims
+from postprocess.report.markdown import table_lines
+from studies.claims.verdicts import Claim, Tested, claims
 
 HEAD = """\
 # The paper's claims, one by one
 
 Savoie, Tuazon, Bhamla and Goldman, "Amorphous Entangled Active Matter", Soft Matter 2023 (DOI 10.1039/d2sm01573k), in
-its order; what its simulations say was tested twice where both are told: by the rules of the **text**, and by those of
-the paper's own **code** where it says otherwise (`protocol: text` and `protocol: code`, spelled out by `smarticles
-plan`). Made by `make claims` from the tables of the studies in this folder, which name scene, seed, versions and
-command of every run; a test holds this page against them. Errors are standard errors; verdicts go by 95 %.
+its order. What its simulations say was tested twice where both rules are published: under those of the **text**, and
+under those of the paper's own **code** where it differs (`protocol: text` and `protocol: code`, spelled out by
+`smarticles plan`). Made by `make claims` from the tables of the studies in this folder, which name scene, seed,
+versions and command of every run; a test compares this page with them. Errors are standard errors; verdicts go by 95 %.
 
-*Reproduced*: found beyond the 95 % half-width, by all rules it was tested by. *Partly*: by one of them. *Not*: by none,
-and the opposite was found by one at least. *Not resolved*: neither; what it would take is told by the scatter there is.
-*No data*: the runs are still to be made. *On YADE*: the same finding on the other engine, where it has runs of its own:
-no say in the verdict, but it shows where engines differ. *By a test of ours*: the paper's own test of strength is held
-fast by single smarticles that bridge its hooks; where it does not resolve a claim, the test that tears the pile decides
-the verdict ([strength](strength/), [strength-code](strength-code/)).
+*Reproduced*: found beyond the 95 % half-width under all rules it was tested under. *Partly*: under one of them. *Not*:
+under none, and the opposite was found under one at least. *Not resolved*: neither; the scatter gives what it would
+take. *No data*: the runs are still to be made. *On YADE*: the finding on the other engine, where it has runs of its
+own: no part of the verdict, but it shows where engines differ. *By a test of ours*: in the paper's own test of strength
+single smarticles that bridge its hooks hold fast; where it does not resolve a claim, the test that tears the pile
+decides the verdict ([strength](strength/), [strength-code](strength-code/)).
 """
+_HEADER = ("", "claim", "verdict", "by the text", "by the code", "text on YADE", "code on YADE", "rests on", "why")
 
 
 def text(found: Sequence[Claim]) -> str:
-    """The page."""
-    counted = Counter(claim.verdict for claim in found)
-    lines = [
-        HEAD,
-        f"{len(found)} claims: " + ", ".join(f"{n} {verdict}" for verdict, n in counted.most_common()) + ".",
-        "",
-        engines(found),
-        "",
-    ]
-    part = ""
-    for claim in found:
-        if claim.part != part:
-            part = claim.part
-            lines += [
-                "",
-                f"## {part}",
-                "",
-                "| | claim | verdict | by the text | by the code | text on YADE | code on YADE | rests on | why |",
-                "| --- | --- | --- | --- | --- | --- | --- | --- | --- |",
-            ]
-        ours = (_told(tested) for tested in _all(claim))
-        verdict = f"**{claim.verdict}**" + (" (otherwise on YADE)" if "opposite" in claim.engines.values() else "")
-        cells = (str(claim.number), claim.says, verdict, *ours, _rests(claim), claim.why)
-        lines.append("| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |")
+    """Make the page."""
+    counts = ", ".join(f"{n} {verdict}" for verdict, n in Counter(claim.verdict for claim in found).most_common())
+    lines = [HEAD, f"{len(found)} claims: {counts}.", "", engines(found), ""]
+    for part, group in groupby(found, key=lambda claim: claim.part):
+        lines += ["", f"## {part}", "", *table_lines(_HEADER, map(_row, group))]
     return "\n".join(lines) + "\n"
 
 
-def engines(found: Sequence[Claim]) -> str:
-    """What both engines say of the claims that both were asked, and which they are where they do not agree."""
-    asked = [(claim.number, protocol, how) for claim in found for protocol, how in claim.engines.items()]
-
-    def which(how: Engines) -> str:
-        numbers = [f"{number} by the {protocol}" for number, protocol, one in asked if one == how]
-        return ", ".join(numbers) or "none"
-
-    alike = sum(how == "alike" for _, _, how in asked)
-    return (
-        f"Both engines were asked {len(asked)} findings of {len({number for number, _, _ in asked})} claims: {alike} "
-        f"verdicts are the same. Opposite, for the reason told there: {which('opposite')}. Links alone resolves, by "
-        f"more runs: {which('links alone tells')}. YADE alone: {which('YADE alone tells')}. "
-        "All others rest on one engine, as told."
-    )
+def _row(claim: Claim) -> list[str]:
+    verdict = f"**{claim.verdict}**" + (" (otherwise on YADE)" if "opposite" in claim.engines.values() else "")
+    tested = [claim.tested[name] for name in ("text", "code", "text on YADE", "code on YADE")]
+    every = [one for by in tested if by is not None for one in (by, by.instead) if one is not None]
+    rests = "; ".join(f"[{one.study}]({one.study}/): {one.basis}" for one in every) or "–"
+    cells = (str(claim.number), claim.says, verdict, *map(_numbers, tested), rests, claim.why)
+    return [cell.replace("|", "\\|") for cell in cells]
 
 
-def _told(tested: Tested | None) -> str:
+def _numbers(tested: Tested | None) -> str:
     if tested is None:
         return "–"
     other = tested.instead
-    instead = "" if other is None else f"by a test of ours, {other.study}: {_told(other)}"
+    instead = "" if other is None else f"by a test of ours, {other.study}: {_numbers(other)}"
     return "; ".join(filter(None, [f"{tested.verdict}: {tested.ours}", tested.needed, instead]))
 
 
-def _all(claim: Claim) -> tuple[Tested | None, ...]:
-    """By protocol and engine, in the order of the columns."""
-    return claim.text, claim.code, claim.yade, claim.code_on_yade
+def engines(found: Sequence[Claim]) -> str:
+    """State how both engines judge the claims that both were asked about."""
+    asked = [(f"{claim.number} by the {protocol}", how) for claim in found for protocol, how in claim.engines.items()]
+    which = {one: ", ".join(name for name, how in asked if how == one) or "none" for one in _HOW}
+    claimed = len({name.split()[0] for name, _ in asked})
+    return (
+        f"Both engines judge {len(asked)} findings of {claimed} claims: {sum(how == 'alike' for _, how in asked)} "
+        f"verdicts are equal. Opposite, for the reason given there: {which['opposite']}. Resolved by links alone, with "
+        f"more runs: {which['links alone']}. By YADE alone: {which['YADE alone']}. All others rest on one engine."
+    )
 
 
-def _rests(claim: Claim) -> str:
-    tested = [one for by in _all(claim) if by is not None for one in (by, by.instead) if one is not None]
-    told = [f"[{one.study}]({one.study}/): {one.basis}" for one in tested]
-    return "; ".join(told) or "–"
+_HOW = ("opposite", "links alone", "YADE alone")
 
 
 def table(found: Sequence[Claim]) -> pd.DataFrame:
-    """The same as one row per claim."""
+    """Make one row per claim."""
     rows = []
     for claim in found:
-        row = {
-            "number": claim.number,
-            "part": claim.part,
-            "claim": claim.says,
-            "verdict": claim.verdict,
-            "why": claim.why,
-        }
-        for name, tested in zip(("text", "code", "text on YADE", "code on YADE"), _all(claim), strict=True):
+        row = {"number": claim.number, "part": claim.part, "claim": claim.says, "verdict": claim.verdict}
+        row["why"] = claim.why
+        for name in ("text", "code", "text on YADE", "code on YADE"):
+            tested = claim.tested[name]
             for key in ("study", "verdict", "ours", "criterion", "basis"):
                 row[f"by the {name}: {key}"] = "" if tested is None else getattr(tested, key)
             if tested is not None and tested.instead is not None:
-                row[f"by the {name}: by a test of ours"] = _told(tested.instead)
+                row[f"by the {name}: by a test of ours"] = _numbers(tested.instead)
         rows.append(row)
     return pd.DataFrame(rows)
 

@@ -12,7 +12,6 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
-from typing import Literal
 
 import pandas as pd
 import yaml
@@ -22,12 +21,7 @@ from postprocess.statistics.columns import ASPECT, SEED, SEEDS
 
 CLAIMS = Path(__file__).with_name("claims.yaml")
 
-Verdict = Literal["reproduced", "partly", "not", "not resolved", "not testable", "no data"]
-
-Engines = Literal["alike", "opposite", "links alone tells", "YADE alone tells"]
-"""Verdicts of both engines on one finding: the same, one found and the other refused, or one not resolved."""
-
-_FOUND: Mapping[str, Verdict] = {
+_FOUND = {
     **dict.fromkeys(("found", "yes"), "reproduced"),
     **dict.fromkeys(("not found", "no"), "not"),
     **dict.fromkeys(("not resolved", "undetermined"), "not resolved"),
@@ -41,16 +35,16 @@ class Tested:
 
     Attributes:
         study: Folder under `results/`.
-        verdict: Of its finding.
+        verdict: `reproduced`, `not`, `not resolved` or `no data`.
         ours: Its numbers.
         criterion: What its verdict asks for.
         basis: Smarticles, seeds and engine that it rests on.
         needed: What it would take, where the verdict is not resolved and that is known; else empty.
-        instead: What a test of ours says where the paper's own cannot tell; None where there is none.
+        instead: What a test of ours says where the paper's own cannot decide; None where there is none.
     """
 
     study: str
-    verdict: Verdict
+    verdict: str
     ours: str
     criterion: str
     basis: str
@@ -58,7 +52,7 @@ class Tested:
     instead: Tested | None = None
 
     @property
-    def settled(self) -> Verdict:
+    def settled(self) -> str:
         """The verdict by the paper's own test, or that of ours where the paper's does not resolve it."""
         unsettled = self.verdict in ("not resolved", "no data")
         return self.instead.verdict if unsettled and self.instead is not None else self.verdict
@@ -72,48 +66,37 @@ class Claim:
         number: In the paper's order, from 1.
         part: Of the paper.
         says: The claim.
-        text: By the rules of the paper's text; None where that was not tested.
-        code: By those of its own code.
-        yade: By those of the text on YADE, from results of their own; None where these have no such finding.
-        code_on_yade: The same by the code.
+        tested: By the rules of the `text` and of the paper's `code`, and each `on YADE` from results of its own; None
+            where that was not tested.
         why: What decides the verdict, or why there is none.
     """
 
     number: int
     part: str
     says: str
-    text: Tested | None
-    code: Tested | None
-    yade: Tested | None
-    code_on_yade: Tested | None
+    tested: Mapping[str, Tested | None]
     why: str
 
     @property
-    def verdict(self) -> Verdict:
-        """Of both together: partly where one finds it and the other does not; not where one finds the opposite."""
-        tested = [one.settled for one in (self.text, self.code) if one is not None]
-        known = set(tested) - {"no data"}
+    def verdict(self) -> str:
+        """Of both protocols: partly where one finds it and the other does not; not where one finds the opposite."""
+        settled = [one.settled for one in (self.tested["text"], self.tested["code"]) if one is not None]
+        known = set(settled) - {"no data"}
         if not known:
-            return "no data" if tested else "not testable"
+            return "no data" if settled else "not testable"
         return next(iter(known)) if len(known) == 1 else "partly" if "reproduced" in known else "not"
 
     @property
-    def engines(self) -> Mapping[str, Engines]:
-        """How the engines agree, by protocol, where the same finding was asked of both."""
-        pairs = {"text": (self.text, self.yade), "code": (self.code, self.code_on_yade)}
-        return {
-            name: _agreement(links.verdict, yade.verdict)
-            for name, (links, yade) in pairs.items()
-            if links is not None and yade is not None and "no data" not in (links.verdict, yade.verdict)
-        }
-
-
-def _agreement(links: Verdict, yade: Verdict) -> Engines:
-    if links == yade:
-        return "alike"
-    if links == "not resolved":
-        return "YADE alone tells"
-    return "links alone tells" if yade == "not resolved" else "opposite"
+    def engines(self) -> dict[str, str]:
+        """How the engines agree, by protocol, where both judge a finding: alike, opposite, or which one resolves it."""
+        found = {}
+        for name in ("text", "code"):
+            verdicts = [one.verdict for one in (self.tested[name], self.tested[f"{name} on YADE"]) if one is not None]
+            if len(verdicts) == 2 and "no data" not in verdicts:
+                links, yade = verdicts
+                resolves = "YADE alone" if links == "not resolved" else "links alone" if yade == "not resolved" else ""
+                found[name] = "alike" if links == yade else resolves or "opposite"
+        return found
 
 
 def claims(results: Path, listed: Path = CLAIMS) -> tuple[Claim, ...]:
@@ -136,30 +119,21 @@ def claims(results: Path, listed: Path = CLAIMS) -> tuple[Claim, ...]:
     found: list[Claim] = []
     for part in yaml.safe_load(listed.read_text(encoding="utf-8")):
         for entry in part["claims"]:
-            text, code = entry.get("text"), entry.get("code")
-            yade, code_on_yade = (
-                _tested(read, [f"{named[0]}-yade", named[1]], optional=True)
-                if named and (results / f"{named[0]}-yade").is_dir()
-                else None
-                for named in (text, code)
-            )
-            found.append(
-                Claim(
-                    number=len(found) + 1,
-                    part=part["part"],
-                    says=entry["says"],
-                    text=_tested(read, text, entry.get("text_instead")),
-                    code=_tested(read, code, entry.get("code_instead")),
-                    yade=yade,
-                    code_on_yade=code_on_yade,
-                    why=entry.get("untested") or entry.get("why", ""),
+            tested = {}
+            for name in ("text", "code"):
+                named = entry.get(name)
+                tested[name] = _tested(read, named, entry.get(f"{name}_instead"))
+                there = named and (results / f"{named[0]}-yade").is_dir()
+                tested[f"{name} on YADE"] = (
+                    _tested(read, [f"{named[0]}-yade", named[1]], optional=True) if there else None
                 )
-            )
+            why = entry.get("untested") or entry.get("why", "")
+            found.append(Claim(number=len(found) + 1, part=part["part"], says=entry["says"], tested=tested, why=why))
     return tuple(found)
 
 
-_Findings = tuple[Mapping[str, Sequence[str]], str]
-"""Numbers, verdict, criterion and what is needed by id of the finding; what all of them rest on."""
+_Findings = tuple[Mapping[str, Mapping[str, str]], str]
+"""Row of each finding by id; what all of them rest on."""
 
 
 def _tested(
@@ -169,7 +143,7 @@ def _tested(
     *,
     optional: bool = False,
 ) -> Tested | None:
-    """What a study says, named with its finding, and what another one says instead; None of none."""
+    """Read what a study says, named with its finding, and what another one says instead; None of none."""
     if named is None:
         return None
     study, finding = named
@@ -179,39 +153,39 @@ def _tested(
             return None
         msg = f"{study}: has no finding {finding!r}; correct studies/claims/claims.yaml"
         raise InputError(msg)
-    ours, verdict, criterion, *needed = findings[finding]
+    row = findings[finding]
     return Tested(
         study=study,
-        verdict=_FOUND[verdict],
-        ours=ours,
-        criterion=criterion,
+        verdict=_FOUND[row["verdict"]],
+        ours=row["ours"],
+        criterion=row["criterion"],
         basis=basis,
-        needed=needed[0] if needed else "",
+        needed=row.get("needed", ""),  # absent in tables written before the column was added
         instead=_tested(read, instead),
     )
 
 
 def _findings(folder: Path) -> _Findings:
-    """Read the findings of a study; questions of earlier studies by their sentence where they have no id."""
-    for name, order in (("findings.csv", ("ours", "verdict", "criterion", "needed")), ("verdicts.csv", None)):
+    """Read the findings of a study; those of earlier tables by their sentence where they have no id."""
+    for name in ("findings.csv", "verdicts.csv"):
         path = folder / name
         if path.is_file():
             with path.open(encoding="utf-8", newline="") as file:
                 header, *rows = [row for row in csv.reader(file) if not row[0].startswith("# ")]
+            if name == "verdicts.csv":
+                header = ["criterion", "verdict", "ours", *header[3:]]
             key = header.index("id") if "id" in header else 0
-            # Absent in tables written before the column `needed` was added.
-            columns = [2, 1, 0] if order is None else [header.index(one) for one in order if one in header]
-            return {row[key]: [row[column] for column in columns] for row in rows}, _basis(folder)
+            return {row[key]: dict(zip(header, row, strict=True)) for row in rows}, _basis(folder)
     msg = f"{folder}: has neither findings.csv nor verdicts.csv; analyse the study first"
     raise InputError(msg)
 
 
 def _basis(folder: Path) -> str:
-    """`168 – 494 smarticles, l/w 0.4 – 1.1, 8 seeds, links`."""
+    """Format `168 – 494 smarticles, l/w 0.4 – 1.1, 8 seeds, links`."""
     runs = pd.read_csv(folder / "runs.csv", comment="#")
     made = json.loads((folder / "provenance.json").read_text(encoding="utf-8"))["runs"]
     engines = sorted({"links" if "links" in run["versions"] else "YADE" for run in made})
-    # Seeds from the point with the fewest to that with the most; how many in all where no table tells of points.
+    # Seeds from the point with the fewest to that with the most; how many in all where no table has points.
     points = [folder / name for name in ("points.csv", "summary.csv") if (folder / name).is_file()]
     counts = next((table[SEEDS] for path in points if SEEDS in (table := pd.read_csv(path, comment="#"))), None)
     seeds = _span(counts) if counts is not None else str(runs[SEED].nunique())

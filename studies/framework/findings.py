@@ -1,4 +1,4 @@
-"""Findings: statements of a paper, each judged by effects with their errors that are computed from a table of runs.
+"""Findings: statements, each judged by effects with their errors that are computed from a table of runs.
 
 A `Finding` has an id, by which `claims.yaml` refers to it, the statement, what makes it true, and a function from a
 table to effects. An `Effect` is a number with its 95 % interval, the sign that the statement asks for, and a
@@ -16,13 +16,16 @@ from enum import StrEnum
 import numpy as np
 import pandas as pd
 
-from postprocess.statistics.columns import ASPECT
+from postprocess.statistics.columns import ASPECT, SEED
 from postprocess.statistics.findings import CRITERION, Unresolved, judge, told, told_more
 from postprocess.statistics.pairs import pairs
 from postprocess.statistics.ranks import correlation_within
 from postprocess.statistics.seeds import SeedMean, Slope, mean_over_seeds, slope_within
+from studies.framework.procedures import CROSSINGS, ENERGY, PHI, PHI_ACTIVE, PROCEDURE, THETA, of_procedure
 
-__all__ = ["CRITERION", "Effect", "Finding", "Judged", "Outcome", "Verdict", "above", "mean", "ranks", "slope"]
+__all__ = ["CRITERION"]
+
+_SYMBOLS = {ASPECT: "l/w", SEED: "seed", THETA: "θ", PHI: "φ", PHI_ACTIVE: "φ_f", CROSSINGS: "⟨N⟩", ENERGY: "energy"}
 
 Rows = Callable[[pd.DataFrame], pd.DataFrame]
 """Selects or derives the rows that a finding is about."""
@@ -111,7 +114,7 @@ class Finding:
     Attributes:
         id: Short name, unique in its study.
         says: The statement, as the paper has it or our own.
-        found_if: What makes it true.
+        found_if: What makes it true, where that is more than all effects beyond their thresholds.
         outcome: Effects of a table of runs or samples.
         rows: Applied to the table before.
         tables: Names of the study's tables that `outcome` takes instead, one argument each.
@@ -119,10 +122,10 @@ class Finding:
 
     id: str
     says: str
-    found_if: str
     outcome: Callable[..., Outcome | Sequence[Effect]] = field(repr=False)
     rows: Rows = field(default=lambda table: table, repr=False)
     tables: Sequence[str] = ()
+    found_if: str = ""
 
     def judge(self, samples: pd.DataFrame, tables: Mapping[str, pd.DataFrame] | None = None) -> Judged:
         """Judge the finding by a table of samples, or by the study's tables that it names."""
@@ -133,7 +136,10 @@ class Finding:
         if outcome.verdict is not None:
             verdict, more = outcome.verdict, math.nan if outcome.verdict != verdict else more
         ours = "; ".join(filter(None, [*map(str, outcome.effects), outcome.note])) or "no data"
-        return Judged(finding=self, ours=ours, verdict=verdict, more=more)
+        sides = [
+            f"{one.label} {'>' if one.sign > 0 else '<'} {one.threshold:.4g}" for one in outcome.effects if one.sign
+        ]
+        return Judged(finding=self, ours=ours, verdict=verdict, more=more, criterion=self.found_if or "; ".join(sides))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -141,16 +147,16 @@ class Judged:
     """A finding with its verdict.
 
     Attributes:
-        finding: The finding.
         ours: Our numbers; errors are standard errors.
-        verdict: The verdict.
         more: How many times as many runs would resolve it; NaN where that does not apply.
+        criterion: What makes the finding true.
     """
 
     finding: Finding
     ours: str
     verdict: Verdict
     more: float = math.nan
+    criterion: str = ""
 
     @property
     def needed(self) -> str:
@@ -172,13 +178,17 @@ def all_of(verdicts: Iterable[Verdict]) -> Verdict:
     return next((verdict for verdict in order if verdict in found), Verdict.NO_DATA)
 
 
+def decide(found: bool, wrong: bool = False, *, data: bool = True) -> Verdict:
+    """Turn what was found into a verdict; `wrong`: whether the opposite was."""
+    if not data:
+        return Verdict.NO_DATA
+    return Verdict.FOUND if found else Verdict.NOT_FOUND if wrong else Verdict.NOT_RESOLVED
+
+
 def within(value: float, half_width: float, margin: float) -> Verdict:
     """Judge whether a number with its 95 % half-width is as near to 0 as a margin, both ways beyond its error."""
-    if math.isnan(value):
-        return Verdict.NO_DATA
-    if abs(value) + half_width <= margin:
-        return Verdict.FOUND
-    return Verdict.NOT_FOUND if abs(value) - half_width > margin else Verdict.NOT_RESOLVED
+    size = abs(value)
+    return decide(size + half_width <= margin, size - half_width > margin, data=not math.isnan(value))
 
 
 def findings_table(judged: Sequence[Judged]) -> pd.DataFrame:
@@ -188,7 +198,7 @@ def findings_table(judged: Sequence[Judged]) -> pd.DataFrame:
             "finding in the paper": one.finding.says,
             "ours": one.ours,
             "verdict": str(one.verdict),
-            "criterion": one.finding.found_if,
+            "criterion": one.criterion,
             "needed": one.needed,
             "id": one.finding.id,
         }
@@ -200,59 +210,54 @@ def findings_table(judged: Sequence[Judged]) -> pd.DataFrame:
 def above(
     name: str,
     says: str,
-    quantity: str,
+    quantities: str | Mapping[str, int],
     one: str,
     others: Sequence[str],
     *,
-    of: Callable[[pd.DataFrame, str], pd.DataFrame],
-    found_if: str,
     sign: int = 1,
-    label: str = "",
     beside: Sequence[str] = (),
     beside_quantity: str | None = None,
     bounds: str | None = None,
     rows: Rows = lambda table: table,
-    note: Callable[[pd.DataFrame], str] = lambda _: "",
+    shown: Sequence[str] = (),
+    found_if: str = "",
 ) -> Finding:
-    """A group is above (sign 1) or below (−1) each of others, paired by aspect ratio and seed.
+    """Judge whether a procedure is above (sign 1) or below (−1) each of others, paired by aspect ratio and seed.
 
-    Args:
-        name: Id of the finding.
-        says: See `Finding`.
-        quantity: Column.
-        one: Name of the group.
-        others: Names of the others.
-        of: Rows of a group.
-        found_if: See `Finding`.
-        sign: Which way.
-        label: What the quantity is called.
-        beside: Groups that are shown, not judged.
-        beside_quantity: Column of those, where it is another one.
-        bounds: Column that is above 0 where the quantity is a lower bound.
-        rows: See `Finding`.
-        note: Shown behind the effects.
+    Several quantities have a sign each. Procedures `beside`, by the column `beside_quantity` if it is another one, and
+    means of the columns `shown` are shown and not judged. Where the column `bounds` is above 0 the first quantity is a
+    lower bound, and the others are unknown.
     """
+    signs = {quantities: sign} if isinstance(quantities, str) else quantities
 
     def outcome(table: pd.DataFrame) -> Outcome:
-        bounded = {name: bounds is not None and bool(of(table, name)[bounds].any()) for name in (one, *others)}
+        bounded = {
+            name: bounds is not None and bool(of_procedure(table, name)[bounds].any()) for name in (one, *others)
+        }
         effects: list[Effect] = []
-        for other, judged in [*((name, sign) for name in others), *((name, 0) for name in beside)]:
-            column = quantity if judged else beside_quantity or quantity
-            both = pairs(of(table, one), of(table, other), column)
-            difference = both["one"] - both["other"]
-            means = difference.groupby(both[ASPECT]).mean()
-            side = "above" if sign > 0 else "below"
-            effects.append(
-                Effect(
-                    label=f"{label or quantity} of {one} less {other}" if not effects else f"less {other}",
-                    value=mean_over_seeds(difference),
-                    sign=judged,
-                    note=f", {side} at {(sign * means > 0).sum()} of {len(means)} l/w" if len(means) > 1 else "",
-                    may_be_higher=bool(judged) and bounded[one],
-                    may_be_lower=bool(judged) and bounded[other],
+        for number, (quantity, wanted) in enumerate(signs.items()):
+            for other, judged in [*((other, wanted) for other in others), *((other, 0) for other in beside)]:
+                column = quantity if judged else beside_quantity or quantity
+                both = pairs(of_procedure(table, one), of_procedure(table, other), column)
+                difference = both["one"] - both["other"]
+                means = difference.groupby(both[ASPECT]).mean()
+                side = f", {'above' if wanted > 0 else 'below'} at {(wanted * means > 0).sum()} of {len(means)} l/w"
+                high, low = bounded[one], bounded.get(other, False)
+                effects.append(
+                    Effect(
+                        label=f"{symbol(column)} of {one} less {other}"
+                        if other == others[0] and judged
+                        else f"less {other}",
+                        value=mean_over_seeds(difference),
+                        sign=judged,
+                        unit=unit_of(column),
+                        note=side if len(means) > 1 else "",
+                        may_be_higher=bool(judged) and (high or (number > 0 and low)),
+                        may_be_lower=bool(judged) and (low or (number > 0 and high)),
+                    )
                 )
-            )
-        return Outcome(effects=effects, note=note(table))
+        note = "; ".join(f"{symbol(column)}: {means_by(table, column, PROCEDURE, '.3g')}" for column in shown)
+        return Outcome(effects=effects, note=note)
 
     return Finding(id=name, says=says, found_if=found_if, outcome=outcome, rows=rows)
 
@@ -263,36 +268,24 @@ def slope(
     quantity: str,
     against: str,
     *,
-    sign: int,
-    label: str,
-    found_if: str,
+    sign: int = 1,
     within: Sequence[str] = (),
     rows: Rows = lambda table: table,
-    unit: str = "",
-    means: str = "",
+    label: str = "",
 ) -> Finding:
-    """A quantity rises (sign 1) or falls (−1) with a variable, by a straight line within blocks.
+    """Judge whether a quantity rises (sign 1) or falls (−1) with a variable, by a straight line within blocks.
 
-    Args:
-        name: Id of the finding.
-        says: See `Finding`.
-        quantity: Column.
-        against: Column of the variable.
-        sign: Which way.
-        label: What the slope is of.
-        found_if: See `Finding`.
-        within: Columns that make a block, which has its own level; none: one line through all rows.
-        rows: See `Finding`.
-        unit: Of the slope, with a space before.
-        means: Format of means by the variable, shown behind it; empty: none.
+    Columns `within` make a block, which has its own level; without them there is one line through all rows.
     """
+    label = f"{label or symbol(quantity)} against {symbol(against)}"
 
     def outcome(table: pd.DataFrame) -> Outcome:
         value = slope_within(table[against], table[quantity], blocks(table, within))
-        by = f"by {'l/w' if against == ASPECT else against} {means_by(table, quantity, against, means)}"
-        return Outcome(effects=[Effect(label=label, value=value, sign=sign, unit=unit)], note=by if means else "")
+        note = "" if within else f"by {symbol(against)} {means_by(table, quantity, against, '.4g')}"
+        unit = unit_of(quantity) + (f" per{unit_of(against)}" if unit_of(against) else "")
+        return Outcome(effects=[Effect(label=label, value=value, sign=sign, unit=unit)], note=note)
 
-    return Finding(id=name, says=says, found_if=found_if, outcome=outcome, rows=rows)
+    return Finding(id=name, says=says, outcome=outcome, rows=rows)
 
 
 def mean(
@@ -304,18 +297,20 @@ def mean(
     rows: Rows = lambda table: table,
     sign: int = 1,
     threshold: float = 0.0,
-    found_if: str = "",
-    note: Callable[[pd.DataFrame], str] = lambda _: "",
+    shown: Sequence[str] = (),
+    by: str = PROCEDURE,
 ) -> Finding:
-    """A value of each row is above (sign 1) or below (−1) a threshold in the mean."""
+    """Judge whether a value of each row is above (sign 1) or below (−1) a threshold in the mean.
+
+    Means of the columns `shown` at each value of the column `by` are shown, not judged.
+    """
 
     def outcome(table: pd.DataFrame) -> Outcome:
         effect = Effect(label=label, value=mean_over_seeds(values(table)), sign=sign, threshold=threshold)
-        return Outcome(effects=[effect], note=note(table))
+        note = "; ".join(f"{symbol(column)}: {means_by(table, column, by, '.3g')}" for column in shown)
+        return Outcome(effects=[effect], note=note)
 
-    side = ">" if sign > 0 else "<"
-    found_if = found_if or f"{label} {side} {threshold:g}, mean over runs"
-    return Finding(id=name, says=says, found_if=found_if, outcome=outcome, rows=rows)
+    return Finding(id=name, says=says, outcome=outcome, rows=rows)
 
 
 def ranks(
@@ -329,24 +324,14 @@ def ranks(
     found_if: str,
     unit: str,
     rows: Rows = lambda table: table,
-    beside: Callable[[pd.DataFrame], Sequence[Effect]] = lambda _: (),
 ) -> Finding:
-    """Y goes with x, by their rank correlation within blocks; a lower bound ranks above all that is none.
+    """Judge whether y goes with x, by their rank correlation within blocks; a lower bound ranks above all others.
 
     A pile that held fast has a peak of at least what it took, and one that a single smarticle braces has one many times
     that of others: neither has a place on a straight line, but each has its rank among the piles of its block.
 
-    Args:
-        name: Id of the finding.
-        says: See `Finding`.
-        x: Column.
-        y: Column.
-        within: Columns that make a block.
-        bounds: Column that is above 0 where y is a lower bound.
-        found_if: See `Finding`.
-        unit: Of the slope, which is shown beside.
-        rows: See `Finding`.
-        beside: Effects that are shown besides.
+    Columns `within` make a block; the column `bounds` is above 0 where y is a lower bound; `unit` is that of the slope,
+    which is shown beside.
     """
 
     def outcome(table: pd.DataFrame) -> Outcome:
@@ -359,12 +344,22 @@ def ranks(
             effects=[
                 Effect(label="rank correlation", value=found, text=told(found, 2)),
                 Effect(label="slope", value=line, sign=0, unit=f" {unit}"),
-                *beside(table),
             ],
             note=note,
         )
 
     return Finding(id=name, says=says, found_if=found_if, outcome=outcome, rows=rows)
+
+
+def symbol(column: str) -> str:
+    """Give what a column is called in text: its symbol, or its name without the unit."""
+    return _SYMBOLS.get(column) or column.partition(" [")[0]
+
+
+def unit_of(column: str) -> str:
+    """Give the unit of a column, with a space before; empty for a pure number."""
+    unit = column.rpartition(" [")[2].removesuffix("]") if column.endswith("]") else "-"
+    return "" if unit == "-" else f" {unit}"
 
 
 def blocks(table: pd.DataFrame, columns: Sequence[str]) -> Sequence[Hashable]:
@@ -377,9 +372,3 @@ def means_by(table: pd.DataFrame, quantity: str, by: str, form: str) -> str:
     means = table.groupby(by)[quantity].mean().dropna()
     cells = {value if isinstance(value, str) else f"{value:g}": one for value, one in means.items()}
     return ", ".join(f"{value}: {one:{form}}" for value, one in cells.items()) or "none"
-
-
-def ranked(means: Mapping[str, float], form: str = ".3g") -> str:
-    """`shape-change 5.1 > internal 4.2`."""
-    known = sorted((name for name in means if math.isfinite(means[name])), key=lambda name: -means[name])
-    return " > ".join(f"{name} {means[name]:{form}}" for name in known) or "none"

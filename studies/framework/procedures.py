@@ -1,20 +1,34 @@
-"""Procedures: what a pile goes through, the points of studies that compare them, and how they are compared."""
+"""Procedures: what a pile goes through, how procedures are compared, and what is measured of one activity.
+
+A run of one activity is poured, rests, goes through the activity, and rests again. Both rests are averaged over their
+frames: the first one is the static state of its aspect ratio and seed, the last one what the activity left. φ_f is
+taken at the end of the activity, as the paper's own code does, and at rest again beside it: a shaken pile bounces, and
+is looser while it does.
+"""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from types import MappingProxyType
 
 import numpy as np
 import pandas as pd
+from numpy.typing import NDArray
 
 from dem.errors import InputError
+from dem.record.document import Phase
 from dem.record.run import Run
+from dem.record.series import Series
+from postprocess.measures.motors import APART, SAMPLED_WORK
+from postprocess.measures.table import PASSIVE_PHASES, summarise_run
+from postprocess.statistics.columns import ASPECT, SEED
 from postprocess.statistics.pairs import mean_difference
 from postprocess.statistics.seeds import SeedMean
-from studies.framework.runs import DEFINITION
+from studies.framework.runs import DEFINITION, duration, last_columns, run_columns
 
 STATIC, EXTERNAL, SHAPE, INTERNAL = "static", "external", "shape-change", "internal"
+ORDER = (STATIC, EXTERNAL, SHAPE, INTERNAL)
 PROCEDURES: Mapping[str, str] = MappingProxyType(
     {"shake": EXTERNAL, "shape-change": SHAPE, "internal-oscillation": INTERNAL}
 )
@@ -25,17 +39,21 @@ AMPLITUDE = 10.0
 
 PROCEDURE, THETA, ACTIVE = "procedure", "theta [deg]", "time active [s]"
 PHI, CROSSINGS = f"phi {DEFINITION} [-]", "crossings [-]"
+PHI_ACTIVE = f"phi {DEFINITION} at the end of the activity [-]"
+ENERGY = "energy per smarticle [J]"
+SAMPLED = f"energy per smarticle sampled every {APART:g} s [J]"
+HEIGHT, STRAIGHT, HALF = "com height over h0 [-]", "com height straight over h0 [-]", "half of compaction at [-]"
+LOWEST = "lowest com height over h0 while closing [-]"
 
 BY_RANKS = "mean over seeds of the rank correlation of peak force and ⟨N⟩ > 0; what held fast is above all that did not"
 """Criterion by which the force that tears a pile goes with its entanglement."""
 
+_WORK = {EXTERNAL: "container_work_J", SHAPE: "motor_work_J", INTERNAL: "motor_work_J"}
+_WINDOW = 0.1  # s: over which heights are averaged; more than a period of θ = 10° and three of shaking at 30 Hz
 
-def prepared_by(run: Run, *then: str) -> str:
-    """The procedure of a run: a pour, a rest, one activity with a rest of its own or none, and then some phases.
 
-    Args:
-        run: A run.
-        then: Types of the phases that follow.
+def prepared_by(run: Run, *then: str) -> dict[str, object]:
+    """Give procedure, θ and pile of a run: a pour, a rest, one activity with a rest or none, then phases of some types.
 
     Raises:
         InputError: The phases are others.
@@ -48,15 +66,183 @@ def prepared_by(run: Run, *then: str) -> str:
             f"({', '.join(PROCEDURES)}) with a rest or none, {' and '.join(then)}"
         )
         raise InputError(msg)
-    return PROCEDURES[active[0]] if active else STATIC
+    procedure = PROCEDURES[active[0]] if active else STATIC
+    theta = run.scene["phases"][2]["theta_deg"] if procedure == INTERNAL else math.nan
+    pile = run_columns(run)
+    return {PROCEDURE: procedure, THETA: theta, **pile, ACTIVE: duration(run.phases[2]) if active else 0.0}
 
 
 def of_procedure(table: pd.DataFrame, procedure: str) -> pd.DataFrame:
-    """Samples of one procedure; of the internal oscillation those that procedures are compared at."""
+    """Select samples of one procedure; of the internal oscillation those that procedures are compared at."""
     chosen = table[table[PROCEDURE] == procedure]
     return chosen[np.isclose(chosen[THETA], AMPLITUDE)] if procedure == INTERNAL and THETA in chosen else chosen
 
 
+def compared(table: pd.DataFrame) -> pd.DataFrame:
+    """Select the rows of all procedures that are compared: of the internal oscillation those of one θ."""
+    return pd.concat([of_procedure(table, name) for name in table[PROCEDURE].unique()]) if len(table) else table
+
+
 def paired(table: pd.DataFrame, quantity: str, one: str, other: str) -> SeedMean:
-    """One procedure less another, mean over pairs of the same aspect ratio and seed."""
+    """Subtract one procedure from another, mean over pairs of the same aspect ratio and seed."""
     return mean_difference(of_procedure(table, one), of_procedure(table, other), quantity)
+
+
+def activity(run: Run) -> Phase:
+    """Find the one activity of a run.
+
+    Raises:
+        InputError: There is not exactly one of a known kind between two rests.
+    """
+    active = [phase for phase in run.phases if phase.type not in PASSIVE_PHASES]
+    around = run.phases[active[0].index - 1 : active[0].index + 2] if active else ()
+    if len(active) != 1 or active[0].type not in PROCEDURES or len(around) != 3 or around[2].type != "relax":
+        types = ", ".join(phase.type for phase in run.phases)
+        msg = f"{run.path}: not one activity ({', '.join(PROCEDURES)}) between two rests: its phases are {types}"
+        raise InputError(msg)
+    return active[0]
+
+
+def procedure_row(run: Run) -> dict[str, object]:
+    """Measure one activity between two rests: a row of the table of runs.
+
+    Raises:
+        InputError: It is not one activity between two rests, or cannot be read.
+    """
+    active = activity(run)
+    settings = run.scene["phases"][active.index]
+    if settings["type"] != active.type:
+        msg = f"{run.path}: phase {active.index} is {active.type} in run.json, {settings['type']} in scene.yaml"
+        raise InputError(msg)
+    procedure = PROCEDURES[active.type]
+    wanted = range(active.index - 1, active.index + 2)
+    table = summarise_run(run, definitions=[DEFINITION], phases=set(wanted))
+    if len(table) != len(wanted):
+        msg = f"{run.path}: no frame of its activity or of the rest before or after it; run it again"
+        raise InputError(msg)
+    before, during, after = (table.set_index("phase").loc[phase] for phase in wanted)
+    theta = settings["theta_deg"] if procedure == INTERNAL else math.nan
+    row: dict[str, object] = {PROCEDURE: procedure, THETA: theta, **run_columns(run), ACTIVE: duration(active)}
+    for name, rest in ((f"{STATIC} ", before), ("", after)):
+        row |= {f"{name}{PHI}": rest[PHI], f"{name}{CROSSINGS}": rest["crossings mean [-]"]}
+    row |= {f"{STATIC} {PHI_ACTIVE}": before[PHI], PHI_ACTIVE: during[PHI]}
+    row[f"phi {DEFINITION} SE in run [-]"] = after[f"phi {DEFINITION} SE [-]"]
+    row["h0 [m]"] = before["com height [m]"]
+    row[HEIGHT] = after["com height [m]"] / before["com height [m]"]
+    straight_until = settings["opening_s"] + settings["straight_hold_s"] if procedure == SHAPE else None
+    row |= _of_series(run, active, straight_until)
+    row[SAMPLED] = during.get(SAMPLED_WORK, math.nan) / run.manifest.count
+    row["escaped at the end [-]"] = after["escaped [-]"]
+    row["frames averaged [-]"] = int(table["frames averaged"].min())
+    return row | last_columns(run)
+
+
+def height_history(run: Run) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Read h/h0 of a run's centre of mass, (n,) [-], and its times since the activity began, (n,) [s].
+
+    h0 is the mean over the rest before the activity, with which the history begins.
+
+    Raises:
+        InputError: There is no series of it.
+    """
+    return _heights(run.series, activity(run))
+
+
+def _heights(series: Series, active: Phase) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    height = np.asarray(series["com_height_m"], dtype=np.float64)
+    shown = (series["phase"] >= active.index - 1) & np.isfinite(height)
+    before = shown & (series["phase"] == active.index - 1)
+    if active.start_s is None or not before.any():
+        msg = f"{series.path}: no height of the centre of mass in the rest before the activity; run it again"
+        raise InputError(msg)
+    return height[shown] / height[before].mean(), series.time[shown] - active.start_s
+
+
+def _of_series(run: Run, active: Phase, straight_until: float | None) -> dict[str, float]:
+    """Measure heights and energy by the series; barbs start to close again at `straight_until` [s].
+
+    NaN stands where there was no recording.
+    """
+    found = {STRAIGHT: math.nan, LOWEST: math.nan, HALF: math.nan, ENERGY: math.nan}
+    if not (run.path / "series.h5").exists():
+        return found
+    series = run.series
+    work = _WORK[PROCEDURES[active.type]]
+    if work in series.data:
+        found[ENERGY] = gained(series[work], series["phase"] < active.index) / run.manifest.count
+    if "com_height_m" in series.data:
+        height, time = _heights(series, active)
+        if straight_until is not None:
+            last = (time > straight_until - _WINDOW) & (time <= straight_until)
+            found[STRAIGHT] = float(height[last].mean()) if last.any() else math.nan
+            closing = (time > straight_until) & (time <= duration(active))
+            found[LOWEST] = float(min(_smooth(height, time, closing), default=math.nan))
+        elif active.type == "internal-oscillation":
+            found[HALF] = half_compaction(time, height, duration(active))
+    return found
+
+
+def _smooth(values: NDArray[np.float64], time: NDArray[np.float64], chosen: NDArray[np.bool_]) -> NDArray[np.float64]:
+    """Average over a moving window; empty if less than a window is chosen."""
+    if chosen.sum() < 2:
+        return np.empty(0)
+    samples = max(round(_WINDOW / float(np.median(np.diff(time[chosen])))), 1)
+    kernel = np.full(samples, 1 / samples)
+    return np.convolve(values[chosen], kernel, mode="valid") if chosen.sum() >= samples else np.empty(0)
+
+
+def gained(work: NDArray[np.float64], before: NDArray[np.bool_]) -> float:
+    """Compute what a cumulative work gained since before the activity, to the end [J]."""
+    known = np.isfinite(work)
+    if not known.any():
+        return math.nan
+    start = work[known & before]
+    return float(work[known][-1] - (start[-1] if len(start) else 0.0))
+
+
+def half_compaction(time: NDArray[np.float64], height: NDArray[np.float64], duration: float) -> float:
+    """Find the share of the activity after which the centre of mass has come down by half of what it does in the end.
+
+    Args:
+        time: (n,) since the activity began, with the rests before and after [s].
+        height: (n,) over that before the activity [-].
+        duration: Of the activity [s].
+
+    Returns:
+        The share [-]; NaN if the centre of mass is not lower in the end.
+    """
+    final = height[time > duration]
+    moving = (time >= 0) & (time <= duration)
+    if not len(final) or moving.sum() < 2 or not final.mean() < 1:
+        return math.nan
+    level = (1 + final.mean()) / 2
+    time = time[moving]
+    samples = min(max(round(_WINDOW / float(np.median(np.diff(time)))), 1), len(time))
+    kernel = np.full(samples, 1 / samples)
+    # The mean over a window stands at its middle; before the first middle the height is that of the rest.
+    centres, smooth = (
+        np.concatenate([[start], np.convolve(values, kernel, mode="valid")])
+        for start, values in ((0.0, time), (1.0, height[moving]))
+    )
+    below = np.nonzero(smooth <= level)[0]
+    if not len(below):
+        return 1.0
+    k = int(below[0])
+    share = (smooth[k - 1] - level) / (smooth[k - 1] - smooth[k])
+    return float((centres[k - 1] + share * (centres[k] - centres[k - 1])) / duration)
+
+
+def samples(runs: pd.DataFrame) -> pd.DataFrame:
+    """Make one row per procedure, aspect ratio, θ and seed of rows as of `procedure_row`, the static state among them.
+
+    The static state of an aspect ratio and a seed is the mean over the runs that began with it: they are poured alike,
+    so they count as one sample. What a procedure does not have is NaN. "runs [-]" says how many a row stands for.
+    """
+    columns = {f"{STATIC} {quantity}": quantity for quantity in (PHI_ACTIVE, PHI, CROSSINGS)}
+    static = runs.groupby([ASPECT, SEED], as_index=False)[list(columns)].mean().rename(columns=columns)
+    static["runs [-]"] = runs.groupby([ASPECT, SEED]).size().to_numpy()
+    static = static.assign(**{PROCEDURE: STATIC, THETA: math.nan})
+    measured = [PHI_ACTIVE, PHI, CROSSINGS, ENERGY, SAMPLED, HEIGHT, STRAIGHT, LOWEST, HALF]
+    active = runs[[PROCEDURE, THETA, ASPECT, SEED, *measured]].assign(**{"runs [-]": 1})
+    table = pd.concat([static.reindex(columns=active.columns), active], ignore_index=True)
+    return table.sort_values([PROCEDURE, ASPECT, THETA, SEED], ignore_index=True)

@@ -15,6 +15,7 @@ from postprocess.measures.table import PASSIVE_PHASES
 from postprocess.statistics.columns import ASPECT, SEED
 from studies.framework.figures import Analysis
 from studies.framework.procedures import EXTERNAL, INTERNAL, PROCEDURE, PROCEDURES, SHAPE, STATIC
+from studies.framework.runs import run_columns
 
 ORDER = (STATIC, EXTERNAL, INTERNAL, SHAPE)
 """Procedures in the order of tables and pictures."""
@@ -51,7 +52,7 @@ def around(run: Run) -> tuple[Frame, FrameSequence]:
 
 
 def named_columns(run: Run) -> dict[str, object]:
-    """Cells of the columns that tell a run from others.
+    """Give the cells of the columns that name a run.
 
     Raises:
         InputError: The run has more than one activity, or an unknown one.
@@ -60,13 +61,7 @@ def named_columns(run: Run) -> dict[str, object]:
     if len(active) > 1 or not set(active) <= set(PROCEDURES):
         msg = f"{run.path}: not one activity ({', '.join(PROCEDURES)}) or none: it has {', '.join(active)}"
         raise InputError(msg)
-    return {
-        PROCEDURE: PROCEDURES[active[0]] if active else STATIC,
-        ASPECT: round(run.manifest.aspect_ratio, 6),
-        SEED: run.manifest.seed,
-        "smarticles [-]": run.manifest.count,
-        "fidelity": run.manifest.fidelity,
-    }
+    return {PROCEDURE: PROCEDURES[active[0]] if active else STATIC, **run_columns(run)}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -89,7 +84,7 @@ class Pictures:
         """Draw the runs whose directories are there."""
         from postprocess.pictures import strip  # noqa: PLC0415  (imports PyVista)
 
-        runs, rows = analysis.runs, []
+        runs, rows = analysis.table("runs"), []
         if self.select:
             runs = runs[(runs[list(self.select)] == 0).all(axis=1)]
         runs = runs.assign(apart=(runs[ASPECT] - 0.7).abs()).sort_values(["apart", SEED])
@@ -105,6 +100,6 @@ class Pictures:
         if not rows:
             return []
         columns = ("with the wall", "0.1 s after", "at the end" if self.after is None else f"{self.after:g} s after")
-        told = "Each smarticle has a colour of its own, the same in all pictures of a row; first seed."
+        note = "Each smarticle keeps its colour in all pictures of a row; first seed."
         output = path.with_suffix(".png")
-        return [strip.draw_strip(rows, output, columns=columns, footer=[told, *analysis.footer])]
+        return [strip.draw_strip(rows, output, columns=columns, footer=[note, *analysis.footer])]

@@ -1,22 +1,47 @@
-"""What the studies of shaken piles measure of a run: packing fraction and crossings before and after shaking."""
+"""Shaken piles: packing fraction and crossings before and after shaking, and Gravish's points of them."""
 
 from __future__ import annotations
 
+import hashlib
+import math
 from collections.abc import Mapping, Sequence
+from importlib.resources import files
 from types import MappingProxyType
 
 import numpy as np
+import pandas as pd
 
 from dem.errors import InputError
 from dem.record.run import Run, SceneData
 from postprocess.measures.packing import COSTLY_DEFINITIONS, DEFINITIONS
 from postprocess.measures.table import LAST_FRAMES, packing_change, summarise_run
-from postprocess.statistics.columns import ASPECT, SEED
-from studies.framework.plots import History
-from studies.framework.runs import DEFINITION, duration
+from postprocess.statistics.columns import ASPECT
+from studies.framework.figures import History
+from studies.framework.provenance import Reference
+from studies.framework.runs import DEFINITION, duration, last_columns, run_columns
 
 SHAKEN = "time shaken [s]"
+SHAKE_TIME = 20.0
+"""How long Gravish et al. shook [s]."""
 
+DIGITISING_ERROR = 0.003
+"""Taken as the error of each of Gravish's points [-]."""
+
+GRAVISH_COLUMNS: Mapping[str, str] = MappingProxyType(
+    {"phi_0": "phi_initial", "phi_f": "phi_final", "phi_f relaxed": "phi_final"}
+)
+"""Column of Gravish's points that each stage is compared with."""
+
+_FILE = files("postprocess") / "reference" / "gravish2012_phi.csv"
+_CITATION = "Gravish et al., PRL 108, 208001 (2012), digitised"
+GRAVISH = Reference(
+    statement=f"{_CITATION}; error of reading taken as ±{DIGITISING_ERROR:g}",
+    facts={
+        "file": _FILE.name,
+        "sha256": hashlib.sha256(_FILE.read_bytes()).hexdigest(),
+        "digitising_error": DIGITISING_ERROR,
+    },
+)
 
 STAGES: Mapping[str, str] = MappingProxyType(
     {
@@ -39,6 +64,26 @@ WINDOW = 1.0
 """Over how long before those times it is averaged [s]: 30 periods of shaking."""
 
 _SHAKE, _SERIES = "shake", "packing_fraction"
+
+
+def read_gravish() -> pd.DataFrame:
+    """Read Gravish's digitised points: columns `l_over_w`, `phi_initial`, `phi_final`; NaN where there is no point."""
+    with _FILE.open(encoding="utf-8") as file:
+        return pd.read_csv(file)
+
+
+def gravish_at(aspect: float, stage: str) -> float:
+    """Give Gravish's φ at exactly this aspect ratio, or NaN; a stage is a key of `GRAVISH_COLUMNS`."""
+    points = read_gravish()
+    same = np.isclose(points["l_over_w"], aspect, rtol=0, atol=1e-6)
+    return float(points.loc[same, GRAVISH_COLUMNS[stage]].iloc[0]) if same.any() else math.nan
+
+
+def gravish_note(aspects: Sequence[float], stages: Sequence[str] = ("phi_0", "phi_f")) -> str:
+    """State what Gravish's points are, and at which l/w there are none, for figures that show them."""
+    lacking = {stage: [f"{one:g}" for one in aspects if math.isnan(gravish_at(one, stage))] for stage in stages}
+    gaps = [f"no {stage.replace('phi', 'φ')} at l/w = {', '.join(some)}" for stage, some in lacking.items() if some]
+    return f"{_CITATION}, read to ±{DIGITISING_ERROR:g}; {'; '.join(gaps) or 'at every l/w shown'}."
 
 
 def phi(stage: str, definition: str = DEFINITION) -> str:
@@ -97,12 +142,10 @@ def while_shaken(run: Run) -> History:
 
 
 def measured_row(run: Run, definitions: Sequence[str]) -> dict[str, object]:
-    """One run's row: φ by each definition and the crossings before and after shaking, and what the run was.
+    """Measure φ by each definition and the crossings before and after shaking: a row of the table of runs.
 
-    Args:
-        run: A finished run.
-        definitions: Of the packing fraction; `DEFINITION` is always among them. The costly ones
-            are taken of the last frame alone, before and at the end of shaking.
+    `DEFINITION` is always among the definitions. Costly ones are taken of the last frame alone, before and at the end
+    of shaking.
 
     Raises:
         InputError: It was not shaken after another phase, or cannot be read.
@@ -117,22 +160,12 @@ def measured_row(run: Run, definitions: Sequence[str]) -> dict[str, object]:
         wanted["phi_f relaxed"] = run.phases[-1].index
     cheap = [DEFINITION, *(set(definitions) - {DEFINITION} - COSTLY_DEFINITIONS)]
     summary = summarise_run(run, definitions=cheap, phases=set(wanted.values()))
-    if summary.empty:
-        msg = f"{run.path}: no frame of the phases around shaking; run it again"
+    table = summary.set_index("phase") if len(summary) else summary
+    gone = next((phase for phase in wanted.values() if phase not in table.index), None)
+    if gone is not None:
+        msg = f"{run.path}: no frame of phase {gone} ({run.phases[gone].type}); run it again"
         raise InputError(msg)
-    table = summary.set_index("phase")
-    for phase in wanted.values():
-        if phase not in table.index:
-            kind = run.phases[phase].type
-            msg = f"{run.path}: no frame of phase {phase} ({kind}); run it again"
-            raise InputError(msg)
-    row: dict[str, object] = {
-        ASPECT: round(run.manifest.aspect_ratio, 6),
-        SEED: run.manifest.seed,
-        "smarticles [-]": run.manifest.count,
-        "fidelity": run.manifest.fidelity,
-        SHAKEN: sum(map(duration, shakes)),
-    }
+    row: dict[str, object] = {**run_columns(run), SHAKEN: sum(map(duration, shakes))}
     for definition in DEFINITIONS:
         if definition in cheap:
             for stage, phase in wanted.items():
@@ -148,16 +181,11 @@ def measured_row(run: Run, definitions: Sequence[str]) -> dict[str, object]:
             row[f"crossings {name} [-]"] = table.loc[wanted[stage], "crossings mean [-]"]
     row["escaped at the end [-]"] = table["escaped [-]"].iloc[-1]
     row["frames averaged [-]"] = int(table.loc[list(wanted.values()), "frames averaged"].min())
-    row["scene_sha256"] = run.manifest.scene_sha256
-    row["run"] = run.path.name
-    return row
+    return row | last_columns(run)
 
 
 def packing_history(run: Run) -> History:
-    """φ of a shaken run against the time since shaking began [-].
-
-    Args:
-        run: A finished run.
+    """Read φ of a shaken run against the time since shaking began [-].
 
     Raises:
         InputError: It was not shaken, or recorded no φ.

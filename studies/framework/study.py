@@ -2,48 +2,40 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import partial
 from pathlib import Path
 
 import pandas as pd
 
-from dem.errors import InputError
 from dem.record.run import Run
 from postprocess.report import figures as style
 from postprocess.report.markdown import meaning_lines, table_lines
 from postprocess.statistics.columns import ASPECT, SEED, SEEDS
-from postprocess.statistics.points import marked, seeds_of
-from postprocess.statistics.seeds import mean_over_seeds
-from studies.framework.engines import (
-    by_engine,
-    compared_engines,
-    engine_lines,
-    engines_of,
-    judging,
-    told_by_engine,
-    told_engines,
-)
-from studies.framework.figures import Analysis, Figure
+from postprocess.statistics.points import averaged, seeds_of
+from studies.framework.figures import BARS, Analysis, Figure
 from studies.framework.findings import CRITERION, Finding, Judged, findings_table
-from studies.framework.procedures import ACTIVE, PROCEDURE, STATIC
 from studies.framework.provenance import SAVOIE, Origin, Reference, make_folder
-from studies.framework.quantities import Key, Quantity, cells_of, short_table, sort_rows
 from studies.framework.runs import (
+    ENGINE,
+    ENGINE_NAMES,
     Collected,
+    Key,
     MeasuredRun,
     MissingRun,
+    Quantity,
     Row,
+    by_engine,
     collect_runs,
-    runs_table,
-    told_bars,
-    told_range,
-    told_seeds,
+    compared_engines,
+    engines_of,
+    judging,
+    sort_rows,
 )
 
 COUNT = "smarticles [-]"
 TEXT = "findings.md"
+_MEANS = "Means over seeds ± standard error."
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -51,20 +43,16 @@ class Report:
     """Results of a study.
 
     Attributes:
-        header: Columns of the table for a person to read.
-        rows: Of that table.
-        told: Lines below it: what the numbers are, and every finding with its verdict.
+        lines: Below it: what the numbers are, and every finding with its verdict.
         tables: All tables by name, `runs`, `points` and `findings` among them.
-        judged: The findings.
         missing: Runs that were given and are not in the tables.
         footer: Origin of the results, one statement each.
         files: Everything that was written, by name.
-        output: Folder of the files.
     """
 
     header: Sequence[str]
     rows: Sequence[Sequence[str]] = field(repr=False)
-    told: Sequence[str]
+    lines: Sequence[str]
     tables: Mapping[str, pd.DataFrame] = field(repr=False)
     judged: Sequence[Judged]
     missing: Sequence[MissingRun]
@@ -79,13 +67,11 @@ class Study:
 
     Attributes:
         name: For the command line, and in provenance.
-        title: Of its text.
         measure: Measures one finished run: its row of the table of runs, several rows, or a `MeasuredRun` with a
             history. An InputError lists the run as missing.
         keys: Columns that name a point: one combination of the sweep's variables.
         quantities: Columns that are averaged over seeds.
         findings: What is judged, in the paper's order.
-        figures: What is drawn.
         samples: Makes the table that is averaged and judged from the table of runs of one engine.
         extra: Makes further tables by name from the table of runs; one called `points` replaces the means over seeds.
         shown: Selects the points of the short table.
@@ -94,7 +80,7 @@ class Study:
         order: Columns that the table of runs is sorted by; none: as given.
         constant: Columns that must be equal within groups, with the columns that make the groups.
         bounds: Column that is above 0 where a run's quantities are lower bounds, with the word for such runs.
-        count_values: Whether the points say how many seeds have a value of each quantity.
+        count_values: Whether the points have the number of seeds with a value of each quantity.
         one_engine: Whether runs of several engines are rejected.
         from_tables: Whether the table of runs is enough for everything but figures of histories, so that runs of an
             earlier analysis need not be there.
@@ -149,31 +135,26 @@ class Study:
         output = make_folder(output)
         found = collect_runs(self.name, run_dirs, self.measured, earlier=earlier)
         self.reject_unlike(found)
-        tables = self.tabulate(runs_table(found), found.times())
+        tables = self.tabulate(found.table(), found.times())
         judged = self.judge(tables)
         tables["findings"] = findings_table(judged)
-        manifests, missing = found.manifests, found.missing
-        origin = Origin(
-            study=self.name, manifests=manifests, missing=missing, note=note, command=command, reference=self.reference
-        )
+        origin = Origin(found=found, note=note, command=command, reference=self.reference)
         footer = origin.footer(*self.statements(tables))
         header, rows = self.table(tables)
         lines = self.text(tables, judged, table_lines(header, rows))
-        files = dict(origin.write(output, footer, tables=tables, text=(TEXT, lines)))
+        files = origin.write(output, footer, tables=tables, text=(TEXT, lines))
+        manifests = {run.run.path.name: run.run for run in found.runs}
         below = origin.below_figures(f"{self._seeds(tables)}.", TEXT)
-        analysis = Analysis(tables=tables, manifests={run.path.name: run for run in manifests}, footer=below)
+        analysis = Analysis(tables=tables, manifests=manifests, footer=below)
         files |= {path.name: path for path in self.draw(output, analysis)}
+        verdicts = [f"{one.verdict.upper()}: {one.finding.says}\n    {one.ours}" for one in judged]
         return Report(
             header=header,
             rows=rows,
-            told=[
-                "Means over seeds ± standard error.",
-                "",
-                *(f"{one.verdict.upper()}: {one.finding.says}\n    {one.ours}" for one in judged),
-            ],
+            lines=[_MEANS, "", *verdicts],
             tables=tables,
             judged=judged,
-            missing=missing,
+            missing=found.missing,
             footer=footer,
             files=files,
             output=output,
@@ -192,19 +173,21 @@ class Study:
         Raises:
             InputError: Fidelities, counts or constants differ, or a point has the same seed twice.
         """
-        found.refuse_mixture(
-            "fidelity", lambda run: run.run.manifest.fidelity, within=partial(_values, columns=self.same_fidelity)
-        )
+
+        def cells(columns: Sequence[str]) -> Callable[[MeasuredRun], tuple[object, ...]]:
+            return lambda run: tuple(run.row[name] for name in columns)
+
+        def text(column: str) -> Callable[[MeasuredRun], str]:
+            return lambda run: value if isinstance(value := run.row[column], str) else f"{value:.3g}"
+
+        found.reject_mixture("fidelity", lambda run: run.run.manifest.fidelity, within=cells(self.same_fidelity))
         if self.one_engine:
-            found.refuse_mixture("engine", lambda run: run.run.manifest.engine)
-        found.refuse_mixture(
-            "count",
-            lambda run: f"{run.run.manifest.count} smarticles",
-            within=partial(_values, columns=self.same_count),
-        )
+            found.reject_mixture("engine", lambda run: run.run.manifest.engine)
+        counts = cells(self.same_count)
+        found.reject_mixture("count", lambda run: f"{run.run.manifest.count} smarticles", within=counts)
         for column, within in self.constant.items():
-            found.refuse_mixture(column, partial(_value, column=column), within=partial(_values, columns=within))
-        found.refuse_repeats("point", self.point_of)
+            found.reject_mixture(column, text(column), within=cells(within))
+        found.reject_repeats(self.point_of)
 
     def point_of(self, run: MeasuredRun) -> str:
         """Name the point of a run, such as `procedure internal, θ 10°, l/w 0.7`."""
@@ -233,14 +216,9 @@ class Study:
         for values, group in samples.groupby(columns, sort=True, dropna=False):
             row: dict[str, object] = {**dict(zip(columns, values, strict=True)), **seeds_of(group)}
             for name in (quantity.column for quantity in self.quantities):
-                mean = mean_over_seeds(group[name])
-                row |= {
-                    name: mean.value,
-                    marked(name, "SE"): mean.standard_error,
-                    marked(name, "95 %"): mean.half_width,
-                }
+                row |= averaged(group, [name])
                 if self.count_values:
-                    row[f"{name.rpartition(' [')[0]} seeds [-]"] = mean.count
+                    row[f"{name.rpartition(' [')[0]} seeds [-]"] = int(group[name].count())
             rows.append(row)
         return sort_rows(pd.DataFrame(rows), columns, self.keys)
 
@@ -250,13 +228,16 @@ class Study:
         return tuple(finding.judge(samples, tables) for finding in self.findings)
 
     def table(self, tables: Mapping[str, pd.DataFrame]) -> tuple[list[str], list[list[str]]]:
-        """Header and rows of the short table of points."""
+        """Make header and rows of the short table of points; quantities without a label are left out."""
         points = self.shown(tables["points"])
-        named = {
-            **cells_of([key for key in self.keys if key.column in points]),
-            "seeds": lambda point: str(point[SEEDS]),
-        }
-        return short_table(points, told_by_engine(points, named), self.quantities)
+        keys = [Key(column=ENGINE, label="engine")] if engines_of(points) else []
+        keys += [key for key in self.keys if key.column in points]
+        shown = [quantity for quantity in self.quantities if quantity.label]
+        rows = [
+            [*(key.text(row[key.column]) for key in keys), str(row[SEEDS]), *(one.cell(row) for one in shown)]
+            for _, row in points.iterrows()
+        ]
+        return [*(key.label for key in keys), "seeds", *(one.label for one in shown)], rows
 
     def draw(self, output: Path, analysis: Analysis) -> list[Path]:
         """Draw all figures into a folder."""
@@ -264,14 +245,9 @@ class Study:
             return [path for figure in self.figures for path in figure.draw(output / figure.name, analysis)]
 
     def text(self, tables: Mapping[str, pd.DataFrame], judged: Sequence[Judged], table: Sequence[str]) -> list[str]:
-        """Lines of the Markdown file."""
+        """Make the lines of the Markdown file."""
         findings = [
-            [
-                one.finding.says,
-                one.ours,
-                "; ".join(filter(None, [f"**{one.verdict}**", one.needed])),
-                one.finding.found_if,
-            ]
+            [one.finding.says, one.ours, f"**{one.verdict}**{one.needed and f'; {one.needed}'}", one.criterion]
             for one in judged
         ]
         return [
@@ -279,60 +255,54 @@ class Study:
             "",
             *table_lines(["finding", "ours (± standard error)", "verdict", "found if"], findings),
             *(line for remark in self.remarks for line in ("", remark)),
-            "",
-            "## Points",
-            "",
-            "Means over seeds ± standard error.",
-            "",
-            *table,
-            *engine_lines(tables.get("engines"), cells_of(self.keys)),
+            *("", "## Points", "", _MEANS, "", *table),
             *meaning_lines("points.csv", {quantity.column: quantity.meaning for quantity in self.quantities}),
         ]
 
     def statements(self, tables: Mapping[str, pd.DataFrame]) -> list[str]:
         """State which runs there are, and what numbers and verdicts are, for footers."""
         every = tables["runs"]
-        runs, counts = judging(every), judging(tables["points"])[SEEDS]
+        runs = judging(every)
         parts = []
         for key in (key for key in self.keys if key.column in runs):
             values = [key.text(value) for value in runs[key.column].drop_duplicates().sort_values()]
             parts.append(f"{key.label} {' '.join(filter(None, values))}")
-        counts_by = runs.groupby(ASPECT)[COUNT].first() if ASPECT in runs else runs[COUNT]
-        parts += [f"{told_range(counts_by)} smarticles", self._seeds(tables)]
-        statement = ", ".join(parts)
-        if {PROCEDURE, ACTIVE} <= set(runs):
-            times = runs[runs[PROCEDURE] != STATIC].groupby(PROCEDURE)[ACTIVE].first()
-            statement += "; active for: " + ", ".join(f"{name} {time:.3g} s" for name, time in times.items())
-        bars = told_bars(counts, "point")
-        compared = [told_engines(every)] if "engines" in tables else []
-        return [f"{statement}.", *filter(None, compared), *self.remarks, f"{bars}.", f"{CRITERION}."]
+        counts = runs.groupby(ASPECT)[COUNT].first() if ASPECT in runs else runs[COUNT]
+        statement = ", ".join([*parts, f"{format_range(counts)} smarticles", self._seeds(tables)])
+        statements = [f"{statement}."]
+        if "engines" in tables:
+            several = engines_of(every)
+            each = ", ".join(f"{ENGINE_NAMES.get(name, name)} {(every[ENGINE] == name).sum()} runs" for name in several)
+            judges = ENGINE_NAMES.get(several[0], several[0])
+            statements.append(f"Engines: {each}, from the same poses where point and seed are equal; {judges} judges.")
+        bars = BARS if judging(tables["points"])[SEEDS].max() > 1 else "One seed per point: no error bars"
+        return [*statements, *self.remarks, f"{bars}.", f"{CRITERION}."]
 
     def _seeds(self, tables: Mapping[str, pd.DataFrame]) -> str:
         runs, counts = judging(tables["runs"]), judging(tables["points"])[SEEDS]
-        bounded = ""
-        if self.bounds is not None:
-            column, word = self.bounds
-            bounded = f"; {word}: {int((runs[column] > 0).sum())} of {len(runs)} runs, whose numbers are lower bounds"
-        return f"{told_seeds(runs, counts, 'point')}{bounded}"
+        seeds = f"seeds {format_numbers(runs[SEED])} ({format_range(counts)} per point)"
+        if self.bounds is None:
+            return seeds
+        column, word = self.bounds
+        return f"{seeds}; {word}: {(runs[column] > 0).sum()} of {len(runs)} runs, whose numbers are lower bounds"
 
 
-def _value(run: MeasuredRun, *, column: str) -> str:
-    value = run.row[column]
-    return value if isinstance(value, str) else f"{value:.3g}"
+def format_numbers(numbers: Iterable[int]) -> str:
+    """Format `1 2 3`, or `1 to 8` where five or more follow each other.
 
-
-def _values(run: MeasuredRun, *, columns: Sequence[str]) -> tuple[object, ...]:
-    return tuple(run.row[name] for name in columns)
-
-
-def read_runs(results: Path, name: str = "runs.csv") -> pd.DataFrame:
-    """Read a table of runs as a study wrote it.
-
-    Raises:
-        InputError: There is none.
+    Example:
+        >>> format_numbers([1, 2, 3, 4, 5, 9])
+        '1 to 5 9'
     """
-    try:
-        return pd.read_csv(results / name, comment="#", dtype={"run": str, "scene_sha256": str, SEED: int})
-    except (OSError, ValueError) as error:
-        msg = f"cannot read {results / name}: {error}; give the results folder of a study"
-        raise InputError(msg) from None
+    rows: list[list[int]] = []
+    for number in sorted(set(numbers)):
+        if rows and number == rows[-1][-1] + 1:
+            rows[-1].append(number)
+        else:
+            rows.append([number])
+    return " ".join(f"{row[0]} to {row[-1]}" if len(row) > 4 else " ".join(map(str, row)) for row in rows)
+
+
+def format_range(counts: pd.Series) -> str:
+    """Format `3` or `1 to 3`: how many there are of each."""
+    return str(counts.min()) if counts.nunique() == 1 else f"{counts.min()} to {counts.max()}"

@@ -13,15 +13,15 @@ from numpy.typing import NDArray
 from synthetic import SyntheticRun, mesh_of, write_ending, write_manifest
 
 from benchmarks.rivals import __main__ as bench
-from benchmarks.rivals.given import Given, Outcome
 from benchmarks.rivals.settings import ENGINES, SETTINGS, SHAKE, Setting
+from benchmarks.rivals.task import Outcome, Task
 from dem.body.state import State
 from dem.record.frames import FrameWriter
 from dem.scene.reading import parse_scene
 
 Array = NDArray[np.float64]
 
-LOOK = 1e-3  # s
+SAMPLE = 1e-3  # s
 GAMMA, FREQUENCY = 2.0, 30.0
 CHOSEN = {  # settings that are tried: stiff ones of others, which do not sink in
     "links": "standard",
@@ -55,19 +55,19 @@ def flat(folder: Path, height: float) -> Path:
 
 def given_of(
     setting: Setting, pile: Path, folder: Path, *, activity: str, seconds: float, gamma: float = GAMMA
-) -> Given:
-    """What the engine is told: contacts that hardly spring back, as those of the others do not."""
-    scene = bench.scene_of(setting, activity, pile, count=1, seed=1, seconds=seconds, look=LOOK, account=False)
+) -> Task:
+    """Make the task of an engine: contacts that hardly spring back, as those of the others do not."""
+    scene = bench.scene_of(setting, activity, pile, count=1, seed=1, seconds=seconds, sample=SAMPLE)
     scene["contact"] = {"restitution": 0.01}
     scene["container"] = {"radius_m": 0.0234}
     if activity == SHAKE:
         scene["phases"][-1]["peak_acceleration_g"] = gamma
-    return Given(parse_scene(scene, source="x"), folder, LOOK)
+    return Task(parse_scene(scene, source="x"), folder, SAMPLE)
 
 
 def simulated(
     engine: str, tmp_path: Path, *, activity: str, seconds: float, gamma: float = GAMMA
-) -> tuple[Given, Outcome]:
+) -> tuple[Task, Outcome]:
     """One smarticle, put down from a tenth of a millimetre."""
     setting = setting_of(engine)
     pile = flat(tmp_path / "pile", 0.735e-3)
@@ -93,7 +93,7 @@ def flight(times: Array) -> tuple[Array, float]:
     return np.where((times > leaves) & (times < lands), above(times), 0.0), lands
 
 
-def thickness(given: Given, shape: str) -> float:
+def thickness(given: Task, shape: str) -> float:
     """How high the centre of one that lies flat is [m]."""
     particle = given.scene.particle
     return particle.boxes.thickness_normal / 2 if shape == "boxes" else particle.radius
@@ -117,21 +117,21 @@ def test_a_smarticle_lies_on_the_floor_and_goes_with_it(engine: str, tmp_path: P
 def test_a_smarticle_is_thrown_as_far_as_theory_says(engine: str, tmp_path: Path) -> None:
     _, found = simulated(engine, tmp_path, activity=SHAKE, seconds=0.03)
     heights = found.positions[:, 0, 1, 2]
-    times = LOOK * np.arange(1, len(heights) - 1)
+    times = SAMPLE * np.arange(1, len(heights) - 1)
     expected, lands = flight(times)
     assert expected.max() > 5e-4
     assert lands > 0.02
-    flying = times < lands - LOOK
+    flying = times < lands - SAMPLE
     assert np.abs(heights[2:] - heights[1] - expected)[flying].max() < 0.05 * expected.max()
 
 
-def test_what_is_missing_is_told_in_one_line_and_left_out(
+def test_what_is_missing_is_reported_in_one_line_and_left_out(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     absent = {**ENGINES, "bullet": replace(ENGINES["bullet"], needs="no_such_package")}
     monkeypatch.setattr(bench, "ENGINES", absent)
     monkeypatch.setattr("sys.argv", ["rivals", "--engines", "bullet", "--out", str(tmp_path / "out")])
     assert bench.main() == 1
-    told = capsys.readouterr()
-    assert told.out.splitlines() == ["Bullet: left out, no_such_package is not installed (make rivals)"]
-    assert told.err == "nothing was run\n"
+    printed = capsys.readouterr()
+    assert printed.out.splitlines() == ["Bullet: left out, no_such_package is not installed (make rivals)"]
+    assert printed.err == "nothing was run\n"

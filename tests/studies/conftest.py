@@ -17,13 +17,13 @@ from postprocess.report import figures
 
 @pytest.fixture
 def undrawn(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Leaves out the figures of all studies, which take most of the time."""
+    """Leave out the figures of all studies, which take most of the time."""
     monkeypatch.setattr("studies.framework.study.Study.draw", lambda *_: [])
 
 
 @pytest.fixture(scope="session", autouse=True)
-def looked_at() -> Iterator[None]:
-    """Every figure that a test of a study draws is held against what holds for all of them.
+def checked_figures() -> Iterator[None]:
+    """Check every figure that a test of a study draws.
 
     A footer is short and whole, error bars are of one kind that is named once, no limit of an axis cuts anything, and
     no label or legend leaves the figure.
@@ -32,12 +32,12 @@ def looked_at() -> Iterator[None]:
 
     def add(figure: Figure, lines: Sequence[str]) -> None:
         add_footer(figure, lines)
-        look_at_footer(figure, lines)
+        check_footer(figure, lines)
 
     def saved(figure: Figure, path: Path, **formats: Sequence[str]) -> list[Path]:
-        look_at_bars(figure)
-        look_at_limits(figure)
-        look_at_edges(figure)
+        check_bars(figure)
+        check_limits(figure)
+        check_edges(figure)
         return save(figure, path, **formats)
 
     with pytest.MonkeyPatch.context() as patch:
@@ -46,8 +46,8 @@ def looked_at() -> Iterator[None]:
         yield
 
 
-def look_at_footer(figure: Figure, lines: Sequence[str]) -> None:
-    """Its height and width as drawn, and whether it is all there."""
+def check_footer(figure: Figure, lines: Sequence[str]) -> None:
+    """Check height and width of the footer as drawn, and that it is whole."""
     footer = figure.texts[-1]
     figure.draw_without_rendering()
     box = footer.get_window_extent()
@@ -57,9 +57,9 @@ def look_at_footer(figure: Figure, lines: Sequence[str]) -> None:
     assert footer.get_text().split() == " ".join(lines).split(), "the footer was cut: say less"
 
 
-def look_at_bars(figure: Figure) -> None:
-    """Whether error bars are named once, and nothing is named that is not there."""
-    told = figure.texts[-1].get_text().replace("\n", " ")
+def check_bars(figure: Figure) -> None:
+    """Check that error bars are named once, and nothing is named that is not there."""
+    text = figure.texts[-1].get_text().replace("\n", " ")
     bars = [
         ends
         for axes in figure.axes
@@ -69,8 +69,8 @@ def look_at_bars(figure: Figure) -> None:
         for ends in lines.get_segments()
         if np.isfinite(ends).all() and len(ends)
     ]
-    assert told.count("Error bars: 95 % confidence") == bool(bars), told
-    assert not [word for word in ("standard error", "SE)", "Error bars: one") if word in told], told
+    assert text.count("Error bars: 95 % confidence") == bool(bars), text
+    assert not [word for word in ("standard error", "SE)", "Error bars: one") if word in text], text
 
 
 def bounds(container: ErrorbarContainer) -> bool:
@@ -78,16 +78,16 @@ def bounds(container: ErrorbarContainer) -> bool:
     return any(cap.get_marker() not in {"|", "_"} for cap in container.lines[1])
 
 
-def look_at_limits(figure: Figure) -> None:
-    """Whether everything lies within the axes; on a logarithmic one what is 0 or less cannot, and is told."""
-    told = figure.texts[-1].get_text()
+def check_limits(figure: Figure) -> None:
+    """Check that everything lies within the axes; on a logarithmic one what is 0 or less cannot, and is stated."""
+    text = figure.texts[-1].get_text()
     for axes in figure.axes:
         for k, (scale, limits) in enumerate(
             ((axes.get_xscale(), sorted(axes.get_xlim())), (axes.get_yscale(), sorted(axes.get_ylim())))
         ):
             values = drawn(axes, k)
             if scale == "log":
-                assert (values > 0).all() or "or below: cut by the axis" in told
+                assert (values > 0).all() or "or below: cut by the axis" in text
                 values = values[values > 0]
             if len(values):
                 room = 1e-9 * max(map(abs, limits))
@@ -95,8 +95,8 @@ def look_at_limits(figure: Figure) -> None:
                 assert values.max() <= limits[1] + room, f"{values.max()} is cut by {limits}"
 
 
-def look_at_edges(figure: Figure) -> None:
-    """Whether labels and legends are whole."""
+def check_edges(figure: Figure) -> None:
+    """Check that labels and legends are whole."""
     figure.draw_without_rendering()
     width, height = figure.get_size_inches() * figure.dpi
     words = [*figure.legends, *figure.texts]
@@ -111,7 +111,7 @@ def look_at_edges(figure: Figure) -> None:
 
 
 def drawn(axes: object, k: int) -> NDArray[np.float64]:
-    """All coordinates, x (0) or y (1), of lines, error bars and bands that stand in coordinates of the data."""
+    """Collect all coordinates, x (0) or y (1), of lines, error bars and bands that stand in coordinates of the data."""
     found = [np.asarray(line.get_xydata(), float) for line in axes.lines if line.get_transform() == axes.transData]
     for part in axes.collections:
         if isinstance(part, LineCollection):

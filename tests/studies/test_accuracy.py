@@ -13,7 +13,6 @@ import pytest
 from synthetic import SyntheticRun, write_run
 from synthetic.hooked import weight, write_hooked_run
 
-from dem.errors import InputError
 from postprocess.statistics.columns import ASPECT, SEED
 from postprocess.statistics.points import marked
 from studies.accuracy import (
@@ -28,14 +27,14 @@ from studies.accuracy import (
     TIME_STEP,
     VARIANT,
     WALL,
+    Rung,
     advise,
     study,
     work_precision,
 )
 from studies.framework.findings import Outcome
-from studies.framework.runs import ENGINE
-from studies.framework.study import Report, read_runs
-from studies.ladder import Rung
+from studies.framework.runs import ENGINE, read_runs
+from studies.framework.study import Report
 
 RESULTS = Path(__file__).resolve().parents[2] / "results"
 STEPS = [
@@ -131,35 +130,12 @@ def test_pure_scatter_is_not_resolved() -> None:
     assert note.endswith("are not resolved with 3 seeds, and 3.3 % in φ cannot be excluded")
 
 
-def test_a_clear_trend_is_resolved() -> None:
-    table = table_of({"base": 0.132 + NARROW, "half": 0.126 + NARROW, "quarter": 0.120 + NARROW})
-    assert verdicts(table) == {"base": "resolved", "half": "resolved", "quarter": "reference"}
-    verdict, note = advice(table)
-    assert verdict == "not found"
-    # All three settings tell the scatter: t(0.975; 6) · 0.0005 · √(2/3) / 0.120 = 0.83 %.
-    assert note.startswith("use 0.225. Cheaper: 0.9: ")
-    assert "φ_f +5.0 ± 0.8 %" in note
-
-
 def test_the_cheapest_unresolved_rung_is_named_and_a_finer_resolved_one_with_it() -> None:
     table = table_of({"base": 0.126 + NARROW, "half": 0.120 + NARROW, "quarter": 0.120 + NARROW})
     assert advice(table)[1].startswith("use 0.45, ")
     odd = table_of({"base": 0.120 + NARROW, "half": 0.126 + NARROW, "quarter": 0.120 + NARROW})
     assert advice(odd)[1].startswith("use 0.9, ")
     assert advice(odd)[1].endswith("but errors of a finer rung are resolved: 0.45")
-
-
-def test_another_measure_can_resolve_what_phi_f_does_not() -> None:
-    same = [0.118, 0.120, 0.122]
-    table = table_of({"base": same, "quarter": same}, phi_0={"base": 0.11})
-    assert verdicts(table)["base"] == "resolved"
-    assert table.loc[0, ["phi_0 resolved", "phi_f resolved", "crossings resolved"]].tolist() == [True, False, False]
-
-
-def test_one_seed_resolves_nothing_however_large_the_error() -> None:
-    table = table_of({"base": [0.2], "half": [0.15], "quarter": [0.1]})
-    assert verdicts(table) == {"base": "unknown", "half": "unknown", "quarter": "reference"}
-    assert advice(table)[0] == "no data"
 
 
 def test_the_finest_rung_with_runs_stands_in_for_one_without() -> None:
@@ -254,22 +230,3 @@ def test_scenes_with_a_hook_are_compared_by_its_peak_force_too(tmp_path: Path) -
     assert table.loc["base", COMPARED["hook_force"]] == pytest.approx(3.15 / run().count)
     assert table.loc["base", "hook_force error [%]"] == pytest.approx(100 * (3.15 / 2.15 - 1))
     assert table.loc["base", "hook_force resolved"]
-
-
-@pytest.mark.parametrize(
-    ("name", "made", "message"),
-    [
-        ("x_seed1", {"aspect_ratio": 0.5}, "different aspect ratio .* must not be averaged"),
-        ("x_seed1", {"count": 9}, "different count must not be averaged"),
-        ("a/base_seed1", {}, "setting base with seed 1 is given twice"),
-        ("base_seed9", {}, "none of 1 runs is done; .*not named SETTING_seed1, as runs of a ladder are"),
-        ("base_seed1", {"phases": ("deposit", "relax")}, "no activity after another phase: its phases are deposit,"),
-    ],
-)
-def test_runs_that_cannot_be_compared_are_rejected(
-    ladder: tuple[list[Path], Report], tmp_path: Path, name: str, made: dict[str, Any], message: str
-) -> None:
-    other = write_run(tmp_path / name, run(**made))
-    first = [ladder[0][0]] if "done" not in message and "activity" not in message else []
-    with pytest.raises(InputError, match=message):
-        study(STEPS).analyse([*first, other], tmp_path / "out", **ORIGIN)

@@ -47,7 +47,7 @@ def row_of(directory: Path) -> dict[str, Any]:
     return dict(STUDY.measured(open_run(directory)).row)
 
 
-def test_a_run_tells_what_each_tier_holds_before_and_after(tmp_path: Path) -> None:
+def test_a_run_has_what_each_tier_holds_before_and_after(tmp_path: Path) -> None:
     # 14 levels of 1.27 mm before, 17.8 mm; 10 after, 12.7 mm, the lowest four with two smarticles each.
     before, after = crossed(14), np.concatenate([crossed(10), crossed(10)])[:14]
     row = row_of(write_released(tmp_path, "internal", before=before, after=after, **KEYS))
@@ -62,7 +62,7 @@ def test_a_run_tells_what_each_tier_holds_before_and_after(tmp_path: Path) -> No
     assert row[HEIGHT] == pytest.approx(13.5 * 1.27e-3, rel=0.05)
 
 
-def test_of_a_tier_that_holds_less_than_the_ball_no_share_is_told(tmp_path: Path) -> None:
+def test_a_tier_that_holds_less_than_the_ball_has_no_share(tmp_path: Path) -> None:
     pile = crossed(9)  # 11.4 mm high: all in the lower two tiers
     upright = pile[-1:].copy()
     upright[..., 2] = 0.0115 + np.array([0.005, 0, 0, 0.005])  # but for the ends of two barbs

@@ -9,9 +9,8 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
-from synthetic.columns import H0, PHASES, WITH_WALL, Column, F, write_column
+from synthetic.columns import H0, WITH_WALL, Column, F, write_column
 
-from dem.errors import InputError
 from dem.record.run import Run, open_run
 from postprocess.measures.collapse import COM, CORE, HEIGHTS, REMAINING, column_history, period_means, vibration
 from postprocess.statistics.columns import ASPECT, SEED, SEEDS
@@ -170,18 +169,3 @@ def test_a_maximum_at_an_end_is_not_found() -> None:
     }
     assert verdicts(rows_of(seeds))[2] == "not found"
     assert verdicts(rows_of({key: value for key, value in seeds.items() if key[0] != 0.13}))[2] == "no data"
-
-
-@pytest.mark.parametrize(
-    ("columns", "expected"),
-    [
-        ([Column(tau=0.5, phases=PHASES[:3])], "no shake after a remove-container: its phases are deposit, shake"),
-        ([Column(tau=0.5), Column(tau=0.6, gamma=4.0, frequency=20.0)], "runs of different frequency"),
-        ([Column(tau=0.5), Column(tau=0.6, gamma=4.0, count=40)], "runs of different count must not"),
-        ([Column(tau=0.5), Column(tau=0.6)], "l/w 0.4, Γ 2.5 with seed 1 is given twice"),
-    ],
-)
-def test_runs_that_must_not_be_mixed_are_rejected(tmp_path: Path, columns: list[Column], expected: str) -> None:
-    runs = [write_column(tmp_path / str(k), column) for k, column in enumerate(columns)]
-    with pytest.raises(InputError, match=expected):
-        STUDY.analyse(runs, tmp_path / "out", **ORIGIN)

@@ -12,8 +12,6 @@ import pytest
 
 from studies import compaction
 from studies.compaction import (
-    FIRST,
-    INTERVALS,
     LAWS,
     LOGARITHMIC,
     MISSED,
@@ -24,9 +22,8 @@ from studies.compaction import (
     at,
     fit,
     of,
-    spread_out,
 )
-from studies.framework.plots import History
+from studies.framework.figures import History
 
 TRUE = {law: Fit(law=law, begin=0.11, end=0.17, tau=4.0, power=0.5, residual=0.0) for law in LAWS}
 
@@ -44,7 +41,7 @@ def runs_of(
     times = np.arange(1, round(seconds / 0.02) + 1) * 0.02
     rows = []
     for seed in seeds:
-        values = Fit(**{**vars(TRUE[law]), **other}).at(times)
+        values = TRUE[law]._replace(**other).at(times)
         values = values + np.random.default_rng(seed).normal(0, noise, len(times))
         history = History(times=times, values=values, active=seconds)
         for name, found in {"packing_history": history, "while_shaken": history, "timed_row": {"seed": seed}}.items():
@@ -84,13 +81,3 @@ def test_growth_is_that_of_the_law_and_noise_does_not_grow(monkeypatch: pytest.M
     short = runs_of(monkeypatch, STRETCHED, seeds=(1, 2), seconds=10.0)
     assert short[[at(20.0), at(200.0)]].isna().all(axis=None)
     assert verdicts(short)[0] == "no data"
-
-
-def test_intervals_on_a_logarithmic_axis_average() -> None:
-    times = np.arange(1, 10_001) * 0.02
-    centres, means = spread_out(times, times)
-    assert (np.diff(centres) > 0).all()
-    assert len(centres) <= INTERVALS
-    assert means[0] >= FIRST
-    # A constant stays one, however many samples an interval has.
-    np.testing.assert_allclose(spread_out(times, np.full(len(times), 0.3))[1], 0.3)

@@ -35,8 +35,7 @@ from studies.contacts import (
     points,
     risen,
 )
-from studies.framework.provenance import read_reference, reference_at
-from studies.framework.shaken import FRICTION
+from studies.framework.shaken import FRICTION, gravish_at
 
 RATIOS = (0.4, 0.7, 1.0)
 NOISE = 0.003
@@ -67,8 +66,7 @@ def verdicts(runs: pd.DataFrame) -> dict[str, str]:
 
 
 def gravish(runs: pd.DataFrame) -> pd.Series:
-    reference = read_reference()
-    return runs[ASPECT].map({ratio: reference_at(reference, ratio, "phi_f") for ratio in RATIOS})
+    return runs[ASPECT].map({ratio: gravish_at(ratio, "phi_f") for ratio in RATIOS})
 
 
 def test_effects_are_those_put_in_and_what_a_seed_shares_is_no_scatter() -> None:
@@ -98,16 +96,6 @@ def test_each_verdict_is_given_to_data_that_deserve_it() -> None:
     assert (other["friction-more-than-container"], other["frictions-together"]) == ("not found", "found")
 
 
-@pytest.mark.parametrize(
-    ("off", "noise", "verdict"), [(0.0, 1e-4, "found"), (0.09, 1e-4, "not found"), (0.04, 3e-3, "not resolved")]
-)
-def test_gravish_is_met_or_missed_only_beyond_all_errors(off: float, noise: float, verdict: str) -> None:
-    runs, generator = runs_of(noise=noise), np.random.default_rng(5)
-    # The error of reading alone is ± 0.003, up to 2.9 % of φ_f.
-    runs[PHI_F] = gravish(runs) * (1 + off) + noise * generator.standard_normal(len(runs))
-    assert verdicts(runs)["near-gravish"] == verdict
-
-
 def test_what_is_missing_takes_its_pairs_with_it_and_is_not_accepted() -> None:
     runs = runs_of(noise=1e-4)
     right = (runs[FRICTION] == 0.8) & (runs[WALL] == 0.4) & (runs[RESTITUTION] == 0.7)
@@ -119,24 +107,8 @@ def test_what_is_missing_takes_its_pairs_with_it_and_is_not_accepted() -> None:
     assert by_seed(runs[runs[FRICTION] == 0.4], PHI_F, FRICTION).empty
     row = points(runs).iloc[0]
     own = row[PHI_F.replace(" [", " 95 % [")]
-    known = float(reference_at(read_reference(), row[ASPECT], "phi_f"))
+    known = gravish_at(row[ASPECT], "phi_f")
     assert row[DEVIATION.replace(" [", " 95 % [")] == pytest.approx(100 * np.hypot(own, 0.003) / known)
-
-
-def test_from_runs_to_effects(tmp_path: Path) -> None:
-    """Every combination at one l/w, two seeds: friction between smarticles takes a tenth of φ, the container's none."""
-    runs = []
-    for (between, wall, restitution), seed in product(product(*FACTORS.values()), (1, 2)):
-        share = (0.9 if between > 0.5 else 1.0) * (1 + 0.001 * seed * (1 + wall))
-        packing = tuple(share * value for value in (0.100, 0.105, 0.130, 0.132))
-        run = SyntheticRun(seed=seed, packing=packing, friction=between, friction_wall=wall, restitution=restitution)
-        runs.append(write_run(tmp_path / f"mu{between}_wall{wall}_e{restitution}_seed{seed}", run))
-    report = STUDY.analyse(runs, tmp_path / "out", note="the full study", command="smarticles study contacts")
-    effect = report.tables["effects"].set_index([QUANTITY, FACTOR, ASPECT])[EFFECT]
-    # A tenth of 0.130, and of what seeds add to it.
-    assert effect["phi_f", CALLED[FRICTION], EVERYWHERE] == pytest.approx(-0.0130, rel=5e-3)
-    assert abs(effect["phi_f", CALLED[RESTITUTION], EVERYWHERE]) < 1e-9
-    assert {"points.csv", "effects.csv", "findings.csv", "contacts.png"} <= set(report.files)
 
 
 def test_the_lowest_tenth_rises_by_what_the_piles_height_makes_it(tmp_path: Path) -> None:

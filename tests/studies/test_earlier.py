@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import shutil
 from pathlib import Path
 
@@ -12,8 +11,7 @@ from synthetic import write_run
 from dem.errors import InputError
 from dem.scene.reading import dump_scene
 from smarticles.main import main
-from studies.framework.earlier import Wanted, earlier_runs
-from studies.framework.runs import MeasuredRun, collect_runs
+from studies.framework.runs import MeasuredRun, Wanted, collect_runs, earlier_runs
 from studies.registry import shipped, study_file
 from templates.sweep.expand import Point, expand
 from templates.sweep.sweep_file import load_sweep
@@ -89,13 +87,6 @@ def copy(tmp_path: Path) -> Path:
     return folder
 
 
-def test_a_row_without_its_origin_does_not_count(copy: Path, wanted: dict[str, Wanted]) -> None:
-    told = json.loads((copy / "provenance.json").read_text())
-    told["runs"] = [run for run in told["runs"] if not run["directory"].endswith(NAME)]
-    (copy / "provenance.json").write_text(json.dumps(told))
-    assert NAME not in earlier_runs(copy, wanted)
-
-
 @pytest.mark.parametrize(
     ("file", "text", "cause"),
     [
@@ -107,7 +98,7 @@ def test_a_row_without_its_origin_does_not_count(copy: Path, wanted: dict[str, W
         ("provenance.json", '{"runs": [1]}', "cannot read .*provenance.json: it is no provenance"),
     ],
 )
-def test_damaged_tables_are_told(
+def test_damaged_tables_are_reported(
     copy: Path, wanted: dict[str, Wanted], file: str, text: str | None, cause: str
 ) -> None:
     if text is None:
@@ -132,7 +123,7 @@ def test_a_study_that_draws_from_its_runs_says_so(tmp_path: Path, capsys: pytest
     assert "--earlier" in capsys.readouterr().err
 
 
-def test_tables_of_other_scenes_are_refused_before_anything_runs(
+def test_tables_of_other_scenes_are_rejected_before_anything_runs(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     arguments = ["study", "procedures", "--quick", "--out", str(tmp_path / "p"), "--earlier", str(RESULTS)]

@@ -5,13 +5,10 @@ from __future__ import annotations
 import math
 from pathlib import Path
 
-import numpy as np
-import pandas as pd
 import pytest
 from synthetic import SyntheticRun, write_manifest, write_run
 
-from postprocess.statistics.columns import SEED
-from studies.engines import CASE, COMPARED, FORCE, QUANTITIES, STUDY, VARIANT, equivalence, pitch_of
+from studies.engines import COMPARED, STUDY, pitch_of
 from studies.framework.findings import within
 from studies.framework.study import Report
 
@@ -96,26 +93,6 @@ def test_chains_are_followed_to_links(report: Report) -> None:
 )
 def test_a_number_within_a_margin(percent: float, half_width: float, verdict: str) -> None:
     assert within(percent, half_width, 5.0) == verdict
-
-
-def verdict_of(rng: np.random.Generator, apart: float, scatter: float, seeds: int) -> str:
-    """The verdict on chains that are so far apart, and scatter by so much."""
-    rows = []
-    for variant, factor in (("links", 1 + apart), ("yade", 1.0)):
-        for seed in range(seeds):
-            row = {one.column: math.nan for one in QUANTITIES} | {CASE: "chain", VARIANT: variant, SEED: seed}
-            rows.append(row | {FORCE: factor * (1 + scatter * rng.standard_normal())})
-    return str(equivalence(pd.DataFrame(rows))["verdict"].iloc[0])
-
-
-def test_verdicts_err_as_seldom_as_they_say() -> None:
-    """At the very margin engines are called equivalent in one study of forty, and as often different."""
-    rng = np.random.default_rng(5)
-    found = [verdict_of(rng, 0.10, 0.02, 8) for _ in range(120)]
-    assert found.count("equivalent") < 0.07 * 120
-    assert found.count("different") < 0.07 * 120
-    assert [verdict_of(rng, 0.0, 0.02, 8) for _ in range(30)].count("equivalent") > 26
-    assert {verdict_of(rng, 0.0, 0.5, 3) for _ in range(30)} <= {"not resolved", "different"}
 
 
 def test_pitches() -> None:

@@ -14,8 +14,7 @@ from synthetic import SyntheticRun, write_run
 
 from postprocess.statistics.columns import ASPECT
 from postprocess.statistics.seeds import Scatter
-from studies.framework.provenance import DIGITISING_ERROR
-from studies.framework.shaken import FRICTION, phi
+from studies.framework.shaken import DIGITISING_ERROR, FRICTION, phi
 from studies.friction import GROWTHS, STUDY, Curve
 
 ORIGIN = {"note": "the full study as shipped", "command": "smarticles study friction --out friction"}
@@ -92,7 +91,7 @@ def test_points_have_the_error_of_their_seeds_and_deviations_also_gravishs() -> 
     assert tables["growth"][GROWTHS[1]].tolist() == pytest.approx([100 * (1 / 0.95 - 1)] * 15)
 
 
-def test_one_friction_for_all_is_found_and_different_ones_are_refused() -> None:
+def test_one_friction_for_all_is_found_and_different_ones_are_rejected() -> None:
     found = verdicts(runs_of())
     assert (found["one-friction-phi-0-and-phi-f"], found["common-friction"]) == ("found", "found")
     # At rest again piles are 8 % denser: another friction would do, but not together with φ_0.

@@ -11,8 +11,7 @@ import pytest
 from synthetic import SyntheticRun, write_run
 
 from postprocess.statistics.columns import ASPECT, SEED
-from studies.framework.provenance import read_reference
-from studies.framework.shaken import phi
+from studies.framework.shaken import phi, read_gravish
 from studies.gravish import STUDY, deviations, steps
 
 ORIGIN = {"note": "the full study as shipped", "command": "smarticles study gravish --out gravish"}
@@ -34,7 +33,7 @@ def verdict(name: str, levels: Mapping[float, tuple[float, float]], spread: Mapp
 
 
 def test_gravish_is_never_interpolated() -> None:
-    reference = read_reference().set_index("l_over_w")
+    reference = read_gravish().set_index("l_over_w")
     assert reference.loc[0.7].tolist() == [0.105, 0.130]
     found = deviations(runs_of({0.5: (0.125, 0.15), 0.65: (0.11, 0.13), 0.7: (0.1155, 0.117)}))
     assert found[["stage", ASPECT]].to_numpy().tolist() == [["phi_0", 0.7], ["phi_f", 0.5], ["phi_f", 0.7]]

@@ -75,7 +75,7 @@ def test_the_table_is_printed_and_written(studies: Path, tmp_path: Path, capsys:
     assert len(pd.read_csv(out / "hours.csv")) == 3
 
 
-def test_what_holds_no_study_is_refused(studies: Path, tmp_path: Path) -> None:
+def test_what_holds_no_study_is_rejected(studies: Path, tmp_path: Path) -> None:
     with pytest.raises(InputError, match="there is no such directory"):
         hours(tmp_path / "none")
     with pytest.raises(InputError, match="none of its folders is that of a sweep"):

@@ -7,13 +7,10 @@ from pathlib import Path
 import pytest
 
 from dem.errors import InputError
-from dem.phases.actuated import ActuatedPhase
 from dem.scene.reading import load_scene, scene_hash
 from dem.scene.scene import Scene
 from dem.setting.fidelity import FIDELITIES, fidelities
-from studies.ladder import (
-    ACTIVITIES,
-    ACTUATED,
+from studies.accuracy import (
     BASE,
     KNOBS,
     Ladder,
@@ -117,33 +114,6 @@ def test_the_scene_has_its_own_place_among_the_rungs(tmp_path: Path) -> None:
     assert labels(ladder, "fidelity")[0] == ("draft", "draft")
 
 
-def test_a_diameter_by_hand_is_a_rung_of_its_own(tmp_path: Path) -> None:
-    ladder = build_ladder(
-        scene_of(tmp_path, SCENE, "fidelity.diameter_m=1.2e-3"), source="scene.yaml", knobs=["section"]
-    )
-    names = labels(ladder, "section")
-    assert names[0] in [("pitch 1.3", "pitch-1.3"), ("pitch 1.3 d 1.2 mm", BASE)]
-    assert {BASE, "pitch-1.3"} <= {setting for _, setting in names}
-    assert ladder.scenes["pitch-1.3"].fidelity.diameter_m is None
-
-
-def test_a_scene_of_two_rows_is_compared_with_what_is_finer_yet(tmp_path: Path) -> None:
-    ladder = build_ladder(scene_of(tmp_path, SCENE, "fidelity=reference"), source="scene.yaml", knobs=["section"])
-    assert labels(ladder, "section")[3:] == [
-        ("two rows", BASE),
-        ("two rows of pitch 0.5", "two-rows-of-pitch-0.5"),
-        ("four rows", "four-rows"),
-    ]
-    spheres = [len(ladder.scenes[name].particle.centres) for _, name in labels(ladder, "section")[3:]]
-    assert spheres[1] > 1.9 * spheres[0]
-    assert spheres[2] == 2 * spheres[0]
-
-
-def test_settings_that_differ_in_nothing_but_their_name_run_once(tmp_path: Path) -> None:
-    ladder = build_ladder(scene_of(tmp_path, SCENE, "fidelity=standard"), source="scene.yaml")
-    assert labels(ladder, "fidelity") == [("draft", "draft"), ("standard", BASE), ("reference", "two-rows")]
-
-
 def test_knobs_of_motors_belong_to_scenes_that_actuate(tmp_path: Path) -> None:
     ladder = build_ladder(scene_of(tmp_path, OSCILLATION), source="scene.yaml")
     assert ladder.knobs == tuple(knob for knob in KNOBS if knob != "engine")
@@ -202,15 +172,6 @@ def test_twenty_seeds_where_they_are_cheap(tmp_path: Path) -> None:
     assert default_seeds(scene_of(tmp_path, SCENE, "engine=links")) == tuple(range(1, 21))
 
 
-def test_types_of_phase_that_actuate_are_those_of_the_simulator(tmp_path: Path) -> None:
-    phase = scene_of(tmp_path, OSCILLATION).phases[-1]
-    assert isinstance(phase, ActuatedPhase)
-    assert phase.type in ACTUATED
-    shaken = scene_of(tmp_path).phases[-1]
-    assert not isinstance(shaken, ActuatedPhase)
-    assert shaken.type in ACTIVITIES - ACTUATED
-
-
 def test_what_the_scene_cannot_have_is_left_out_and_said(tmp_path: Path) -> None:
     square = scene_of(tmp_path, SCENE, "smarticle.thickness_in_plane_m=1.27e-3")
     ladder = build_ladder(square, source="scene.yaml")
@@ -241,7 +202,7 @@ def test_what_takes_too_long_is_left_out_but_never_the_scene(scene: Scene) -> No
         (SCENE, (), ["control"], "--knobs: control turns nothing: no phase of scene.yaml actuates"),
     ],
 )
-def test_a_scene_that_makes_no_ladder_is_refused(
+def test_a_scene_that_makes_no_ladder_is_rejected(
     text: str, settings: tuple[str, ...], knobs: list[str] | None, message: str, tmp_path: Path
 ) -> None:
     with pytest.raises(InputError, match=message) as error:

@@ -52,7 +52,7 @@ def test_a_run_is_measured_against_time_from_when_the_wall_went(tmp_path: Path) 
     assert run.history[SPREAD][-1] > 5
 
 
-def test_a_pile_that_fell_over_is_told_from_one_that_sank(tmp_path: Path) -> None:
+def test_a_pile_that_fell_over_differs_from_one_that_sank(tmp_path: Path) -> None:
     afters = {"over": fallen(stack()), "sank": sunk(stack(), 0.99)}
     over, sank = (
         dict(measured(write_released(tmp_path / name, "shape-change", before=stack(), after=after)).row)

@@ -11,13 +11,11 @@ import numpy as np
 import pandas as pd
 import pytest
 from sweeps import of_one_seed
-from synthetic import SyntheticRun, write_run
 
-from dem.errors import InputError
 from postprocess.report import figures
-from studies.claims.verdicts import claims
 from studies.framework.figures import Analysis
-from studies.framework.study import Study, read_runs
+from studies.framework.runs import read_runs
+from studies.framework.study import Study
 from studies.registry import STUDIES, Script
 from templates.sweep.expand import expand
 from templates.sweep.sweep_file import load_sweep
@@ -152,19 +150,3 @@ def test_text_and_figures_are_made_from_the_tables(table: str, tmp_path: Path, m
     drawn = study.draw(tmp_path, Analysis(tables=tables, manifests={}, footer=["A footer."]))
     assert {path.stem for path in drawn} <= {figure.name for figure in study.figures}
     assert all(path.stat().st_size > 1000 for path in drawn)
-
-
-def test_verdicts_of_the_claims() -> None:
-    published = pd.read_csv(RESULTS / "claims.csv", keep_default_na=False)
-    assert [claim.verdict for claim in claims(RESULTS)] == published["verdict"].tolist()
-    assert len(published) == 68
-
-
-def test_runs_that_must_not_be_averaged_are_rejected(tmp_path: Path) -> None:
-    study, origin = STUDIES["gravish"].load(), {"note": "the full study as shipped", "command": "smarticles study"}
-    runs = [SyntheticRun(aspect_ratio=0.7, count=count, seed=seed) for count, seed in ((9, 1), (10, 2), (9, 1))]
-    made = [write_run(tmp_path / str(number), run) for number, run in enumerate(runs)]
-    with pytest.raises(InputError, match=r"different count must not be averaged: .*0 is 9 smarticles, .*1 is 10"):
-        study.analyse(made[:2], tmp_path / "out", **origin)
-    with pytest.raises(InputError, match=r"l/w 0.7, .* with seed 1 is given twice"):
-        study.analyse(made[::2], tmp_path / "out", **origin)

@@ -52,7 +52,7 @@ def test_means_and_changes_are_those_put_in(tmp_path: Path) -> None:
     assert len(report.missing) == 1
 
 
-def test_runs_of_other_names_or_aspect_ratios_are_refused(tmp_path: Path) -> None:
+def test_runs_of_other_names_or_aspect_ratios_are_rejected(tmp_path: Path) -> None:
     good = write(tmp_path / "draft_seed1")
     renamed = write(tmp_path / "draft_seed2")
     report = STUDY.analyse([good, renamed], tmp_path / "out", **ORIGIN)

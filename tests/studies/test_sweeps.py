@@ -6,7 +6,6 @@ import subprocess
 import sys
 from collections.abc import Mapping
 from functools import cache
-from itertools import product
 from typing import Any
 
 import pytest
@@ -88,20 +87,6 @@ def test_a_study_by_the_papers_code_differs_in_the_protocol_alone(name: str) -> 
             else:
                 assert phase == twin
         assert one.scene.seed_for("poses") == other.scene.seed_for("poses")
-
-
-def test_factors_are_all_combinations_of_the_rules() -> None:
-    factors = first_seed("factors")
-    rules = {(p.scene.motor.law, p.scene.contact.friction_wall, p.scene.container.radius_m) for p in factors}
-    assert rules == set(product(("halt", "ease"), (0.4, 0.2), (0.0234, 0.0224)))
-    assert len(factors) == len(rules) * 2
-
-
-def test_the_study_of_engines_pairs_every_run() -> None:
-    names = {point.name for point in points_of("engines")}
-    assert {name.replace("_links_", "_yade_") for name in names} <= names
-    with pytest.raises(InputError, match=r"'engine' is a variable.*; leave --engine links out"):
-        on_engine(load_sweep(study_file("engines")), "links")
 
 
 @pytest.mark.parametrize(

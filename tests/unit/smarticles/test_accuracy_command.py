@@ -146,7 +146,7 @@ def test_more_seeds_and_knobs_are_taken_up_in_the_same_directory(
         (["--max-run-hours", "-1"], "argument --max-run-hours: must be a number above 0: got '-1'"),
         (
             ["--set", "phases.2={type: relax}"],
-            "no activity whose result accuracy could be told by; add a phase of type",
+            "no activity whose result could be compared; add a phase of type",
         ),
         ([], "accuracy: --out DIR is missing; give a directory, or --dry-run to only show the ladder"),
     ],

@@ -1,0 +1,195 @@
+"""The task that every engine gets, and the outcome that it returns."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from dem.body.particle import Boxes
+from dem.body.state import State
+from dem.phases.actuated import Drive, drive
+from dem.phases.shake import Shake
+from dem.phases.take_over import TakeOver, poses_of
+from dem.scene.scene import Scene
+
+Array = NDArray[np.float64]
+Knobs = Mapping[str, Any]
+
+REST, ACTIVITY = 1, 2  # phases of the scene, after the take-over
+FACETS = 32  # flat walls of engines that have no cylinder to be in; they touch it from outside
+CREEP = 0.1  # s at the end of the rest in which it is measured whether the pile still sinks
+
+
+@dataclass(frozen=True, eq=False)
+class Task:
+    """A scene of three phases, take-over, relax and an activity.
+
+    Args:
+        folder: where an engine may leave files.
+        sample_s: time between two samples of the poses [s].
+    """
+
+    scene: Scene
+    folder: Path
+    sample_s: float
+
+    @cached_property
+    def state(self) -> State:
+        """The smarticles at the beginning, at rest."""
+        first = self.scene.phases[0]
+        assert isinstance(first, TakeOver)
+        poses = poses_of(self.scene, first.taken)
+        turns, still = np.array([turn.as_matrix() for turn in poses.rotations]), np.zeros_like(poses.positions)
+        return State.rigid(self.boxes, poses.positions, turns, still, still)
+
+    @property
+    def turns(self) -> Array:
+        """(N, 3, 3) body frame to laboratory frame at the beginning."""
+        turns: Array = self.state.link_rotations[:, 1] @ self.boxes.link_rotations[1].T
+        return turns
+
+    @property
+    def boxes(self) -> Boxes:
+        """One smarticle."""
+        return self.scene.particle.boxes
+
+    @property
+    def rest_s(self) -> float:
+        """How long the pile rests [s]."""
+        return float(self.scene.phases[REST].known_duration or 0.0)
+
+    @property
+    def activity_s(self) -> float:
+        """How long the activity takes [s]."""
+        return float(self.scene.phases[ACTIVITY].known_duration or 0.0)
+
+    @property
+    def actuates(self) -> bool:
+        """Whether motors act."""
+        return self.scene.phases[ACTIVITY].actuates
+
+    @cached_property
+    def gait(self) -> Drive:
+        """Targets of the motors."""
+        return drive(self.scene, ACTIVITY)
+
+    def floor(self, time_s: float) -> float:
+        """Compute the height of the container's floor [m] at a time after the activity began."""
+        phase = self.scene.phases[ACTIVITY]
+        if not isinstance(phase, Shake):
+            return 0.0
+        omega = 2 * math.pi * phase.frequency_hz
+        return phase.amplitude(self.scene.gravity_m_per_s2) * math.sin(omega * time_s)
+
+    def gravity(self, time_s: float) -> float:
+        """Compute gravity in the container's frame [m/s²], downwards, at a time after the activity began."""
+        phase = self.scene.phases[ACTIVITY]
+        omega = 2 * math.pi * phase.frequency_hz if isinstance(phase, Shake) else 0.0
+        return self.scene.gravity_m_per_s2 - omega**2 * self.floor(time_s)
+
+    @property
+    def kick(self) -> float:
+        """Velocity that the container jumps to as the activity begins [m/s]; seen from it, all have the opposite."""
+        return float(self.scene.phases[ACTIVITY].peak_speed(self.scene.gravity_m_per_s2))
+
+    def walls(self) -> tuple[Array, Array]:
+        """Place flat walls: (FACETS, 3) points [m] and unit normals into the container."""
+        angles = 2 * math.pi * np.arange(FACETS) / FACETS
+        outwards = np.column_stack([np.cos(angles), np.sin(angles), np.zeros(FACETS)])
+        return self.scene.cylinder.radius * outwards, -outwards
+
+    def slabs(self, scale: float) -> Iterator[tuple[Array, Rotation, Array]]:
+        """Place floor and walls as boxes: centre, rotation and halves of the sides, times a scale [m]."""
+        thick, radius, height = 2.0, scale * self.scene.cylinder.radius, scale * 0.2
+        yield np.array([0.0, 0.0, -thick / 2]), Rotation.identity(), np.array([3 * radius, 3 * radius, thick / 2])
+        for point, inward in zip(*self.walls(), strict=True):
+            centre = scale * point - inward * thick / 2 + np.array([0.0, 0.0, height / 2])
+            turn = Rotation.from_euler("z", math.atan2(inward[1], inward[0]))
+            yield centre, turn, np.array([thick / 2, 1.3 * math.pi * radius / FACETS, height / 2 + thick])
+
+
+@dataclass(frozen=True, eq=False)
+class Outcome:
+    """What a simulation gave.
+
+    Args:
+        time_step: dt of the activity [s].
+        processor_s: processor time that the activity took.
+        positions: (2 + F, N, 3, 3) centres of the links, seen from the container [m]: `CREEP` before the end of the
+            rest, at its end, and at each sample during the activity.
+        frames: (2 + F, N, 3, 3, 3) their axes as columns.
+        version: of the engine.
+    """
+
+    time_step: float
+    processor_s: float
+    positions: Array
+    frames: Array
+    version: str
+
+
+class World:
+    """A simulation in the container's frame, advanced from sample to sample; a rival has `kick`, `step` and `links`."""
+
+    def __init__(self, task: Task, time_step: float, version: str) -> None:
+        self.task, self.time_step, self.version = task, time_step, version
+        self._since: float | None = None
+
+    def kick(self, speed: float) -> None:
+        """Add a vertical velocity [m/s] to all smarticles."""
+        raise NotImplementedError
+
+    def step(self, gravity: float, time_s: float) -> None:
+        """Take one step at a gravity [m/s²], which ends at a time after the activity began [s]."""
+        raise NotImplementedError
+
+    def begin(self) -> None:
+        """Begin the activity."""
+        self._since = 0.0
+        self.kick(-self.task.kick)
+
+    def links(self) -> tuple[Array, Array]:
+        """Return (N, 3, 3) centres of the links [m] and (N, 3, 3, 3) their axes as columns."""
+        raise NotImplementedError
+
+    def advance(self, seconds: float) -> None:
+        """Advance by a time [s]; gravity is that of the middle of a step."""
+        for _ in range(round(seconds / self.time_step)):
+            if self._since is None:
+                self.step(self.task.scene.gravity_m_per_s2, 0.0)
+            else:
+                self._since += self.time_step
+                self.step(self.task.gravity(self._since - self.time_step / 2), self._since)
+
+
+def simulated(task: Task, simulation: World) -> Outcome:
+    """Rest and act; only the steps of the activity are timed."""
+    if task.rest_s > CREEP:
+        simulation.advance(task.rest_s - CREEP)
+    samples, spent = [simulation.links()], 0.0
+    simulation.advance(min(CREEP, task.rest_s))
+    samples.append(simulation.links())
+    simulation.begin()
+    for _ in range(round(task.activity_s / task.sample_s)):
+        begun = time.process_time()
+        simulation.advance(task.sample_s)
+        spent += time.process_time() - begun
+        samples.append(simulation.links())
+    positions, frames = (np.array(each) for each in zip(*samples, strict=True))
+    return Outcome(simulation.time_step, spent, positions, frames, simulation.version)
+
+
+def rigid_links(boxes: Boxes, positions: Array, turns: Array) -> tuple[Array, Array]:
+    """Place links of smarticles that are one body each, from (N, 3) centres of mass [m] and (N, 3, 3) rotations."""
+    still = np.zeros_like(positions)
+    state = State.rigid(boxes, positions, turns, still, still)
+    return state.link_positions, state.link_rotations
