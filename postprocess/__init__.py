@@ -11,8 +11,7 @@ from dem.record.frame import Frame, read_frame
 from dem.record.frames import FrameSequence, read_frames
 from dem.record.run import Run, open_run
 from dem.record.series import Series, read_series
-from postprocess.errors import UndefinedMeasureError
-from postprocess.geometry.links import centres_of_mass
+from postprocess.geometry.links import UndefinedMeasureError, centres_of_mass
 from postprocess.measures.contacts import (
     ContactPairs,
     contact_pairs,

@@ -7,19 +7,18 @@ import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, Literal, Self
+from typing import Any, Literal, Self
 
 import numpy as np
 from matplotlib.colors import Colormap, ListedColormap, Normalize, hsv_to_rgb, to_rgb
+from numpy.typing import NDArray
 
 from dem.errors import InputError
 from dem.record.frame import Frame
 from dem.record.run import Run
 from postprocess.bodies.fields import Field, checked_field, link_values
+from postprocess.geometry.links import Floats
 from postprocess.report import figures
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
 
 ALIASES: Mapping[str, str] = MappingProxyType({"speed": "speed_m_per_s", "height": "height_m", "id": "smarticle_id"})
 """Short names of fields."""
@@ -120,7 +119,7 @@ def colour_field(name: str | None, run: Run) -> Field:
     return field
 
 
-def scalars(field: Field, frame: Frame, run: Run) -> NDArray[np.float64]:
+def scalars(field: Field, frame: Frame, run: Run) -> Floats:
     """Return values (N, 3) to colour by, one per link: of a vector its length; NaN where there is none."""
     values = link_values(field, frame, run)
     if values is None:
@@ -128,7 +127,7 @@ def scalars(field: Field, frame: Frame, run: Run) -> NDArray[np.float64]:
     return np.linalg.norm(values, axis=2) if values.ndim == 3 else np.asarray(values, dtype=np.float64)
 
 
-def span(values: Iterable[NDArray[np.float64]]) -> Span:
+def span(values: Iterable[Floats]) -> Span:
     """Return the least and the greatest of all values that there are; 0 and 1 without any."""
     finite = [each[np.isfinite(each)] for each in values]
     joined = np.concatenate([np.empty(0), *finite])

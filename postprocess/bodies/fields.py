@@ -5,25 +5,22 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, Literal
+from typing import Any, Literal
 
 import numpy as np
+from numpy.typing import NDArray
 
 from dem.errors import InputError, nearest
 from dem.record.forces import read_forces
 from dem.record.frame import Frame
 from dem.record.run import Run
-from postprocess.errors import UndefinedMeasureError
-from postprocess.geometry.links import centres_of_mass, link_lengths
+from postprocess.geometry.links import Floats, UndefinedMeasureError, centres_of_mass, link_lengths
 from postprocess.geometry.region import Region
 from postprocess.geometry.voronoi import local_packing
 from postprocess.measures.clusters import Clusters, contact_graph, entanglement_clusters
 from postprocess.measures.entanglement import link_crossings
 from postprocess.measures.force_chains import force_chains
 from postprocess.measures.registry import in_space
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
 
 LINKS = 3
 
@@ -74,11 +71,11 @@ class Field:
         return self.name if unit == "-" else f"{self.name} [{unit}]"
 
 
-def _speed(frame: Frame, run: Run) -> NDArray[np.float64]:
+def _speed(frame: Frame, run: Run) -> Floats:
     sections = np.array(run.manifest.thicknesses_in_plane_m) / run.manifest.thickness_in_plane_m
     weights = (link_lengths(frame.vertices) * sections)[:, :, None]
     velocity = (weights * frame.link_velocity).sum(axis=1) / weights.sum(axis=1)
-    speed: NDArray[np.float64] = np.linalg.norm(velocity, axis=1)
+    speed: Floats = np.linalg.norm(velocity, axis=1)
     return speed
 
 
@@ -93,7 +90,7 @@ def _labels(find: Callable[[Frame, Run], Clusters]) -> Callable[[Frame, Run], ND
     return take
 
 
-def _local_packing(frame: Frame, run: Run) -> NDArray[np.float64]:
+def _local_packing(frame: Frame, run: Run) -> Floats:
     """(N,) [-]; NaN where a smarticle has no cell, or no wall bounds them."""
     if not run.manifest.fills_cylinder(frame.phase) or frame.count == 0:
         return np.full(frame.count, np.nan)
@@ -111,7 +108,7 @@ def _local_packing(frame: Frame, run: Run) -> NDArray[np.float64]:
     return np.where(closed, run.manifest.solid_volume_m3 / np.where(closed, found, 1.0), np.nan)
 
 
-def _pressed(frame: Frame, _: Run) -> NDArray[np.float64]:
+def _pressed(frame: Frame, _: Run) -> Floats:
     """(N,) [N]."""
     forces = read_forces(frame)
     found, between = forces.contacts, forces.between

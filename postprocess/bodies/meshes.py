@@ -11,7 +11,7 @@ import math
 import warnings
 from collections.abc import Iterable, Mapping, Sequence
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -21,7 +21,7 @@ from dem.record.frame import Frame
 from dem.record.run import Run
 from postprocess.bodies.fields import Field, link_values
 from postprocess.bodies.surroundings import read_surroundings
-from postprocess.geometry.links import checked_vertices, link_lengths, plane_frames
+from postprocess.geometry.links import Vertices, Whole, checked_vertices, link_lengths, plane_frames
 from postprocess.measures.entanglement import link_passages
 from postprocess.measures.force_chains import strong_contacts
 
@@ -30,8 +30,6 @@ with warnings.catch_warnings():
     warnings.filterwarnings("ignore", message="Unable to import Axes3D")
     import pyvista as pv
 
-if TYPE_CHECKING:
-    from numpy.typing import ArrayLike, NDArray
 
 KINDS: Mapping[str, str] = MappingProxyType(
     {
@@ -85,7 +83,6 @@ class Bodies:
     """The bodies of one run, frame after frame.
 
     Args:
-        run: The run.
         kinds: Which bodies, keys of `KINDS`.
         fields: What the smarticles carry.
         cut: Whether walls end a little above the pile, as in pictures.
@@ -241,7 +238,7 @@ class Bodies:
 
 
 def link_boxes(
-    vertices: ArrayLike, *, thickness_normal: float, thickness_in_plane: float | Sequence[float]
+    vertices: Vertices, *, thickness_normal: float, thickness_in_plane: float | Sequence[float]
 ) -> pv.PolyData:
     """Return the links of all smarticles as one mesh of boxes.
 
@@ -249,7 +246,6 @@ def link_boxes(
     vertices do not tell: some angle is taken. Links without length have no box.
 
     Args:
-        vertices: (N, 4, 3) [m], barb tip, hinge, hinge, barb tip of each smarticle.
         thickness_normal: t1, along the normal of the smarticle's plane [m].
         thickness_in_plane: t2, in the smarticle's plane [m]; of all links, or of barb 1, middle link and barb 2.
 
@@ -258,7 +254,7 @@ def link_boxes(
         `vertices`, and `link`, 0 to 2.
 
     Raises:
-        InputError: Bad vertices or thicknesses.
+        InputError: Bad thicknesses.
     """
     vertices = checked_vertices(vertices)
     in_plane = np.broadcast_to(thickness_in_plane, 3)
@@ -283,7 +279,7 @@ def link_boxes(
     return mesh
 
 
-def owners(mesh: pv.PolyData, frame: Frame) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+def owners(mesh: pv.PolyData, frame: Frame) -> tuple[Whole, Whole]:
     """Return places in a frame's arrays of the boxes' smarticles, and links; the mesh carries both fields."""
     owner, link = (np.asarray(mesh.cell_data[name])[::BOX_FACES] for name in ("smarticle_id", "link"))
     order = np.argsort(frame.smarticle_ids)
@@ -314,7 +310,6 @@ def solid(kind: str, mesh: pv.PolyData, run: Run, *, largest: float | None = Non
     Args:
         kind: Key of `KINDS`.
         mesh: Of `Bodies.at`.
-        run: The run.
         largest: Normal force of the thickest tube [N]; that of this mesh if not given.
     """
     thin = min(run.manifest.thickness_in_plane_m, run.manifest.thickness_normal_m)

@@ -5,17 +5,14 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field
 from itertools import pairwise
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from dem.record.frame import Frame
 from dem.record.run import Run, SceneData
 from dem.record.series import Series
+from postprocess.geometry.links import Floats
 from postprocess.measures.mould import read_tiers
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
 
 _REMOVAL, _STRAIN, _ARRANGE = "remove-container", "strain", "arrange"
 
@@ -36,8 +33,8 @@ class DrawnHooks:
 
     bars: tuple[tuple[Bounds, ...], tuple[Bounds, ...]]
     lower: float
-    times: NDArray[np.float64] = field(repr=False)
-    upper: NDArray[np.float64] = field(repr=False)
+    times: Floats = field(repr=False)
+    upper: Floats = field(repr=False)
 
     def heights(self, time: float) -> tuple[float, float]:
         """Return the heights of the lower and the upper cross above the floor at a time [m]."""
@@ -60,9 +57,9 @@ class ChainStrings:
     start: float
     speed: float
     from_hinge: float
-    anchors: NDArray[np.float64] = field(repr=False)
+    anchors: Floats = field(repr=False)
 
-    def lines(self, frame: Frame) -> NDArray[np.float64]:
+    def lines(self, frame: Frame) -> Floats:
         """Return knot and other end (2, 2, 3) of each string [m]; (0, 2, 3) while none is tied."""
         if frame.phase != self.phase:
             return np.empty((0, 2, 3))
@@ -181,7 +178,7 @@ def _bars(length: float, side: float, count: int) -> tuple[Bounds, ...]:
     return tuple(found)
 
 
-def knots(vertices: NDArray[np.float64], from_hinge: float) -> NDArray[np.float64]:
+def knots(vertices: Floats, from_hinge: float) -> Floats:
     """Return points (2, 3) on the outer barbs of a chain, at a distance from their hinges [m].
 
     Args:

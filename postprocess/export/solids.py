@@ -2,22 +2,19 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
+import pyvista as pv
 import trimesh
+from numpy.typing import NDArray
 
 from dem.errors import InputError
 from dem.record.frame import Frame
 from dem.record.frames import FrameSequence
 from postprocess.bodies.colours import PAINTS, ColourScale, colour_field, linear, scalars, span
 from postprocess.bodies.meshes import BOX_FACES, BOX_POINTS, Bodies, owners, solid
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    import pyvista as pv
-    from numpy.typing import NDArray
 
 SUFFIXES = ("stl", "obj", "gltf", "glb")
 
@@ -51,7 +48,6 @@ class Painter:
         """Return the content of a file of a frame; None where there is none of the bodies.
 
         Args:
-            frame: The frame.
             suffix: One of `SUFFIXES`; an STL has one object for all bodies, others one for each kind.
         """
         scene: Any = trimesh.Scene()

@@ -8,14 +8,10 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-from postprocess.geometry.links import link_lengths, plane_frames, swept_axes
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
+from postprocess.geometry.links import Floats, link_lengths, plane_frames, swept_axes
 
 # `dem.body.particle.HINGE_CLEARANCE` and `INWARDS`; a test holds the two places together.
 _CLEARANCE, _INWARDS = 0.01, math.radians(15)
@@ -41,17 +37,17 @@ class Chain:
     bulge: float = 0.0
 
     @property
-    def _offsets(self) -> NDArray[np.float64]:
+    def _offsets(self) -> Floats:
         reach = (self.width - self.diameter) / 2 if self.rows > 1 else 0.0
         return np.linspace(-reach, reach, self.rows) if self.rows > 1 else np.zeros(1)
 
 
-def strands(vertices: NDArray[np.float64], chain: Chain) -> NDArray[np.float64]:
+def strands(vertices: Floats, chain: Chain) -> Floats:
     """What a sphere is swept along: (N, R, 4, 3) [m] for (N, 4, 3) [m] vertices and R strands."""
     return _side_by_side(swept_axes(vertices, chain.diameter), vertices, chain)
 
 
-def spheres(vertices: NDArray[np.float64], chain: Chain) -> NDArray[np.float64]:
+def spheres(vertices: Floats, chain: Chain) -> Floats:
     """Centres of the spheres: (N, S, 3) [m] for (N, 4, 3) [m] vertices.
 
     Source:
@@ -73,21 +69,21 @@ def spheres(vertices: NDArray[np.float64], chain: Chain) -> NDArray[np.float64]:
     return _side_by_side(np.concatenate(parts, axis=1), vertices, chain).reshape(len(vertices), -1, 3)
 
 
-def _side_by_side(points: NDArray[np.float64], vertices: NDArray[np.float64], chain: Chain) -> NDArray[np.float64]:
+def _side_by_side(points: Floats, vertices: Floats, chain: Chain) -> Floats:
     """Points (N, P, 3) of smarticles once per row: (N, R, P, 3)."""
     if chain.rows == 1:
         return points[:, None]
     normals = plane_frames(vertices)[:, 2]
-    shifted: NDArray[np.float64] = points[:, None] + (chain._offsets[:, None] * normals[:, None])[:, :, None]
+    shifted: Floats = points[:, None] + (chain._offsets[:, None] * normals[:, None])[:, :, None]
     return shifted
 
 
-def _sides(chain: Chain) -> NDArray[np.float64]:
+def _sides(chain: Chain) -> Floats:
     """Offsets of a thicker middle link's rows in the plane [m]."""
     return np.linspace(-chain.bulge, chain.bulge, 2 * math.ceil(chain.bulge / chain.diameter) + 1)
 
 
-def _stations(length: float, chain: Chain, *, middle: bool, barbs: bool) -> NDArray[np.float64]:
+def _stations(length: float, chain: Chain, *, middle: bool, barbs: bool) -> Floats:
     """Distances of the centres along a link from its hinge [m]."""
     if middle:
         inset = 0.0 if barbs else chain.diameter / 2

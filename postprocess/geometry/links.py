@@ -1,23 +1,31 @@
-"""Lengths, centres and planes of smarticles given by their four vertices."""
+"""Lengths, centres, planes and shapes of smarticles, by their four vertices."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
+from numpy.typing import ArrayLike, NDArray
 from scipy.spatial import cKDTree
 
 from dem.errors import InputError
 
-if TYPE_CHECKING:
-    from numpy.typing import ArrayLike, NDArray
+Floats = NDArray[np.float64]
+Whole = NDArray[np.int64]
+Flags = NDArray[np.bool_]
+
+Vertices = ArrayLike
+"""(N, 4, 3) [m]: barb tip, hinge, hinge, barb tip of each smarticle. Functions that take them check them first, see
+`checked_vertices`."""
 
 
-def checked_vertices(vertices: ArrayLike) -> NDArray[np.float64]:
+class UndefinedMeasureError(InputError):
+    """The measure has no meaning for this frame, e.g. a packing fraction of one smarticle.
+
+    Tables over whole runs show such values as NaN; every other error stops them.
+    """
+
+
+def checked_vertices(vertices: Vertices) -> Floats:
     """The vertices as an array that every measure can rely on.
-
-    Args:
-        vertices: (N, 4, 3) [m], barb tip, hinge, hinge, barb tip of each smarticle.
 
     Returns:
         (N, 4, 3) float64 [m].
@@ -40,41 +48,33 @@ def checked_vertices(vertices: ArrayLike) -> NDArray[np.float64]:
     return array
 
 
-def link_lengths(vertices: NDArray[np.float64]) -> NDArray[np.float64]:
+def link_lengths(vertices: Floats) -> Floats:
     """(N, 3) [m], lengths of barb 1, middle link and barb 2, of (N, 4, 3) [m] vertices."""
-    lengths: NDArray[np.float64] = np.linalg.norm(np.diff(vertices, axis=1), axis=2)
+    lengths: Floats = np.linalg.norm(np.diff(vertices, axis=1), axis=2)
     return lengths
 
 
-def centres_of_mass(vertices: ArrayLike) -> NDArray[np.float64]:
+def centres_of_mass(vertices: Vertices) -> Floats:
     """Centres of mass of smarticles whose three links have the same cross-section.
-
-    Args:
-        vertices: (N, 4, 3) [m], barb tip, hinge, hinge, barb tip of each smarticle.
 
     Returns:
         (N, 3) [m].
-
-    Raises:
-        InputError: See `checked_vertices`.
     """
     vertices = checked_vertices(vertices)
     weights = link_lengths(vertices)[:, :, None]
     middles = (vertices[:, :-1] + vertices[:, 1:]) / 2
-    centres: NDArray[np.float64] = (weights * middles).sum(axis=1) / weights.sum(axis=1)
+    centres: Floats = (weights * middles).sum(axis=1) / weights.sum(axis=1)
     return centres
 
 
-def bounding_spheres(
-    vertices: NDArray[np.float64],
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def bounding_spheres(vertices: Floats) -> tuple[Floats, Floats]:
     """Centres (N, 3) [m] and radii (N,) [m] of spheres that hold all four vertices of each."""
     centres = vertices.mean(axis=1)
     radii = np.linalg.norm(vertices - centres[:, None], axis=2).max(axis=1)
     return centres, radii
 
 
-def close_pairs(vertices: NDArray[np.float64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+def close_pairs(vertices: Floats) -> tuple[Whole, Whole]:
     """Pairs of smarticles whose bounding spheres overlap: only they can touch, or pass through each other.
 
     Args:
@@ -92,7 +92,7 @@ def close_pairs(vertices: NDArray[np.float64]) -> tuple[NDArray[np.int64], NDArr
     return i, j
 
 
-def swept_axes(vertices: NDArray[np.float64], diameter: float) -> NDArray[np.float64]:
+def swept_axes(vertices: Floats, diameter: float) -> Floats:
     """What a sphere is swept along where engines see a smarticle: tips pulled in by the radius, hinges as they are.
 
     Args:
@@ -119,7 +119,7 @@ def swept_axes(vertices: NDArray[np.float64], diameter: float) -> NDArray[np.flo
     return axes
 
 
-def plane_frames(vertices: NDArray[np.float64]) -> NDArray[np.float64]:
+def plane_frames(vertices: Floats) -> Floats:
     """Right-handed axes of the best-fitting plane of each smarticle.
 
     The normal is the direction of least spread of the four vertices: unlike a cross product of
@@ -134,5 +134,5 @@ def plane_frames(vertices: NDArray[np.float64]) -> NDArray[np.float64]:
     """
     _, _, axes = np.linalg.svd(vertices - vertices.mean(axis=1, keepdims=True))
     axes[np.linalg.det(axes) < 0, 2] *= -1
-    frames: NDArray[np.float64] = axes
+    frames: Floats = axes
     return frames

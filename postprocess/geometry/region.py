@@ -4,15 +4,9 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
-
-import numpy as np
 
 from dem.errors import InputError
-from postprocess.errors import UndefinedMeasureError
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
+from postprocess.geometry.links import Flags, Floats, UndefinedMeasureError
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -36,10 +30,10 @@ class Region:
         """[m³]."""
         return math.pi * self.radius**2 * (self.top - self.bottom)
 
-    def contains(self, points: NDArray[np.float64]) -> NDArray[np.bool_]:
+    def contains(self, points: Floats) -> Flags:
         """(n,) bool, which of (n, 3) points [m] lie inside."""
         x, y, z = points[:, 0] - self.axis[0], points[:, 1] - self.axis[1], points[:, 2]
-        inside: NDArray[np.bool_] = (x**2 + y**2 < self.radius**2) & (z > self.bottom) & (z < self.top)
+        inside: Flags = (x**2 + y**2 < self.radius**2) & (z > self.bottom) & (z < self.top)
         return inside
 
 
@@ -51,9 +45,6 @@ def inner_region(pile: Region, *, inner: float = 0.75, low: float = 0.2, high: f
         inner: Radius of the part, as a share of the pile's [-].
         low: Lower cut, as a share of the pile's height [-].
         high: Upper cut, as a share of the pile's height [-].
-
-    Returns:
-        The part.
 
     Raises:
         InputError: The shares are not in order between 0 and 1.

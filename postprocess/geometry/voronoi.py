@@ -4,25 +4,23 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from itertools import chain
-from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.spatial import QhullError, Voronoi, cKDTree
 
 from dem.errors import InputError
-from postprocess.errors import UndefinedMeasureError
 from postprocess.geometry.links import (
+    Flags,
+    Floats,
+    UndefinedMeasureError,
+    Vertices,
+    Whole,
     bounding_spheres,
     centres_of_mass,
     checked_vertices,
     link_lengths,
 )
-
-if TYPE_CHECKING:
-    from numpy.typing import ArrayLike, NDArray
-
-    from postprocess.geometry.region import Region
-
+from postprocess.geometry.region import Region
 
 TOGETHER = 60_000
 """Most points whose cells are found at once: they take 15 kB each while they are."""
@@ -38,18 +36,13 @@ class LocalPacking:
         value: Solid volume over cell volume of the interior ones together [-].
     """
 
-    volumes: NDArray[np.float64] = field(repr=False)
-    interior: NDArray[np.bool_] = field(repr=False)
+    volumes: Floats = field(repr=False)
+    interior: Flags = field(repr=False)
     value: float
 
 
 def local_packing(
-    vertices: ArrayLike,
-    container: Region,
-    region: Region,
-    *,
-    solid_volume: float,
-    spacing: float | None = None,
+    vertices: Vertices, container: Region, region: Region, *, solid_volume: float, spacing: float | None = None
 ) -> LocalPacking:
     """Packing fraction of the smarticles in a region by the volume nearer to them than to others.
 
@@ -61,18 +54,14 @@ def local_packing(
     in the region are counted, so that walls and lid matter little.
 
     Args:
-        vertices: (N, 4, 3) [m], barb tip, hinge, hinge, barb tip of each smarticle.
         container: The container from its floor to the pile's height.
         region: The smarticles with their centre of mass in here are counted.
         solid_volume: Volume of one smarticle [m³].
         spacing: Largest distance of points along a link [m]; w/8 if not given, which is within 0.5 % of the
             limit of close points in piles of 270.
 
-    Returns:
-        The cells and the packing fraction.
-
     Raises:
-        InputError: Bad vertices or spacing.
+        InputError: Bad spacing.
         UndefinedMeasureError: No smarticle in the region, or one of them has no closed cell.
 
     Source:
@@ -115,7 +104,7 @@ def local_packing(
     return LocalPacking(volumes=volumes, interior=interior, value=value)
 
 
-def _sample(vertices: NDArray[np.float64], spacing: float) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+def _sample(vertices: Floats, spacing: float) -> tuple[Floats, Whole]:
     """Points (n, 3) evenly along each link, none at a hinge, and their smarticles (n,)."""
     # Lengths differ by rounding, which must not give one link a point more than its equals.
     cuts = np.ceil(link_lengths(vertices) / spacing - 1e-6).astype(int).ravel()
@@ -127,7 +116,7 @@ def _sample(vertices: NDArray[np.float64], spacing: float) -> tuple[NDArray[np.f
     return start + share[:, None] * along, link // 3
 
 
-def _mirrored(points: NDArray[np.float64], container: Region, lid: float, band: float) -> NDArray[np.float64]:
+def _mirrored(points: Floats, container: Region, lid: float, band: float) -> Floats:
     """Images of the points nearer than `band` to floor, lid or wall."""
     floor = points[points[:, 2] < container.bottom + band] * [1, 1, -1]
     floor[:, 2] += 2 * container.bottom
@@ -143,9 +132,7 @@ def _mirrored(points: NDArray[np.float64], container: Region, lid: float, band: 
     return np.concatenate([floor, top, wall])
 
 
-def _cell_volumes(
-    points: NDArray[np.float64], count: int, *, reach: float, together: int = TOGETHER
-) -> NDArray[np.float64]:
+def _cell_volumes(points: Floats, count: int, *, reach: float, together: int = TOGETHER) -> Floats:
     """Volume (count,) of the Voronoi cells of the first points, infinite for open ones.
 
     Cells are found slab by slab along x, among all points within a reach of the slab. A point's cell among them is its
@@ -191,13 +178,13 @@ class _Cells:
         highest: (n,) [m], greatest.
     """
 
-    volumes: NDArray[np.float64]
-    farthest: NDArray[np.float64]
-    lowest: NDArray[np.float64]
-    highest: NDArray[np.float64]
+    volumes: Floats
+    farthest: Floats
+    lowest: Floats
+    highest: Floats
 
 
-def _cells(points: NDArray[np.float64]) -> _Cells:
+def _cells(points: Floats) -> _Cells:
     """Voronoi cells of all points.
 
     A cell is the sum of the pyramids from its point over its faces, whose height is half the
@@ -226,7 +213,7 @@ def _cells(points: NDArray[np.float64]) -> _Cells:
     distance = np.linalg.norm(diagram.vertices[corners] - np.repeat(points[pairs[:, 0]], sizes, axis=0), axis=1)
     place = diagram.vertices[corners, 0]
 
-    def greatest(of_corners: NDArray[np.float64]) -> NDArray[np.float64]:
+    def greatest(of_corners: Floats) -> Floats:
         of_faces = np.where(open_faces, np.inf, np.maximum.reduceat(of_corners, starts))
         found = np.full(len(points), -np.inf)
         np.maximum.at(found, pairs.ravel(), np.repeat(of_faces, 2))

@@ -2,28 +2,29 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from dem.errors import InputError
-from postprocess.errors import UndefinedMeasureError
-from postprocess.geometry.links import checked_vertices, link_lengths, plane_frames
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
-
-    from numpy.typing import ArrayLike, NDArray
-
-    from postprocess.geometry.region import Region
+from postprocess.geometry.links import (
+    Floats,
+    UndefinedMeasureError,
+    Vertices,
+    Whole,
+    checked_vertices,
+    link_lengths,
+    plane_frames,
+)
+from postprocess.geometry.region import Region
 
 # Point tests held in memory at a time.
 _CHUNK = 1_000_000
 
 
 def solid_fraction(
-    vertices: ArrayLike,
+    vertices: Vertices,
     region: Region,
     *,
     thickness_normal: float,
@@ -41,7 +42,6 @@ def solid_fraction(
     vertices do not tell: some angle is taken.
 
     Args:
-        vertices: (N, 4, 3) [m], barb tip, hinge, hinge, barb tip of each smarticle.
         region: Where to look.
         thickness_normal: t1, along the normal of the smarticle's plane [m].
         thickness_in_plane: t2, in the smarticle's plane [m].
@@ -51,7 +51,7 @@ def solid_fraction(
         The solid fraction [-], above 0.
 
     Raises:
-        InputError: Bad vertices or sizes.
+        InputError: Bad sizes.
         UndefinedMeasureError: No material in the region.
     """
     points, pitch = solid_points(
@@ -68,17 +68,16 @@ def solid_fraction(
 
 
 def solid_points(
-    vertices: ArrayLike,
+    vertices: Vertices,
     *,
     thickness_normal: float,
     thickness_in_plane: float,
     pitch: float | None = None,
     region: Region | None = None,
-) -> tuple[NDArray[np.float64], float]:
+) -> tuple[Floats, float]:
     """Points of a cubic grid that lie inside a link's box, each once; a point stands for the cube of the pitch.
 
     Args:
-        vertices: (N, 4, 3) [m], barb tip, hinge, hinge, barb tip of each smarticle.
         thickness_normal: t1, along the normal of the smarticle's plane [m].
         thickness_in_plane: t2, in the smarticle's plane [m].
         pitch: Spacing of the points [m]; half the smaller thickness if not given.
@@ -88,7 +87,7 @@ def solid_points(
         The points (n, 3) [m], and their pitch [m].
 
     Raises:
-        InputError: Bad vertices or sizes.
+        InputError: Bad sizes.
     """
     vertices = checked_vertices(vertices)
     sizes = (thickness_normal, thickness_in_plane)
@@ -120,13 +119,13 @@ class _Pieces:
         reach: Radius of a sphere that holds any of the pieces [m].
     """
 
-    centres: NDArray[np.float64]
-    axes: NDArray[np.float64]
-    halves: NDArray[np.float64]
+    centres: Floats
+    axes: Floats
+    halves: Floats
     reach: float
 
     @classmethod
-    def cut(cls, vertices: NDArray[np.float64], normal: float, in_plane: float) -> _Pieces:
+    def cut(cls, vertices: Floats, normal: float, in_plane: float) -> _Pieces:
         """Cuts the links of (N, 4, 3) [m] vertices into pieces about as long as thick."""
         lengths = link_lengths(vertices)
         # A link of no length (l = 0) has no direction; it yields no piece either.
@@ -156,7 +155,7 @@ class _Pieces:
         keep &= (z > region.bottom - self.reach) & (z < region.top + self.reach)
         return _Pieces(self.centres[keep], self.axes[keep], self.halves[keep], self.reach)
 
-    def grid_points(self, turn: NDArray[np.float64], pitch: float) -> Iterator[NDArray[np.int64]]:
+    def grid_points(self, turn: Floats, pitch: float) -> Iterator[Whole]:
         """Indices (n, 3) of the turned grid's points inside the pieces, some of them repeated."""
         centres = self.centres @ turn.T
         axes = self.axes @ turn.T
@@ -177,7 +176,7 @@ class _Pieces:
             yield first[part][piece] + np.stack(offset, axis=1)
 
 
-def _odd_rotation() -> NDArray[np.float64]:
+def _odd_rotation() -> Floats:
     """A fixed rotation (3, 3) by no simple angle about no simple axis."""
     quaternion = np.array([1.0, 2**0.5 - 1, 3**0.5 - 1, 5**0.5 - 2])
     w, x, y, z = quaternion / np.linalg.norm(quaternion)
@@ -190,7 +189,7 @@ def _odd_rotation() -> NDArray[np.float64]:
     )
 
 
-def _distinct(indices: NDArray[np.int64]) -> NDArray[np.int64]:
+def _distinct(indices: Whole) -> Whole:
     """(m, 3), each of (n, 3) indices once."""
     if len(indices) == 0:
         return indices
@@ -198,5 +197,5 @@ def _distinct(indices: NDArray[np.int64]) -> NDArray[np.int64]:
     low = indices.min(axis=0)
     shape = tuple(indices.max(axis=0) - low + 1)
     keys = np.unique(np.ravel_multi_index(tuple((indices - low).T), shape))
-    distinct: NDArray[np.int64] = np.stack(np.unravel_index(keys, shape), axis=1) + low
+    distinct: Whole = np.stack(np.unravel_index(keys, shape), axis=1) + low
     return distinct

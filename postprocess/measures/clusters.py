@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.sparse import coo_array
@@ -12,15 +11,11 @@ from scipy.sparse.csgraph import connected_components
 
 from dem.record.frame import Frame
 from dem.record.run import Run
-from postprocess.errors import UndefinedMeasureError
-from postprocess.geometry.links import checked_vertices
+from postprocess.geometry.links import UndefinedMeasureError, Vertices, Whole, checked_vertices
 from postprocess.measures.contacts import at_wall, contact_pairs, on_floor, pairs_in_contact, touching_pairs
 from postprocess.measures.entanglement import crossing_pairs
 from postprocess.measures.heights import material_height
 from postprocess.measures.registry import FrameMeasure, Quantity
-
-if TYPE_CHECKING:
-    from numpy.typing import ArrayLike, NDArray
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -32,8 +27,8 @@ class Clusters:
         sizes: (C,) int64, smarticles of each cluster, descending.
     """
 
-    labels: NDArray[np.int64] = field(repr=False)
-    sizes: NDArray[np.int64]
+    labels: Whole = field(repr=False)
+    sizes: Whole
 
     @property
     def largest(self) -> float:
@@ -41,53 +36,38 @@ class Clusters:
         return float(self.sizes[0] / len(self.labels))
 
 
-def contact_clusters(vertices: ArrayLike, distance: float) -> Clusters:
+def contact_clusters(vertices: Vertices, distance: float) -> Clusters:
     """Smarticles joined by contact, directly or through others.
 
     Args:
-        vertices: (N, 4, 3) [m], barb tip, hinge, hinge, barb tip of each smarticle.
         distance: Distance of centrelines up to which two smarticles touch [m], see `contacts.contact_pairs`.
 
-    Returns:
-        The clusters.
-
     Raises:
-        InputError: Bad vertices or distance.
+        InputError: Bad distance.
         UndefinedMeasureError: There is no smarticle.
     """
     pairs = contact_pairs(vertices, distance)
     return joined_clusters(len(checked_vertices(vertices)), pairs.i, pairs.j)
 
 
-def entanglement_clusters(vertices: ArrayLike) -> Clusters:
+def entanglement_clusters(vertices: Vertices) -> Clusters:
     """Smarticles joined by entanglement: a link of one passes through the plane of the other, whichever it is.
 
-    Args:
-        vertices: (N, 4, 3) [m], barb tip, hinge, hinge, barb tip of each smarticle.
-
-    Returns:
-        The clusters.
-
     Raises:
-        InputError: Bad vertices.
         UndefinedMeasureError: There is no smarticle.
     """
     pairs = crossing_pairs(vertices)
     return joined_clusters(len(checked_vertices(vertices)), pairs.i, pairs.j)
 
 
-def touching_clusters(vertices: ArrayLike, diameter: float) -> Clusters:
+def touching_clusters(vertices: Vertices, diameter: float) -> Clusters:
     """Smarticles joined by contact where each is what a sphere sweeps along its links, see `contacts.touching_pairs`.
 
     Args:
-        vertices: (N, 4, 3) [m], barb tip, hinge, hinge, barb tip of each smarticle.
         diameter: Of the sphere that sweeps the links [m], `Run.sphere_diameter`.
 
-    Returns:
-        The clusters.
-
     Raises:
-        InputError: Bad vertices or diameter.
+        InputError: Bad diameter.
         UndefinedMeasureError: There is no smarticle.
     """
     pairs = touching_pairs(vertices, diameter)
@@ -105,19 +85,15 @@ def contact_graph(frame: Frame, run: Run) -> Clusters:
     return joined_clusters(frame.count, pairs.i, pairs.j)
 
 
-def spans_height(clusters: Clusters, vertices: ArrayLike, *, diameter: float, floor_z: float) -> bool:
+def spans_height(clusters: Clusters, vertices: Vertices, *, diameter: float, floor_z: float) -> bool:
     """Whether one cluster reaches from the floor to the top of the pile.
 
     The top is where 95 % of the links' material lie below; alone on top there may be one smarticle.
 
     Args:
         clusters: Of the smarticles of a frame.
-        vertices: (N, 4, 3) [m], barb tip, hinge, hinge, barb tip of each smarticle.
         diameter: Of the sphere that sweeps the links [m].
         floor_z: Height of the floor [m].
-
-    Raises:
-        InputError: Bad vertices.
 
     Source:
         Stauffer & Aharony, Introduction to Percolation Theory (1994), section 2: a cluster percolates if it joins
@@ -130,17 +106,13 @@ def spans_height(clusters: Clusters, vertices: ArrayLike, *, diameter: float, fl
     return bool(np.isin(low, high).any())
 
 
-def spans_width(clusters: Clusters, vertices: ArrayLike, *, diameter: float, wall_radius: float) -> bool:
+def spans_width(clusters: Clusters, vertices: Vertices, *, diameter: float, wall_radius: float) -> bool:
     """Whether one cluster reaches from wall to wall: no half of the round wall has all its contacts with the wall.
 
     Args:
         clusters: Of the smarticles of a frame.
-        vertices: (N, 4, 3) [m], barb tip, hinge, hinge, barb tip of each smarticle.
         diameter: Of the sphere that sweeps the links [m].
         wall_radius: Of the wall about the axis x = y = 0 [m].
-
-    Raises:
-        InputError: Bad vertices.
 
     Source:
         As `spans_height`; a round wall has no opposite faces, and what touches it on one side alone is not wedged.
@@ -155,7 +127,7 @@ def spans_width(clusters: Clusters, vertices: ArrayLike, *, diameter: float, wal
     return False
 
 
-def joined_clusters(count: int, i: NDArray[np.int64], j: NDArray[np.int64]) -> Clusters:
+def joined_clusters(count: int, i: Whole, j: Whole) -> Clusters:
     """Clusters of so many smarticles of which some are joined, the i-th with the j-th.
 
     Raises:

@@ -11,20 +11,17 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, Literal
+from typing import Any, Literal
 
 import numpy as np
+from numpy.typing import ArrayLike
 from scipy.optimize import least_squares
 
 from dem.errors import InputError
-from postprocess.geometry.links import centres_of_mass
+from dem.record.document import Phase
+from dem.record.run import Run
+from postprocess.geometry.links import Floats, centres_of_mass
 from postprocess.statistics.averages import mean_with_error
-
-if TYPE_CHECKING:
-    from numpy.typing import ArrayLike, NDArray
-
-    from dem.record.document import Phase
-    from dem.record.run import Run
 
 REMAINING, COM, CORE = "remaining", "com", "core"
 
@@ -82,8 +79,8 @@ class ColumnHistory:
         before: That height: [m], or a share of the smarticles by `REMAINING` [-].
     """
 
-    times: NDArray[np.float64]
-    heights: NDArray[np.float64]
+    times: Floats
+    heights: Floats
     before: float
 
 
@@ -171,7 +168,7 @@ def height_with_the_wall(run: Run) -> float:
     return float(heights[-1])
 
 
-def _of_series(run: Run, definition: str, shaken: Vibration) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _of_series(run: Run, definition: str, shaken: Vibration) -> tuple[Floats, Floats]:
     series = run.series
     last = shaken.phase.index
     shown = (series["phase"] >= last - 1) & (series["phase"] <= last)
@@ -182,7 +179,7 @@ def _of_series(run: Run, definition: str, shaken: Vibration) -> tuple[NDArray[np
     return series.time[shown], heights
 
 
-def _core(run: Run, shaken: Vibration) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _core(run: Run, shaken: Vibration) -> tuple[Floats, Floats]:
     frames, last = run.frames, shaken.phase.index
     times, heights = [], []
     for frame in (frame for phase in (last - 1, last) for frame in frames.in_phase(phase)):
@@ -203,9 +200,7 @@ def collapse_of(history: ColumnHistory, definition: str, shaken: Vibration) -> C
     return collapse_time(times, heights, **_KNOWN_ENDS.get(definition, {}))
 
 
-def period_means(
-    times: NDArray[np.float64], values: NDArray[np.float64], frequency: float
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def period_means(times: Floats, values: Floats, frequency: float) -> tuple[Floats, Floats]:
     """Average over whole periods from time 0 on: mean times (m,) [s] and values (m,) of periods with a sample."""
     # A sample at the end of a period belongs to it.
     period = np.ceil(times * frequency - 1e-6).astype(np.int64)
@@ -276,7 +271,7 @@ def collapse_time(
     )
 
 
-def _check(times: NDArray[np.float64], heights: NDArray[np.float64]) -> None:
+def _check(times: Floats, heights: Floats) -> None:
     if times.ndim != 1 or times.shape != heights.shape or len(times) < _LEAST_SAMPLES:
         msg = (
             f"a collapse needs {_LEAST_SAMPLES} times and as many heights: got shapes {times.shape} and "
@@ -300,24 +295,24 @@ class _Model:
     Times are over the time watched, heights over a height of the start.
     """
 
-    times: NDArray[np.float64]
+    times: Floats
     start: float | None
     end: float | None
 
-    def named(self, free: NDArray[np.float64]) -> tuple[float, float, float, float]:
+    def named(self, free: Floats) -> tuple[float, float, float, float]:
         """τ, β, start and end."""
         rest = list(free[2:])
         start = float(rest.pop(0)) if self.start is None else self.start
         end = float(rest.pop(0)) * start if self.end is None else self.end
         return float(np.exp(free[0])), float(free[1]), start, end
 
-    def curve(self, free: NDArray[np.float64]) -> NDArray[np.float64]:
+    def curve(self, free: Floats) -> Floats:
         """(n,) heights."""
         tau, beta, start, end = self.named(free)
-        curve: NDArray[np.float64] = end + (start - end) * np.exp(-((self.times / tau) ** beta))
+        curve: Floats = end + (start - end) * np.exp(-((self.times / tau) ** beta))
         return curve
 
-    def fit(self, heights: NDArray[np.float64]) -> Any:
+    def fit(self, heights: Floats) -> Any:
         """The best of several fits: the sum of squares may have more than one valley."""
         low, high = [math.log(self.times[0] / 10), _EXPONENTS[0]], [math.log(_LONGEST), _EXPONENTS[1]]
         guess: list[float] = []

@@ -7,20 +7,18 @@ not which. Where a scene asks for the forces at contacts these are recorded besi
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import ArrayLike
 from scipy.spatial import cKDTree
 
 from dem.errors import InputError
 from dem.record.frame import Frame
 from dem.record.run import Run
 from postprocess.geometry.chains import Chain, spheres, strands
-from postprocess.geometry.links import checked_vertices, link_lengths, swept_axes
+from postprocess.geometry.links import Flags, Floats, Vertices, Whole, checked_vertices, link_lengths, swept_axes
 from postprocess.measures.registry import FrameMeasure, Quantity, in_space
-
-if TYPE_CHECKING:
-    from numpy.typing import ArrayLike, NDArray
 
 # Pairs of links held in memory at a time.
 _CHUNK = 200_000
@@ -38,26 +36,25 @@ class ContactPairs(NamedTuple):
         distance: (P,) float64 [m], the least distance of their centrelines.
     """
 
-    i: NDArray[np.int64]
-    j: NDArray[np.int64]
-    distance: NDArray[np.float64]
+    i: Whole
+    j: Whole
+    distance: Floats
 
 
-def contact_pairs(vertices: ArrayLike, distance: float) -> ContactPairs:
+def contact_pairs(vertices: Vertices, distance: float) -> ContactPairs:
     """Pairs of smarticles whose centrelines come as close as a given distance.
 
     With spheres of diameter d along the links, d finds the pairs that touch; boxes of section
     t1 × t2 can touch at any distance from min(t1, t2) to (t1² + t2²)^½.
 
     Args:
-        vertices: (N, 4, 3) [m], barb tip, hinge, hinge, barb tip of each smarticle.
         distance: Largest distance of the centrelines [m].
 
     Returns:
         The pairs, sorted by i, then j.
 
     Raises:
-        InputError: Bad vertices or distance.
+        InputError: Bad distance.
     """
     vertices = checked_vertices(vertices)
     if not (math.isfinite(distance) and distance > 0):
@@ -74,21 +71,20 @@ def contact_pairs(vertices: ArrayLike, distance: float) -> ContactPairs:
     return _merged(a[near] // 3, b[near] // 3, gaps[near], count)
 
 
-def touching_pairs(vertices: ArrayLike, diameter: float) -> ContactPairs:
+def touching_pairs(vertices: Vertices, diameter: float) -> ContactPairs:
     """Pairs of smarticles that touch where each is what a sphere sweeps along its links.
 
     On the engine "links" with links of one row these are the pairs that touch. YADE's chains have gaps between their
     beads, where others rest, and there this finds too many, see `pairs_in_contact`, which knows a run's chains.
 
     Args:
-        vertices: (N, 4, 3) [m], barb tip, hinge, hinge, barb tip of each smarticle.
         diameter: Of the sphere [m], `Run.sphere_diameter`.
 
     Returns:
         The pairs, sorted by i, then j.
 
     Raises:
-        InputError: Bad vertices or diameter.
+        InputError: Bad diameter.
     """
     vertices = checked_vertices(vertices)
     if not (math.isfinite(diameter) and diameter > 0):
@@ -108,10 +104,6 @@ def pairs_in_contact(frame: Frame, run: Run) -> ContactPairs:
     shaken, where contacts that open may carry no force. Of the first two `touching_pairs`, which knows no gaps between
     beads, finds 1.2 at rest and 4 shaken; axes within 1.05 diameters, 1.4 and 6. On links of one strand (40 of draft)
     and of two (40 of reference) it is 1.000 in every phase.
-
-    Args:
-        frame: One of the run's frames.
-        run: The run.
 
     Returns:
         The pairs, sorted by i, then j; distances are those of spheres or strands.
@@ -146,7 +138,7 @@ def chain_of(run: Run) -> Chain:
     )
 
 
-def pairs_of_spheres(centres: NDArray[np.float64], diameter: float) -> ContactPairs:
+def pairs_of_spheres(centres: Floats, diameter: float) -> ContactPairs:
     """Pairs of smarticles of whose spheres two touch; centres are (N, S, 3) [m], the diameter is in metres."""
     count, each, _ = centres.shape
     points = centres.reshape(-1, 3)
@@ -156,7 +148,7 @@ def pairs_of_spheres(centres: NDArray[np.float64], diameter: float) -> ContactPa
     return _merged(pairs[:, 0] // each, pairs[:, 1] // each, gaps, count)
 
 
-def _merged(a: NDArray[np.int64], b: NDArray[np.int64], gaps: NDArray[np.float64], count: int) -> ContactPairs:
+def _merged(a: Whole, b: Whole, gaps: Floats, count: int) -> ContactPairs:
     """One pair for all contacts of two smarticles, with the least distance; contacts of one with itself are none."""
     apart = a != b
     a, b, gaps = a[apart], b[apart], gaps[apart]
@@ -166,18 +158,17 @@ def _merged(a: NDArray[np.int64], b: NDArray[np.int64], gaps: NDArray[np.float64
     return ContactPairs(keys // max(count, 1), keys % max(count, 1), least)
 
 
-def neighbours_in_contact(vertices: ArrayLike, distance: float) -> NDArray[np.int64]:
+def neighbours_in_contact(vertices: Vertices, distance: float) -> Whole:
     """How many other smarticles come as close to each one as a given distance.
 
     Args:
-        vertices: (N, 4, 3) [m], barb tip, hinge, hinge, barb tip of each smarticle.
         distance: Largest distance of the centrelines [m].
 
     Returns:
         (N,) int64.
 
     Raises:
-        InputError: Bad vertices or distance.
+        InputError: Bad distance.
     """
     vertices = checked_vertices(vertices)
     pairs = contact_pairs(vertices, distance)
@@ -185,12 +176,7 @@ def neighbours_in_contact(vertices: ArrayLike, distance: float) -> NDArray[np.in
     return counts.astype(np.int64)
 
 
-def segment_distances(
-    p0: NDArray[np.float64],
-    p1: NDArray[np.float64],
-    q0: NDArray[np.float64],
-    q1: NDArray[np.float64],
-) -> NDArray[np.float64]:
+def segment_distances(p0: Floats, p1: Floats, q0: Floats, q1: Floats) -> Floats:
     """Least distances of segments p0–p1 from segments q0–q1.
 
     Either the least distance is at an end of one segment, or it is that of the two lines and is
@@ -224,16 +210,11 @@ def segment_distances(
     s, t = (uv * vw - vv * uw) / safe, (uu * vw - uv * uw) / safe
     inside = skew & (s > 0) & (s < 1) & (t > 0) & (t < 1)
     across = np.linalg.norm(w + s[:, None] * u - t[:, None] * v, axis=1)
-    distances: NDArray[np.float64] = np.where(inside, np.minimum(across, ends), ends)
+    distances: Floats = np.where(inside, np.minimum(across, ends), ends)
     return distances
 
 
-def _close_links(
-    starts: NDArray[np.float64],
-    ends: NDArray[np.float64],
-    lengths: NDArray[np.float64],
-    distance: float,
-) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+def _close_links(starts: Floats, ends: Floats, lengths: Floats, distance: float) -> tuple[Whole, Whole]:
     """Pairs of links of different smarticles whose bounding spheres come close enough."""
     if len(starts) == 0:
         return np.empty(0, dtype=np.int64), np.empty(0, dtype=np.int64)
@@ -245,31 +226,28 @@ def _close_links(
     return a[keep], b[keep]
 
 
-def _point_distances(
-    points: NDArray[np.float64], origins: NDArray[np.float64], along: NDArray[np.float64]
-) -> NDArray[np.float64]:
+def _point_distances(points: Floats, origins: Floats, along: Floats) -> Floats:
     """(n,) [m], distances of points from segments given by an end and a vector."""
     offset = points - origins
     share = np.clip(_dot(offset, along) / np.maximum(_dot(along, along), 1e-300), 0, 1)
-    distances: NDArray[np.float64] = np.linalg.norm(offset - share[:, None] * along, axis=1)
+    distances: Floats = np.linalg.norm(offset - share[:, None] * along, axis=1)
     return distances
 
 
-def _dot(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float64]:
-    product: NDArray[np.float64] = np.einsum("nc,nc->n", a, b)
+def _dot(a: Floats, b: Floats) -> Floats:
+    product: Floats = np.einsum("nc,nc->n", a, b)
     return product
 
 
 def without_support(
-    vertices: ArrayLike, contacts: ArrayLike, *, diameter: float, floor_z: float, wall_radius: float | None
-) -> NDArray[np.bool_]:
+    vertices: Vertices, contacts: ArrayLike, *, diameter: float, floor_z: float, wall_radius: float | None
+) -> Flags:
     """Rattlers: smarticles that nothing holds, neither another one, nor the floor, nor the wall.
 
     Such a one carries no force for certain. One that does touch something may carry none as well: that would take the
     forces, which frames do not hold.
 
     Args:
-        vertices: (N, 4, 3) [m], barb tip, hinge, hinge, barb tip of each smarticle.
         contacts: (N,) how many other smarticles each one touches, `Frame.contacts`.
         diameter: Of the sphere that sweeps the links [m], `Run.sphere_diameter`.
         floor_z: Height of the floor [m].
@@ -277,9 +255,6 @@ def without_support(
 
     Returns:
         (N,) bool.
-
-    Raises:
-        InputError: Bad vertices.
 
     Source:
         Agnolin & Roux, Phys. Rev. E 76, 061302 (2007): grains that carry no force are left out of the coordination
@@ -292,20 +267,20 @@ def without_support(
     return ~held
 
 
-def on_floor(vertices: ArrayLike, *, diameter: float, floor_z: float) -> NDArray[np.bool_]:
+def on_floor(vertices: Vertices, *, diameter: float, floor_z: float) -> Flags:
     """(N,) bool, which smarticles touch the floor at a height [m]; arguments as `without_support`."""
     axes = swept_axes(checked_vertices(vertices), diameter)
-    touching: NDArray[np.bool_] = axes[..., 2].min(axis=1) - floor_z <= _REACH * diameter / 2
+    touching: Flags = axes[..., 2].min(axis=1) - floor_z <= _REACH * diameter / 2
     return touching
 
 
-def at_wall(vertices: ArrayLike, *, diameter: float, wall_radius: float) -> NDArray[np.bool_]:
+def at_wall(vertices: Vertices, *, diameter: float, wall_radius: float) -> Flags:
     """(N, 4) bool, which vertices of smarticles touch the wall: a straight link does so at its ends first.
 
     Arguments as `without_support`.
     """
     axes = swept_axes(checked_vertices(vertices), diameter)
-    touching: NDArray[np.bool_] = wall_radius - np.hypot(axes[..., 0], axes[..., 1]) <= _REACH * diameter / 2
+    touching: Flags = wall_radius - np.hypot(axes[..., 0], axes[..., 1]) <= _REACH * diameter / 2
     return touching
 
 

@@ -11,17 +11,24 @@ then what its outline winds around.
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from dem.record.frame import Frame
 from dem.record.run import Run
-from postprocess.geometry.links import bounding_spheres, checked_vertices, close_pairs, link_lengths, plane_frames
+from postprocess.geometry.links import (
+    Flags,
+    Floats,
+    Vertices,
+    Whole,
+    bounding_spheres,
+    checked_vertices,
+    close_pairs,
+    link_lengths,
+    plane_frames,
+)
 from postprocess.measures.registry import FrameMeasure, Quantity, Shown, in_space
-
-if TYPE_CHECKING:
-    from numpy.typing import ArrayLike, NDArray
 
 STRAIGHT = 0.99
 """Tip-to-tip distance over unfolded length above which a smarticle counts as straight [-]."""
@@ -40,9 +47,9 @@ class CrossingPairs(NamedTuple):
         links: (P,) int64, how many of j's links pass, 1 to 3.
     """
 
-    i: NDArray[np.int64]
-    j: NDArray[np.int64]
-    links: NDArray[np.int64]
+    i: Whole
+    j: Whole
+    links: Whole
 
 
 class LinkPassages(NamedTuple):
@@ -55,10 +62,10 @@ class LinkPassages(NamedTuple):
         point: (P, 3) [m], where it meets the plane of i.
     """
 
-    i: NDArray[np.int64]
-    j: NDArray[np.int64]
-    link: NDArray[np.int64]
-    point: NDArray[np.float64]
+    i: Whole
+    j: Whole
+    link: Whole
+    point: Floats
 
 
 class LinkedPairs(NamedTuple):
@@ -70,9 +77,9 @@ class LinkedPairs(NamedTuple):
         number: (P,) int64, the linking number, never 0; its sign follows the order of the vertices.
     """
 
-    i: NDArray[np.int64]
-    j: NDArray[np.int64]
-    number: NDArray[np.int64]
+    i: Whole
+    j: Whole
+    number: Whole
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -85,23 +92,16 @@ class Entanglement:
         mean: Mean over the smarticles that have a plane [-]; NaN if none has.
     """
 
-    crossings: NDArray[np.int64] = field(repr=False)
-    has_plane: NDArray[np.bool_] = field(repr=False)
+    crossings: Whole = field(repr=False)
+    has_plane: Flags = field(repr=False)
     mean: float
 
 
-def entanglement(vertices: ArrayLike, crossings: NDArray[np.int64] | None = None) -> Entanglement:
+def entanglement(vertices: Vertices, crossings: Whole | None = None) -> Entanglement:
     """Crossings of all smarticles, with what the mean needs to skip.
 
     Args:
-        vertices: (N, 4, 3) [m], barb tip, hinge, hinge, barb tip of each smarticle.
         crossings: What `link_crossings` found of them, where that is known already.
-
-    Returns:
-        The crossings and their mean.
-
-    Raises:
-        InputError: Bad vertices.
 
     Source:
         Savoie et al., Soft Matter 2023, ⟨N⟩. Unlike in that paper's own code, straight smarticles
@@ -114,17 +114,11 @@ def entanglement(vertices: ArrayLike, crossings: NDArray[np.int64] | None = None
     return Entanglement(crossings=crossings, has_plane=planes, mean=mean)
 
 
-def link_crossings(vertices: ArrayLike) -> NDArray[np.int64]:
+def link_crossings(vertices: Vertices) -> Whole:
     """How many links of other smarticles pass through each smarticle's plane.
-
-    Args:
-        vertices: (N, 4, 3) [m], barb tip, hinge, hinge, barb tip of each smarticle.
 
     Returns:
         (N,) int64; 0 for straight smarticles, see `has_plane`.
-
-    Raises:
-        InputError: Bad vertices.
 
     Source:
         Savoie et al., Soft Matter 2023, ⟨N⟩; the module's docstring has the rule at the boundary.
@@ -142,17 +136,11 @@ def link_crossings(vertices: ArrayLike) -> NDArray[np.int64]:
     return counts
 
 
-def crossing_pairs(vertices: ArrayLike) -> CrossingPairs:
+def crossing_pairs(vertices: Vertices) -> CrossingPairs:
     """The pairs behind `link_crossings`, for graphs of entanglement.
-
-    Args:
-        vertices: (N, 4, 3) [m], barb tip, hinge, hinge, barb tip of each smarticle.
 
     Returns:
         Pairs with at least one link passing, sorted by i, then j.
-
-    Raises:
-        InputError: Bad vertices.
     """
     vertices = checked_vertices(vertices)
     i, j = _close_pairs(vertices, has_plane(vertices))
@@ -160,17 +148,11 @@ def crossing_pairs(vertices: ArrayLike) -> CrossingPairs:
     return CrossingPairs(*_sorted_nonzero(i, j, links))
 
 
-def link_passages(vertices: ArrayLike) -> LinkPassages:
+def link_passages(vertices: Vertices) -> LinkPassages:
     """The passages that `link_crossings` counts, each with its place.
-
-    Args:
-        vertices: (N, 4, 3) [m], barb tip, hinge, hinge, barb tip of each smarticle.
 
     Returns:
         One entry per passing link, sorted by i, then j, then link.
-
-    Raises:
-        InputError: Bad vertices.
     """
     vertices = checked_vertices(vertices)
     i, j = _close_pairs(vertices, has_plane(vertices))
@@ -184,22 +166,16 @@ def link_passages(vertices: ArrayLike) -> LinkPassages:
     return LinkPassages(i, j, link.astype(np.int64), start + share[:, None] * (end - start))
 
 
-def linking_pairs(vertices: ArrayLike) -> LinkedPairs:
+def linking_pairs(vertices: Vertices) -> LinkedPairs:
     """Linking numbers of smarticles closed across their mouths, a topological cross-check.
 
     Counts how often the outline of one passes through the other, with sign. Unlike the number of
     crossings it does not depend on which of the two is asked, and a link that passes in and out
     again adds nothing.
 
-    Args:
-        vertices: (N, 4, 3) [m], barb tip, hinge, hinge, barb tip of each smarticle.
-
     Returns:
         Pairs with a linking number other than 0, sorted by i, then j; pairs with a straight
         smarticle are left out.
-
-    Raises:
-        InputError: Bad vertices.
     """
     vertices = checked_vertices(vertices)
     planes = has_plane(vertices)
@@ -210,43 +186,29 @@ def linking_pairs(vertices: ArrayLike) -> LinkedPairs:
     return LinkedPairs(*_sorted_nonzero(i, j, number))
 
 
-def has_plane(vertices: ArrayLike) -> NDArray[np.bool_]:
+def has_plane(vertices: Vertices) -> Flags:
     """Which smarticles are bent enough to span a plane.
-
-    Args:
-        vertices: (N, 4, 3) [m], barb tip, hinge, hinge, barb tip of each smarticle.
 
     Returns:
         (N,) bool, False where the tips are further apart than 0.99 (2l + w), or where all four
         vertices lie on one line.
-
-    Raises:
-        InputError: Bad vertices.
     """
     vertices = checked_vertices(vertices)
     unfolded = link_lengths(vertices).sum(axis=1)
     mouth = np.linalg.norm(vertices[:, 3] - vertices[:, 0], axis=1)
     spread = np.linalg.svd(vertices - vertices.mean(axis=1, keepdims=True), compute_uv=False)
-    bent: NDArray[np.bool_] = (mouth <= STRAIGHT * unfolded) & (spread[:, 1] > 1e-6 * unfolded)
+    bent: Flags = (mouth <= STRAIGHT * unfolded) & (spread[:, 1] > 1e-6 * unfolded)
     return bent
 
 
-def _close_pairs(
-    vertices: NDArray[np.float64], planes: NDArray[np.bool_]
-) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+def _close_pairs(vertices: Floats, planes: Flags) -> tuple[Whole, Whole]:
     """Ordered pairs (i with a plane, j) whose bounding spheres overlap."""
     low, high = close_pairs(vertices)
     i, j = np.concatenate([low, high]), np.concatenate([high, low])
     return i[planes[i]], j[planes[i]]
 
 
-def _signed_crossings(
-    vertices: NDArray[np.float64],
-    i: NDArray[np.int64],
-    j: NDArray[np.int64],
-    *,
-    closed: bool,
-) -> NDArray[np.int64]:
+def _signed_crossings(vertices: Floats, i: Whole, j: Whole, *, closed: bool) -> Whole:
     """Passages of the links of j through i: (P, 3), or (P, 4) with j's mouth as a fourth.
 
     The sign is that of the passage along the plane's normal times that of the winding of the
@@ -273,9 +235,7 @@ def _signed_crossings(
     return signs
 
 
-def _winding(
-    points: NDArray[np.float64], corners: NDArray[np.float64], tolerance: NDArray[np.float64]
-) -> NDArray[np.int64]:
+def _winding(points: Floats, corners: Floats, tolerance: Floats) -> Whole:
     """How often the outline of each quadrilateral winds around its point; 0 on an edge.
 
     Args:
@@ -298,13 +258,11 @@ def _winding(
     share = np.clip(-(starts * edges).sum(axis=2) / squared, 0, 1)
     gaps = np.linalg.norm(starts + share[..., None] * edges, axis=2).min(axis=1)
     winding[gaps <= tolerance] = 0
-    counts: NDArray[np.int64] = winding.astype(np.int64)
+    counts: Whole = winding.astype(np.int64)
     return counts
 
 
-def _sorted_nonzero(
-    i: NDArray[np.int64], j: NDArray[np.int64], number: NDArray[np.int64]
-) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
+def _sorted_nonzero(i: Whole, j: Whole, number: Whole) -> tuple[Whole, Whole, Whole]:
     keep = np.nonzero(number)[0]
     order = keep[np.lexsort((j[keep], i[keep]))]
     return i[order], j[order], number[order]

@@ -13,20 +13,18 @@ e⁻¹ = 0.37 strong contacts, which carry 2/e = 0.74 of the load, and a partici
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from dem.errors import InputError
 from dem.record.forces import RecordedForces, read_forces
 from dem.record.frame import Frame
 from dem.record.run import Run
-from postprocess.errors import UndefinedMeasureError
+from postprocess.geometry.links import Flags, Floats, UndefinedMeasureError
 from postprocess.measures.clusters import Clusters, joined_clusters
 from postprocess.measures.registry import FrameMeasure, Quantity
-
-if TYPE_CHECKING:
-    from numpy.typing import ArrayLike, NDArray
 
 
 class ForceDistribution(NamedTuple):
@@ -37,11 +35,11 @@ class ForceDistribution(NamedTuple):
         density: (B,) float64 [-], its integral is 1 where the bins hold all forces.
     """
 
-    edges: NDArray[np.float64]
-    density: NDArray[np.float64]
+    edges: Floats
+    density: Floats
 
 
-def checked_forces(normal: ArrayLike) -> NDArray[np.float64]:
+def checked_forces(normal: ArrayLike) -> Floats:
     """Normal forces as an array.
 
     Raises:
@@ -58,7 +56,7 @@ def checked_forces(normal: ArrayLike) -> NDArray[np.float64]:
     return normal
 
 
-def strong_contacts(normal: ArrayLike) -> NDArray[np.bool_]:
+def strong_contacts(normal: ArrayLike) -> Flags:
     """Which contacts are strong: those whose normal force is above the mean.
 
     Args:
@@ -79,7 +77,7 @@ def strong_contacts(normal: ArrayLike) -> NDArray[np.bool_]:
         [False, False, True]
     """
     normal = checked_forces(normal)
-    found: NDArray[np.bool_] = normal > normal.mean()
+    found: Flags = normal > normal.mean()
     return found
 
 
@@ -111,9 +109,6 @@ def force_distribution(normal: ArrayLike, *, edges: ArrayLike | None = None) -> 
         normal: (M,) normal forces [N].
         edges: (B + 1,) of the bins, f / ⟨f⟩ [-]; 0 to 8 in steps of 0.25 if not given. Larger forces are left out of
             the bins, and counted in the density.
-
-    Returns:
-        Bins and density.
 
     Raises:
         InputError: Not (M,) finite numbers above 0, or edges that do not ascend.

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -11,13 +10,9 @@ from dem.errors import InputError
 from dem.record.frame import Frame
 from dem.record.packing import second_highest
 from dem.record.run import Run
-from postprocess.errors import UndefinedMeasureError
-from postprocess.geometry.links import centres_of_mass, checked_vertices, link_lengths
+from postprocess.geometry.links import UndefinedMeasureError, Vertices, centres_of_mass, checked_vertices, link_lengths
 from postprocess.measures.registry import FrameMeasure, Quantity, Shown, in_space
 from postprocess.statistics.bisection import least_reaching
-
-if TYPE_CHECKING:
-    from numpy.typing import ArrayLike
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -39,19 +34,15 @@ class Heights:
     percentile: float
 
 
-def heights(vertices: ArrayLike, *, floor_z: float = 0.0, percentile: float = 95.0) -> Heights:
+def heights(vertices: Vertices, *, floor_z: float = 0.0, percentile: float = 95.0) -> Heights:
     """All heights of a frame above the floor.
 
     Args:
-        vertices: (N, 4, 3) [m], barb tip, hinge, hinge, barb tip of each smarticle.
         floor_z: Height of the floor [m].
         percentile: Share of the material that lies below `top` [%].
 
-    Returns:
-        The heights.
-
     Raises:
-        InputError: Bad vertices or percentile.
+        InputError: Bad percentile.
         UndefinedMeasureError: There is no smarticle.
     """
     vertices = checked_vertices(vertices)
@@ -70,7 +61,7 @@ def heights(vertices: ArrayLike, *, floor_z: float = 0.0, percentile: float = 95
     )
 
 
-def material_height(vertices: ArrayLike, *, floor_z: float = 0.0, percentile: float = 95.0) -> float:
+def material_height(vertices: Vertices, *, floor_z: float = 0.0, percentile: float = 95.0) -> float:
     """Height below which a given share of the links' material lies.
 
     The material is spread evenly along each link's centreline. The share below a height is then
@@ -78,7 +69,6 @@ def material_height(vertices: ArrayLike, *, floor_z: float = 0.0, percentile: fl
     without sampling points along the links.
 
     Args:
-        vertices: (N, 4, 3) [m], barb tip, hinge, hinge, barb tip of each smarticle.
         floor_z: Height of the floor [m].
         percentile: Share of the material [%], above 0 and up to 100.
 
@@ -86,7 +76,7 @@ def material_height(vertices: ArrayLike, *, floor_z: float = 0.0, percentile: fl
         The height above the floor [m].
 
     Raises:
-        InputError: Bad vertices or percentile.
+        InputError: Bad percentile.
         UndefinedMeasureError: There is no smarticle.
     """
     vertices = checked_vertices(vertices)

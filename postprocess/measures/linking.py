@@ -10,18 +10,15 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from dem.errors import InputError
 from dem.record.frame import Frame
 from dem.record.run import Run
-from postprocess.geometry.links import checked_vertices, close_pairs
+from postprocess.geometry.links import Floats, Vertices, Whole, checked_vertices, close_pairs
 from postprocess.measures.registry import FrameMeasure, Quantity, in_space
-
-if TYPE_CHECKING:
-    from numpy.typing import ArrayLike, NDArray
 
 # Pairs of smarticles held in memory at a time: their temporary arrays then fit the cache of a core.
 _CHUNK = 500
@@ -38,10 +35,10 @@ class Linking:
         per_smarticle: (N,) float64 [-], Σ|Lk| over the pairs of each smarticle.
     """
 
-    i: NDArray[np.int64] = field(repr=False)
-    j: NDArray[np.int64] = field(repr=False)
-    number: NDArray[np.float64] = field(repr=False)
-    per_smarticle: NDArray[np.float64] = field(repr=False)
+    i: Whole = field(repr=False)
+    j: Whole = field(repr=False)
+    number: Floats = field(repr=False)
+    per_smarticle: Floats = field(repr=False)
 
     @property
     def mean(self) -> float:
@@ -49,21 +46,14 @@ class Linking:
         return float(self.per_smarticle.mean()) if len(self.per_smarticle) else math.nan
 
 
-def linking(vertices: ArrayLike, *, far: bool = False) -> Linking:
+def linking(vertices: Vertices, *, far: bool = False) -> Linking:
     """Linking numbers of pairs of smarticles, each the open chain tip, hinge, hinge, tip.
 
     Of open chains far from each other the number falls with the square of the distance only, so that a sum over all
     pairs grows with the size of the pile. Hence only pairs whose bounding spheres overlap count, those that can hook.
 
     Args:
-        vertices: (N, 4, 3) [m], barb tip, hinge, hinge, barb tip of each smarticle.
         far: Whether all pairs are wanted; of N = 300 they take 0.1 s, as N².
-
-    Returns:
-        The numbers of the pairs.
-
-    Raises:
-        InputError: Bad vertices.
 
     Source:
         See `gauss_integral`. The integral of open chains as a measure of entanglement: Panagiotou, Kröger & Millett,
@@ -81,7 +71,7 @@ def linking(vertices: ArrayLike, *, far: bool = False) -> Linking:
     return Linking(i=i, j=j, number=number, per_smarticle=each)
 
 
-def gauss_integral(first: ArrayLike, second: ArrayLike) -> NDArray[np.float64]:
+def gauss_integral(first: ArrayLike, second: ArrayLike) -> Floats:
     """Gauss's linking integral of pairs of polygons, open or closed, in closed form.
 
     (1 / 4π) ∫∫ (r₁ - r₂) · (dr₁ × dr₂) / |r₁ - r₂|³ of two straight segments is the solid angle, over 4π, under which
@@ -129,12 +119,12 @@ def gauss_integral(first: ArrayLike, second: ArrayLike) -> NDArray[np.float64]:
     angle += np.arctan2(volume, product * ld + _dot(a, d) * lc + _dot(d, c) * la + diagonal * ld)
     # A parallelogram that holds the origin is seen under half of the sphere, from neither side.
     angle[volume == 0] = 0.0
-    total: NDArray[np.float64] = angle.sum(axis=(-2, -1)) / (2 * math.pi)
+    total: Floats = angle.sum(axis=(-2, -1)) / (2 * math.pi)
     return total
 
 
-def _dot(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float64]:
-    product: NDArray[np.float64] = np.einsum("...c,...c->...", a, b)
+def _dot(a: Floats, b: Floats) -> Floats:
+    product: Floats = np.einsum("...c,...c->...", a, b)
     return product
 
 

@@ -12,16 +12,16 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
 from dem.errors import InputError
 from dem.record.frame import Frame
 from dem.record.frames import FrameSequence
 from dem.record.run import Run
 from dem.record.series import Series
+from postprocess.geometry.links import Floats
 from postprocess.measures.registry import PhaseMeasure, Quantity
 
-Array = NDArray[np.float64]
+Array = Floats
 
 APART = 0.1
 """Between two samples, as in the paper's code [s]."""

@@ -4,17 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from dem.record.run import Run
-from postprocess.geometry.links import checked_vertices, link_lengths
+from postprocess.geometry.links import Flags, Floats, Vertices, checked_vertices, link_lengths
 from postprocess.geometry.outline import outlines
 from postprocess.geometry.region import Region
-
-if TYPE_CHECKING:
-    from numpy.typing import ArrayLike, NDArray
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -32,11 +29,11 @@ class Cast:
         likeness_before: The same of the pile before and the mould [-].
     """
 
-    filled_before: NDArray[np.float64]
-    filled_after: NDArray[np.float64]
-    kept: NDArray[np.float64]
-    material_before: NDArray[np.float64]
-    material_after: NDArray[np.float64]
+    filled_before: Floats
+    filled_after: Floats
+    kept: Floats
+    material_before: Floats
+    material_after: Floats
     overlap: float
     likeness: float
     likeness_before: float
@@ -64,11 +61,8 @@ def cast(
         ball: Radius of the ball that the outline is found with [m].
         pitch: Side of a voxel [m]; a fourth of the ball's radius if not given.
 
-    Returns:
-        Shares and overlaps.
-
     Raises:
-        InputError: Bad vertices or sizes.
+        InputError: Bad sizes.
         UndefinedMeasureError: There is no smarticle, or a tier is smaller than a voxel.
     """
     found = outlines([before, after], thickness=thickness, ball=ball, pitch=pitch, regions=tiers)
@@ -90,9 +84,6 @@ def cast(
 def read_tiers(run: Run) -> tuple[Region, ...]:
     """The tiers of a run's container, heights above its floor.
 
-    Args:
-        run: A run.
-
     Returns:
         The tiers from below; none where the container is one cylinder.
 
@@ -108,17 +99,17 @@ def read_tiers(run: Run) -> tuple[Region, ...]:
     return tuple(found)
 
 
-def _share(part: NDArray[np.bool_], whole: NDArray[np.bool_]) -> float:
+def _share(part: Flags, whole: Flags) -> float:
     total = int(whole.sum())
     return float(part.sum() / total) if total else float("nan")
 
 
-def _material(vertices: ArrayLike, tiers: Sequence[Region], samples: int = 50) -> NDArray[np.float64]:
+def _material(vertices: Vertices, tiers: Sequence[Region], samples: int = 50) -> Floats:
     """(T,) share of all links' length in each tier, by points evenly along each link."""
     vertices = checked_vertices(vertices)
     shares = (np.arange(samples) + 0.5) / samples
     along = np.diff(vertices, axis=1)[:, :, None]
     points = (vertices[:, :-1, None] + shares[:, None] * along).reshape(-1, 3)
     weights = np.repeat(link_lengths(vertices).ravel(), samples)
-    inside: NDArray[np.float64] = np.array([weights[tier.contains(points)].sum() / weights.sum() for tier in tiers])
+    inside: Floats = np.array([weights[tier.contains(points)].sum() / weights.sum() for tier in tiers])
     return inside

@@ -4,19 +4,15 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from dem.errors import InputError
 from dem.record.frame import Frame
 from dem.record.run import Run
-from postprocess.errors import UndefinedMeasureError
-from postprocess.geometry.links import checked_vertices
+from postprocess.geometry.links import Floats, UndefinedMeasureError, checked_vertices
 from postprocess.measures.registry import FrameMeasure, Quantity, in_space
-
-if TYPE_CHECKING:
-    from numpy.typing import ArrayLike, NDArray
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -30,9 +26,9 @@ class NematicOrder:
         director: (3,) the unit vector of S, upwards.
     """
 
-    tensor: NDArray[np.float64] = field(repr=False)
+    tensor: Floats = field(repr=False)
     order: float
-    director: NDArray[np.float64]
+    director: Floats
 
     @property
     def polar_angle(self) -> float:

@@ -7,27 +7,21 @@ definition corrects the container's radius but where a scene says so, with `cont
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import partial
 from types import MappingProxyType
-from typing import TYPE_CHECKING
 
 from dem.errors import InputError
 from dem.record.frame import Frame
 from dem.record.packing import filled
 from dem.record.run import Run
-from postprocess.errors import UndefinedMeasureError
-from postprocess.geometry.links import checked_vertices
+from postprocess.geometry.links import UndefinedMeasureError, Vertices, checked_vertices
 from postprocess.geometry.region import Region, inner_region
 from postprocess.geometry.voronoi import local_packing
 from postprocess.geometry.voxel import solid_fraction
 from postprocess.measures.heights import heights, material_height
 from postprocess.measures.registry import FrameMeasure, Quantity, Shown, in_space
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
-
-    from numpy.typing import ArrayLike
 
 DEFINITIONS: Mapping[str, str] = MappingProxyType(
     {
@@ -59,7 +53,7 @@ class PackingFraction:
 
 
 def packing_fraction(
-    vertices: ArrayLike,
+    vertices: Vertices,
     *,
     radius: float,
     solid_volume: float,
@@ -77,7 +71,6 @@ def packing_fraction(
     """Packing fraction of smarticles in an upright cylinder.
 
     Args:
-        vertices: (N, 4, 3) [m], barb tip, hinge, hinge, barb tip of each smarticle.
         radius: Radius of the container [m].
         solid_volume: Volume of one smarticle [m³].
         definition: Key of `DEFINITIONS`.
@@ -91,9 +84,6 @@ def packing_fraction(
         high: Upper end of the inner cylinder as a share of the height [-].
         spacing: Distance of grid points ("voxel") or of points along links ("voronoi") [m]; half
             the smaller thickness, or w/8, if not given.
-
-    Returns:
-        The packing fraction with its definition and the height it used.
 
     Raises:
         InputError: Unknown definition, bad vertices or sizes, or missing thicknesses.
@@ -157,8 +147,6 @@ def packing_of(frame: Frame, run: Run, *, definition: str) -> float:
     """Packing fraction of a frame of a run [-]; NaN where it has no meaning.
 
     Args:
-        frame: One of the run's frames.
-        run: The run.
         definition: Key of `DEFINITIONS`.
     """
     if not run.manifest.fills_cylinder(frame.phase):

@@ -4,17 +4,14 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
 
 import numpy as np
 import pandas as pd
 
 from dem.errors import InputError
 from dem.record.run import Run
+from postprocess.geometry.links import Floats, Vertices
 from postprocess.geometry.voxel import solid_points
-
-if TYPE_CHECKING:
-    from numpy.typing import ArrayLike, NDArray
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -28,15 +25,15 @@ class PackingProfile:
         outside: Volume of the links' boxes that is in no ring of any layer [m³].
     """
 
-    radii: NDArray[np.float64] = field(repr=False)
-    heights: NDArray[np.float64] = field(repr=False)
-    packing: NDArray[np.float64] = field(repr=False)
+    radii: Floats = field(repr=False)
+    heights: Floats = field(repr=False)
+    packing: Floats = field(repr=False)
     outside: float
 
     @property
-    def volumes(self) -> NDArray[np.float64]:
+    def volumes(self) -> Floats:
         """(R, Z) [m³], of each ring of each layer."""
-        volumes: NDArray[np.float64] = math.pi * np.outer(np.diff(self.radii**2), np.diff(self.heights))
+        volumes: Floats = math.pi * np.outer(np.diff(self.radii**2), np.diff(self.heights))
         return volumes
 
     @property
@@ -49,7 +46,7 @@ class PackingProfile:
 
 
 def packing_profile(
-    vertices: ArrayLike,
+    vertices: Vertices,
     *,
     radius: float,
     thickness_normal: float,
@@ -62,7 +59,6 @@ def packing_profile(
     """φ(r, z) of smarticles in an upright cylinder about x = y = 0.
 
     Args:
-        vertices: (N, 4, 3) [m], barb tip, hinge, hinge, barb tip of each smarticle.
         radius: Of the container [m].
         thickness_normal: t1, along the normal of the smarticle's plane [m].
         thickness_in_plane: t2, in the smarticle's plane [m].
@@ -71,9 +67,6 @@ def packing_profile(
         layer: Thickness of the layers [m]; a ring's width if not given. The uppermost reaches above the pile.
         pitch: Spacing of the points that the boxes are made of [m]; half the smaller thickness if not given, which
             makes 16 points of the section of 1.27 × 0.5 mm² and some hundreds in the smallest ring of a loose pile.
-
-    Returns:
-        The profile.
 
     Raises:
         InputError: Bad vertices, sizes, or numbers of rings and layers.
@@ -107,7 +100,6 @@ def profile_table(run: Run, *, rings: int = 6, layer: float | None = None) -> pd
     """φ(r, z) of the last frame of each phase of a run that has one.
 
     Args:
-        run: A run.
         rings: Rings of equal width.
         layer: Thickness of the layers [m]; a ring's width if not given.
 

@@ -9,17 +9,14 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from dem.errors import InputError
 from dem.record.run import Run, SceneData
 from dem.record.series import Series
+from postprocess.geometry.links import Floats
 from postprocess.measures.registry import PhaseMeasure, Quantity, Shown
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
 
 PULL = "pull-hook"
 """Type of the phase."""
@@ -47,17 +44,17 @@ class HookPull:
         engine_work: Work of the hook on the smarticles by the engine's own account [J]; NaN where not recorded.
     """
 
-    edges: NDArray[np.float64] = field(repr=False)
-    raised: NDArray[np.float64] = field(repr=False)
-    force: NDArray[np.float64] = field(repr=False)
-    held: NDArray[np.float64] = field(repr=False)
+    edges: Floats = field(repr=False)
+    raised: Floats = field(repr=False)
+    force: Floats = field(repr=False)
+    held: Floats = field(repr=False)
     before: float
     engine_work: float
 
     @property
-    def times(self) -> NDArray[np.float64]:
+    def times(self) -> Floats:
         """(n,) middles of the intervals that forces are means over [s]."""
-        middles: NDArray[np.float64] = (self.edges[:-1] + self.edges[1:]) / 2
+        middles: Floats = (self.edges[:-1] + self.edges[1:]) / 2
         return middles
 
     @property
@@ -95,8 +92,6 @@ def read_pull(run: Run, series: Series, phase: int) -> HookPull:
     """A hook's history in a phase, so far as it has come.
 
     Args:
-        run: The run.
-        series: Its series.
         phase: Index of a phase that pulls a hook.
 
     Raises:
@@ -132,7 +127,7 @@ def weight_of_one(run: Run) -> float:
     return float(run.manifest.smarticle_mass_kg * run.scene["gravity_m_per_s2"])
 
 
-def moving_mean(pull: HookPull, window: float = WINDOW) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def moving_mean(pull: HookPull, window: float = WINDOW) -> tuple[Floats, Floats]:
     """Means of the force over every window: middles (m,) [s] and forces (m,) [N].
 
     Args:
@@ -204,7 +199,7 @@ def has_pull(series: Series, phase: int) -> bool:
     return "hook_upper_force_N" in series.data and int((series["phase"] == phase).sum()) >= 2
 
 
-def _samples(edges: NDArray[np.float64], window: float) -> int:
+def _samples(edges: Floats, window: float) -> int:
     """Samples in a window [s], one at least and all at most."""
     return min(max(round(window / float(np.median(np.diff(edges)))), 1), len(edges) - 1)
 

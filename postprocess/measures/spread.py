@@ -4,22 +4,23 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from dem.errors import InputError
 from dem.record.frame import Frame
 from dem.record.run import Run
-from postprocess.errors import UndefinedMeasureError
-from postprocess.geometry.links import centres_of_mass, checked_vertices, link_lengths
+from postprocess.geometry.links import (
+    Floats,
+    UndefinedMeasureError,
+    Vertices,
+    centres_of_mass,
+    checked_vertices,
+    link_lengths,
+)
 from postprocess.measures.clusters import contact_clusters, entanglement_clusters
 from postprocess.measures.registry import FrameMeasure, Quantity, Shown, in_space
 from postprocess.statistics.bisection import least_reaching
-
-if TYPE_CHECKING:
-    from numpy.typing import ArrayLike, NDArray
-
 
 TOUCHING = 1.05
 """Distance of centrelines over the diameter of the spheres up to which two smarticles count as touching [-].
@@ -61,26 +62,17 @@ class FreePile:
 
 
 def free_pile(
-    vertices: ArrayLike,
-    run: Run,
-    *,
-    floor_z: float = 0.0,
-    foot: tuple[float, float] = (0.0, 0.0),
+    vertices: Vertices, run: Run, *, floor_z: float = 0.0, foot: tuple[float, float] = (0.0, 0.0)
 ) -> FreePile:
     """All measures of a pile without a wall.
 
     Args:
-        vertices: (N, 4, 3) [m], barb tip, hinge, hinge, barb tip of each smarticle.
         run: The run, for its container and its smarticles.
         floor_z: Height of the floor [m].
         foot: x and y of the point that the pile stands on [m]: the container's axis if not given, better the place
             of the centre of mass while the wall was there.
 
-    Returns:
-        The measures.
-
     Raises:
-        InputError: Bad vertices.
         UndefinedMeasureError: There is no smarticle.
     """
     vertices = checked_vertices(vertices)
@@ -98,14 +90,10 @@ def free_pile(
     )
 
 
-def centre_of_mass(vertices: ArrayLike) -> NDArray[np.float64]:
+def centre_of_mass(vertices: Vertices) -> Floats:
     """(3,) [m], of the whole pile.
 
-    Args:
-        vertices: (N, 4, 3) [m], barb tip, hinge, hinge, barb tip of each smarticle.
-
     Raises:
-        InputError: Bad vertices.
         UndefinedMeasureError: There is no smarticle.
     """
     vertices = checked_vertices(vertices)
@@ -114,18 +102,17 @@ def centre_of_mass(vertices: ArrayLike) -> NDArray[np.float64]:
         raise UndefinedMeasureError(msg)
     # Smarticles may differ in length, so their centres are weighted by it.
     weights = link_lengths(vertices).sum(axis=1)
-    centre: NDArray[np.float64] = np.average(centres_of_mass(vertices), axis=0, weights=weights)
+    centre: Floats = np.average(centres_of_mass(vertices), axis=0, weights=weights)
     return centre
 
 
-def spread_radius(vertices: ArrayLike, *, share: float, axis: tuple[float, float] | None = None) -> float:
+def spread_radius(vertices: Vertices, *, share: float, axis: tuple[float, float] | None = None) -> float:
     """Radius about a vertical axis that holds a given share of the links' material.
 
     The material is spread evenly along each link's centreline. What of a link lies within a radius is where a
     straight line is inside a circle, seen from above; the radius is found by bisection: exact, without sampling.
 
     Args:
-        vertices: (N, 4, 3) [m], barb tip, hinge, hinge, barb tip of each smarticle.
         share: Of the material [-], above 0 and up to 1.
         axis: x and y of the axis [m]; that of the pile's centre of mass if not given.
 
@@ -133,7 +120,7 @@ def spread_radius(vertices: ArrayLike, *, share: float, axis: tuple[float, float
         The radius [m].
 
     Raises:
-        InputError: Bad vertices or share.
+        InputError: Bad share.
         UndefinedMeasureError: There is no smarticle.
     """
     vertices = checked_vertices(vertices)
@@ -149,11 +136,10 @@ def spread_radius(vertices: ArrayLike, *, share: float, axis: tuple[float, float
     return least_reaching(lambda radius: float(weights @ _shares_within(start, along, radius)), wanted, 0.0, farthest)
 
 
-def share_outside(vertices: ArrayLike, radius: float, *, axis: tuple[float, float] = (0.0, 0.0)) -> float:
+def share_outside(vertices: Vertices, radius: float, *, axis: tuple[float, float] = (0.0, 0.0)) -> float:
     """Share of the smarticles whose centre of mass is farther than a radius from a vertical axis.
 
     Args:
-        vertices: (N, 4, 3) [m], barb tip, hinge, hinge, barb tip of each smarticle.
         radius: [m].
         axis: x and y of the axis [m].
 
@@ -161,7 +147,6 @@ def share_outside(vertices: ArrayLike, radius: float, *, axis: tuple[float, floa
         The share [-].
 
     Raises:
-        InputError: Bad vertices.
         UndefinedMeasureError: There is no smarticle.
     """
     centres = centres_of_mass(vertices)
@@ -171,20 +156,13 @@ def share_outside(vertices: ArrayLike, radius: float, *, axis: tuple[float, floa
     return float((np.hypot(*(centres[:, :2] - axis).T) > radius).mean())
 
 
-def middle(vertices: ArrayLike) -> tuple[float, float]:
-    """Middle of a pile seen from above, x and y [m]: medians of the centres of mass, which few strays do not move.
-
-    Args:
-        vertices: (N, 4, 3) [m], barb tip, hinge, hinge, barb tip of each smarticle.
-
-    Raises:
-        InputError: Bad vertices.
-    """
+def middle(vertices: Vertices) -> tuple[float, float]:
+    """Middle of a pile seen from above, x and y [m]: medians of the centres of mass, which few strays do not move."""
     x, y = np.median(centres_of_mass(vertices)[:, :2], axis=0)
     return float(x), float(y)
 
 
-def tilt(vertices: ArrayLike, *, foot: tuple[float, float] = (0.0, 0.0), floor_z: float = 0.0) -> float:
+def tilt(vertices: Vertices, *, foot: tuple[float, float] = (0.0, 0.0), floor_z: float = 0.0) -> float:
     """Angle between the vertical and the line from a pile's foot to its centre of mass.
 
     A pile that is turned rigidly about its foot by an angle has that tilt; one that spreads evenly to all sides has
@@ -194,7 +172,6 @@ def tilt(vertices: ArrayLike, *, foot: tuple[float, float] = (0.0, 0.0), floor_z
     fallen over lies above the middle of its side, and would be upright.
 
     Args:
-        vertices: (N, 4, 3) [m], barb tip, hinge, hinge, barb tip of each smarticle.
         foot: x and y of the point of the floor that the pile stood on [m].
         floor_z: Height of the floor [m].
 
@@ -202,7 +179,6 @@ def tilt(vertices: ArrayLike, *, foot: tuple[float, float] = (0.0, 0.0), floor_z
         The angle [rad], 0 to π/2.
 
     Raises:
-        InputError: Bad vertices.
         UndefinedMeasureError: There is no smarticle, or the centre of mass is not above the floor.
     """
     x, y, z = centre_of_mass(vertices) - [*foot, floor_z]
@@ -225,7 +201,7 @@ def has_toppled(offset: float, base_radius: float) -> bool:
     return offset > base_radius
 
 
-def _shares_within(start: NDArray[np.float64], along: NDArray[np.float64], radius: float) -> NDArray[np.float64]:
+def _shares_within(start: Floats, along: Floats, radius: float) -> Floats:
     """(n,) shares of straight lines (start, start + along), each (n, 2), within a circle about the origin."""
     square, mixed = (along**2).sum(axis=1), (start * along).sum(axis=1)
     inside = radius**2 - (start**2).sum(axis=1)
@@ -235,7 +211,7 @@ def _shares_within(start: NDArray[np.float64], along: NDArray[np.float64], radiu
     root = mixed**2 + safe * inside
     reach = np.sqrt(np.maximum(root, 0.0))
     first, last = (np.clip((-mixed + sign * reach) / safe, 0, 1) for sign in (-1, 1))
-    shares: NDArray[np.float64] = np.where(upright, (inside >= 0).astype(float), np.where(root > 0, last - first, 0.0))
+    shares: Floats = np.where(upright, (inside >= 0).astype(float), np.where(root > 0, last - first, 0.0))
     return shares
 
 

@@ -12,14 +12,14 @@ from dataclasses import dataclass
 from types import MappingProxyType
 
 import numpy as np
-from numpy.typing import NDArray
 
 from dem.errors import InputError
 from dem.record.run import Run
 from dem.record.series import Series
+from postprocess.geometry.links import Floats
 from postprocess.measures.registry import PhaseMeasure, Quantity, Shown
 
-Array = NDArray[np.float64]
+Array = Floats
 
 STRAIN = "strain"
 """Type of the phase."""

@@ -2,24 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
 import pandas as pd
 
 from dem.errors import InputError
 from dem.record.columns import EVERY
+from dem.record.frames import FrameSequence
+from dem.record.run import Run
 from dem.record.series import Series
 from postprocess.measures.packing import DEFINITIONS, packing_of
 from postprocess.measures.registry import frame_measures, phase_measures
 from postprocess.statistics.averages import Mean, mean_with_error
 from postprocess.statistics.columns import ASPECT, SEED
-
-if TYPE_CHECKING:
-    from collections.abc import Collection, Iterable, Sequence
-
-    from dem.record.frames import FrameSequence
-    from dem.record.run import Run
 
 Costly = Literal["never", "phase-end", "every-frame"]
 """When to take the packing fractions of `COSTLY_DEFINITIONS`."""
@@ -57,10 +54,7 @@ class PackingChange:
 
 
 def measure_run(
-    run: Run,
-    *,
-    definitions: Sequence[str] = tuple(DEFINITIONS),
-    costly: Costly = "phase-end",
+    run: Run, *, definitions: Sequence[str] = tuple(DEFINITIONS), costly: Costly = "phase-end"
 ) -> pd.DataFrame:
     """All measures of a run, one row per frame; the run may be done, failed or still going on.
 
@@ -69,7 +63,6 @@ def measure_run(
     recorded in `series.h5` is taken at the sample nearest in time, if that file exists.
 
     Args:
-        run: A run; it may be done, failed or still going on.
         definitions: Definitions of the packing fraction, keys of `packing.DEFINITIONS`.
         costly: Whether the costly ones among them are taken never, at the last frame of each
             phase recorded so far, or at every frame.
@@ -103,7 +96,6 @@ def summarise_run(
     what it tells as a whole beside, see `registry.PhaseMeasure`.
 
     Args:
-        run: A run; it may be done, failed or still going on.
         last: Frames to average; "frames averaged" says how many there were.
         definitions: Definitions of the packing fraction, keys of `packing.DEFINITIONS`.
         costly: When to take the costly ones among them, see `measure_run`.
@@ -152,13 +144,9 @@ def packing_change(
     it belong to another state of the pile.
 
     Args:
-        run: A run; it may be done, failed or still going on.
         definition: Key of `packing.DEFINITIONS`.
         last: Frames to average; the results say how many there were.
         activity: Types of phase that count as activity; all but `PASSIVE_PHASES` if not given.
-
-    Returns:
-        Both means with their errors.
 
     Raises:
         InputError: The run has no activity, has not come to it, or a file is missing or damaged.
@@ -227,13 +215,7 @@ def _phases(run: Run, frames: FrameSequence) -> list[FrameSequence]:
 
 
 def _rows(
-    part: FrameSequence,
-    run: Run,
-    series: Series | None,
-    definitions: Sequence[str],
-    costly: Costly,
-    *,
-    offset: int = 0,
+    part: FrameSequence, run: Run, series: Series | None, definitions: Sequence[str], costly: Costly, *, offset: int = 0
 ) -> list[dict[str, object]]:
     """One row per frame of a part of one phase; `offset` is the number of its first frame."""
     rows: list[dict[str, object]] = []

@@ -13,11 +13,13 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, Self
+from typing import Any, Self
 
 import numpy as np
 import pyvista as pv
+from matplotlib.colors import Colormap
 from matplotlib.font_manager import FontProperties, findfont
+from numpy.typing import NDArray
 from PIL import Image, ImageDraw
 from vtkmodules.vtkCommonCore import vtkLogger
 from vtkmodules.vtkRenderingCore import vtkTextRenderer
@@ -28,11 +30,8 @@ from dem.record.run import Run
 from postprocess.bodies.colours import PAINTS, ColourScale, colour_field
 from postprocess.bodies.fields import Field
 from postprocess.bodies.meshes import BOX_POINTS, Bodies, owners, solid
+from postprocess.geometry.links import Floats
 from postprocess.report import figures
-
-if TYPE_CHECKING:
-    from matplotlib.colors import Colormap
-    from numpy.typing import NDArray
 
 VIEWS: Mapping[str, tuple[float, float]] = MappingProxyType(
     {"front": (-90.0, 14.0), "oblique": (-62.0, 34.0), "top": (-90.0, 90.0)}
@@ -63,7 +62,7 @@ class Look:
 
     field: Field
     size: tuple[int, int]
-    axes: NDArray[np.float64]
+    axes: Floats
 
     @classmethod
     def checked(cls, run: Run, *, color_by: str | None, size: tuple[int, int], view: str | None) -> Self:
@@ -95,7 +94,7 @@ class Caption:
     lines: tuple[str, ...]
 
 
-def axes_from(azimuth: float, elevation: float) -> NDArray[np.float64]:
+def axes_from(azimuth: float, elevation: float) -> Floats:
     """Return right, up and forward (3, 3) of a camera, by its direction from the pile [degree]."""
     a, e = math.radians(azimuth), math.radians(elevation)
     right = np.array([-math.sin(a), math.cos(a), 0.0])
@@ -103,9 +102,7 @@ def axes_from(azimuth: float, elevation: float) -> NDArray[np.float64]:
     return np.stack([right, np.cross(right, forward), forward])
 
 
-def drawn(
-    bodies: Bodies, frame: Frame, forward: NDArray[np.float64], *, largest: float | None = None
-) -> dict[str, pv.PolyData]:
+def drawn(bodies: Bodies, frame: Frame, forward: Floats, *, largest: float | None = None) -> dict[str, pv.PolyData]:
     """Return what is drawn of a frame, [mm] above the floor: walls cut open in front, lines as tubes.
 
     A wall that was taken away is there as `ghost`.
@@ -128,7 +125,7 @@ def drawn(
     return found
 
 
-def rectangle(meshes: Iterable[pv.PolyData], axes: NDArray[np.float64]) -> Rectangle:
+def rectangle(meshes: Iterable[pv.PolyData], axes: Floats) -> Rectangle:
     """Return the part of the picture's plane that meshes [mm] take."""
     places = np.concatenate([np.asarray(mesh.points) @ axes[:2].T for mesh in meshes])
     (left, below), (right, above) = places.min(axis=0), places.max(axis=0)
@@ -255,7 +252,7 @@ class Canvas:
         unit = self._look.unit
         return _MARGIN * unit, (_FOOT / 2 + 0.9) * unit, _MARGIN * unit + self._length / self.pixel, _FOOT / 2 * unit
 
-    def turn(self, axes: NDArray[np.float64]) -> None:
+    def turn(self, axes: Floats) -> None:
         """Turn all cameras."""
         right, up, forward = axes
         focus = self._centre[0] * right + self._centre[1] * up
@@ -268,12 +265,7 @@ class Canvas:
             camera.up, camera.clipping_range = tuple(up), (self._reach / 1000, 2 * self._reach)
 
     def show(
-        self,
-        column: int,
-        frame: Frame,
-        meshes: Mapping[str, pv.PolyData],
-        colours: NDArray[np.uint8],
-        caption: Caption,
+        self, column: int, frame: Frame, meshes: Mapping[str, pv.PolyData], colours: NDArray[np.uint8], caption: Caption
     ) -> None:
         """Put a frame into a panel.
 
@@ -294,7 +286,7 @@ class Canvas:
                 down -= 1.4 * size * unit
                 self._write(column, f"line {number}", text, (_MARGIN * unit, down), size, bold=not number)
 
-    def add_patch(self, corners: NDArray[np.float64], colour: str) -> None:
+    def add_patch(self, corners: Floats, colour: str) -> None:
         """Add a flat see-through patch with corners (n, 3) [mm]."""
         patch = pv.PolyData.from_regular_faces(corners, [list(range(len(corners)))])
         self._plotter.add_mesh(patch, color=colour, opacity=0.25, lighting=False, reset_camera=False, render=False)

@@ -33,8 +33,6 @@ def caption_of(frame: Frame, run: Run, *, title: str, pace: str = "", force: flo
     """Return the caption of a frame.
 
     Args:
-        frame: One of the run's frames.
-        run: The run.
         title: The heading.
         pace: How fast a film plays; empty for a picture.
         force: Normal force of the thickest line of force [N]; None where none are drawn.

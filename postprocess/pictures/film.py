@@ -8,15 +8,14 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field
 from itertools import pairwise
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Self
+from typing import Any, Self
 
 import numpy as np
+from numpy.typing import ArrayLike
 from PIL import Image
 
 from dem.errors import InputError
-
-if TYPE_CHECKING:
-    from numpy.typing import ArrayLike, NDArray
+from postprocess.geometry.links import Floats
 
 KINDS = (".gif", ".webp", ".mp4")
 """Suffixes of films."""
@@ -43,7 +42,7 @@ class Moments:
         rate: Pictures per second [1/s].
     """
 
-    times: NDArray[np.float64] = field(repr=False)
+    times: Floats = field(repr=False)
     every: float
     rate: float
 
@@ -105,7 +104,7 @@ class Moments:
             raise InputError(msg)
         return cls(times=low + every * np.arange(steps + 1.0), every=every, rate=rate)
 
-    def indices(self, recorded: NDArray[np.float64]) -> list[int]:
+    def indices(self, recorded: Floats) -> list[int]:
         """Return the frame nearest to each moment, of frames at (m,) times [s]."""
         nearest: list[int] = np.abs(recorded[None] - self.times[:, None]).argmin(axis=1).tolist()
         return nearest

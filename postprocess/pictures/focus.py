@@ -3,21 +3,18 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 from matplotlib.colors import to_rgb
+from numpy.typing import NDArray
 from PIL import Image
 
 from dem.errors import InputError
-from postprocess.geometry.links import plane_frames
+from postprocess.geometry.links import Floats, plane_frames
 from postprocess.measures.entanglement import has_plane, link_passages
 from postprocess.pictures.canvas import MILLIMETRE, Canvas, Caption, Look, drawn, rectangle
 from postprocess.pictures.shot import Shot
 from postprocess.report import figures
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
 
 _OTHERS = "#c4ccd4"
 _ASKEW = np.radians([25.0, 20.0])  # how far the camera looks past the normal, across and along the middle link
@@ -85,7 +82,7 @@ def focused(shot: Shot, index: int, smarticle: int, size: tuple[int, int]) -> Im
         return canvas.image()
 
 
-def _through_the_mouth(vertices: NDArray[np.float64]) -> NDArray[np.float64]:
+def _through_the_mouth(vertices: Floats) -> Floats:
     """Return axes (3, 3): right, along the middle link, up, towards the mouth, and forward; turned by `_ASKEW`."""
     normal = plane_frames(vertices[None])[0, 2]
     right = vertices[2] - vertices[1]

@@ -6,23 +6,20 @@ import math
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
-import numpy as np
 from PIL import Image
 
 from dem.errors import InputError
 from dem.record.forces import read_forces
 from postprocess.bodies.colours import ColourScale, Span, span
+from postprocess.geometry.links import Floats
 from postprocess.pictures import film
 from postprocess.pictures.canvas import VIEWS, Canvas, Caption, Look, axes_from, drawn, union
 from postprocess.pictures.captions import caption_of, titles_of
 from postprocess.pictures.focus import focused
 from postprocess.pictures.shot import Shot
 from postprocess.report import figures
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
 
 Limits = Span | Literal["run"] | None
 """Ends of the scale of colours: given, of all frames of the runs, or of what is shown."""
@@ -63,9 +60,6 @@ def render_run(
         forces: Whether lines of force are drawn, through smarticles that let them be seen; as thick as the normal force
             is large.
         overwrite: Whether an existing file may be replaced.
-
-    Returns:
-        The file written.
 
     Raises:
         InputError: No frame, unknown field or view, a time before the first or after the last
@@ -136,9 +130,6 @@ def render_film(
         forces: As in `render_run`; the thickest line is that of the largest force of the film.
         track: Follows the drawing, see `Track`.
         overwrite: Whether an existing file may be replaced.
-
-    Returns:
-        The file written.
 
     Raises:
         InputError: Fewer than two frames, a kind of file that cannot be written here, an output
@@ -230,7 +221,7 @@ def _largest_force(shot: Shot, indices: Sequence[int]) -> float:
     return max(float(read_forces(shot.frames[i]).contacts.normal.max(initial=0.0)) for i in indices) or 1e-3
 
 
-def _span(shots: Sequence[Shot], values: Sequence[dict[int, NDArray[np.float64]]], look: Look, limits: Limits) -> Span:
+def _span(shots: Sequence[Shot], values: Sequence[dict[int, Floats]], look: Look, limits: Limits) -> Span:
     if isinstance(limits, tuple):
         low, high = limits
         if not (math.isfinite(low) and math.isfinite(high) and low < high):
@@ -250,7 +241,7 @@ def _look(shots: Sequence[Shot], color_by: str | None, size: tuple[int, int], vi
     return Look.checked(shots[0].run, color_by=color_by, size=size, view=view)
 
 
-def common_times(shots: Sequence[Shot]) -> NDArray[np.float64]:
+def common_times(shots: Sequence[Shot]) -> Floats:
     """Return times of the frames that all runs have come to: those of the one with the fewest [s].
 
     Raises:

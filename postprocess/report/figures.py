@@ -11,9 +11,12 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
 
 from dem.errors import InputError, RunError
 from dem.record.files import whole
@@ -28,11 +31,6 @@ with warnings.catch_warnings():
 from matplotlib import rc_context
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.colors import BoundaryNorm, Colormap, ListedColormap, to_hex
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
-    from numpy.typing import NDArray
 
 COLUMN_WIDTH = 3.5
 """Width of a journal column [inch]."""
@@ -114,9 +112,6 @@ def blank_figure(width: float, height: float, *, dpi: int = RESOLUTION) -> Figur
         width: [inch].
         height: [inch].
         dpi: Pixels per inch on screen.
-
-    Returns:
-        The figure.
     """
     figure = matplotlib.figure.Figure(figsize=(width, height), dpi=dpi, facecolor="white")
     FigureCanvasAgg(figure)
@@ -184,12 +179,8 @@ def save(figure: Figure, path: Path, *, formats: Sequence[str] = ("png", "svg", 
     The files hold no date: the same figure gives the same bytes.
 
     Args:
-        figure: to write.
         path: without suffix.
         formats: suffixes without the dot.
-
-    Returns:
-        The files written.
     """
     metadata: dict[str, dict[str, str | None]] = {
         "svg": {"Date": None},

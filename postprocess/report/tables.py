@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
+
+import pandas as pd
 
 from dem.errors import InputError, RunError
 from dem.record.files import whole
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 
 def write_table(table: pd.DataFrame, path: Path | str, *, overwrite: bool = False) -> Path:

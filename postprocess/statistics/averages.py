@@ -3,12 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
-
-if TYPE_CHECKING:
-    from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike, NDArray
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -38,9 +35,6 @@ def mean_with_error(samples: ArrayLike) -> Mean:
 
     Args:
         samples: (n,), in time order; NaN are left out.
-
-    Returns:
-        The mean with its error, in the samples' unit.
 
     Source:
         Geyer, Statistical Science 7 (1992) 473 (initial positive sequence).

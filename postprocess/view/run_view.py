@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import pyvista as pv
@@ -16,10 +16,8 @@ from dem.record.run import open_run
 from postprocess.bodies.colours import ColourScale, colour_field, scalars, span
 from postprocess.bodies.fields import IDENTITY, Field, fields_of, link_values
 from postprocess.bodies.meshes import BOX_FACES, USUAL, Bodies, owners
+from postprocess.geometry.links import Floats
 from postprocess.pictures.canvas import VIEWS, add_bodies, axes_from, drawn
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
 
 PICKED = (255, 0, 170)
 """Colour of the smarticle that is picked, which no palette has."""
@@ -143,7 +141,7 @@ class RunView:
         ]
         return shown[::-1]
 
-    def pick_along(self, ray: NDArray[np.float64]) -> None:
+    def pick_along(self, ray: Floats) -> None:
         """Pick the smarticle that a ray (2, 3) [mm] meets first, or none."""
         self.pick = None
         if "smarticles" in self._meshes:
@@ -171,7 +169,7 @@ class RunView:
     def _spread(self, number: int) -> list[int]:
         return sorted({round(place) for place in np.linspace(0, len(self.frames) - 1, number)})
 
-    def _widened(self, values: NDArray[np.float64]) -> tuple[float, float]:
+    def _widened(self, values: Floats) -> tuple[float, float]:
         """Return bounds of the field's scale: of some frames of the run and of all that were shown."""
         name = self.field.name
         if name not in self._bounds:

@@ -14,7 +14,7 @@ from dem.errors import InputError
 from dem.record.forces import has_forces, read_forces
 from dem.record.frames import read_frames
 from dem.record.run import Run, open_run
-from postprocess.errors import UndefinedMeasureError
+from postprocess.geometry.links import UndefinedMeasureError
 from postprocess.measures.force_chains import (
     MEASURES,
     force_chains,
