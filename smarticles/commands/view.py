@@ -43,7 +43,7 @@ def _port(text: str) -> int:
 def view_run(arguments: argparse.Namespace) -> int:
     """`smarticles view`."""
     try:
-        from postprocess.view.page import view_run as serve  # noqa: PLC0415  (imports PyVista and the server)
+        from postprocess.view import view_run as serve  # noqa: PLC0415  (imports PyVista and the server)
     except ModuleNotFoundError as error:
         msg = f"view: the Python package {error.name!r} is not installed; run 'make setup', or install the project anew"
         raise InputError(msg) from None

@@ -8,7 +8,7 @@ from synthetic import T1, SyntheticRun, W, mesh_of, u_shape, write_frame, write_
 
 from dem.errors import InputError
 from dem.record.frames import FrameWriter, read_frames
-from postprocess.view.run_view import PICKED, RunView
+from postprocess.view import PICKED, RunView
 
 
 @pytest.fixture
