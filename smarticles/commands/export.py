@@ -116,7 +116,7 @@ def export_run(arguments: argparse.Namespace) -> int:
     """`smarticles export`."""
     if arguments.to == _LAMMPS:
         return _export_scene(arguments)
-    from postprocess.export import export  # noqa: PLC0415  (imports PyVista)
+    from postprocess import export  # noqa: PLC0415  (imports PyVista)
 
     watched = sys.stderr.isatty()
 
@@ -133,7 +133,7 @@ def export_run(arguments: argparse.Namespace) -> int:
         wanted=arguments.wanted,
         unwanted=arguments.unwanted,
         color_by=arguments.color_by,
-        tell=tell,
+        progress=tell,
     )
     print(written)
     return 0

@@ -17,8 +17,7 @@ from dem.record.forces import force_mesh
 from dem.record.frames import FrameWriter, read_frames
 from dem.record.names import FORCE
 from postprocess.bodies.fields import FIELDS
-from postprocess.export.export import FORMATS, export_run
-from postprocess.export.solids import SUFFIXES
+from postprocess.export import FORMATS, SUFFIXES, export_run
 from postprocess.geometry.links import centres_of_mass
 
 HOSTILE = [
@@ -240,7 +239,7 @@ def test_hostile_names_are_data(tmp_path, name):
 def test_all_frames_are_numbered_files(pile, tmp_path, suffix):
     told = []
     folder = export_run(
-        pile, to=suffix, output=tmp_path / "out", every_frame=True, tell=lambda *done: told.append(done),
+        pile, to=suffix, output=tmp_path / "out", every_frame=True, progress=lambda *done: told.append(done),
         unwanted=["local_packing_fraction"],
     )  # fmt: skip
     assert sorted(path.name for path in folder.iterdir()) == [f"frame_{k:06d}.{suffix}" for k in range(8)]
