@@ -42,7 +42,7 @@ from postprocess.measures.packing import DEFINITIONS, PackingFraction, packing_f
 from postprocess.measures.profile import PackingProfile, packing_profile, profile_table
 from postprocess.measures.table import PackingChange, measure_run, packing_change, summarise_run
 from postprocess.report.tables import write_table
-from postprocess.statistics.averages import Mean, mean_with_error
+from postprocess.statistics.seeds import Mean, mean_with_error
 
 __all__ = [
     "DEFINITIONS",

@@ -115,7 +115,7 @@ def _one(directory: Path, *, frames: bool, costly: Costly) -> pd.DataFrame:
 
 
 def grouped(table: pd.DataFrame, by: Sequence[str]) -> pd.DataFrame:
-    """Means over runs, one row per group and phase; see `postprocess.statistics.groups.means_by`.
+    """Means over runs, one row per group and phase; see `postprocess.statistics.points.means_by`.
 
     Args:
         table: of `measured`, one row per run and phase.
@@ -124,7 +124,7 @@ def grouped(table: pd.DataFrame, by: Sequence[str]) -> pd.DataFrame:
     Raises:
         InputError: there is no such column.
     """
-    from postprocess.statistics.groups import means_by  # noqa: PLC0415
+    from postprocess.statistics.points import means_by  # noqa: PLC0415
 
     for name in by:
         if name not in table.columns:

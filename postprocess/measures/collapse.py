@@ -21,7 +21,7 @@ from dem.errors import InputError
 from dem.record.document import Phase
 from dem.record.run import Run
 from postprocess.geometry.links import Floats, centres_of_mass
-from postprocess.statistics.averages import mean_with_error
+from postprocess.statistics.seeds import mean_with_error
 
 REMAINING, COM, CORE = "remaining", "com", "core"
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,7 +13,6 @@ from dem.record.packing import second_highest
 from dem.record.run import Run
 from postprocess.geometry.links import UndefinedMeasureError, Vertices, centres_of_mass, checked_vertices, link_lengths
 from postprocess.measures.registry import FrameMeasure, Quantity, Shown, in_space
-from postprocess.statistics.bisection import least_reaching
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -59,6 +59,17 @@ def heights(vertices: Vertices, *, floor_z: float = 0.0, percentile: float = 95.
         top=material_height(vertices, floor_z=floor_z, percentile=percentile),
         percentile=percentile,
     )
+
+
+def least_reaching(growing: Callable[[float], float], level: float, low: float, high: float) -> float:
+    """Find the least argument at which a growing function, which may have steps, reaches a level, to rounding.
+
+    The function is below the level at `low`, or just reaches it, and has reached it at `high`.
+    """
+    for _ in range(60):  # more than the 52 bits of a number
+        middle = (low + high) / 2
+        low, high = (middle, high) if growing(middle) < level else (low, middle)
+    return high
 
 
 def material_height(vertices: Vertices, *, floor_z: float = 0.0, percentile: float = 95.0) -> float:

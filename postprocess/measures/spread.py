@@ -19,8 +19,8 @@ from postprocess.geometry.links import (
     link_lengths,
 )
 from postprocess.measures.clusters import contact_clusters, entanglement_clusters
+from postprocess.measures.heights import least_reaching
 from postprocess.measures.registry import FrameMeasure, Quantity, Shown, in_space
-from postprocess.statistics.bisection import least_reaching
 
 TOUCHING = 1.05
 """Distance of centrelines over the diameter of the spheres up to which two smarticles count as touching [-].

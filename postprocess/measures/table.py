@@ -15,8 +15,8 @@ from dem.record.run import Run
 from dem.record.series import Series
 from postprocess.measures.packing import DEFINITIONS, packing_of
 from postprocess.measures.registry import frame_measures, phase_measures
-from postprocess.statistics.averages import Mean, mean_with_error
 from postprocess.statistics.columns import ASPECT, SEED
+from postprocess.statistics.seeds import Mean, mean_with_error
 
 Costly = Literal["never", "phase-end", "every-frame"]
 """When to take the packing fractions of `COSTLY_DEFINITIONS`."""

@@ -17,14 +17,14 @@ import pandas as pd
 def paired_differences(
     table: pd.DataFrame, quantity: str, factor: str, levels: tuple[object, object], others: Sequence[str]
 ) -> pd.DataFrame:
-    """What a quantity does when a factor goes from one level to another, all else alike.
+    """Return what a quantity does when a factor goes from one level to another, all else alike.
 
     Args:
         table: One row per run.
         quantity: Column.
         factor: Column.
         levels: From, and to.
-        others: Columns of all else that tells runs apart, such as the other factors and the seed.
+        others: Columns of all else that runs differ in, such as the other factors and the seed.
 
     Returns:
         One row per pair: `others`, and the difference in the quantity's column, in its unit. What lacks a run at

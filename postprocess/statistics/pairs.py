@@ -1,4 +1,4 @@
-"""Runs of one aspect ratio and seed were poured alike: what was done to them is compared pair by pair."""
+"""Compare runs pair by pair: those of one aspect ratio and seed were poured alike."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from postprocess.statistics.seeds import SeedMean, mean_over_seeds
 
 
 def pairs(one: pd.DataFrame, other: pd.DataFrame, quantity: str) -> pd.DataFrame:
-    """Values of two parts of a table of runs for the same aspect ratio and seed: columns `one` and `other`."""
+    """Join a quantity of two tables of runs by aspect ratio and seed: columns `one` and `other`."""
     keys = [ASPECT, SEED]
     left = one[[*keys, quantity]].rename(columns={quantity: "one"})
     right = other[[*keys, quantity]].rename(columns={quantity: "other"})
@@ -17,6 +17,6 @@ def pairs(one: pd.DataFrame, other: pd.DataFrame, quantity: str) -> pd.DataFrame
 
 
 def mean_difference(one: pd.DataFrame, other: pd.DataFrame, quantity: str) -> SeedMean:
-    """One part less the other, mean over pairs."""
+    """Average one table less the other over pairs."""
     both = pairs(one, other, quantity)
     return mean_over_seeds(both["one"] - both["other"])

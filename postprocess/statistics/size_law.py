@@ -12,12 +12,9 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import fdtrc, fdtri, stdtrit
 
-from postprocess.statistics.seeds import CONFIDENCE, Slope
-
-Floats = NDArray[np.float64]
+from postprocess.statistics.seeds import CONFIDENCE, Floats, Slope
 
 POWER = 1 / 3
 POWERS = np.arange(0.02, 1.501, 0.01)
@@ -33,7 +30,7 @@ class Scatter:
     Attributes:
         variance: c, in the square of the quantity's unit.
         fall: Power of N that σ² falls with [1].
-        freedom: Degrees of freedom that it is known with.
+        freedom: Its degrees of freedom.
     """
 
     variance: float

@@ -14,9 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import chdtrc, chdtri
 
-from postprocess.statistics.seeds import CONFIDENCE
-
-Floats = NDArray[np.float64]
+from postprocess.statistics.seeds import CONFIDENCE, Floats
 
 _PLACES, _WIDTHS = 401, 30
 
@@ -26,11 +24,11 @@ class Profile:
     """What the runs of one group say of x_c.
 
     Attributes:
-        places: (n,) where x_c may be, those of all groups alike.
+        places: (n,) where x_c may be, common to all groups.
         likelihood: (n,) log of it, of the best width at each place.
         widths: (n,) these widths.
-        runs: How many runs.
-        having: How many of them have the property.
+        runs: Number of runs.
+        having: Number of runs with the property.
     """
 
     places: Floats
@@ -92,7 +90,7 @@ def profiles(x: Floats, having: Floats, groups: NDArray[np.int64]) -> dict[int, 
 
 
 def alike(found: Collection[Profile]) -> float:
-    """Probability of places so unlike each other, were they all one, by the ratio of likelihoods [1].
+    """Return the probability of places so unlike each other, were they all one, by the ratio of likelihoods [1].
 
     NaN where fewer than two groups know theirs.
     """
