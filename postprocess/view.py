@@ -26,7 +26,7 @@ from dem.record.frames import read_frames
 from dem.record.run import open_run
 from postprocess.bodies.colours import ColourScale, colour_field, scalars, span
 from postprocess.bodies.fields import IDENTITY, fields_of, link_values
-from postprocess.bodies.meshes import BOX_FACES, USUAL, Bodies, owners
+from postprocess.bodies.meshes import BOX_FACES, USUAL, Bodies
 from postprocess.geometry.links import Floats
 from postprocess.pictures.canvas import VIEWS, add_bodies, axes_from, drawn
 
@@ -147,8 +147,7 @@ class RunView:
         if self.pick is not None:
             colours[self.frame.smarticle_ids == self.pick.smarticle_id] = PICKED
         self._meshes = drawn(self._bodies, self.frame, np.zeros(3))
-        boxes = self._meshes.get("smarticles")
-        add_bodies(self.plotter, self._meshes, colours[:0, 0] if boxes is None else colours[owners(boxes, self.frame)])
+        add_bodies(self.plotter, self._meshes, self.frame, colours)
 
     def aim(self) -> None:
         """Turn the camera to all that is drawn: from the front, a little from above; at a plane from above."""
