@@ -15,8 +15,8 @@ from dem.record.forces import read_forces
 from dem.record.frame import Frame
 from dem.record.run import Run
 from postprocess.geometry.links import Floats, UndefinedMeasureError, centres_of_mass, link_lengths
-from postprocess.geometry.region import Region
 from postprocess.geometry.voronoi import local_packing
+from postprocess.geometry.voxel import Region
 from postprocess.measures.clusters import Clusters, contact_graph, entanglement_clusters
 from postprocess.measures.entanglement import link_crossings
 from postprocess.measures.force_chains import force_chains

@@ -18,7 +18,7 @@ from scipy.ndimage import distance_transform_edt
 
 from dem.errors import InputError
 from postprocess.geometry.links import Flags, Floats, UndefinedMeasureError, checked_vertices
-from postprocess.geometry.region import Region
+from postprocess.geometry.voxel import Region
 
 BALL = 0.25
 """Radius of the ball over w [-].
@@ -48,7 +48,7 @@ class Outlines:
     inside: Flags = field(repr=False)
 
     def within(self, region: Region) -> Flags:
-        """(x, y, z) bool, which voxels have their centre in a cylinder whose heights are above the floor."""
+        """Return which voxels (x, y, z) have their centre in a cylinder whose heights are above the floor."""
         x, y, z = (
             start + self.pitch * np.arange(count)
             for start, count in zip(self.origin, self.inside.shape[1:], strict=True)
@@ -71,17 +71,16 @@ def outlines(
     pitch: float | None = None,
     regions: Sequence[Region] = (),
 ) -> Outlines:
-    """The regions that piles take up, all on one grid.
+    """Find the regions that piles take up, all on one grid.
+
+    A flat face is found to within half a voxel, a volume therefore to much less.
 
     Args:
-        piles: (N, 4, 3) [m] each, heights above the floor.
+        piles: Vertices of each, heights above the floor.
         thickness: Of the links, taken as round [m].
         ball: Radius of the ball [m]; see `BALL`.
         pitch: Side of a voxel [m]; a fourth of the ball's radius if not given.
         regions: What the grid must hold besides the piles.
-
-    Returns:
-        The regions. A flat face is found to within half a voxel, a volume therefore to much less.
 
     Raises:
         InputError: Bad sizes, or piles that need more voxels than there is memory for.
@@ -117,7 +116,7 @@ def outlines(
 
 
 def _closed(vertices: Floats, axes: Sequence[Floats], *, ball: float, thickness: float) -> Flags:
-    """Voxels, by the coordinates of their centres, that no ball covers which keeps clear of links and floor."""
+    """Find voxels, given by the coordinates of their centres, that no ball covers clear of links and floor."""
     first, pitch = np.array([axis[0] for axis in axes]), float(axes[0][1] - axes[0][0])
     # Where the ball's centre cannot be; the floor holds it off as links do.
     blocked = np.zeros(tuple(map(len, axes)), dtype=bool)
@@ -136,7 +135,7 @@ def _closed(vertices: Floats, axes: Sequence[Floats], *, ball: float, thickness:
 
 
 def _near_link(axes: tuple[Floats, ...], start: Floats, end: Floats, reach: float) -> Flags:
-    """Which points of a grid, given by its coordinates, lie within a distance [m] of a link's centreline."""
+    """Find points of a grid, given by its coordinates, within a distance [m] of a link's centreline."""
     along = end - start
     square = float(along @ along)
     x, y, z = (axis - place for axis, place in zip(axes, start, strict=True))

@@ -20,7 +20,7 @@ from postprocess.geometry.links import (
     checked_vertices,
     link_lengths,
 )
-from postprocess.geometry.region import Region
+from postprocess.geometry.voxel import Region
 
 TOGETHER = 60_000
 """Most points whose cells are found at once: they take 15 kB each while they are."""
@@ -44,14 +44,13 @@ class LocalPacking:
 def local_packing(
     vertices: Vertices, container: Region, region: Region, *, solid_volume: float, spacing: float | None = None
 ) -> LocalPacking:
-    """Packing fraction of the smarticles in a region by the volume nearer to them than to others.
+    """Compute the packing fraction of smarticles in a region by the volume nearer to them than to others.
 
-    Points are sampled along the centrelines, their Voronoi cells are united per smarticle. That
-    is the set-Voronoi cell of thin links up to the spacing and up to differences of thickness,
-    which are the same for all. Images of the points mirrored in floor, wall and lid bound the
-    cells there; the wall is thereby a polygon around the circle, the lid lies at the highest
-    point of the smarticles below the container's top. Only smarticles with their centre of mass
-    in the region are counted, so that walls and lid matter little.
+    Points are sampled along the centrelines, and their Voronoi cells united per smarticle. That is the set-Voronoi cell
+    of thin links, up to the spacing and to differences of thickness. Images of the points mirrored in floor, wall and
+    lid bound the cells there; the wall is thereby a polygon around the circle, the lid lies at the highest point of the
+    smarticles below the container's top. Only smarticles with their centre of mass in the region count, so that walls
+    and lid matter little.
 
     Args:
         container: The container from its floor to the pile's height.
@@ -105,7 +104,7 @@ def local_packing(
 
 
 def _sample(vertices: Floats, spacing: float) -> tuple[Floats, Whole]:
-    """Points (n, 3) evenly along each link, none at a hinge, and their smarticles (n,)."""
+    """Place points (n, 3) evenly along each link, none at a hinge; return them and their smarticles (n,)."""
     # Lengths differ by rounding, which must not give one link a point more than its equals.
     cuts = np.ceil(link_lengths(vertices) / spacing - 1e-6).astype(int).ravel()
     link = np.repeat(np.arange(len(cuts)), cuts)
@@ -117,7 +116,7 @@ def _sample(vertices: Floats, spacing: float) -> tuple[Floats, Whole]:
 
 
 def _mirrored(points: Floats, container: Region, lid: float, band: float) -> Floats:
-    """Images of the points nearer than `band` to floor, lid or wall."""
+    """Mirror the points nearer than `band` to floor, lid or wall."""
     floor = points[points[:, 2] < container.bottom + band] * [1, 1, -1]
     floor[:, 2] += 2 * container.bottom
     top = points[points[:, 2] > lid - band] * [1, 1, -1]
@@ -133,7 +132,7 @@ def _mirrored(points: Floats, container: Region, lid: float, band: float) -> Flo
 
 
 def _cell_volumes(points: Floats, count: int, *, reach: float, together: int = TOGETHER) -> Floats:
-    """Volume (count,) of the Voronoi cells of the first points, infinite for open ones.
+    """Compute volumes (count,) of the Voronoi cells of the first points, infinite for open ones.
 
     Cells are found slab by slab along x, among all points within a reach of the slab. A point's cell among them is its
     cell among all points where the spheres around its corners through the point, in which there must be no other, do
@@ -142,7 +141,7 @@ def _cell_volumes(points: Floats, count: int, *, reach: float, together: int = T
 
     Args:
         points: (n, 3) [m].
-        count: How many of them have their cells told; the others bound cells.
+        count: Of the points whose cells are wanted; the others bound cells.
         reach: The first one [m].
         together: Most points of a slab.
     """
@@ -169,7 +168,7 @@ def _cell_volumes(points: Floats, count: int, *, reach: float, together: int = T
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class _Cells:
-    """Voronoi cells of points; what is told of corners is infinite for open ones.
+    """Voronoi cells of points; lengths are infinite for open ones.
 
     Attributes:
         volumes: (n,) [m³].
@@ -185,7 +184,7 @@ class _Cells:
 
 
 def _cells(points: Floats) -> _Cells:
-    """Voronoi cells of all points.
+    """Compute the Voronoi cells of all points.
 
     A cell is the sum of the pyramids from its point over its faces, whose height is half the
     distance to the neighbour.

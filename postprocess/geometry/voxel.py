@@ -1,14 +1,17 @@
-"""What the true boxes of the links fill: points of a fine grid inside them, and the share of a region."""
+"""Upright cylinders, and what the true boxes of the links fill of them: points of a fine grid inside them."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from dem.errors import InputError
 from postprocess.geometry.links import (
+    Flags,
     Floats,
     UndefinedMeasureError,
     Vertices,
@@ -17,10 +20,67 @@ from postprocess.geometry.links import (
     link_lengths,
     plane_frames,
 )
-from postprocess.geometry.region import Region
 
 # Point tests held in memory at a time.
 _CHUNK = 1_000_000
+# A fixed rotation by no simple angle about no simple axis: boxes in line with x, y, z meet the grid as all others do.
+_TURN = Rotation.from_quat([2**0.5 - 1, 3**0.5 - 1, 5**0.5 - 2, 1.0]).as_matrix()
+
+
+@dataclass(frozen=True, kw_only=True)
+class Region:
+    """An upright cylinder.
+
+    Attributes:
+        radius: [m].
+        bottom: Height of its lower end [m].
+        top: Height of its upper end [m].
+        axis: x and y of its axis [m].
+    """
+
+    radius: float
+    bottom: float
+    top: float
+    axis: tuple[float, float] = (0.0, 0.0)
+
+    @property
+    def volume(self) -> float:
+        """[m³]."""
+        return math.pi * self.radius**2 * (self.top - self.bottom)
+
+    def contains(self, points: Floats) -> Flags:
+        """(n,) bool, which of (n, 3) points [m] lie inside."""
+        x, y, z = points[:, 0] - self.axis[0], points[:, 1] - self.axis[1], points[:, 2]
+        inside: Flags = (x**2 + y**2 < self.radius**2) & (z > self.bottom) & (z < self.top)
+        return inside
+
+
+def inner_region(pile: Region, *, inner: float = 0.75, low: float = 0.2, high: float = 0.8) -> Region:
+    """Return the part of a pile that stays clear of wall, floor and free surface.
+
+    Args:
+        pile: The cylinder from the floor to the pile's height.
+        inner: Radius of the part, as a share of the pile's [-].
+        low: Lower cut, as a share of the pile's height [-].
+        high: Upper cut, as a share of the pile's height [-].
+
+    Raises:
+        InputError: The shares are not in order between 0 and 1.
+        UndefinedMeasureError: The pile has no height.
+    """
+    if not 0 < inner <= 1:
+        msg = f"inner must be above 0 and up to 1 of the container's radius: got {inner}"
+        raise InputError(msg)
+    if not 0 <= low < high <= 1:
+        msg = f"low and high must be in order between 0 and 1 of the height: got {low}, {high}"
+        raise InputError(msg)
+    height = pile.top - pile.bottom
+    if not height > 0:
+        msg = f"the pile has no height above its floor: {height:g} m; check floor_z"
+        raise UndefinedMeasureError(msg)
+    return Region(
+        radius=inner * pile.radius, bottom=pile.bottom + low * height, top=pile.bottom + high * height, axis=pile.axis
+    )
 
 
 def solid_fraction(
@@ -31,24 +91,13 @@ def solid_fraction(
     thickness_in_plane: float,
     pitch: float | None = None,
 ) -> float:
-    """Share of the region's volume that lies inside a link's box.
+    """Return the share of the region's volume that lies inside a link's box, above 0; arguments as `solid_points`.
 
-    A cubic grid of points is laid over the region, turned by a fixed odd angle so that boxes in
-    line with x, y, z meet it as fairly as all others; each point is tested against the boxes. A
-    point in two boxes counts once. Links of one smarticle overlap at the hinges, so a U reads
-    lower than t1 t2 (w + 2l) by t2 / (2 (w + 2l)), about 1 % for the usual sizes.
+    A point in two boxes counts once. Links of one smarticle overlap at the hinges, so a U reads lower than
+    t1 t2 (w + 2l) by t2 / (2 (w + 2l)), about 1 % for the usual sizes.
 
-    The section of a straight smarticle is turned about its length by an unknown angle, which four
-    vertices do not tell: some angle is taken.
-
-    Args:
-        region: Where to look.
-        thickness_normal: t1, along the normal of the smarticle's plane [m].
-        thickness_in_plane: t2, in the smarticle's plane [m].
-        pitch: Spacing of the points [m]; half the smaller thickness if not given.
-
-    Returns:
-        The solid fraction [-], above 0.
+    The section of a straight smarticle is turned about its length by an angle that four vertices do not give: some
+    angle is taken.
 
     Raises:
         InputError: Bad sizes.
@@ -75,16 +124,13 @@ def solid_points(
     pitch: float | None = None,
     region: Region | None = None,
 ) -> tuple[Floats, float]:
-    """Points of a cubic grid that lie inside a link's box, each once; a point stands for the cube of the pitch.
+    """Return points (n, 3) [m] of a cubic grid that lie inside a link's box, each once, and their pitch [m].
 
     Args:
         thickness_normal: t1, along the normal of the smarticle's plane [m].
         thickness_in_plane: t2, in the smarticle's plane [m].
-        pitch: Spacing of the points [m]; half the smaller thickness if not given.
+        pitch: Spacing of the points [m]; half the smaller thickness if not given. A point stands for its cube.
         region: Only points inside it; all if not given.
-
-    Returns:
-        The points (n, 3) [m], and their pitch [m].
 
     Raises:
         InputError: Bad sizes.
@@ -98,19 +144,18 @@ def solid_points(
             f"got t1 {sizes[0]} m, t2 {sizes[1]} m, pitch {pitch} m"
         )
         raise InputError(msg)
-    turn = _odd_rotation()
     pieces = _Pieces.cut(vertices, thickness_normal, thickness_in_plane)
     if region is not None:
         pieces = pieces.near(region)
     found = [np.empty((0, 3), dtype=np.int64)]
-    for indices in pieces.grid_points(turn, pitch):
-        found.append(indices if region is None else indices[region.contains(pitch * indices @ turn)])
-    return pitch * _distinct(np.concatenate(found)) @ turn, pitch
+    for indices in pieces.grid_points(pitch):
+        found.append(indices if region is None else indices[region.contains(pitch * indices @ _TURN)])
+    return pitch * _distinct(np.concatenate(found)) @ _TURN, pitch
 
 
 @dataclass(frozen=True)
 class _Pieces:
-    """The links' boxes cut into short pieces, so that few grid points lie around each.
+    """The links' boxes cut into pieces about as long as thick, so that few grid points lie around each.
 
     Attributes:
         centres: (P, 3) [m].
@@ -126,7 +171,6 @@ class _Pieces:
 
     @classmethod
     def cut(cls, vertices: Floats, normal: float, in_plane: float) -> _Pieces:
-        """Cuts the links of (N, 4, 3) [m] vertices into pieces about as long as thick."""
         lengths = link_lengths(vertices)
         # A link of no length (l = 0) has no direction; it yields no piece either.
         along = np.diff(vertices, axis=1) / np.maximum(lengths, 1e-300)[..., None]
@@ -149,16 +193,16 @@ class _Pieces:
         )
 
     def near(self, region: Region) -> _Pieces:
-        """The pieces that may reach into the region."""
+        """Return the pieces that may reach into the region."""
         x, y, z = (self.centres - [*region.axis, 0.0]).T
         keep = np.hypot(x, y) < region.radius + self.reach
         keep &= (z > region.bottom - self.reach) & (z < region.top + self.reach)
         return _Pieces(self.centres[keep], self.axes[keep], self.halves[keep], self.reach)
 
-    def grid_points(self, turn: Floats, pitch: float) -> Iterator[Whole]:
-        """Indices (n, 3) of the turned grid's points inside the pieces, some of them repeated."""
-        centres = self.centres @ turn.T
-        axes = self.axes @ turn.T
+    def grid_points(self, pitch: float) -> Iterator[Whole]:
+        """Yield indices (n, 3) of the turned grid's points inside the pieces, some of them repeated."""
+        centres = self.centres @ _TURN.T
+        axes = self.axes @ _TURN.T
         first = np.ceil((centres - self.reach) / pitch).astype(np.int64)
         steps = np.arange(int(np.ceil(2 * self.reach / pitch)) + 1)
         size = max(1, _CHUNK // len(steps) ** 3)
@@ -176,21 +220,8 @@ class _Pieces:
             yield first[part][piece] + np.stack(offset, axis=1)
 
 
-def _odd_rotation() -> Floats:
-    """A fixed rotation (3, 3) by no simple angle about no simple axis."""
-    quaternion = np.array([1.0, 2**0.5 - 1, 3**0.5 - 1, 5**0.5 - 2])
-    w, x, y, z = quaternion / np.linalg.norm(quaternion)
-    return np.array(
-        [
-            [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
-            [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
-            [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
-        ]
-    )
-
-
 def _distinct(indices: Whole) -> Whole:
-    """(m, 3), each of (n, 3) indices once."""
+    """Return each of (n, 3) indices once."""
     if len(indices) == 0:
         return indices
     # One number per grid point sorts much faster than rows of three.

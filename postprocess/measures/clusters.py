@@ -1,4 +1,4 @@
-"""Which smarticles hang together: connected parts of the graphs of contact and of entanglement, and what they span."""
+"""Find which smarticles hang together: connected parts of the graphs of contact and of crossings, and their spans."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from scipy.sparse.csgraph import connected_components
 from dem.record.frame import Frame
 from dem.record.run import Run
 from postprocess.geometry.links import UndefinedMeasureError, Vertices, Whole, checked_vertices
-from postprocess.measures.contacts import at_wall, contact_pairs, on_floor, pairs_in_contact, touching_pairs
+from postprocess.measures.contacts import at_wall, contact_pairs, on_floor, pairs_in_contact
 from postprocess.measures.entanglement import crossing_pairs
 from postprocess.measures.heights import material_height
 from postprocess.measures.registry import FrameMeasure, Quantity
@@ -37,10 +37,7 @@ class Clusters:
 
 
 def contact_clusters(vertices: Vertices, distance: float) -> Clusters:
-    """Smarticles joined by contact, directly or through others.
-
-    Args:
-        distance: Distance of centrelines up to which two smarticles touch [m], see `contacts.contact_pairs`.
+    """Join smarticles whose centrelines come as close as a distance [m], see `contacts.contact_pairs`.
 
     Raises:
         InputError: Bad distance.
@@ -51,7 +48,7 @@ def contact_clusters(vertices: Vertices, distance: float) -> Clusters:
 
 
 def entanglement_clusters(vertices: Vertices) -> Clusters:
-    """Smarticles joined by entanglement: a link of one passes through the plane of the other, whichever it is.
+    """Join smarticles of which a link of one passes through the plane of the other.
 
     Raises:
         UndefinedMeasureError: There is no smarticle.
@@ -60,25 +57,11 @@ def entanglement_clusters(vertices: Vertices) -> Clusters:
     return joined_clusters(len(checked_vertices(vertices)), pairs.i, pairs.j)
 
 
-def touching_clusters(vertices: Vertices, diameter: float) -> Clusters:
-    """Smarticles joined by contact where each is what a sphere sweeps along its links, see `contacts.touching_pairs`.
-
-    Args:
-        diameter: Of the sphere that sweeps the links [m], `Run.sphere_diameter`.
-
-    Raises:
-        InputError: Bad diameter.
-        UndefinedMeasureError: There is no smarticle.
-    """
-    pairs = touching_pairs(vertices, diameter)
-    return joined_clusters(len(checked_vertices(vertices)), pairs.i, pairs.j)
-
-
 def contact_graph(frame: Frame, run: Run) -> Clusters:
-    """Smarticles joined by contact by the shapes that the run's engine gave them, see `contacts.pairs_in_contact`.
+    """Join smarticles that touch by the shapes that the run's engine gave them, see `contacts.pairs_in_contact`.
 
     Raises:
-        InputError: Bad vertices, or the scene of the run cannot be read.
+        InputError: The scene of the run cannot be read.
         UndefinedMeasureError: There is no smarticle.
     """
     pairs = pairs_in_contact(frame, run)
@@ -91,7 +74,6 @@ def spans_height(clusters: Clusters, vertices: Vertices, *, diameter: float, flo
     The top is where 95 % of the links' material lie below; alone on top there may be one smarticle.
 
     Args:
-        clusters: Of the smarticles of a frame.
         diameter: Of the sphere that sweeps the links [m].
         floor_z: Height of the floor [m].
 
@@ -109,13 +91,11 @@ def spans_height(clusters: Clusters, vertices: Vertices, *, diameter: float, flo
 def spans_width(clusters: Clusters, vertices: Vertices, *, diameter: float, wall_radius: float) -> bool:
     """Whether one cluster reaches from wall to wall: no half of the round wall has all its contacts with the wall.
 
+    A round wall has no opposite faces, and what touches it on one side alone is not wedged.
+
     Args:
-        clusters: Of the smarticles of a frame.
         diameter: Of the sphere that sweeps the links [m].
         wall_radius: Of the wall about the axis x = y = 0 [m].
-
-    Source:
-        As `spans_height`; a round wall has no opposite faces, and what touches it on one side alone is not wedged.
     """
     vertices = checked_vertices(vertices)
     smarticle, vertex = np.nonzero(at_wall(vertices, diameter=diameter, wall_radius=wall_radius))
@@ -128,7 +108,7 @@ def spans_width(clusters: Clusters, vertices: Vertices, *, diameter: float, wall
 
 
 def joined_clusters(count: int, i: Whole, j: Whole) -> Clusters:
-    """Clusters of so many smarticles of which some are joined, the i-th with the j-th.
+    """Join smarticles, of which there are `count`, the i-th with the j-th.
 
     Raises:
         UndefinedMeasureError: There is no smarticle.
@@ -168,7 +148,7 @@ MEASURES = tuple(
             Quantity(f"{name} graph spans width", "-"),
         ),
         take=take,
-        told_of=_in_one_cylinder,
+        available_for=_in_one_cylinder,
         costly=True,
     )
     for name, take in (

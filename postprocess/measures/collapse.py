@@ -56,13 +56,7 @@ _LONGEST = 1e4  # τ over the time watched: beyond it a curve is flat, whatever 
 
 @dataclass(frozen=True, kw_only=True)
 class Vibration:
-    """The phase in which a free-standing column is shaken.
-
-    Attributes:
-        phase: Its record.
-        acceleration: Γ, peak acceleration over g [-].
-        frequency: f [Hz].
-    """
+    """The phase in which a free-standing column is shaken, with peak acceleration over g [-] and frequency [Hz]."""
 
     phase: Phase
     acceleration: float
@@ -96,7 +90,7 @@ class CollapseTime:
         time: τ [s]; NaN unless collapsed.
         error: Standard error of the fit [s], with the correlation of successive residuals, or the first sample's time
             where τ is shorter than that; NaN unless collapsed.
-        bound: What τ is not below [s]: the time watched; NaN if collapsed.
+        bound: Lower bound of τ [s]: the time watched; NaN if collapsed.
         exponent: β of the fit [-].
         start: h_start of the fit, in the heights' unit.
         end: h_end of the fit, in the heights' unit.
@@ -290,7 +284,7 @@ def _check(times: Floats, heights: Floats) -> None:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class _Model:
-    """The curve with what is free of it: ln τ, β, and of start and share (end over start) those that are not given.
+    """The curve and its free parameters: ln τ, β, and of start and share (end over start) those that are not given.
 
     Times are over the time watched, heights over a height of the start.
     """
@@ -300,20 +294,20 @@ class _Model:
     end: float | None
 
     def named(self, free: Floats) -> tuple[float, float, float, float]:
-        """τ, β, start and end."""
+        """Return τ, β, start and end."""
         rest = list(free[2:])
         start = float(rest.pop(0)) if self.start is None else self.start
         end = float(rest.pop(0)) * start if self.end is None else self.end
         return float(np.exp(free[0])), float(free[1]), start, end
 
     def curve(self, free: Floats) -> Floats:
-        """(n,) heights."""
+        """Return heights (n,)."""
         tau, beta, start, end = self.named(free)
         curve: Floats = end + (start - end) * np.exp(-((self.times / tau) ** beta))
         return curve
 
     def fit(self, heights: Floats) -> Any:
-        """The best of several fits: the sum of squares may have more than one valley."""
+        """Return the best of several fits: the sum of squares may have more than one valley."""
         low, high = [math.log(self.times[0] / 10), _EXPONENTS[0]], [math.log(_LONGEST), _EXPONENTS[1]]
         guess: list[float] = []
         if self.start is None:
@@ -331,7 +325,7 @@ class _Model:
 
 
 def _error(fit: Any) -> float:
-    """Standard error of ln τ; infinite where the samples do not tell."""
+    """Return the standard error of ln τ; infinite where the samples do not determine it."""
     residuals, jacobian = fit.fun, fit.jac
     spare = len(residuals) - len(fit.x)
     # What is at a bound is not free; its column would make the matrix singular.

@@ -1,4 +1,4 @@
-"""Which smarticles touch, lie close to each other, or touch nothing.
+"""Find which smarticles touch, lie close to each other, or touch nothing.
 
 Contacts are counted by the engine and pairs found from vertices: a frame holds how many others each smarticle touches,
 not which. Where a scene asks for the forces at contacts these are recorded beside, see `force_chains`.
@@ -16,8 +16,18 @@ from scipy.spatial import cKDTree
 from dem.errors import InputError
 from dem.record.frame import Frame
 from dem.record.run import Run
-from postprocess.geometry.chains import Chain, spheres, strands
-from postprocess.geometry.links import Flags, Floats, Vertices, Whole, checked_vertices, link_lengths, swept_axes
+from postprocess.geometry.links import (
+    Chain,
+    Flags,
+    Floats,
+    Vertices,
+    Whole,
+    checked_vertices,
+    link_lengths,
+    spheres,
+    strands,
+    swept_axes,
+)
 from postprocess.measures.registry import FrameMeasure, Quantity, in_space
 
 # Pairs of links held in memory at a time.
@@ -42,16 +52,10 @@ class ContactPairs(NamedTuple):
 
 
 def contact_pairs(vertices: Vertices, distance: float) -> ContactPairs:
-    """Pairs of smarticles whose centrelines come as close as a given distance.
+    """Find pairs of smarticles whose centrelines come as close as a distance [m], sorted by i, then j.
 
-    With spheres of diameter d along the links, d finds the pairs that touch; boxes of section
-    t1 × t2 can touch at any distance from min(t1, t2) to (t1² + t2²)^½.
-
-    Args:
-        distance: Largest distance of the centrelines [m].
-
-    Returns:
-        The pairs, sorted by i, then j.
+    With spheres of diameter d along the links, d finds the pairs that touch; boxes of section t1 × t2 can touch at any
+    distance from min(t1, t2) to (t1² + t2²)^½.
 
     Raises:
         InputError: Bad distance.
@@ -72,16 +76,13 @@ def contact_pairs(vertices: Vertices, distance: float) -> ContactPairs:
 
 
 def touching_pairs(vertices: Vertices, diameter: float) -> ContactPairs:
-    """Pairs of smarticles that touch where each is what a sphere sweeps along its links.
+    """Find pairs of smarticles that touch where each is what a sphere sweeps along its links, sorted.
 
     On the engine "links" with links of one row these are the pairs that touch. YADE's chains have gaps between their
     beads, where others rest, and there this finds too many, see `pairs_in_contact`, which knows a run's chains.
 
     Args:
         diameter: Of the sphere [m], `Run.sphere_diameter`.
-
-    Returns:
-        The pairs, sorted by i, then j.
 
     Raises:
         InputError: Bad diameter.
@@ -95,18 +96,17 @@ def touching_pairs(vertices: Vertices, diameter: float) -> ContactPairs:
 
 
 def pairs_in_contact(frame: Frame, run: Run) -> ContactPairs:
-    """Pairs of smarticles that touch by the shapes that the run's engine gave them.
+    """Find pairs of smarticles that touch by the shapes that the run's engine gave them, sorted by i, then j.
 
-    Frames hold how many others a smarticle touches, not which; chains of spheres, or strands that a sphere sweeps, tell
-    which. In three runs on YADE (40 smarticles of draft fidelity, pitch 1.3; 60 of standard, pitch 1; 30 of reference,
-    two rows; poured and shaken) this finds 1.000 times the engine's pairs at rest after pouring, every smarticle with
-    as many as the engine said, 1.005 to 1.014 while poured, 1.000 to 1.007 at rest again, and 1.06, 1.06 and 1.11 while
+    In three runs on YADE (40 smarticles of draft fidelity, pitch 1.3; 60 of standard, pitch 1; 30 of reference, two
+    rows; poured and shaken) this finds 1.000 times the engine's pairs at rest after pouring, every smarticle with as
+    many as the engine said, 1.005 to 1.014 while poured, 1.000 to 1.007 at rest again, and 1.06, 1.06 and 1.11 while
     shaken, where contacts that open may carry no force. Of the first two `touching_pairs`, which knows no gaps between
     beads, finds 1.2 at rest and 4 shaken; axes within 1.05 diameters, 1.4 and 6. On links of one strand (40 of draft)
     and of two (40 of reference) it is 1.000 in every phase.
 
     Returns:
-        The pairs, sorted by i, then j; distances are those of spheres or strands.
+        The pairs; distances are those of spheres or strands.
 
     Raises:
         InputError: The scene of the run cannot be read.
@@ -121,7 +121,7 @@ def pairs_in_contact(frame: Frame, run: Run) -> ContactPairs:
 
 
 def chain_of(run: Run) -> Chain:
-    """What stands for a smarticle of a run.
+    """Return the chain that stands for a smarticle of a run.
 
     Raises:
         InputError: The scene of the run cannot be read.
@@ -139,7 +139,7 @@ def chain_of(run: Run) -> Chain:
 
 
 def pairs_of_spheres(centres: Floats, diameter: float) -> ContactPairs:
-    """Pairs of smarticles of whose spheres two touch; centres are (N, S, 3) [m], the diameter is in metres."""
+    """Find pairs of smarticles of whose spheres, of centres (N, S, 3) [m] and one diameter [m], two touch."""
     count, each, _ = centres.shape
     points = centres.reshape(-1, 3)
     pairs = cKDTree(points).query_pairs(diameter, output_type="ndarray").astype(np.int64)
@@ -149,7 +149,7 @@ def pairs_of_spheres(centres: Floats, diameter: float) -> ContactPairs:
 
 
 def _merged(a: Whole, b: Whole, gaps: Floats, count: int) -> ContactPairs:
-    """One pair for all contacts of two smarticles, with the least distance; contacts of one with itself are none."""
+    """Keep one pair for all contacts of two smarticles, with the least distance, and none of one with itself."""
     apart = a != b
     a, b, gaps = a[apart], b[apart], gaps[apart]
     keys, which = np.unique(np.minimum(a, b) * count + np.maximum(a, b), return_inverse=True)
@@ -158,39 +158,11 @@ def _merged(a: Whole, b: Whole, gaps: Floats, count: int) -> ContactPairs:
     return ContactPairs(keys // max(count, 1), keys % max(count, 1), least)
 
 
-def neighbours_in_contact(vertices: Vertices, distance: float) -> Whole:
-    """How many other smarticles come as close to each one as a given distance.
-
-    Args:
-        distance: Largest distance of the centrelines [m].
-
-    Returns:
-        (N,) int64.
-
-    Raises:
-        InputError: Bad distance.
-    """
-    vertices = checked_vertices(vertices)
-    pairs = contact_pairs(vertices, distance)
-    counts = np.bincount(np.concatenate([pairs.i, pairs.j]), minlength=len(vertices))
-    return counts.astype(np.int64)
-
-
 def segment_distances(p0: Floats, p1: Floats, q0: Floats, q1: Floats) -> Floats:
-    """Least distances of segments p0–p1 from segments q0–q1.
+    """Compute least distances (n,) [m] of segments p0–p1 from segments q0–q1, ends (n, 3) [m].
 
-    Either the least distance is at an end of one segment, or it is that of the two lines and is
-    reached inside both. Taking the best of the five holds for parallel segments and for segments
-    of no length as well.
-
-    Args:
-        p0: (n, 3) [m].
-        p1: (n, 3) [m].
-        q0: (n, 3) [m].
-        q1: (n, 3) [m].
-
-    Returns:
-        (n,) [m].
+    Either the least distance is at an end of one segment, or it is that of the two lines and is reached inside both.
+    Taking the best of the five holds for parallel segments and for segments of no length as well.
     """
     u, v, w = p1 - p0, q1 - q0, p0 - q0
     ends = np.minimum.reduce(
@@ -215,7 +187,7 @@ def segment_distances(p0: Floats, p1: Floats, q0: Floats, q1: Floats) -> Floats:
 
 
 def _close_links(starts: Floats, ends: Floats, lengths: Floats, distance: float) -> tuple[Whole, Whole]:
-    """Pairs of links of different smarticles whose bounding spheres come close enough."""
+    """Find pairs of links of different smarticles whose bounding spheres come close enough."""
     if len(starts) == 0:
         return np.empty(0, dtype=np.int64), np.empty(0, dtype=np.int64)
     middles = (starts + ends) / 2
@@ -227,7 +199,7 @@ def _close_links(starts: Floats, ends: Floats, lengths: Floats, distance: float)
 
 
 def _point_distances(points: Floats, origins: Floats, along: Floats) -> Floats:
-    """(n,) [m], distances of points from segments given by an end and a vector."""
+    """Compute distances (n,) [m] of points from segments given by an end and a vector."""
     offset = points - origins
     share = np.clip(_dot(offset, along) / np.maximum(_dot(along, along), 1e-300), 0, 1)
     distances: Floats = np.linalg.norm(offset - share[:, None] * along, axis=1)
@@ -242,19 +214,16 @@ def _dot(a: Floats, b: Floats) -> Floats:
 def without_support(
     vertices: Vertices, contacts: ArrayLike, *, diameter: float, floor_z: float, wall_radius: float | None
 ) -> Flags:
-    """Rattlers: smarticles that nothing holds, neither another one, nor the floor, nor the wall.
+    """Find rattlers (N,): smarticles that nothing holds, neither another one, nor the floor, nor the wall.
 
-    Such a one carries no force for certain. One that does touch something may carry none as well: that would take the
-    forces, which frames do not hold.
+    They carry no force for certain. One that does touch something may carry none as well: that would take the forces,
+    which frames do not hold.
 
     Args:
         contacts: (N,) how many other smarticles each one touches, `Frame.contacts`.
         diameter: Of the sphere that sweeps the links [m], `Run.sphere_diameter`.
         floor_z: Height of the floor [m].
         wall_radius: Of the wall about the axis x = y = 0 [m]; None: there is no wall.
-
-    Returns:
-        (N,) bool.
 
     Source:
         Agnolin & Roux, Phys. Rev. E 76, 061302 (2007): grains that carry no force are left out of the coordination
@@ -268,14 +237,14 @@ def without_support(
 
 
 def on_floor(vertices: Vertices, *, diameter: float, floor_z: float) -> Flags:
-    """(N,) bool, which smarticles touch the floor at a height [m]; arguments as `without_support`."""
+    """Find smarticles (N,) that touch the floor at a height [m]; arguments as `without_support`."""
     axes = swept_axes(checked_vertices(vertices), diameter)
     touching: Flags = axes[..., 2].min(axis=1) - floor_z <= _REACH * diameter / 2
     return touching
 
 
 def at_wall(vertices: Vertices, *, diameter: float, wall_radius: float) -> Flags:
-    """(N, 4) bool, which vertices of smarticles touch the wall: a straight link does so at its ends first.
+    """Find vertices (N, 4) that touch the wall: a straight link does so at its ends first.
 
     Arguments as `without_support`.
     """
@@ -318,6 +287,6 @@ MEASURES = (
         quantities=(Quantity("rattlers", "-"),),
         take=_rattlers_of,
         # The walls of a mould's tiers are not one wall.
-        told_of=lambda run: in_space(run) and run.manifest.container_tiers == 1,
+        available_for=lambda run: in_space(run) and run.manifest.container_tiers == 1,
     ),
 )

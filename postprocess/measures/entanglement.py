@@ -1,11 +1,10 @@
-"""Which links pass through which smarticles.
+"""Find which links pass through which smarticles.
 
-The plane of smarticle A is its quadrilateral barb tip, hinge, hinge, barb tip, closed across the
-mouth. A link of another smarticle B passes through it if its ends lie strictly on the two sides of
-the plane and it meets the plane strictly inside the quadrilateral. Touching is not passing: a link
-that ends in the plane, lies in it, or meets an edge of the quadrilateral does not count, to within
-1e-9 of A's size. Barbs at unequal angles make the quadrilateral concave or cross itself; inside is
-then what its outline winds around.
+The plane of smarticle A is its quadrilateral barb tip, hinge, hinge, barb tip, closed across the mouth. A link of
+another smarticle B passes through it if its ends lie strictly on the two sides of the plane and it meets the plane
+strictly inside the quadrilateral. Touching is not passing: a link that ends in the plane, lies in it, or meets an edge
+of the quadrilateral does not count, to within 1e-9 of A's size. Barbs at unequal angles make the quadrilateral concave
+or cross itself; inside is then what its outline winds around.
 """
 
 from __future__ import annotations
@@ -68,20 +67,6 @@ class LinkPassages(NamedTuple):
     point: Floats
 
 
-class LinkedPairs(NamedTuple):
-    """Pairs of smarticles that are linked when both are closed across their mouths.
-
-    Attributes:
-        i: (P,) int64, the lower index.
-        j: (P,) int64, the higher index.
-        number: (P,) int64, the linking number, never 0; its sign follows the order of the vertices.
-    """
-
-    i: Whole
-    j: Whole
-    number: Whole
-
-
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Entanglement:
     """Crossings of all smarticles of a frame.
@@ -98,14 +83,14 @@ class Entanglement:
 
 
 def entanglement(vertices: Vertices, crossings: Whole | None = None) -> Entanglement:
-    """Crossings of all smarticles, with what the mean needs to skip.
+    """Compute the crossings of all smarticles and their mean, ⟨N⟩.
 
     Args:
-        crossings: What `link_crossings` found of them, where that is known already.
+        crossings: Result of `link_crossings` of them, where that is known already.
 
     Source:
-        Savoie et al., Soft Matter 2023, ⟨N⟩. Unlike in that paper's own code, straight smarticles
-        are skipped as A only, and a smarticle that passes twice counts twice.
+        Savoie et al., Soft Matter 2023, ⟨N⟩. Unlike in that paper's own code, straight smarticles are skipped as A
+        only, and a smarticle that passes twice counts twice.
     """
     vertices = checked_vertices(vertices)
     planes = has_plane(vertices)
@@ -115,10 +100,7 @@ def entanglement(vertices: Vertices, crossings: Whole | None = None) -> Entangle
 
 
 def link_crossings(vertices: Vertices) -> Whole:
-    """How many links of other smarticles pass through each smarticle's plane.
-
-    Returns:
-        (N,) int64; 0 for straight smarticles, see `has_plane`.
+    """Count the links of other smarticles through each smarticle's plane: (N,); 0 for straight ones.
 
     Source:
         Savoie et al., Soft Matter 2023, ⟨N⟩; the module's docstring has the rule at the boundary.
@@ -137,26 +119,20 @@ def link_crossings(vertices: Vertices) -> Whole:
 
 
 def crossing_pairs(vertices: Vertices) -> CrossingPairs:
-    """The pairs behind `link_crossings`, for graphs of entanglement.
-
-    Returns:
-        Pairs with at least one link passing, sorted by i, then j.
-    """
+    """Find the pairs behind `link_crossings`, for graphs of entanglement, sorted by i, then j."""
     vertices = checked_vertices(vertices)
     i, j = _close_pairs(vertices, has_plane(vertices))
-    links = (_signed_crossings(vertices, i, j, closed=False) != 0).sum(axis=1)
-    return CrossingPairs(*_sorted_nonzero(i, j, links))
+    links = _passing(vertices, i, j).sum(axis=1)
+    kept = np.nonzero(links)[0]
+    order = kept[np.lexsort((j[kept], i[kept]))]
+    return CrossingPairs(i[order], j[order], links[order])
 
 
 def link_passages(vertices: Vertices) -> LinkPassages:
-    """The passages that `link_crossings` counts, each with its place.
-
-    Returns:
-        One entry per passing link, sorted by i, then j, then link.
-    """
+    """Find the passages that `link_crossings` counts, each with its place, sorted by i, then j, then link."""
     vertices = checked_vertices(vertices)
     i, j = _close_pairs(vertices, has_plane(vertices))
-    pair, link = np.nonzero(_signed_crossings(vertices, i, j, closed=False))
+    pair, link = np.nonzero(_passing(vertices, i, j))
     order = np.lexsort((link, j[pair], i[pair]))
     i, j, link = i[pair][order], j[pair][order], link[order]
     normal, centre = plane_frames(vertices)[i, 2], vertices[i].mean(axis=1)
@@ -166,32 +142,10 @@ def link_passages(vertices: Vertices) -> LinkPassages:
     return LinkPassages(i, j, link.astype(np.int64), start + share[:, None] * (end - start))
 
 
-def linking_pairs(vertices: Vertices) -> LinkedPairs:
-    """Linking numbers of smarticles closed across their mouths, a topological cross-check.
-
-    Counts how often the outline of one passes through the other, with sign. Unlike the number of
-    crossings it does not depend on which of the two is asked, and a link that passes in and out
-    again adds nothing.
-
-    Returns:
-        Pairs with a linking number other than 0, sorted by i, then j; pairs with a straight
-        smarticle are left out.
-    """
-    vertices = checked_vertices(vertices)
-    planes = has_plane(vertices)
-    i, j = _close_pairs(vertices, planes)
-    once = (i < j) & planes[j]
-    i, j = i[once], j[once]
-    number = _signed_crossings(vertices, i, j, closed=True).sum(axis=1)
-    return LinkedPairs(*_sorted_nonzero(i, j, number))
-
-
 def has_plane(vertices: Vertices) -> Flags:
-    """Which smarticles are bent enough to span a plane.
+    """Find smarticles (N,) that are bent enough to span a plane.
 
-    Returns:
-        (N,) bool, False where the tips are further apart than 0.99 (2l + w), or where all four
-        vertices lie on one line.
+    Others have tips further apart than 0.99 (2l + w), or all four vertices on one line.
     """
     vertices = checked_vertices(vertices)
     unfolded = link_lengths(vertices).sum(axis=1)
@@ -202,49 +156,39 @@ def has_plane(vertices: Vertices) -> Flags:
 
 
 def _close_pairs(vertices: Floats, planes: Flags) -> tuple[Whole, Whole]:
-    """Ordered pairs (i with a plane, j) whose bounding spheres overlap."""
+    """Find ordered pairs (i with a plane, j) whose bounding spheres overlap."""
     low, high = close_pairs(vertices)
     i, j = np.concatenate([low, high]), np.concatenate([high, low])
     return i[planes[i]], j[planes[i]]
 
 
-def _signed_crossings(vertices: Floats, i: Whole, j: Whole, *, closed: bool) -> Whole:
-    """Passages of the links of j through i: (P, 3), or (P, 4) with j's mouth as a fourth.
-
-    The sign is that of the passage along the plane's normal times that of the winding of the
-    outline about it.
-    """
+def _passing(vertices: Floats, i: Whole, j: Whole) -> Flags:
+    """Find which links of j pass through i: (P, 3)."""
     centres, radii = bounding_spheres(vertices)
     frames = plane_frames(vertices)
     corners = np.einsum("nkc,nac->nka", vertices - centres[:, None], frames[:, :2])
-    signs = np.zeros((len(i), 4 if closed else 3), dtype=np.int64)
+    passing = np.zeros((len(i), 3), dtype=bool)
     for start in range(0, len(i), _CHUNK):
-        part = slice(start, start + _CHUNK)
-        a, b = i[part], j[part]
+        a, b = i[start : start + _CHUNK], j[start : start + _CHUNK]
         relative = vertices[b] - centres[a, None]
         heights = np.einsum("pkc,pc->pk", relative, frames[a, 2])
         heights[np.abs(heights) <= _TOLERANCE * radii[a, None]] = 0.0
-        ends = np.roll(heights, -1, axis=1)
-        row, link = np.nonzero((heights * ends < 0)[:, : signs.shape[1]])
-        below, above = heights[row, link], ends[row, link]
-        from_, to = relative[row, link], relative[row, (link + 1) % 4]
+        row, link = np.nonzero(heights[:, :-1] * heights[:, 1:] < 0)
+        below, above = heights[row, link], heights[row, link + 1]
+        from_, to = relative[row, link], relative[row, link + 1]
         hits = from_ + (below / (below - above))[:, None] * (to - from_)
         flat = np.einsum("pc,pac->pa", hits, frames[a[row], :2])
-        winding = _winding(flat, corners[a[row]], _TOLERANCE * radii[a[row]])
-        signs[start + row, link] = winding * np.sign(above - below).astype(np.int64)
-    return signs
+        passing[start + row, link] = _winding(flat, corners[a[row]], _TOLERANCE * radii[a[row]]) != 0
+    return passing
 
 
 def _winding(points: Floats, corners: Floats, tolerance: Floats) -> Whole:
-    """How often the outline of each quadrilateral winds around its point; 0 on an edge.
+    """Count how often the outline of each quadrilateral winds around its point; 0 on an edge.
 
     Args:
         points: (n, 2) [m].
         corners: (n, 4, 2) [m].
         tolerance: (n,) [m], distance from an edge up to which a point lies on it.
-
-    Returns:
-        (n,) int64.
     """
     starts = corners - points[:, None]
     ends = np.roll(starts, -1, axis=1)
@@ -262,12 +206,6 @@ def _winding(points: Floats, corners: Floats, tolerance: Floats) -> Whole:
     return counts
 
 
-def _sorted_nonzero(i: Whole, j: Whole, number: Whole) -> tuple[Whole, Whole, Whole]:
-    keep = np.nonzero(number)[0]
-    order = keep[np.lexsort((j[keep], i[keep]))]
-    return i[order], j[order], number[order]
-
-
 def _entanglement_of(frame: Frame, _: Run) -> tuple[float, int]:
     tangle = entanglement(frame.vertices)
     return tangle.mean, int(tangle.has_plane.sum())
@@ -282,6 +220,6 @@ MEASURES = (
             Quantity("planes", "-"),
         ),
         take=_entanglement_of,
-        told_of=in_space,
+        available_for=in_space,
     ),
 )

@@ -40,7 +40,7 @@ class ForceDistribution(NamedTuple):
 
 
 def checked_forces(normal: ArrayLike) -> Floats:
-    """Normal forces as an array.
+    """Return normal forces as an array.
 
     Raises:
         InputError: Not (M,) finite numbers above 0.
@@ -57,13 +57,7 @@ def checked_forces(normal: ArrayLike) -> Floats:
 
 
 def strong_contacts(normal: ArrayLike) -> Flags:
-    """Which contacts are strong: those whose normal force is above the mean.
-
-    Args:
-        normal: (M,) normal forces [N].
-
-    Returns:
-        (M,) bool.
+    """Find strong contacts (M,): those whose normal force, of (M,) [N], is above the mean.
 
     Raises:
         InputError: Not (M,) finite numbers above 0.
@@ -82,14 +76,9 @@ def strong_contacts(normal: ArrayLike) -> Flags:
 
 
 def force_participation(normal: ArrayLike) -> float:
-    """How evenly contacts share the load [-]: 1 where all carry alike, 1/M where one carries all.
+    """Compute how evenly contacts share the load [-], by their normal forces (M,) [N].
 
-    Args:
-        normal: (M,) normal forces [N].
-
-    Raises:
-        InputError: Not (M,) finite numbers above 0.
-        UndefinedMeasureError: There is none.
+    1 where all carry alike, 1/M where one carries all; raises as `strong_contacts`.
 
     Source:
         Makse, Johnson & Schwartz, Phys. Rev. Lett. 84, 4160 (2000).
@@ -103,10 +92,9 @@ def force_participation(normal: ArrayLike) -> float:
 
 
 def force_distribution(normal: ArrayLike, *, edges: ArrayLike | None = None) -> ForceDistribution:
-    """P(f), the density of normal forces over their mean; of several frames, each over its own mean, joined by hand.
+    """Compute P(f), the density of normal forces (M,) [N] over their mean; average frames by hand.
 
     Args:
-        normal: (M,) normal forces [N].
         edges: (B + 1,) of the bins, f / ⟨f⟩ [-]; 0 to 8 in steps of 0.25 if not given. Larger forces are left out of
             the bins, and counted in the density.
 
@@ -127,14 +115,9 @@ def force_distribution(normal: ArrayLike, *, edges: ArrayLike | None = None) -> 
 
 
 def force_chains(frame: Frame, forces: RecordedForces | None = None) -> Clusters:
-    """Smarticles joined by strong contacts, directly or through others.
+    """Join smarticles by strong contacts, directly or through others; clusters of one smarticle are no chain.
 
-    Args:
-        frame: One of a run's frames.
-        forces: Recorded with it; read if not given.
-
-    Returns:
-        The clusters; those of one smarticle are no chain.
+    The forces recorded with the frame are read if not given.
 
     Raises:
         InputError: The run recorded no forces, or they are damaged.
@@ -178,6 +161,6 @@ MEASURES = (
             Quantity("force chain largest share", "-"),
         ),
         take=_taken_of,
-        told_of=lambda run: run.forces is not None,
+        available_for=lambda run: run.forces is not None,
     ),
 )

@@ -1,4 +1,4 @@
-"""How high a pile stands above the container's floor."""
+"""Measure how high a pile stands above the container's floor."""
 
 from __future__ import annotations
 
@@ -35,11 +35,7 @@ class Heights:
 
 
 def heights(vertices: Vertices, *, floor_z: float = 0.0, percentile: float = 95.0) -> Heights:
-    """All heights of a frame above the floor.
-
-    Args:
-        floor_z: Height of the floor [m].
-        percentile: Share of the material that lies below `top` [%].
+    """Return all heights of a frame above the floor; `percentile` % of the material lies below `top`.
 
     Raises:
         InputError: Bad percentile.
@@ -73,18 +69,14 @@ def least_reaching(growing: Callable[[float], float], level: float, low: float, 
 
 
 def material_height(vertices: Vertices, *, floor_z: float = 0.0, percentile: float = 95.0) -> float:
-    """Height below which a given share of the links' material lies.
+    """Find the height above the floor [m] below which a given share of the links' material lies.
 
-    The material is spread evenly along each link's centreline. The share below a height is then
-    a sum over links of clipped straight lines, and the height is found by bisection: exact,
-    without sampling points along the links.
+    The material is spread evenly along each link's centreline. The share below a height is then a sum over links of
+    clipped straight lines, and the height is found by bisection: exact, without sampling points along the links.
 
     Args:
         floor_z: Height of the floor [m].
         percentile: Share of the material [%], above 0 and up to 100.
-
-    Returns:
-        The height above the floor [m].
 
     Raises:
         InputError: Bad percentile.
@@ -127,6 +119,6 @@ MEASURES = (
             Quantity(f"top {_PERCENTILE:g} % height", "m"),
         ),
         take=_heights_of,
-        told_of=in_space,
+        available_for=in_space,
     ),
 )

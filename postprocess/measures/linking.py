@@ -1,9 +1,9 @@
-"""How far smarticles are wound about each other: linking numbers of open chains, by Gauss's integral.
+"""Measure how far smarticles are wound about each other: linking numbers of open chains, by Gauss's integral.
 
 Of two closed curves the integral is a whole number and a property of their topology; of two open ones, as smarticles
-are, it is a number that goes smoothly with their shapes: the mean, over all directions that one looks from, of half
-the signed crossings that are seen. It needs no plane, unlike `postprocess.measures.entanglement`, so that straight
-smarticles have it too.
+are, it is a number that goes smoothly with their shapes: the mean, over all directions of view, of half the signed
+crossings that are seen. It needs no plane, unlike `postprocess.measures.entanglement`, so that straight smarticles
+have it too.
 """
 
 from __future__ import annotations
@@ -47,13 +47,11 @@ class Linking:
 
 
 def linking(vertices: Vertices, *, far: bool = False) -> Linking:
-    """Linking numbers of pairs of smarticles, each the open chain tip, hinge, hinge, tip.
+    """Compute linking numbers of pairs of smarticles, each the open chain tip, hinge, hinge, tip.
 
     Of open chains far from each other the number falls with the square of the distance only, so that a sum over all
-    pairs grows with the size of the pile. Hence only pairs whose bounding spheres overlap count, those that can hook.
-
-    Args:
-        far: Whether all pairs are wanted; of N = 300 they take 0.1 s, as N².
+    pairs grows with the size of the pile. Hence only pairs whose bounding spheres overlap count, those that can hook;
+    with `far` all pairs, which takes 0.1 s of N = 300, as N².
 
     Source:
         See `gauss_integral`. The integral of open chains as a measure of entanglement: Panagiotou, Kröger & Millett,
@@ -138,7 +136,7 @@ MEASURES = (
         place=42,
         quantities=(Quantity("linking mean", "-"),),
         take=_linking_of,
-        told_of=in_space,
+        available_for=in_space,
         costly=True,
     ),
 )

@@ -1,4 +1,4 @@
-"""How well a pile fills the tiers of a mould, and what of that is there when the mould is gone."""
+"""Measure how well a pile fills the tiers of a mould, and how much of that is left without the mould."""
 
 from __future__ import annotations
 
@@ -11,22 +11,22 @@ from numpy.typing import ArrayLike
 from dem.record.run import Run
 from postprocess.geometry.links import Flags, Floats, Vertices, checked_vertices, link_lengths
 from postprocess.geometry.outline import outlines
-from postprocess.geometry.region import Region
+from postprocess.geometry.voxel import Region
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Cast:
-    """A pile in its mould, and the same pile without it.
+    """A pile in its mould, and that pile without it, after.
 
     Attributes:
         filled_before: (T,) share of each tier's volume that is inside the pile, see `postprocess.geometry.outline` [-].
-        filled_after: (T,) the same without the mould [-].
+        filled_after: (T,) likewise without the mould [-].
         kept: (T,) of what was filled before, the share that still is [-]; NaN for an empty tier.
         material_before: (T,) share of all links' length inside each tier [-].
-        material_after: (T,) the same without the mould [-].
+        material_after: (T,) likewise without the mould [-].
         overlap: Volume common to the pile before and after over that of both together (Jaccard) [-].
-        likeness: The same of the pile after and the whole mould: 1 for a perfect cast [-].
-        likeness_before: The same of the pile before and the mould [-].
+        likeness: Of the pile after and the whole mould: 1 for a perfect cast [-].
+        likeness_before: Of the pile before and the mould [-].
     """
 
     filled_before: Floats
@@ -48,14 +48,14 @@ def cast(
     ball: float,
     pitch: float | None = None,
 ) -> Cast:
-    """Compares a pile in a mould with the same pile after the mould was taken away.
+    """Compare a pile in a mould with that pile after the mould was taken away.
 
     Shares of a tier are of its voxels, so that a tier that is all inside the pile has 1 and one without a link
     has 0, however coarse the voxels.
 
     Args:
-        before: (N, 4, 3) [m], in the mould, heights above the floor.
-        after: (N, 4, 3) [m], without the mould.
+        before: Vertices in the mould, heights above the floor.
+        after: Vertices without the mould, likewise.
         tiers: T cylinders, from the lowest, heights above the floor.
         thickness: Of the links, taken as round [m].
         ball: Radius of the ball that the outline is found with [m].
@@ -82,10 +82,7 @@ def cast(
 
 
 def read_tiers(run: Run) -> tuple[Region, ...]:
-    """The tiers of a run's container, heights above its floor.
-
-    Returns:
-        The tiers from below; none where the container is one cylinder.
+    """Read the tiers of a run's container, from below, heights above its floor; none of one cylinder.
 
     Raises:
         InputError: The file is missing or damaged, or a tier lacks its sizes.
@@ -105,7 +102,7 @@ def _share(part: Flags, whole: Flags) -> float:
 
 
 def _material(vertices: Vertices, tiers: Sequence[Region], samples: int = 50) -> Floats:
-    """(T,) share of all links' length in each tier, by points evenly along each link."""
+    """Return shares (T,) of all links' length in each tier, by points evenly along each link."""
     vertices = checked_vertices(vertices)
     shares = (np.arange(samples) + 0.5) / samples
     along = np.diff(vertices, axis=1)[:, :, None]

@@ -1,4 +1,4 @@
-"""Whether smarticles lie alike: the nematic order of their middle links."""
+"""Measure whether smarticles lie alike: the nematic order of their middle links."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from postprocess.measures.registry import FrameMeasure, Quantity, in_space
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class NematicOrder:
-    """Order of directions without a head.
+    """Nematic order: that of directions whose sign does not count.
 
     Attributes:
         tensor: (3, 3) float64 [-], Q = ⟨(3 u u - 1) / 2⟩, symmetric and without a trace.
@@ -42,13 +42,7 @@ class NematicOrder:
 
 
 def nematic_order(directions: ArrayLike) -> NematicOrder:
-    """Order of directions.
-
-    Args:
-        directions: (N, 3), of any length above 0.
-
-    Returns:
-        Q, its largest eigenvalue and its director.
+    """Compute the nematic order of directions (N, 3), of any length above 0.
 
     Raises:
         InputError: Not (N, 3) finite vectors with a length.
@@ -97,6 +91,6 @@ MEASURES = (
             Quantity("upright order", "-"),
         ),
         take=_nematic_of,
-        told_of=in_space,
+        available_for=in_space,
     ),
 )

@@ -17,9 +17,8 @@ from dem.record.frame import Frame
 from dem.record.packing import filled
 from dem.record.run import Run
 from postprocess.geometry.links import UndefinedMeasureError, Vertices, checked_vertices
-from postprocess.geometry.region import Region, inner_region
 from postprocess.geometry.voronoi import local_packing
-from postprocess.geometry.voxel import solid_fraction
+from postprocess.geometry.voxel import Region, inner_region, solid_fraction
 from postprocess.measures.heights import heights, material_height
 from postprocess.measures.registry import FrameMeasure, Quantity, Shown, in_space
 
@@ -68,7 +67,7 @@ def packing_fraction(
     high: float = 0.8,
     spacing: float | None = None,
 ) -> PackingFraction:
-    """Packing fraction of smarticles in an upright cylinder.
+    """Compute the packing fraction of smarticles in an upright cylinder.
 
     Args:
         radius: Radius of the container [m].
@@ -86,8 +85,8 @@ def packing_fraction(
             the smaller thickness, or w/8, if not given.
 
     Raises:
-        InputError: Unknown definition, bad vertices or sizes, or missing thicknesses.
-        UndefinedMeasureError: Too few smarticles, or none where the definition looks.
+        InputError: Unknown definition, bad sizes, or missing thicknesses.
+        UndefinedMeasureError: Too few smarticles, or none where the definition counts them.
 
     Source:
         "second-highest-com": wsavoie/SmarticleSim, without the factor (0.0234/0.0224)² = 1.091
@@ -144,14 +143,10 @@ def packing_fraction(
 
 
 def packing_of(frame: Frame, run: Run, *, definition: str) -> float:
-    """Packing fraction of a frame of a run [-]; NaN where it has no meaning.
-
-    Args:
-        definition: Key of `DEFINITIONS`.
-    """
+    """Return the packing fraction of a frame of a run [-], by a key of `DEFINITIONS`; NaN where it has no meaning."""
     if not run.manifest.fills_cylinder(frame.phase):
         return math.nan
-    # The costly ones look inside the pile, where it is only the wall that can be in the way.
+    # The costly ones count inside the pile, where only the wall can be in the way.
     radius = run.manifest.container_radius_m if definition in COSTLY_DEFINITIONS else run.manifest.measured_radius_m
     try:
         return packing_fraction(
@@ -183,7 +178,7 @@ MEASURES = tuple(
         place=70,
         quantities=(Quantity(f"phi {definition}", "-", _SHOWN[definition]),),
         take=partial(_packing, definition),
-        told_of=in_space,
+        available_for=in_space,
         definition=definition,
         costly=definition in COSTLY_DEFINITIONS,
     )

@@ -1,4 +1,4 @@
-"""Where in a container the material is: φ(r, z), the packing fraction of rings about the axis, layer by layer."""
+"""Measure where in a container the material is: φ(r, z), the packing fraction of rings, layer by layer."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ class PackingProfile:
 
     @property
     def solid_volume(self) -> float:
-        """Volume of all links' boxes, counted once where they overlap [m³]: all rings and layers, and what is outside.
+        """Volume of all links' boxes, in rings and layers and outside, counted once where they overlap [m³].
 
         Links of a U overlap at their hinges by t1 t2² / 2, which t1 t2 (w + 2l) counts twice.
         """
@@ -56,7 +56,7 @@ def packing_profile(
     layer: float | None = None,
     pitch: float | None = None,
 ) -> PackingProfile:
-    """φ(r, z) of smarticles in an upright cylinder about x = y = 0.
+    """Compute φ(r, z) of smarticles in an upright cylinder about x = y = 0, by points as of "voxel".
 
     Args:
         radius: Of the container [m].
@@ -69,10 +69,7 @@ def packing_profile(
             makes 16 points of the section of 1.27 × 0.5 mm² and some hundreds in the smallest ring of a loose pile.
 
     Raises:
-        InputError: Bad vertices, sizes, or numbers of rings and layers.
-
-    Source:
-        Counted points as in the definition "voxel" of `postprocess.measures.packing`.
+        InputError: Bad sizes or numbers of rings and layers.
     """
     if not (math.isfinite(radius) and radius > 0 and rings >= 1):
         msg = f"a profile needs a radius above 0 m and 1 ring or more: got {radius} m, {rings} rings"
@@ -97,14 +94,11 @@ def packing_profile(
 
 
 def profile_table(run: Run, *, rings: int = 6, layer: float | None = None) -> pd.DataFrame:
-    """φ(r, z) of the last frame of each phase of a run that has one.
+    """Compute φ(r, z) of the last frame of each phase of a run: a row per phase, ring and layer.
 
     Args:
         rings: Rings of equal width.
         layer: Thickness of the layers [m]; a ring's width if not given.
-
-    Returns:
-        A row per phase, ring and layer, with units in the column names.
 
     Raises:
         InputError: The run is in a plane, its container is no one cylinder, or as `packing_profile`.

@@ -1,4 +1,4 @@
-"""What a hook tells that is pulled out of a pile: its force against time, peak, work, and whether it came free.
+"""Measure the pull of a hook out of a pile: its force against time, peak, work, and whether it came free.
 
 Forces are those that it takes to raise the hook, upwards positive: what the smarticles exert on it, with the other
 sign. The series holds means between samples, so nothing is missed between two of them, but contacts come and go and
@@ -40,8 +40,8 @@ class HookPull:
         raised: (n + 1,) how far the hook has been raised there [m].
         force: (n,) needed to raise it, mean between two samples [N].
         held: (n,) with which the smarticles pull the other hook upwards, likewise [N]: what goes from hook to hook.
-        before: The same force before the pull [N]: what rested on the hook; negative where it was held up.
-        engine_work: Work of the hook on the smarticles by the engine's own account [J]; NaN where not recorded.
+        before: The force before the pull [N]: what rested on the hook; negative where it was held up.
+        engine_work: Work of the hook on the smarticles by the engine's own ledger [J]; NaN where not recorded.
     """
 
     edges: Floats = field(repr=False)
@@ -64,7 +64,7 @@ class HookPull:
 
     @property
     def net(self) -> HookPull:
-        """The same history with the force that does not go on to the other hook: that of pile and container."""
+        """The history with the force that does not go on to the other hook: that of pile and container."""
         return replace(self, force=self.force - self.held)
 
     @property
@@ -89,10 +89,7 @@ class Peak:
 
 
 def read_pull(run: Run, series: Series, phase: int) -> HookPull:
-    """A hook's history in a phase, so far as it has come.
-
-    Args:
-        phase: Index of a phase that pulls a hook.
+    """Read a hook's history in a phase, by its index, so far as it has come.
 
     Raises:
         InputError: The series lacks the hook's force or height, or does not reach into the phase.
@@ -119,20 +116,18 @@ def read_pull(run: Run, series: Series, phase: int) -> HookPull:
 
 
 def weight_of_one(run: Run) -> float:
-    """W_s, weight of one smarticle [N].
+    """Return W_s, weight of one smarticle [N].
 
     Raises:
-        InputError: The scene cannot be read, or does not tell gravity.
+        InputError: The scene cannot be read, or lacks gravity.
     """
     return float(run.manifest.smarticle_mass_kg * run.scene["gravity_m_per_s2"])
 
 
 def moving_mean(pull: HookPull, window: float = WINDOW) -> tuple[Floats, Floats]:
-    """Means of the force over every window: middles (m,) [s] and forces (m,) [N].
+    """Average the force over every window: middles (m,) [s] and forces (m,) [N].
 
-    Args:
-        pull: The history.
-        window: [s]; rounded to whole samples, one at least, all at most.
+    The window [s] is rounded to whole samples, one at least, all at most.
     """
     count = _samples(pull.edges, window)
     weights = np.full(count, 1 / count)
@@ -140,7 +135,7 @@ def moving_mean(pull: HookPull, window: float = WINDOW) -> tuple[Floats, Floats]
 
 
 def peak(pull: HookPull, window: float = WINDOW) -> Peak:
-    """The largest mean over a window; arguments as in `moving_mean`."""
+    """Return the largest mean over a window; arguments as in `moving_mean`."""
     times, means = moving_mean(pull, window)
     highest = int(means.argmax())
     time = float(times[highest])
@@ -148,13 +143,13 @@ def peak(pull: HookPull, window: float = WINDOW) -> Peak:
 
 
 def held_at(pull: HookPull, time: float, window: float = WINDOW) -> float:
-    """Mean over a window about a time, since the pull began [s], of the force on the other hook [N]."""
+    """Average the force on the other hook [N] over a window about a time since the pull began [s]."""
     times, means = moving_mean(replace(pull, force=pull.held), window)
     return float(np.interp(time, times, means))
 
 
 def freed(pull: HookPull, window: float = WINDOW) -> float:
-    """Time from which the windowed force stays below `FREE` of its peak [s]; NaN if it does not come to that."""
+    """Return the time from which the windowed force stays below `FREE` of its peak [s]; NaN if it never does."""
     times, means = moving_mean(pull, window)
     held = np.nonzero(means > FREE * means.max())[0]
     if not len(held) or held[-1] + 1 == len(means):
@@ -163,11 +158,10 @@ def freed(pull: HookPull, window: float = WINDOW) -> float:
 
 
 def held_fast(pull: HookPull, asked: SceneData) -> bool:
-    """Whether the hook was stopped by its force limit on the way, so that its peak is a lower bound.
+    """Whether the hook was stopped by its force limit in a whole pull, so that its peak is a lower bound.
 
     Args:
-        pull: A whole pull.
-        asked: What the scene says of the phase.
+        asked: The phase in the scene.
 
     Raises:
         InputError: The scene does not say how far.
@@ -177,7 +171,7 @@ def held_fast(pull: HookPull, asked: SceneData) -> bool:
 
 
 def _pull_of(run: Run, series: Series, phase: int) -> tuple[float, ...]:
-    """Measures of a pull for a table, forces over the weight of all smarticles, n W_s."""
+    """Measure a pull for a table, forces over the weight of all smarticles, n W_s."""
     pull, weight = read_pull(run, series, phase), weight_of_one(run)
     highest = peak(pull)
     ended = run.phases[phase].end_s is not None
@@ -200,7 +194,7 @@ def has_pull(series: Series, phase: int) -> bool:
 
 
 def _samples(edges: Floats, window: float) -> int:
-    """Samples in a window [s], one at least and all at most."""
+    """Return the samples in a window [s], one at least and all at most."""
     return min(max(round(window / float(np.median(np.diff(edges)))), 1), len(edges) - 1)
 
 
@@ -220,6 +214,6 @@ MEASURES = (
             Quantity("hook held fast", "-"),
         ),
         take=_pull_of,
-        told_of=has_pull,
+        available_for=has_pull,
     ),
 )

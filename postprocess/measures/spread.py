@@ -1,4 +1,4 @@
-"""How many smarticles there are, and how many escaped; how a pile spreads, leans and sheds that no wall holds."""
+"""Count smarticles and those that escaped; measure how a pile without a wall spreads, leans and sheds."""
 
 from __future__ import annotations
 
@@ -46,10 +46,10 @@ class FreePile:
         touching: Share of the smarticles in the largest cluster joined by contact [-].
         entangled: Share of them in the largest cluster joined by entanglement [-].
         radius_half: Radius about the vertical through the centre of mass that holds half of the material [m].
-        radius_most: The same for 95 % [m].
+        radius_most: Radius that holds 95 % of it [m].
         sloughed: Share of the smarticles farther from the pile's middle than the wall was, see `OUTSIDE` [-].
         tilt: Angle of the pile from the vertical [degree], see `tilt`.
-        offset: How far the centre of mass is from the vertical through the foot [m].
+        offset: Distance of the centre of mass from the vertical through the foot [m].
     """
 
     touching: float
@@ -64,10 +64,9 @@ class FreePile:
 def free_pile(
     vertices: Vertices, run: Run, *, floor_z: float = 0.0, foot: tuple[float, float] = (0.0, 0.0)
 ) -> FreePile:
-    """All measures of a pile without a wall.
+    """Measure a pile without a wall, of a run's container and smarticles.
 
     Args:
-        run: The run, for its container and its smarticles.
         floor_z: Height of the floor [m].
         foot: x and y of the point that the pile stands on [m]: the container's axis if not given, better the place
             of the centre of mass while the wall was there.
@@ -91,7 +90,7 @@ def free_pile(
 
 
 def centre_of_mass(vertices: Vertices) -> Floats:
-    """(3,) [m], of the whole pile.
+    """Return the centre of mass (3,) [m] of the whole pile.
 
     Raises:
         UndefinedMeasureError: There is no smarticle.
@@ -107,7 +106,7 @@ def centre_of_mass(vertices: Vertices) -> Floats:
 
 
 def spread_radius(vertices: Vertices, *, share: float, axis: tuple[float, float] | None = None) -> float:
-    """Radius about a vertical axis that holds a given share of the links' material.
+    """Find the radius [m] about a vertical axis that holds a given share of the links' material.
 
     The material is spread evenly along each link's centreline. What of a link lies within a radius is where a
     straight line is inside a circle, seen from above; the radius is found by bisection: exact, without sampling.
@@ -115,9 +114,6 @@ def spread_radius(vertices: Vertices, *, share: float, axis: tuple[float, float]
     Args:
         share: Of the material [-], above 0 and up to 1.
         axis: x and y of the axis [m]; that of the pile's centre of mass if not given.
-
-    Returns:
-        The radius [m].
 
     Raises:
         InputError: Bad share.
@@ -137,14 +133,7 @@ def spread_radius(vertices: Vertices, *, share: float, axis: tuple[float, float]
 
 
 def share_outside(vertices: Vertices, radius: float, *, axis: tuple[float, float] = (0.0, 0.0)) -> float:
-    """Share of the smarticles whose centre of mass is farther than a radius from a vertical axis.
-
-    Args:
-        radius: [m].
-        axis: x and y of the axis [m].
-
-    Returns:
-        The share [-].
+    """Return the share [-] of smarticles whose centre of mass is farther than a radius [m] from an axis.
 
     Raises:
         UndefinedMeasureError: There is no smarticle.
@@ -157,26 +146,23 @@ def share_outside(vertices: Vertices, radius: float, *, axis: tuple[float, float
 
 
 def middle(vertices: Vertices) -> tuple[float, float]:
-    """Middle of a pile seen from above, x and y [m]: medians of the centres of mass, which few strays do not move."""
+    """Return the middle of a pile seen from above, x and y [m]: medians of centres of mass, which ignore strays."""
     x, y = np.median(centres_of_mass(vertices)[:, :2], axis=0)
     return float(x), float(y)
 
 
 def tilt(vertices: Vertices, *, foot: tuple[float, float] = (0.0, 0.0), floor_z: float = 0.0) -> float:
-    """Angle between the vertical and the line from a pile's foot to its centre of mass.
+    """Return the angle [rad], 0 to π/2, between the vertical and the line from a pile's foot to its centre of mass.
 
     A pile that is turned rigidly about its foot by an angle has that tilt; one that spreads evenly to all sides has
     none. The principal axis of the pile's inertia would not do: it lies level in every pile that is lower than
-    about 1.7 times its radius (a solid cylinder's axes change places there), and it cannot tell a leaning pile from a
-    sheared one. The foot is a place on the floor and not the middle of what now lies on it: a column that has
-    fallen over lies above the middle of its side, and would be upright.
+    about 1.7 times its radius (a solid cylinder's axes change places there), and a leaning pile has the axis of a
+    sheared one. The foot is a place on the floor and not the middle of what now lies on it: a column that has fallen
+    over lies above the middle of its side, and would be upright.
 
     Args:
         foot: x and y of the point of the floor that the pile stood on [m].
         floor_z: Height of the floor [m].
-
-    Returns:
-        The angle [rad], 0 to π/2.
 
     Raises:
         UndefinedMeasureError: There is no smarticle, or the centre of mass is not above the floor.
@@ -202,7 +188,7 @@ def has_toppled(offset: float, base_radius: float) -> bool:
 
 
 def _shares_within(start: Floats, along: Floats, radius: float) -> Floats:
-    """(n,) shares of straight lines (start, start + along), each (n, 2), within a circle about the origin."""
+    """Return shares (n,) of lines (start, start + along), each (n, 2), within a circle about the origin."""
     square, mixed = (along**2).sum(axis=1), (start * along).sum(axis=1)
     inside = radius**2 - (start**2).sum(axis=1)
     # Upright links are points seen from above.
@@ -223,7 +209,7 @@ def _free_pile_of(frame: Frame, run: Run) -> tuple[float, ...]:
 
 
 def escaped(frame: Frame, run: Run) -> int:
-    """Smarticles with their centre of mass beside or below the container."""
+    """Count smarticles with their centre of mass beside or below the container."""
     centres = centres_of_mass(frame.vertices)
     outside = np.hypot(centres[:, 0], centres[:, 1]) > run.manifest.container_radius_m
     return int((outside | (centres[:, 2] < frame.floor_z)).sum())
@@ -241,7 +227,7 @@ MEASURES = (
         place=20,
         quantities=(Quantity("escaped", "-"),),
         take=lambda frame, run: (escaped(frame, run),),
-        told_of=in_space,
+        available_for=in_space,
     ),
     FrameMeasure(
         name="free pile",
@@ -256,6 +242,6 @@ MEASURES = (
         ),
         take=_free_pile_of,
         # Of a run that takes its wall away.
-        told_of=lambda run: not (run.manifest.planar or run.manifest.walled(run.phases[-1].index)),
+        available_for=lambda run: not (run.manifest.planar or run.manifest.walled(run.phases[-1].index)),
     ),
 )

@@ -1,4 +1,4 @@
-"""What a strain test of a chain tells: force against strain, peak, yield, fracture, widening.
+"""Measure a strain test of a chain: force against strain, peak, yield, fracture, widening.
 
 Strain is that of the distance along x between the two points where strings are tied; force is that of the pulled
 string. A chain holds as long as it carries a fifth of its peak force; what comes after is its fracture.
@@ -105,7 +105,7 @@ def has_strain(series: Series) -> bool:
 
 
 def _strain_of(run: Run, _: Series, __: int) -> tuple[float, ...]:
-    """Measures of a strain test for a table; what its end tells is NaN while the run is not done."""
+    """Measure a strain test for a table; what depends on its end is NaN while the run is not done."""
     found = measured(read_strain_test(run))
     if run.status.state != "done":
         found |= dict.fromkeys((FRACTURE, YIELD, DROP), math.nan)
@@ -113,7 +113,7 @@ def _strain_of(run: Run, _: Series, __: int) -> tuple[float, ...]:
 
 
 def read_strain_test(run: Run) -> StrainTest:
-    """The strain test of a run.
+    """Read the strain test of a run.
 
     Raises:
         InputError: There is none, or its series cannot be read.
@@ -138,7 +138,7 @@ def read_strain_test(run: Run) -> StrainTest:
 
 
 def measured(pull: StrainTest) -> dict[str, float]:
-    """The quantities of one strain test; see `QUANTITIES`."""
+    """Return the quantities of one strain test, see `QUANTITIES`."""
     end = pull.fracture + 1
     strains, forces = pull.strains[:end], pull.forces[:end]
     peak = int(np.argmax(forces))
@@ -164,17 +164,16 @@ def measured(pull: StrainTest) -> dict[str, float]:
 
 
 def _mean_over(values: Array, samples: float) -> Array:
-    """Moving mean over a number of samples, over fewer at the ends."""
+    """Return the moving mean over a number of samples, over fewer at the ends."""
     window = np.ones(max(1, round(samples)))
     means: Array = np.convolve(values, window, "same") / np.convolve(np.ones_like(values), window, "same")
     return means
 
 
 def first_drop(forces: Array) -> tuple[int, float]:
-    """The first maximum after which a tenth of the force is lost, or the greatest one.
+    """Find the first maximum after which a tenth of the force (n,) [N] is lost, or the greatest one.
 
-    Args:
-        forces: (n,) [N]; what is lost below three tenths of the peak does not count.
+    What is lost below three tenths of the peak does not count.
 
     Returns:
         Its index, and the share of the force that is lost before the maximum is passed again [-].
@@ -190,7 +189,7 @@ def first_drop(forces: Array) -> tuple[int, float]:
 
 
 def _slopes(strains: Array, forces: Array) -> tuple[float, float]:
-    """Slope of force against strain [N], and that of the upper half of the forces over that of the lower [-]."""
+    """Return the slope of force against strain [N], and that of the upper half over that of the lower [-]."""
     top = forces[-1]
     ranges = ((0.2, 0.8), (0.2, 0.5), (0.5, 0.8))
     slopes = []
@@ -208,6 +207,6 @@ MEASURES = (
         phases=(STRAIN,),
         quantities=tuple(_MEANINGS),
         take=_strain_of,
-        told_of=lambda series, _: has_strain(series),
+        available_for=lambda series, _: has_strain(series),
     ),
 )

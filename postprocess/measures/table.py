@@ -56,16 +56,16 @@ class PackingChange:
 def measure_run(
     run: Run, *, definitions: Sequence[str] = tuple(DEFINITIONS), costly: Costly = "phase-end"
 ) -> pd.DataFrame:
-    """All measures of a run, one row per frame; the run may be done, failed or still going on.
+    """Measure a run, which may be done, failed or still going on: one row per frame.
 
-    A value without meaning for its frame (a packing fraction of one smarticle, the mean crossings
-    of straight ones) is NaN, as are costly values where they were not asked for. What the engine
-    recorded in `series.h5` is taken at the sample nearest in time, if that file exists.
+    A value without meaning for its frame (a packing fraction of one smarticle, the mean crossings of straight ones) is
+    NaN, as are costly values where they were not asked for. What the engine recorded in `series.h5` is taken at the
+    sample nearest in time, if that file exists.
 
     Args:
         definitions: Definitions of the packing fraction, keys of `packing.DEFINITIONS`.
-        costly: Whether the costly ones among them are taken never, at the last frame of each
-            phase recorded so far, or at every frame.
+        costly: Whether the costly ones among them are taken never, at the last frame of each phase recorded so far, or
+            at every frame.
 
     Returns:
         A table with units in its column names.
@@ -88,12 +88,11 @@ def summarise_run(
     costly: Costly = "phase-end",
     phases: Collection[int] | None = None,
 ) -> pd.DataFrame:
-    """Measures of a run averaged over the last frames of each phase, one row per phase.
+    """Measure a run averaged over the last frames of each phase: one row per phase.
 
-    Each measure has a second column, "… SE", with the standard error of the mean as in
-    `averages.mean_with_error`, which allows for correlated frames. Costly packing fractions are
-    those of the last frame alone, without an error, unless asked for at every frame. A phase has
-    what it tells as a whole beside, see `registry.PhaseMeasure`.
+    Each measure has a second column, "… SE", with the standard error of the mean as in `seeds.mean_with_error`, which
+    allows for correlated frames. Costly packing fractions are those of the last frame alone, without an error, unless
+    asked for at every frame. Measures of whole phases stand beside, see `registry.PhaseMeasure`.
 
     Args:
         last: Frames to average; "frames averaged" says how many there were.
@@ -138,10 +137,10 @@ def packing_change(
     last: int = LAST_FRAMES,
     activity: Collection[str] | None = None,
 ) -> PackingChange:
-    """φ_0 and φ_f of a run: before its first activity and at the end of its last one.
+    """Compute φ_0 and φ_f of a run: before its first activity and at the end of its last one.
 
-    Only frames of the one phase are averaged, even if it has fewer than asked for: those before
-    it belong to another state of the pile.
+    Only frames of the one phase are averaged, even if it has fewer than asked for: those before it belong to another
+    state of the pile.
 
     Args:
         definition: Key of `packing.DEFINITIONS`.
@@ -203,7 +202,7 @@ def _open(run: Run, definitions: Iterable[str]) -> tuple[FrameSequence, Series |
 
 
 def _phases(run: Run, frames: FrameSequence) -> list[FrameSequence]:
-    """The frames of each phase that has any."""
+    """Return the frames of each phase that has any."""
     parts = [frames.in_phase(phase.index) for phase in run.phases]
     if sum(map(len, parts)) != len(frames):
         msg = (
@@ -217,9 +216,9 @@ def _phases(run: Run, frames: FrameSequence) -> list[FrameSequence]:
 def _rows(
     part: FrameSequence, run: Run, series: Series | None, definitions: Sequence[str], costly: Costly, *, offset: int = 0
 ) -> list[dict[str, object]]:
-    """One row per frame of a part of one phase; `offset` is the number of its first frame."""
+    """Return one row per frame of a part of one phase; `offset` is the number of its first frame."""
     rows: list[dict[str, object]] = []
-    measures = [measure for measure in frame_measures(definitions) if measure.told_of(run)]
+    measures = [measure for measure in frame_measures(definitions) if measure.available_for(run)]
     for number, frame in enumerate(part):
         take_costly = costly == "every-frame" or (costly == "phase-end" and number == len(part) - 1)
         row: dict[str, object] = _labels(run)

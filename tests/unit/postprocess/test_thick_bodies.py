@@ -19,7 +19,7 @@ from dem.record.frames import FrameWriter
 from dem.record.run import open_run
 from dem.scene.reading import dump_scene
 from postprocess.bodies.meshes import link_boxes
-from postprocess.geometry import chains
+from postprocess.geometry import links
 from postprocess.measures.contacts import chain_of
 
 W, L, T1, BARB, BODY = 0.0467, 0.042, 0.021, 0.0095, 0.0213
@@ -85,13 +85,13 @@ def test_spheres_are_where_the_simulator_puts_them(angles: tuple[float, float], 
     particle = Particle(boxes, SphereChain(rows=1, diameter=BARB, pitch=pitch * BARB))
     turn = Rotation.from_euler("xyz", [0.3, -1.1, 2.0]).as_matrix()
     known = chain_of(open_run(run))
-    chain = chains.Chain(
+    chain = links.Chain(
         diameter=known.diameter, rows=known.rows, width=known.width, pitch=pitch * BARB, bulge=known.bulge
     )
-    found = chains.spheres((boxes.vertices @ turn.T)[None], chain)[0]
+    found = links.spheres((boxes.vertices @ turn.T)[None], chain)[0]
     expected = particle.centres @ turn.T
     assert found.shape == expected.shape
     apart = np.linalg.norm(found[:, None] - expected, axis=2)
     assert apart.min(axis=0).max() < 1e-12
     assert apart.min(axis=1).max() < 1e-12
-    assert (chains._CLEARANCE, chains._INWARDS) == (HINGE_CLEARANCE, INWARDS)
+    assert (links._CLEARANCE, links._INWARDS) == (HINGE_CLEARANCE, INWARDS)

@@ -73,7 +73,7 @@ def test_chains_are_joined_by_strong_contacts_alone(run: Path) -> None:
 
 def test_a_run_that_records_none_has_no_such_columns_and_says_how_to(run: Path) -> None:
     assert not has_forces(run)
-    assert not MEASURE.told_of(open_run(run))
+    assert not MEASURE.available_for(open_run(run))
     assert not [name for name in measure_run(Run(run)).columns if "force" in name and "chain" in name]
     with pytest.raises(InputError, match=r"cannot read forces .*force_000000.vtu: .*recording.contact_forces: true"):
         read_forces(read_frames(run)[0])

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from postprocess.geometry.outline import outlines
-from postprocess.geometry.region import Region
+from postprocess.geometry.voxel import Region
 from postprocess.measures.mould import cast
 
 T = 1e-3

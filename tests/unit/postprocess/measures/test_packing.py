@@ -6,9 +6,8 @@ from scipy.spatial.transform import Rotation
 
 from dem.errors import InputError
 from postprocess import DEFINITIONS, packing_fraction
-from postprocess.geometry.region import Region
 from postprocess.geometry.voronoi import local_packing
-from postprocess.geometry.voxel import solid_fraction
+from postprocess.geometry.voxel import Region, solid_fraction
 
 T1, T2 = 0.11, 0.05
 SOLID = T1 * T2 * 2.4
