@@ -57,12 +57,7 @@ _FACES = np.array([[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2
 
 
 def checked_kinds(wanted: Sequence[str], unwanted: Sequence[str], *, also: Sequence[str] = ()) -> tuple[str, ...]:
-    """Return the kinds to export.
-
-    Args:
-        wanted: Besides those that are exported anyway.
-        unwanted: To leave out.
-        also: What else may be left out.
+    """Return the kinds to export: the usual and the wanted ones without the unwanted; `also` may be left out too.
 
     Raises:
         InputError: An unknown kind, or nothing is left.
@@ -83,7 +78,8 @@ class Bodies:
     """The bodies of one run, frame after frame.
 
     Args:
-        kinds: Which bodies, keys of `KINDS`.
+        run: The run.
+        kinds: Keys of `KINDS`.
         fields: What the smarticles carry.
         cut: Whether walls end a little above the pile, as in pictures.
 
@@ -240,18 +236,17 @@ class Bodies:
 def link_boxes(
     vertices: Vertices, *, thickness_normal: float, thickness_in_plane: float | Sequence[float]
 ) -> pv.PolyData:
-    """Return the links of all smarticles as one mesh of boxes.
+    """Return the links of all smarticles as one mesh of boxes, six quadrilaterals and eight points each [m].
 
     The section of a straight smarticle, or of one without barbs, is turned about its length by an angle that four
-    vertices do not tell: some angle is taken. Links without length have no box.
+    vertices do not give: some angle is taken. Links without length have no box.
 
     Args:
         thickness_normal: t1, along the normal of the smarticle's plane [m].
         thickness_in_plane: t2, in the smarticle's plane [m]; of all links, or of barb 1, middle link and barb 2.
 
     Returns:
-        Six quadrilaterals and eight points per box [m]; cell data `smarticle`, the index into
-        `vertices`, and `link`, 0 to 2.
+        The mesh, with cell data `smarticle`, the index into `vertices`, and `link`, 0 to 2.
 
     Raises:
         InputError: Bad thicknesses.
@@ -302,15 +297,11 @@ def force_lines(forces: RecordedForces) -> pv.PolyData:
 
 
 def solid(kind: str, mesh: pv.PolyData, run: Run, *, largest: float | None = None) -> pv.PolyData:
-    """Return a body as triangles alone.
+    """Return a body of a kind as triangles alone.
 
     Strings become tubes a fifth of a link thick, crossings arrows a third of w long, forces tubes as thick as a link at
-    most, whose thickness is in proportion to the normal force; boxes stay what they are.
-
-    Args:
-        kind: Key of `KINDS`.
-        mesh: Of `Bodies.at`.
-        largest: Normal force of the thickest tube [N]; that of this mesh if not given.
+    most, whose thickness is in proportion to the normal force; boxes stay what they are. The thickest tube is that of
+    the normal force `largest` [N], or of the mesh's largest one.
     """
     thin = min(run.manifest.thickness_in_plane_m, run.manifest.thickness_normal_m)
     if kind == "strings":

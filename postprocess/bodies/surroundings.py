@@ -1,4 +1,4 @@
-"""The rigid boundaries of a run and where they are at a time: wall, mould, hooks, strings."""
+"""Read the rigid boundaries of a run and where they are at a time: wall, mould, hooks, strings."""
 
 from __future__ import annotations
 
@@ -70,7 +70,7 @@ class ChainStrings:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Surroundings:
-    """What does not give way to smarticles.
+    """The rigid boundaries of a run.
 
     Attributes:
         tiers: Radius and top of each tier of a mould, from the bottom up [m]; empty for one cylinder.
@@ -99,12 +99,9 @@ class Surroundings:
         return found
 
     def raised(self, time: float, phase: int, top: float) -> float | None:
-        """Return how far the wall has been lifted [m]; None once it is gone.
+        """Return how far the wall has been lifted [m] at a time [s] in a phase; None once it is gone.
 
-        Args:
-            time: [s].
-            phase: Index of the phase at that time.
-            top: Height of the pile's top above the floor [m]; a wall that is lifted clear of it is gone.
+        A wall that is lifted clear of the pile's top, at a height above the floor [m], is gone.
         """
         if self.removed is None or phase < self.removed:
             return 0.0
@@ -156,9 +153,8 @@ def _hooks(settings: SceneData, series: Series | None) -> DrawnHooks:
     if series is not None:
         times, upper = series.time, series["hook_upper_z_m"] - series["container_z_m"]
     side, length = settings["side_m"], settings["length_m"]
-    # Older scenes have two crosses alike.
-    lower_length = settings["lower_length_m"] if "lower_length_m" in settings else length
-    count = round(settings["lower_bars"]) if "lower_bars" in settings else 1
+    # Older scenes have two equal crosses.
+    lower_length, count = settings.get("lower_length_m", length), round(settings.get("lower_bars", 1))
     return DrawnHooks(
         bars=(_bars(lower_length, side, count), _bars(length, side, 1)),
         lower=settings["lower_height_m"],
@@ -168,7 +164,7 @@ def _hooks(settings: SceneData, series: Series | None) -> DrawnHooks:
 
 
 def _bars(length: float, side: float, count: int) -> tuple[Bounds, ...]:
-    """As `dem.setting.hooks.Cross` has them: evenly spaced along x and y, up to a disc."""
+    """Return bars evenly spaced along x and y, up to a disc, as `dem.setting.hooks.Cross` has them."""
     thick, found = side / 2, []
     for k in range(count):
         place = length * ((k + 1) / (count + 1) - 0.5)
@@ -179,11 +175,9 @@ def _bars(length: float, side: float, count: int) -> tuple[Bounds, ...]:
 
 
 def knots(vertices: Floats, from_hinge: float) -> Floats:
-    """Return points (2, 3) on the outer barbs of a chain, at a distance from their hinges [m].
+    """Return points (2, 3) on the outer barbs of a chain, at a distance [m] from their hinges.
 
-    Args:
-        vertices: (N, 4, 3) [m]; every second smarticle is turned by half a turn.
-        from_hinge: [m].
+    Every second smarticle is turned by half a turn.
 
     Source:
         `dem.body.chain.Chain.ties`.
