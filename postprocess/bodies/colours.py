@@ -23,6 +23,8 @@ from postprocess.report import figures
 ALIASES: Mapping[str, str] = MappingProxyType({"speed": "speed_m_per_s", "height": "height_m", "id": "smarticle_id"})
 """Short names of fields."""
 
+_MOST_COUNTS = 12  # with colours of their own; larger ones share the last
+
 UNKNOWN = (201, 201, 201)
 """Where a field has no value."""
 
@@ -61,7 +63,7 @@ class ColourScale:
 
     Attributes:
         kind: Of the field.
-        colours: Of the bar; None where colours only tell identity.
+        colours: Of the bar; None where colours only show identity.
         low: Value at the bar's lower end.
         high: Value at its upper end.
         labels: By value, what is written beside the bar.
@@ -80,9 +82,12 @@ class ColourScale:
         if field.kind == "name":
             return cls(kind="name")
         if field.kind == "count":
-            counts = figures.count_colours(int(high))
-            labels = dict(zip(map(float, counts.ticks), counts.labels, strict=True))
-            return cls(kind="count", colours=counts.colours, low=-0.5, high=len(labels) - 0.5, labels=labels)
+            top = max(1, min(int(high), _MOST_COUNTS))
+            labels = {float(count): str(count) for count in range(top + 1)}
+            if int(high) > top:
+                labels[float(top)] = f"≥ {top}"
+            colours = ListedColormap(["#c9c9c9", *figures.sequence(top)])
+            return cls(kind="count", colours=colours, low=-0.5, high=top + 0.5, labels=labels)
         if not high > low:  # one smarticle, or all alike
             low, high = low - 0.5, high + 0.5
         factor = field.shown[0] if field.shown else 1.0
@@ -135,7 +140,7 @@ def span(values: Iterable[Floats]) -> Span:
 
 
 def linear(colours: NDArray[np.uint8]) -> NDArray[np.uint8]:
-    """Return sRGB colours as shares of light, 0 to 255: what glTF wants of the colours of points.
+    """Return sRGB colours as shares of light, 0 to 255, as glTF has the colours of points.
 
     Source:
         IEC 61966-2-1; glTF 2.0, section 3.9.2.

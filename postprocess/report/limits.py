@@ -1,4 +1,4 @@
-"""Limits of axes that hide nothing: every error bar, band and line that was drawn lies within them."""
+"""Widen limits of axes so that they hide nothing: every error bar, band and line that was drawn lies within them."""
 
 from __future__ import annotations
 
@@ -12,12 +12,9 @@ _MARGIN = 0.03  # of the axis, beyond what would be cut: what ends at the frame 
 
 
 def hold_everything(figure: Figure) -> list[str]:
-    """Widens limits that cut what was drawn; those that hold it stay.
+    """Widen limits that cut what was drawn, of a figure drawn completely but for its footer.
 
-    On a logarithmic axis nothing at or below 0 has a place: bars that reach there end at the axis, which is told.
-
-    Args:
-        figure: Drawn completely, but for its footer.
+    On a logarithmic axis nothing at or below 0 has a place: bars that reach there end at the axis, which is stated.
 
     Returns:
         What could not be shown whole, one statement each, for the footer.
@@ -33,7 +30,7 @@ def hold_everything(figure: Figure) -> list[str]:
 
 
 def _hold(axes: Axes, place: int, *, log: bool) -> None:
-    """One axis, x (0) or y (1)."""
+    """Widen one axis, x (0) or y (1)."""
     values = np.concatenate([np.empty(0), *(points[:, place] for points in _drawn(axes))])
     values = values[np.isfinite(values) & ((values > 0) if log else True)]
     if not len(values):
@@ -50,7 +47,7 @@ def _hold(axes: Axes, place: int, *, log: bool) -> None:
 
 
 def _drawn(axes: Axes) -> list[NDArray[np.float64]]:
-    """Points (n, 2) of lines, error bars and bands that stand in coordinates of the data.
+    """Return points (n, 2) of lines, error bars and bands that stand in coordinates of the data.
 
     Not `Axes.dataLim`: of error bars it knows the corners of them all together, not the least that is above 0.
     """
@@ -64,7 +61,7 @@ def _drawn(axes: Axes) -> list[NDArray[np.float64]]:
 
 
 def _bars(axes: Axes) -> list[NDArray[np.float64]]:
-    """Ends (n, 2) of error bars."""
+    """Return ends (n, 2) of error bars."""
     return [
         np.asarray(ends, dtype=np.float64)
         for bars in axes.collections

@@ -1,4 +1,4 @@
-"""Lines of the texts that studies write: tables, findings, and what columns mean."""
+"""Write tables and the meanings of columns as Markdown."""
 
 from __future__ import annotations
 
@@ -6,11 +6,11 @@ from collections.abc import Iterable, Mapping, Sequence
 
 
 def table_lines(header: Sequence[str], rows: Iterable[Sequence[str]]) -> list[str]:
-    """A table."""
+    """Return the lines of a table."""
     lines = [f"| {' | '.join(header)} |", "| --- " * len(header) + "|"]
     return [*lines, *(f"| {' | '.join(row)} |" for row in rows)]
 
 
 def meaning_lines(file: str, meanings: Mapping[str, str]) -> list[str]:
-    """What the columns of a file are."""
-    return ["", f"What the columns of `{file}` are:", "", *(f"- `{name}`: {told}" for name, told in meanings.items())]
+    """Return lines that say what the columns of a file are."""
+    return ["", f"What the columns of `{file}` are:", "", *(f"- `{name}`: {text}" for name, text in meanings.items())]

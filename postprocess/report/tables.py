@@ -11,15 +11,7 @@ from dem.record.files import whole
 
 
 def write_table(table: pd.DataFrame, path: Path | str, *, overwrite: bool = False) -> Path:
-    """Writes a table as CSV beside its place and renames it, so that it is whole or absent.
-
-    Args:
-        table: The table; its column names carry the units.
-        path: Where to, ending in `.csv`.
-        overwrite: Whether an existing file may be replaced.
-
-    Returns:
-        The path written.
+    """Write a table as CSV beside its place and rename it, so that it is whole or absent.
 
     Raises:
         InputError: The file exists already, its folder does not, or it is no `.csv`.
