@@ -10,7 +10,7 @@ from dem.errors import InputError
 from dem.record.frames import read_frames
 from dem.record.run import open_run
 from postprocess.bodies.fields import fields_of
-from postprocess.bodies.meshes import KINDS, Bodies, checked_kinds, solid
+from postprocess.bodies.meshes import KINDS, Bodies, checked_kinds, link_boxes, solid
 from postprocess.measures.entanglement import link_crossings, link_passages
 
 ALL = checked_kinds(["crossings"], [])
@@ -52,6 +52,34 @@ def test_boxes_of_one_smarticle_have_its_volume_and_place(tmp_path):
     low, high = vertices.min(axis=0), vertices.max(axis=0)
     assert mesh.bounds[::2] == pytest.approx(low - [T2 / 2, T2 / 2, T1 / 2], abs=1e-8)
     assert mesh.bounds[1::2] == pytest.approx(high + np.array([T2 / 2, 0.0, T1 / 2]), abs=1e-8)
+
+
+def test_boxes_carry_their_smarticle_and_link():
+    scene = SyntheticRun(count=5)
+    vertices = scene.vertices(0.1)
+    mesh = link_boxes(vertices, thickness_normal=T1, thickness_in_plane=T2)
+    centres = mesh.cell_centers().points.reshape(15, 6, 3).mean(axis=1)
+    smarticle, link = mesh.cell_data["smarticle"][::6], mesh.cell_data["link"][::6]
+    middles = (vertices[smarticle, link] + vertices[smarticle, link + 1]) / 2
+    assert centres == pytest.approx(middles, abs=1e-6 * W)
+    assert sorted(zip(smarticle, link, strict=True)) == [(i, k) for i in range(5) for k in range(3)]
+
+
+def test_rods_have_one_box():
+    scene = SyntheticRun(aspect_ratio=0.0, count=4)
+    mesh = link_boxes(scene.vertices(0.1) * 1e3, thickness_normal=1e3 * T1, thickness_in_plane=1e3 * T2)
+    assert mesh.n_cells == 4 * 6
+    assert mesh.triangulate().volume * 1e-9 == pytest.approx(4 * T1 * T2 * W, rel=1e-6)
+
+
+def test_boxes_are_as_thick_as_their_links():
+    barb, body, length, t1 = 0.0095, 0.0213, 0.042, 0.021
+    vertices = u_shape(length, 0.0467)
+    mesh = link_boxes(vertices[None] * 1e3, thickness_normal=1e3 * t1, thickness_in_plane=[9.5, 21.3, 9.5])
+    low, high = mesh.points.min(axis=0) / 1e3, mesh.points.max(axis=0) / 1e3
+    # The body shows below the hinges, barbs beside them.
+    assert high - low == pytest.approx([0.0467 + barb, length + body / 2, t1])
+    assert mesh.triangulate().volume * 1e-9 == pytest.approx(t1 * (0.0467 * body + 2 * length * barb), rel=1e-6)
 
 
 def test_wall_and_floor_are_the_container(pile):

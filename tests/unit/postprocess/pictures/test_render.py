@@ -6,7 +6,7 @@ from unittest.mock import Mock
 import numpy as np
 import pytest
 from PIL import Image
-from synthetic import RADIUS, T1, T2, SyntheticRun, W, u_shape, write_frame, write_run
+from synthetic import RADIUS, T2, SyntheticRun, W, u_shape, write_frame, write_run
 from synthetic.forces import pressed
 
 from dem.errors import InputError, RunError
@@ -15,7 +15,6 @@ from dem.record.frames import FrameWriter, read_frames
 from dem.record.names import FORCE
 from postprocess.bodies.colours import ColourScale
 from postprocess.bodies.fields import BY_NAME
-from postprocess.bodies.meshes import link_boxes
 from postprocess.geometry.links import centres_of_mass
 from postprocess.pictures.render import render_run, turntable
 
@@ -49,24 +48,6 @@ def panel(image):
 def coloured(image):
     """Which pixels are clearly neither white nor grey: container, floor and shadows are."""
     return np.ptp(image, axis=2) > 40
-
-
-def test_mesh_knows_which_box_is_whose():
-    scene = SyntheticRun(count=5)
-    vertices = scene.vertices(0.1)
-    mesh = link_boxes(vertices, thickness_normal=T1, thickness_in_plane=T2)
-    centres = mesh.cell_centers().points.reshape(15, 6, 3).mean(axis=1)
-    smarticle, link = mesh.cell_data["smarticle"][::6], mesh.cell_data["link"][::6]
-    middles = (vertices[smarticle, link] + vertices[smarticle, link + 1]) / 2
-    assert centres == pytest.approx(middles, abs=1e-6 * W)
-    assert sorted(zip(smarticle, link, strict=True)) == [(i, k) for i in range(5) for k in range(3)]
-
-
-def test_rods_have_one_box():
-    scene = SyntheticRun(aspect_ratio=0.0, count=4)
-    mesh = link_boxes(scene.vertices(0.1) * 1e3, thickness_normal=1e3 * T1, thickness_in_plane=1e3 * T2)
-    assert mesh.n_cells == 4 * 6
-    assert mesh.triangulate().volume * 1e-9 == pytest.approx(4 * T1 * T2 * W, rel=1e-6)
 
 
 def test_colours_reach_the_right_smarticle(tmp_path):
