@@ -53,7 +53,7 @@ class Outlines:
             start + self.pitch * np.arange(count)
             for start, count in zip(self.origin, self.inside.shape[1:], strict=True)
         )
-        off_axis = np.hypot(x[:, None] - region.axis[0], y - region.axis[1])
+        off_axis = np.hypot(x[:, None], y)
         mask: Flags = (off_axis < region.radius)[:, :, None] & ((z > region.bottom) & (z < region.top))
         return mask
 
@@ -98,7 +98,7 @@ def outlines(
     corners = [corner for vertices in checked for corner in (vertices.min(axis=(0, 1)), vertices.max(axis=(0, 1)))]
     for region in regions:
         for sign, height in ((-1, region.bottom), (1, region.top)):
-            corners.append(np.array([*(np.array(region.axis) + sign * region.radius), height]))
+            corners.append(np.array([sign * region.radius, sign * region.radius, height]))
     # Around the piles there is room for the ball on every side.
     margin = 2 * ball + thickness + 2 * pitch
     first, last = np.min(corners, axis=0) - margin, np.max(corners, axis=0) + margin

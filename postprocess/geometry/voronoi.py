@@ -81,7 +81,7 @@ def local_packing(
     # A little higher, lest the highest point coincide with its own image.
     lid = float(below[:, :, 2].max(initial=container.top)) + spacing / 2
     points, owners = _sample(vertices, spacing)
-    x, y = (points[:, :2] - container.axis).T
+    x, y = points[:, :2].T
     # Points outside the container have no image that would bound their cells.
     kept = (np.hypot(x, y) < container.radius) & (points[:, 2] > container.bottom)
     kept &= points[:, 2] < lid
@@ -121,13 +121,12 @@ def _mirrored(points: Floats, container: Region, lid: float, band: float) -> Flo
     floor[:, 2] += 2 * container.bottom
     top = points[points[:, 2] > lid - band] * [1, 1, -1]
     top[:, 2] += 2 * lid
-    radial = points[:, :2] - container.axis
-    distance = np.hypot(*radial.T)
+    distance = np.hypot(*points[:, :2].T)
     # On the axis itself there is no direction to the wall.
     near = (distance > container.radius - band) & (distance > 1e-3 * container.radius)
     wall = points[near].copy()
     stretch = (2 * container.radius - distance[near]) / distance[near]
-    wall[:, :2] = radial[near] * stretch[:, None] + container.axis
+    wall[:, :2] *= stretch[:, None]
     return np.concatenate([floor, top, wall])
 
 

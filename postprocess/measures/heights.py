@@ -23,22 +23,19 @@ class Heights:
         mean_com: Height of the centre of mass of all smarticles [m].
         highest_com: Height of the highest smarticle's centre of mass [m].
         second_highest_com: Of the second highest [m]; NaN for a single smarticle.
-        top: Height below which `percentile` % of the material lies [m].
-        percentile: [%].
+        top: Height below which 95 % of the material lies [m].
     """
 
     mean_com: float
     highest_com: float
     second_highest_com: float
     top: float
-    percentile: float
 
 
-def heights(vertices: Vertices, *, floor_z: float = 0.0, percentile: float = 95.0) -> Heights:
-    """Return all heights of a frame above the floor; `percentile` % of the material lies below `top`.
+def heights(vertices: Vertices, *, floor_z: float = 0.0) -> Heights:
+    """Return all heights of a frame above the floor.
 
     Raises:
-        InputError: Bad percentile.
         UndefinedMeasureError: There is no smarticle.
     """
     vertices = checked_vertices(vertices)
@@ -52,8 +49,7 @@ def heights(vertices: Vertices, *, floor_z: float = 0.0, percentile: float = 95.
         mean_com=float(np.average(centres_of_mass(vertices)[:, 2], weights=weights) - floor_z),
         highest_com=float(com[-1]),
         second_highest_com=second_highest(com),
-        top=material_height(vertices, floor_z=floor_z, percentile=percentile),
-        percentile=percentile,
+        top=material_height(vertices, floor_z=floor_z),
     )
 
 
@@ -101,11 +97,8 @@ def material_height(vertices: Vertices, *, floor_z: float = 0.0, percentile: flo
     )
 
 
-_PERCENTILE = 95.0
-
-
 def _heights_of(frame: Frame, _: Run) -> tuple[float, ...]:
-    levels = heights(frame.vertices, floor_z=frame.floor_z, percentile=_PERCENTILE)
+    levels = heights(frame.vertices, floor_z=frame.floor_z)
     return levels.mean_com, levels.second_highest_com, levels.top
 
 
@@ -116,7 +109,7 @@ MEASURES = (
         quantities=(
             Quantity("com height", "m", Shown(heading="z [mm]", place=30, form=".2f", factor=1e3)),
             Quantity("second-highest com height", "m"),
-            Quantity(f"top {_PERCENTILE:g} % height", "m"),
+            Quantity("top 95 % height", "m"),
         ),
         take=_heights_of,
         available_for=in_space,

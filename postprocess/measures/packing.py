@@ -18,7 +18,7 @@ from dem.record.packing import filled
 from dem.record.run import Run
 from postprocess.geometry.links import UndefinedMeasureError, Vertices, checked_vertices
 from postprocess.geometry.voronoi import local_packing
-from postprocess.geometry.voxel import Region, inner_region, solid_fraction
+from postprocess.geometry.voxel import Region, solid_fraction
 from postprocess.measures.heights import heights, material_height
 from postprocess.measures.registry import FrameMeasure, Quantity, Shown, in_space
 
@@ -58,31 +58,18 @@ def packing_fraction(
     solid_volume: float,
     definition: str = "second-highest-com",
     floor_z: float = 0.0,
-    axis: tuple[float, float] = (0.0, 0.0),
-    percentile: float = 95.0,
     thickness_normal: float | None = None,
     thickness_in_plane: float | None = None,
-    inner: float = 0.75,
-    low: float = 0.2,
-    high: float = 0.8,
-    spacing: float | None = None,
 ) -> PackingFraction:
-    """Compute the packing fraction of smarticles in an upright cylinder.
+    """Compute the packing fraction of smarticles in an upright cylinder about x = y = 0.
 
     Args:
         radius: Radius of the container [m].
         solid_volume: Volume of one smarticle [m³].
         definition: Key of `DEFINITIONS`.
         floor_z: Height of the container's floor [m].
-        axis: x and y of the container's axis [m].
-        percentile: Share of the material below the height, for all but the first definition [%].
         thickness_normal: t1, along the normal of the smarticle's plane [m]; "voxel" only.
         thickness_in_plane: t2, in the smarticle's plane [m]; "voxel" only.
-        inner: Radius of the inner cylinder as a share of the container's [-].
-        low: Lower end of the inner cylinder as a share of the height [-].
-        high: Upper end of the inner cylinder as a share of the height [-].
-        spacing: Distance of grid points ("voxel") or of points along links ("voronoi") [m]; half
-            the smaller thickness, or w/8, if not given.
 
     Raises:
         InputError: Unknown definition, bad sizes, or missing thicknesses.
@@ -113,30 +100,20 @@ def packing_fraction(
     if definition == "second-highest-com":
         height = heights(vertices, floor_z=floor_z).second_highest_com
     else:
-        height = material_height(vertices, floor_z=floor_z, percentile=percentile)
+        height = material_height(vertices, floor_z=floor_z)
     if not height > 0:
         msg = f"the pile has no height above its floor: {height:g} m; check floor_z"
         raise UndefinedMeasureError(msg)
-    pile = Region(radius=radius, bottom=floor_z, top=floor_z + height, axis=axis)
+    pile = Region(radius=radius, bottom=floor_z, top=floor_z + height)
     if definition == "voxel":
         if thickness_normal is None or thickness_in_plane is None:
             msg = "definition 'voxel' needs thickness_normal and thickness_in_plane [m]: got None"
             raise InputError(msg)
         value = solid_fraction(
-            vertices,
-            inner_region(pile, inner=inner, low=low, high=high),
-            thickness_normal=thickness_normal,
-            thickness_in_plane=thickness_in_plane,
-            pitch=spacing,
+            vertices, pile.inner, thickness_normal=thickness_normal, thickness_in_plane=thickness_in_plane
         )
     elif definition == "voronoi":
-        value = local_packing(
-            vertices,
-            pile,
-            inner_region(pile, inner=inner, low=low, high=high),
-            solid_volume=solid_volume,
-            spacing=spacing,
-        ).value
+        value = local_packing(vertices, pile, pile.inner, solid_volume=solid_volume).value
     else:
         value = filled(len(vertices), solid_volume=solid_volume, radius=radius, height=pile.top - pile.bottom)
     return PackingFraction(value=value, definition=definition, height=height)
