@@ -114,80 +114,54 @@ def solid_points(
             f"got t1 {sizes[0]} m, t2 {sizes[1]} m, pitch {pitch} m"
         )
         raise InputError(msg)
-    pieces = _Pieces.cut(vertices, thickness_normal, thickness_in_plane)
-    if region is not None:
-        pieces = pieces.near(region)
     found = [np.empty((0, 3), dtype=np.int64)]
-    for indices in pieces.grid_points(pitch):
+    for indices in _grid_points(vertices, thickness_normal, thickness_in_plane, pitch, region):
         found.append(indices if region is None else indices[region.contains(pitch * indices @ _TURN)])
     return pitch * _distinct(np.concatenate(found)) @ _TURN, pitch
 
 
-@dataclass(frozen=True)
-class _Pieces:
-    """The links' boxes cut into pieces about as long as thick, so that few grid points lie around each.
+def _grid_points(
+    vertices: Floats, normal: float, in_plane: float, pitch: float, region: Region | None
+) -> Iterator[Whole]:
+    """Yield indices (n, 3) of the turned grid's points inside the links' boxes, some of them repeated.
 
-    Attributes:
-        centres: (P, 3) [m].
-        axes: (P, 3, 3), rows: along the link, in the plane across it, along the plane's normal.
-        halves: (P, 3) [m], half the size along each axis.
-        reach: Radius of a sphere that holds any of the pieces [m].
+    Boxes are cut into pieces about as long as thick, so that few grid points lie around each.
     """
-
-    centres: Floats
-    axes: Floats
-    halves: Floats
-    reach: float
-
-    @classmethod
-    def cut(cls, vertices: Floats, normal: float, in_plane: float) -> _Pieces:
-        lengths = link_lengths(vertices)
-        # A link of no length (l = 0) has no direction; it yields no piece either.
-        along = np.diff(vertices, axis=1) / np.maximum(lengths, 1e-300)[..., None]
-        across = np.cross(plane_frames(vertices)[:, None, 2], along)
-        across /= np.maximum(np.linalg.norm(across, axis=2), 1e-300)[..., None]
-        axes = np.stack([along, across, np.cross(along, across)], axis=-2).reshape(-1, 3, 3)
-        cuts = np.ceil(lengths / max(normal, in_plane)).astype(int).ravel()
-        link = np.repeat(np.arange(len(cuts)), cuts)
-        step = np.arange(len(link)) - np.repeat(np.cumsum(cuts) - cuts, cuts)
-        share = (step + 0.5) / cuts[link]
-        start = vertices[:, :-1].reshape(-1, 3)[link]
-        end = vertices[:, 1:].reshape(-1, 3)[link]
-        section = np.broadcast_to([in_plane / 2, normal / 2], (len(link), 2))
-        halves = np.column_stack([lengths.ravel()[link] / cuts[link] / 2, section])
-        return cls(
-            centres=start + share[:, None] * (end - start),
-            axes=axes[link],
-            halves=halves,
-            reach=float(np.linalg.norm(halves, axis=1).max(initial=0.0)),
-        )
-
-    def near(self, region: Region) -> _Pieces:
-        """Return the pieces that may reach into the region."""
-        x, y, z = self.centres.T
-        keep = np.hypot(x, y) < region.radius + self.reach
-        keep &= (z > region.bottom - self.reach) & (z < region.top + self.reach)
-        return _Pieces(self.centres[keep], self.axes[keep], self.halves[keep], self.reach)
-
-    def grid_points(self, pitch: float) -> Iterator[Whole]:
-        """Yield indices (n, 3) of the turned grid's points inside the pieces, some of them repeated."""
-        centres = self.centres @ _TURN.T
-        axes = self.axes @ _TURN.T
-        first = np.ceil((centres - self.reach) / pitch).astype(np.int64)
-        steps = np.arange(int(np.ceil(2 * self.reach / pitch)) + 1)
-        size = max(1, _CHUNK // len(steps) ** 3)
-        for start in range(0, len(centres), size):
-            part = slice(start, start + size)
-            # (p, 3, n): coordinates of the grid's planes around each piece.
-            planes = pitch * (first[part, :, None] + steps) - centres[part, :, None]
-            inside = np.ones((len(planes), *[len(steps)] * 3), dtype=bool)
-            for axis, half in zip(axes[part].swapaxes(0, 1), self.halves[part].T, strict=True):
-                # A dot product with the axis, as a sum over the planes' own contributions.
-                x, y, z = (axis[:, :, None] * planes).swapaxes(0, 1)
-                local = (x[:, :, None] + y[:, None, :])[..., None] + z[:, None, None, :]
-                inside &= np.abs(local) <= half[:, None, None, None]
-            piece, *offset = np.nonzero(inside)
-            yield first[part][piece] + np.stack(offset, axis=1)
+    lengths = link_lengths(vertices)
+    # A link of no length (l = 0) has no direction; it yields no piece either.
+    along = np.diff(vertices, axis=1) / np.maximum(lengths, 1e-300)[..., None]
+    across = np.cross(plane_frames(vertices)[:, None, 2], along)
+    across /= np.maximum(np.linalg.norm(across, axis=2), 1e-300)[..., None]
+    cuts = np.ceil(lengths / max(normal, in_plane)).astype(int).ravel()
+    link = np.repeat(np.arange(len(cuts)), cuts)
+    step = np.arange(len(link)) - np.repeat(np.cumsum(cuts) - cuts, cuts)
+    start, end = vertices[:, :-1].reshape(-1, 3)[link], vertices[:, 1:].reshape(-1, 3)[link]
+    centres = start + ((step + 0.5) / cuts[link])[:, None] * (end - start)
+    axes = np.stack([along, across, np.cross(along, across)], axis=-2).reshape(-1, 3, 3)[link]
+    section = np.broadcast_to([in_plane / 2, normal / 2], (len(link), 2))
+    halves = np.column_stack([lengths.ravel()[link] / cuts[link] / 2, section])
+    reach = float(np.linalg.norm(halves, axis=1).max(initial=0.0))
+    if region is not None:  # the pieces that may reach into it
+        x, y, z = centres.T
+        keep = np.hypot(x, y) < region.radius + reach
+        keep &= (z > region.bottom - reach) & (z < region.top + reach)
+        centres, axes, halves = centres[keep], axes[keep], halves[keep]
+    centres, axes = centres @ _TURN.T, axes @ _TURN.T
+    first = np.ceil((centres - reach) / pitch).astype(np.int64)
+    steps = np.arange(int(np.ceil(2 * reach / pitch)) + 1)
+    size = max(1, _CHUNK // len(steps) ** 3)
+    for begin in range(0, len(centres), size):
+        part = slice(begin, begin + size)
+        # (p, 3, n): coordinates of the grid's planes around each piece.
+        planes = pitch * (first[part, :, None] + steps) - centres[part, :, None]
+        inside = np.ones((len(planes), *[len(steps)] * 3), dtype=bool)
+        for axis, half in zip(axes[part].swapaxes(0, 1), halves[part].T, strict=True):
+            # A dot product with the axis, as a sum over the planes' own contributions.
+            x, y, z = (axis[:, :, None] * planes).swapaxes(0, 1)
+            local = (x[:, :, None] + y[:, None, :])[..., None] + z[:, None, None, :]
+            inside &= np.abs(local) <= half[:, None, None, None]
+        piece, *offset = np.nonzero(inside)
+        yield first[part][piece] + np.stack(offset, axis=1)
 
 
 def _distinct(indices: Whole) -> Whole:

@@ -237,14 +237,15 @@ def collapse_time(
         msg = f"heights of a collapse are all 0, or start is not above 0: got {scale:g}; a column has a height"
         raise InputError(msg)
     watched = float(t[-1])
-    model = _Model(times=t / watched, start=None if start is None else 1.0, end=None if end is None else end / scale)
-    fit = model.fit(h / scale)
-    tau, beta, first, last = model.named(fit.x)
-    curve = model.curve(fit.x)
+    # Times are over the time watched, heights over a height of the start.
+    known = None if start is None else 1.0, None if end is None else end / scale
+    fit = _fit(t / watched, h / scale, *known)
+    tau, beta, first, last = _named(fit.x, *known)
+    curve = _curve(fit.x, t / watched, *known)
     # A start that is fitted may lie on a single sample: no more has fallen than was seen to.
     top = float(curve[0]) if start is None else first
     fall = float((top - curve[-1]) / top)
-    shortest, error = float(model.times[0]), _error(fit) * tau
+    shortest, error = float(t[0] / watched), _error(fit) * tau
     outcome: Literal["collapsed", "collapsing", "standing"] = "collapsed"
     if fall < LEAST_FALL:
         outcome = "standing"
@@ -282,46 +283,39 @@ def _check(times: Floats, heights: Floats) -> None:
     raise InputError(msg)
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class _Model:
-    """The curve and its free parameters: ln τ, β, and of start and share (end over start) those that are not given.
+def _named(free: Floats, start: float | None, end: float | None) -> tuple[float, float, float, float]:
+    """Return τ, β, start and end of free parameters: ln τ, β, and start and end over start unless given."""
+    rest = list(free[2:])
+    start = float(rest.pop(0)) if start is None else start
+    end = float(rest.pop(0)) * start if end is None else end
+    return float(np.exp(free[0])), float(free[1]), start, end
 
-    Times are over the time watched, heights over a height of the start.
-    """
 
-    times: Floats
-    start: float | None
-    end: float | None
+def _curve(free: Floats, times: Floats, start: float | None, end: float | None) -> Floats:
+    tau, beta, start, end = _named(free, start, end)
+    curve: Floats = end + (start - end) * np.exp(-((times / tau) ** beta))
+    return curve
 
-    def named(self, free: Floats) -> tuple[float, float, float, float]:
-        """Return τ, β, start and end."""
-        rest = list(free[2:])
-        start = float(rest.pop(0)) if self.start is None else self.start
-        end = float(rest.pop(0)) * start if self.end is None else self.end
-        return float(np.exp(free[0])), float(free[1]), start, end
 
-    def curve(self, free: Floats) -> Floats:
-        """Return heights (n,)."""
-        tau, beta, start, end = self.named(free)
-        curve: Floats = end + (start - end) * np.exp(-((self.times / tau) ** beta))
-        return curve
-
-    def fit(self, heights: Floats) -> Any:
-        """Return the best of several fits: the sum of squares may have more than one valley."""
-        low, high = [math.log(self.times[0] / 10), _EXPONENTS[0]], [math.log(_LONGEST), _EXPONENTS[1]]
-        guess: list[float] = []
-        if self.start is None:
-            low, high, guess = [*low, 1e-3], [*high, 3.0], [*guess, max(float(heights[0]), 2e-3)]
-        if self.end is None:
-            low, high, guess = [*low, 0.0], [*high, 1.0], [*guess, min(float(heights[-1] / heights.max()), 0.9)]
-        fits = [
-            least_squares(
-                lambda free: self.curve(free) - heights, [math.log(tau), beta, *guess], bounds=(low, high), x_scale=0.1
-            )
-            for tau in (0.03, 0.3, 3.0)
-            for beta in (0.7, 1.5)
-        ]
-        return min(fits, key=lambda fit: float(fit.cost))
+def _fit(times: Floats, heights: Floats, start: float | None, end: float | None) -> Any:
+    """Return the best of several fits: the sum of squares may have more than one valley."""
+    low, high = [math.log(times[0] / 10), _EXPONENTS[0]], [math.log(_LONGEST), _EXPONENTS[1]]
+    guess: list[float] = []
+    if start is None:
+        low, high, guess = [*low, 1e-3], [*high, 3.0], [*guess, max(float(heights[0]), 2e-3)]
+    if end is None:
+        low, high, guess = [*low, 0.0], [*high, 1.0], [*guess, min(float(heights[-1] / heights.max()), 0.9)]
+    fits = [
+        least_squares(
+            lambda free: _curve(free, times, start, end) - heights,
+            [math.log(tau), beta, *guess],
+            bounds=(low, high),
+            x_scale=0.1,
+        )
+        for tau in (0.03, 0.3, 3.0)
+        for beta in (0.7, 1.5)
+    ]
+    return min(fits, key=lambda fit: float(fit.cost))
 
 
 def _error(fit: Any) -> float:

@@ -16,6 +16,7 @@ from dem.record.series import Series
 from postprocess.measures.packing import DEFINITIONS, packing_of
 from postprocess.measures.registry import frame_measures, phase_measures
 from postprocess.statistics.columns import ASPECT, SEED
+from postprocess.statistics.points import marked
 from postprocess.statistics.seeds import Mean, mean_with_error
 
 Costly = Literal["never", "phase-end", "every-frame"]
@@ -113,15 +114,11 @@ def summarise_run(
         if phases is not None and part[0].phase not in phases:
             continue
         table = pd.DataFrame(_rows(part[-last:], run, series, definitions, costly))
-        final = table.iloc[-1]
-        kept = [*_LABELS, "phase", "phase type"]
-        summary = {name: final[name] for name in kept}
-        summary |= {"time [s]": final["time [s]"], "frames averaged": len(table)}
+        summary = {name: table[name].iloc[-1] for name in (*_LABELS, "phase", "phase type", "time [s]")}
+        summary["frames averaged"] = len(table)
         for name in table.columns.difference([*summary, "frame"], sort=False):
             mean = mean_with_error(table[name])
-            quantity, _, unit = name.rpartition(" [")
-            summary[name] = mean.value
-            summary[f"{quantity} SE [{unit}"] = mean.standard_error
+            summary |= {name: mean.value, marked(name, "SE"): mean.standard_error}
         if series is not None:
             # Of the whole phase, not of its last frames.
             for measure in phase_measures():
@@ -176,13 +173,7 @@ def packing_change(
             msg = f"run {run} has no frame of phase {phase} ({kind}) yet; wait or resume it"
             raise InputError(msg)
         means.append(mean_with_error([packing_of(frame, run, definition=definition) for frame in part]))
-    return PackingChange(
-        before=means[0],
-        after=means[1],
-        definition=definition,
-        phase_before=before,
-        phase_after=after,
-    )
+    return PackingChange(before=means[0], after=means[1], definition=definition, phase_before=before, phase_after=after)
 
 
 def _check_last(last: int) -> None:
@@ -219,10 +210,13 @@ def _rows(
     """Return one row per frame of a part of one phase; `offset` is the number of its first frame."""
     rows: list[dict[str, object]] = []
     measures = [measure for measure in frame_measures(definitions) if measure.available_for(run)]
+    made = run.manifest
+    values = (str(run.path), made.name, made.seed, made.aspect_ratio, made.count, made.fidelity, made.scene_sha256)
+    labels = dict(zip(_LABELS, values, strict=True))
     for number, frame in enumerate(part):
         take_costly = costly == "every-frame" or (costly == "phase-end" and number == len(part) - 1)
-        row: dict[str, object] = _labels(run)
-        row |= {
+        row: dict[str, object] = {
+            **labels,
             "frame": offset + number,
             "time [s]": frame.time,
             "phase": frame.phase,
@@ -234,19 +228,6 @@ def _rows(
             row |= _series_columns(series, frame.time)
         rows.append(row)
     return rows
-
-
-def _labels(run: Run) -> dict[str, object]:
-    values = (
-        str(run.path),
-        run.manifest.name,
-        run.manifest.seed,
-        run.manifest.aspect_ratio,
-        run.manifest.count,
-        run.manifest.fidelity,
-        run.manifest.scene_sha256,
-    )
-    return dict(zip(_LABELS, values, strict=True))
 
 
 def _series_columns(series: Series, time: float) -> dict[str, float]:
