@@ -15,8 +15,7 @@ from dem.record.run import Run
 from dem.record.series import Series
 from postprocess.measures.packing import DEFINITIONS, packing_of
 from postprocess.measures.registry import frame_measures, phase_measures
-from postprocess.statistics.columns import ASPECT, SEED
-from postprocess.statistics.points import marked
+from postprocess.statistics.points import ASPECT, SEED, marked
 from postprocess.statistics.seeds import Mean, mean_with_error
 
 Costly = Literal["never", "phase-end", "every-frame"]

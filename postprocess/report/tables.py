@@ -1,7 +1,8 @@
-"""Tables on disk, whole or absent."""
+"""Tables on disk, whole or absent, and as lines of Markdown."""
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 
 import pandas as pd
@@ -34,3 +35,14 @@ def write_table(table: pd.DataFrame, path: Path | str, *, overwrite: bool = Fals
         msg = f"cannot write table {path}: {error.strerror or error}; free space or choose another folder"
         raise RunError(msg) from error
     return path
+
+
+def table_lines(header: Sequence[str], rows: Iterable[Sequence[str]]) -> list[str]:
+    """Return the lines of a table."""
+    lines = [f"| {' | '.join(header)} |", "| --- " * len(header) + "|"]
+    return [*lines, *(f"| {' | '.join(row)} |" for row in rows)]
+
+
+def meaning_lines(file: str, meanings: Mapping[str, str]) -> list[str]:
+    """Return lines that say what the columns of a file are."""
+    return ["", f"What the columns of `{file}` are:", "", *(f"- `{name}`: {text}" for name, text in meanings.items())]

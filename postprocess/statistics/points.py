@@ -1,4 +1,11 @@
-"""Means over runs that are alike, with their errors, as columns of a table, and as cells for a person to read."""
+"""Tables over runs: means of runs that are alike, and differences between runs that were poured alike.
+
+A difference is taken between two runs that differ in one factor alone, so that what they share, such as the poses that
+they were poured from, does not count as scatter. The difference of such differences is an interaction.
+
+Source:
+    Box, Hunter and Hunter, Statistics for Experimenters, 2nd ed. (Wiley 2005), chapter 5.
+"""
 
 from __future__ import annotations
 
@@ -7,8 +14,10 @@ from collections.abc import Iterable, Sequence
 
 import pandas as pd
 
-from postprocess.statistics.columns import ASPECT, SEED, SEEDS
 from postprocess.statistics.seeds import SeedMean, mean_over_seeds
+
+ASPECT, SEED, SEEDS = "aspect ratio [-]", "seed", "seeds [-]"
+
 
 ToldTable = tuple[list[str], list[list[str]]]
 """Header and rows of a table for a person to read."""
@@ -79,3 +88,42 @@ def told_number(value: float, form: str, error: float = math.nan) -> str:
     if math.isnan(value):
         return "-"
     return f"{value:{form}}" + (f" ± {error:{form.removeprefix('+')}}" if math.isfinite(error) else "")
+
+
+def pairs(one: pd.DataFrame, other: pd.DataFrame, quantity: str) -> pd.DataFrame:
+    """Join a quantity of two tables of runs by aspect ratio and seed: columns `one` and `other`."""
+    keys = [ASPECT, SEED]
+    left = one[[*keys, quantity]].rename(columns={quantity: "one"})
+    right = other[[*keys, quantity]].rename(columns={quantity: "other"})
+    return left.merge(right, on=keys).dropna()
+
+
+def mean_difference(one: pd.DataFrame, other: pd.DataFrame, quantity: str) -> SeedMean:
+    """Average one table less the other over pairs."""
+    both = pairs(one, other, quantity)
+    return mean_over_seeds(both["one"] - both["other"])
+
+
+def paired_differences(
+    table: pd.DataFrame, quantity: str, factor: str, levels: tuple[object, object], others: Sequence[str]
+) -> pd.DataFrame:
+    """Return what a quantity does when a factor goes from one level to another, all else alike.
+
+    Args:
+        table: One row per run.
+        quantity: Column.
+        factor: Column.
+        levels: From, and to.
+        others: Columns of all else that runs differ in, such as the other factors and the seed.
+
+    Returns:
+        One row per pair: `others`, and the difference in the quantity's column, in its unit. What lacks a run at
+        either level is left out. Given to this function again with another factor: interactions.
+
+    Example:
+        >>> runs = pd.DataFrame({"mu": [0.4, 0.8, 0.4, 0.8], "seed": [1, 1, 2, 2], "N": [5.0, 6.0, 5.5, 7.5]})
+        >>> paired_differences(runs, "N", "mu", (0.4, 0.8), ["seed"])["N"].tolist()
+        [1.0, 2.0]
+    """
+    first, second = (table[table[factor] == level].groupby(list(others))[quantity].mean().dropna() for level in levels)
+    return (second - first).dropna().rename(quantity).reset_index()

@@ -7,9 +7,7 @@ import math
 import pandas as pd
 import pytest
 
-from postprocess.statistics.columns import ASPECT, SEED, SEEDS
-from postprocess.statistics.pairs import mean_difference, pairs
-from postprocess.statistics.points import averaged, seeds_of, told_number
+from postprocess.statistics.points import ASPECT, SEED, SEEDS, averaged, mean_difference, pairs, seeds_of, told_number
 
 FORCE = "force [N]"
 

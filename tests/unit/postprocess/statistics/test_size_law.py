@@ -8,8 +8,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from postprocess.statistics.size_law import Floats, scatter_of, size_law
-from postprocess.statistics.threshold import alike, profiles
+from postprocess.statistics.size_law import Floats, alike, profiles, scatter_of, size_law
 
 SEEDS = {100: 9, 300: 9, 1000: 6, 3000: 3, 10_000: 3}
 COUNTS = np.repeat(list(SEEDS), list(SEEDS.values())).astype(float)
