@@ -20,8 +20,7 @@ from postprocess.geometry.outline import BALL
 from postprocess.measures.heights import heights
 from postprocess.measures.mould import cast, read_tiers
 from postprocess.report import figures as style
-from postprocess.statistics.columns import SEED
-from postprocess.statistics.points import marked
+from postprocess.statistics.points import SEED, marked
 from postprocess.statistics.seeds import mean_over_seeds
 from studies.framework import plots
 from studies.framework.figures import Analysis, Drawing

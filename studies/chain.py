@@ -33,8 +33,7 @@ from postprocess.measures.strain import (
 )
 from postprocess.measures.strain import QUANTITIES as MEANINGS
 from postprocess.report import figures as style
-from postprocess.statistics.columns import SEED, SEEDS
-from postprocess.statistics.points import averaged
+from postprocess.statistics.points import SEED, SEEDS, averaged
 from postprocess.statistics.seeds import SeedMean, mean_over_seeds, slope_within
 from studies.framework import plots
 from studies.framework.figures import Analysis, Drawing, Histories, Means, one_by_one

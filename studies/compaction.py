@@ -21,8 +21,7 @@ from scipy.optimize import least_squares
 from dem.errors import InputError
 from dem.record.run import Run
 from postprocess.report import figures as style
-from postprocess.statistics.columns import ASPECT, SEED
-from postprocess.statistics.points import told_number
+from postprocess.statistics.points import ASPECT, SEED, told_number
 from postprocess.statistics.seeds import mean_over_seeds
 from studies.framework.figures import Analysis, Drawing
 from studies.framework.findings import Effect, Finding

@@ -15,9 +15,17 @@ from numpy.typing import NDArray
 
 from dem.record.run import Run
 from postprocess.geometry.links import centres_of_mass
-from postprocess.statistics.columns import ASPECT, SEED, SEEDS
-from postprocess.statistics.factorial import paired_differences
-from postprocess.statistics.points import averaged, marked, mean_columns, seeds_of, told_number
+from postprocess.statistics.points import (
+    ASPECT,
+    SEED,
+    SEEDS,
+    averaged,
+    marked,
+    mean_columns,
+    paired_differences,
+    seeds_of,
+    told_number,
+)
 from postprocess.statistics.seeds import SeedMean, mean_over_seeds
 from studies.framework.figures import Combinations
 from studies.framework.findings import Effect, Finding, Outcome, Rows, Verdict

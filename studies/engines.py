@@ -21,8 +21,7 @@ from postprocess.measures import strain
 from postprocess.measures.collapse import REMAINING, collapse_of, column_history, vibration
 from postprocess.measures.pull import PULL, peak, read_pull, weight_of_one
 from postprocess.report import figures as style
-from postprocess.statistics.columns import ASPECT, SEED
-from postprocess.statistics.points import mean_columns
+from postprocess.statistics.points import ASPECT, SEED, mean_columns
 from postprocess.statistics.seeds import difference, mean_over_seeds
 from studies.framework.activity import ENERGY, HEIGHT, PHI_ACTIVE, procedure_row
 from studies.framework.figures import Analysis, Drawing

@@ -26,12 +26,10 @@ from postprocess.measures.entanglement import entanglement
 from postprocess.measures.packing import packing_of
 from postprocess.measures.spread import escaped
 from postprocess.report import figures as style
-from postprocess.statistics.columns import ASPECT, SEED
 from postprocess.statistics.findings import judge, negative
-from postprocess.statistics.points import told_number
+from postprocess.statistics.points import ASPECT, SEED, told_number
 from postprocess.statistics.seeds import slope_within
-from postprocess.statistics.size_law import POWER, POWERS, SizeLaw, size_law
-from postprocess.statistics.threshold import Profile, alike, profiles
+from postprocess.statistics.size_law import POWER, POWERS, Profile, SizeLaw, alike, profiles, size_law
 from studies.framework.figures import Analysis, Drawing, one_by_one
 from studies.framework.findings import Effect, Finding, Outcome, Verdict
 from studies.framework.plots import CROSSINGS_LABEL, draw_means, finished, marker

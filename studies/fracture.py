@@ -18,7 +18,7 @@ from dem.record.run import Run
 from postprocess.geometry.links import centres_of_mass
 from postprocess.measures.pull import END, FREE, PULL, WINDOW, freed, held_at, held_fast, peak, read_pull, weight_of_one
 from postprocess.measures.table import summarise_run
-from postprocess.statistics.columns import ASPECT, SEED
+from postprocess.statistics.points import ASPECT, SEED
 from studies.framework.figures import Histories, Means, Scatter, Series, Split, by_procedure, one_by_one
 from studies.framework.findings import Effect, Finding, Rows, above, ranks
 from studies.framework.plots import ASPECT_LABEL, CROSSINGS_LABEL, THETA_LABEL, History, procedure_marker

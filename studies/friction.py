@@ -21,8 +21,7 @@ from scipy.special import stdtr, stdtrit
 
 from dem.record.run import Run
 from postprocess.report import figures as style
-from postprocess.statistics.columns import ASPECT, SEED, SEEDS
-from postprocess.statistics.points import marked, seeds_of, told_number
+from postprocess.statistics.points import ASPECT, SEED, SEEDS, marked, seeds_of, told_number
 from postprocess.statistics.seeds import CONFIDENCE as LEVEL
 from postprocess.statistics.seeds import Scatter, mean_over_seeds, pooled_scatter, slope_within
 from studies.framework import plots

@@ -20,8 +20,7 @@ from dem.record.run import Run
 from postprocess.measures.motors import APART
 from postprocess.measures.packing import DEFINITIONS
 from postprocess.report import figures as style
-from postprocess.statistics.columns import ASPECT, SEED
-from postprocess.statistics.pairs import pairs
+from postprocess.statistics.points import ASPECT, SEED, pairs
 from postprocess.statistics.seeds import CONFIDENCE, Slope, difference, mean_over_seeds, parabola, slope_within
 from studies.framework.activity import (
     ENERGY,

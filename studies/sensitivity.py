@@ -15,8 +15,7 @@ import pandas as pd
 from dem.errors import InputError
 from dem.record.run import Run
 from postprocess.report import figures as style
-from postprocess.statistics.columns import ASPECT, SEED
-from postprocess.statistics.points import marked, seeds_of
+from postprocess.statistics.points import ASPECT, SEED, marked, seeds_of
 from postprocess.statistics.seeds import SeedMean, mean_over_seeds, relative_difference
 from studies.framework import plots
 from studies.framework.figures import Analysis, Drawing

@@ -24,8 +24,7 @@ from postprocess.geometry.links import centres_of_mass
 from postprocess.measures.heights import heights
 from postprocess.measures.pull import PULL, WINDOW, held_at, held_fast, moving_mean, peak, read_pull, weight_of_one
 from postprocess.measures.table import summarise_run
-from postprocess.statistics.columns import ASPECT, SEED
-from postprocess.statistics.pairs import mean_difference
+from postprocess.statistics.points import ASPECT, SEED, mean_difference
 from postprocess.statistics.seeds import SeedMean, slope_within
 from studies.framework.figures import Histories, Means, Scatter, by_procedure
 from studies.framework.findings import Effect, Finding, Outcome, Verdict, above, blocks, ranked, ranks

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 
-from postprocess.report.markdown import table_lines
+from postprocess.report.tables import table_lines
 
 
 def cell(text: str) -> str:

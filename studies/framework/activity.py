@@ -22,7 +22,7 @@ from dem.record.run import Run
 from dem.record.series import Series
 from postprocess.measures.motors import APART, SAMPLED_WORK
 from postprocess.measures.table import PASSIVE_PHASES, summarise_run
-from postprocess.statistics.columns import ASPECT, SEED
+from postprocess.statistics.points import ASPECT, SEED
 from studies.framework.procedures import (
     ACTIVE,
     CROSSINGS,

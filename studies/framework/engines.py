@@ -12,9 +12,8 @@ from types import MappingProxyType
 
 import pandas as pd
 
-from postprocess.report.markdown import table_lines
-from postprocess.statistics.columns import SEED
-from postprocess.statistics.points import told_number
+from postprocess.report.tables import table_lines
+from postprocess.statistics.points import SEED, told_number
 from postprocess.statistics.seeds import SeedMean, mean_over_seeds
 from studies.framework.runs import ENGINE, ENGINES
 

@@ -19,9 +19,8 @@ import pandas as pd
 from matplotlib.container import ErrorbarContainer
 
 from postprocess.report import figures
-from postprocess.report.limits import hold_everything
-from postprocess.statistics.columns import ASPECT
-from postprocess.statistics.points import marked
+from postprocess.report.figures import hold_everything
+from postprocess.statistics.points import ASPECT, marked
 from studies.framework.procedures import EXTERNAL, INTERNAL, SHAPE, STATIC
 from studies.framework.runs import BARS
 

@@ -10,7 +10,7 @@ import pandas as pd
 
 from dem.errors import InputError
 from dem.record.run import Run
-from postprocess.statistics.pairs import mean_difference
+from postprocess.statistics.points import mean_difference
 from postprocess.statistics.seeds import SeedMean
 from studies.framework.runs import DEFINITION
 

@@ -20,7 +20,7 @@ from dem.record.run import Run
 from postprocess.measures.packing import DEFINITIONS
 from postprocess.measures.table import LAST_FRAMES
 from postprocess.report import figures
-from postprocess.report.markdown import table_lines
+from postprocess.report.tables import table_lines
 from studies.framework.runs import DEFINITION, MissingRun
 
 CITATION = "Gravish et al., PRL 108, 208001 (2012), digitised"

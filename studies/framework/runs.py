@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from dem.errors import InputError
 from dem.record.document import Phase
 from dem.record.run import Run, open_run
-from postprocess.statistics.columns import SEED
+from postprocess.statistics.points import SEED
 
 Row = Mapping[str, object]
 """Cells of one row of a table, by the names of its columns."""

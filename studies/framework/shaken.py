@@ -11,7 +11,7 @@ from dem.errors import InputError
 from dem.record.run import Run, SceneData
 from postprocess.measures.packing import COSTLY_DEFINITIONS, DEFINITIONS
 from postprocess.measures.table import LAST_FRAMES, packing_change, summarise_run
-from postprocess.statistics.columns import ASPECT, SEED
+from postprocess.statistics.points import ASPECT, SEED
 from studies.framework.plots import History
 from studies.framework.runs import DEFINITION, duration
 

@@ -12,9 +12,8 @@ import pandas as pd
 from dem.errors import InputError
 from dem.record.run import Run
 from postprocess.report import figures as style
-from postprocess.report.markdown import meaning_lines, table_lines
-from postprocess.statistics.columns import ASPECT, SEED, SEEDS
-from postprocess.statistics.points import marked, seeds_of
+from postprocess.report.tables import meaning_lines, table_lines
+from postprocess.statistics.points import ASPECT, SEED, SEEDS, marked, seeds_of
 from postprocess.statistics.seeds import mean_over_seeds
 from studies.framework.engines import (
     by_engine,

@@ -14,8 +14,7 @@ from synthetic import SyntheticRun, write_run
 from synthetic.hooked import weight, write_hooked_run
 
 from dem.errors import InputError
-from postprocess.statistics.columns import ASPECT, SEED
-from postprocess.statistics.points import marked
+from postprocess.statistics.points import ASPECT, SEED, marked
 from studies.accuracy import (
     ACTIVITY,
     COMPARED,

@@ -10,7 +10,7 @@ import pandas as pd
 import pytest
 from synthetic import SyntheticRun, write_manifest, write_run
 
-from postprocess.statistics.columns import SEED
+from postprocess.statistics.points import SEED
 from studies.engines import CASE, COMPARED, FORCE, QUANTITIES, STUDY, VARIANT, equivalence, pitch_of
 from studies.framework.findings import within
 from studies.framework.study import Report

@@ -16,7 +16,7 @@ from matplotlib.figure import Figure
 
 import studies
 from postprocess.report import figures
-from postprocess.report.limits import hold_everything
+from postprocess.report.figures import hold_everything
 from studies.framework.plots import draw_bounds, draw_means, finished, marker
 from studies.framework.provenance import told_gaps, told_reference
 from studies.framework.runs import BARS, told_numbers
