@@ -95,8 +95,9 @@ class RunView:
         )
         self.field = colour_field(None, self.run)
         self.pick: Pick | None = None
-        self.plotter: Any = pv.Plotter(off_screen=True)
-        self.plotter.set_background("white")
+        window: Any = pv.Plotter(off_screen=True)
+        window.set_background("white")
+        self.plotter = window
         self._bodies = Bodies(self.run, USUAL, [each for each in self.fields if each.name in IDENTITY])
         self._meshes: dict[str, pv.PolyData] = {}
         self._bodies.hold(self.frames[index] for index in self._sampled(_SAMPLES))

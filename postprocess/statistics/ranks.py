@@ -15,8 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import rankdata
 
-from postprocess.statistics.seeds import CONFIDENCE, Floats, SeedMean, mean_over_seeds
+from postprocess.statistics.seeds import CONFIDENCE, SeedMean, mean_over_seeds
 
+Floats = NDArray[np.float64]
 Whole = NDArray[np.int64]
 
 _NONE = 1e-12  # of a spread: what rounding leaves of none
