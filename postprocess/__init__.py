@@ -1,27 +1,21 @@
 """Frames and series in; measures, tables, figures and pictures out.
 
-Readers take a run directory (see docs/reference/files.md); measures are pure functions of NumPy arrays and
-return frozen results. Lengths are in metres, times in seconds. `heights`,
-`entanglement` and `linking` are functions of the modules of the same name and are imported from there.
+Readers take a run directory (see docs/reference/files.md); measures are pure functions of NumPy arrays and return
+frozen results. Lengths are in metres, times in seconds. Vertices are (N, 4, 3) [m]: barb tip, hinge, hinge, barb tip of
+each smarticle; others are rejected with `InputError`. `heights`, `entanglement` and `linking` are functions of the
+modules of these names and are imported from there.
 """
 
-from dem.record.forces import read_forces
+from dem.record.forces import RecordedForces, read_forces
 from dem.record.frame import Frame, read_frame
 from dem.record.frames import FrameSequence, read_frames
 from dem.record.run import Run, open_run
-from dem.record.series import read_series
+from dem.record.series import Series, read_series
 from postprocess.geometry.links import UndefinedMeasureError, centres_of_mass
-from postprocess.measures.contacts import (
-    contact_pairs,
-    pairs_in_contact,
-    touching_pairs,
-)
-from postprocess.measures.entanglement import (
-    crossing_pairs,
-    has_plane,
-    link_crossings,
-)
+from postprocess.measures.contacts import ContactPairs, contact_pairs, pairs_in_contact, touching_pairs
+from postprocess.measures.entanglement import CrossingPairs, crossing_pairs, has_plane, link_crossings
 from postprocess.measures.force_chains import (
+    ForceDistribution,
     force_chains,
     force_distribution,
     force_participation,
@@ -29,18 +23,28 @@ from postprocess.measures.force_chains import (
 )
 from postprocess.measures.heights import material_height
 from postprocess.measures.linking import gauss_integral
-from postprocess.measures.nematic import nematic_order
-from postprocess.measures.packing import DEFINITIONS, packing_fraction
-from postprocess.measures.profile import packing_profile, profile_table
-from postprocess.measures.table import measure_run, packing_change, summarise_run
+from postprocess.measures.nematic import NematicOrder, nematic_order
+from postprocess.measures.packing import DEFINITIONS, PackingFraction, packing_fraction
+from postprocess.measures.profile import PackingProfile, packing_profile, profile_table
+from postprocess.measures.table import PackingChange, measure_run, packing_change, summarise_run
 from postprocess.report.tables import write_table
-from postprocess.statistics.seeds import mean_with_error
+from postprocess.statistics.seeds import Mean, mean_with_error
 
 __all__ = [
     "DEFINITIONS",
+    "ContactPairs",
+    "CrossingPairs",
+    "ForceDistribution",
     "Frame",
     "FrameSequence",
+    "Mean",
+    "NematicOrder",
+    "PackingChange",
+    "PackingFraction",
+    "PackingProfile",
+    "RecordedForces",
     "Run",
+    "Series",
     "UndefinedMeasureError",
     "centres_of_mass",
     "contact_pairs",

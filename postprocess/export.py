@@ -55,7 +55,6 @@ def export_run(
         output: What to write, which must not exist: of vtp and of all frames a folder, else a file that ends as `to`
             says; `export-TO` or `export.TO` in the run directory if not given.
         time: Simulated time [s], the nearest frame is taken; the last one if not given.
-        every_frame: All frames instead.
         wanted: Kinds of bodies besides the usual ones, see `postprocess.bodies.meshes.KINDS`.
         unwanted: Kinds and fields to leave out.
         color_by: Name of a field, for formats with colours; None: crossings, in a plane smarticle_id.

@@ -214,7 +214,6 @@ class Viewer:
     """One run in one page, and the server of that page.
 
     Args:
-        view: The run.
         port: To listen on; 0: any that is free.
         opened: Called with the address once the server listens.
     """

@@ -59,21 +59,13 @@ PAINTS: Mapping[str, Paint] = MappingProxyType(
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class ColourScale:
-    """Turns values of a field into colours.
+    """Turns values of a field into colours."""
 
-    Attributes:
-        kind: Of the field.
-        colours: Of the bar; None where colours only show identity.
-        low: Value at the bar's lower end.
-        high: Value at its upper end.
-        labels: By value, what is written beside the bar.
-    """
-
-    kind: Literal["count", "value", "name"]
-    colours: Colormap | None = None
-    low: float = 0.0
-    high: float = 1.0
-    labels: Mapping[float, str] = dataclasses.field(default_factory=dict)
+    kind: Literal["count", "value", "name"]  #: Of the field
+    colours: Colormap | None = None  #: Of the bar; None where colours only show identity
+    low: float = 0.0  #: Value at the bar's lower end
+    high: float = 1.0  #: Value at its upper end
+    labels: Mapping[float, str] = dataclasses.field(default_factory=dict)  #: By value, what is written beside the bar
 
     @classmethod
     def of(cls, field: Field, bounds: Span) -> Self:

@@ -35,32 +35,21 @@ Of piles of 100 and 135, the medians of both differ by 1 %, their tenths and nin
 
 @dataclass(frozen=True)
 class Field:
-    """One quantity of a smarticle, or of each of its links.
+    """One quantity of a smarticle, or of each of its links."""
 
-    Attributes:
-        name: With its unit, as in the run's frames.
-        unit: SI; "-" for a pure number.
-        meaning: One sentence.
-        take: (N,), (N, 3) or (N, 3, 3) values of a frame: one per smarticle, per link, or a vector per link; None where
-            the frame does not have it.
-        kind: "count" for whole numbers that count, "value" for a continuous quantity, "name" for identity.
-        of: Whether it belongs to each smarticle or to each link.
-        available_for: Whether a run has it at all.
-        costly: Whether it takes tenths of a second per frame or more.
-        label: For the colour bar of a picture; the name if empty.
-        shown: Factor and unit of the numbers of that bar; None: as they are.
-    """
-
-    name: str
-    unit: str
-    meaning: str
+    name: str  #: With its unit, as in the run's frames
+    unit: str  #: SI; "-" for a pure number
+    meaning: str  #: One sentence
+    #: (N,), (N, 3) or (N, 3, 3) values of a frame: one per smarticle, per link, or a vector per link; None where the
+    #: frame does not have it
     take: Callable[[Frame, Run], NDArray[Any] | None]
+    #: "count" for whole numbers that count, "value" for a continuous quantity, "name" for identity
     kind: Literal["count", "value", "name"] = "value"
-    of: Literal["smarticle", "link"] = "smarticle"
-    available_for: Callable[[Run], bool] = lambda _: True
-    costly: bool = False
-    label: str = ""
-    shown: tuple[float, str] | None = None
+    of: Literal["smarticle", "link"] = "smarticle"  #: Whether it belongs to each smarticle or to each link
+    available_for: Callable[[Run], bool] = lambda _: True  #: Whether a run has it at all
+    costly: bool = False  #: Whether it takes tenths of a second per frame or more
+    label: str = ""  #: For the colour bar of a picture; the name if empty
+    shown: tuple[float, str] | None = None  #: Factor and unit of the numbers of that bar; None: as they are
 
     @property
     def title(self) -> str:

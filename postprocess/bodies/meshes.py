@@ -42,19 +42,12 @@ Bounds = tuple[float, float, float, float, float, float]
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class DrawnHooks:
-    """Two crosses of square bars.
+    """Two crosses of square bars."""
 
-    Attributes:
-        bars: Of the lower and of the upper cross, about the cross's centre.
-        lower: Height of the lower cross above the floor [m].
-        times: (n,) at which the upper cross's height is known [s].
-        upper: (n,) height of the upper cross above the floor [m].
-    """
-
-    bars: tuple[tuple[Bounds, ...], tuple[Bounds, ...]]
-    lower: float
-    times: Floats = field(repr=False)
-    upper: Floats = field(repr=False)
+    bars: tuple[tuple[Bounds, ...], tuple[Bounds, ...]]  #: Of lower and upper cross, about its centre
+    lower: float  #: Height of the lower cross above the floor [m]
+    times: Floats = field(repr=False)  #: (n,) at which the upper cross's height is known [s]
+    upper: Floats = field(repr=False)  #: (n,) height of the upper cross above the floor [m]
 
     def heights(self, time: float) -> tuple[float, float]:
         """Return the heights of the lower and the upper cross above the floor at a time [m]."""
@@ -63,20 +56,13 @@ class DrawnHooks:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class ChainStrings:
-    """Strings of a strain test; lengths in m.
+    """Strings of a strain test; lengths in m."""
 
-    Attributes:
-        phase: Index of the phase while they are tied.
-        start: Time at which that phase begins [s].
-        speed: Of the end that is moved [m/s].
-        from_hinge: Where on a barb they are tied, from its hinge [m].
-        anchors: (2, 3) the other ends at the start: at lower x, held, and at higher x, moved away along x.
-    """
-
-    phase: int
-    start: float
-    speed: float
-    from_hinge: float
+    phase: int  #: Index of the phase while they are tied
+    start: float  #: Time at which that phase begins [s]
+    speed: float  #: Of the end that is moved [m/s]
+    from_hinge: float  #: Where on a barb they are tied, from its hinge [m]
+    #: (2, 3) the other ends at the start: at lower x, held, and at higher x, moved away along x
     anchors: Floats = field(repr=False)
 
     def lines(self, frame: Frame) -> Floats:
@@ -90,25 +76,18 @@ class ChainStrings:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Surroundings:
-    """The rigid boundaries of a run.
+    """The rigid boundaries of a run."""
 
-    Attributes:
-        tiers: Radius and top of each tier of a mould, from the bottom up [m]; empty for one cylinder.
-        height: Of the cylinder's wall [m]; None: as high as the pile needs.
-        floor_alone: Indices of phases that move the floor and leave the wall at rest, at z = 0.
-        removed: Index of the phase that takes the wall away; None if none does.
-        lift: Start [s], end [s] and speed [m/s] of its lifting; None if it goes at once.
-        hooks: None in scenes without.
-        strings: Of a strain test; None in scenes without.
-    """
-
+    #: Radius and top of each tier of a mould, from the bottom up [m]; empty for one cylinder
     tiers: tuple[tuple[float, float], ...] = ()
-    height: float | None = None
+    height: float | None = None  #: Of the cylinder's wall [m]; None: as high as the pile needs
+    #: Indices of phases that move the floor and leave the wall at rest, at z = 0
     floor_alone: frozenset[int] = frozenset()
-    removed: int | None = None
+    removed: int | None = None  #: Index of the phase that takes the wall away; None if none does
+    #: Start [s], end [s] and speed [m/s] of its lifting; None if it goes at once
     lift: tuple[float, float, float] | None = None
-    hooks: DrawnHooks | None = field(default=None, repr=False)
-    strings: ChainStrings | None = field(default=None, repr=False)
+    hooks: DrawnHooks | None = field(default=None, repr=False)  #: None in scenes without
+    strings: ChainStrings | None = field(default=None, repr=False)  #: Of a strain test; None in scenes without
 
     @property
     def corners(self) -> list[tuple[float, float]]:
@@ -289,9 +268,6 @@ class Bodies:
     """The bodies of one run, frame after frame.
 
     Args:
-        run: The run.
-        kinds: Keys of `KINDS`.
-        fields: What the smarticles carry.
         cut: Whether walls end a little above the pile, as in pictures.
 
     Raises:

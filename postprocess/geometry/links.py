@@ -126,21 +126,13 @@ def plane_frames(vertices: Floats) -> Floats:
 
 @dataclass(frozen=True, kw_only=True)
 class Chain:
-    """How spheres stand for a smarticle.
+    """How spheres stand for a smarticle."""
 
-    Attributes:
-        diameter: Of the spheres [m].
-        rows: Rows, or strands, side by side along the smarticle's normal.
-        width: Of the rows together, along the normal [m].
-        pitch: Largest distance of neighbouring centres along a link [m]; 0: spheres are swept along the links.
-        bulge: By how much the middle link is thicker than the barbs, to either side in the plane [m]; not of what is
-            swept.
-    """
-
-    diameter: float
-    rows: int
-    width: float
-    pitch: float
+    diameter: float  #: Of the spheres [m]
+    rows: int  #: Rows, or strands, side by side along the smarticle's normal
+    width: float  #: Of the rows together, along the normal [m]
+    pitch: float  #: Largest distance of neighbouring centres along a link [m]; 0: spheres are swept along the links
+    #: By how much the middle link is thicker than the barbs, to either side in the plane [m]; not of what is swept
     bulge: float = 0.0
 
 

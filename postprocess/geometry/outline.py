@@ -35,17 +35,11 @@ _MOST_VOXELS = 40_000_000
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Outlines:
-    """The regions of one or more piles on one grid of voxels above the floor.
+    """The regions of one or more piles on one grid of voxels above the floor."""
 
-    Attributes:
-        pitch: Side of a voxel [m].
-        origin: (3,) [m], centre of the first voxel, above the floor.
-        inside: (P, x, y, z) bool, which voxels belong to each pile.
-    """
-
-    pitch: float
-    origin: Floats
-    inside: Flags = field(repr=False)
+    pitch: float  #: Side of a voxel [m]
+    origin: Floats  #: (3,) [m], centre of the first voxel, above the floor
+    inside: Flags = field(repr=False)  #: (P, x, y, z) bool, which voxels belong to each pile
 
     def within(self, region: Region) -> Flags:
         """Return which voxels (x, y, z) have their centre in a cylinder whose heights are above the floor."""

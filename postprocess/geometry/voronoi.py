@@ -28,17 +28,11 @@ TOGETHER = 60_000
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class LocalPacking:
-    """Set-Voronoi cells of the smarticles of a pile.
+    """Set-Voronoi cells of the smarticles of a pile."""
 
-    Attributes:
-        volumes: (N,) [m³], of the cell of each smarticle; infinite or zero where it has none.
-        interior: (N,) bool, which smarticles lie in the region asked for.
-        value: Solid volume over cell volume of the interior ones together [-].
-    """
-
-    volumes: Floats = field(repr=False)
-    interior: Flags = field(repr=False)
-    value: float
+    volumes: Floats = field(repr=False)  #: (N,) [m³], of the cell of each smarticle; infinite or zero where it has none
+    interior: Flags = field(repr=False)  #: (N,) bool, which smarticles lie in the region asked for
+    value: float  #: Solid volume over cell volume of the interior ones together [-]
 
 
 def local_packing(
@@ -141,8 +135,6 @@ def _cell_volumes(points: Floats, count: int, *, reach: float, together: int = T
     Args:
         points: (n, 3) [m].
         count: Of the points whose cells are wanted; the others bound cells.
-        reach: The first one [m].
-        together: Most points of a slab.
     """
     if count <= together:
         return _cells(points).volumes[:count]
@@ -167,19 +159,12 @@ def _cell_volumes(points: Floats, count: int, *, reach: float, together: int = T
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class _Cells:
-    """Voronoi cells of points; lengths are infinite for open ones.
+    """Voronoi cells of points; lengths are infinite for open ones."""
 
-    Attributes:
-        volumes: (n,) [m³].
-        farthest: (n,) [m], distance of the farthest corner.
-        lowest: (n,) [m], least x of the spheres around the corners through the point.
-        highest: (n,) [m], greatest.
-    """
-
-    volumes: Floats
-    farthest: Floats
-    lowest: Floats
-    highest: Floats
+    volumes: Floats  #: (n,) [m³]
+    farthest: Floats  #: (n,) [m], distance of the farthest corner
+    lowest: Floats  #: (n,) [m], least x of the spheres around the corners through the point
+    highest: Floats  #: (n,) [m], greatest
 
 
 def _cells(points: Floats) -> _Cells:

@@ -20,15 +20,10 @@ from postprocess.measures.registry import FrameMeasure, Quantity
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Clusters:
-    """Connected parts of a graph whose nodes are the smarticles of a frame.
+    """Connected parts of a graph whose nodes are the smarticles of a frame."""
 
-    Attributes:
-        labels: (N,) int64, number of each smarticle's cluster, 0 for the largest one.
-        sizes: (C,) int64, smarticles of each cluster, descending.
-    """
-
-    labels: Whole = field(repr=False)
-    sizes: Whole
+    labels: Whole = field(repr=False)  #: (N,) int64, number of each smarticle's cluster, 0 for the largest one
+    sizes: Whole  #: (C,) int64, smarticles of each cluster, descending
 
     @property
     def largest(self) -> float:

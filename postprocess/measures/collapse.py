@@ -65,17 +65,11 @@ class Vibration:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class ColumnHistory:
-    """Heights of one column against time.
+    """Heights of one column against time."""
 
-    Attributes:
-        times: (n,) since the vibration began [s], some of them before.
-        heights: (n,) over the mean height in the last `REST` before [-].
-        before: That height: [m], or a share of the smarticles by `REMAINING` [-].
-    """
-
-    times: Floats
-    heights: Floats
-    before: float
+    times: Floats  #: (n,) since the vibration began [s], some of them before
+    heights: Floats  #: (n,) over the mean height in the last `REST` before [-]
+    before: float  #: That height: [m], or a share of the smarticles by `REMAINING` [-]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -83,28 +77,20 @@ class CollapseTime:
     """The collapse of one column.
 
     h(t) = h_end + (h_start − h_end) exp(−(t/τ)^β).
-
-    Attributes:
-        outcome: "collapsed": τ was seen; "collapsing": it has lost height, but τ is beyond the end, or not known from
-            what was seen; "standing": it has lost less than `LEAST_FALL`.
-        time: τ [s]; NaN unless collapsed.
-        error: Standard error of the fit [s], with the correlation of successive residuals, or the first sample's time
-            where τ is shorter than that; NaN unless collapsed.
-        bound: Lower bound of τ [s]: the time watched; NaN if collapsed.
-        exponent: β of the fit [-].
-        start: h_start of the fit, in the heights' unit.
-        end: h_end of the fit, in the heights' unit.
-        fall: Share of the height that the fit loses while it is watched [-].
     """
 
+    #: "collapsed": τ was seen; "collapsing": it has lost height, but τ is beyond the end, or not known from what was
+    #: seen; "standing": it has lost less than `LEAST_FALL`
     outcome: Literal["collapsed", "collapsing", "standing"]
-    time: float
+    time: float  #: τ [s]; NaN unless collapsed
+    #: Standard error of the fit [s], with the correlation of successive residuals, or the first sample's time where τ
+    #: is shorter than that; NaN unless collapsed
     error: float
-    bound: float
-    exponent: float
-    start: float
-    end: float
-    fall: float
+    bound: float  #: Lower bound of τ [s]: the time watched; NaN if collapsed
+    exponent: float  #: β of the fit [-]
+    start: float  #: h_start of the fit, in the heights' unit
+    end: float  #: h_end of the fit, in the heights' unit
+    fall: float  #: Share of the height that the fit loses while it is watched [-]
 
 
 def vibration(run: Run) -> Vibration:

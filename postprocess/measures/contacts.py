@@ -38,17 +38,11 @@ _REACH = 1.05
 
 
 class ContactPairs(NamedTuple):
-    """Pairs of smarticles whose centrelines come close; the edges of a contact graph.
+    """Pairs of smarticles whose centrelines come close; the edges of a contact graph."""
 
-    Attributes:
-        i: (P,) int64, the lower index.
-        j: (P,) int64, the higher index.
-        distance: (P,) float64 [m], the least distance of their centrelines.
-    """
-
-    i: Whole
-    j: Whole
-    distance: Floats
+    i: Whole  #: (P,) int64, the lower index
+    j: Whole  #: (P,) int64, the higher index
+    distance: Floats  #: (P,) float64 [m], the least distance of their centrelines
 
 
 def contact_pairs(vertices: Vertices, distance: float) -> ContactPairs:

@@ -38,48 +38,30 @@ _CHUNK = 100_000
 
 
 class CrossingPairs(NamedTuple):
-    """Pairs of smarticles of which one passes through the other; the edges of a directed graph.
+    """Pairs of smarticles of which one passes through the other; the edges of a directed graph."""
 
-    Attributes:
-        i: (P,) int64, the smarticle passed through.
-        j: (P,) int64, the smarticle that passes.
-        links: (P,) int64, how many of j's links pass, 1 to 3.
-    """
-
-    i: Whole
-    j: Whole
-    links: Whole
+    i: Whole  #: (P,) int64, the smarticle passed through
+    j: Whole  #: (P,) int64, the smarticle that passes
+    links: Whole  #: (P,) int64, how many of j's links pass, 1 to 3
 
 
 class LinkPassages(NamedTuple):
-    """Links that pass through smarticles, one by one.
+    """Links that pass through smarticles, one by one."""
 
-    Attributes:
-        i: (P,) int64, the smarticle passed through.
-        j: (P,) int64, the smarticle that passes.
-        link: (P,) int64, which of j's links: 0 barb 1, 1 middle, 2 barb 2.
-        point: (P, 3) [m], where it meets the plane of i.
-    """
-
-    i: Whole
-    j: Whole
-    link: Whole
-    point: Floats
+    i: Whole  #: (P,) int64, the smarticle passed through
+    j: Whole  #: (P,) int64, the smarticle that passes
+    link: Whole  #: (P,) int64, which of j's links: 0 barb 1, 1 middle, 2 barb 2
+    point: Floats  #: (P, 3) [m], where it meets the plane of i
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Entanglement:
-    """Crossings of all smarticles of a frame.
+    """Crossings of all smarticles of a frame."""
 
-    Attributes:
-        crossings: (N,) int64, links of others through each smarticle's plane; 0 without a plane.
-        has_plane: (N,) bool, False for (nearly) straight smarticles, which have no plane.
-        mean: Mean over the smarticles that have a plane [-]; NaN if none has.
-    """
-
+    #: (N,) int64, links of others through each smarticle's plane; 0 without a plane
     crossings: Whole = field(repr=False)
-    has_plane: Flags = field(repr=False)
-    mean: float
+    has_plane: Flags = field(repr=False)  #: (N,) bool, False for (nearly) straight smarticles, which have no plane
+    mean: float  #: Mean over the smarticles that have a plane [-]; NaN if none has
 
 
 def entanglement(vertices: Vertices, crossings: Whole | None = None) -> Entanglement:

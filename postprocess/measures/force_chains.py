@@ -28,15 +28,10 @@ from postprocess.measures.registry import FrameMeasure, Quantity
 
 
 class ForceDistribution(NamedTuple):
-    """P(f), the density of normal forces over their mean.
+    """P(f), the density of normal forces over their mean."""
 
-    Attributes:
-        edges: (B + 1,) float64, of the bins, f / ⟨f⟩ [-].
-        density: (B,) float64 [-], its integral is 1 where the bins hold all forces.
-    """
-
-    edges: Floats
-    density: Floats
+    edges: Floats  #: (B + 1,) float64, of the bins, f / ⟨f⟩ [-]
+    density: Floats  #: (B,) float64 [-], its integral is 1 where the bins hold all forces
 
 
 def checked_forces(normal: ArrayLike) -> Floats:

@@ -17,19 +17,12 @@ from postprocess.measures.registry import FrameMeasure, Quantity, Shown, in_spac
 
 @dataclass(frozen=True, kw_only=True)
 class Heights:
-    """Heights above the floor.
+    """Heights above the floor."""
 
-    Attributes:
-        mean_com: Height of the centre of mass of all smarticles [m].
-        highest_com: Height of the highest smarticle's centre of mass [m].
-        second_highest_com: Of the second highest [m]; NaN for a single smarticle.
-        top: Height below which 95 % of the material lies [m].
-    """
-
-    mean_com: float
-    highest_com: float
-    second_highest_com: float
-    top: float
+    mean_com: float  #: Height of the centre of mass of all smarticles [m]
+    highest_com: float  #: Height of the highest smarticle's centre of mass [m]
+    second_highest_com: float  #: Of the second highest [m]; NaN for a single smarticle
+    top: float  #: Height below which 95 % of the material lies [m]
 
 
 def heights(vertices: Vertices, *, floor_z: float = 0.0) -> Heights:

@@ -26,19 +26,12 @@ _CHUNK = 500
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Linking:
-    """Linking numbers of pairs of smarticles of a frame, as open chains.
+    """Linking numbers of pairs of smarticles of a frame, as open chains."""
 
-    Attributes:
-        i: (P,) int64, the lower index of each pair.
-        j: (P,) int64, the higher index.
-        number: (P,) float64 [-], signed; its sign follows the order of the vertices.
-        per_smarticle: (N,) float64 [-], Σ|Lk| over the pairs of each smarticle.
-    """
-
-    i: Whole = field(repr=False)
-    j: Whole = field(repr=False)
-    number: Floats = field(repr=False)
-    per_smarticle: Floats = field(repr=False)
+    i: Whole = field(repr=False)  #: (P,) int64, the lower index of each pair
+    j: Whole = field(repr=False)  #: (P,) int64, the higher index
+    number: Floats = field(repr=False)  #: (P,) float64 [-], signed; its sign follows the order of the vertices
+    per_smarticle: Floats = field(repr=False)  #: (N,) float64 [-], Σ|Lk| over the pairs of each smarticle
 
     @property
     def mean(self) -> float:

@@ -16,27 +16,17 @@ from postprocess.geometry.voxel import Region
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Cast:
-    """A pile in its mould, and that pile without it, after.
+    """A pile in its mould, and that pile without it, after."""
 
-    Attributes:
-        filled_before: (T,) share of each tier's volume that is inside the pile, see `postprocess.geometry.outline` [-].
-        filled_after: (T,) likewise without the mould [-].
-        kept: (T,) of what was filled before, the share that still is [-]; NaN for an empty tier.
-        material_before: (T,) share of all links' length inside each tier [-].
-        material_after: (T,) likewise without the mould [-].
-        overlap: Volume common to the pile before and after over that of both together (Jaccard) [-].
-        likeness: Of the pile after and the whole mould: 1 for a perfect cast [-].
-        likeness_before: Of the pile before and the mould [-].
-    """
-
+    #: (T,) share of each tier's volume that is inside the pile, see `postprocess.geometry.outline` [-]
     filled_before: Floats
-    filled_after: Floats
-    kept: Floats
-    material_before: Floats
-    material_after: Floats
-    overlap: float
-    likeness: float
-    likeness_before: float
+    filled_after: Floats  #: (T,) likewise without the mould [-]
+    kept: Floats  #: (T,) of what was filled before, the share that still is [-]; NaN for an empty tier
+    material_before: Floats  #: (T,) share of all links' length inside each tier [-]
+    material_after: Floats  #: (T,) likewise without the mould [-]
+    overlap: float  #: Volume common to the pile before and after over that of both together (Jaccard) [-]
+    likeness: float  #: Of the pile after and the whole mould: 1 for a perfect cast [-]
+    likeness_before: float  #: Of the pile before and the mould [-]
 
 
 def cast(

@@ -17,18 +17,13 @@ from postprocess.measures.registry import FrameMeasure, Quantity, in_space
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class NematicOrder:
-    """Nematic order: that of directions whose sign does not count.
+    """Nematic order: that of directions whose sign does not count."""
 
-    Attributes:
-        tensor: (3, 3) float64 [-], Q = ⟨(3 u u - 1) / 2⟩, symmetric and without a trace.
-        order: S, its largest eigenvalue [-]: 1 where all are parallel, 1/4 where all lie in a plane at random, and of
-            N random directions in space not 0 but about 0.8 / N^½.
-        director: (3,) the unit vector of S, upwards.
-    """
-
-    tensor: Floats = field(repr=False)
+    tensor: Floats = field(repr=False)  #: (3, 3) float64 [-], Q = ⟨(3 u u - 1) / 2⟩, symmetric and without a trace
+    #: S, its largest eigenvalue [-]: 1 where all are parallel, 1/4 where all lie in a plane at random, and of N random
+    #: directions in space not 0 but about 0.8 / N^½
     order: float
-    director: Floats
+    director: Floats  #: (3,) the unit vector of S, upwards
 
     @property
     def polar_angle(self) -> float:

@@ -38,17 +38,11 @@ COSTLY_DEFINITIONS = frozenset({"voxel", "voronoi"})
 
 @dataclass(frozen=True, kw_only=True)
 class PackingFraction:
-    """A packing fraction that names its definition.
+    """A packing fraction that names its definition."""
 
-    Attributes:
-        value: Solid volume over volume [-].
-        definition: Key of `DEFINITIONS`.
-        height: Height of the pile above the floor that the definition used [m].
-    """
-
-    value: float
-    definition: str
-    height: float
+    value: float  #: Solid volume over volume [-]
+    definition: str  #: Key of `DEFINITIONS`
+    height: float  #: Height of the pile above the floor that the definition used [m]
 
 
 def packing_fraction(

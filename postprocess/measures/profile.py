@@ -16,19 +16,13 @@ from postprocess.geometry.voxel import solid_points
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class PackingProfile:
-    """Packing fraction in rings and layers of an upright cylinder.
+    """Packing fraction in rings and layers of an upright cylinder."""
 
-    Attributes:
-        radii: (R + 1,) float64 [m], edges of the rings, 0 to the container's radius.
-        heights: (Z + 1,) float64 [m], edges of the layers, from the floor up.
-        packing: (R, Z) float64 [-], share of each ring of each layer that lies inside a link's box.
-        outside: Volume of the links' boxes that is in no ring of any layer [m³].
-    """
-
-    radii: Floats = field(repr=False)
-    heights: Floats = field(repr=False)
+    radii: Floats = field(repr=False)  #: (R + 1,) float64 [m], edges of the rings, 0 to the container's radius
+    heights: Floats = field(repr=False)  #: (Z + 1,) float64 [m], edges of the layers, from the floor up
+    #: (R, Z) float64 [-], share of each ring of each layer that lies inside a link's box
     packing: Floats = field(repr=False)
-    outside: float
+    outside: float  #: Volume of the links' boxes that is in no ring of any layer [m³]
 
     @property
     def volumes(self) -> Floats:
@@ -63,7 +57,6 @@ def packing_profile(
         thickness_normal: t1, along the normal of the smarticle's plane [m].
         thickness_in_plane: t2, in the smarticle's plane [m].
         floor_z: Height of the container's floor [m].
-        rings: Rings of equal width.
         layer: Thickness of the layers [m]; a ring's width if not given. The uppermost reaches above the pile.
         pitch: Spacing of the points that the boxes are made of [m]; half the smaller thickness if not given, which
             makes 16 points of the section of 1.27 × 0.5 mm² and some hundreds in the smallest ring of a loose pile.
@@ -97,7 +90,6 @@ def profile_table(run: Run, *, rings: int = 6, layer: float | None = None) -> pd
     """Compute φ(r, z) of the last frame of each phase of a run: a row per phase, ring and layer.
 
     Args:
-        rings: Rings of equal width.
         layer: Thickness of the layers [m]; a ring's width if not given.
 
     Raises:

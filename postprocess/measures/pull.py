@@ -33,23 +33,15 @@ END = 0.1
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class HookPull:
-    """A hook's history while it is pulled.
+    """A hook's history while it is pulled."""
 
-    Attributes:
-        edges: (n + 1,) times since the pull began, of samples and of the one before them [s].
-        raised: (n + 1,) how far the hook has been raised there [m].
-        force: (n,) needed to raise it, mean between two samples [N].
-        held: (n,) with which the smarticles pull the other hook upwards, likewise [N]: what goes from hook to hook.
-        before: The force before the pull [N]: what rested on the hook; negative where it was held up.
-        engine_work: Work of the hook on the smarticles by the engine's own ledger [J]; NaN where not recorded.
-    """
-
-    edges: Floats = field(repr=False)
-    raised: Floats = field(repr=False)
-    force: Floats = field(repr=False)
+    edges: Floats = field(repr=False)  #: (n + 1,) times since the pull began, of samples and of the one before them [s]
+    raised: Floats = field(repr=False)  #: (n + 1,) how far the hook has been raised there [m]
+    force: Floats = field(repr=False)  #: (n,) needed to raise it, mean between two samples [N]
+    #: (n,) with which the smarticles pull the other hook upwards, likewise [N]: what goes from hook to hook
     held: Floats = field(repr=False)
-    before: float
-    engine_work: float
+    before: float  #: The force before the pull [N]: what rested on the hook; negative where it was held up
+    engine_work: float  #: Work of the hook on the smarticles by the engine's own ledger [J]; NaN where not recorded
 
     @property
     def times(self) -> Floats:
@@ -75,17 +67,11 @@ class HookPull:
 
 @dataclass(frozen=True, kw_only=True)
 class Peak:
-    """The largest force of a pull.
+    """The largest force of a pull."""
 
-    Attributes:
-        force: Mean over the window [N].
-        time: Of the window's middle, since the pull began [s].
-        raised: How far the hook had been raised then [m].
-    """
-
-    force: float
-    time: float
-    raised: float
+    force: float  #: Mean over the window [N]
+    time: float  #: Of the window's middle, since the pull began [s]
+    raised: float  #: How far the hook had been raised then [m]
 
 
 def read_pull(run: Run, series: Series, phase: int) -> HookPull:
@@ -159,9 +145,6 @@ def freed(pull: HookPull, window: float = WINDOW) -> float:
 
 def held_fast(pull: HookPull, asked: SceneData) -> bool:
     """Whether the hook was stopped by its force limit in a whole pull, so that its peak is a lower bound.
-
-    Args:
-        asked: The phase in the scene.
 
     Raises:
         InputError: The scene does not say how far.

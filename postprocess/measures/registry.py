@@ -22,40 +22,27 @@ _PACKAGE = __name__.rpartition(".")[0]
 
 @dataclass(frozen=True, kw_only=True)
 class Shown:
-    """A column of short tables for a person; most columns are for CSV alone.
+    """A column of short tables for a person; most columns are for CSV alone."""
 
-    Attributes:
-        heading: With the unit that it is shown in.
-        place: Among the others: lower ones come first.
-        form: Format of the number.
-        factor: From SI to the unit of the heading [1].
-        with_error: Whether its standard error stands beside.
-    """
-
-    heading: str
-    place: int
-    form: str
-    factor: float = 1.0
-    with_error: bool = False
+    heading: str  #: With the unit that it is shown in
+    place: int  #: Among the others: lower ones come first
+    form: str  #: Format of the number
+    factor: float = 1.0  #: From SI to the unit of the heading [1]
+    with_error: bool = False  #: Whether its standard error stands beside
 
 
 @dataclass(frozen=True)
 class Quantity:
     """One column of a table.
 
-    Attributes:
-        label: Its name.
-        unit: SI, or "-" for a pure number, "degree", "smarticles".
-        shown: In short tables; None: not at all.
-
     Example:
         >>> Quantity("com height", "m").header
         'com height [m]'
     """
 
-    label: str
-    unit: str
-    shown: Shown | None = None
+    label: str  #: Its name
+    unit: str  #: SI, or "-" for a pure number, "degree", "smarticles"
+    shown: Shown | None = None  #: In short tables; None: not at all
 
     @property
     def header(self) -> str:
@@ -65,25 +52,18 @@ class Quantity:
 
 @dataclass(frozen=True, kw_only=True)
 class FrameMeasure:
-    """A measure of each frame.
+    """A measure of each frame."""
 
-    Attributes:
-        name: Of the measure, unique.
-        place: Among the columns of a table: those of lower places come first.
-        quantities: Its columns.
-        take: The values of a frame of a run, one per column; NaN where they have no meaning in this frame.
-        available_for: Whether a run has it at all; else its tables have no such columns.
-        definition: Where several measures define one quantity, by what name this one is chosen.
-        costly: Whether it takes longer than all that is cheap together, tens of milliseconds per frame or more: tables
-            have it of the last frame of a phase, unless asked for at every frame.
-    """
-
-    name: str
-    place: int
-    quantities: tuple[Quantity, ...]
+    name: str  #: Of the measure, unique
+    place: int  #: Among the columns of a table: those of lower places come first
+    quantities: tuple[Quantity, ...]  #: Its columns
+    #: The values of a frame of a run, one per column; NaN where they have no meaning in this frame
     take: Callable[[Frame, Run], Sequence[float]]
+    #: Whether a run has it at all; else its tables have no such columns
     available_for: Callable[[Run], bool] = lambda _: True
-    definition: str | None = None
+    definition: str | None = None  #: Where several measures define one quantity, by what name this one is chosen
+    #: Whether it takes longer than all that is cheap together, tens of milliseconds per frame or more: tables have it
+    #: of the last frame of a phase, unless asked for at every frame
     costly: bool = False
 
     def columns(self, frame: Frame | None, run: Run) -> dict[str, float]:
@@ -94,20 +74,13 @@ class FrameMeasure:
 
 @dataclass(frozen=True, kw_only=True)
 class PhaseMeasure:
-    """A measure of a whole phase.
+    """A measure of a whole phase."""
 
-    Attributes:
-        name: Of the measure, unique.
-        phases: Types of the phases that have it.
-        quantities: Its columns.
-        take: The values of a phase of an index, one per column.
-        available_for: Whether the series holds enough of a phase of an index; else there are no such columns.
-    """
-
-    name: str
-    phases: tuple[str, ...]
-    quantities: tuple[Quantity, ...]
-    take: Callable[[Run, Series, int], Sequence[float]]
+    name: str  #: Of the measure, unique
+    phases: tuple[str, ...]  #: Types of the phases that have it
+    quantities: tuple[Quantity, ...]  #: Its columns
+    take: Callable[[Run, Series, int], Sequence[float]]  #: The values of a phase of an index, one per column
+    #: Whether the series holds enough of a phase of an index; else there are no such columns
     available_for: Callable[[Series, int], bool]
 
     def columns(self, run: Run, series: Series, phase: int) -> dict[str, float]:

@@ -40,25 +40,15 @@ from the middle of the pile, wherever that is by now: a pile that fell over as a
 
 @dataclass(frozen=True, kw_only=True)
 class FreePile:
-    """A pile without a wall.
+    """A pile without a wall."""
 
-    Attributes:
-        touching: Share of the smarticles in the largest cluster joined by contact [-].
-        entangled: Share of them in the largest cluster joined by entanglement [-].
-        radius_half: Radius about the vertical through the centre of mass that holds half of the material [m].
-        radius_most: Radius that holds 95 % of it [m].
-        sloughed: Share of the smarticles farther from the pile's middle than the wall was, see `OUTSIDE` [-].
-        tilt: Angle of the pile from the vertical [degree], see `tilt`.
-        offset: Distance of the centre of mass from the vertical through the foot [m].
-    """
-
-    touching: float
-    entangled: float
-    radius_half: float
-    radius_most: float
-    sloughed: float
-    tilt: float
-    offset: float
+    touching: float  #: Share of the smarticles in the largest cluster joined by contact [-]
+    entangled: float  #: Share of them in the largest cluster joined by entanglement [-]
+    radius_half: float  #: Radius about the vertical through the centre of mass that holds half of the material [m]
+    radius_most: float  #: Radius that holds 95 % of it [m]
+    sloughed: float  #: Share of the smarticles farther from the pile's middle than the wall was, see `OUTSIDE` [-]
+    tilt: float  #: Angle of the pile from the vertical [degree], see `tilt`
+    offset: float  #: Distance of the centre of mass from the vertical through the foot [m]
 
 
 def free_pile(

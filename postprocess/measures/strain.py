@@ -71,23 +71,14 @@ _TAUT = 0.3  # of the peak force: what is lost below is the jolt of the start
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class StrainTest:
-    """One strain test.
+    """One strain test."""
 
-    Attributes:
-        times: (n,) [s], while the strings are tied.
-        strains: (n,) [-].
-        forces: (n,) of the pulled string along x [N].
-        held: (n,) of the other string, in the opposite direction [N].
-        widths: (n,) of the chain [m].
-        walls: (n,) the greater of the forces on the two walls, outwards [N].
-    """
-
-    times: Array
-    strains: Array
-    forces: Array
-    held: Array
-    widths: Array
-    walls: Array
+    times: Array  #: (n,) [s], while the strings are tied
+    strains: Array  #: (n,) [-]
+    forces: Array  #: (n,) of the pulled string along x [N]
+    held: Array  #: (n,) of the other string, in the opposite direction [N]
+    widths: Array  #: (n,) of the chain [m]
+    walls: Array  #: (n,) the greater of the forces on the two walls, outwards [N]
 
     @property
     def fracture(self) -> int:

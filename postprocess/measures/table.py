@@ -36,21 +36,13 @@ _SERIES_MEASURED = frozenset({"time_s", "phase", "count", "com_height_m", "packi
 
 @dataclass(frozen=True, kw_only=True)
 class PackingChange:
-    """Packing fraction before and at the end of the activity of a run.
+    """Packing fraction before and at the end of the activity of a run."""
 
-    Attributes:
-        before: φ_0, mean over the last frames of the phase before the first activity [-].
-        after: φ_f, mean over the last frames of the last activity [-].
-        definition: Key of `packing.DEFINITIONS`.
-        phase_before: Index of the phase of φ_0.
-        phase_after: Index of the phase of φ_f.
-    """
-
-    before: Mean
-    after: Mean
-    definition: str
-    phase_before: int
-    phase_after: int
+    before: Mean  #: φ_0, mean over the last frames of the phase before the first activity [-]
+    after: Mean  #: φ_f, mean over the last frames of the last activity [-]
+    definition: str  #: Key of `packing.DEFINITIONS`
+    phase_before: int  #: Index of the phase of φ_0
+    phase_after: int  #: Index of the phase of φ_f
 
 
 def measure_run(

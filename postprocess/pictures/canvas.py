@@ -134,8 +134,6 @@ def drawn(bodies: Bodies, frame: Frame, forward: Floats, *, largest: float | Non
     A wall that was taken away is there as `ghost`.
 
     Args:
-        bodies: Of the run.
-        frame: One of its frames.
         forward: (3,) direction of view; zeros: walls stay whole.
         largest: Normal force of the thickest line of force [N].
     """
@@ -194,10 +192,8 @@ class Canvas:
     """A window of one or more panels with one camera, one scale of colours and one scale bar.
 
     Args:
-        look: Of each panel.
         extent: (2, 2) of what the camera has in view [mm].
         run: By whose sizes corners are shaded.
-        columns: Panels side by side.
         scale: Of colours; None: no bar of colours.
         quick: Whether to leave out the shade in corners, which takes most of the time of a picture.
 

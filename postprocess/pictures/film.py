@@ -34,17 +34,11 @@ _H264 = ("-crf", "18", "-movflags", "+faststart", "-vf", "scale=out_color_matrix
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Moments:
-    """Times at equal distances, so that a film plays at one speed.
+    """Times at equal distances, so that a film plays at one speed."""
 
-    Attributes:
-        times: (n,) simulated times [s]; each is shown by the recorded frame nearest to it.
-        every: From one to the next [s].
-        rate: Pictures per second [1/s].
-    """
-
-    times: Floats = field(repr=False)
-    every: float
-    rate: float
+    times: Floats = field(repr=False)  #: (n,) simulated times [s]; each is shown by the recorded frame nearest to it
+    every: float  #: From one to the next [s]
+    rate: float  #: Pictures per second [1/s]
 
     @property
     def pace(self) -> str:

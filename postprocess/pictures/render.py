@@ -67,7 +67,6 @@ def render_run(
         view: Key of `VIEWS`; None: from the front, of motion in a plane from above.
         forces: Whether lines of force are drawn, in front of pale smarticles; their thickness is in proportion to
             the normal force.
-        overwrite: Whether an existing file may be replaced.
 
     Raises:
         InputError: No frame, unknown field or view, a time before the first or after the last
@@ -130,7 +129,6 @@ def render_film(
         compare: Further runs; the film shows the times that all have come to.
         limits: Ends of the scale of colours; those of the film if not given.
         size: Width and height of the picture of one run [pixel]; for `.mp4` even numbers.
-        frames_per_second: Of the film.
         start: Simulated time at which it begins [s]; that of the first frame if not given.
         end: Simulated time at which it ends [s]; that of the last frame if not given.
         every: Simulated time from one picture to the next [s]; if not given, that between frames.
@@ -192,11 +190,7 @@ def pictures(
     """Draw runs side by side under one camera, in one scale of colours, picture after picture.
 
     Args:
-        shots: The runs.
         indices: Of the frames of each that are shown.
-        look: Of each panel.
-        limits: Ends of the scale.
-        quick: See `Canvas`.
         pace: For the captions of a film.
     """
     titles = titles_of([shot.run for shot in shots])
@@ -346,7 +340,6 @@ def caption_of(frame: Frame, run: Run, *, title: str, pace: str = "", force: flo
     """Return the lines of the caption of a frame.
 
     Args:
-        title: The heading.
         pace: How fast a film plays; empty for a picture.
         force: Normal force of the thickest line of force [N]; None where none are drawn.
     """

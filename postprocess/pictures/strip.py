@@ -17,17 +17,11 @@ _SIZE = (400, 400)  # pixel, of a picture with its caption, which is left out
 
 @dataclass(frozen=True, kw_only=True)
 class Row:
-    """Pictures of one run.
+    """Pictures of one run."""
 
-    Attributes:
-        directory: The run.
-        label: What is written beside them.
-        times: Simulated times [s]; of each the nearest frame is drawn.
-    """
-
-    directory: Path
-    label: str
-    times: tuple[float, ...]
+    directory: Path  #: The run
+    label: str  #: What is written beside them
+    times: tuple[float, ...]  #: Simulated times [s]; of each the nearest frame is drawn
 
 
 def draw_strip(rows: Sequence[Row], output: Path, *, columns: Sequence[str], footer: Sequence[str]) -> Path:
@@ -36,8 +30,6 @@ def draw_strip(rows: Sequence[Row], output: Path, *, columns: Sequence[str], foo
     A smarticle has one colour in all pictures of a run.
 
     Args:
-        rows: The runs, from above.
-        output: File to write, `.png`.
         columns: What is written above the pictures, one each.
         footer: Origin, one statement each.
 

@@ -109,9 +109,6 @@ def add_footer(figure: Figure, lines: Sequence[str]) -> None:
 
     The footer takes `FOOTER_SHARE` of the figure at most: of what is longer the last statement stays, which says where
     the rest is to be read, and the others are cut at "…".
-
-    Args:
-        lines: One statement each; a long one is broken.
     """
     width, height = figure.get_size_inches()
     text = _fitting(lines, int(_FOOTER_COLUMNS * width / COLUMN_WIDTH), _most_lines(height))
@@ -194,7 +191,6 @@ def sequence(colours: int, *, first: float = 0.16, last: float = 1.0) -> list[st
     """Return hexadecimal colours, dark to light: equal steps of viridis, lightened so that shading stays visible.
 
     Args:
-        colours: Their number.
         first: Place of the first one in the map, 0 … 1.
         last: Place of the last one.
     """

@@ -16,12 +16,7 @@ _MOST_TIMES = 100  # times as many runs that are stated as a number
 
 
 class Unresolved(str):
-    """The verdict `not resolved`, and what it would take.
-
-    Attributes:
-        more: So many times as many runs of the same scatter would resolve an effect as large as the one seen [-];
-            infinite where no effect is seen at all, NaN where one run has no scatter.
-    """
+    """The verdict `not resolved`, and what it would take."""
 
     __slots__ = ("more",)
 
@@ -31,6 +26,8 @@ class Unresolved(str):
         verdict.more = more
         return verdict
 
+    # So many times as many runs of the same scatter would resolve an effect as large as the one seen [-]; infinite
+    # where no effect is seen at all, NaN where one run has no scatter
     more: float
 
 

@@ -110,10 +110,6 @@ def paired_differences(
     """Return what a quantity does when a factor goes from one level to another, all else alike.
 
     Args:
-        table: One row per run.
-        quantity: Column.
-        factor: Column.
-        levels: From, and to.
         others: Columns of all else that runs differ in, such as the other factors and the seed.
 
     Returns:

@@ -110,8 +110,6 @@ def resamples(blocks: Whole, strata: Whole, *, count: int, seed: int) -> Iterato
     Args:
         blocks: (n,) block of each row; a block lies in one stratum.
         strata: (n,) its stratum.
-        count: Of the tables.
-        seed: Of the draw.
     """
     random = np.random.default_rng(seed)
     rows = {block: np.nonzero(blocks == block)[0] for block in np.unique(blocks)}

@@ -21,19 +21,12 @@ CONFIDENCE = 0.95
 
 @dataclass(frozen=True, kw_only=True)
 class SeedMean:
-    """A mean over seeds, or another estimate from independent runs.
+    """A mean over seeds, or another estimate from independent runs."""
 
-    Attributes:
-        value: NaN without data.
-        standard_error: Of a mean s/√n; NaN without a degree of freedom to spare.
-        half_width: Of the 95 % confidence interval by Student's t; NaN without an error.
-        count: n, runs or points.
-    """
-
-    value: float
-    standard_error: float
-    half_width: float
-    count: int
+    value: float  #: NaN without data
+    standard_error: float  #: Of a mean s/√n; NaN without a degree of freedom to spare
+    half_width: float  #: Of the 95 % confidence interval by Student's t; NaN without an error
+    count: int  #: n, runs or points
 
 
 Slope = SeedMean
@@ -55,32 +48,20 @@ class Difference:
 
 @dataclass(frozen=True, kw_only=True)
 class Scatter:
-    """Standard deviation from seed to seed that several points share.
+    """Standard deviation from seed to seed that several points share."""
 
-    Attributes:
-        value: In the unit of what scatters; NaN where no point has two seeds.
-        freedom: Its degrees of freedom.
-    """
-
-    value: float
-    freedom: int
+    value: float  #: In the unit of what scatters; NaN where no point has two seeds
+    freedom: int  #: Its degrees of freedom
 
 
 @dataclass(frozen=True, kw_only=True)
 class Mean:
-    """A mean over successive frames.
+    """A mean over successive frames."""
 
-    Attributes:
-        value: The mean; NaN without samples. Infinite if a sample is, NaN if samples are of either sign.
-        standard_error: NaN with fewer than two samples, or infinite ones.
-        count: Number of samples averaged.
-        effective_count: Number of independent samples they are worth; NaN with infinite ones.
-    """
-
-    value: float
-    standard_error: float
-    count: int
-    effective_count: float
+    value: float  #: The mean; NaN without samples. Infinite if a sample is, NaN if samples are of either sign.
+    standard_error: float  #: NaN with fewer than two samples, or infinite ones
+    count: int  #: Number of samples averaged
+    effective_count: float  #: Number of independent samples they are worth; NaN with infinite ones
 
 
 def mean_with_error(samples: ArrayLike) -> Mean:
@@ -170,8 +151,6 @@ def difference(mean: SeedMean, baseline: SeedMean, *, scatter: Scatter | None = 
     """Subtract an independent mean from another one.
 
     Args:
-        mean: Over its seeds.
-        baseline: Over its own.
         scatter: That of a single seed, common to both; None: each has its own, by Welch.
 
     Source:
@@ -228,19 +207,13 @@ def slope_within(x: Sequence[float], y: Sequence[float], blocks: Sequence[Hashab
 
 @dataclass(frozen=True, kw_only=True)
 class Parabola:
-    """A parabola through points.
+    """A parabola through points."""
 
-    Attributes:
-        slope: At the place that was asked for; NaN where x has fewer than three values.
-        bend: Half the second derivative, everywhere; below 0 where the parabola has a maximum.
-        top: Where its slope is 0; NaN without a bend.
-        fits: Probability of means at equal x that are off it by as much or more, if it were the truth (F test of the
-            lack of fit); NaN where x has no more than three values, or no value twice.
-    """
-
-    slope: Slope
-    bend: Slope
-    top: float
+    slope: Slope  #: At the place that was asked for; NaN where x has fewer than three values
+    bend: Slope  #: Half the second derivative, everywhere; below 0 where the parabola has a maximum
+    top: float  #: Where its slope is 0; NaN without a bend
+    #: Probability of means at equal x that are off it by as much or more, if it were the truth (F test of the lack of
+    #: fit); NaN where x has no more than three values, or no value twice
     fits: float
 
 

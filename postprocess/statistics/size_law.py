@@ -32,17 +32,11 @@ _FALLS = np.arange(0.0, 2.01, 0.02)
 
 @dataclass(frozen=True, kw_only=True)
 class Scatter:
-    """Scatter of one run, σ² = c N^(-fall).
+    """Scatter of one run, σ² = c N^(-fall)."""
 
-    Attributes:
-        variance: c, in the square of the quantity's unit.
-        fall: Power of N that σ² falls with [1].
-        freedom: Its degrees of freedom.
-    """
-
-    variance: float
-    fall: float
-    freedom: int
+    variance: float  #: c, in the square of the quantity's unit
+    fall: float  #: Power of N that σ² falls with [1]
+    freedom: int  #: Its degrees of freedom
 
     def error(self, count: float, runs: int) -> float:
         """Half-width of the 95 % interval of a mean over runs of one size; NaN where no scatter is known."""
@@ -53,29 +47,18 @@ class Scatter:
 
 @dataclass(frozen=True, kw_only=True)
 class SizeLaw:
-    """q = bulk + slope N^(-1/3), fitted to runs.
+    """q = bulk + slope N^(-1/3), fitted to runs."""
 
-    Attributes:
-        bulk: q of a pile without end.
-        slope: a.
-        covariance: (2, 2) of the two, enlarged where the law leaves more than scatter; NaN without scatter.
-        scatter: Of one run.
-        excess: Variance that the law leaves of the means of sizes, over what scatter explains; NaN below three sizes.
-        refused: Probability of so much, were the law true [1]; likewise.
-        powers: Best power of N and its 95 % interval [1]; likewise.
-        sizes: How many sizes.
-        runs: How many runs.
-    """
-
-    bulk: float
-    slope: float
-    covariance: Floats
-    scatter: Scatter
+    bulk: float  #: q of a pile without end
+    slope: float  #: a
+    covariance: Floats  #: (2, 2) of the two, enlarged where the law leaves more than scatter; NaN without scatter
+    scatter: Scatter  #: Of one run
+    #: Variance that the law leaves of the means of sizes, over what scatter explains; NaN below three sizes
     excess: float
-    refused: float
-    powers: tuple[float, float, float]
-    sizes: int
-    runs: int
+    refused: float  #: Probability of so much, were the law true [1]; likewise
+    powers: tuple[float, float, float]  #: Best power of N and its 95 % interval [1]; likewise
+    sizes: int  #: How many sizes
+    runs: int  #: How many runs
 
     def error(self, bulk: float, slope: float) -> float:
         """Half-width of the 95 % interval of bulk · q_∞ + slope · a; NaN without scatter."""
@@ -172,21 +155,13 @@ _PLACES, _WIDTHS = 401, 30
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Profile:
-    """What the runs of one group say of x_c.
+    """What the runs of one group say of x_c."""
 
-    Attributes:
-        places: (n,) where x_c may be, common to all groups.
-        likelihood: (n,) log of it, of the best width at each place.
-        widths: (n,) these widths.
-        runs: Number of runs.
-        having: Number of runs with the property.
-    """
-
-    places: Floats
-    likelihood: Floats
-    widths: Floats
-    runs: int
-    having: int
+    places: Floats  #: (n,) where x_c may be, common to all groups
+    likelihood: Floats  #: (n,) log of it, of the best width at each place
+    widths: Floats  #: (n,) these widths
+    runs: int  #: Number of runs
+    having: int  #: Number of runs with the property
 
     @property
     def known(self) -> bool:

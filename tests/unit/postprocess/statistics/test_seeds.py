@@ -7,12 +7,7 @@ import pytest
 from scipy.stats import linregress, ttest_ind
 
 from postprocess import mean_with_error
-from postprocess.statistics.seeds import (
-    difference,
-    mean_over_seeds,
-    parabola,
-    slope_within,
-)
+from postprocess.statistics.seeds import difference, mean_over_seeds, parabola, slope_within
 
 
 def test_half_width_is_student_t():
