@@ -64,19 +64,15 @@ class Entanglement:
     mean: float  #: Mean over the smarticles that have a plane [-]; NaN if none has
 
 
-def entanglement(vertices: Vertices, crossings: Whole | None = None) -> Entanglement:
+def entanglement(vertices: Vertices) -> Entanglement:
     """Compute the crossings of all smarticles and their mean, ⟨N⟩.
-
-    Args:
-        crossings: Result of `link_crossings` of them, where that is known already.
 
     Source:
         Savoie et al., Soft Matter 2023, ⟨N⟩. Unlike in that paper's own code, straight smarticles are skipped as A
         only, and a smarticle that passes twice counts twice.
     """
     vertices = checked_vertices(vertices)
-    planes = has_plane(vertices)
-    crossings = link_crossings(vertices) if crossings is None else crossings
+    planes, crossings = has_plane(vertices), link_crossings(vertices)
     mean = float(crossings[planes].mean()) if np.any(planes) else float("nan")
     return Entanglement(crossings=crossings, has_plane=planes, mean=mean)
 

@@ -39,20 +39,18 @@ class Linking:
         return float(self.per_smarticle.mean()) if len(self.per_smarticle) else math.nan
 
 
-def linking(vertices: Vertices, *, far: bool = False) -> Linking:
+def linking(vertices: Vertices) -> Linking:
     """Compute linking numbers of pairs of smarticles, each the open chain tip, hinge, hinge, tip.
 
     Of open chains far from each other the number falls with the square of the distance only, so that a sum over all
-    pairs grows with the size of the pile. Hence only pairs whose bounding spheres overlap count, those that can hook;
-    with `far` all pairs, which takes 0.1 s of N = 300, as N².
+    pairs grows with the size of the pile. Hence only pairs whose bounding spheres overlap count, those that can hook.
 
     Source:
         See `gauss_integral`. The integral of open chains as a measure of entanglement: Panagiotou, Kröger & Millett,
         Phys. Rev. E 88, 062604 (2013).
     """
     vertices = checked_vertices(vertices)
-    i, j = np.triu_indices(len(vertices), k=1) if far else close_pairs(vertices)
-    i, j = i.astype(np.int64), j.astype(np.int64)
+    i, j = close_pairs(vertices)
     number = np.empty(len(i))
     for start in range(0, len(i), _CHUNK):
         part = slice(start, start + _CHUNK)

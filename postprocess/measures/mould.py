@@ -13,6 +13,8 @@ from postprocess.geometry.links import Flags, Floats, Vertices, checked_vertices
 from postprocess.geometry.outline import outlines
 from postprocess.geometry.voxel import Region
 
+_SAMPLES = 50  # points along a link
+
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Cast:
@@ -36,7 +38,6 @@ def cast(
     *,
     thickness: float,
     ball: float,
-    pitch: float | None = None,
 ) -> Cast:
     """Compare a pile in a mould with that pile after the mould was taken away.
 
@@ -49,13 +50,12 @@ def cast(
         tiers: T cylinders, from the lowest, heights above the floor.
         thickness: Of the links, taken as round [m].
         ball: Radius of the ball that the outline is found with [m].
-        pitch: Side of a voxel [m]; a fourth of the ball's radius if not given.
 
     Raises:
         InputError: Bad sizes.
         UndefinedMeasureError: There is no smarticle, or a tier is smaller than a voxel.
     """
-    found = outlines([before, after], thickness=thickness, ball=ball, pitch=pitch, regions=tiers)
+    found = outlines([before, after], thickness=thickness, ball=ball, regions=tiers)
     one, other = found.inside
     masks = [found.within(tier) for tier in tiers]
     mould = np.logical_or.reduce(masks)
@@ -91,12 +91,12 @@ def _share(part: Flags, whole: Flags) -> float:
     return float(part.sum() / total) if total else float("nan")
 
 
-def _material(vertices: Vertices, tiers: Sequence[Region], samples: int = 50) -> Floats:
+def _material(vertices: Vertices, tiers: Sequence[Region]) -> Floats:
     """Return shares (T,) of all links' length in each tier, by points evenly along each link."""
     vertices = checked_vertices(vertices)
-    shares = (np.arange(samples) + 0.5) / samples
+    shares = (np.arange(_SAMPLES) + 0.5) / _SAMPLES
     along = np.diff(vertices, axis=1)[:, :, None]
     points = (vertices[:, :-1, None] + shares[:, None] * along).reshape(-1, 3)
-    weights = np.repeat(link_lengths(vertices).ravel(), samples)
+    weights = np.repeat(link_lengths(vertices).ravel(), _SAMPLES)
     inside: Floats = np.array([weights[tier.contains(points)].sum() / weights.sum() for tier in tiers])
     return inside

@@ -128,15 +128,15 @@ def peak(pull: HookPull, window: float = WINDOW) -> Peak:
     return Peak(force=float(means[highest]), time=time, raised=float(np.interp(time, pull.edges, pull.raised)))
 
 
-def held_at(pull: HookPull, time: float, window: float = WINDOW) -> float:
+def held_at(pull: HookPull, time: float) -> float:
     """Average the force on the other hook [N] over a window about a time since the pull began [s]."""
-    times, means = moving_mean(replace(pull, force=pull.held), window)
+    times, means = moving_mean(replace(pull, force=pull.held))
     return float(np.interp(time, times, means))
 
 
-def freed(pull: HookPull, window: float = WINDOW) -> float:
+def freed(pull: HookPull) -> float:
     """Return the time from which the windowed force stays below `FREE` of its peak [s]; NaN if it never does."""
-    times, means = moving_mean(pull, window)
+    times, means = moving_mean(pull)
     held = np.nonzero(means > FREE * means.max())[0]
     if not len(held) or held[-1] + 1 == len(means):
         return math.nan

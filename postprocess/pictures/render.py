@@ -154,7 +154,7 @@ def render_film(
     return output
 
 
-def turntable(directory: Path | str, *, views: int = 24, size: int = 560, elevation: float = 26.0) -> list[Image.Image]:
+def turntable(directory: Path | str, *, views: int = 24, size: int = 560) -> list[Image.Image]:
     """Draw the last frame of a run from all around, at equal angles from the front.
 
     Raises:
@@ -165,7 +165,7 @@ def turntable(directory: Path | str, *, views: int = 24, size: int = 560, elevat
     index, frame = len(shot.frames) - 1, shot.frames[-1]
     shot.bodies.hold([frame])
     look = Look.of([shot.run], color_by=None, size=(size, size), view=None)
-    around = [axes_from(VIEWS["front"][0] + 360.0 * number / views, elevation) for number in range(views)]
+    around = [axes_from(VIEWS["front"][0] + 360.0 * number / views, 26.0) for number in range(views)]
     (values,) = shot.values([index], look)
     colours = ColourScale.of(look.field, span([values])).painted(values)
     images = []

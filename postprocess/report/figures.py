@@ -187,14 +187,13 @@ def refuse_to_overwrite(path: Path, *, overwrite: bool) -> None:
         raise InputError(msg)
 
 
-def sequence(colours: int, *, first: float = 0.16, last: float = 1.0) -> list[str]:
+def sequence(colours: int, *, last: float = 1.0) -> list[str]:
     """Return hexadecimal colours, dark to light: equal steps of viridis, lightened so that shading stays visible.
 
     Args:
-        first: Place of the first one in the map, 0 … 1.
-        last: Place of the last one.
+        last: Place of the last one in the map, up to 1.
     """
-    steps = [first + (last - first) * i / max(colours - 1, 1) for i in range(colours)]
+    steps = [0.16 + (last - 0.16) * i / max(colours - 1, 1) for i in range(colours)]
     plain = np.array([matplotlib.colormaps["viridis"](step)[:3] for step in steps])
     return [to_hex(colour) for colour in 1 - 0.86 * (1 - plain)]
 

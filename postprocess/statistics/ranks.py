@@ -129,9 +129,9 @@ def interval(value: float, drawn: Sequence[float]) -> Interval:
     return Interval(value=value, low=float(low), high=float(high))
 
 
-def few_blocks(blocks: Whole, strata: Whole, *, least: int = 3) -> bool:
+def few_blocks(blocks: Whole, strata: Whole) -> bool:
     """Whether any stratum has too few blocks for resampling to give an error."""
-    return any(len(np.unique(blocks[strata == stratum])) < least for stratum in np.unique(strata))
+    return any(len(np.unique(blocks[strata == stratum])) < 3 for stratum in np.unique(strata))
 
 
 def resampled(measures: Callable[[Whole], Floats], blocks: Whole, strata: Whole, *, count: int, seed: int) -> Floats:

@@ -61,18 +61,12 @@ def test_closed_across_their_mouths_smarticles_have_whole_numbers(scene):
     assert (number.round() != 0).sum() > 50
 
 
-def test_all_pairs_of_a_pile_and_the_mean_of_their_sizes(scene):
+def test_near_pairs_of_a_pile_and_the_mean_of_their_sizes(scene):
     vertices = scene(60, 3, box=2.0, angles=(90, 90))
-    near, every = linking(vertices), linking(vertices, far=True)
-    assert len(every.number) == 60 * 59 / 2
-    k = 777
-    assert every.number[k] == pytest.approx(gauss_integral(vertices[every.i[k]], vertices[every.j[k]]))
-    assert every.mean == pytest.approx(2 * np.abs(every.number).sum() / 60)
-    assert every.per_smarticle[7] == pytest.approx(np.abs(every.number[(every.i == 7) | (every.j == 7)]).sum())
-    # Near pairs are some of them, with the same numbers.
-    assert 0 < len(near.number) < len(every.number)
-    assert 0 < near.mean < every.mean
-    told = {(i, j): n for i, j, n in zip(every.i, every.j, every.number, strict=True)}
-    assert all(told[i, j] == n for i, j, n in zip(near.i, near.j, near.number, strict=True))
+    near = linking(vertices)
+    assert 0 < len(near.number) < 60 * 59 / 2
+    assert near.number == pytest.approx(gauss_integral(vertices[near.i], vertices[near.j]))
+    assert near.mean == pytest.approx(2 * np.abs(near.number).sum() / 60)
+    assert near.per_smarticle[7] == pytest.approx(np.abs(near.number[(near.i == 7) | (near.j == 7)]).sum())
     assert math.isnan(linking(np.empty((0, 4, 3))).mean)
     assert linking(vertices[:1]).mean == 0
