@@ -36,23 +36,6 @@ with warnings.catch_warnings():
 
 _REMOVAL, _STRAIN, _ARRANGE = "remove-container", "strain", "arrange"
 
-Bounds = tuple[float, float, float, float, float, float]
-"""Least and largest x, y and z of a box [m]."""
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class DrawnHooks:
-    """Two crosses of square bars."""
-
-    bars: tuple[tuple[Bounds, ...], tuple[Bounds, ...]]  #: Of lower and upper cross, about its centre
-    lower: float  #: Height of the lower cross above the floor [m]
-    times: Floats = field(repr=False)  #: (n,) at which the upper cross's height is known [s]
-    upper: Floats = field(repr=False)  #: (n,) height of the upper cross above the floor [m]
-
-    def heights(self, time: float) -> tuple[float, float]:
-        """Return the heights of the lower and the upper cross above the floor at a time [m]."""
-        return self.lower, float(np.interp(time, self.times, self.upper))
-
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class ChainStrings:
@@ -86,7 +69,6 @@ class Surroundings:
     removed: int | None = None  #: Index of the phase that takes the wall away; None if none does
     #: Start [s], end [s] and speed [m/s] of its lifting; None if it goes at once
     lift: tuple[float, float, float] | None = None
-    hooks: DrawnHooks | None = field(default=None, repr=False)  #: None in scenes without
     strings: ChainStrings | None = field(default=None, repr=False)  #: Of a strain test; None in scenes without
 
     @property
@@ -119,7 +101,6 @@ def read_surroundings(run: Run) -> Surroundings:
     """
     scene, phases = run.scene, run.scene.get("phases", ())
     series = run.series if run.has_series else None
-    hooks = scene.get("hooks")
     removed = next((phase.index for phase in run.phases if phase.type == _REMOVAL), None)
     return Surroundings(
         tiers=tuple((tier.radius, tier.top) for tier in read_tiers(run)),
@@ -127,7 +108,6 @@ def read_surroundings(run: Run) -> Surroundings:
         floor_alone=frozenset(index for index, phase in enumerate(phases) if phase.get("moves") == "floor"),
         removed=removed,
         lift=None if removed is None else _lift(phases[removed], _start(run, removed, series)),
-        hooks=None if hooks is None else _hooks(hooks, series),
         strings=_strings(run, series) if run.manifest.planar else None,
     )
 
@@ -146,31 +126,15 @@ def _lift(phase: SceneData, start: float | None) -> tuple[float, float, float] |
     return start, start + phase["duration_s"], phase["speed_m_per_s"]
 
 
-def _hooks(settings: SceneData, series: Series | None) -> DrawnHooks:
-    """Return the hooks of a scene; without a series the upper one is where it started."""
-    times, upper = np.zeros(1), np.array([settings["upper_height_m"]])
-    if series is not None:
-        times, upper = series.time, series["hook_upper_z_m"] - series["container_z_m"]
-    side, length = settings["side_m"], settings["length_m"]
-    # Older scenes have two equal crosses.
-    lower_length, count = settings.get("lower_length_m", length), round(settings.get("lower_bars", 1))
-    return DrawnHooks(
-        bars=(_bars(lower_length, side, count), _bars(length, side, 1)),
-        lower=settings["lower_height_m"],
-        times=times,
-        upper=upper,
-    )
-
-
-def _bars(length: float, side: float, count: int) -> tuple[Bounds, ...]:
-    """Return bars evenly spaced along x and y, up to a disc, as `dem.setting.hooks.Cross` has them."""
-    thick, found = side / 2, []
+def _cross(length: float, side: float, count: int, height: float) -> pv.PolyData:
+    """Return the bars of a hook's cross, evenly spaced up to a disc, as `dem.setting.hooks.Cross` has them."""
+    thick, bars = side / 2, []
     for k in range(count):
         place = length * ((k + 1) / (count + 1) - 0.5)
         long = math.sqrt((length / 2) ** 2 - place**2)
-        found.append((-long, long, place - thick, place + thick, -thick, thick))
-        found.append((place - thick, place + thick, -long, long, -thick, thick))
-    return tuple(found)
+        for sides in ((-long, long, place - thick, place + thick), (place - thick, place + thick, -long, long)):
+            bars.append(pv.Box((*sides, height - thick, height + thick)))
+    return joined(bars)
 
 
 def knots(vertices: Floats, from_hinge: float) -> Floats:
@@ -296,10 +260,8 @@ class Bodies:
                 points = frame.vertices.reshape(-1, 3)
                 self._top = max(self._top, float(points[:, 2].max()) - frame.floor_z)
                 self._reach = max(self._reach, float(np.hypot(points[:, 0], points[:, 1]).max()))
-                self._span = (
-                    min(self._span[0], float(points[:, 0].min())),
-                    max(self._span[1], float(points[:, 0].max())),
-                )
+                low, high = float(points[:, 0].min()), float(points[:, 0].max())
+                self._span = min(self._span[0], low), max(self._span[1], high)
 
     def at(self, frame: Frame) -> dict[str, pv.PolyData]:
         """Return the bodies of a frame by kind, [m]; only those that there are."""
@@ -361,13 +323,19 @@ class Bodies:
         return floor
 
     def _hooks(self, frame: Frame) -> pv.PolyData | None:
-        hooks = self.around.hooks
-        if hooks is None:
+        settings = self.run.scene.get("hooks")
+        if settings is None:
             return None
-        heights = [frame.floor_z + height for height in hooks.heights(frame.time)]
+        upper = settings["upper_height_m"]  # without a series it is where it started
+        if self.run.has_series:
+            series = self.run.series
+            upper = float(np.interp(frame.time, series.time, series["hook_upper_z_m"] - series["container_z_m"]))
+        side, length = settings["side_m"], settings["length_m"]
+        # Older scenes have two equal crosses.
+        lower_length, count = settings.get("lower_length_m", length), round(settings.get("lower_bars", 1))
         crosses = [
-            joined(pv.Box((*bar[:4], height + bar[4], height + bar[5])) for bar in bars)
-            for bars, height in zip(hooks.bars, heights, strict=True)
+            _cross(lower_length, side, count, frame.floor_z + settings["lower_height_m"]),
+            _cross(length, side, 1, frame.floor_z + upper),
         ]
         mesh = joined(crosses)
         mesh.cell_data["hook"] = np.repeat([0, 1], [one.n_cells for one in crosses])
