@@ -124,7 +124,7 @@ def _checked_output(directory: Path, output: Path | str | None, to: str, *, fold
 
 @contextmanager
 def _whole(path: Path) -> Iterator[Path]:
-    """Give a path in a folder beside `path`, to which it is moved when the block ends well; else it is removed."""
+    """Give a path in a folder beside `path`; it is moved to `path` when the block ends well, else removed."""
     scratch: Path | None = None
     try:
         scratch = Path(tempfile.mkdtemp(prefix=f".{path.name}.", dir=path.parent))
@@ -140,7 +140,7 @@ def _whole(path: Path) -> Iterator[Path]:
 
 
 def _write_collection(folder: Path, bodies: Bodies, frames: Iterable[tuple[int, Frame]]) -> int:
-    """Write `KIND.pvd`, which lists `KIND/KIND_000000.vtp` and so on, of each kind; return how many kinds there are.
+    """Write `KIND.pvd`, which lists `KIND/KIND_000000.vtp` …, of each kind; return the number of kinds.
 
     A kind has a file for every frame, without a point where there is none of it: ParaView would show the one before, a
     wall that is gone or the forces of a moment ago.
@@ -210,7 +210,7 @@ class _Painter:
         self._scale = ColourScale.of(self._field, self._bounds)
 
     def content(self, frame: Frame, suffix: str) -> bytes | None:
-        """Return the file of a frame, an STL with one object, others with one for each kind; None without bodies."""
+        """Return the file of a frame, an object per kind, in an STL one for all; None without bodies."""
         scene: Any = trimesh.Scene()
         web = suffix in {"gltf", "glb"}
         for kind, mesh in self._bodies.at(frame).items():

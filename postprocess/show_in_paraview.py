@@ -1,4 +1,4 @@
-"""Show an exported run in ParaView: boxes coloured by crossings, the wall cut open in front, time ready to run.
+"""Show an exported run in ParaView: boxes by crossings, the wall cut open, time ready to run.
 
     paraview --script=show_in_paraview.py                     in its window; then press play
     pvpython show_in_paraview.py FOLDER --picture last.png    the last frame, without a window

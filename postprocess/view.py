@@ -111,7 +111,7 @@ class RunView:
 
     @property
     def ended(self) -> bool:
-        """Whether no more frames will come, by the present state of the run directory; so also where it is gone."""
+        """Whether no more frames will come, by the run directory as it is now; true where it is gone."""
         try:
             return open_run(self.run.path).status.state not in ("running", "stopped")
         except InputError:
@@ -310,7 +310,7 @@ class Viewer:
                     html.I(style=("{ background: entry.colour }",))
                     html.Span("{{ entry.label }}")
                 html.P("click on a smarticle to see its fields", v_if="!picked.length")
-                with html.Dl(v_if="picked.length", id="told"), html.Template(v_for="entry in picked", key="entry.name"):
+                with html.Dl(v_if="picked.length", id="pick"), html.Template(v_for="entry in picked", key="entry.name"):
                     html.Dt("{{ entry.name }}", title=("entry.meaning",))
                     html.Dd("{{ entry.value }} {{ entry.unit == '-' ? '' : entry.unit }}")
             with html.Footer():

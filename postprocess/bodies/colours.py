@@ -103,7 +103,7 @@ class ColourScale:
 
 
 def colour_field(name: str | None, run: Run) -> Field:
-    """Return the field to colour by: crossings, or of motion in a plane, which has none, the number of the smarticle.
+    """Return the field to colour by; None: crossings, or in a plane the number of the smarticle.
 
     Raises:
         InputError: It is no field, or the run has no such.

@@ -238,7 +238,7 @@ def checked_field(name: str, aliases: Mapping[str, str] = MappingProxyType({})) 
 
 
 def link_values(field: Field, frame: Frame, run: Run) -> NDArray[Any] | None:
-    """Return values (N, 3) of a field, or vectors (N, 3, 3), one per link; None where the frame does not have it."""
+    """Return values (N, 3) or vectors (N, 3, 3) of a field, one per link; None where a frame lacks it."""
     values = field.take(frame, run)
     if values is None or field.of == "link":
         return values

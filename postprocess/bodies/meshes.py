@@ -1,4 +1,4 @@
-"""True bodies of a run at a time, as meshes in metres: boxes of links, walls, floor, hooks, strings, crossings, forces.
+"""True bodies of a run at a time, as meshes in metres: links, walls, floor, hooks, strings, forces.
 
 Coordinates are those of the frames, z upwards: a container that is shaken moves. Everything is as large as in the
 simulation, but for what has no size there: a wall without a height ends above the highest smarticle, a string has no
@@ -113,7 +113,7 @@ def read_surroundings(run: Run) -> Surroundings:
 
 
 def _start(run: Run, index: int, series: Series | None) -> float | None:
-    """Return when a phase begins [s]; a phase that is not done began with the last sample of the one before."""
+    """Return when a phase begins [s]; one that is not done began with the last sample before it."""
     start = run.phases[index].start_s
     if start is None and series is not None:
         start = float(series.time[series["phase"] < index].max(initial=0.0))
@@ -211,7 +211,7 @@ _FACES = np.array([[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2
 
 
 def checked_kinds(wanted: Sequence[str], unwanted: Sequence[str], *, also: Sequence[str] = ()) -> tuple[str, ...]:
-    """Return the kinds to export: the usual and the wanted ones without the unwanted; `also` may be left out too.
+    """Return the kinds to export: usual and wanted ones without the unwanted; `also` may be unwanted too.
 
     Raises:
         InputError: An unknown kind, or nothing is left.
@@ -391,7 +391,7 @@ class Bodies:
 def link_boxes(
     vertices: Vertices, *, thickness_normal: float, thickness_in_plane: float | Sequence[float]
 ) -> pv.PolyData:
-    """Return the links of all smarticles as one mesh of boxes, six quadrilaterals and eight points each [m].
+    """Return the links of all smarticles as one mesh of boxes [m], six quadrilaterals each.
 
     The section of a straight smarticle, or of one without barbs, is turned about its length by an angle that four
     vertices do not give: some angle is taken. Links without length have no box.
@@ -437,7 +437,7 @@ def owners(mesh: pv.PolyData, frame: Frame) -> tuple[Whole, Whole]:
 
 
 def force_lines(forces: RecordedForces) -> pv.PolyData:
-    """Return lines from centres of mass to the contacts [m]: two for each contact, one where a boundary is touched.
+    """Return lines from centres of mass to contacts [m]: two for each, one where a boundary is touched.
 
     Straight lines, each with two points of its own: a tube about a line that bends at a sharp angle is torn. Cell data
     `contact`, the place of the contact.

@@ -1,4 +1,4 @@
-"""Lengths, centres and planes of smarticles by their four vertices, and the spheres that engines put in their place.
+"""Lengths, centres and planes of smarticles by their vertices, and the spheres in their place.
 
 Frames hold the centrelines alone. Where each sphere of a chain is follows from them, from the chain's rows and pitch,
 and, of several rows, from the plane of the smarticle; a straight smarticle has none, some plane through it is taken.
@@ -91,7 +91,7 @@ def close_pairs(vertices: Floats) -> tuple[Whole, Whole]:
 
 
 def swept_axes(vertices: Floats, diameter: float) -> Floats:
-    """Return the lines (N, 4, 3) [m] that a sphere is swept along: tips pulled in by its radius, hinges as they are.
+    """Return the lines (N, 4, 3) [m] that a sphere is swept along: tips pulled in by its radius.
 
     A barb shorter than the radius shrinks to its hinge; a smarticle without barbs is pulled in at the ends of its
     middle link.
@@ -113,7 +113,7 @@ def swept_axes(vertices: Floats, diameter: float) -> Floats:
 
 
 def plane_frames(vertices: Floats) -> Floats:
-    """Return right-handed axes (N, 3, 3) of the best-fitting plane of each smarticle, the last row its normal.
+    """Return right-handed axes (N, 3, 3) of each smarticle's best-fitting plane, the normal last.
 
     The normal is the direction of least spread of the four vertices: unlike a cross product of two links it is as good
     for every shape, and it averages over slightly bent hinges. Of a straight smarticle it is some vector across it.

@@ -1,4 +1,4 @@
-"""Upright cylinders, and what the true boxes of the links fill of them: points of a fine grid inside them."""
+"""Upright cylinders, and points of a fine grid inside the true boxes of the links."""
 
 from __future__ import annotations
 
@@ -61,7 +61,7 @@ def solid_fraction(
     thickness_in_plane: float,
     pitch: float | None = None,
 ) -> float:
-    """Return the share of the region's volume that lies inside a link's box, above 0; arguments as `solid_points`.
+    """Return the share of a region inside a link's box, above 0; arguments as `solid_points`.
 
     A point in two boxes counts once. Links of one smarticle overlap at the hinges, so a U reads lower than
     t1 t2 (w + 2l) by t2 / (2 (w + 2l)), about 1 % for the usual sizes.
@@ -94,7 +94,7 @@ def solid_points(
     pitch: float | None = None,
     region: Region | None = None,
 ) -> tuple[Floats, float]:
-    """Return points (n, 3) [m] of a cubic grid that lie inside a link's box, each once, and their pitch [m].
+    """Return points (n, 3) [m] of a cubic grid inside a link's box, each once, and their pitch [m].
 
     Args:
         thickness_normal: t1, along the normal of the smarticle's plane [m].

@@ -1,4 +1,4 @@
-"""Find which smarticles hang together: connected parts of the graphs of contact and of crossings, and their spans."""
+"""Find which smarticles hang together, by contact or by crossings, and what they span."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ def entanglement_clusters(vertices: Vertices) -> Clusters:
 
 
 def contact_graph(frame: Frame, run: Run) -> Clusters:
-    """Join smarticles that touch by the shapes that the run's engine gave them, see `contacts.pairs_in_contact`.
+    """Join smarticles that touch by their shapes in the run's engine, see `contacts.pairs_in_contact`.
 
     Raises:
         InputError: The scene of the run cannot be read.
@@ -84,7 +84,7 @@ def spans_height(clusters: Clusters, vertices: Vertices, *, diameter: float, flo
 
 
 def spans_width(clusters: Clusters, vertices: Vertices, *, diameter: float, wall_radius: float) -> bool:
-    """Whether one cluster reaches from wall to wall: no half of the round wall has all its contacts with the wall.
+    """Whether one cluster reaches from wall to wall: no half of the wall has all its contacts with it.
 
     A round wall has no opposite faces, and what touches it on one side alone is not wedged.
 

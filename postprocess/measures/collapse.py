@@ -1,4 +1,4 @@
-"""Measure how a free-standing column collapses on a vibrating floor: its height against time, and the time it takes.
+"""Measure how a free-standing column collapses on a vibrating floor: height against time, and τ.
 
 A column on a floor without end loses height in two ways: it sinks, and smarticles leave it. On a floor that shakes with
 several g, those that have left hop millimetres high, as high as a low column, so heights of all smarticles, or of the
@@ -56,7 +56,7 @@ _LONGEST = 1e4  # τ over the time watched: beyond it a curve is flat, whatever 
 
 @dataclass(frozen=True, kw_only=True)
 class Vibration:
-    """The phase in which a free-standing column is shaken, with peak acceleration over g [-] and frequency [Hz]."""
+    """The phase that shakes a free-standing column: peak acceleration over g [-], frequency [Hz]."""
 
     phase: Phase
     acceleration: float
@@ -114,7 +114,7 @@ def vibration(run: Run) -> Vibration:
 
 
 def column_history(run: Run, definition: str, shaken: Vibration) -> ColumnHistory:
-    """Read the heights of a run's column, by one of `HEIGHTS`, from the phase before its vibration to the end of that.
+    """Read a column's heights, by one of `HEIGHTS`, from the phase before its vibration to the end of that.
 
     Raises:
         InputError: The run lacks its series or frames, or samples before the vibration.
@@ -171,7 +171,7 @@ def _core(run: Run, shaken: Vibration) -> tuple[Floats, Floats]:
 
 
 def collapse_of(history: ColumnHistory, definition: str, shaken: Vibration) -> CollapseTime:
-    """Fit the collapse time of a column to means over periods, so that bouncing within a period does not count.
+    """Fit the collapse time of a column to means over periods: bouncing within one does not count.
 
     Raises:
         InputError: It was sampled too rarely, or watched for too short a time.
@@ -181,7 +181,7 @@ def collapse_of(history: ColumnHistory, definition: str, shaken: Vibration) -> C
 
 
 def period_means(times: Floats, values: Floats, frequency: float) -> tuple[Floats, Floats]:
-    """Average over whole periods from time 0 on: mean times (m,) [s] and values (m,) of periods with a sample."""
+    """Average over whole periods from time 0 on: times (m,) [s] and values (m,) of those with a sample."""
     # A sample at the end of a period belongs to it.
     period = np.ceil(times * frequency - 1e-6).astype(np.int64)
     used = period > 0

@@ -90,7 +90,7 @@ def touching_pairs(vertices: Vertices, diameter: float) -> ContactPairs:
 
 
 def pairs_in_contact(frame: Frame, run: Run) -> ContactPairs:
-    """Find pairs of smarticles that touch by the shapes that the run's engine gave them, sorted by i, then j.
+    """Find pairs of smarticles that touch by their shapes in the run's engine, sorted by i, then j.
 
     In three runs on YADE (40 smarticles of draft fidelity, pitch 1.3; 60 of standard, pitch 1; 30 of reference, two
     rows; poured and shaken) this finds 1.000 times the engine's pairs at rest after pouring, every smarticle with as
@@ -143,7 +143,7 @@ def pairs_of_spheres(centres: Floats, diameter: float) -> ContactPairs:
 
 
 def _merged(a: Whole, b: Whole, gaps: Floats, count: int) -> ContactPairs:
-    """Keep one pair for all contacts of two smarticles, with the least distance, and none of one with itself."""
+    """Keep one pair for all contacts of two smarticles, with the least distance; none with itself."""
     apart = a != b
     a, b, gaps = a[apart], b[apart], gaps[apart]
     keys, which = np.unique(np.minimum(a, b) * count + np.maximum(a, b), return_inverse=True)

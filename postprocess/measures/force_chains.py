@@ -1,4 +1,4 @@
-"""Force chains: how contacts share the load, where a run recorded their forces (`recording.contact_forces`).
+"""Measure how contacts share the load, where a run recorded forces (`recording.contact_forces`).
 
 A contact is all points at which a pair of links touches; those with floor, wall and hooks are left out. A contact is
 strong if its normal force is above the mean of the frame, and smarticles that strong contacts join make a chain: the
@@ -110,7 +110,7 @@ def force_distribution(normal: ArrayLike, *, edges: ArrayLike | None = None) -> 
 
 
 def force_chains(frame: Frame, forces: RecordedForces | None = None) -> Clusters:
-    """Join smarticles by strong contacts, directly or through others; clusters of one smarticle are no chain.
+    """Join smarticles by strong contacts; clusters of one smarticle are no chain.
 
     The forces recorded with the frame are read if not given.
 

@@ -47,7 +47,7 @@ def heights(vertices: Vertices, *, floor_z: float = 0.0) -> Heights:
 
 
 def least_reaching(growing: Callable[[float], float], level: float, low: float, high: float) -> float:
-    """Find the least argument at which a growing function, which may have steps, reaches a level, to rounding.
+    """Find the least argument at which a growing function, perhaps with steps, reaches a level.
 
     The function is below the level at `low`, or just reaches it, and has reached it at `high`.
     """

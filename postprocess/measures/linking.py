@@ -1,4 +1,4 @@
-"""Measure how far smarticles are wound about each other: linking numbers of open chains, by Gauss's integral.
+"""Measure how far smarticles are wound about each other, by Gauss's integral of open chains.
 
 Of two closed curves the integral is a whole number and a property of their topology; of two open ones, as smarticles
 are, it is a number that goes smoothly with their shapes: the mean, over all directions of view, of half the signed

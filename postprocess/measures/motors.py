@@ -40,7 +40,7 @@ _NEAR = 1e-3  # share of the interval by which a frame may be off; frames fall o
 
 
 def sampled_work(angles: Array, torques: Array) -> float:
-    """Sum τ Δα over all barbs [J], each torque times the way since the sample before; NaN of fewer than two.
+    """Sum τ Δα over all barbs [J], with Δα since the sample before; NaN of fewer than two samples.
 
     Args:
         angles: (samples, N, 2) of the barbs [rad].
@@ -77,7 +77,7 @@ def sampled(frames: FrameSequence, apart: float = APART) -> list[int]:
 
 
 def _sampled_work_of(run: Run, series: Series, phase: int) -> tuple[float, ...]:
-    """Sum from the first frame on, and the least and greatest of beginning at any frame of the first 0.1 s."""
+    """Sum from the first frame on, and least and greatest sum from any frame of the first 0.1 s."""
     frames = run.frames.in_phase(phase)
     begun = [sampled(frames[first:]) for first in range(int(np.searchsorted(frames.times, _first_end(frames))))]
     found = [_work_of([frames[first + k] for k in chosen]) for first, chosen in enumerate(begun)]
@@ -88,7 +88,7 @@ def _sampled_work_of(run: Run, series: Series, phase: int) -> tuple[float, ...]:
 
 
 def _first_end(frames: FrameSequence) -> float:
-    """Return when the samples that began with the first frame come to their second [s]; -inf without frames."""
+    """Return the time of the second sample from the first frame on [s]; -inf without frames."""
     return float(frames.times[0]) + APART * (1 - _NEAR) if len(frames) else -math.inf
 
 

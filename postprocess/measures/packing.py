@@ -114,7 +114,7 @@ def packing_fraction(
 
 
 def packing_of(frame: Frame, run: Run, *, definition: str) -> float:
-    """Return the packing fraction of a frame of a run [-], by a key of `DEFINITIONS`; NaN where it has no meaning."""
+    """Return a frame's packing fraction [-] by a key of `DEFINITIONS`; NaN where it has no meaning."""
     if not run.manifest.fills_cylinder(frame.phase):
         return math.nan
     # The costly ones count inside the pile, where only the wall can be in the way.

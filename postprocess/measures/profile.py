@@ -1,4 +1,4 @@
-"""Measure where in a container the material is: φ(r, z), the packing fraction of rings, layer by layer."""
+"""Measure φ(r, z), the packing fraction of rings of a container, layer by layer."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Measure the pull of a hook out of a pile: its force against time, peak, work, and whether it came free.
+"""Measure the pull of a hook out of a pile: force against time, peak, work, whether it came free.
 
 Forces are those that it takes to raise the hook, upwards positive: what the smarticles exert on it, with the other
 sign. The series holds means between samples, so nothing is missed between two of them, but contacts come and go and
@@ -135,7 +135,7 @@ def held_at(pull: HookPull, time: float) -> float:
 
 
 def freed(pull: HookPull) -> float:
-    """Return the time from which the windowed force stays below `FREE` of its peak [s]; NaN if it never does."""
+    """Return when the windowed force falls below `FREE` of its peak for good [s]; NaN if it never does."""
     times, means = moving_mean(pull)
     held = np.nonzero(means > FREE * means.max())[0]
     if not len(held) or held[-1] + 1 == len(means):

@@ -92,7 +92,7 @@ class PhaseMeasure:
 
 
 def in_space(run: Run) -> bool:
-    """Whether smarticles move in space: in a plane all lie at one height, and each in the plane of all others."""
+    """Whether smarticles move in space, not in a plane, where all lie at one height."""
     return not run.manifest.planar
 
 
@@ -118,7 +118,7 @@ def shown_quantities() -> tuple[tuple[Quantity, Shown], ...]:
 
 
 def frame_measures(definitions: Sequence[str]) -> tuple[FrameMeasure, ...]:
-    """Return the measures of frames in the order of their columns, those that have definitions in the given order."""
+    """Return the measures of frames in the order of columns, those with definitions as given."""
     known = sorted((m for m in registered() if isinstance(m, FrameMeasure)), key=lambda measure: measure.place)
     chosen = {measure.definition: measure for measure in known}
     return (

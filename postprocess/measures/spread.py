@@ -28,7 +28,7 @@ TOUCHING = 1.05
 Spheres that touch are a diameter apart or, pressed, less; beads rest in the gaps of the other chain, so that
 centrelines come nearer still. A twentieth more keeps contacts that open and close while a pile settles.
 
-It tells nearness more than contact: of piles on YADE it finds 1.4 times as many pairs as touch at rest after pouring,
+It measures nearness, not contact: of piles on YADE it finds 1.4 times as many pairs as touch at rest after pouring,
 1.9 to 2.1 at rest after shaking, 6 while shaken; see `contacts.pairs_in_contact`, which finds those that touch."""
 
 OUTSIDE = 0.5
@@ -136,13 +136,13 @@ def share_outside(vertices: Vertices, radius: float, *, axis: tuple[float, float
 
 
 def middle(vertices: Vertices) -> tuple[float, float]:
-    """Return the middle of a pile seen from above, x and y [m]: medians of centres of mass, which ignore strays."""
+    """Return the middle of a pile seen from above, x and y [m]: medians, which ignore strays."""
     x, y = np.median(centres_of_mass(vertices)[:, :2], axis=0)
     return float(x), float(y)
 
 
 def tilt(vertices: Vertices, *, foot: tuple[float, float] = (0.0, 0.0), floor_z: float = 0.0) -> float:
-    """Return the angle [rad], 0 to π/2, between the vertical and the line from a pile's foot to its centre of mass.
+    """Return the angle [rad] from the vertical to the line from a pile's foot to its centre of mass.
 
     A pile that is turned rigidly about its foot by an angle has that tilt; one that spreads evenly to all sides has
     none. The principal axis of the pile's inertia would not do: it lies level in every pile that is lower than

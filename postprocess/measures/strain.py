@@ -56,7 +56,7 @@ _MEANINGS = {
         "imbalance of the strings", "N"
     ): "root mean square difference of the two strings' forces along x before the fracture",
 }
-QUANTITIES: Mapping[str, str] = MappingProxyType({quantity.header: told for quantity, told in _MEANINGS.items()})
+QUANTITIES: Mapping[str, str] = MappingProxyType({quantity.header: text for quantity, text in _MEANINGS.items()})
 """What is measured of a strain test: names of columns with their units, and what they are."""
 PEAK, AT_PEAK, FRACTURE, STIFFNESS, BEND, YIELD, DROP, WIDENING, SLIP_WIDENING, WALL, IMBALANCE = QUANTITIES
 

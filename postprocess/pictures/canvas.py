@@ -1,4 +1,4 @@
-"""The canvas of a picture: bodies of one or more runs side by side, in parallel projection, drawn by PyVista.
+"""Draw bodies of one or more runs side by side, in parallel projection, by PyVista.
 
 It is drawn at twice its size and scaled down. No display is needed: VTK falls back to EGL.
 """
@@ -161,7 +161,7 @@ def union(extents: Sequence[Floats]) -> Floats:
 
 
 def add_bodies(plotter: Any, meshes: Mapping[str, pv.PolyData], frame: Frame, colours: NDArray[np.uint8]) -> None:
-    """Put meshes of `drawn` into a window in place of those that are there, links with colours (N, 3, 3), 0 to 255."""
+    """Put meshes of `drawn` into a window in place of those there, links in colours (N, 3, 3), 0 to 255."""
     pale = "forces" in meshes
     for kind in (*PAINTS, "ghost"):
         for name in (kind, f"{kind} edges"):
@@ -278,7 +278,7 @@ class Canvas:
         colours: NDArray[np.uint8],
         caption: Sequence[str] = (),
     ) -> None:
-        """Put meshes of `drawn` into a panel, with colours (N, 3, 3) of all links, and a title and lines above."""
+        """Put meshes of `drawn` into a panel, links in colours (N, 3, 3), a title and lines above."""
         with quiet_vtk():
             self._plotter.subplot(0, column)
             add_bodies(self._plotter, meshes, frame, colours)

@@ -99,7 +99,7 @@ class Moments:
 
 
 def durations(count: int, rate: float, unit: float) -> list[int]:
-    """Return how long each of some pictures is shown, in whole units of time [s], right to half a unit in sum.
+    """Return how long each picture is shown, in whole units of time [s], right to half a unit in sum.
 
     Example:
         >>> durations(4, 15.0, 0.01)

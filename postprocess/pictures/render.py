@@ -50,7 +50,7 @@ def render_run(
     forces: bool = False,
     overwrite: bool = False,
 ) -> Path:
-    """Draw one frame of a run: every link as its real box, in a container cut open in front, with hooks and strings.
+    """Draw one frame of a run: real boxes of links, a container cut open in front, hooks and strings.
 
     A wall that is being lifted is where it is then; of one that was taken away its outline is left, faint.
 
@@ -305,7 +305,7 @@ def _focused(shot: Shot, index: int, smarticle: int, look: Look) -> Image.Image:
 
 
 def _through_the_mouth(vertices: Floats) -> Floats:
-    """Return axes (3, 3): right, along the middle link, up, towards the mouth, and forward; turned by `_ASKEW`."""
+    """Return axes (3, 3): right, along the middle link, up, towards the mouth, and forward; askew."""
     normal = plane_frames(vertices[None])[0, 2]
     right = vertices[2] - vertices[1]
     right -= (right @ normal) * normal
@@ -323,7 +323,7 @@ def _through_the_mouth(vertices: Floats) -> Floats:
 
 
 def titles_of(runs: Sequence[Run]) -> list[str]:
-    """Return the headings of runs beside each other: their names, with their folders where these are alike."""
+    """Return the headings of runs beside each other: names, with folders where these are alike."""
     names = [run.manifest.name for run in runs]
     if len(set(names)) == len(names):
         return names

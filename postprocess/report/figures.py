@@ -1,4 +1,4 @@
-"""The style of every figure: size, colours, footer, limits that hide nothing, and how a figure reaches the disk whole.
+"""The style of every figure: size, colours, footer, limits that hide nothing, whole files.
 
 A figure is drawn inside `style()`, gets its provenance from `add_footer` and is written by `save`.
 """
@@ -105,7 +105,7 @@ def blank_figure(width: float, height: float) -> Figure:
 
 
 def add_footer(figure: Figure, lines: Sequence[str]) -> None:
-    """Put the provenance below the axes, of a figure drawn completely, which grows by the height of the text.
+    """Put the provenance below a figure drawn completely, which grows by the height of the text.
 
     The footer takes `FOOTER_SHARE` of the figure at most: of what is longer the last statement stays, which says where
     the rest is to be read, and the others are cut at "…".
@@ -129,7 +129,7 @@ def _most_lines(height: float) -> int:
 
 
 def _fitting(lines: Sequence[str], columns: int, most: int) -> list[str]:
-    """Break statements at a number of columns, and cut all but the last where there are more lines than `most`."""
+    """Break statements at a number of columns, and cut all but the last beyond `most` lines."""
     broken = [textwrap.wrap(line, columns, break_on_hyphens=False) or [""] for line in lines]
     text = [part for parts in broken for part in parts]
     if len(text) <= most:
@@ -188,7 +188,7 @@ def refuse_to_overwrite(path: Path, *, overwrite: bool) -> None:
 
 
 def sequence(colours: int, *, last: float = 1.0) -> list[str]:
-    """Return hexadecimal colours, dark to light: equal steps of viridis, lightened so that shading stays visible.
+    """Return hexadecimal colours, dark to light: steps of viridis, lightened so that shading shows.
 
     Args:
         last: Place of the last one in the map, up to 1.

@@ -67,7 +67,7 @@ def _runs_needed(effect: SeedMean, size: float) -> float:
 
 
 def told_more(verdict: Verdict) -> str:
-    """Write `an effect of this size would take 3.1 times as many runs` of an unresolved verdict; else nothing."""
+    """Write `an effect of this size would take 3.1 times as many runs` if unresolved; else nothing."""
     more = verdict.more if isinstance(verdict, Unresolved) else math.nan
     if math.isnan(more):
         return ""

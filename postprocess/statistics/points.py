@@ -33,7 +33,7 @@ def marked(quantity: str, mark: str) -> str:
 
 
 def mean_columns(quantity: str, mean: SeedMean) -> dict[str, float]:
-    """Return a mean over seeds as columns: `… SE` is the standard error, `… 95 %` the half-width by Student's t."""
+    """Return a mean over seeds as columns, `… SE` the standard error, `… 95 %` the half-width."""
     return {
         quantity: mean.value,
         marked(quantity, "SE"): mean.standard_error,

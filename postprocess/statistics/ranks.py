@@ -26,7 +26,7 @@ _COINS = 6  # that show the same side in less than 5 % of all throws
 
 @dataclass(frozen=True, kw_only=True)
 class Interval:
-    """A value with its 95 % interval, which need not lie about it evenly; NaN ends where blocks are too few."""
+    """A value with its 95 % interval, perhaps uneven; NaN ends where blocks are too few."""
 
     value: float
     low: float
@@ -39,7 +39,7 @@ class Interval:
 
 
 def rank_correlations(x: Floats, y: Floats, strata: Whole) -> Floats:
-    """Compute Spearman's rank correlations of the columns of x (n, m) with y (n,), of ranks within strata (n,).
+    """Compute Spearman's correlations of the columns of x (n, m) with y (n,), ranked in strata (n,).
 
     Returns:
         (m,) from -1 to 1; NaN where a column or y is constant in every stratum.
@@ -57,7 +57,7 @@ def rank_correlations(x: Floats, y: Floats, strata: Whole) -> Floats:
 
 
 def ranks_within(values: Floats, strata: Whole) -> Floats:
-    """Rank columns (n, m) within each stratum, about the mean, over its number of rows plus one; ties share."""
+    """Rank columns (n, m) within strata, about the mean, over their rows plus one; ties share."""
     found = np.empty(values.shape)
     for stratum in np.unique(strata):
         inside = strata == stratum
@@ -92,7 +92,7 @@ def _correlation(part: Floats) -> float:
 
 
 def common_slopes(x: Floats, y: Floats, strata: Whole) -> Floats:
-    """Fit slopes (m,) of y (n,) against each column of x (n, m), common to strata (n,) with levels of their own.
+    """Fit slopes (m,) of y (n,) against columns of x (n, m), common to strata with own levels.
 
     NaN where a column is constant in every stratum.
     """
@@ -120,7 +120,7 @@ def resamples(blocks: Whole, strata: Whole, *, count: int, seed: int) -> Iterato
 
 
 def interval(value: float, drawn: Sequence[float]) -> Interval:
-    """Take the 95 % interval from the percentiles of what resamples gave; NaN where one of ten has no value."""
+    """Take the 95 % interval from percentiles of resamples; NaN where one of ten has no value."""
     known = np.asarray(drawn, dtype=np.float64)
     known = known[np.isfinite(known)]
     if len(known) < 0.9 * len(drawn) or not len(known):
@@ -135,5 +135,5 @@ def few_blocks(blocks: Whole, strata: Whole) -> bool:
 
 
 def resampled(measures: Callable[[Whole], Floats], blocks: Whole, strata: Whole, *, count: int, seed: int) -> Floats:
-    """Compute (count, m) values: those (m,) that `measures` takes of the rows of each table of `resamples`."""
+    """Compute the values (count, m) that `measures` takes of each table of `resamples`."""
     return np.array([measures(rows) for rows in resamples(blocks, strata, count=count, seed=seed)])

@@ -1,4 +1,4 @@
-"""Means with their errors: over seeds, their differences and slopes, with 95 % intervals, and over successive frames.
+"""Means with errors, over seeds and over successive frames; differences, slopes, parabolas.
 
 Runs that differ in their seed alone are independent, and their intervals are those of Student's t; one seed has a mean
 and no error. Successive frames of one run are correlated, see `mean_with_error`.
@@ -35,7 +35,7 @@ Slope = SeedMean
 
 @dataclass(frozen=True, kw_only=True)
 class Difference:
-    """The difference of two means, and the half-width of its 95 % interval; NaN where either mean has none."""
+    """The difference of two means with the half-width of its 95 % interval; NaN where one has none."""
 
     value: float
     half_width: float
@@ -171,7 +171,7 @@ def difference(mean: SeedMean, baseline: SeedMean, *, scatter: Scatter | None = 
 
 
 def relative_difference(mean: SeedMean, baseline: SeedMean, *, scatter: Scatter | None = None) -> Difference:
-    """Return `difference` in per cent of the baseline's mean, which is itself taken as exact; NaN where that is 0."""
+    """Return `difference` in per cent of the baseline's mean, taken as exact; NaN where that is 0."""
     change = difference(mean, baseline, scatter=scatter)
     scale = 100 / baseline.value if baseline.value else math.nan
     return Difference(value=scale * change.value, half_width=abs(scale) * change.half_width)

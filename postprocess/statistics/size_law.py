@@ -1,4 +1,4 @@
-"""Fit what a quantity of piles of one shape comes to as they grow: q = q_∞ + a N^(-1/3), surface over volume.
+"""Fit how a quantity changes with the size of piles: q = q_∞ + a N^(-1/3), surface over volume.
 
 The scatter from seed to seed falls with the size of a pile, and a few seeds of one size hardly know it. It is taken as
 a power of N that all sizes share, fitted to what seeds differ by within sizes alone, so that it knows nothing of the
@@ -142,7 +142,7 @@ def _fit(counts: Floats, values: Floats, scatter: Scatter, power: float) -> tupl
 
 
 def _powers(counts: Floats, values: Floats, scatter: Scatter) -> tuple[float, float, float]:
-    """The best power, and all that the data do not refuse at 95 %, errors enlarged as those of the law."""
+    """Return the best power and the interval that the data admit at 95 %, errors enlarged as the law's."""
     left = np.array([_fit(counts, values, scatter, float(power))[2] for power in POWERS]) / scatter.variance
     free = len(np.unique(counts)) - 3
     larger = max(left.min() / free, 1.0) if free > 0 else 1.0
@@ -216,7 +216,7 @@ def profiles(x: Floats, having: Floats, groups: NDArray[np.int64]) -> dict[int, 
 
 
 def alike(found: Collection[Profile]) -> float:
-    """Return the probability of places so unlike each other, were they all one, by the ratio of likelihoods [1].
+    """Return the probability of places so unlike, were they all one, by the ratio of likelihoods [1].
 
     NaN where fewer than two groups know theirs.
     """

@@ -67,7 +67,7 @@ class Window:
         On a busy machine the answer comes when a place or two farther on have been clicked, whose own answers take it
         away again: so the last places are clicked once more, with time.
         """
-        box, told = self.page.locator("main").bounding_box(), self.page.locator("#told")
+        box, told = self.page.locator("main").bounding_box(), self.page.locator("#pick")
         tried = []
         for share in shares:
             tried.append(share)
@@ -116,9 +116,9 @@ def test_page(flat, browser):
         page.wait_for_function("document.querySelector('#clock').innerText.startsWith('t = 0.5 s')")
         # Picking: places are tried along the middle column until the smarticle is met; there is one.
         window.pick(np.linspace(0.35, 0.95, 40))
-        assert window.text("#told").split()[:2] == ["smarticle_id", "0"]
-        assert "link\n1" in window.text("#told")
-        assert "local_packing_fraction" in window.text("#told")
+        assert window.text("#pick").split()[:2] == ["smarticle_id", "0"]
+        assert "link\n1" in window.text("#pick")
+        assert "local_packing_fraction" in window.text("#pick")
         picture = window.settled()
         magenta = (picture[..., 0] > 120) & (picture[..., 1] < 60) & (picture[..., 2] > 60)
         assert magenta.sum() > 100

@@ -51,7 +51,7 @@ def test_forces_that_are_alike_share_alike_and_none_is_strong(count: int) -> Non
     assert not strong_contacts([2.0] * count).any()
 
 
-def test_no_contact_has_no_chain_and_bad_bins_are_refused() -> None:
+def test_no_contact_has_no_chain_and_bad_bins_are_rejected() -> None:
     with pytest.raises(UndefinedMeasureError, match="at least 1 contact"):
         force_participation([])
     with pytest.raises(InputError, match="edges must be numbers that ascend"):

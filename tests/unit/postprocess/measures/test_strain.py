@@ -50,7 +50,7 @@ def pull(*, yields: bool, jolt: float = 0.0) -> StrainTest:
 
 
 @pytest.mark.parametrize("jolt", [0.0, 0.05])
-def test_a_yield_drop_is_told_from_the_fracture(jolt: float) -> None:
+def test_a_yield_drop_is_not_the_fracture(jolt: float) -> None:
     found = measured(pull(yields=True, jolt=jolt))
     assert found[PEAK] == pytest.approx(1.8, rel=1e-3)
     assert found[AT_PEAK] == found[FRACTURE] == pytest.approx(0.7, rel=1e-3)

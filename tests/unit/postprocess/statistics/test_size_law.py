@@ -1,4 +1,4 @@
-"""The law in the size of piles: a law that made the values comes out again, and another one is refused."""
+"""The law in the size of piles: a law that made the values comes out again, and another one is rejected."""
 
 from __future__ import annotations
 
@@ -40,19 +40,19 @@ def test_intervals_hold_what_they_are_to_hold() -> None:
     """95 % of them: in 150 trials within three standard deviations of that."""
     laws = [size_law(COUNTS, piles(0.15, -0.12, seed=seed)) for seed in range(150)]
     assert 0.897 < np.mean([abs(law.bulk - 0.15) <= law.error(1, 0) for law in laws])
-    # As many laws are refused as chance has it, no more.
+    # As many laws are rejected as chance has it, no more.
     assert 0 < np.mean([law.refused < 0.05 for law in laws]) < 0.103
 
 
 @pytest.mark.parametrize("power", [0.1, 1.0])
-def test_another_law_is_refused(power: float) -> None:
+def test_another_law_is_rejected(power: float) -> None:
     values = piles(0.15, -0.12 * 5 ** (3 * power - 1), power=power)
     law = size_law(COUNTS, values)
     assert law.refused < 0.05
     assert law.excess > 3
     assert not law.powers[1] < 1 / 3 < law.powers[2]
     assert law.powers[1] <= power <= law.powers[2]
-    # What is refused has larger errors than the same scatter about the law itself.
+    # A law that is rejected has larger errors than the same scatter about the law itself.
     means = pd.Series(values).groupby(COUNTS).transform("mean").to_numpy()
     along = size_law(COUNTS, values - means + 0.15 - 0.12 * COUNTS ** (-1 / 3))
     assert law.scatter.variance == pytest.approx(along.scatter.variance)
