@@ -51,11 +51,6 @@ class Outlines:
         mask: Flags = (off_axis < region.radius)[:, :, None] & ((z > region.bottom) & (z < region.top))
         return mask
 
-    def volumes(self) -> Floats:
-        """(P,) [m³]."""
-        found: Floats = self.pitch**3 * self.inside.sum(axis=(1, 2, 3)).astype(float)
-        return found
-
 
 def outlines(
     piles: Sequence[ArrayLike],

@@ -127,7 +127,7 @@ def _mirrored(points: Floats, container: Region, lid: float, band: float) -> Flo
 def _cell_volumes(points: Floats, count: int, *, reach: float, together: int = TOGETHER) -> Floats:
     """Compute volumes (count,) of the Voronoi cells of the first points, infinite for open ones.
 
-    Cells are found slab by slab along x, among all points within a reach of the slab. A point's cell among them is its
+    Cells are found slab by slab along x, among all points within a reach [m] of it. A point's cell among them is its
     cell among all points where the spheres around its corners through the point, in which there must be no other, do
     not go beyond. The few others are found again among all points within twice the reach of one of them, where those
     spheres lie if the reach is twice the distance of the farthest corner; and so on.
@@ -137,41 +137,34 @@ def _cell_volumes(points: Floats, count: int, *, reach: float, together: int = T
         count: Of the points whose cells are wanted; the others bound cells.
     """
     if count <= together:
-        return _cells(points).volumes[:count]
+        return _cells(points)[0][:count]
     volumes, tree, across = np.empty(count), cKDTree(points), points[:, 0]
     for slab in np.array_split(np.argsort(across[:count], kind="stable"), -(-count // together)):
         low, high = across[slab[0]] - reach, across[slab[-1]] + reach
         near, wanted, now = np.flatnonzero((across >= low) & (across <= high)), slab, reach
-        cells = _cells(points[near])
-        sure = (cells.lowest > low) & (cells.highest < high)
+        found, _, lowest, highest = _cells(points[near])
+        sure = (lowest > low) & (highest < high)
         while True:
             places = np.searchsorted(near, wanted)
             known = sure[places]
-            volumes[wanted[known]] = cells.volumes[places[known]]
+            volumes[wanted[known]] = found[places[known]]
             wanted, now = wanted[~known], 2 * now
             if not len(wanted):
                 break
             near = np.unique(np.concatenate(tree.query_ball_point(points[wanted], now)).astype(np.int64))
-            cells = _cells(points[near])
-            sure = (2 * cells.farthest < now) | (len(near) == len(points))
+            found, farthest, *_ = _cells(points[near])
+            sure = (2 * farthest < now) | (len(near) == len(points))
     return volumes
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class _Cells:
-    """Voronoi cells of points; lengths are infinite for open ones."""
-
-    volumes: Floats  #: (n,) [m³]
-    farthest: Floats  #: (n,) [m], distance of the farthest corner
-    lowest: Floats  #: (n,) [m], least x of the spheres around the corners through the point
-    highest: Floats  #: (n,) [m], greatest
-
-
-def _cells(points: Floats) -> _Cells:
+def _cells(points: Floats) -> tuple[Floats, Floats, Floats, Floats]:
     """Compute the Voronoi cells of all points.
 
-    A cell is the sum of the pyramids from its point over its faces, whose height is half the
-    distance to the neighbour.
+    A cell is the sum of the pyramids from its point over its faces, whose height is half the distance to the neighbour.
+
+    Returns:
+        Volumes (n,) [m³], distances of the farthest corner, least and greatest x of the spheres around the corners
+        through the point [m]; lengths are infinite for open cells.
     """
     diagram = Voronoi(points)
     pairs = np.asarray(diagram.ridge_points)
@@ -202,9 +195,4 @@ def _cells(points: Floats) -> _Cells:
         np.maximum.at(found, pairs.ravel(), np.repeat(of_faces, 2))
         return found
 
-    return _Cells(
-        volumes=volumes,
-        farthest=greatest(distance),
-        lowest=-greatest(distance - place),
-        highest=greatest(distance + place),
-    )
+    return volumes, greatest(distance), -greatest(distance - place), greatest(distance + place)

@@ -21,8 +21,6 @@ from dem.record.series import Series
 from postprocess.geometry.links import Floats
 from postprocess.measures.registry import PhaseMeasure, Quantity
 
-Array = Floats
-
 APART = 0.1
 """Between two samples, as in the paper's code [s]."""
 
@@ -39,7 +37,7 @@ SAMPLED_WORK = _WORK.header
 _NEAR = 1e-3  # share of the interval by which a frame may be off; frames fall on the nearest step
 
 
-def sampled_work(angles: Array, torques: Array) -> float:
+def sampled_work(angles: Floats, torques: Floats) -> float:
     """Sum τ Δα over all barbs [J], with Δα since the sample before; NaN of fewer than two samples.
 
     Args:

@@ -19,8 +19,6 @@ from dem.record.series import Series
 from postprocess.geometry.links import Floats
 from postprocess.measures.registry import PhaseMeasure, Quantity, Shown
 
-Array = Floats
-
 STRAIN = "strain"
 """Type of the phase."""
 
@@ -73,12 +71,12 @@ _TAUT = 0.3  # of the peak force: what is lost below is the jolt of the start
 class StrainTest:
     """One strain test."""
 
-    times: Array  #: (n,) [s], while the strings are tied
-    strains: Array  #: (n,) [-]
-    forces: Array  #: (n,) of the pulled string along x [N]
-    held: Array  #: (n,) of the other string, in the opposite direction [N]
-    widths: Array  #: (n,) of the chain [m]
-    walls: Array  #: (n,) the greater of the forces on the two walls, outwards [N]
+    times: Floats  #: (n,) [s], while the strings are tied
+    strains: Floats  #: (n,) [-]
+    forces: Floats  #: (n,) of the pulled string along x [N]
+    held: Floats  #: (n,) of the other string, in the opposite direction [N]
+    widths: Floats  #: (n,) of the chain [m]
+    walls: Floats  #: (n,) the greater of the forces on the two walls, outwards [N]
 
     @property
     def fracture(self) -> int:
@@ -154,14 +152,14 @@ def measured(pull: StrainTest) -> dict[str, float]:
     }
 
 
-def _mean_over(values: Array, samples: float) -> Array:
+def _mean_over(values: Floats, samples: float) -> Floats:
     """Return the moving mean over a number of samples, over fewer at the ends."""
     window = np.ones(max(1, round(samples)))
-    means: Array = np.convolve(values, window, "same") / np.convolve(np.ones_like(values), window, "same")
+    means: Floats = np.convolve(values, window, "same") / np.convolve(np.ones_like(values), window, "same")
     return means
 
 
-def first_drop(forces: Array) -> tuple[int, float]:
+def first_drop(forces: Floats) -> tuple[int, float]:
     """Find the first maximum after which a tenth of the force (n,) [N] is lost, or the greatest one.
 
     What is lost below three tenths of the peak does not count.
@@ -179,7 +177,7 @@ def first_drop(forces: Array) -> tuple[int, float]:
     return top, float(1 - forces[top:until].min() / forces[top])
 
 
-def _slopes(strains: Array, forces: Array) -> tuple[float, float]:
+def _slopes(strains: Floats, forces: Floats) -> tuple[float, float]:
     """Return the slope of force against strain [N], and that of the upper half over that of the lower [-]."""
     top = forces[-1]
     ranges = ((0.2, 0.8), (0.2, 0.5), (0.5, 0.8))
