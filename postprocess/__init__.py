@@ -1,34 +1,19 @@
 """Frames and series in; measures, tables, figures and pictures out.
 
-Readers take a run directory (see docs/reference/files.md); measures are pure functions of NumPy arrays and
-return frozen results. Lengths are in metres, times in seconds. `heights`,
-`entanglement` and `linking` are functions of the modules of the same name and are imported from there.
+Readers take a run directory (see docs/reference/files.md); measures are pure functions of NumPy arrays and return
+frozen results. Lengths are in metres, times in seconds. Vertices are (N, 4, 3) [m]: barb tip, hinge, hinge, barb tip of
+each smarticle; others are rejected with `InputError`. `heights`, `entanglement` and `linking` are functions of the
+modules of these names and are imported from there.
 """
 
-from dem.record.document import Phase
 from dem.record.forces import RecordedForces, read_forces
 from dem.record.frame import Frame, read_frame
 from dem.record.frames import FrameSequence, read_frames
 from dem.record.run import Run, open_run
 from dem.record.series import Series, read_series
-from postprocess.errors import UndefinedMeasureError
-from postprocess.geometry.links import centres_of_mass
-from postprocess.measures.contacts import (
-    ContactPairs,
-    contact_pairs,
-    neighbours_in_contact,
-    pairs_in_contact,
-    touching_pairs,
-)
-from postprocess.measures.entanglement import (
-    CrossingPairs,
-    Entanglement,
-    LinkedPairs,
-    crossing_pairs,
-    has_plane,
-    link_crossings,
-    linking_pairs,
-)
+from postprocess.geometry.links import UndefinedMeasureError, centres_of_mass
+from postprocess.measures.contacts import ContactPairs, contact_pairs, pairs_in_contact, touching_pairs
+from postprocess.measures.entanglement import CrossingPairs, crossing_pairs, has_plane, link_crossings
 from postprocess.measures.force_chains import (
     ForceDistribution,
     force_chains,
@@ -36,32 +21,27 @@ from postprocess.measures.force_chains import (
     force_participation,
     strong_contacts,
 )
-from postprocess.measures.heights import Heights, material_height
-from postprocess.measures.linking import Linking, gauss_integral
+from postprocess.measures.heights import material_height
+from postprocess.measures.linking import gauss_integral
 from postprocess.measures.nematic import NematicOrder, nematic_order
 from postprocess.measures.packing import DEFINITIONS, PackingFraction, packing_fraction
 from postprocess.measures.profile import PackingProfile, packing_profile, profile_table
 from postprocess.measures.table import PackingChange, measure_run, packing_change, summarise_run
 from postprocess.report.tables import write_table
-from postprocess.statistics.averages import Mean, mean_with_error
+from postprocess.statistics.seeds import Mean, mean_with_error
 
 __all__ = [
     "DEFINITIONS",
     "ContactPairs",
     "CrossingPairs",
-    "Entanglement",
     "ForceDistribution",
     "Frame",
     "FrameSequence",
-    "Heights",
-    "LinkedPairs",
-    "Linking",
     "Mean",
     "NematicOrder",
     "PackingChange",
     "PackingFraction",
     "PackingProfile",
-    "Phase",
     "RecordedForces",
     "Run",
     "Series",
@@ -75,11 +55,9 @@ __all__ = [
     "gauss_integral",
     "has_plane",
     "link_crossings",
-    "linking_pairs",
     "material_height",
     "mean_with_error",
     "measure_run",
-    "neighbours_in_contact",
     "nematic_order",
     "open_run",
     "packing_change",

@@ -123,7 +123,7 @@ def _table(directory: Path, values: Mapping[str, Any], *, frames: bool, costly: 
 
 
 def grouped(table: pd.DataFrame, by: Sequence[str]) -> pd.DataFrame:
-    """Return means over runs, one row per group and phase; see `postprocess.statistics.groups.means_by`.
+    """Return means over runs, one row per group and phase; see `postprocess.statistics.points.means_by`.
 
     Args:
         table: of `measured`, one row per run and phase.
@@ -132,7 +132,7 @@ def grouped(table: pd.DataFrame, by: Sequence[str]) -> pd.DataFrame:
     Raises:
         InputError: there is no such column.
     """
-    from postprocess.statistics.groups import means_by  # noqa: PLC0415
+    from postprocess.statistics.points import means_by  # noqa: PLC0415
 
     for name in by:
         if name not in table.columns:

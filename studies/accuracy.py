@@ -27,8 +27,7 @@ from dem.setting.fidelity import Fidelity, fidelities
 from postprocess.measures.packing import DEFINITIONS
 from postprocess.measures.pull import PULL, has_pull, peak, read_pull, weight_of_one
 from postprocess.measures.table import LAST_FRAMES, summarise_run
-from postprocess.statistics.columns import ASPECT, SEED, SEEDS
-from postprocess.statistics.points import marked, seeds_of, told_number
+from postprocess.statistics.points import ASPECT, SEED, SEEDS, marked, seeds_of, told_number
 from postprocess.statistics.seeds import Scatter, mean_over_seeds, pooled_scatter, relative_difference
 from studies.framework.figures import POOLED, Means, one_by_one
 from studies.framework.findings import Finding, Outcome, Verdict, decide

@@ -17,7 +17,7 @@ from dem.record.run import Run
 from postprocess.geometry.outline import BALL
 from postprocess.measures.heights import heights
 from postprocess.measures.mould import cast, read_tiers
-from postprocess.statistics.columns import SEED
+from postprocess.statistics.points import SEED
 from postprocess.statistics.seeds import mean_over_seeds
 from studies.framework.figures import PROCEDURE_LABELS, Rows, by_procedure
 from studies.framework.findings import Effect, Finding, Outcome, above, mean, means_by

@@ -32,8 +32,7 @@ from postprocess.measures.strain import (
     read_strain_test,
 )
 from postprocess.measures.strain import QUANTITIES as MEANINGS
-from postprocess.statistics.columns import SEED, SEEDS
-from postprocess.statistics.points import averaged
+from postprocess.statistics.points import SEED, SEEDS, averaged
 from postprocess.statistics.seeds import SeedMean, mean_over_seeds, slope_within
 from studies.framework import figures
 from studies.framework.figures import Histories, History, Means, one_by_one

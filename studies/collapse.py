@@ -32,8 +32,7 @@ from postprocess.measures.collapse import (
     height_with_the_wall,
     vibration,
 )
-from postprocess.statistics.columns import ASPECT, SEED, SEEDS
-from postprocess.statistics.points import marked, mean_columns, told_number
+from postprocess.statistics.points import ASPECT, SEED, SEEDS, marked, mean_columns, told_number
 from postprocess.statistics.seeds import SeedMean, Slope, difference, mean_over_seeds, slope_within
 from studies.framework.figures import ASPECT_LABEL, Histories, History, Means, one_by_one
 from studies.framework.findings import Effect, Finding, Outcome, Verdict, all_of, decide, within

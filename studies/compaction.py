@@ -18,8 +18,7 @@ from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
 from dem.record.run import Run
-from postprocess.statistics.columns import ASPECT, SEED
-from postprocess.statistics.points import told_number
+from postprocess.statistics.points import ASPECT, SEED, told_number
 from postprocess.statistics.seeds import mean_over_seeds
 from studies.framework.figures import Histories, one_by_one
 from studies.framework.findings import Effect, Finding

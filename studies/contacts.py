@@ -15,9 +15,7 @@ from numpy.typing import NDArray
 
 from dem.record.run import Run
 from postprocess.geometry.links import centres_of_mass
-from postprocess.statistics.columns import ASPECT, SEED, SEEDS
-from postprocess.statistics.factorial import paired_differences
-from postprocess.statistics.points import marked, mean_columns, told_number
+from postprocess.statistics.points import ASPECT, SEED, SEEDS, marked, mean_columns, paired_differences, told_number
 from postprocess.statistics.seeds import mean_over_seeds
 from studies.framework.figures import Rows, one_by_one
 from studies.framework.findings import Effect, Finding, Outcome, Verdict, decide

@@ -19,8 +19,7 @@ from dem.record.run import Run
 from postprocess.measures import strain
 from postprocess.measures.collapse import REMAINING, collapse_of, column_history, vibration
 from postprocess.measures.pull import PULL, peak, read_pull, weight_of_one
-from postprocess.statistics.columns import SEED
-from postprocess.statistics.points import mean_columns
+from postprocess.statistics.points import SEED, mean_columns
 from postprocess.statistics.seeds import difference, mean_over_seeds
 from studies.framework.figures import Means, Rows, one_by_one
 from studies.framework.findings import Finding, Outcome, Verdict, within

@@ -13,8 +13,7 @@ import pandas as pd
 
 from dem.errors import InputError
 from dem.record.run import Run
-from postprocess.statistics.columns import ASPECT, SEED
-from postprocess.statistics.factorial import paired_differences
+from postprocess.statistics.points import ASPECT, SEED, paired_differences
 from postprocess.statistics.seeds import mean_over_seeds
 from studies.framework.figures import Rows, one_by_one
 from studies.framework.findings import Effect, Finding, Outcome, means_by

@@ -22,12 +22,10 @@ from postprocess.measures.clusters import entanglement_clusters, spans_height, s
 from postprocess.measures.entanglement import entanglement
 from postprocess.measures.packing import packing_of
 from postprocess.measures.spread import escaped
-from postprocess.statistics.columns import ASPECT, SEED
 from postprocess.statistics.findings import judge, negative
-from postprocess.statistics.points import told_number
+from postprocess.statistics.points import ASPECT, SEED, told_number
 from postprocess.statistics.seeds import slope_within
-from postprocess.statistics.size_law import POWER, POWERS, SizeLaw, size_law
-from postprocess.statistics.threshold import Profile, alike, profiles
+from postprocess.statistics.size_law import POWER, POWERS, Profile, SizeLaw, alike, profiles, size_law
 from studies.framework.figures import Means, one_by_one
 from studies.framework.findings import Effect, Finding, Outcome, Verdict, decide
 from studies.framework.provenance import NOTHING

@@ -18,7 +18,7 @@ from dem.record.run import Run
 from postprocess.geometry.links import centres_of_mass
 from postprocess.measures.pull import END, FREE, PULL, WINDOW, freed, held_at, held_fast, peak, read_pull, weight_of_one
 from postprocess.measures.table import summarise_run
-from postprocess.statistics.columns import ASPECT, SEED
+from postprocess.statistics.points import ASPECT, SEED
 from studies.framework.figures import (
     ASPECT_LABEL,
     CROSSINGS_LABEL,

@@ -19,8 +19,7 @@ from numpy.typing import NDArray
 from scipy.special import stdtr, stdtrit
 
 from dem.record.run import Run
-from postprocess.statistics.columns import ASPECT, SEED, SEEDS
-from postprocess.statistics.points import marked, seeds_of, told_number
+from postprocess.statistics.points import ASPECT, SEED, SEEDS, marked, seeds_of, told_number
 from postprocess.statistics.seeds import CONFIDENCE as LEVEL
 from postprocess.statistics.seeds import Scatter, mean_over_seeds, pooled_scatter, slope_within
 from studies.framework.figures import POOLED, Histories, Means, one_by_one

@@ -16,7 +16,7 @@ import pandas as pd
 
 from dem.record.run import Run
 from postprocess.measures.packing import DEFINITIONS
-from postprocess.statistics.columns import ASPECT, SEED, SEEDS
+from postprocess.statistics.points import ASPECT, SEED, SEEDS
 from postprocess.statistics.seeds import SeedMean, mean_over_seeds
 from studies.framework.figures import (
     ASPECT_LABEL,

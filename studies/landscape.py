@@ -29,9 +29,8 @@ from postprocess.geometry.links import centres_of_mass
 from postprocess.measures.pull import PULL, WINDOW, held_fast, peak, read_pull, weight_of_one
 from postprocess.measures.table import summarise_run
 from postprocess.report import figures as style
-from postprocess.statistics.columns import ASPECT, SEED
 from postprocess.statistics.findings import judge, told
-from postprocess.statistics.points import averaged, told_number
+from postprocess.statistics.points import ASPECT, SEED, averaged, told_number
 from postprocess.statistics.ranks import (
     Floats,
     Interval,

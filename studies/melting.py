@@ -13,8 +13,7 @@ import pandas as pd
 from dem.record.run import Run
 from postprocess.measures.heights import heights
 from postprocess.measures.spread import OUTSIDE, TOUCHING, centre_of_mass, free_pile, has_toppled
-from postprocess.statistics.columns import ASPECT, SEED
-from postprocess.statistics.pairs import mean_difference, pairs
+from postprocess.statistics.points import ASPECT, SEED, mean_difference, pairs
 from postprocess.statistics.seeds import mean_over_seeds
 from studies.framework.figures import PROCEDURE_LABELS, Histories, by_procedure
 from studies.framework.findings import Effect, Finding, Outcome, Verdict, above, decide, mean, means_by

@@ -20,8 +20,7 @@ import pandas as pd
 from dem.record.run import Run
 from postprocess.measures.motors import APART
 from postprocess.measures.packing import DEFINITIONS
-from postprocess.statistics.columns import ASPECT, SEED
-from postprocess.statistics.pairs import pairs
+from postprocess.statistics.points import ASPECT, SEED, pairs
 from postprocess.statistics.seeds import CONFIDENCE, difference, mean_over_seeds, parabola, slope_within
 from studies.framework.figures import (
     ASPECT_LABEL,

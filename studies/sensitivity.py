@@ -13,8 +13,7 @@ import pandas as pd
 
 from dem.errors import InputError
 from dem.record.run import Run
-from postprocess.statistics.columns import ASPECT, SEED
-from postprocess.statistics.points import marked, seeds_of
+from postprocess.statistics.points import ASPECT, SEED, marked, seeds_of
 from postprocess.statistics.seeds import SeedMean, mean_over_seeds, relative_difference
 from studies.framework.figures import Rows
 from studies.framework.findings import Effect, Finding, Outcome, decide

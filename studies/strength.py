@@ -26,7 +26,7 @@ from postprocess.geometry.links import centres_of_mass
 from postprocess.measures.heights import heights
 from postprocess.measures.pull import PULL, WINDOW, held_at, held_fast, moving_mean, peak, read_pull, weight_of_one
 from postprocess.measures.table import summarise_run
-from postprocess.statistics.columns import ASPECT, SEED
+from postprocess.statistics.points import ASPECT, SEED
 from studies.framework.figures import CROSSINGS_LABEL, Histories, History, Means, Scatter, by_procedure
 from studies.framework.findings import Effect, Finding, Outcome, Rows, above, decide, means_by, ranks, symbol
 from studies.framework.procedures import (

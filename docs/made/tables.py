@@ -9,7 +9,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any
 
-from postprocess.report.markdown import table_lines
+from postprocess.report.tables import table_lines
 
 RESULTS = Path(__file__).resolve().parents[2] / "results"
 _WIDTH = "100"

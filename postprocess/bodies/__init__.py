@@ -1,1 +1,1 @@
-"""True bodies of a run at a time, as meshes with fields: what pictures draw, exports write, and pages show."""
+"""True bodies of a run at a time, as meshes with fields, for pictures, exports and pages."""

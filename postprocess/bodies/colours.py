@@ -7,22 +7,23 @@ import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, Literal, Self
+from typing import Any, Literal, Self
 
 import numpy as np
 from matplotlib.colors import Colormap, ListedColormap, Normalize, hsv_to_rgb, to_rgb
+from numpy.typing import NDArray
 
 from dem.errors import InputError
 from dem.record.frame import Frame
 from dem.record.run import Run
 from postprocess.bodies.fields import Field, checked_field, link_values
+from postprocess.geometry.links import Floats
 from postprocess.report import figures
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
 
 ALIASES: Mapping[str, str] = MappingProxyType({"speed": "speed_m_per_s", "height": "height_m", "id": "smarticle_id"})
 """Short names of fields."""
+
+_MOST_COUNTS = 12  # with colours of their own; larger ones share the last
 
 UNKNOWN = (201, 201, 201)
 """Where a field has no value."""
@@ -58,21 +59,13 @@ PAINTS: Mapping[str, Paint] = MappingProxyType(
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class ColourScale:
-    """Turns values of a field into colours.
+    """Turns values of a field into colours."""
 
-    Attributes:
-        kind: Of the field.
-        colours: Of the bar; None where colours only tell identity.
-        low: Value at the bar's lower end.
-        high: Value at its upper end.
-        labels: By value, what is written beside the bar.
-    """
-
-    kind: Literal["count", "value", "name"]
-    colours: Colormap | None = None
-    low: float = 0.0
-    high: float = 1.0
-    labels: Mapping[float, str] = dataclasses.field(default_factory=dict)
+    kind: Literal["count", "value", "name"]  #: Of the field
+    colours: Colormap | None = None  #: Of the bar; None where colours only show identity
+    low: float = 0.0  #: Value at the bar's lower end
+    high: float = 1.0  #: Value at its upper end
+    labels: Mapping[float, str] = dataclasses.field(default_factory=dict)  #: By value, what is written beside the bar
 
     @classmethod
     def of(cls, field: Field, bounds: Span) -> Self:
@@ -81,9 +74,12 @@ class ColourScale:
         if field.kind == "name":
             return cls(kind="name")
         if field.kind == "count":
-            counts = figures.count_colours(int(high))
-            labels = dict(zip(map(float, counts.ticks), counts.labels, strict=True))
-            return cls(kind="count", colours=counts.colours, low=-0.5, high=len(labels) - 0.5, labels=labels)
+            top = max(1, min(int(high), _MOST_COUNTS))
+            labels = {float(count): str(count) for count in range(top + 1)}
+            if int(high) > top:
+                labels[float(top)] = f"≥ {top}"
+            colours = ListedColormap(["#c9c9c9", *figures.sequence(top)])
+            return cls(kind="count", colours=colours, low=-0.5, high=top + 0.5, labels=labels)
         if not high > low:  # one smarticle, or all alike
             low, high = low - 0.5, high + 0.5
         factor = field.shown[0] if field.shown else 1.0
@@ -107,7 +103,7 @@ class ColourScale:
 
 
 def colour_field(name: str | None, run: Run) -> Field:
-    """Return the field to colour by: crossings, or of motion in a plane, which has none, the number of the smarticle.
+    """Return the field to colour by; None: crossings, or in a plane the number of the smarticle.
 
     Raises:
         InputError: It is no field, or the run has no such.
@@ -120,7 +116,7 @@ def colour_field(name: str | None, run: Run) -> Field:
     return field
 
 
-def scalars(field: Field, frame: Frame, run: Run) -> NDArray[np.float64]:
+def scalars(field: Field, frame: Frame, run: Run) -> Floats:
     """Return values (N, 3) to colour by, one per link: of a vector its length; NaN where there is none."""
     values = link_values(field, frame, run)
     if values is None:
@@ -128,7 +124,7 @@ def scalars(field: Field, frame: Frame, run: Run) -> NDArray[np.float64]:
     return np.linalg.norm(values, axis=2) if values.ndim == 3 else np.asarray(values, dtype=np.float64)
 
 
-def span(values: Iterable[NDArray[np.float64]]) -> Span:
+def span(values: Iterable[Floats]) -> Span:
     """Return the least and the greatest of all values that there are; 0 and 1 without any."""
     finite = [each[np.isfinite(each)] for each in values]
     joined = np.concatenate([np.empty(0), *finite])
@@ -136,7 +132,7 @@ def span(values: Iterable[NDArray[np.float64]]) -> Span:
 
 
 def linear(colours: NDArray[np.uint8]) -> NDArray[np.uint8]:
-    """Return sRGB colours as shares of light, 0 to 255: what glTF wants of the colours of points.
+    """Return sRGB colours as shares of light, 0 to 255, as glTF has the colours of points.
 
     Source:
         IEC 61966-2-1; glTF 2.0, section 3.9.2.

@@ -1,4 +1,4 @@
-"""True bodies of a run at a time, as meshes in metres: boxes of links, walls, floor, hooks, strings, crossings, forces.
+"""True bodies of a run at a time, as meshes in metres: links, walls, floor, hooks, strings, forces.
 
 Coordinates are those of the frames, z upwards: a container that is shaken moves. Everything is as large as in the
 simulation, but for what has no size there: a wall without a height ends above the highest smarticle, a string has no
@@ -10,28 +10,180 @@ from __future__ import annotations
 import math
 import warnings
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from itertools import pairwise
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from dem.errors import InputError, nearest
 from dem.record.forces import NO_FORCES, RecordedForces, read_forces
 from dem.record.frame import Frame
-from dem.record.run import Run
+from dem.record.run import Run, SceneData
+from dem.record.series import Series
 from postprocess.bodies.fields import Field, link_values
-from postprocess.bodies.surroundings import read_surroundings
-from postprocess.geometry.links import checked_vertices, link_lengths, plane_frames
+from postprocess.geometry.links import Floats, Vertices, Whole, checked_vertices, link_lengths, plane_frames
 from postprocess.measures.entanglement import link_passages
 from postprocess.measures.force_chains import strong_contacts
+from postprocess.measures.mould import read_tiers
 
 with warnings.catch_warnings():
     # PyVista imports pyplot: see postprocess.report.figures.
     warnings.filterwarnings("ignore", message="Unable to import Axes3D")
     import pyvista as pv
 
-if TYPE_CHECKING:
-    from numpy.typing import ArrayLike, NDArray
+
+_REMOVAL, _STRAIN, _ARRANGE = "remove-container", "strain", "arrange"
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class ChainStrings:
+    """Strings of a strain test; lengths in m."""
+
+    phase: int  #: Index of the phase while they are tied
+    start: float  #: Time at which that phase begins [s]
+    speed: float  #: Of the end that is moved [m/s]
+    from_hinge: float  #: Where on a barb they are tied, from its hinge [m]
+    #: (2, 3) the other ends at the start: at lower x, held, and at higher x, moved away along x
+    anchors: Floats = field(repr=False)
+
+    def lines(self, frame: Frame) -> Floats:
+        """Return knot and other end (2, 2, 3) of each string [m]; (0, 2, 3) while none is tied."""
+        if frame.phase != self.phase:
+            return np.empty((0, 2, 3))
+        ends = self.anchors.copy()
+        ends[1, 0] += self.speed * (frame.time - self.start)
+        return np.stack([knots(frame.vertices, self.from_hinge), ends], axis=1)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Surroundings:
+    """The rigid boundaries of a run."""
+
+    #: Radius and top of each tier of a mould, from the bottom up [m]; empty for one cylinder
+    tiers: tuple[tuple[float, float], ...] = ()
+    height: float | None = None  #: Of the cylinder's wall [m]; None: as high as the pile needs
+    #: Indices of phases that move the floor and leave the wall at rest, at z = 0
+    floor_alone: frozenset[int] = frozenset()
+    removed: int | None = None  #: Index of the phase that takes the wall away; None if none does
+    #: Start [s], end [s] and speed [m/s] of its lifting; None if it goes at once
+    lift: tuple[float, float, float] | None = None
+    strings: ChainStrings | None = field(default=None, repr=False)  #: Of a strain test; None in scenes without
+
+    @property
+    def corners(self) -> list[tuple[float, float]]:
+        """Radius and height of the corners of a mould's wall, from the floor up [m]: walls and ceilings in turn."""
+        found = [(self.tiers[0][0], 0.0), self.tiers[0]] if self.tiers else []
+        for (_, top), (radius, higher) in pairwise(self.tiers):
+            found += [(radius, top), (radius, higher)]
+        return found
+
+    def raised(self, time: float, phase: int, top: float) -> float | None:
+        """Return how far the wall has been lifted [m] at a time [s] in a phase; None once it is gone.
+
+        A wall that is lifted clear of the pile's top, at a height above the floor [m], is gone.
+        """
+        if self.removed is None or phase < self.removed:
+            return 0.0
+        if self.lift is None:
+            return None
+        start, end, speed = self.lift
+        raised = speed * (min(max(time, start), end) - start)
+        return raised if raised <= top else None
+
+
+def read_surroundings(run: Run) -> Surroundings:
+    """Read the rigid boundaries of a run from its scene and its series.
+
+    Raises:
+        InputError: `scene.yaml` or `series.h5` is damaged, or lacks what it should have.
+    """
+    scene, phases = run.scene, run.scene.get("phases", ())
+    series = run.series if run.has_series else None
+    removed = next((phase.index for phase in run.phases if phase.type == _REMOVAL), None)
+    return Surroundings(
+        tiers=tuple((tier.radius, tier.top) for tier in read_tiers(run)),
+        height=(scene.get("container") or {}).get("height_m"),
+        floor_alone=frozenset(index for index, phase in enumerate(phases) if phase.get("moves") == "floor"),
+        removed=removed,
+        lift=None if removed is None else _lift(phases[removed], _start(run, removed, series)),
+        strings=_strings(run, series) if run.manifest.planar else None,
+    )
+
+
+def _start(run: Run, index: int, series: Series | None) -> float | None:
+    """Return when a phase begins [s]; one that is not done began with the last sample before it."""
+    start = run.phases[index].start_s
+    if start is None and series is not None:
+        start = float(series.time[series["phase"] < index].max(initial=0.0))
+    return start
+
+
+def _lift(phase: SceneData, start: float | None) -> tuple[float, float, float] | None:
+    if phase.get("speed_m_per_s") is None or start is None:
+        return None
+    return start, start + phase["duration_s"], phase["speed_m_per_s"]
+
+
+def _cross(length: float, side: float, count: int, height: float) -> pv.PolyData:
+    """Return the bars of a hook's cross, evenly spaced up to a disc, as `dem.setting.hooks.Cross` has them."""
+    thick, bars = side / 2, []
+    for k in range(count):
+        place = length * ((k + 1) / (count + 1) - 0.5)
+        long = math.sqrt((length / 2) ** 2 - place**2)
+        for sides in ((-long, long, place - thick, place + thick), (place - thick, place + thick, -long, long)):
+            bars.append(pv.Box((*sides, height - thick, height + thick)))
+    return joined(bars)
+
+
+def knots(vertices: Floats, from_hinge: float) -> Floats:
+    """Return points (2, 3) on the outer barbs of a chain, at a distance [m] from their hinges.
+
+    Every second smarticle is turned by half a turn.
+
+    Source:
+        `dem.body.chain.Chain.ties`.
+    """
+    last = len(vertices) - 1
+    points = []
+    for smarticle, tip, hinge in ((0, 0, 1), (last, 0, 1) if last % 2 else (last, 3, 2)):
+        along = vertices[smarticle, tip] - vertices[smarticle, hinge]
+        points.append(vertices[smarticle, hinge] + from_hinge * along / np.linalg.norm(along))
+    return np.array(points)
+
+
+def _strings(run: Run, series: Series | None) -> ChainStrings | None:
+    """Return the strings of a run's strain test; None where there is no such phase.
+
+    They are tied to the chain as it was laid out; a chain that moved before it was pulled has them where they are to
+    within that motion.
+
+    Source:
+        `dem.body.chain.Chain`: how a chain is laid out.
+    """
+    planned = run.scene["phases"]
+    phases = {phase["type"]: phase for phase in planned}
+    if _STRAIN not in phases or _ARRANGE not in phases:
+        return None
+    strain, gap = phases[_STRAIN], phases[_ARRANGE]["gap_m"]
+    index = planned.index(strain)
+    radius, barb = run.manifest.sphere_diameter_m / 2, run.manifest.barb_length_m
+    offset = barb + gap + run.manifest.bulge_m + radius  # of the two rows of middle links
+    from_hinge = barb - radius if strain.get("tied_at") == "tip" else offset / 2
+    reach = (
+        (run.manifest.count - 1) * (run.manifest.middle_length_m - 2 * radius - gap) + run.manifest.middle_length_m
+    ) / 2
+    length = strain["string_length_m"]
+    ends = reach + np.sqrt(length**2 - (from_hinge - offset / 2) ** 2)
+    return ChainStrings(
+        phase=index,
+        start=_start(run, index, series) or 0.0,
+        speed=strain["speed_m_per_s"],
+        from_hinge=from_hinge,
+        anchors=np.array([[-ends, 0.0, 0.0], [ends, 0.0, 0.0]]),
+    )
+
 
 KINDS: Mapping[str, str] = MappingProxyType(
     {
@@ -59,12 +211,7 @@ _FACES = np.array([[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2
 
 
 def checked_kinds(wanted: Sequence[str], unwanted: Sequence[str], *, also: Sequence[str] = ()) -> tuple[str, ...]:
-    """Return the kinds to export.
-
-    Args:
-        wanted: Besides those that are exported anyway.
-        unwanted: To leave out.
-        also: What else may be left out.
+    """Return the kinds to export: usual and wanted ones without the unwanted; `also` may be unwanted too.
 
     Raises:
         InputError: An unknown kind, or nothing is left.
@@ -85,9 +232,6 @@ class Bodies:
     """The bodies of one run, frame after frame.
 
     Args:
-        run: The run.
-        kinds: Which bodies, keys of `KINDS`.
-        fields: What the smarticles carry.
         cut: Whether walls end a little above the pile, as in pictures.
 
     Raises:
@@ -116,10 +260,8 @@ class Bodies:
                 points = frame.vertices.reshape(-1, 3)
                 self._top = max(self._top, float(points[:, 2].max()) - frame.floor_z)
                 self._reach = max(self._reach, float(np.hypot(points[:, 0], points[:, 1]).max()))
-                self._span = (
-                    min(self._span[0], float(points[:, 0].min())),
-                    max(self._span[1], float(points[:, 0].max())),
-                )
+                low, high = float(points[:, 0].min()), float(points[:, 0].max())
+                self._span = min(self._span[0], low), max(self._span[1], high)
 
     def at(self, frame: Frame) -> dict[str, pv.PolyData]:
         """Return the bodies of a frame by kind, [m]; only those that there are."""
@@ -134,10 +276,10 @@ class Bodies:
             thickness_in_plane=run.manifest.thicknesses_in_plane_m,
         )
         owner = mesh.cell_data.pop("smarticle"), mesh.cell_data.pop("link")
-        for field in self._fields:
-            values = link_values(field, frame, run)
+        for each in self._fields:
+            values = link_values(each, frame, run)
             if values is not None:
-                mesh.cell_data[field.name] = values[owner]
+                mesh.cell_data[each.name] = values[owner]
         return mesh
 
     def _wall(self, frame: Frame) -> pv.PolyData | None:
@@ -181,13 +323,19 @@ class Bodies:
         return floor
 
     def _hooks(self, frame: Frame) -> pv.PolyData | None:
-        hooks = self.around.hooks
-        if hooks is None:
+        settings = self.run.scene.get("hooks")
+        if settings is None:
             return None
-        heights = [frame.floor_z + height for height in hooks.heights(frame.time)]
+        upper = settings["upper_height_m"]  # without a series it is where it started
+        if self.run.has_series:
+            series = self.run.series
+            upper = float(np.interp(frame.time, series.time, series["hook_upper_z_m"] - series["container_z_m"]))
+        side, length = settings["side_m"], settings["length_m"]
+        # Older scenes have two equal crosses.
+        lower_length, count = settings.get("lower_length_m", length), round(settings.get("lower_bars", 1))
         crosses = [
-            joined(pv.Box((*bar[:4], height + bar[4], height + bar[5])) for bar in bars)
-            for bars, height in zip(hooks.bars, heights, strict=True)
+            _cross(lower_length, side, count, frame.floor_z + settings["lower_height_m"]),
+            _cross(length, side, 1, frame.floor_z + upper),
         ]
         mesh = joined(crosses)
         mesh.cell_data["hook"] = np.repeat([0, 1], [one.n_cells for one in crosses])
@@ -241,24 +389,22 @@ class Bodies:
 
 
 def link_boxes(
-    vertices: ArrayLike, *, thickness_normal: float, thickness_in_plane: float | Sequence[float]
+    vertices: Vertices, *, thickness_normal: float, thickness_in_plane: float | Sequence[float]
 ) -> pv.PolyData:
-    """Return the links of all smarticles as one mesh of boxes.
+    """Return the links of all smarticles as one mesh of boxes [m], six quadrilaterals each.
 
     The section of a straight smarticle, or of one without barbs, is turned about its length by an angle that four
-    vertices do not tell: some angle is taken. Links without length have no box.
+    vertices do not give: some angle is taken. Links without length have no box.
 
     Args:
-        vertices: (N, 4, 3) [m], barb tip, hinge, hinge, barb tip of each smarticle.
         thickness_normal: t1, along the normal of the smarticle's plane [m].
         thickness_in_plane: t2, in the smarticle's plane [m]; of all links, or of barb 1, middle link and barb 2.
 
     Returns:
-        Six quadrilaterals and eight points per box [m]; cell data `smarticle`, the index into
-        `vertices`, and `link`, 0 to 2.
+        The mesh, with cell data `smarticle`, the index into `vertices`, and `link`, 0 to 2.
 
     Raises:
-        InputError: Bad vertices or thicknesses.
+        InputError: Bad thicknesses.
     """
     vertices = checked_vertices(vertices)
     in_plane = np.broadcast_to(thickness_in_plane, 3)
@@ -283,7 +429,7 @@ def link_boxes(
     return mesh
 
 
-def owners(mesh: pv.PolyData, frame: Frame) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+def owners(mesh: pv.PolyData, frame: Frame) -> tuple[Whole, Whole]:
     """Return places in a frame's arrays of the boxes' smarticles, and links; the mesh carries both fields."""
     owner, link = (np.asarray(mesh.cell_data[name])[::BOX_FACES] for name in ("smarticle_id", "link"))
     order = np.argsort(frame.smarticle_ids)
@@ -291,7 +437,7 @@ def owners(mesh: pv.PolyData, frame: Frame) -> tuple[NDArray[np.int64], NDArray[
 
 
 def force_lines(forces: RecordedForces) -> pv.PolyData:
-    """Return lines from centres of mass to the contacts [m]: two for each contact, one where a boundary is touched.
+    """Return lines from centres of mass to contacts [m]: two for each, one where a boundary is touched.
 
     Straight lines, each with two points of its own: a tube about a line that bends at a sharp angle is torn. Cell data
     `contact`, the place of the contact.
@@ -306,16 +452,11 @@ def force_lines(forces: RecordedForces) -> pv.PolyData:
 
 
 def solid(kind: str, mesh: pv.PolyData, run: Run, *, largest: float | None = None) -> pv.PolyData:
-    """Return a body as triangles alone.
+    """Return a body of a kind as triangles alone.
 
     Strings become tubes a fifth of a link thick, crossings arrows a third of w long, forces tubes as thick as a link at
-    most, whose thickness is in proportion to the normal force; boxes stay what they are.
-
-    Args:
-        kind: Key of `KINDS`.
-        mesh: Of `Bodies.at`.
-        run: The run.
-        largest: Normal force of the thickest tube [N]; that of this mesh if not given.
+    most, whose thickness is in proportion to the normal force; boxes stay what they are. The thickest tube is that of
+    the normal force `largest` [N], or of the mesh's largest one.
     """
     thin = min(run.manifest.thickness_in_plane_m, run.manifest.thickness_normal_m)
     if kind == "strings":

@@ -1,26 +1,41 @@
-"""Lengths, centres and planes of smarticles given by their four vertices."""
+"""Lengths, centres and planes of smarticles by their vertices, and the spheres in their place.
+
+Frames hold the centrelines alone. Where each sphere of a chain is follows from them, from the chain's rows and pitch,
+and, of several rows, from the plane of the smarticle; a straight smarticle has none, some plane through it is taken.
+"""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+import math
+from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import ArrayLike, NDArray
 from scipy.spatial import cKDTree
 
 from dem.errors import InputError
 
-if TYPE_CHECKING:
-    from numpy.typing import ArrayLike, NDArray
+Floats = NDArray[np.float64]
+Whole = NDArray[np.int64]
+Flags = NDArray[np.bool_]
+
+Vertices = ArrayLike
+"""(N, 4, 3) [m]: barb tip, hinge, hinge, barb tip of each smarticle. Functions that take them check them first, see
+`checked_vertices`."""
+
+# `dem.body.particle.HINGE_CLEARANCE` and `INWARDS`; a test compares the two places.
+_CLEARANCE, _INWARDS = 0.01, math.radians(15)
 
 
-def checked_vertices(vertices: ArrayLike) -> NDArray[np.float64]:
-    """The vertices as an array that every measure can rely on.
+class UndefinedMeasureError(InputError):
+    """The measure has no meaning for this frame, e.g. a packing fraction of one smarticle.
 
-    Args:
-        vertices: (N, 4, 3) [m], barb tip, hinge, hinge, barb tip of each smarticle.
+    Tables over whole runs show such values as NaN; every other error stops them.
+    """
 
-    Returns:
-        (N, 4, 3) float64 [m].
+
+def checked_vertices(vertices: Vertices) -> Floats:
+    """Return vertices as a float64 array (N, 4, 3) [m] that every measure can rely on.
 
     Raises:
         InputError: Wrong shape, a value that is not finite, or a smarticle without any length.
@@ -29,59 +44,42 @@ def checked_vertices(vertices: ArrayLike) -> NDArray[np.float64]:
     if array.ndim != 3 or array.shape[1:] != (4, 3):
         msg = f"vertices must be (N, 4, 3) [m]: got {array.shape}; pass frame.vertices"
         raise InputError(msg)
-    if not np.all(np.isfinite(array)):
-        bad = int(np.nonzero(~np.isfinite(array).all(axis=(1, 2)))[0][0])
-        msg = f"vertices must be finite [m]: smarticle {bad} is not; the run has blown up there"
+    finite = np.isfinite(array).all(axis=(1, 2))
+    if not finite.all():
+        msg = f"vertices must be finite [m]: smarticle {int(np.argmin(finite))} is not; the run has blown up there"
         raise InputError(msg)
-    if np.any(link_lengths(array).sum(axis=1) <= 0):
-        bad = int(np.argmin(link_lengths(array).sum(axis=1)))
-        msg = f"vertices of smarticle {bad} coincide (0 m long); leave it out"
+    lengths = link_lengths(array).sum(axis=1)
+    if np.any(lengths <= 0):
+        msg = f"vertices of smarticle {int(np.argmin(lengths))} coincide (0 m long); leave it out"
         raise InputError(msg)
     return array
 
 
-def link_lengths(vertices: NDArray[np.float64]) -> NDArray[np.float64]:
-    """(N, 3) [m], lengths of barb 1, middle link and barb 2, of (N, 4, 3) [m] vertices."""
-    lengths: NDArray[np.float64] = np.linalg.norm(np.diff(vertices, axis=1), axis=2)
+def link_lengths(vertices: Floats) -> Floats:
+    """Return lengths (N, 3) [m] of barb 1, middle link and barb 2."""
+    lengths: Floats = np.linalg.norm(np.diff(vertices, axis=1), axis=2)
     return lengths
 
 
-def centres_of_mass(vertices: ArrayLike) -> NDArray[np.float64]:
-    """Centres of mass of smarticles whose three links have the same cross-section.
-
-    Args:
-        vertices: (N, 4, 3) [m], barb tip, hinge, hinge, barb tip of each smarticle.
-
-    Returns:
-        (N, 3) [m].
-
-    Raises:
-        InputError: See `checked_vertices`.
-    """
+def centres_of_mass(vertices: Vertices) -> Floats:
+    """Return centres of mass (N, 3) [m] of smarticles whose three links have one cross-section."""
     vertices = checked_vertices(vertices)
     weights = link_lengths(vertices)[:, :, None]
     middles = (vertices[:, :-1] + vertices[:, 1:]) / 2
-    centres: NDArray[np.float64] = (weights * middles).sum(axis=1) / weights.sum(axis=1)
+    centres: Floats = (weights * middles).sum(axis=1) / weights.sum(axis=1)
     return centres
 
 
-def bounding_spheres(
-    vertices: NDArray[np.float64],
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Centres (N, 3) [m] and radii (N,) [m] of spheres that hold all four vertices of each."""
+def bounding_spheres(vertices: Floats) -> tuple[Floats, Floats]:
+    """Return centres (N, 3) [m] and radii (N,) [m] of spheres that hold all four vertices of each."""
     centres = vertices.mean(axis=1)
-    radii = np.linalg.norm(vertices - centres[:, None], axis=2).max(axis=1)
-    return centres, radii
+    return centres, np.linalg.norm(vertices - centres[:, None], axis=2).max(axis=1)
 
 
-def close_pairs(vertices: NDArray[np.float64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Pairs of smarticles whose bounding spheres overlap: only they can touch, or pass through each other.
+def close_pairs(vertices: Floats) -> tuple[Whole, Whole]:
+    """Find pairs of smarticles (P,), (P,), lower index first, whose bounding spheres overlap.
 
-    Args:
-        vertices: (N, 4, 3) [m].
-
-    Returns:
-        (P,) the lower and (P,) the higher index of each pair.
+    Only they can touch, or pass through each other.
     """
     if len(vertices) < 2:
         return np.empty(0, dtype=np.int64), np.empty(0, dtype=np.int64)
@@ -92,19 +90,14 @@ def close_pairs(vertices: NDArray[np.float64]) -> tuple[NDArray[np.int64], NDArr
     return i, j
 
 
-def swept_axes(vertices: NDArray[np.float64], diameter: float) -> NDArray[np.float64]:
-    """What a sphere is swept along where engines see a smarticle: tips pulled in by the radius, hinges as they are.
+def swept_axes(vertices: Floats, diameter: float) -> Floats:
+    """Return the lines (N, 4, 3) [m] that a sphere is swept along: tips pulled in by its radius.
 
-    Args:
-        vertices: (N, 4, 3) [m].
-        diameter: Of the sphere [m].
-
-    Returns:
-        (N, 4, 3) [m]; a barb shorter than the radius shrinks to its hinge, a smarticle without barbs is pulled in at
-        the ends of its middle link.
+    A barb shorter than the radius shrinks to its hinge; a smarticle without barbs is pulled in at the ends of its
+    middle link.
 
     Source:
-        `dem.engine.links.shape`; the sphere chains of `dem.body.particle` lie along the same axes.
+        `dem.engine.links.shape`; the sphere chains of `dem.body.particle` lie along these axes too.
     """
     axes = vertices.copy()
     lengths = link_lengths(vertices)
@@ -119,20 +112,79 @@ def swept_axes(vertices: NDArray[np.float64], diameter: float) -> NDArray[np.flo
     return axes
 
 
-def plane_frames(vertices: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Right-handed axes of the best-fitting plane of each smarticle.
+def plane_frames(vertices: Floats) -> Floats:
+    """Return right-handed axes (N, 3, 3) of each smarticle's best-fitting plane, the normal last.
 
-    The normal is the direction of least spread of the four vertices: unlike a cross product of
-    two links it is as good for every shape, and it averages over slightly bent hinges. Of a
-    straight smarticle it is some vector across it.
-
-    Args:
-        vertices: (N, 4, 3) [m].
-
-    Returns:
-        (N, 3, 3), rows: two axes in the plane and the normal.
+    The normal is the direction of least spread of the four vertices: unlike a cross product of two links it is as good
+    for every shape, and it averages over slightly bent hinges. Of a straight smarticle it is some vector across it.
     """
     _, _, axes = np.linalg.svd(vertices - vertices.mean(axis=1, keepdims=True))
     axes[np.linalg.det(axes) < 0, 2] *= -1
-    frames: NDArray[np.float64] = axes
+    frames: Floats = axes
     return frames
+
+
+@dataclass(frozen=True, kw_only=True)
+class Chain:
+    """How spheres stand for a smarticle."""
+
+    diameter: float  #: Of the spheres [m]
+    rows: int  #: Rows, or strands, side by side along the smarticle's normal
+    width: float  #: Of the rows together, along the normal [m]
+    pitch: float  #: Largest distance of neighbouring centres along a link [m]; 0: spheres are swept along the links
+    #: By how much the middle link is thicker than the barbs, to either side in the plane [m]; not of what is swept
+    bulge: float = 0.0
+
+
+def strands(vertices: Floats, chain: Chain) -> Floats:
+    """Return the lines (N, R, 4, 3) [m] that a sphere is swept along in R strands."""
+    return _side_by_side(swept_axes(vertices, chain.diameter), vertices, chain)
+
+
+def spheres(vertices: Floats, chain: Chain) -> Floats:
+    """Return the centres (N, S, 3) [m] of the spheres of smarticles.
+
+    Source:
+        `dem.body.particle`: the hinges' spheres belong to the middle link; a barb's begin a diameter and a little from
+        there, and end where the last one's surface is the tip; a thicker middle link has rows beside each other.
+    """
+    lengths = link_lengths(vertices).mean(axis=0)
+    parts = []
+    for link, (start, end) in enumerate(((1, 0), (1, 2), (2, 3))):
+        along = vertices[:, end] - vertices[:, start]
+        along = along / np.maximum(np.linalg.norm(along, axis=1, keepdims=True), 1e-300)
+        stations = _stations(float(lengths[link]), chain, middle=link == 1, barbs=bool(lengths[[0, 2]].any()))
+        points = vertices[:, start, None] + stations[:, None] * along[:, None]
+        if link == 1 and chain.bulge:
+            across = np.cross(plane_frames(vertices)[:, 2], along)[:, None]
+            count = 2 * math.ceil(chain.bulge / chain.diameter) + 1  # rows of a thicker middle link in the plane
+            parts += [points + side * across for side in np.linspace(-chain.bulge, chain.bulge, count)]
+        else:
+            parts.append(points)
+    return _side_by_side(np.concatenate(parts, axis=1), vertices, chain).reshape(len(vertices), -1, 3)
+
+
+def _side_by_side(points: Floats, vertices: Floats, chain: Chain) -> Floats:
+    """Repeat points (N, P, 3) of smarticles once per row: (N, R, P, 3)."""
+    if chain.rows == 1:
+        return points[:, None]
+    reach = (chain.width - chain.diameter) / 2
+    offsets = np.linspace(-reach, reach, chain.rows)[:, None] * plane_frames(vertices)[:, None, 2]
+    shifted: Floats = points[:, None] + offsets[:, :, None]
+    return shifted
+
+
+def _stations(length: float, chain: Chain, *, middle: bool, barbs: bool) -> Floats:
+    """Return distances of the centres along a link from its hinge [m]."""
+    if middle:
+        inset = 0.0 if barbs else chain.diameter / 2
+        start, end = inset, length - inset
+    else:
+        start, end = chain.diameter * (1 + _CLEARANCE), length - chain.diameter / 2
+        if chain.bulge:
+            start = (chain.bulge + start) / math.cos(_INWARDS)
+        if end <= 0:
+            return np.empty(0)
+        if end <= start:
+            return np.array([end])
+    return np.linspace(start, end, max(2, math.ceil((end - start) / chain.pitch - 1e-9) + 1))

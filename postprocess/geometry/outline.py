@@ -11,19 +11,14 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import ArrayLike
 from scipy.ndimage import distance_transform_edt
 
 from dem.errors import InputError
-from postprocess.errors import UndefinedMeasureError
-from postprocess.geometry.links import checked_vertices
-
-if TYPE_CHECKING:
-    from numpy.typing import ArrayLike, NDArray
-
-    from postprocess.geometry.region import Region
+from postprocess.geometry.links import Flags, Floats, UndefinedMeasureError, checked_vertices
+from postprocess.geometry.voxel import Region
 
 BALL = 0.25
 """Radius of the ball over w [-].
@@ -40,32 +35,21 @@ _MOST_VOXELS = 40_000_000
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Outlines:
-    """The regions of one or more piles on one grid of voxels above the floor.
+    """The regions of one or more piles on one grid of voxels above the floor."""
 
-    Attributes:
-        pitch: Side of a voxel [m].
-        origin: (3,) [m], centre of the first voxel, above the floor.
-        inside: (P, x, y, z) bool, which voxels belong to each pile.
-    """
+    pitch: float  #: Side of a voxel [m]
+    origin: Floats  #: (3,) [m], centre of the first voxel, above the floor
+    inside: Flags = field(repr=False)  #: (P, x, y, z) bool, which voxels belong to each pile
 
-    pitch: float
-    origin: NDArray[np.float64]
-    inside: NDArray[np.bool_] = field(repr=False)
-
-    def within(self, region: Region) -> NDArray[np.bool_]:
-        """(x, y, z) bool, which voxels have their centre in a cylinder whose heights are above the floor."""
+    def within(self, region: Region) -> Flags:
+        """Return which voxels (x, y, z) have their centre in a cylinder whose heights are above the floor."""
         x, y, z = (
             start + self.pitch * np.arange(count)
             for start, count in zip(self.origin, self.inside.shape[1:], strict=True)
         )
-        off_axis = np.hypot(x[:, None] - region.axis[0], y - region.axis[1])
-        mask: NDArray[np.bool_] = (off_axis < region.radius)[:, :, None] & ((z > region.bottom) & (z < region.top))
+        off_axis = np.hypot(x[:, None], y)
+        mask: Flags = (off_axis < region.radius)[:, :, None] & ((z > region.bottom) & (z < region.top))
         return mask
-
-    def volumes(self) -> NDArray[np.float64]:
-        """(P,) [m³]."""
-        found: NDArray[np.float64] = self.pitch**3 * self.inside.sum(axis=(1, 2, 3)).astype(float)
-        return found
 
 
 def outlines(
@@ -76,20 +60,19 @@ def outlines(
     pitch: float | None = None,
     regions: Sequence[Region] = (),
 ) -> Outlines:
-    """The regions that piles take up, all on one grid.
+    """Find the regions that piles take up, all on one grid.
+
+    A flat face is found to within half a voxel, a volume therefore to much less.
 
     Args:
-        piles: (N, 4, 3) [m] each, heights above the floor.
+        piles: Vertices of each, heights above the floor.
         thickness: Of the links, taken as round [m].
         ball: Radius of the ball [m]; see `BALL`.
         pitch: Side of a voxel [m]; a fourth of the ball's radius if not given.
         regions: What the grid must hold besides the piles.
 
-    Returns:
-        The regions. A flat face is found to within half a voxel, a volume therefore to much less.
-
     Raises:
-        InputError: Bad vertices or sizes, or piles that need more voxels than there is memory for.
+        InputError: Bad sizes, or piles that need more voxels than there is memory for.
         UndefinedMeasureError: There is no smarticle.
     """
     checked = [checked_vertices(vertices) for vertices in piles]
@@ -104,7 +87,7 @@ def outlines(
     corners = [corner for vertices in checked for corner in (vertices.min(axis=(0, 1)), vertices.max(axis=(0, 1)))]
     for region in regions:
         for sign, height in ((-1, region.bottom), (1, region.top)):
-            corners.append(np.array([*(np.array(region.axis) + sign * region.radius), height]))
+            corners.append(np.array([sign * region.radius, sign * region.radius, height]))
     # Around the piles there is room for the ball on every side.
     margin = 2 * ball + thickness + 2 * pitch
     first, last = np.min(corners, axis=0) - margin, np.max(corners, axis=0) + margin
@@ -121,10 +104,8 @@ def outlines(
     return Outlines(pitch=pitch, origin=origin, inside=np.stack(bodies)[..., floor:])
 
 
-def _closed(
-    vertices: NDArray[np.float64], axes: Sequence[NDArray[np.float64]], *, ball: float, thickness: float
-) -> NDArray[np.bool_]:
-    """Voxels, by the coordinates of their centres, that no ball covers which keeps clear of links and floor."""
+def _closed(vertices: Floats, axes: Sequence[Floats], *, ball: float, thickness: float) -> Flags:
+    """Find voxels, given by the coordinates of their centres, that no ball covers clear of links and floor."""
     first, pitch = np.array([axis[0] for axis in axes]), float(axes[0][1] - axes[0][0])
     # Where the ball's centre cannot be; the floor holds it off as links do.
     blocked = np.zeros(tuple(map(len, axes)), dtype=bool)
@@ -138,14 +119,12 @@ def _closed(
     # The nearest free voxel's centre lies beyond where freedom begins: by half a voxel behind a face along the grid, by
     # an eighth or so behind any other one, where many voxels are nearly as near.
     free_at = (distance_transform_edt(blocked) - 0.25) * pitch
-    closed: NDArray[np.bool_] = free_at > ball
+    closed: Flags = free_at > ball
     return closed
 
 
-def _near_link(
-    axes: tuple[NDArray[np.float64], ...], start: NDArray[np.float64], end: NDArray[np.float64], reach: float
-) -> NDArray[np.bool_]:
-    """Which points of a grid, given by its coordinates, lie within a distance [m] of a link's centreline."""
+def _near_link(axes: tuple[Floats, ...], start: Floats, end: Floats, reach: float) -> Flags:
+    """Find points of a grid, given by its coordinates, within a distance [m] of a link's centreline."""
     along = end - start
     square = float(along @ along)
     x, y, z = (axis - place for axis, place in zip(axes, start, strict=True))
@@ -153,5 +132,5 @@ def _near_link(
     share = np.clip(dot / square, 0, 1) if square else np.zeros_like(dot)
     apart = (x**2)[:, None, None] + (y**2)[:, None] + z**2
     # |p - s a|^2, of the foot s of the perpendicular kept on the link.
-    near: NDArray[np.bool_] = apart - 2 * share * dot + share**2 * square < reach**2
+    near: Flags = apart - 2 * share * dot + share**2 * square < reach**2
     return near

@@ -4,25 +4,23 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from itertools import chain
-from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.spatial import QhullError, Voronoi, cKDTree
 
 from dem.errors import InputError
-from postprocess.errors import UndefinedMeasureError
 from postprocess.geometry.links import (
+    Flags,
+    Floats,
+    UndefinedMeasureError,
+    Vertices,
+    Whole,
     bounding_spheres,
     centres_of_mass,
     checked_vertices,
     link_lengths,
 )
-
-if TYPE_CHECKING:
-    from numpy.typing import ArrayLike, NDArray
-
-    from postprocess.geometry.region import Region
-
+from postprocess.geometry.voxel import Region
 
 TOGETHER = 60_000
 """Most points whose cells are found at once: they take 15 kB each while they are."""
@@ -30,49 +28,33 @@ TOGETHER = 60_000
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class LocalPacking:
-    """Set-Voronoi cells of the smarticles of a pile.
+    """Set-Voronoi cells of the smarticles of a pile."""
 
-    Attributes:
-        volumes: (N,) [m³], of the cell of each smarticle; infinite or zero where it has none.
-        interior: (N,) bool, which smarticles lie in the region asked for.
-        value: Solid volume over cell volume of the interior ones together [-].
-    """
-
-    volumes: NDArray[np.float64] = field(repr=False)
-    interior: NDArray[np.bool_] = field(repr=False)
-    value: float
+    volumes: Floats = field(repr=False)  #: (N,) [m³], of the cell of each smarticle; infinite or zero where it has none
+    interior: Flags = field(repr=False)  #: (N,) bool, which smarticles lie in the region asked for
+    value: float  #: Solid volume over cell volume of the interior ones together [-]
 
 
 def local_packing(
-    vertices: ArrayLike,
-    container: Region,
-    region: Region,
-    *,
-    solid_volume: float,
-    spacing: float | None = None,
+    vertices: Vertices, container: Region, region: Region, *, solid_volume: float, spacing: float | None = None
 ) -> LocalPacking:
-    """Packing fraction of the smarticles in a region by the volume nearer to them than to others.
+    """Compute the packing fraction of smarticles in a region by the volume nearer to them than to others.
 
-    Points are sampled along the centrelines, their Voronoi cells are united per smarticle. That
-    is the set-Voronoi cell of thin links up to the spacing and up to differences of thickness,
-    which are the same for all. Images of the points mirrored in floor, wall and lid bound the
-    cells there; the wall is thereby a polygon around the circle, the lid lies at the highest
-    point of the smarticles below the container's top. Only smarticles with their centre of mass
-    in the region are counted, so that walls and lid matter little.
+    Points are sampled along the centrelines, and their Voronoi cells united per smarticle. That is the set-Voronoi cell
+    of thin links, up to the spacing and to differences of thickness. Images of the points mirrored in floor, wall and
+    lid bound the cells there; the wall is thereby a polygon around the circle, the lid lies at the highest point of the
+    smarticles below the container's top. Only smarticles with their centre of mass in the region count, so that walls
+    and lid matter little.
 
     Args:
-        vertices: (N, 4, 3) [m], barb tip, hinge, hinge, barb tip of each smarticle.
         container: The container from its floor to the pile's height.
         region: The smarticles with their centre of mass in here are counted.
         solid_volume: Volume of one smarticle [m³].
         spacing: Largest distance of points along a link [m]; w/8 if not given, which is within 0.5 % of the
             limit of close points in piles of 270.
 
-    Returns:
-        The cells and the packing fraction.
-
     Raises:
-        InputError: Bad vertices or spacing.
+        InputError: Bad spacing.
         UndefinedMeasureError: No smarticle in the region, or one of them has no closed cell.
 
     Source:
@@ -93,7 +75,7 @@ def local_packing(
     # A little higher, lest the highest point coincide with its own image.
     lid = float(below[:, :, 2].max(initial=container.top)) + spacing / 2
     points, owners = _sample(vertices, spacing)
-    x, y = (points[:, :2] - container.axis).T
+    x, y = points[:, :2].T
     # Points outside the container have no image that would bound their cells.
     kept = (np.hypot(x, y) < container.radius) & (points[:, 2] > container.bottom)
     kept &= points[:, 2] < lid
@@ -115,8 +97,8 @@ def local_packing(
     return LocalPacking(volumes=volumes, interior=interior, value=value)
 
 
-def _sample(vertices: NDArray[np.float64], spacing: float) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
-    """Points (n, 3) evenly along each link, none at a hinge, and their smarticles (n,)."""
+def _sample(vertices: Floats, spacing: float) -> tuple[Floats, Whole]:
+    """Place points (n, 3) evenly along each link, none at a hinge; return them and their smarticles (n,)."""
     # Lengths differ by rounding, which must not give one link a point more than its equals.
     cuts = np.ceil(link_lengths(vertices) / spacing - 1e-6).astype(int).ravel()
     link = np.repeat(np.arange(len(cuts)), cuts)
@@ -127,81 +109,62 @@ def _sample(vertices: NDArray[np.float64], spacing: float) -> tuple[NDArray[np.f
     return start + share[:, None] * along, link // 3
 
 
-def _mirrored(points: NDArray[np.float64], container: Region, lid: float, band: float) -> NDArray[np.float64]:
-    """Images of the points nearer than `band` to floor, lid or wall."""
+def _mirrored(points: Floats, container: Region, lid: float, band: float) -> Floats:
+    """Mirror the points nearer than `band` to floor, lid or wall."""
     floor = points[points[:, 2] < container.bottom + band] * [1, 1, -1]
     floor[:, 2] += 2 * container.bottom
     top = points[points[:, 2] > lid - band] * [1, 1, -1]
     top[:, 2] += 2 * lid
-    radial = points[:, :2] - container.axis
-    distance = np.hypot(*radial.T)
+    distance = np.hypot(*points[:, :2].T)
     # On the axis itself there is no direction to the wall.
     near = (distance > container.radius - band) & (distance > 1e-3 * container.radius)
     wall = points[near].copy()
     stretch = (2 * container.radius - distance[near]) / distance[near]
-    wall[:, :2] = radial[near] * stretch[:, None] + container.axis
+    wall[:, :2] *= stretch[:, None]
     return np.concatenate([floor, top, wall])
 
 
-def _cell_volumes(
-    points: NDArray[np.float64], count: int, *, reach: float, together: int = TOGETHER
-) -> NDArray[np.float64]:
-    """Volume (count,) of the Voronoi cells of the first points, infinite for open ones.
+def _cell_volumes(points: Floats, count: int, *, reach: float, together: int = TOGETHER) -> Floats:
+    """Compute volumes (count,) of the Voronoi cells of the first points, infinite for open ones.
 
-    Cells are found slab by slab along x, among all points within a reach of the slab. A point's cell among them is its
+    Cells are found slab by slab along x, among all points within a reach [m] of it. A point's cell among them is its
     cell among all points where the spheres around its corners through the point, in which there must be no other, do
     not go beyond. The few others are found again among all points within twice the reach of one of them, where those
     spheres lie if the reach is twice the distance of the farthest corner; and so on.
 
     Args:
         points: (n, 3) [m].
-        count: How many of them have their cells told; the others bound cells.
-        reach: The first one [m].
-        together: Most points of a slab.
+        count: Of the points whose cells are wanted; the others bound cells.
     """
     if count <= together:
-        return _cells(points).volumes[:count]
+        return _cells(points)[0][:count]
     volumes, tree, across = np.empty(count), cKDTree(points), points[:, 0]
     for slab in np.array_split(np.argsort(across[:count], kind="stable"), -(-count // together)):
         low, high = across[slab[0]] - reach, across[slab[-1]] + reach
         near, wanted, now = np.flatnonzero((across >= low) & (across <= high)), slab, reach
-        cells = _cells(points[near])
-        sure = (cells.lowest > low) & (cells.highest < high)
+        found, _, lowest, highest = _cells(points[near])
+        sure = (lowest > low) & (highest < high)
         while True:
             places = np.searchsorted(near, wanted)
             known = sure[places]
-            volumes[wanted[known]] = cells.volumes[places[known]]
+            volumes[wanted[known]] = found[places[known]]
             wanted, now = wanted[~known], 2 * now
             if not len(wanted):
                 break
             near = np.unique(np.concatenate(tree.query_ball_point(points[wanted], now)).astype(np.int64))
-            cells = _cells(points[near])
-            sure = (2 * cells.farthest < now) | (len(near) == len(points))
+            found, farthest, *_ = _cells(points[near])
+            sure = (2 * farthest < now) | (len(near) == len(points))
     return volumes
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class _Cells:
-    """Voronoi cells of points; what is told of corners is infinite for open ones.
+def _cells(points: Floats) -> tuple[Floats, Floats, Floats, Floats]:
+    """Compute the Voronoi cells of all points.
 
-    Attributes:
-        volumes: (n,) [m³].
-        farthest: (n,) [m], distance of the farthest corner.
-        lowest: (n,) [m], least x of the spheres around the corners through the point.
-        highest: (n,) [m], greatest.
-    """
+    A cell is the sum of the pyramids from its point over its faces, whose height is half the distance to the neighbour.
 
-    volumes: NDArray[np.float64]
-    farthest: NDArray[np.float64]
-    lowest: NDArray[np.float64]
-    highest: NDArray[np.float64]
-
-
-def _cells(points: NDArray[np.float64]) -> _Cells:
-    """Voronoi cells of all points.
-
-    A cell is the sum of the pyramids from its point over its faces, whose height is half the
-    distance to the neighbour.
+    Returns:
+        Volumes (n,) [m³], distances of the farthest corner, least and greatest x of the spheres around the corners
+        through the point [m]; lengths are infinite for open cells.
     """
     diagram = Voronoi(points)
     pairs = np.asarray(diagram.ridge_points)
@@ -226,15 +189,10 @@ def _cells(points: NDArray[np.float64]) -> _Cells:
     distance = np.linalg.norm(diagram.vertices[corners] - np.repeat(points[pairs[:, 0]], sizes, axis=0), axis=1)
     place = diagram.vertices[corners, 0]
 
-    def greatest(of_corners: NDArray[np.float64]) -> NDArray[np.float64]:
+    def greatest(of_corners: Floats) -> Floats:
         of_faces = np.where(open_faces, np.inf, np.maximum.reduceat(of_corners, starts))
         found = np.full(len(points), -np.inf)
         np.maximum.at(found, pairs.ravel(), np.repeat(of_faces, 2))
         return found
 
-    return _Cells(
-        volumes=volumes,
-        farthest=greatest(distance),
-        lowest=-greatest(distance - place),
-        highest=greatest(distance + place),
-    )
+    return volumes, greatest(distance), -greatest(distance - place), greatest(distance + place)

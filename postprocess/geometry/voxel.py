@@ -1,57 +1,76 @@
-"""What the true boxes of the links fill: points of a fine grid inside them, and the share of a region."""
+"""Upright cylinders, and points of a fine grid inside the true boxes of the links."""
 
 from __future__ import annotations
 
+import math
+from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from dem.errors import InputError
-from postprocess.errors import UndefinedMeasureError
-from postprocess.geometry.links import checked_vertices, link_lengths, plane_frames
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
-
-    from numpy.typing import ArrayLike, NDArray
-
-    from postprocess.geometry.region import Region
+from postprocess.geometry.links import (
+    Flags,
+    Floats,
+    UndefinedMeasureError,
+    Vertices,
+    Whole,
+    checked_vertices,
+    link_lengths,
+    plane_frames,
+)
 
 # Point tests held in memory at a time.
 _CHUNK = 1_000_000
+# A fixed rotation by no simple angle about no simple axis: boxes in line with x, y, z meet the grid as all others do.
+_TURN = Rotation.from_quat([2**0.5 - 1, 3**0.5 - 1, 5**0.5 - 2, 1.0]).as_matrix()
+
+
+@dataclass(frozen=True, kw_only=True)
+class Region:
+    """An upright cylinder about x = y = 0: its radius, and the heights of its lower and its upper end [m]."""
+
+    radius: float
+    bottom: float
+    top: float
+
+    @property
+    def volume(self) -> float:
+        """[m³]."""
+        return math.pi * self.radius**2 * (self.top - self.bottom)
+
+    @property
+    def inner(self) -> Region:
+        """The part, 0.75 r and 20 % to 80 % of the height, that stays clear of wall, floor and free surface."""
+        height = self.top - self.bottom
+        return Region(radius=0.75 * self.radius, bottom=self.bottom + 0.2 * height, top=self.bottom + 0.8 * height)
+
+    def contains(self, points: Floats) -> Flags:
+        """Find which of (n, 3) points [m] lie inside."""
+        x, y, z = points.T
+        inside: Flags = (x**2 + y**2 < self.radius**2) & (z > self.bottom) & (z < self.top)
+        return inside
 
 
 def solid_fraction(
-    vertices: ArrayLike,
+    vertices: Vertices,
     region: Region,
     *,
     thickness_normal: float,
     thickness_in_plane: float,
     pitch: float | None = None,
 ) -> float:
-    """Share of the region's volume that lies inside a link's box.
+    """Return the share of a region inside a link's box, above 0; arguments as `solid_points`.
 
-    A cubic grid of points is laid over the region, turned by a fixed odd angle so that boxes in
-    line with x, y, z meet it as fairly as all others; each point is tested against the boxes. A
-    point in two boxes counts once. Links of one smarticle overlap at the hinges, so a U reads
-    lower than t1 t2 (w + 2l) by t2 / (2 (w + 2l)), about 1 % for the usual sizes.
+    A point in two boxes counts once. Links of one smarticle overlap at the hinges, so a U reads lower than
+    t1 t2 (w + 2l) by t2 / (2 (w + 2l)), about 1 % for the usual sizes.
 
-    The section of a straight smarticle is turned about its length by an unknown angle, which four
-    vertices do not tell: some angle is taken.
-
-    Args:
-        vertices: (N, 4, 3) [m], barb tip, hinge, hinge, barb tip of each smarticle.
-        region: Where to look.
-        thickness_normal: t1, along the normal of the smarticle's plane [m].
-        thickness_in_plane: t2, in the smarticle's plane [m].
-        pitch: Spacing of the points [m]; half the smaller thickness if not given.
-
-    Returns:
-        The solid fraction [-], above 0.
+    The section of a straight smarticle is turned about its length by an angle that four vertices do not give: some
+    angle is taken.
 
     Raises:
-        InputError: Bad vertices or sizes.
+        InputError: Bad sizes.
         UndefinedMeasureError: No material in the region.
     """
     points, pitch = solid_points(
@@ -68,27 +87,23 @@ def solid_fraction(
 
 
 def solid_points(
-    vertices: ArrayLike,
+    vertices: Vertices,
     *,
     thickness_normal: float,
     thickness_in_plane: float,
     pitch: float | None = None,
     region: Region | None = None,
-) -> tuple[NDArray[np.float64], float]:
-    """Points of a cubic grid that lie inside a link's box, each once; a point stands for the cube of the pitch.
+) -> tuple[Floats, float]:
+    """Return points (n, 3) [m] of a cubic grid inside a link's box, each once, and their pitch [m].
 
     Args:
-        vertices: (N, 4, 3) [m], barb tip, hinge, hinge, barb tip of each smarticle.
         thickness_normal: t1, along the normal of the smarticle's plane [m].
         thickness_in_plane: t2, in the smarticle's plane [m].
-        pitch: Spacing of the points [m]; half the smaller thickness if not given.
+        pitch: Spacing of the points [m]; half the smaller thickness if not given. A point stands for its cube.
         region: Only points inside it; all if not given.
 
-    Returns:
-        The points (n, 3) [m], and their pitch [m].
-
     Raises:
-        InputError: Bad vertices or sizes.
+        InputError: Bad sizes.
     """
     vertices = checked_vertices(vertices)
     sizes = (thickness_normal, thickness_in_plane)
@@ -99,104 +114,63 @@ def solid_points(
             f"got t1 {sizes[0]} m, t2 {sizes[1]} m, pitch {pitch} m"
         )
         raise InputError(msg)
-    turn = _odd_rotation()
-    pieces = _Pieces.cut(vertices, thickness_normal, thickness_in_plane)
-    if region is not None:
-        pieces = pieces.near(region)
     found = [np.empty((0, 3), dtype=np.int64)]
-    for indices in pieces.grid_points(turn, pitch):
-        found.append(indices if region is None else indices[region.contains(pitch * indices @ turn)])
-    return pitch * _distinct(np.concatenate(found)) @ turn, pitch
+    for indices in _grid_points(vertices, thickness_normal, thickness_in_plane, pitch, region):
+        found.append(indices if region is None else indices[region.contains(pitch * indices @ _TURN)])
+    return pitch * _distinct(np.concatenate(found)) @ _TURN, pitch
 
 
-@dataclass(frozen=True)
-class _Pieces:
-    """The links' boxes cut into short pieces, so that few grid points lie around each.
+def _grid_points(
+    vertices: Floats, normal: float, in_plane: float, pitch: float, region: Region | None
+) -> Iterator[Whole]:
+    """Yield indices (n, 3) of the turned grid's points inside the links' boxes, some of them repeated.
 
-    Attributes:
-        centres: (P, 3) [m].
-        axes: (P, 3, 3), rows: along the link, in the plane across it, along the plane's normal.
-        halves: (P, 3) [m], half the size along each axis.
-        reach: Radius of a sphere that holds any of the pieces [m].
+    Boxes are cut into pieces about as long as thick, so that few grid points lie around each.
     """
-
-    centres: NDArray[np.float64]
-    axes: NDArray[np.float64]
-    halves: NDArray[np.float64]
-    reach: float
-
-    @classmethod
-    def cut(cls, vertices: NDArray[np.float64], normal: float, in_plane: float) -> _Pieces:
-        """Cuts the links of (N, 4, 3) [m] vertices into pieces about as long as thick."""
-        lengths = link_lengths(vertices)
-        # A link of no length (l = 0) has no direction; it yields no piece either.
-        along = np.diff(vertices, axis=1) / np.maximum(lengths, 1e-300)[..., None]
-        across = np.cross(plane_frames(vertices)[:, None, 2], along)
-        across /= np.maximum(np.linalg.norm(across, axis=2), 1e-300)[..., None]
-        axes = np.stack([along, across, np.cross(along, across)], axis=-2).reshape(-1, 3, 3)
-        cuts = np.ceil(lengths / max(normal, in_plane)).astype(int).ravel()
-        link = np.repeat(np.arange(len(cuts)), cuts)
-        step = np.arange(len(link)) - np.repeat(np.cumsum(cuts) - cuts, cuts)
-        share = (step + 0.5) / cuts[link]
-        start = vertices[:, :-1].reshape(-1, 3)[link]
-        end = vertices[:, 1:].reshape(-1, 3)[link]
-        section = np.broadcast_to([in_plane / 2, normal / 2], (len(link), 2))
-        halves = np.column_stack([lengths.ravel()[link] / cuts[link] / 2, section])
-        return cls(
-            centres=start + share[:, None] * (end - start),
-            axes=axes[link],
-            halves=halves,
-            reach=float(np.linalg.norm(halves, axis=1).max(initial=0.0)),
-        )
-
-    def near(self, region: Region) -> _Pieces:
-        """The pieces that may reach into the region."""
-        x, y, z = (self.centres - [*region.axis, 0.0]).T
-        keep = np.hypot(x, y) < region.radius + self.reach
-        keep &= (z > region.bottom - self.reach) & (z < region.top + self.reach)
-        return _Pieces(self.centres[keep], self.axes[keep], self.halves[keep], self.reach)
-
-    def grid_points(self, turn: NDArray[np.float64], pitch: float) -> Iterator[NDArray[np.int64]]:
-        """Indices (n, 3) of the turned grid's points inside the pieces, some of them repeated."""
-        centres = self.centres @ turn.T
-        axes = self.axes @ turn.T
-        first = np.ceil((centres - self.reach) / pitch).astype(np.int64)
-        steps = np.arange(int(np.ceil(2 * self.reach / pitch)) + 1)
-        size = max(1, _CHUNK // len(steps) ** 3)
-        for start in range(0, len(centres), size):
-            part = slice(start, start + size)
-            # (p, 3, n): coordinates of the grid's planes around each piece.
-            planes = pitch * (first[part, :, None] + steps) - centres[part, :, None]
-            inside = np.ones((len(planes), *[len(steps)] * 3), dtype=bool)
-            for axis, half in zip(axes[part].swapaxes(0, 1), self.halves[part].T, strict=True):
-                # A dot product with the axis, as a sum over the planes' own contributions.
-                x, y, z = (axis[:, :, None] * planes).swapaxes(0, 1)
-                local = (x[:, :, None] + y[:, None, :])[..., None] + z[:, None, None, :]
-                inside &= np.abs(local) <= half[:, None, None, None]
-            piece, *offset = np.nonzero(inside)
-            yield first[part][piece] + np.stack(offset, axis=1)
+    lengths = link_lengths(vertices)
+    # A link of no length (l = 0) has no direction; it yields no piece either.
+    along = np.diff(vertices, axis=1) / np.maximum(lengths, 1e-300)[..., None]
+    across = np.cross(plane_frames(vertices)[:, None, 2], along)
+    across /= np.maximum(np.linalg.norm(across, axis=2), 1e-300)[..., None]
+    cuts = np.ceil(lengths / max(normal, in_plane)).astype(int).ravel()
+    link = np.repeat(np.arange(len(cuts)), cuts)
+    step = np.arange(len(link)) - np.repeat(np.cumsum(cuts) - cuts, cuts)
+    start, end = vertices[:, :-1].reshape(-1, 3)[link], vertices[:, 1:].reshape(-1, 3)[link]
+    centres = start + ((step + 0.5) / cuts[link])[:, None] * (end - start)
+    axes = np.stack([along, across, np.cross(along, across)], axis=-2).reshape(-1, 3, 3)[link]
+    section = np.broadcast_to([in_plane / 2, normal / 2], (len(link), 2))
+    halves = np.column_stack([lengths.ravel()[link] / cuts[link] / 2, section])
+    reach = float(np.linalg.norm(halves, axis=1).max(initial=0.0))
+    if region is not None:  # the pieces that may reach into it
+        x, y, z = centres.T
+        keep = np.hypot(x, y) < region.radius + reach
+        keep &= (z > region.bottom - reach) & (z < region.top + reach)
+        centres, axes, halves = centres[keep], axes[keep], halves[keep]
+    centres, axes = centres @ _TURN.T, axes @ _TURN.T
+    first = np.ceil((centres - reach) / pitch).astype(np.int64)
+    steps = np.arange(int(np.ceil(2 * reach / pitch)) + 1)
+    size = max(1, _CHUNK // len(steps) ** 3)
+    for begin in range(0, len(centres), size):
+        part = slice(begin, begin + size)
+        # (p, 3, n): coordinates of the grid's planes around each piece.
+        planes = pitch * (first[part, :, None] + steps) - centres[part, :, None]
+        inside = np.ones((len(planes), *[len(steps)] * 3), dtype=bool)
+        for axis, half in zip(axes[part].swapaxes(0, 1), halves[part].T, strict=True):
+            # A dot product with the axis, as a sum over the planes' own contributions.
+            x, y, z = (axis[:, :, None] * planes).swapaxes(0, 1)
+            local = (x[:, :, None] + y[:, None, :])[..., None] + z[:, None, None, :]
+            inside &= np.abs(local) <= half[:, None, None, None]
+        piece, *offset = np.nonzero(inside)
+        yield first[part][piece] + np.stack(offset, axis=1)
 
 
-def _odd_rotation() -> NDArray[np.float64]:
-    """A fixed rotation (3, 3) by no simple angle about no simple axis."""
-    quaternion = np.array([1.0, 2**0.5 - 1, 3**0.5 - 1, 5**0.5 - 2])
-    w, x, y, z = quaternion / np.linalg.norm(quaternion)
-    return np.array(
-        [
-            [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
-            [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
-            [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
-        ]
-    )
-
-
-def _distinct(indices: NDArray[np.int64]) -> NDArray[np.int64]:
-    """(m, 3), each of (n, 3) indices once."""
+def _distinct(indices: Whole) -> Whole:
+    """Return each of (n, 3) indices once."""
     if len(indices) == 0:
         return indices
     # One number per grid point sorts much faster than rows of three.
     low = indices.min(axis=0)
     shape = tuple(indices.max(axis=0) - low + 1)
     keys = np.unique(np.ravel_multi_index(tuple((indices - low).T), shape))
-    distinct: NDArray[np.int64] = np.stack(np.unravel_index(keys, shape), axis=1) + low
+    distinct: Whole = np.stack(np.unravel_index(keys, shape), axis=1) + low
     return distinct

@@ -1,5 +1,4 @@
-"""Pure functions of frames and series: what they tell, and the tables of it.
+"""Measures of frames and series, and tables of them; one file each, registered by its tuple `MEASURES`.
 
-On `dem.record` and `postprocess.statistics` alone: measures know nothing of reports and
-pictures. A measure is one file with one registration, see `postprocess.measures.registry`.
+They know nothing of reports and pictures.
 """

@@ -1,10 +1,9 @@
-"""Which smarticles hang together: connected parts of the graphs of contact and of entanglement, and what they span."""
+"""Find which smarticles hang together, by contact or by crossings, and what they span."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.sparse import coo_array
@@ -12,28 +11,19 @@ from scipy.sparse.csgraph import connected_components
 
 from dem.record.frame import Frame
 from dem.record.run import Run
-from postprocess.errors import UndefinedMeasureError
-from postprocess.geometry.links import checked_vertices
-from postprocess.measures.contacts import at_wall, contact_pairs, on_floor, pairs_in_contact, touching_pairs
+from postprocess.geometry.links import UndefinedMeasureError, Vertices, Whole, checked_vertices
+from postprocess.measures.contacts import at_wall, contact_pairs, on_floor, pairs_in_contact
 from postprocess.measures.entanglement import crossing_pairs
 from postprocess.measures.heights import material_height
 from postprocess.measures.registry import FrameMeasure, Quantity
 
-if TYPE_CHECKING:
-    from numpy.typing import ArrayLike, NDArray
-
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Clusters:
-    """Connected parts of a graph whose nodes are the smarticles of a frame.
+    """Connected parts of a graph whose nodes are the smarticles of a frame."""
 
-    Attributes:
-        labels: (N,) int64, number of each smarticle's cluster, 0 for the largest one.
-        sizes: (C,) int64, smarticles of each cluster, descending.
-    """
-
-    labels: NDArray[np.int64] = field(repr=False)
-    sizes: NDArray[np.int64]
+    labels: Whole = field(repr=False)  #: (N,) int64, number of each smarticle's cluster, 0 for the largest one
+    sizes: Whole  #: (C,) int64, smarticles of each cluster, descending
 
     @property
     def largest(self) -> float:
@@ -41,83 +31,46 @@ class Clusters:
         return float(self.sizes[0] / len(self.labels))
 
 
-def contact_clusters(vertices: ArrayLike, distance: float) -> Clusters:
-    """Smarticles joined by contact, directly or through others.
-
-    Args:
-        vertices: (N, 4, 3) [m], barb tip, hinge, hinge, barb tip of each smarticle.
-        distance: Distance of centrelines up to which two smarticles touch [m], see `contacts.contact_pairs`.
-
-    Returns:
-        The clusters.
+def contact_clusters(vertices: Vertices, distance: float) -> Clusters:
+    """Join smarticles whose centrelines come as close as a distance [m], see `contacts.contact_pairs`.
 
     Raises:
-        InputError: Bad vertices or distance.
+        InputError: Bad distance.
         UndefinedMeasureError: There is no smarticle.
     """
     pairs = contact_pairs(vertices, distance)
     return joined_clusters(len(checked_vertices(vertices)), pairs.i, pairs.j)
 
 
-def entanglement_clusters(vertices: ArrayLike) -> Clusters:
-    """Smarticles joined by entanglement: a link of one passes through the plane of the other, whichever it is.
-
-    Args:
-        vertices: (N, 4, 3) [m], barb tip, hinge, hinge, barb tip of each smarticle.
-
-    Returns:
-        The clusters.
+def entanglement_clusters(vertices: Vertices) -> Clusters:
+    """Join smarticles of which a link of one passes through the plane of the other.
 
     Raises:
-        InputError: Bad vertices.
         UndefinedMeasureError: There is no smarticle.
     """
     pairs = crossing_pairs(vertices)
     return joined_clusters(len(checked_vertices(vertices)), pairs.i, pairs.j)
 
 
-def touching_clusters(vertices: ArrayLike, diameter: float) -> Clusters:
-    """Smarticles joined by contact where each is what a sphere sweeps along its links, see `contacts.touching_pairs`.
-
-    Args:
-        vertices: (N, 4, 3) [m], barb tip, hinge, hinge, barb tip of each smarticle.
-        diameter: Of the sphere that sweeps the links [m], `Run.sphere_diameter`.
-
-    Returns:
-        The clusters.
-
-    Raises:
-        InputError: Bad vertices or diameter.
-        UndefinedMeasureError: There is no smarticle.
-    """
-    pairs = touching_pairs(vertices, diameter)
-    return joined_clusters(len(checked_vertices(vertices)), pairs.i, pairs.j)
-
-
 def contact_graph(frame: Frame, run: Run) -> Clusters:
-    """Smarticles joined by contact by the shapes that the run's engine gave them, see `contacts.pairs_in_contact`.
+    """Join smarticles that touch by their shapes in the run's engine, see `contacts.pairs_in_contact`.
 
     Raises:
-        InputError: Bad vertices, or the scene of the run cannot be read.
+        InputError: The scene of the run cannot be read.
         UndefinedMeasureError: There is no smarticle.
     """
     pairs = pairs_in_contact(frame, run)
     return joined_clusters(frame.count, pairs.i, pairs.j)
 
 
-def spans_height(clusters: Clusters, vertices: ArrayLike, *, diameter: float, floor_z: float) -> bool:
+def spans_height(clusters: Clusters, vertices: Vertices, *, diameter: float, floor_z: float) -> bool:
     """Whether one cluster reaches from the floor to the top of the pile.
 
     The top is where 95 % of the links' material lie below; alone on top there may be one smarticle.
 
     Args:
-        clusters: Of the smarticles of a frame.
-        vertices: (N, 4, 3) [m], barb tip, hinge, hinge, barb tip of each smarticle.
         diameter: Of the sphere that sweeps the links [m].
         floor_z: Height of the floor [m].
-
-    Raises:
-        InputError: Bad vertices.
 
     Source:
         Stauffer & Aharony, Introduction to Percolation Theory (1994), section 2: a cluster percolates if it joins
@@ -130,20 +83,14 @@ def spans_height(clusters: Clusters, vertices: ArrayLike, *, diameter: float, fl
     return bool(np.isin(low, high).any())
 
 
-def spans_width(clusters: Clusters, vertices: ArrayLike, *, diameter: float, wall_radius: float) -> bool:
-    """Whether one cluster reaches from wall to wall: no half of the round wall has all its contacts with the wall.
+def spans_width(clusters: Clusters, vertices: Vertices, *, diameter: float, wall_radius: float) -> bool:
+    """Whether one cluster reaches from wall to wall: no half of the wall has all its contacts with it.
+
+    A round wall has no opposite faces, and what touches it on one side alone is not wedged.
 
     Args:
-        clusters: Of the smarticles of a frame.
-        vertices: (N, 4, 3) [m], barb tip, hinge, hinge, barb tip of each smarticle.
         diameter: Of the sphere that sweeps the links [m].
         wall_radius: Of the wall about the axis x = y = 0 [m].
-
-    Raises:
-        InputError: Bad vertices.
-
-    Source:
-        As `spans_height`; a round wall has no opposite faces, and what touches it on one side alone is not wedged.
     """
     vertices = checked_vertices(vertices)
     smarticle, vertex = np.nonzero(at_wall(vertices, diameter=diameter, wall_radius=wall_radius))
@@ -155,8 +102,8 @@ def spans_width(clusters: Clusters, vertices: ArrayLike, *, diameter: float, wal
     return False
 
 
-def joined_clusters(count: int, i: NDArray[np.int64], j: NDArray[np.int64]) -> Clusters:
-    """Clusters of so many smarticles of which some are joined, the i-th with the j-th.
+def joined_clusters(count: int, i: Whole, j: Whole) -> Clusters:
+    """Join smarticles, of which there are `count`, the i-th with the j-th.
 
     Raises:
         UndefinedMeasureError: There is no smarticle.
@@ -196,7 +143,7 @@ MEASURES = tuple(
             Quantity(f"{name} graph spans width", "-"),
         ),
         take=take,
-        told_of=_in_one_cylinder,
+        available_for=_in_one_cylinder,
         costly=True,
     )
     for name, take in (

@@ -1,4 +1,4 @@
-"""Measure how a free-standing column collapses on a vibrating floor: its height against time, and the time it takes.
+"""Measure how a free-standing column collapses on a vibrating floor: height against time, and τ.
 
 A column on a floor without end loses height in two ways: it sinks, and smarticles leave it. On a floor that shakes with
 several g, those that have left hop millimetres high, as high as a low column, so heights of all smarticles, or of the
@@ -11,20 +11,17 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, Literal
+from typing import Any, Literal
 
 import numpy as np
+from numpy.typing import ArrayLike
 from scipy.optimize import least_squares
 
 from dem.errors import InputError
-from postprocess.geometry.links import centres_of_mass
-from postprocess.statistics.averages import mean_with_error
-
-if TYPE_CHECKING:
-    from numpy.typing import ArrayLike, NDArray
-
-    from dem.record.document import Phase
-    from dem.record.run import Run
+from dem.record.document import Phase
+from dem.record.run import Run
+from postprocess.geometry.links import Floats, centres_of_mass
+from postprocess.statistics.seeds import mean_with_error
 
 REMAINING, COM, CORE = "remaining", "com", "core"
 
@@ -59,13 +56,7 @@ _LONGEST = 1e4  # τ over the time watched: beyond it a curve is flat, whatever 
 
 @dataclass(frozen=True, kw_only=True)
 class Vibration:
-    """The phase in which a free-standing column is shaken.
-
-    Attributes:
-        phase: Its record.
-        acceleration: Γ, peak acceleration over g [-].
-        frequency: f [Hz].
-    """
+    """The phase that shakes a free-standing column: peak acceleration over g [-], frequency [Hz]."""
 
     phase: Phase
     acceleration: float
@@ -74,17 +65,11 @@ class Vibration:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class ColumnHistory:
-    """Heights of one column against time.
+    """Heights of one column against time."""
 
-    Attributes:
-        times: (n,) since the vibration began [s], some of them before.
-        heights: (n,) over the mean height in the last `REST` before [-].
-        before: That height: [m], or a share of the smarticles by `REMAINING` [-].
-    """
-
-    times: NDArray[np.float64]
-    heights: NDArray[np.float64]
-    before: float
+    times: Floats  #: (n,) since the vibration began [s], some of them before
+    heights: Floats  #: (n,) over the mean height in the last `REST` before [-]
+    before: float  #: That height: [m], or a share of the smarticles by `REMAINING` [-]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -92,28 +77,20 @@ class CollapseTime:
     """The collapse of one column.
 
     h(t) = h_end + (h_start − h_end) exp(−(t/τ)^β).
-
-    Attributes:
-        outcome: "collapsed": τ was seen; "collapsing": it has lost height, but τ is beyond the end, or not known from
-            what was seen; "standing": it has lost less than `LEAST_FALL`.
-        time: τ [s]; NaN unless collapsed.
-        error: Standard error of the fit [s], with the correlation of successive residuals, or the first sample's time
-            where τ is shorter than that; NaN unless collapsed.
-        bound: What τ is not below [s]: the time watched; NaN if collapsed.
-        exponent: β of the fit [-].
-        start: h_start of the fit, in the heights' unit.
-        end: h_end of the fit, in the heights' unit.
-        fall: Share of the height that the fit loses while it is watched [-].
     """
 
+    #: "collapsed": τ was seen; "collapsing": it has lost height, but τ is beyond the end, or not known from what was
+    #: seen; "standing": it has lost less than `LEAST_FALL`
     outcome: Literal["collapsed", "collapsing", "standing"]
-    time: float
+    time: float  #: τ [s]; NaN unless collapsed
+    #: Standard error of the fit [s], with the correlation of successive residuals, or the first sample's time where τ
+    #: is shorter than that; NaN unless collapsed
     error: float
-    bound: float
-    exponent: float
-    start: float
-    end: float
-    fall: float
+    bound: float  #: Lower bound of τ [s]: the time watched; NaN if collapsed
+    exponent: float  #: β of the fit [-]
+    start: float  #: h_start of the fit, in the heights' unit
+    end: float  #: h_end of the fit, in the heights' unit
+    fall: float  #: Share of the height that the fit loses while it is watched [-]
 
 
 def vibration(run: Run) -> Vibration:
@@ -137,7 +114,7 @@ def vibration(run: Run) -> Vibration:
 
 
 def column_history(run: Run, definition: str, shaken: Vibration) -> ColumnHistory:
-    """Read the heights of a run's column, by one of `HEIGHTS`, from the phase before its vibration to the end of that.
+    """Read a column's heights, by one of `HEIGHTS`, from the phase before its vibration to the end of that.
 
     Raises:
         InputError: The run lacks its series or frames, or samples before the vibration.
@@ -171,7 +148,7 @@ def height_with_the_wall(run: Run) -> float:
     return float(heights[-1])
 
 
-def _of_series(run: Run, definition: str, shaken: Vibration) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _of_series(run: Run, definition: str, shaken: Vibration) -> tuple[Floats, Floats]:
     series = run.series
     last = shaken.phase.index
     shown = (series["phase"] >= last - 1) & (series["phase"] <= last)
@@ -182,7 +159,7 @@ def _of_series(run: Run, definition: str, shaken: Vibration) -> tuple[NDArray[np
     return series.time[shown], heights
 
 
-def _core(run: Run, shaken: Vibration) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _core(run: Run, shaken: Vibration) -> tuple[Floats, Floats]:
     frames, last = run.frames, shaken.phase.index
     times, heights = [], []
     for frame in (frame for phase in (last - 1, last) for frame in frames.in_phase(phase)):
@@ -194,7 +171,7 @@ def _core(run: Run, shaken: Vibration) -> tuple[NDArray[np.float64], NDArray[np.
 
 
 def collapse_of(history: ColumnHistory, definition: str, shaken: Vibration) -> CollapseTime:
-    """Fit the collapse time of a column to means over periods, so that bouncing within a period does not count.
+    """Fit the collapse time of a column to means over periods: bouncing within one does not count.
 
     Raises:
         InputError: It was sampled too rarely, or watched for too short a time.
@@ -203,10 +180,8 @@ def collapse_of(history: ColumnHistory, definition: str, shaken: Vibration) -> C
     return collapse_time(times, heights, **_KNOWN_ENDS.get(definition, {}))
 
 
-def period_means(
-    times: NDArray[np.float64], values: NDArray[np.float64], frequency: float
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Average over whole periods from time 0 on: mean times (m,) [s] and values (m,) of periods with a sample."""
+def period_means(times: Floats, values: Floats, frequency: float) -> tuple[Floats, Floats]:
+    """Average over whole periods from time 0 on: times (m,) [s] and values (m,) of those with a sample."""
     # A sample at the end of a period belongs to it.
     period = np.ceil(times * frequency - 1e-6).astype(np.int64)
     used = period > 0
@@ -248,14 +223,15 @@ def collapse_time(
         msg = f"heights of a collapse are all 0, or start is not above 0: got {scale:g}; a column has a height"
         raise InputError(msg)
     watched = float(t[-1])
-    model = _Model(times=t / watched, start=None if start is None else 1.0, end=None if end is None else end / scale)
-    fit = model.fit(h / scale)
-    tau, beta, first, last = model.named(fit.x)
-    curve = model.curve(fit.x)
+    # Times are over the time watched, heights over a height of the start.
+    known = None if start is None else 1.0, None if end is None else end / scale
+    fit = _fit(t / watched, h / scale, *known)
+    tau, beta, first, last = _named(fit.x, *known)
+    curve = _curve(fit.x, t / watched, *known)
     # A start that is fitted may lie on a single sample: no more has fallen than was seen to.
     top = float(curve[0]) if start is None else first
     fall = float((top - curve[-1]) / top)
-    shortest, error = float(model.times[0]), _error(fit) * tau
+    shortest, error = float(t[0] / watched), _error(fit) * tau
     outcome: Literal["collapsed", "collapsing", "standing"] = "collapsed"
     if fall < LEAST_FALL:
         outcome = "standing"
@@ -276,7 +252,7 @@ def collapse_time(
     )
 
 
-def _check(times: NDArray[np.float64], heights: NDArray[np.float64]) -> None:
+def _check(times: Floats, heights: Floats) -> None:
     if times.ndim != 1 or times.shape != heights.shape or len(times) < _LEAST_SAMPLES:
         msg = (
             f"a collapse needs {_LEAST_SAMPLES} times and as many heights: got shapes {times.shape} and "
@@ -293,50 +269,43 @@ def _check(times: NDArray[np.float64], heights: NDArray[np.float64]) -> None:
     raise InputError(msg)
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class _Model:
-    """The curve with what is free of it: ln τ, β, and of start and share (end over start) those that are not given.
+def _named(free: Floats, start: float | None, end: float | None) -> tuple[float, float, float, float]:
+    """Return τ, β, start and end of free parameters: ln τ, β, and start and end over start unless given."""
+    rest = list(free[2:])
+    start = float(rest.pop(0)) if start is None else start
+    end = float(rest.pop(0)) * start if end is None else end
+    return float(np.exp(free[0])), float(free[1]), start, end
 
-    Times are over the time watched, heights over a height of the start.
-    """
 
-    times: NDArray[np.float64]
-    start: float | None
-    end: float | None
+def _curve(free: Floats, times: Floats, start: float | None, end: float | None) -> Floats:
+    tau, beta, start, end = _named(free, start, end)
+    curve: Floats = end + (start - end) * np.exp(-((times / tau) ** beta))
+    return curve
 
-    def named(self, free: NDArray[np.float64]) -> tuple[float, float, float, float]:
-        """τ, β, start and end."""
-        rest = list(free[2:])
-        start = float(rest.pop(0)) if self.start is None else self.start
-        end = float(rest.pop(0)) * start if self.end is None else self.end
-        return float(np.exp(free[0])), float(free[1]), start, end
 
-    def curve(self, free: NDArray[np.float64]) -> NDArray[np.float64]:
-        """(n,) heights."""
-        tau, beta, start, end = self.named(free)
-        curve: NDArray[np.float64] = end + (start - end) * np.exp(-((self.times / tau) ** beta))
-        return curve
-
-    def fit(self, heights: NDArray[np.float64]) -> Any:
-        """The best of several fits: the sum of squares may have more than one valley."""
-        low, high = [math.log(self.times[0] / 10), _EXPONENTS[0]], [math.log(_LONGEST), _EXPONENTS[1]]
-        guess: list[float] = []
-        if self.start is None:
-            low, high, guess = [*low, 1e-3], [*high, 3.0], [*guess, max(float(heights[0]), 2e-3)]
-        if self.end is None:
-            low, high, guess = [*low, 0.0], [*high, 1.0], [*guess, min(float(heights[-1] / heights.max()), 0.9)]
-        fits = [
-            least_squares(
-                lambda free: self.curve(free) - heights, [math.log(tau), beta, *guess], bounds=(low, high), x_scale=0.1
-            )
-            for tau in (0.03, 0.3, 3.0)
-            for beta in (0.7, 1.5)
-        ]
-        return min(fits, key=lambda fit: float(fit.cost))
+def _fit(times: Floats, heights: Floats, start: float | None, end: float | None) -> Any:
+    """Return the best of several fits: the sum of squares may have more than one valley."""
+    low, high = [math.log(times[0] / 10), _EXPONENTS[0]], [math.log(_LONGEST), _EXPONENTS[1]]
+    guess: list[float] = []
+    if start is None:
+        low, high, guess = [*low, 1e-3], [*high, 3.0], [*guess, max(float(heights[0]), 2e-3)]
+    if end is None:
+        low, high, guess = [*low, 0.0], [*high, 1.0], [*guess, min(float(heights[-1] / heights.max()), 0.9)]
+    fits = [
+        least_squares(
+            lambda free: _curve(free, times, start, end) - heights,
+            [math.log(tau), beta, *guess],
+            bounds=(low, high),
+            x_scale=0.1,
+        )
+        for tau in (0.03, 0.3, 3.0)
+        for beta in (0.7, 1.5)
+    ]
+    return min(fits, key=lambda fit: float(fit.cost))
 
 
 def _error(fit: Any) -> float:
-    """Standard error of ln τ; infinite where the samples do not tell."""
+    """Return the standard error of ln τ; infinite where the samples do not determine it."""
     residuals, jacobian = fit.fun, fit.jac
     spare = len(residuals) - len(fit.x)
     # What is at a bound is not free; its column would make the matrix singular.

@@ -1,4 +1,4 @@
-"""Which smarticles touch, lie close to each other, or touch nothing.
+"""Find which smarticles touch, lie close to each other, or touch nothing.
 
 Contacts are counted by the engine and pairs found from vertices: a frame holds how many others each smarticle touches,
 not which. Where a scene asks for the forces at contacts these are recorded beside, see `force_chains`.
@@ -7,20 +7,28 @@ not which. Where a scene asks for the forces at contacts these are recorded besi
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import ArrayLike
 from scipy.spatial import cKDTree
 
 from dem.errors import InputError
 from dem.record.frame import Frame
 from dem.record.run import Run
-from postprocess.geometry.chains import Chain, spheres, strands
-from postprocess.geometry.links import checked_vertices, link_lengths, swept_axes
+from postprocess.geometry.links import (
+    Chain,
+    Flags,
+    Floats,
+    Vertices,
+    Whole,
+    checked_vertices,
+    link_lengths,
+    spheres,
+    strands,
+    swept_axes,
+)
 from postprocess.measures.registry import FrameMeasure, Quantity, in_space
-
-if TYPE_CHECKING:
-    from numpy.typing import ArrayLike, NDArray
 
 # Pairs of links held in memory at a time.
 _CHUNK = 200_000
@@ -30,34 +38,21 @@ _REACH = 1.05
 
 
 class ContactPairs(NamedTuple):
-    """Pairs of smarticles whose centrelines come close; the edges of a contact graph.
+    """Pairs of smarticles whose centrelines come close; the edges of a contact graph."""
 
-    Attributes:
-        i: (P,) int64, the lower index.
-        j: (P,) int64, the higher index.
-        distance: (P,) float64 [m], the least distance of their centrelines.
-    """
-
-    i: NDArray[np.int64]
-    j: NDArray[np.int64]
-    distance: NDArray[np.float64]
+    i: Whole  #: (P,) int64, the lower index
+    j: Whole  #: (P,) int64, the higher index
+    distance: Floats  #: (P,) float64 [m], the least distance of their centrelines
 
 
-def contact_pairs(vertices: ArrayLike, distance: float) -> ContactPairs:
-    """Pairs of smarticles whose centrelines come as close as a given distance.
+def contact_pairs(vertices: Vertices, distance: float) -> ContactPairs:
+    """Find pairs of smarticles whose centrelines come as close as a distance [m], sorted by i, then j.
 
-    With spheres of diameter d along the links, d finds the pairs that touch; boxes of section
-    t1 × t2 can touch at any distance from min(t1, t2) to (t1² + t2²)^½.
-
-    Args:
-        vertices: (N, 4, 3) [m], barb tip, hinge, hinge, barb tip of each smarticle.
-        distance: Largest distance of the centrelines [m].
-
-    Returns:
-        The pairs, sorted by i, then j.
+    With spheres of diameter d along the links, d finds the pairs that touch; boxes of section t1 × t2 can touch at any
+    distance from min(t1, t2) to (t1² + t2²)^½.
 
     Raises:
-        InputError: Bad vertices or distance.
+        InputError: Bad distance.
     """
     vertices = checked_vertices(vertices)
     if not (math.isfinite(distance) and distance > 0):
@@ -74,21 +69,17 @@ def contact_pairs(vertices: ArrayLike, distance: float) -> ContactPairs:
     return _merged(a[near] // 3, b[near] // 3, gaps[near], count)
 
 
-def touching_pairs(vertices: ArrayLike, diameter: float) -> ContactPairs:
-    """Pairs of smarticles that touch where each is what a sphere sweeps along its links.
+def touching_pairs(vertices: Vertices, diameter: float) -> ContactPairs:
+    """Find pairs of smarticles that touch where each is what a sphere sweeps along its links, sorted.
 
     On the engine "links" with links of one row these are the pairs that touch. YADE's chains have gaps between their
     beads, where others rest, and there this finds too many, see `pairs_in_contact`, which knows a run's chains.
 
     Args:
-        vertices: (N, 4, 3) [m], barb tip, hinge, hinge, barb tip of each smarticle.
         diameter: Of the sphere [m], `Run.sphere_diameter`.
 
-    Returns:
-        The pairs, sorted by i, then j.
-
     Raises:
-        InputError: Bad vertices or diameter.
+        InputError: Bad diameter.
     """
     vertices = checked_vertices(vertices)
     if not (math.isfinite(diameter) and diameter > 0):
@@ -99,22 +90,17 @@ def touching_pairs(vertices: ArrayLike, diameter: float) -> ContactPairs:
 
 
 def pairs_in_contact(frame: Frame, run: Run) -> ContactPairs:
-    """Pairs of smarticles that touch by the shapes that the run's engine gave them.
+    """Find pairs of smarticles that touch by their shapes in the run's engine, sorted by i, then j.
 
-    Frames hold how many others a smarticle touches, not which; chains of spheres, or strands that a sphere sweeps, tell
-    which. In three runs on YADE (40 smarticles of draft fidelity, pitch 1.3; 60 of standard, pitch 1; 30 of reference,
-    two rows; poured and shaken) this finds 1.000 times the engine's pairs at rest after pouring, every smarticle with
-    as many as the engine said, 1.005 to 1.014 while poured, 1.000 to 1.007 at rest again, and 1.06, 1.06 and 1.11 while
+    In three runs on YADE (40 smarticles of draft fidelity, pitch 1.3; 60 of standard, pitch 1; 30 of reference, two
+    rows; poured and shaken) this finds 1.000 times the engine's pairs at rest after pouring, every smarticle with as
+    many as the engine said, 1.005 to 1.014 while poured, 1.000 to 1.007 at rest again, and 1.06, 1.06 and 1.11 while
     shaken, where contacts that open may carry no force. Of the first two `touching_pairs`, which knows no gaps between
     beads, finds 1.2 at rest and 4 shaken; axes within 1.05 diameters, 1.4 and 6. On links of one strand (40 of draft)
     and of two (40 of reference) it is 1.000 in every phase.
 
-    Args:
-        frame: One of the run's frames.
-        run: The run.
-
     Returns:
-        The pairs, sorted by i, then j; distances are those of spheres or strands.
+        The pairs; distances are those of spheres or strands.
 
     Raises:
         InputError: The scene of the run cannot be read.
@@ -129,7 +115,7 @@ def pairs_in_contact(frame: Frame, run: Run) -> ContactPairs:
 
 
 def chain_of(run: Run) -> Chain:
-    """What stands for a smarticle of a run.
+    """Return the chain that stands for a smarticle of a run.
 
     Raises:
         InputError: The scene of the run cannot be read.
@@ -146,8 +132,8 @@ def chain_of(run: Run) -> Chain:
     )
 
 
-def pairs_of_spheres(centres: NDArray[np.float64], diameter: float) -> ContactPairs:
-    """Pairs of smarticles of whose spheres two touch; centres are (N, S, 3) [m], the diameter is in metres."""
+def pairs_of_spheres(centres: Floats, diameter: float) -> ContactPairs:
+    """Find pairs of smarticles of whose spheres, of centres (N, S, 3) [m] and one diameter [m], two touch."""
     count, each, _ = centres.shape
     points = centres.reshape(-1, 3)
     pairs = cKDTree(points).query_pairs(diameter, output_type="ndarray").astype(np.int64)
@@ -156,8 +142,8 @@ def pairs_of_spheres(centres: NDArray[np.float64], diameter: float) -> ContactPa
     return _merged(pairs[:, 0] // each, pairs[:, 1] // each, gaps, count)
 
 
-def _merged(a: NDArray[np.int64], b: NDArray[np.int64], gaps: NDArray[np.float64], count: int) -> ContactPairs:
-    """One pair for all contacts of two smarticles, with the least distance; contacts of one with itself are none."""
+def _merged(a: Whole, b: Whole, gaps: Floats, count: int) -> ContactPairs:
+    """Keep one pair for all contacts of two smarticles, with the least distance; none with itself."""
     apart = a != b
     a, b, gaps = a[apart], b[apart], gaps[apart]
     keys, which = np.unique(np.minimum(a, b) * count + np.maximum(a, b), return_inverse=True)
@@ -166,45 +152,11 @@ def _merged(a: NDArray[np.int64], b: NDArray[np.int64], gaps: NDArray[np.float64
     return ContactPairs(keys // max(count, 1), keys % max(count, 1), least)
 
 
-def neighbours_in_contact(vertices: ArrayLike, distance: float) -> NDArray[np.int64]:
-    """How many other smarticles come as close to each one as a given distance.
+def segment_distances(p0: Floats, p1: Floats, q0: Floats, q1: Floats) -> Floats:
+    """Compute least distances (n,) [m] of segments p0–p1 from segments q0–q1, ends (n, 3) [m].
 
-    Args:
-        vertices: (N, 4, 3) [m], barb tip, hinge, hinge, barb tip of each smarticle.
-        distance: Largest distance of the centrelines [m].
-
-    Returns:
-        (N,) int64.
-
-    Raises:
-        InputError: Bad vertices or distance.
-    """
-    vertices = checked_vertices(vertices)
-    pairs = contact_pairs(vertices, distance)
-    counts = np.bincount(np.concatenate([pairs.i, pairs.j]), minlength=len(vertices))
-    return counts.astype(np.int64)
-
-
-def segment_distances(
-    p0: NDArray[np.float64],
-    p1: NDArray[np.float64],
-    q0: NDArray[np.float64],
-    q1: NDArray[np.float64],
-) -> NDArray[np.float64]:
-    """Least distances of segments p0–p1 from segments q0–q1.
-
-    Either the least distance is at an end of one segment, or it is that of the two lines and is
-    reached inside both. Taking the best of the five holds for parallel segments and for segments
-    of no length as well.
-
-    Args:
-        p0: (n, 3) [m].
-        p1: (n, 3) [m].
-        q0: (n, 3) [m].
-        q1: (n, 3) [m].
-
-    Returns:
-        (n,) [m].
+    Either the least distance is at an end of one segment, or it is that of the two lines and is reached inside both.
+    Taking the best of the five holds for parallel segments and for segments of no length as well.
     """
     u, v, w = p1 - p0, q1 - q0, p0 - q0
     ends = np.minimum.reduce(
@@ -224,17 +176,12 @@ def segment_distances(
     s, t = (uv * vw - vv * uw) / safe, (uu * vw - uv * uw) / safe
     inside = skew & (s > 0) & (s < 1) & (t > 0) & (t < 1)
     across = np.linalg.norm(w + s[:, None] * u - t[:, None] * v, axis=1)
-    distances: NDArray[np.float64] = np.where(inside, np.minimum(across, ends), ends)
+    distances: Floats = np.where(inside, np.minimum(across, ends), ends)
     return distances
 
 
-def _close_links(
-    starts: NDArray[np.float64],
-    ends: NDArray[np.float64],
-    lengths: NDArray[np.float64],
-    distance: float,
-) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Pairs of links of different smarticles whose bounding spheres come close enough."""
+def _close_links(starts: Floats, ends: Floats, lengths: Floats, distance: float) -> tuple[Whole, Whole]:
+    """Find pairs of links of different smarticles whose bounding spheres come close enough."""
     if len(starts) == 0:
         return np.empty(0, dtype=np.int64), np.empty(0, dtype=np.int64)
     middles = (starts + ends) / 2
@@ -245,41 +192,32 @@ def _close_links(
     return a[keep], b[keep]
 
 
-def _point_distances(
-    points: NDArray[np.float64], origins: NDArray[np.float64], along: NDArray[np.float64]
-) -> NDArray[np.float64]:
-    """(n,) [m], distances of points from segments given by an end and a vector."""
+def _point_distances(points: Floats, origins: Floats, along: Floats) -> Floats:
+    """Compute distances (n,) [m] of points from segments given by an end and a vector."""
     offset = points - origins
     share = np.clip(_dot(offset, along) / np.maximum(_dot(along, along), 1e-300), 0, 1)
-    distances: NDArray[np.float64] = np.linalg.norm(offset - share[:, None] * along, axis=1)
+    distances: Floats = np.linalg.norm(offset - share[:, None] * along, axis=1)
     return distances
 
 
-def _dot(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float64]:
-    product: NDArray[np.float64] = np.einsum("nc,nc->n", a, b)
+def _dot(a: Floats, b: Floats) -> Floats:
+    product: Floats = np.einsum("nc,nc->n", a, b)
     return product
 
 
 def without_support(
-    vertices: ArrayLike, contacts: ArrayLike, *, diameter: float, floor_z: float, wall_radius: float | None
-) -> NDArray[np.bool_]:
-    """Rattlers: smarticles that nothing holds, neither another one, nor the floor, nor the wall.
+    vertices: Vertices, contacts: ArrayLike, *, diameter: float, floor_z: float, wall_radius: float | None
+) -> Flags:
+    """Find rattlers (N,): smarticles that nothing holds, neither another one, nor the floor, nor the wall.
 
-    Such a one carries no force for certain. One that does touch something may carry none as well: that would take the
-    forces, which frames do not hold.
+    They carry no force for certain. One that does touch something may carry none as well: that would take the forces,
+    which frames do not hold.
 
     Args:
-        vertices: (N, 4, 3) [m], barb tip, hinge, hinge, barb tip of each smarticle.
         contacts: (N,) how many other smarticles each one touches, `Frame.contacts`.
         diameter: Of the sphere that sweeps the links [m], `Run.sphere_diameter`.
         floor_z: Height of the floor [m].
         wall_radius: Of the wall about the axis x = y = 0 [m]; None: there is no wall.
-
-    Returns:
-        (N,) bool.
-
-    Raises:
-        InputError: Bad vertices.
 
     Source:
         Agnolin & Roux, Phys. Rev. E 76, 061302 (2007): grains that carry no force are left out of the coordination
@@ -292,20 +230,20 @@ def without_support(
     return ~held
 
 
-def on_floor(vertices: ArrayLike, *, diameter: float, floor_z: float) -> NDArray[np.bool_]:
-    """(N,) bool, which smarticles touch the floor at a height [m]; arguments as `without_support`."""
+def on_floor(vertices: Vertices, *, diameter: float, floor_z: float) -> Flags:
+    """Find smarticles (N,) that touch the floor at a height [m]; arguments as `without_support`."""
     axes = swept_axes(checked_vertices(vertices), diameter)
-    touching: NDArray[np.bool_] = axes[..., 2].min(axis=1) - floor_z <= _REACH * diameter / 2
+    touching: Flags = axes[..., 2].min(axis=1) - floor_z <= _REACH * diameter / 2
     return touching
 
 
-def at_wall(vertices: ArrayLike, *, diameter: float, wall_radius: float) -> NDArray[np.bool_]:
-    """(N, 4) bool, which vertices of smarticles touch the wall: a straight link does so at its ends first.
+def at_wall(vertices: Vertices, *, diameter: float, wall_radius: float) -> Flags:
+    """Find vertices (N, 4) that touch the wall: a straight link does so at its ends first.
 
     Arguments as `without_support`.
     """
     axes = swept_axes(checked_vertices(vertices), diameter)
-    touching: NDArray[np.bool_] = wall_radius - np.hypot(axes[..., 0], axes[..., 1]) <= _REACH * diameter / 2
+    touching: Flags = wall_radius - np.hypot(axes[..., 0], axes[..., 1]) <= _REACH * diameter / 2
     return touching
 
 
@@ -343,6 +281,6 @@ MEASURES = (
         quantities=(Quantity("rattlers", "-"),),
         take=_rattlers_of,
         # The walls of a mould's tiers are not one wall.
-        told_of=lambda run: in_space(run) and run.manifest.container_tiers == 1,
+        available_for=lambda run: in_space(run) and run.manifest.container_tiers == 1,
     ),
 )

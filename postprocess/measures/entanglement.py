@@ -1,27 +1,33 @@
-"""Which links pass through which smarticles.
+"""Find which links pass through which smarticles.
 
-The plane of smarticle A is its quadrilateral barb tip, hinge, hinge, barb tip, closed across the
-mouth. A link of another smarticle B passes through it if its ends lie strictly on the two sides of
-the plane and it meets the plane strictly inside the quadrilateral. Touching is not passing: a link
-that ends in the plane, lies in it, or meets an edge of the quadrilateral does not count, to within
-1e-9 of A's size. Barbs at unequal angles make the quadrilateral concave or cross itself; inside is
-then what its outline winds around.
+The plane of smarticle A is its quadrilateral barb tip, hinge, hinge, barb tip, closed across the mouth. A link of
+another smarticle B passes through it if its ends lie strictly on the two sides of the plane and it meets the plane
+strictly inside the quadrilateral. Touching is not passing: a link that ends in the plane, lies in it, or meets an edge
+of the quadrilateral does not count, to within 1e-9 of A's size. Barbs at unequal angles make the quadrilateral concave
+or cross itself; inside is then what its outline winds around.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from dem.record.frame import Frame
 from dem.record.run import Run
-from postprocess.geometry.links import bounding_spheres, checked_vertices, close_pairs, link_lengths, plane_frames
+from postprocess.geometry.links import (
+    Flags,
+    Floats,
+    Vertices,
+    Whole,
+    bounding_spheres,
+    checked_vertices,
+    close_pairs,
+    link_lengths,
+    plane_frames,
+)
 from postprocess.measures.registry import FrameMeasure, Quantity, Shown, in_space
-
-if TYPE_CHECKING:
-    from numpy.typing import ArrayLike, NDArray
 
 STRAIGHT = 0.99
 """Tip-to-tip distance over unfolded length above which a smarticle counts as straight [-]."""
@@ -32,99 +38,47 @@ _CHUNK = 100_000
 
 
 class CrossingPairs(NamedTuple):
-    """Pairs of smarticles of which one passes through the other; the edges of a directed graph.
+    """Pairs of smarticles of which one passes through the other; the edges of a directed graph."""
 
-    Attributes:
-        i: (P,) int64, the smarticle passed through.
-        j: (P,) int64, the smarticle that passes.
-        links: (P,) int64, how many of j's links pass, 1 to 3.
-    """
-
-    i: NDArray[np.int64]
-    j: NDArray[np.int64]
-    links: NDArray[np.int64]
+    i: Whole  #: (P,) int64, the smarticle passed through
+    j: Whole  #: (P,) int64, the smarticle that passes
+    links: Whole  #: (P,) int64, how many of j's links pass, 1 to 3
 
 
 class LinkPassages(NamedTuple):
-    """Links that pass through smarticles, one by one.
+    """Links that pass through smarticles, one by one."""
 
-    Attributes:
-        i: (P,) int64, the smarticle passed through.
-        j: (P,) int64, the smarticle that passes.
-        link: (P,) int64, which of j's links: 0 barb 1, 1 middle, 2 barb 2.
-        point: (P, 3) [m], where it meets the plane of i.
-    """
-
-    i: NDArray[np.int64]
-    j: NDArray[np.int64]
-    link: NDArray[np.int64]
-    point: NDArray[np.float64]
-
-
-class LinkedPairs(NamedTuple):
-    """Pairs of smarticles that are linked when both are closed across their mouths.
-
-    Attributes:
-        i: (P,) int64, the lower index.
-        j: (P,) int64, the higher index.
-        number: (P,) int64, the linking number, never 0; its sign follows the order of the vertices.
-    """
-
-    i: NDArray[np.int64]
-    j: NDArray[np.int64]
-    number: NDArray[np.int64]
+    i: Whole  #: (P,) int64, the smarticle passed through
+    j: Whole  #: (P,) int64, the smarticle that passes
+    link: Whole  #: (P,) int64, which of j's links: 0 barb 1, 1 middle, 2 barb 2
+    point: Floats  #: (P, 3) [m], where it meets the plane of i
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Entanglement:
-    """Crossings of all smarticles of a frame.
+    """Crossings of all smarticles of a frame."""
 
-    Attributes:
-        crossings: (N,) int64, links of others through each smarticle's plane; 0 without a plane.
-        has_plane: (N,) bool, False for (nearly) straight smarticles, which have no plane.
-        mean: Mean over the smarticles that have a plane [-]; NaN if none has.
-    """
-
-    crossings: NDArray[np.int64] = field(repr=False)
-    has_plane: NDArray[np.bool_] = field(repr=False)
-    mean: float
+    #: (N,) int64, links of others through each smarticle's plane; 0 without a plane
+    crossings: Whole = field(repr=False)
+    has_plane: Flags = field(repr=False)  #: (N,) bool, False for (nearly) straight smarticles, which have no plane
+    mean: float  #: Mean over the smarticles that have a plane [-]; NaN if none has
 
 
-def entanglement(vertices: ArrayLike, crossings: NDArray[np.int64] | None = None) -> Entanglement:
-    """Crossings of all smarticles, with what the mean needs to skip.
-
-    Args:
-        vertices: (N, 4, 3) [m], barb tip, hinge, hinge, barb tip of each smarticle.
-        crossings: What `link_crossings` found of them, where that is known already.
-
-    Returns:
-        The crossings and their mean.
-
-    Raises:
-        InputError: Bad vertices.
+def entanglement(vertices: Vertices) -> Entanglement:
+    """Compute the crossings of all smarticles and their mean, ⟨N⟩.
 
     Source:
-        Savoie et al., Soft Matter 2023, ⟨N⟩. Unlike in that paper's own code, straight smarticles
-        are skipped as A only, and a smarticle that passes twice counts twice.
+        Savoie et al., Soft Matter 2023, ⟨N⟩. Unlike in that paper's own code, straight smarticles are skipped as A
+        only, and a smarticle that passes twice counts twice.
     """
     vertices = checked_vertices(vertices)
-    planes = has_plane(vertices)
-    crossings = link_crossings(vertices) if crossings is None else crossings
+    planes, crossings = has_plane(vertices), link_crossings(vertices)
     mean = float(crossings[planes].mean()) if np.any(planes) else float("nan")
     return Entanglement(crossings=crossings, has_plane=planes, mean=mean)
 
 
-def link_crossings(vertices: ArrayLike) -> NDArray[np.int64]:
-    """How many links of other smarticles pass through each smarticle's plane.
-
-    Args:
-        vertices: (N, 4, 3) [m], barb tip, hinge, hinge, barb tip of each smarticle.
-
-    Returns:
-        (N,) int64; 0 for straight smarticles, see `has_plane`.
-
-    Raises:
-        InputError: Bad vertices.
+def link_crossings(vertices: Vertices) -> Whole:
+    """Count the links of other smarticles through each smarticle's plane: (N,); 0 for straight ones.
 
     Source:
         Savoie et al., Soft Matter 2023, ⟨N⟩; the module's docstring has the rule at the boundary.
@@ -142,39 +96,21 @@ def link_crossings(vertices: ArrayLike) -> NDArray[np.int64]:
     return counts
 
 
-def crossing_pairs(vertices: ArrayLike) -> CrossingPairs:
-    """The pairs behind `link_crossings`, for graphs of entanglement.
-
-    Args:
-        vertices: (N, 4, 3) [m], barb tip, hinge, hinge, barb tip of each smarticle.
-
-    Returns:
-        Pairs with at least one link passing, sorted by i, then j.
-
-    Raises:
-        InputError: Bad vertices.
-    """
+def crossing_pairs(vertices: Vertices) -> CrossingPairs:
+    """Find the pairs behind `link_crossings`, for graphs of entanglement, sorted by i, then j."""
     vertices = checked_vertices(vertices)
     i, j = _close_pairs(vertices, has_plane(vertices))
-    links = (_signed_crossings(vertices, i, j, closed=False) != 0).sum(axis=1)
-    return CrossingPairs(*_sorted_nonzero(i, j, links))
+    links = _passing(vertices, i, j).sum(axis=1)
+    kept = np.nonzero(links)[0]
+    order = kept[np.lexsort((j[kept], i[kept]))]
+    return CrossingPairs(i[order], j[order], links[order])
 
 
-def link_passages(vertices: ArrayLike) -> LinkPassages:
-    """The passages that `link_crossings` counts, each with its place.
-
-    Args:
-        vertices: (N, 4, 3) [m], barb tip, hinge, hinge, barb tip of each smarticle.
-
-    Returns:
-        One entry per passing link, sorted by i, then j, then link.
-
-    Raises:
-        InputError: Bad vertices.
-    """
+def link_passages(vertices: Vertices) -> LinkPassages:
+    """Find the passages that `link_crossings` counts, each with its place, sorted by i, then j, then link."""
     vertices = checked_vertices(vertices)
     i, j = _close_pairs(vertices, has_plane(vertices))
-    pair, link = np.nonzero(_signed_crossings(vertices, i, j, closed=False))
+    pair, link = np.nonzero(_passing(vertices, i, j))
     order = np.lexsort((link, j[pair], i[pair]))
     i, j, link = i[pair][order], j[pair][order], link[order]
     normal, centre = plane_frames(vertices)[i, 2], vertices[i].mean(axis=1)
@@ -184,107 +120,53 @@ def link_passages(vertices: ArrayLike) -> LinkPassages:
     return LinkPassages(i, j, link.astype(np.int64), start + share[:, None] * (end - start))
 
 
-def linking_pairs(vertices: ArrayLike) -> LinkedPairs:
-    """Linking numbers of smarticles closed across their mouths, a topological cross-check.
+def has_plane(vertices: Vertices) -> Flags:
+    """Find smarticles (N,) that are bent enough to span a plane.
 
-    Counts how often the outline of one passes through the other, with sign. Unlike the number of
-    crossings it does not depend on which of the two is asked, and a link that passes in and out
-    again adds nothing.
-
-    Args:
-        vertices: (N, 4, 3) [m], barb tip, hinge, hinge, barb tip of each smarticle.
-
-    Returns:
-        Pairs with a linking number other than 0, sorted by i, then j; pairs with a straight
-        smarticle are left out.
-
-    Raises:
-        InputError: Bad vertices.
-    """
-    vertices = checked_vertices(vertices)
-    planes = has_plane(vertices)
-    i, j = _close_pairs(vertices, planes)
-    once = (i < j) & planes[j]
-    i, j = i[once], j[once]
-    number = _signed_crossings(vertices, i, j, closed=True).sum(axis=1)
-    return LinkedPairs(*_sorted_nonzero(i, j, number))
-
-
-def has_plane(vertices: ArrayLike) -> NDArray[np.bool_]:
-    """Which smarticles are bent enough to span a plane.
-
-    Args:
-        vertices: (N, 4, 3) [m], barb tip, hinge, hinge, barb tip of each smarticle.
-
-    Returns:
-        (N,) bool, False where the tips are further apart than 0.99 (2l + w), or where all four
-        vertices lie on one line.
-
-    Raises:
-        InputError: Bad vertices.
+    Others have tips further apart than 0.99 (2l + w), or all four vertices on one line.
     """
     vertices = checked_vertices(vertices)
     unfolded = link_lengths(vertices).sum(axis=1)
     mouth = np.linalg.norm(vertices[:, 3] - vertices[:, 0], axis=1)
     spread = np.linalg.svd(vertices - vertices.mean(axis=1, keepdims=True), compute_uv=False)
-    bent: NDArray[np.bool_] = (mouth <= STRAIGHT * unfolded) & (spread[:, 1] > 1e-6 * unfolded)
+    bent: Flags = (mouth <= STRAIGHT * unfolded) & (spread[:, 1] > 1e-6 * unfolded)
     return bent
 
 
-def _close_pairs(
-    vertices: NDArray[np.float64], planes: NDArray[np.bool_]
-) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Ordered pairs (i with a plane, j) whose bounding spheres overlap."""
+def _close_pairs(vertices: Floats, planes: Flags) -> tuple[Whole, Whole]:
+    """Find ordered pairs (i with a plane, j) whose bounding spheres overlap."""
     low, high = close_pairs(vertices)
     i, j = np.concatenate([low, high]), np.concatenate([high, low])
     return i[planes[i]], j[planes[i]]
 
 
-def _signed_crossings(
-    vertices: NDArray[np.float64],
-    i: NDArray[np.int64],
-    j: NDArray[np.int64],
-    *,
-    closed: bool,
-) -> NDArray[np.int64]:
-    """Passages of the links of j through i: (P, 3), or (P, 4) with j's mouth as a fourth.
-
-    The sign is that of the passage along the plane's normal times that of the winding of the
-    outline about it.
-    """
+def _passing(vertices: Floats, i: Whole, j: Whole) -> Flags:
+    """Find which links of j pass through i: (P, 3)."""
     centres, radii = bounding_spheres(vertices)
     frames = plane_frames(vertices)
     corners = np.einsum("nkc,nac->nka", vertices - centres[:, None], frames[:, :2])
-    signs = np.zeros((len(i), 4 if closed else 3), dtype=np.int64)
+    passing = np.zeros((len(i), 3), dtype=bool)
     for start in range(0, len(i), _CHUNK):
-        part = slice(start, start + _CHUNK)
-        a, b = i[part], j[part]
+        a, b = i[start : start + _CHUNK], j[start : start + _CHUNK]
         relative = vertices[b] - centres[a, None]
         heights = np.einsum("pkc,pc->pk", relative, frames[a, 2])
         heights[np.abs(heights) <= _TOLERANCE * radii[a, None]] = 0.0
-        ends = np.roll(heights, -1, axis=1)
-        row, link = np.nonzero((heights * ends < 0)[:, : signs.shape[1]])
-        below, above = heights[row, link], ends[row, link]
-        from_, to = relative[row, link], relative[row, (link + 1) % 4]
+        row, link = np.nonzero(heights[:, :-1] * heights[:, 1:] < 0)
+        below, above = heights[row, link], heights[row, link + 1]
+        from_, to = relative[row, link], relative[row, link + 1]
         hits = from_ + (below / (below - above))[:, None] * (to - from_)
         flat = np.einsum("pc,pac->pa", hits, frames[a[row], :2])
-        winding = _winding(flat, corners[a[row]], _TOLERANCE * radii[a[row]])
-        signs[start + row, link] = winding * np.sign(above - below).astype(np.int64)
-    return signs
+        passing[start + row, link] = _winding(flat, corners[a[row]], _TOLERANCE * radii[a[row]]) != 0
+    return passing
 
 
-def _winding(
-    points: NDArray[np.float64], corners: NDArray[np.float64], tolerance: NDArray[np.float64]
-) -> NDArray[np.int64]:
-    """How often the outline of each quadrilateral winds around its point; 0 on an edge.
+def _winding(points: Floats, corners: Floats, tolerance: Floats) -> Whole:
+    """Count how often the outline of each quadrilateral winds around its point; 0 on an edge.
 
     Args:
         points: (n, 2) [m].
         corners: (n, 4, 2) [m].
         tolerance: (n,) [m], distance from an edge up to which a point lies on it.
-
-    Returns:
-        (n,) int64.
     """
     starts = corners - points[:, None]
     ends = np.roll(starts, -1, axis=1)
@@ -298,16 +180,8 @@ def _winding(
     share = np.clip(-(starts * edges).sum(axis=2) / squared, 0, 1)
     gaps = np.linalg.norm(starts + share[..., None] * edges, axis=2).min(axis=1)
     winding[gaps <= tolerance] = 0
-    counts: NDArray[np.int64] = winding.astype(np.int64)
+    counts: Whole = winding.astype(np.int64)
     return counts
-
-
-def _sorted_nonzero(
-    i: NDArray[np.int64], j: NDArray[np.int64], number: NDArray[np.int64]
-) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
-    keep = np.nonzero(number)[0]
-    order = keep[np.lexsort((j[keep], i[keep]))]
-    return i[order], j[order], number[order]
 
 
 def _entanglement_of(frame: Frame, _: Run) -> tuple[float, int]:
@@ -324,6 +198,6 @@ MEASURES = (
             Quantity("planes", "-"),
         ),
         take=_entanglement_of,
-        told_of=in_space,
+        available_for=in_space,
     ),
 )

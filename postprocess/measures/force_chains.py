@@ -1,4 +1,4 @@
-"""Force chains: how contacts share the load, where a run recorded their forces (`recording.contact_forces`).
+"""Measure how contacts share the load, where a run recorded forces (`recording.contact_forces`).
 
 A contact is all points at which a pair of links touches; those with floor, wall and hooks are left out. A contact is
 strong if its normal force is above the mean of the frame, and smarticles that strong contacts join make a chain: the
@@ -13,36 +13,29 @@ e⁻¹ = 0.37 strong contacts, which carry 2/e = 0.74 of the load, and a partici
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from dem.errors import InputError
 from dem.record.forces import RecordedForces, read_forces
 from dem.record.frame import Frame
 from dem.record.run import Run
-from postprocess.errors import UndefinedMeasureError
+from postprocess.geometry.links import Flags, Floats, UndefinedMeasureError
 from postprocess.measures.clusters import Clusters, joined_clusters
 from postprocess.measures.registry import FrameMeasure, Quantity
 
-if TYPE_CHECKING:
-    from numpy.typing import ArrayLike, NDArray
-
 
 class ForceDistribution(NamedTuple):
-    """P(f), the density of normal forces over their mean.
+    """P(f), the density of normal forces over their mean."""
 
-    Attributes:
-        edges: (B + 1,) float64, of the bins, f / ⟨f⟩ [-].
-        density: (B,) float64 [-], its integral is 1 where the bins hold all forces.
-    """
-
-    edges: NDArray[np.float64]
-    density: NDArray[np.float64]
+    edges: Floats  #: (B + 1,) float64, of the bins, f / ⟨f⟩ [-]
+    density: Floats  #: (B,) float64 [-], its integral is 1 where the bins hold all forces
 
 
-def checked_forces(normal: ArrayLike) -> NDArray[np.float64]:
-    """Normal forces as an array.
+def checked_forces(normal: ArrayLike) -> Floats:
+    """Return normal forces as an array.
 
     Raises:
         InputError: Not (M,) finite numbers above 0.
@@ -58,14 +51,8 @@ def checked_forces(normal: ArrayLike) -> NDArray[np.float64]:
     return normal
 
 
-def strong_contacts(normal: ArrayLike) -> NDArray[np.bool_]:
-    """Which contacts are strong: those whose normal force is above the mean.
-
-    Args:
-        normal: (M,) normal forces [N].
-
-    Returns:
-        (M,) bool.
+def strong_contacts(normal: ArrayLike) -> Flags:
+    """Find strong contacts (M,): those whose normal force, of (M,) [N], is above the mean.
 
     Raises:
         InputError: Not (M,) finite numbers above 0.
@@ -79,19 +66,14 @@ def strong_contacts(normal: ArrayLike) -> NDArray[np.bool_]:
         [False, False, True]
     """
     normal = checked_forces(normal)
-    found: NDArray[np.bool_] = normal > normal.mean()
+    found: Flags = normal > normal.mean()
     return found
 
 
 def force_participation(normal: ArrayLike) -> float:
-    """How evenly contacts share the load [-]: 1 where all carry alike, 1/M where one carries all.
+    """Compute how evenly contacts share the load [-], by their normal forces (M,) [N].
 
-    Args:
-        normal: (M,) normal forces [N].
-
-    Raises:
-        InputError: Not (M,) finite numbers above 0.
-        UndefinedMeasureError: There is none.
+    1 where all carry alike, 1/M where one carries all; raises as `strong_contacts`.
 
     Source:
         Makse, Johnson & Schwartz, Phys. Rev. Lett. 84, 4160 (2000).
@@ -105,15 +87,11 @@ def force_participation(normal: ArrayLike) -> float:
 
 
 def force_distribution(normal: ArrayLike, *, edges: ArrayLike | None = None) -> ForceDistribution:
-    """P(f), the density of normal forces over their mean; of several frames, each over its own mean, joined by hand.
+    """Compute P(f), the density of normal forces (M,) [N] over their mean; average frames by hand.
 
     Args:
-        normal: (M,) normal forces [N].
         edges: (B + 1,) of the bins, f / ⟨f⟩ [-]; 0 to 8 in steps of 0.25 if not given. Larger forces are left out of
             the bins, and counted in the density.
-
-    Returns:
-        Bins and density.
 
     Raises:
         InputError: Not (M,) finite numbers above 0, or edges that do not ascend.
@@ -132,14 +110,9 @@ def force_distribution(normal: ArrayLike, *, edges: ArrayLike | None = None) -> 
 
 
 def force_chains(frame: Frame, forces: RecordedForces | None = None) -> Clusters:
-    """Smarticles joined by strong contacts, directly or through others.
+    """Join smarticles by strong contacts; clusters of one smarticle are no chain.
 
-    Args:
-        frame: One of a run's frames.
-        forces: Recorded with it; read if not given.
-
-    Returns:
-        The clusters; those of one smarticle are no chain.
+    The forces recorded with the frame are read if not given.
 
     Raises:
         InputError: The run recorded no forces, or they are damaged.
@@ -183,6 +156,6 @@ MEASURES = (
             Quantity("force chain largest share", "-"),
         ),
         take=_taken_of,
-        told_of=lambda run: run.forces is not None,
+        available_for=lambda run: run.forces is not None,
     ),
 )

@@ -1,9 +1,9 @@
-"""How high a pile stands above the container's floor."""
+"""Measure how high a pile stands above the container's floor."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -11,47 +11,24 @@ from dem.errors import InputError
 from dem.record.frame import Frame
 from dem.record.packing import second_highest
 from dem.record.run import Run
-from postprocess.errors import UndefinedMeasureError
-from postprocess.geometry.links import centres_of_mass, checked_vertices, link_lengths
+from postprocess.geometry.links import UndefinedMeasureError, Vertices, centres_of_mass, checked_vertices, link_lengths
 from postprocess.measures.registry import FrameMeasure, Quantity, Shown, in_space
-from postprocess.statistics.bisection import least_reaching
-
-if TYPE_CHECKING:
-    from numpy.typing import ArrayLike
 
 
 @dataclass(frozen=True, kw_only=True)
 class Heights:
-    """Heights above the floor.
+    """Heights above the floor."""
 
-    Attributes:
-        mean_com: Height of the centre of mass of all smarticles [m].
-        highest_com: Height of the highest smarticle's centre of mass [m].
-        second_highest_com: Of the second highest [m]; NaN for a single smarticle.
-        top: Height below which `percentile` % of the material lies [m].
-        percentile: [%].
-    """
-
-    mean_com: float
-    highest_com: float
-    second_highest_com: float
-    top: float
-    percentile: float
+    mean_com: float  #: Height of the centre of mass of all smarticles [m]
+    highest_com: float  #: Height of the highest smarticle's centre of mass [m]
+    second_highest_com: float  #: Of the second highest [m]; NaN for a single smarticle
+    top: float  #: Height below which 95 % of the material lies [m]
 
 
-def heights(vertices: ArrayLike, *, floor_z: float = 0.0, percentile: float = 95.0) -> Heights:
-    """All heights of a frame above the floor.
-
-    Args:
-        vertices: (N, 4, 3) [m], barb tip, hinge, hinge, barb tip of each smarticle.
-        floor_z: Height of the floor [m].
-        percentile: Share of the material that lies below `top` [%].
-
-    Returns:
-        The heights.
+def heights(vertices: Vertices, *, floor_z: float = 0.0) -> Heights:
+    """Return all heights of a frame above the floor.
 
     Raises:
-        InputError: Bad vertices or percentile.
         UndefinedMeasureError: There is no smarticle.
     """
     vertices = checked_vertices(vertices)
@@ -65,28 +42,33 @@ def heights(vertices: ArrayLike, *, floor_z: float = 0.0, percentile: float = 95
         mean_com=float(np.average(centres_of_mass(vertices)[:, 2], weights=weights) - floor_z),
         highest_com=float(com[-1]),
         second_highest_com=second_highest(com),
-        top=material_height(vertices, floor_z=floor_z, percentile=percentile),
-        percentile=percentile,
+        top=material_height(vertices, floor_z=floor_z),
     )
 
 
-def material_height(vertices: ArrayLike, *, floor_z: float = 0.0, percentile: float = 95.0) -> float:
-    """Height below which a given share of the links' material lies.
+def least_reaching(growing: Callable[[float], float], level: float, low: float, high: float) -> float:
+    """Find the least argument at which a growing function, perhaps with steps, reaches a level.
 
-    The material is spread evenly along each link's centreline. The share below a height is then
-    a sum over links of clipped straight lines, and the height is found by bisection: exact,
-    without sampling points along the links.
+    The function is below the level at `low`, or just reaches it, and has reached it at `high`.
+    """
+    for _ in range(60):  # more than the 52 bits of a number
+        middle = (low + high) / 2
+        low, high = (middle, high) if growing(middle) < level else (low, middle)
+    return high
+
+
+def material_height(vertices: Vertices, *, floor_z: float = 0.0, percentile: float = 95.0) -> float:
+    """Find the height above the floor [m] below which a given share of the links' material lies.
+
+    The material is spread evenly along each link's centreline. The share below a height is then a sum over links of
+    clipped straight lines, and the height is found by bisection: exact, without sampling points along the links.
 
     Args:
-        vertices: (N, 4, 3) [m], barb tip, hinge, hinge, barb tip of each smarticle.
         floor_z: Height of the floor [m].
         percentile: Share of the material [%], above 0 and up to 100.
 
-    Returns:
-        The height above the floor [m].
-
     Raises:
-        InputError: Bad vertices or percentile.
+        InputError: Bad percentile.
         UndefinedMeasureError: There is no smarticle.
     """
     vertices = checked_vertices(vertices)
@@ -108,11 +90,8 @@ def material_height(vertices: ArrayLike, *, floor_z: float = 0.0, percentile: fl
     )
 
 
-_PERCENTILE = 95.0
-
-
 def _heights_of(frame: Frame, _: Run) -> tuple[float, ...]:
-    levels = heights(frame.vertices, floor_z=frame.floor_z, percentile=_PERCENTILE)
+    levels = heights(frame.vertices, floor_z=frame.floor_z)
     return levels.mean_com, levels.second_highest_com, levels.top
 
 
@@ -123,9 +102,9 @@ MEASURES = (
         quantities=(
             Quantity("com height", "m", Shown(heading="z [mm]", place=30, form=".2f", factor=1e3)),
             Quantity("second-highest com height", "m"),
-            Quantity(f"top {_PERCENTILE:g} % height", "m"),
+            Quantity("top 95 % height", "m"),
         ),
         take=_heights_of,
-        told_of=in_space,
+        available_for=in_space,
     ),
 )

@@ -1,27 +1,24 @@
-"""How far smarticles are wound about each other: linking numbers of open chains, by Gauss's integral.
+"""Measure how far smarticles are wound about each other, by Gauss's integral of open chains.
 
 Of two closed curves the integral is a whole number and a property of their topology; of two open ones, as smarticles
-are, it is a number that goes smoothly with their shapes: the mean, over all directions that one looks from, of half
-the signed crossings that are seen. It needs no plane, unlike `postprocess.measures.entanglement`, so that straight
-smarticles have it too.
+are, it is a number that goes smoothly with their shapes: the mean, over all directions of view, of half the signed
+crossings that are seen. It needs no plane, unlike `postprocess.measures.entanglement`, so that straight smarticles
+have it too.
 """
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from dem.errors import InputError
 from dem.record.frame import Frame
 from dem.record.run import Run
-from postprocess.geometry.links import checked_vertices, close_pairs
+from postprocess.geometry.links import Floats, Vertices, Whole, checked_vertices, close_pairs
 from postprocess.measures.registry import FrameMeasure, Quantity, in_space
-
-if TYPE_CHECKING:
-    from numpy.typing import ArrayLike, NDArray
 
 # Pairs of smarticles held in memory at a time: their temporary arrays then fit the cache of a core.
 _CHUNK = 500
@@ -29,19 +26,12 @@ _CHUNK = 500
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Linking:
-    """Linking numbers of pairs of smarticles of a frame, as open chains.
+    """Linking numbers of pairs of smarticles of a frame, as open chains."""
 
-    Attributes:
-        i: (P,) int64, the lower index of each pair.
-        j: (P,) int64, the higher index.
-        number: (P,) float64 [-], signed; its sign follows the order of the vertices.
-        per_smarticle: (N,) float64 [-], Σ|Lk| over the pairs of each smarticle.
-    """
-
-    i: NDArray[np.int64] = field(repr=False)
-    j: NDArray[np.int64] = field(repr=False)
-    number: NDArray[np.float64] = field(repr=False)
-    per_smarticle: NDArray[np.float64] = field(repr=False)
+    i: Whole = field(repr=False)  #: (P,) int64, the lower index of each pair
+    j: Whole = field(repr=False)  #: (P,) int64, the higher index
+    number: Floats = field(repr=False)  #: (P,) float64 [-], signed; its sign follows the order of the vertices
+    per_smarticle: Floats = field(repr=False)  #: (N,) float64 [-], Σ|Lk| over the pairs of each smarticle
 
     @property
     def mean(self) -> float:
@@ -49,29 +39,18 @@ class Linking:
         return float(self.per_smarticle.mean()) if len(self.per_smarticle) else math.nan
 
 
-def linking(vertices: ArrayLike, *, far: bool = False) -> Linking:
-    """Linking numbers of pairs of smarticles, each the open chain tip, hinge, hinge, tip.
+def linking(vertices: Vertices) -> Linking:
+    """Compute linking numbers of pairs of smarticles, each the open chain tip, hinge, hinge, tip.
 
     Of open chains far from each other the number falls with the square of the distance only, so that a sum over all
     pairs grows with the size of the pile. Hence only pairs whose bounding spheres overlap count, those that can hook.
-
-    Args:
-        vertices: (N, 4, 3) [m], barb tip, hinge, hinge, barb tip of each smarticle.
-        far: Whether all pairs are wanted; of N = 300 they take 0.1 s, as N².
-
-    Returns:
-        The numbers of the pairs.
-
-    Raises:
-        InputError: Bad vertices.
 
     Source:
         See `gauss_integral`. The integral of open chains as a measure of entanglement: Panagiotou, Kröger & Millett,
         Phys. Rev. E 88, 062604 (2013).
     """
     vertices = checked_vertices(vertices)
-    i, j = np.triu_indices(len(vertices), k=1) if far else close_pairs(vertices)
-    i, j = i.astype(np.int64), j.astype(np.int64)
+    i, j = close_pairs(vertices)
     number = np.empty(len(i))
     for start in range(0, len(i), _CHUNK):
         part = slice(start, start + _CHUNK)
@@ -81,7 +60,7 @@ def linking(vertices: ArrayLike, *, far: bool = False) -> Linking:
     return Linking(i=i, j=j, number=number, per_smarticle=each)
 
 
-def gauss_integral(first: ArrayLike, second: ArrayLike) -> NDArray[np.float64]:
+def gauss_integral(first: ArrayLike, second: ArrayLike) -> Floats:
     """Gauss's linking integral of pairs of polygons, open or closed, in closed form.
 
     (1 / 4π) ∫∫ (r₁ - r₂) · (dr₁ × dr₂) / |r₁ - r₂|³ of two straight segments is the solid angle, over 4π, under which
@@ -129,12 +108,12 @@ def gauss_integral(first: ArrayLike, second: ArrayLike) -> NDArray[np.float64]:
     angle += np.arctan2(volume, product * ld + _dot(a, d) * lc + _dot(d, c) * la + diagonal * ld)
     # A parallelogram that holds the origin is seen under half of the sphere, from neither side.
     angle[volume == 0] = 0.0
-    total: NDArray[np.float64] = angle.sum(axis=(-2, -1)) / (2 * math.pi)
+    total: Floats = angle.sum(axis=(-2, -1)) / (2 * math.pi)
     return total
 
 
-def _dot(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float64]:
-    product: NDArray[np.float64] = np.einsum("...c,...c->...", a, b)
+def _dot(a: Floats, b: Floats) -> Floats:
+    product: Floats = np.einsum("...c,...c->...", a, b)
     return product
 
 
@@ -148,7 +127,7 @@ MEASURES = (
         place=42,
         quantities=(Quantity("linking mean", "-"),),
         take=_linking_of,
-        told_of=in_space,
+        available_for=in_space,
         costly=True,
     ),
 )

@@ -1,10 +1,10 @@
-"""What motors did in a phase, as somebody sees it who looks at the smarticles only now and then.
+"""Measure the work of motors in a phase by samples far apart in time, as the paper's own code does.
 
 The paper integrates τ dα over every step. Its own code keeps torque and angle together every 0.1 s only
 (CheckPointSmarticles.cpp of `wsavoie/SmarticleSim`), and a sum over samples so far apart is another quantity: of a
 barb that goes to and fro several times in between it is nearly nothing. Both stand beside each other in the tables:
-the integral is `motor_work_J` of the series. When the first sample is taken is nobody's choice: the least and the
-greatest sum over all beginnings that the frames allow stand there too.
+the integral is `motor_work_J` of the series. Where the first sample lies is arbitrary: the least and the greatest sum
+over all beginnings that the frames allow stand there too.
 """
 
 from __future__ import annotations
@@ -12,16 +12,14 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
 from dem.errors import InputError
 from dem.record.frame import Frame
 from dem.record.frames import FrameSequence
 from dem.record.run import Run
 from dem.record.series import Series
+from postprocess.geometry.links import Floats
 from postprocess.measures.registry import PhaseMeasure, Quantity
-
-Array = NDArray[np.float64]
 
 APART = 0.1
 """Between two samples, as in the paper's code [s]."""
@@ -39,15 +37,12 @@ SAMPLED_WORK = _WORK.header
 _NEAR = 1e-3  # share of the interval by which a frame may be off; frames fall on the nearest step
 
 
-def sampled_work(angles: Array, torques: Array) -> float:
-    """Σ τ Δα, each torque times the way since the sample before.
+def sampled_work(angles: Floats, torques: Floats) -> float:
+    """Sum τ Δα over all barbs [J], with Δα since the sample before; NaN of fewer than two samples.
 
     Args:
         angles: (samples, N, 2) of the barbs [rad].
         torques: (samples, N, 2) of their motors [N m].
-
-    Returns:
-        The sum over all barbs [J]; NaN of fewer than two samples.
 
     Raises:
         InputError: The two are not of one shape.
@@ -67,10 +62,9 @@ def sampled_work(angles: Array, torques: Array) -> float:
 
 
 def sampled(frames: FrameSequence, apart: float = APART) -> list[int]:
-    """Which frames are samples: the first one, and each that is a multiple of `apart` [s] later.
+    """Number the frames that are samples: the first one, and each that is a multiple of `apart` [s] later.
 
-    Returns:
-        Their numbers; none where frames do not fall on those times.
+    None where frames do not fall on those times.
     """
     if not len(frames):
         return []
@@ -81,7 +75,7 @@ def sampled(frames: FrameSequence, apart: float = APART) -> list[int]:
 
 
 def _sampled_work_of(run: Run, series: Series, phase: int) -> tuple[float, ...]:
-    """From the first frame on, and the least and greatest of beginning at any frame of the first 0.1 s."""
+    """Sum from the first frame on, and least and greatest sum from any frame of the first 0.1 s."""
     frames = run.frames.in_phase(phase)
     begun = [sampled(frames[first:]) for first in range(int(np.searchsorted(frames.times, _first_end(frames))))]
     found = [_work_of([frames[first + k] for k in chosen]) for first, chosen in enumerate(begun)]
@@ -92,7 +86,7 @@ def _sampled_work_of(run: Run, series: Series, phase: int) -> tuple[float, ...]:
 
 
 def _first_end(frames: FrameSequence) -> float:
-    """When the samples that began with the first frame come to their second [s]; -inf without frames."""
+    """Return the time of the second sample from the first frame on [s]; -inf without frames."""
     return float(frames.times[0]) + APART * (1 - _NEAR) if len(frames) else -math.inf
 
 
@@ -112,6 +106,6 @@ MEASURES = (
         phases=ACTUATED,
         quantities=(_WORK, *_EXTREMES),
         take=_sampled_work_of,
-        told_of=lambda series, _: "motor_work_J" in series.data,
+        available_for=lambda series, _: "motor_work_J" in series.data,
     ),
 )

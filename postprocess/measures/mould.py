@@ -1,45 +1,34 @@
-"""How well a pile fills the tiers of a mould, and what of that is there when the mould is gone."""
+"""Measure how well a pile fills the tiers of a mould, and how much of that is left without the mould."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from dem.record.run import Run
-from postprocess.geometry.links import checked_vertices, link_lengths
+from postprocess.geometry.links import Flags, Floats, Vertices, checked_vertices, link_lengths
 from postprocess.geometry.outline import outlines
-from postprocess.geometry.region import Region
+from postprocess.geometry.voxel import Region
 
-if TYPE_CHECKING:
-    from numpy.typing import ArrayLike, NDArray
+_SAMPLES = 50  # points along a link
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Cast:
-    """A pile in its mould, and the same pile without it.
+    """A pile in its mould, and that pile without it, after."""
 
-    Attributes:
-        filled_before: (T,) share of each tier's volume that is inside the pile, see `postprocess.geometry.outline` [-].
-        filled_after: (T,) the same without the mould [-].
-        kept: (T,) of what was filled before, the share that still is [-]; NaN for an empty tier.
-        material_before: (T,) share of all links' length inside each tier [-].
-        material_after: (T,) the same without the mould [-].
-        overlap: Volume common to the pile before and after over that of both together (Jaccard) [-].
-        likeness: The same of the pile after and the whole mould: 1 for a perfect cast [-].
-        likeness_before: The same of the pile before and the mould [-].
-    """
-
-    filled_before: NDArray[np.float64]
-    filled_after: NDArray[np.float64]
-    kept: NDArray[np.float64]
-    material_before: NDArray[np.float64]
-    material_after: NDArray[np.float64]
-    overlap: float
-    likeness: float
-    likeness_before: float
+    #: (T,) share of each tier's volume that is inside the pile, see `postprocess.geometry.outline` [-]
+    filled_before: Floats
+    filled_after: Floats  #: (T,) likewise without the mould [-]
+    kept: Floats  #: (T,) of what was filled before, the share that still is [-]; NaN for an empty tier
+    material_before: Floats  #: (T,) share of all links' length inside each tier [-]
+    material_after: Floats  #: (T,) likewise without the mould [-]
+    overlap: float  #: Volume common to the pile before and after over that of both together (Jaccard) [-]
+    likeness: float  #: Of the pile after and the whole mould: 1 for a perfect cast [-]
+    likeness_before: float  #: Of the pile before and the mould [-]
 
 
 def cast(
@@ -49,29 +38,24 @@ def cast(
     *,
     thickness: float,
     ball: float,
-    pitch: float | None = None,
 ) -> Cast:
-    """Compares a pile in a mould with the same pile after the mould was taken away.
+    """Compare a pile in a mould with that pile after the mould was taken away.
 
     Shares of a tier are of its voxels, so that a tier that is all inside the pile has 1 and one without a link
     has 0, however coarse the voxels.
 
     Args:
-        before: (N, 4, 3) [m], in the mould, heights above the floor.
-        after: (N, 4, 3) [m], without the mould.
+        before: Vertices in the mould, heights above the floor.
+        after: Vertices without the mould, likewise.
         tiers: T cylinders, from the lowest, heights above the floor.
         thickness: Of the links, taken as round [m].
         ball: Radius of the ball that the outline is found with [m].
-        pitch: Side of a voxel [m]; a fourth of the ball's radius if not given.
-
-    Returns:
-        Shares and overlaps.
 
     Raises:
-        InputError: Bad vertices or sizes.
+        InputError: Bad sizes.
         UndefinedMeasureError: There is no smarticle, or a tier is smaller than a voxel.
     """
-    found = outlines([before, after], thickness=thickness, ball=ball, pitch=pitch, regions=tiers)
+    found = outlines([before, after], thickness=thickness, ball=ball, regions=tiers)
     one, other = found.inside
     masks = [found.within(tier) for tier in tiers]
     mould = np.logical_or.reduce(masks)
@@ -88,13 +72,7 @@ def cast(
 
 
 def read_tiers(run: Run) -> tuple[Region, ...]:
-    """The tiers of a run's container, heights above its floor.
-
-    Args:
-        run: A run.
-
-    Returns:
-        The tiers from below; none where the container is one cylinder.
+    """Read the tiers of a run's container, from below, heights above its floor; none of one cylinder.
 
     Raises:
         InputError: The file is missing or damaged, or a tier lacks its sizes.
@@ -108,17 +86,17 @@ def read_tiers(run: Run) -> tuple[Region, ...]:
     return tuple(found)
 
 
-def _share(part: NDArray[np.bool_], whole: NDArray[np.bool_]) -> float:
+def _share(part: Flags, whole: Flags) -> float:
     total = int(whole.sum())
     return float(part.sum() / total) if total else float("nan")
 
 
-def _material(vertices: ArrayLike, tiers: Sequence[Region], samples: int = 50) -> NDArray[np.float64]:
-    """(T,) share of all links' length in each tier, by points evenly along each link."""
+def _material(vertices: Vertices, tiers: Sequence[Region]) -> Floats:
+    """Return shares (T,) of all links' length in each tier, by points evenly along each link."""
     vertices = checked_vertices(vertices)
-    shares = (np.arange(samples) + 0.5) / samples
+    shares = (np.arange(_SAMPLES) + 0.5) / _SAMPLES
     along = np.diff(vertices, axis=1)[:, :, None]
     points = (vertices[:, :-1, None] + shares[:, None] * along).reshape(-1, 3)
-    weights = np.repeat(link_lengths(vertices).ravel(), samples)
-    inside: NDArray[np.float64] = np.array([weights[tier.contains(points)].sum() / weights.sum() for tier in tiers])
+    weights = np.repeat(link_lengths(vertices).ravel(), _SAMPLES)
+    inside: Floats = np.array([weights[tier.contains(points)].sum() / weights.sum() for tier in tiers])
     return inside

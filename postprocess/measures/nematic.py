@@ -1,38 +1,29 @@
-"""Whether smarticles lie alike: the nematic order of their middle links."""
+"""Measure whether smarticles lie alike: the nematic order of their middle links."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from dem.errors import InputError
 from dem.record.frame import Frame
 from dem.record.run import Run
-from postprocess.errors import UndefinedMeasureError
-from postprocess.geometry.links import checked_vertices
+from postprocess.geometry.links import Floats, UndefinedMeasureError, checked_vertices
 from postprocess.measures.registry import FrameMeasure, Quantity, in_space
-
-if TYPE_CHECKING:
-    from numpy.typing import ArrayLike, NDArray
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class NematicOrder:
-    """Order of directions without a head.
+    """Nematic order: that of directions whose sign does not count."""
 
-    Attributes:
-        tensor: (3, 3) float64 [-], Q = ⟨(3 u u - 1) / 2⟩, symmetric and without a trace.
-        order: S, its largest eigenvalue [-]: 1 where all are parallel, 1/4 where all lie in a plane at random, and of
-            N random directions in space not 0 but about 0.8 / N^½.
-        director: (3,) the unit vector of S, upwards.
-    """
-
-    tensor: NDArray[np.float64] = field(repr=False)
+    tensor: Floats = field(repr=False)  #: (3, 3) float64 [-], Q = ⟨(3 u u - 1) / 2⟩, symmetric and without a trace
+    #: S, its largest eigenvalue [-]: 1 where all are parallel, 1/4 where all lie in a plane at random, and of N random
+    #: directions in space not 0 but about 0.8 / N^½
     order: float
-    director: NDArray[np.float64]
+    director: Floats  #: (3,) the unit vector of S, upwards
 
     @property
     def polar_angle(self) -> float:
@@ -46,13 +37,7 @@ class NematicOrder:
 
 
 def nematic_order(directions: ArrayLike) -> NematicOrder:
-    """Order of directions.
-
-    Args:
-        directions: (N, 3), of any length above 0.
-
-    Returns:
-        Q, its largest eigenvalue and its director.
+    """Compute the nematic order of directions (N, 3), of any length above 0.
 
     Raises:
         InputError: Not (N, 3) finite vectors with a length.
@@ -101,6 +86,6 @@ MEASURES = (
             Quantity("upright order", "-"),
         ),
         take=_nematic_of,
-        told_of=in_space,
+        available_for=in_space,
     ),
 )

@@ -7,27 +7,20 @@ definition corrects the container's radius but where a scene says so, with `cont
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import partial
 from types import MappingProxyType
-from typing import TYPE_CHECKING
 
 from dem.errors import InputError
 from dem.record.frame import Frame
 from dem.record.packing import filled
 from dem.record.run import Run
-from postprocess.errors import UndefinedMeasureError
-from postprocess.geometry.links import checked_vertices
-from postprocess.geometry.region import Region, inner_region
+from postprocess.geometry.links import UndefinedMeasureError, Vertices, checked_vertices
 from postprocess.geometry.voronoi import local_packing
-from postprocess.geometry.voxel import solid_fraction
+from postprocess.geometry.voxel import Region, solid_fraction
 from postprocess.measures.heights import heights, material_height
 from postprocess.measures.registry import FrameMeasure, Quantity, Shown, in_space
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
-
-    from numpy.typing import ArrayLike
 
 DEFINITIONS: Mapping[str, str] = MappingProxyType(
     {
@@ -45,59 +38,36 @@ COSTLY_DEFINITIONS = frozenset({"voxel", "voronoi"})
 
 @dataclass(frozen=True, kw_only=True)
 class PackingFraction:
-    """A packing fraction that names its definition.
+    """A packing fraction that names its definition."""
 
-    Attributes:
-        value: Solid volume over volume [-].
-        definition: Key of `DEFINITIONS`.
-        height: Height of the pile above the floor that the definition used [m].
-    """
-
-    value: float
-    definition: str
-    height: float
+    value: float  #: Solid volume over volume [-]
+    definition: str  #: Key of `DEFINITIONS`
+    height: float  #: Height of the pile above the floor that the definition used [m]
 
 
 def packing_fraction(
-    vertices: ArrayLike,
+    vertices: Vertices,
     *,
     radius: float,
     solid_volume: float,
     definition: str = "second-highest-com",
     floor_z: float = 0.0,
-    axis: tuple[float, float] = (0.0, 0.0),
-    percentile: float = 95.0,
     thickness_normal: float | None = None,
     thickness_in_plane: float | None = None,
-    inner: float = 0.75,
-    low: float = 0.2,
-    high: float = 0.8,
-    spacing: float | None = None,
 ) -> PackingFraction:
-    """Packing fraction of smarticles in an upright cylinder.
+    """Compute the packing fraction of smarticles in an upright cylinder about x = y = 0.
 
     Args:
-        vertices: (N, 4, 3) [m], barb tip, hinge, hinge, barb tip of each smarticle.
         radius: Radius of the container [m].
         solid_volume: Volume of one smarticle [m³].
         definition: Key of `DEFINITIONS`.
         floor_z: Height of the container's floor [m].
-        axis: x and y of the container's axis [m].
-        percentile: Share of the material below the height, for all but the first definition [%].
         thickness_normal: t1, along the normal of the smarticle's plane [m]; "voxel" only.
         thickness_in_plane: t2, in the smarticle's plane [m]; "voxel" only.
-        inner: Radius of the inner cylinder as a share of the container's [-].
-        low: Lower end of the inner cylinder as a share of the height [-].
-        high: Upper end of the inner cylinder as a share of the height [-].
-        spacing: Distance of grid points ("voxel") or of points along links ("voronoi") [m]; half
-            the smaller thickness, or w/8, if not given.
-
-    Returns:
-        The packing fraction with its definition and the height it used.
 
     Raises:
-        InputError: Unknown definition, bad vertices or sizes, or missing thicknesses.
-        UndefinedMeasureError: Too few smarticles, or none where the definition looks.
+        InputError: Unknown definition, bad sizes, or missing thicknesses.
+        UndefinedMeasureError: Too few smarticles, or none where the definition counts them.
 
     Source:
         "second-highest-com": wsavoie/SmarticleSim, without the factor (0.0234/0.0224)² = 1.091
@@ -124,46 +94,30 @@ def packing_fraction(
     if definition == "second-highest-com":
         height = heights(vertices, floor_z=floor_z).second_highest_com
     else:
-        height = material_height(vertices, floor_z=floor_z, percentile=percentile)
+        height = material_height(vertices, floor_z=floor_z)
     if not height > 0:
         msg = f"the pile has no height above its floor: {height:g} m; check floor_z"
         raise UndefinedMeasureError(msg)
-    pile = Region(radius=radius, bottom=floor_z, top=floor_z + height, axis=axis)
+    pile = Region(radius=radius, bottom=floor_z, top=floor_z + height)
     if definition == "voxel":
         if thickness_normal is None or thickness_in_plane is None:
             msg = "definition 'voxel' needs thickness_normal and thickness_in_plane [m]: got None"
             raise InputError(msg)
         value = solid_fraction(
-            vertices,
-            inner_region(pile, inner=inner, low=low, high=high),
-            thickness_normal=thickness_normal,
-            thickness_in_plane=thickness_in_plane,
-            pitch=spacing,
+            vertices, pile.inner, thickness_normal=thickness_normal, thickness_in_plane=thickness_in_plane
         )
     elif definition == "voronoi":
-        value = local_packing(
-            vertices,
-            pile,
-            inner_region(pile, inner=inner, low=low, high=high),
-            solid_volume=solid_volume,
-            spacing=spacing,
-        ).value
+        value = local_packing(vertices, pile, pile.inner, solid_volume=solid_volume).value
     else:
         value = filled(len(vertices), solid_volume=solid_volume, radius=radius, height=pile.top - pile.bottom)
     return PackingFraction(value=value, definition=definition, height=height)
 
 
 def packing_of(frame: Frame, run: Run, *, definition: str) -> float:
-    """Packing fraction of a frame of a run [-]; NaN where it has no meaning.
-
-    Args:
-        frame: One of the run's frames.
-        run: The run.
-        definition: Key of `DEFINITIONS`.
-    """
+    """Return a frame's packing fraction [-] by a key of `DEFINITIONS`; NaN where it has no meaning."""
     if not run.manifest.fills_cylinder(frame.phase):
         return math.nan
-    # The costly ones look inside the pile, where it is only the wall that can be in the way.
+    # The costly ones count inside the pile, where only the wall can be in the way.
     radius = run.manifest.container_radius_m if definition in COSTLY_DEFINITIONS else run.manifest.measured_radius_m
     try:
         return packing_fraction(
@@ -195,7 +149,7 @@ MEASURES = tuple(
         place=70,
         quantities=(Quantity(f"phi {definition}", "-", _SHOWN[definition]),),
         take=partial(_packing, definition),
-        told_of=in_space,
+        available_for=in_space,
         definition=definition,
         costly=definition in COSTLY_DEFINITIONS,
     )

@@ -1,47 +1,38 @@
-"""Where in a container the material is: φ(r, z), the packing fraction of rings about the axis, layer by layer."""
+"""Measure φ(r, z), the packing fraction of rings of a container, layer by layer."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
 
 import numpy as np
 import pandas as pd
 
 from dem.errors import InputError
 from dem.record.run import Run
+from postprocess.geometry.links import Floats, Vertices
 from postprocess.geometry.voxel import solid_points
-
-if TYPE_CHECKING:
-    from numpy.typing import ArrayLike, NDArray
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class PackingProfile:
-    """Packing fraction in rings and layers of an upright cylinder.
+    """Packing fraction in rings and layers of an upright cylinder."""
 
-    Attributes:
-        radii: (R + 1,) float64 [m], edges of the rings, 0 to the container's radius.
-        heights: (Z + 1,) float64 [m], edges of the layers, from the floor up.
-        packing: (R, Z) float64 [-], share of each ring of each layer that lies inside a link's box.
-        outside: Volume of the links' boxes that is in no ring of any layer [m³].
-    """
-
-    radii: NDArray[np.float64] = field(repr=False)
-    heights: NDArray[np.float64] = field(repr=False)
-    packing: NDArray[np.float64] = field(repr=False)
-    outside: float
+    radii: Floats = field(repr=False)  #: (R + 1,) float64 [m], edges of the rings, 0 to the container's radius
+    heights: Floats = field(repr=False)  #: (Z + 1,) float64 [m], edges of the layers, from the floor up
+    #: (R, Z) float64 [-], share of each ring of each layer that lies inside a link's box
+    packing: Floats = field(repr=False)
+    outside: float  #: Volume of the links' boxes that is in no ring of any layer [m³]
 
     @property
-    def volumes(self) -> NDArray[np.float64]:
+    def volumes(self) -> Floats:
         """(R, Z) [m³], of each ring of each layer."""
-        volumes: NDArray[np.float64] = math.pi * np.outer(np.diff(self.radii**2), np.diff(self.heights))
+        volumes: Floats = math.pi * np.outer(np.diff(self.radii**2), np.diff(self.heights))
         return volumes
 
     @property
     def solid_volume(self) -> float:
-        """Volume of all links' boxes, counted once where they overlap [m³]: all rings and layers, and what is outside.
+        """Volume of all links' boxes, in rings and layers and outside, counted once where they overlap [m³].
 
         Links of a U overlap at their hinges by t1 t2² / 2, which t1 t2 (w + 2l) counts twice.
         """
@@ -49,7 +40,7 @@ class PackingProfile:
 
 
 def packing_profile(
-    vertices: ArrayLike,
+    vertices: Vertices,
     *,
     radius: float,
     thickness_normal: float,
@@ -59,27 +50,19 @@ def packing_profile(
     layer: float | None = None,
     pitch: float | None = None,
 ) -> PackingProfile:
-    """φ(r, z) of smarticles in an upright cylinder about x = y = 0.
+    """Compute φ(r, z) of smarticles in an upright cylinder about x = y = 0, by points as of "voxel".
 
     Args:
-        vertices: (N, 4, 3) [m], barb tip, hinge, hinge, barb tip of each smarticle.
         radius: Of the container [m].
         thickness_normal: t1, along the normal of the smarticle's plane [m].
         thickness_in_plane: t2, in the smarticle's plane [m].
         floor_z: Height of the container's floor [m].
-        rings: Rings of equal width.
         layer: Thickness of the layers [m]; a ring's width if not given. The uppermost reaches above the pile.
         pitch: Spacing of the points that the boxes are made of [m]; half the smaller thickness if not given, which
             makes 16 points of the section of 1.27 × 0.5 mm² and some hundreds in the smallest ring of a loose pile.
 
-    Returns:
-        The profile.
-
     Raises:
-        InputError: Bad vertices, sizes, or numbers of rings and layers.
-
-    Source:
-        Counted points as in the definition "voxel" of `postprocess.measures.packing`.
+        InputError: Bad sizes or numbers of rings and layers.
     """
     if not (math.isfinite(radius) and radius > 0 and rings >= 1):
         msg = f"a profile needs a radius above 0 m and 1 ring or more: got {radius} m, {rings} rings"
@@ -104,15 +87,10 @@ def packing_profile(
 
 
 def profile_table(run: Run, *, rings: int = 6, layer: float | None = None) -> pd.DataFrame:
-    """φ(r, z) of the last frame of each phase of a run that has one.
+    """Compute φ(r, z) of the last frame of each phase of a run: a row per phase, ring and layer.
 
     Args:
-        run: A run.
-        rings: Rings of equal width.
         layer: Thickness of the layers [m]; a ring's width if not given.
-
-    Returns:
-        A row per phase, ring and layer, with units in the column names.
 
     Raises:
         InputError: The run is in a plane, its container is no one cylinder, or as `packing_profile`.

@@ -1,4 +1,4 @@
-"""What a hook tells that is pulled out of a pile: its force against time, peak, work, and whether it came free.
+"""Measure the pull of a hook out of a pile: force against time, peak, work, whether it came free.
 
 Forces are those that it takes to raise the hook, upwards positive: what the smarticles exert on it, with the other
 sign. The series holds means between samples, so nothing is missed between two of them, but contacts come and go and
@@ -9,17 +9,14 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from dem.errors import InputError
 from dem.record.run import Run, SceneData
 from dem.record.series import Series
+from postprocess.geometry.links import Floats
 from postprocess.measures.registry import PhaseMeasure, Quantity, Shown
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
 
 PULL = "pull-hook"
 """Type of the phase."""
@@ -36,28 +33,20 @@ END = 0.1
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class HookPull:
-    """A hook's history while it is pulled.
+    """A hook's history while it is pulled."""
 
-    Attributes:
-        edges: (n + 1,) times since the pull began, of samples and of the one before them [s].
-        raised: (n + 1,) how far the hook has been raised there [m].
-        force: (n,) needed to raise it, mean between two samples [N].
-        held: (n,) with which the smarticles pull the other hook upwards, likewise [N]: what goes from hook to hook.
-        before: The same force before the pull [N]: what rested on the hook; negative where it was held up.
-        engine_work: Work of the hook on the smarticles by the engine's own account [J]; NaN where not recorded.
-    """
-
-    edges: NDArray[np.float64] = field(repr=False)
-    raised: NDArray[np.float64] = field(repr=False)
-    force: NDArray[np.float64] = field(repr=False)
-    held: NDArray[np.float64] = field(repr=False)
-    before: float
-    engine_work: float
+    edges: Floats = field(repr=False)  #: (n + 1,) times since the pull began, of samples and of the one before them [s]
+    raised: Floats = field(repr=False)  #: (n + 1,) how far the hook has been raised there [m]
+    force: Floats = field(repr=False)  #: (n,) needed to raise it, mean between two samples [N]
+    #: (n,) with which the smarticles pull the other hook upwards, likewise [N]: what goes from hook to hook
+    held: Floats = field(repr=False)
+    before: float  #: The force before the pull [N]: what rested on the hook; negative where it was held up
+    engine_work: float  #: Work of the hook on the smarticles by the engine's own ledger [J]; NaN where not recorded
 
     @property
-    def times(self) -> NDArray[np.float64]:
+    def times(self) -> Floats:
         """(n,) middles of the intervals that forces are means over [s]."""
-        middles: NDArray[np.float64] = (self.edges[:-1] + self.edges[1:]) / 2
+        middles: Floats = (self.edges[:-1] + self.edges[1:]) / 2
         return middles
 
     @property
@@ -67,7 +56,7 @@ class HookPull:
 
     @property
     def net(self) -> HookPull:
-        """The same history with the force that does not go on to the other hook: that of pile and container."""
+        """The history with the force that does not go on to the other hook: that of pile and container."""
         return replace(self, force=self.force - self.held)
 
     @property
@@ -78,26 +67,15 @@ class HookPull:
 
 @dataclass(frozen=True, kw_only=True)
 class Peak:
-    """The largest force of a pull.
+    """The largest force of a pull."""
 
-    Attributes:
-        force: Mean over the window [N].
-        time: Of the window's middle, since the pull began [s].
-        raised: How far the hook had been raised then [m].
-    """
-
-    force: float
-    time: float
-    raised: float
+    force: float  #: Mean over the window [N]
+    time: float  #: Of the window's middle, since the pull began [s]
+    raised: float  #: How far the hook had been raised then [m]
 
 
 def read_pull(run: Run, series: Series, phase: int) -> HookPull:
-    """A hook's history in a phase, so far as it has come.
-
-    Args:
-        run: The run.
-        series: Its series.
-        phase: Index of a phase that pulls a hook.
+    """Read a hook's history in a phase, by its index, so far as it has come.
 
     Raises:
         InputError: The series lacks the hook's force or height, or does not reach into the phase.
@@ -124,20 +102,18 @@ def read_pull(run: Run, series: Series, phase: int) -> HookPull:
 
 
 def weight_of_one(run: Run) -> float:
-    """W_s, weight of one smarticle [N].
+    """Return W_s, weight of one smarticle [N].
 
     Raises:
-        InputError: The scene cannot be read, or does not tell gravity.
+        InputError: The scene cannot be read, or lacks gravity.
     """
     return float(run.manifest.smarticle_mass_kg * run.scene["gravity_m_per_s2"])
 
 
-def moving_mean(pull: HookPull, window: float = WINDOW) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Means of the force over every window: middles (m,) [s] and forces (m,) [N].
+def moving_mean(pull: HookPull, window: float = WINDOW) -> tuple[Floats, Floats]:
+    """Average the force over every window: middles (m,) [s] and forces (m,) [N].
 
-    Args:
-        pull: The history.
-        window: [s]; rounded to whole samples, one at least, all at most.
+    The window [s] is rounded to whole samples, one at least, all at most.
     """
     count = _samples(pull.edges, window)
     weights = np.full(count, 1 / count)
@@ -145,22 +121,22 @@ def moving_mean(pull: HookPull, window: float = WINDOW) -> tuple[NDArray[np.floa
 
 
 def peak(pull: HookPull, window: float = WINDOW) -> Peak:
-    """The largest mean over a window; arguments as in `moving_mean`."""
+    """Return the largest mean over a window; arguments as in `moving_mean`."""
     times, means = moving_mean(pull, window)
     highest = int(means.argmax())
     time = float(times[highest])
     return Peak(force=float(means[highest]), time=time, raised=float(np.interp(time, pull.edges, pull.raised)))
 
 
-def held_at(pull: HookPull, time: float, window: float = WINDOW) -> float:
-    """Mean over a window about a time, since the pull began [s], of the force on the other hook [N]."""
-    times, means = moving_mean(replace(pull, force=pull.held), window)
+def held_at(pull: HookPull, time: float) -> float:
+    """Average the force on the other hook [N] over a window about a time since the pull began [s]."""
+    times, means = moving_mean(replace(pull, force=pull.held))
     return float(np.interp(time, times, means))
 
 
-def freed(pull: HookPull, window: float = WINDOW) -> float:
-    """Time from which the windowed force stays below `FREE` of its peak [s]; NaN if it does not come to that."""
-    times, means = moving_mean(pull, window)
+def freed(pull: HookPull) -> float:
+    """Return when the windowed force falls below `FREE` of its peak for good [s]; NaN if it never does."""
+    times, means = moving_mean(pull)
     held = np.nonzero(means > FREE * means.max())[0]
     if not len(held) or held[-1] + 1 == len(means):
         return math.nan
@@ -168,11 +144,7 @@ def freed(pull: HookPull, window: float = WINDOW) -> float:
 
 
 def held_fast(pull: HookPull, asked: SceneData) -> bool:
-    """Whether the hook was stopped by its force limit on the way, so that its peak is a lower bound.
-
-    Args:
-        pull: A whole pull.
-        asked: What the scene says of the phase.
+    """Whether the hook was stopped by its force limit in a whole pull, so that its peak is a lower bound.
 
     Raises:
         InputError: The scene does not say how far.
@@ -182,7 +154,7 @@ def held_fast(pull: HookPull, asked: SceneData) -> bool:
 
 
 def _pull_of(run: Run, series: Series, phase: int) -> tuple[float, ...]:
-    """Measures of a pull for a table, forces over the weight of all smarticles, n W_s."""
+    """Measure a pull for a table, forces over the weight of all smarticles, n W_s."""
     pull, weight = read_pull(run, series, phase), weight_of_one(run)
     highest = peak(pull)
     ended = run.phases[phase].end_s is not None
@@ -204,8 +176,8 @@ def has_pull(series: Series, phase: int) -> bool:
     return "hook_upper_force_N" in series.data and int((series["phase"] == phase).sum()) >= 2
 
 
-def _samples(edges: NDArray[np.float64], window: float) -> int:
-    """Samples in a window [s], one at least and all at most."""
+def _samples(edges: Floats, window: float) -> int:
+    """Return the samples in a window [s], one at least and all at most."""
     return min(max(round(window / float(np.median(np.diff(edges)))), 1), len(edges) - 1)
 
 
@@ -225,6 +197,6 @@ MEASURES = (
             Quantity("hook held fast", "-"),
         ),
         take=_pull_of,
-        told_of=has_pull,
+        available_for=has_pull,
     ),
 )

@@ -22,40 +22,27 @@ _PACKAGE = __name__.rpartition(".")[0]
 
 @dataclass(frozen=True, kw_only=True)
 class Shown:
-    """How a short table for a person has a column; most columns are for CSV alone.
+    """A column of short tables for a person; most columns are for CSV alone."""
 
-    Attributes:
-        heading: With the unit that it is shown in.
-        place: Among the others: lower ones come first.
-        form: Format of the number.
-        factor: From SI to the unit of the heading [1].
-        with_error: Whether its standard error stands beside.
-    """
-
-    heading: str
-    place: int
-    form: str
-    factor: float = 1.0
-    with_error: bool = False
+    heading: str  #: With the unit that it is shown in
+    place: int  #: Among the others: lower ones come first
+    form: str  #: Format of the number
+    factor: float = 1.0  #: From SI to the unit of the heading [1]
+    with_error: bool = False  #: Whether its standard error stands beside
 
 
 @dataclass(frozen=True)
 class Quantity:
     """One column of a table.
 
-    Attributes:
-        label: What it is called.
-        unit: SI, or "-" for a pure number, "degree", "smarticles".
-        shown: How a short table has it; None: not at all.
-
     Example:
         >>> Quantity("com height", "m").header
         'com height [m]'
     """
 
-    label: str
-    unit: str
-    shown: Shown | None = None
+    label: str  #: Its name
+    unit: str  #: SI, or "-" for a pure number, "degree", "smarticles"
+    shown: Shown | None = None  #: In short tables; None: not at all
 
     @property
     def header(self) -> str:
@@ -65,94 +52,73 @@ class Quantity:
 
 @dataclass(frozen=True, kw_only=True)
 class FrameMeasure:
-    """Something that each frame tells.
+    """A measure of each frame."""
 
-    Attributes:
-        name: Of the measure; no other has it.
-        place: Among the columns of a table: those of lower places come first.
-        quantities: Its columns.
-        take: The values of a frame of a run, one per column; NaN where they have no meaning in this frame.
-        told_of: Whether a run has it at all; else its tables have no such columns.
-        definition: Where several measures define one quantity, by what name this one is chosen.
-        costly: Whether it takes longer than all that is cheap together, tens of milliseconds per frame or more: tables
-            have it of the last frame of a phase, unless asked for at every frame.
-    """
-
-    name: str
-    place: int
-    quantities: tuple[Quantity, ...]
+    name: str  #: Of the measure, unique
+    place: int  #: Among the columns of a table: those of lower places come first
+    quantities: tuple[Quantity, ...]  #: Its columns
+    #: The values of a frame of a run, one per column; NaN where they have no meaning in this frame
     take: Callable[[Frame, Run], Sequence[float]]
-    told_of: Callable[[Run], bool] = lambda _: True
-    definition: str | None = None
+    #: Whether a run has it at all; else its tables have no such columns
+    available_for: Callable[[Run], bool] = lambda _: True
+    definition: str | None = None  #: Where several measures define one quantity, by what name this one is chosen
+    #: Whether it takes longer than all that is cheap together, tens of milliseconds per frame or more: tables have it
+    #: of the last frame of a phase, unless asked for at every frame
     costly: bool = False
 
     def columns(self, frame: Frame | None, run: Run) -> dict[str, float]:
-        """Its values by column; NaN without a frame."""
+        """Return its values by column; NaN without a frame."""
         values = [float("nan")] * len(self.quantities) if frame is None else self.take(frame, run)
         return dict(zip((quantity.header for quantity in self.quantities), values, strict=True))
 
 
 @dataclass(frozen=True, kw_only=True)
 class PhaseMeasure:
-    """Something that a whole phase tells.
+    """A measure of a whole phase."""
 
-    Attributes:
-        name: Of the measure; no other has it.
-        phases: Types of the phases that tell it.
-        quantities: Its columns.
-        take: The values of a phase of an index, one per column.
-        told_of: Whether the series holds enough of a phase of an index; else there are no such columns.
-    """
-
-    name: str
-    phases: tuple[str, ...]
-    quantities: tuple[Quantity, ...]
-    take: Callable[[Run, Series, int], Sequence[float]]
-    told_of: Callable[[Series, int], bool]
+    name: str  #: Of the measure, unique
+    phases: tuple[str, ...]  #: Types of the phases that have it
+    quantities: tuple[Quantity, ...]  #: Its columns
+    take: Callable[[Run, Series, int], Sequence[float]]  #: The values of a phase of an index, one per column
+    #: Whether the series holds enough of a phase of an index; else there are no such columns
+    available_for: Callable[[Series, int], bool]
 
     def columns(self, run: Run, series: Series, phase: int) -> dict[str, float]:
-        """Its values by column; none where the phase is of another type or the series does not hold enough of it."""
-        if run.phases[phase].type not in self.phases or not self.told_of(series, phase):
+        """Return its values by column; none where the phase is of another type or the series holds too little."""
+        if run.phases[phase].type not in self.phases or not self.available_for(series, phase):
             return {}
         values = self.take(run, series, phase)
         return dict(zip((quantity.header for quantity in self.quantities), values, strict=True))
 
 
 def in_space(run: Run) -> bool:
-    """Whether smarticles move in space: in a plane all lie at one height, and each in the plane of all others."""
+    """Whether smarticles move in space, not in a plane, where all lie at one height."""
     return not run.manifest.planar
 
 
 @cache
 def registered() -> tuple[FrameMeasure | PhaseMeasure, ...]:
-    """All measures of this package, by module."""
+    """Return all measures of this package, by module."""
     package = import_module(_PACKAGE)
     modules = [import_module(f"{_PACKAGE}.{found.name}") for found in pkgutil.iter_modules(package.__path__)]
     measures = tuple(measure for module in modules for measure in getattr(module, "MEASURES", ()))
-    for kind in ("name", "header"):
-        told = [
-            text
-            for measure in measures
-            for text in ([measure.name] if kind == "name" else [quantity.header for quantity in measure.quantities])
-        ]
-        if repeated := {text for text in told if told.count(text) > 1}:
+    names = [measure.name for measure in measures]
+    headers = [quantity.header for measure in measures for quantity in measure.quantities]
+    for kind, words in (("name", names), ("header", headers)):
+        if repeated := {word for word in words if words.count(word) > 1}:
             msg = f"measures share a {kind}: {', '.join(sorted(repeated))}"
             raise ValueError(msg)
     return measures
 
 
 def shown_quantities() -> tuple[tuple[Quantity, Shown], ...]:
-    """What short tables have, in their order."""
+    """Return the columns of short tables, in their order."""
     found = [(one, one.shown) for measure in registered() for one in measure.quantities if one.shown is not None]
     return tuple(sorted(found, key=lambda pair: pair[1].place))
 
 
 def frame_measures(definitions: Sequence[str]) -> tuple[FrameMeasure, ...]:
-    """What tables tell of frames, in the order of their columns.
-
-    Args:
-        definitions: Which of the measures that are chosen by a name are wanted, in this order.
-    """
+    """Return the measures of frames in the order of columns, those with definitions as given."""
     known = sorted((m for m in registered() if isinstance(m, FrameMeasure)), key=lambda measure: measure.place)
     chosen = {measure.definition: measure for measure in known}
     return (
@@ -162,5 +128,5 @@ def frame_measures(definitions: Sequence[str]) -> tuple[FrameMeasure, ...]:
 
 
 def phase_measures() -> tuple[PhaseMeasure, ...]:
-    """What tables tell of whole phases."""
+    """Return the measures of whole phases."""
     return tuple(measure for measure in registered() if isinstance(measure, PhaseMeasure))

@@ -1,25 +1,26 @@
-"""How many smarticles there are, and how many escaped; how a pile spreads, leans and sheds that no wall holds."""
+"""Count smarticles and those that escaped; measure how a pile without a wall spreads, leans and sheds."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from dem.errors import InputError
 from dem.record.frame import Frame
 from dem.record.run import Run
-from postprocess.errors import UndefinedMeasureError
-from postprocess.geometry.links import centres_of_mass, checked_vertices, link_lengths
+from postprocess.geometry.links import (
+    Floats,
+    UndefinedMeasureError,
+    Vertices,
+    centres_of_mass,
+    checked_vertices,
+    link_lengths,
+)
 from postprocess.measures.clusters import contact_clusters, entanglement_clusters
+from postprocess.measures.heights import least_reaching
 from postprocess.measures.registry import FrameMeasure, Quantity, Shown, in_space
-from postprocess.statistics.bisection import least_reaching
-
-if TYPE_CHECKING:
-    from numpy.typing import ArrayLike, NDArray
-
 
 TOUCHING = 1.05
 """Distance of centrelines over the diameter of the spheres up to which two smarticles count as touching [-].
@@ -27,7 +28,7 @@ TOUCHING = 1.05
 Spheres that touch are a diameter apart or, pressed, less; beads rest in the gaps of the other chain, so that
 centrelines come nearer still. A twentieth more keeps contacts that open and close while a pile settles.
 
-It tells nearness more than contact: of piles on YADE it finds 1.4 times as many pairs as touch at rest after pouring,
+It measures nearness, not contact: of piles on YADE it finds 1.4 times as many pairs as touch at rest after pouring,
 1.9 to 2.1 at rest after shaking, 6 while shaken; see `contacts.pairs_in_contact`, which finds those that touch."""
 
 OUTSIDE = 0.5
@@ -39,48 +40,28 @@ from the middle of the pile, wherever that is by now: a pile that fell over as a
 
 @dataclass(frozen=True, kw_only=True)
 class FreePile:
-    """A pile without a wall.
+    """A pile without a wall."""
 
-    Attributes:
-        touching: Share of the smarticles in the largest cluster joined by contact [-].
-        entangled: Share of them in the largest cluster joined by entanglement [-].
-        radius_half: Radius about the vertical through the centre of mass that holds half of the material [m].
-        radius_most: The same for 95 % [m].
-        sloughed: Share of the smarticles farther from the pile's middle than the wall was, see `OUTSIDE` [-].
-        tilt: Angle of the pile from the vertical [degree], see `tilt`.
-        offset: How far the centre of mass is from the vertical through the foot [m].
-    """
-
-    touching: float
-    entangled: float
-    radius_half: float
-    radius_most: float
-    sloughed: float
-    tilt: float
-    offset: float
+    touching: float  #: Share of the smarticles in the largest cluster joined by contact [-]
+    entangled: float  #: Share of them in the largest cluster joined by entanglement [-]
+    radius_half: float  #: Radius about the vertical through the centre of mass that holds half of the material [m]
+    radius_most: float  #: Radius that holds 95 % of it [m]
+    sloughed: float  #: Share of the smarticles farther from the pile's middle than the wall was, see `OUTSIDE` [-]
+    tilt: float  #: Angle of the pile from the vertical [degree], see `tilt`
+    offset: float  #: Distance of the centre of mass from the vertical through the foot [m]
 
 
 def free_pile(
-    vertices: ArrayLike,
-    run: Run,
-    *,
-    floor_z: float = 0.0,
-    foot: tuple[float, float] = (0.0, 0.0),
+    vertices: Vertices, run: Run, *, floor_z: float = 0.0, foot: tuple[float, float] = (0.0, 0.0)
 ) -> FreePile:
-    """All measures of a pile without a wall.
+    """Measure a pile without a wall, of a run's container and smarticles.
 
     Args:
-        vertices: (N, 4, 3) [m], barb tip, hinge, hinge, barb tip of each smarticle.
-        run: The run, for its container and its smarticles.
         floor_z: Height of the floor [m].
         foot: x and y of the point that the pile stands on [m]: the container's axis if not given, better the place
             of the centre of mass while the wall was there.
 
-    Returns:
-        The measures.
-
     Raises:
-        InputError: Bad vertices.
         UndefinedMeasureError: There is no smarticle.
     """
     vertices = checked_vertices(vertices)
@@ -98,14 +79,10 @@ def free_pile(
     )
 
 
-def centre_of_mass(vertices: ArrayLike) -> NDArray[np.float64]:
-    """(3,) [m], of the whole pile.
-
-    Args:
-        vertices: (N, 4, 3) [m], barb tip, hinge, hinge, barb tip of each smarticle.
+def centre_of_mass(vertices: Vertices) -> Floats:
+    """Return the centre of mass (3,) [m] of the whole pile.
 
     Raises:
-        InputError: Bad vertices.
         UndefinedMeasureError: There is no smarticle.
     """
     vertices = checked_vertices(vertices)
@@ -114,26 +91,22 @@ def centre_of_mass(vertices: ArrayLike) -> NDArray[np.float64]:
         raise UndefinedMeasureError(msg)
     # Smarticles may differ in length, so their centres are weighted by it.
     weights = link_lengths(vertices).sum(axis=1)
-    centre: NDArray[np.float64] = np.average(centres_of_mass(vertices), axis=0, weights=weights)
+    centre: Floats = np.average(centres_of_mass(vertices), axis=0, weights=weights)
     return centre
 
 
-def spread_radius(vertices: ArrayLike, *, share: float, axis: tuple[float, float] | None = None) -> float:
-    """Radius about a vertical axis that holds a given share of the links' material.
+def spread_radius(vertices: Vertices, *, share: float, axis: tuple[float, float] | None = None) -> float:
+    """Find the radius [m] about a vertical axis that holds a given share of the links' material.
 
     The material is spread evenly along each link's centreline. What of a link lies within a radius is where a
     straight line is inside a circle, seen from above; the radius is found by bisection: exact, without sampling.
 
     Args:
-        vertices: (N, 4, 3) [m], barb tip, hinge, hinge, barb tip of each smarticle.
         share: Of the material [-], above 0 and up to 1.
         axis: x and y of the axis [m]; that of the pile's centre of mass if not given.
 
-    Returns:
-        The radius [m].
-
     Raises:
-        InputError: Bad vertices or share.
+        InputError: Bad share.
         UndefinedMeasureError: There is no smarticle.
     """
     vertices = checked_vertices(vertices)
@@ -149,19 +122,10 @@ def spread_radius(vertices: ArrayLike, *, share: float, axis: tuple[float, float
     return least_reaching(lambda radius: float(weights @ _shares_within(start, along, radius)), wanted, 0.0, farthest)
 
 
-def share_outside(vertices: ArrayLike, radius: float, *, axis: tuple[float, float] = (0.0, 0.0)) -> float:
-    """Share of the smarticles whose centre of mass is farther than a radius from a vertical axis.
-
-    Args:
-        vertices: (N, 4, 3) [m], barb tip, hinge, hinge, barb tip of each smarticle.
-        radius: [m].
-        axis: x and y of the axis [m].
-
-    Returns:
-        The share [-].
+def share_outside(vertices: Vertices, radius: float, *, axis: tuple[float, float] = (0.0, 0.0)) -> float:
+    """Return the share [-] of smarticles whose centre of mass is farther than a radius [m] from an axis.
 
     Raises:
-        InputError: Bad vertices.
         UndefinedMeasureError: There is no smarticle.
     """
     centres = centres_of_mass(vertices)
@@ -171,38 +135,26 @@ def share_outside(vertices: ArrayLike, radius: float, *, axis: tuple[float, floa
     return float((np.hypot(*(centres[:, :2] - axis).T) > radius).mean())
 
 
-def middle(vertices: ArrayLike) -> tuple[float, float]:
-    """Middle of a pile seen from above, x and y [m]: medians of the centres of mass, which few strays do not move.
-
-    Args:
-        vertices: (N, 4, 3) [m], barb tip, hinge, hinge, barb tip of each smarticle.
-
-    Raises:
-        InputError: Bad vertices.
-    """
+def middle(vertices: Vertices) -> tuple[float, float]:
+    """Return the middle of a pile seen from above, x and y [m]: medians, which ignore strays."""
     x, y = np.median(centres_of_mass(vertices)[:, :2], axis=0)
     return float(x), float(y)
 
 
-def tilt(vertices: ArrayLike, *, foot: tuple[float, float] = (0.0, 0.0), floor_z: float = 0.0) -> float:
-    """Angle between the vertical and the line from a pile's foot to its centre of mass.
+def tilt(vertices: Vertices, *, foot: tuple[float, float] = (0.0, 0.0), floor_z: float = 0.0) -> float:
+    """Return the angle [rad] from the vertical to the line from a pile's foot to its centre of mass.
 
     A pile that is turned rigidly about its foot by an angle has that tilt; one that spreads evenly to all sides has
     none. The principal axis of the pile's inertia would not do: it lies level in every pile that is lower than
-    about 1.7 times its radius (a solid cylinder's axes change places there), and it cannot tell a leaning pile from a
-    sheared one. The foot is a place on the floor and not the middle of what now lies on it: a column that has
-    fallen over lies above the middle of its side, and would be upright.
+    about 1.7 times its radius (a solid cylinder's axes change places there), and a leaning pile has the axis of a
+    sheared one. The foot is a place on the floor and not the middle of what now lies on it: a column that has fallen
+    over lies above the middle of its side, and would be upright.
 
     Args:
-        vertices: (N, 4, 3) [m], barb tip, hinge, hinge, barb tip of each smarticle.
         foot: x and y of the point of the floor that the pile stood on [m].
         floor_z: Height of the floor [m].
 
-    Returns:
-        The angle [rad], 0 to π/2.
-
     Raises:
-        InputError: Bad vertices.
         UndefinedMeasureError: There is no smarticle, or the centre of mass is not above the floor.
     """
     x, y, z = centre_of_mass(vertices) - [*foot, floor_z]
@@ -225,8 +177,8 @@ def has_toppled(offset: float, base_radius: float) -> bool:
     return offset > base_radius
 
 
-def _shares_within(start: NDArray[np.float64], along: NDArray[np.float64], radius: float) -> NDArray[np.float64]:
-    """(n,) shares of straight lines (start, start + along), each (n, 2), within a circle about the origin."""
+def _shares_within(start: Floats, along: Floats, radius: float) -> Floats:
+    """Return shares (n,) of lines (start, start + along), each (n, 2), within a circle about the origin."""
     square, mixed = (along**2).sum(axis=1), (start * along).sum(axis=1)
     inside = radius**2 - (start**2).sum(axis=1)
     # Upright links are points seen from above.
@@ -235,7 +187,7 @@ def _shares_within(start: NDArray[np.float64], along: NDArray[np.float64], radiu
     root = mixed**2 + safe * inside
     reach = np.sqrt(np.maximum(root, 0.0))
     first, last = (np.clip((-mixed + sign * reach) / safe, 0, 1) for sign in (-1, 1))
-    shares: NDArray[np.float64] = np.where(upright, (inside >= 0).astype(float), np.where(root > 0, last - first, 0.0))
+    shares: Floats = np.where(upright, (inside >= 0).astype(float), np.where(root > 0, last - first, 0.0))
     return shares
 
 
@@ -247,7 +199,7 @@ def _free_pile_of(frame: Frame, run: Run) -> tuple[float, ...]:
 
 
 def escaped(frame: Frame, run: Run) -> int:
-    """Smarticles with their centre of mass beside or below the container."""
+    """Count smarticles with their centre of mass beside or below the container."""
     centres = centres_of_mass(frame.vertices)
     outside = np.hypot(centres[:, 0], centres[:, 1]) > run.manifest.container_radius_m
     return int((outside | (centres[:, 2] < frame.floor_z)).sum())
@@ -265,7 +217,7 @@ MEASURES = (
         place=20,
         quantities=(Quantity("escaped", "-"),),
         take=lambda frame, run: (escaped(frame, run),),
-        told_of=in_space,
+        available_for=in_space,
     ),
     FrameMeasure(
         name="free pile",
@@ -280,6 +232,6 @@ MEASURES = (
         ),
         take=_free_pile_of,
         # Of a run that takes its wall away.
-        told_of=lambda run: not (run.manifest.planar or run.manifest.walled(run.phases[-1].index)),
+        available_for=lambda run: not (run.manifest.planar or run.manifest.walled(run.phases[-1].index)),
     ),
 )

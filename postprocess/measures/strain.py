@@ -1,4 +1,4 @@
-"""What a strain test of a chain tells: force against strain, peak, yield, fracture, widening.
+"""Measure a strain test of a chain: force against strain, peak, yield, fracture, widening.
 
 Strain is that of the distance along x between the two points where strings are tied; force is that of the pulled
 string. A chain holds as long as it carries a fifth of its peak force; what comes after is its fracture.
@@ -12,14 +12,12 @@ from dataclasses import dataclass
 from types import MappingProxyType
 
 import numpy as np
-from numpy.typing import NDArray
 
 from dem.errors import InputError
 from dem.record.run import Run
 from dem.record.series import Series
+from postprocess.geometry.links import Floats
 from postprocess.measures.registry import PhaseMeasure, Quantity, Shown
-
-Array = NDArray[np.float64]
 
 STRAIN = "strain"
 """Type of the phase."""
@@ -56,7 +54,7 @@ _MEANINGS = {
         "imbalance of the strings", "N"
     ): "root mean square difference of the two strings' forces along x before the fracture",
 }
-QUANTITIES: Mapping[str, str] = MappingProxyType({quantity.header: told for quantity, told in _MEANINGS.items()})
+QUANTITIES: Mapping[str, str] = MappingProxyType({quantity.header: text for quantity, text in _MEANINGS.items()})
 """What is measured of a strain test: names of columns with their units, and what they are."""
 PEAK, AT_PEAK, FRACTURE, STIFFNESS, BEND, YIELD, DROP, WIDENING, SLIP_WIDENING, WALL, IMBALANCE = QUANTITIES
 
@@ -71,23 +69,14 @@ _TAUT = 0.3  # of the peak force: what is lost below is the jolt of the start
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class StrainTest:
-    """One strain test.
+    """One strain test."""
 
-    Attributes:
-        times: (n,) [s], while the strings are tied.
-        strains: (n,) [-].
-        forces: (n,) of the pulled string along x [N].
-        held: (n,) of the other string, in the opposite direction [N].
-        widths: (n,) of the chain [m].
-        walls: (n,) the greater of the forces on the two walls, outwards [N].
-    """
-
-    times: Array
-    strains: Array
-    forces: Array
-    held: Array
-    widths: Array
-    walls: Array
+    times: Floats  #: (n,) [s], while the strings are tied
+    strains: Floats  #: (n,) [-]
+    forces: Floats  #: (n,) of the pulled string along x [N]
+    held: Floats  #: (n,) of the other string, in the opposite direction [N]
+    widths: Floats  #: (n,) of the chain [m]
+    walls: Floats  #: (n,) the greater of the forces on the two walls, outwards [N]
 
     @property
     def fracture(self) -> int:
@@ -105,7 +94,7 @@ def has_strain(series: Series) -> bool:
 
 
 def _strain_of(run: Run, _: Series, __: int) -> tuple[float, ...]:
-    """Measures of a strain test for a table; what its end tells is NaN while the run is not done."""
+    """Measure a strain test for a table; what depends on its end is NaN while the run is not done."""
     found = measured(read_strain_test(run))
     if run.status.state != "done":
         found |= dict.fromkeys((FRACTURE, YIELD, DROP), math.nan)
@@ -113,7 +102,7 @@ def _strain_of(run: Run, _: Series, __: int) -> tuple[float, ...]:
 
 
 def read_strain_test(run: Run) -> StrainTest:
-    """The strain test of a run.
+    """Read the strain test of a run.
 
     Raises:
         InputError: There is none, or its series cannot be read.
@@ -138,7 +127,7 @@ def read_strain_test(run: Run) -> StrainTest:
 
 
 def measured(pull: StrainTest) -> dict[str, float]:
-    """The quantities of one strain test; see `QUANTITIES`."""
+    """Return the quantities of one strain test, see `QUANTITIES`."""
     end = pull.fracture + 1
     strains, forces = pull.strains[:end], pull.forces[:end]
     peak = int(np.argmax(forces))
@@ -163,18 +152,17 @@ def measured(pull: StrainTest) -> dict[str, float]:
     }
 
 
-def _mean_over(values: Array, samples: float) -> Array:
-    """Moving mean over a number of samples, over fewer at the ends."""
+def _mean_over(values: Floats, samples: float) -> Floats:
+    """Return the moving mean over a number of samples, over fewer at the ends."""
     window = np.ones(max(1, round(samples)))
-    means: Array = np.convolve(values, window, "same") / np.convolve(np.ones_like(values), window, "same")
+    means: Floats = np.convolve(values, window, "same") / np.convolve(np.ones_like(values), window, "same")
     return means
 
 
-def first_drop(forces: Array) -> tuple[int, float]:
-    """The first maximum after which a tenth of the force is lost, or the greatest one.
+def first_drop(forces: Floats) -> tuple[int, float]:
+    """Find the first maximum after which a tenth of the force (n,) [N] is lost, or the greatest one.
 
-    Args:
-        forces: (n,) [N]; what is lost below three tenths of the peak does not count.
+    What is lost below three tenths of the peak does not count.
 
     Returns:
         Its index, and the share of the force that is lost before the maximum is passed again [-].
@@ -189,8 +177,8 @@ def first_drop(forces: Array) -> tuple[int, float]:
     return top, float(1 - forces[top:until].min() / forces[top])
 
 
-def _slopes(strains: Array, forces: Array) -> tuple[float, float]:
-    """Slope of force against strain [N], and that of the upper half of the forces over that of the lower [-]."""
+def _slopes(strains: Floats, forces: Floats) -> tuple[float, float]:
+    """Return the slope of force against strain [N], and that of the upper half over that of the lower [-]."""
     top = forces[-1]
     ranges = ((0.2, 0.8), (0.2, 0.5), (0.5, 0.8))
     slopes = []
@@ -208,6 +196,6 @@ MEASURES = (
         phases=(STRAIN,),
         quantities=tuple(_MEANINGS),
         take=_strain_of,
-        told_of=lambda series, _: has_strain(series),
+        available_for=lambda series, _: has_strain(series),
     ),
 )

@@ -2,24 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
 import pandas as pd
 
 from dem.errors import InputError
 from dem.record.columns import EVERY
+from dem.record.frames import FrameSequence
+from dem.record.run import Run
 from dem.record.series import Series
 from postprocess.measures.packing import DEFINITIONS, packing_of
 from postprocess.measures.registry import frame_measures, phase_measures
-from postprocess.statistics.averages import Mean, mean_with_error
-from postprocess.statistics.columns import ASPECT, SEED
-
-if TYPE_CHECKING:
-    from collections.abc import Collection, Iterable, Sequence
-
-    from dem.record.frames import FrameSequence
-    from dem.record.run import Run
+from postprocess.statistics.points import ASPECT, SEED, marked
+from postprocess.statistics.seeds import Mean, mean_with_error
 
 Costly = Literal["never", "phase-end", "every-frame"]
 """When to take the packing fractions of `COSTLY_DEFINITIONS`."""
@@ -39,40 +36,28 @@ _SERIES_MEASURED = frozenset({"time_s", "phase", "count", "com_height_m", "packi
 
 @dataclass(frozen=True, kw_only=True)
 class PackingChange:
-    """Packing fraction before and at the end of the activity of a run.
+    """Packing fraction before and at the end of the activity of a run."""
 
-    Attributes:
-        before: φ_0, mean over the last frames of the phase before the first activity [-].
-        after: φ_f, mean over the last frames of the last activity [-].
-        definition: Key of `packing.DEFINITIONS`.
-        phase_before: Index of the phase of φ_0.
-        phase_after: Index of the phase of φ_f.
-    """
-
-    before: Mean
-    after: Mean
-    definition: str
-    phase_before: int
-    phase_after: int
+    before: Mean  #: φ_0, mean over the last frames of the phase before the first activity [-]
+    after: Mean  #: φ_f, mean over the last frames of the last activity [-]
+    definition: str  #: Key of `packing.DEFINITIONS`
+    phase_before: int  #: Index of the phase of φ_0
+    phase_after: int  #: Index of the phase of φ_f
 
 
 def measure_run(
-    run: Run,
-    *,
-    definitions: Sequence[str] = tuple(DEFINITIONS),
-    costly: Costly = "phase-end",
+    run: Run, *, definitions: Sequence[str] = tuple(DEFINITIONS), costly: Costly = "phase-end"
 ) -> pd.DataFrame:
-    """All measures of a run, one row per frame; the run may be done, failed or still going on.
+    """Measure a run, which may be done, failed or still going on: one row per frame.
 
-    A value without meaning for its frame (a packing fraction of one smarticle, the mean crossings
-    of straight ones) is NaN, as are costly values where they were not asked for. What the engine
-    recorded in `series.h5` is taken at the sample nearest in time, if that file exists.
+    A value without meaning for its frame (a packing fraction of one smarticle, the mean crossings of straight ones) is
+    NaN, as are costly values where they were not asked for. What the engine recorded in `series.h5` is taken at the
+    sample nearest in time, if that file exists.
 
     Args:
-        run: A run; it may be done, failed or still going on.
         definitions: Definitions of the packing fraction, keys of `packing.DEFINITIONS`.
-        costly: Whether the costly ones among them are taken never, at the last frame of each
-            phase recorded so far, or at every frame.
+        costly: Whether the costly ones among them are taken never, at the last frame of each phase recorded so far, or
+            at every frame.
 
     Returns:
         A table with units in its column names.
@@ -95,15 +80,13 @@ def summarise_run(
     costly: Costly = "phase-end",
     phases: Collection[int] | None = None,
 ) -> pd.DataFrame:
-    """Measures of a run averaged over the last frames of each phase, one row per phase.
+    """Measure a run averaged over the last frames of each phase: one row per phase.
 
-    Each measure has a second column, "… SE", with the standard error of the mean as in
-    `averages.mean_with_error`, which allows for correlated frames. Costly packing fractions are
-    those of the last frame alone, without an error, unless asked for at every frame. A phase has
-    what it tells as a whole beside, see `registry.PhaseMeasure`.
+    Each measure has a second column, "… SE", with the standard error of the mean as in `seeds.mean_with_error`, which
+    allows for correlated frames. Costly packing fractions are those of the last frame alone, without an error, unless
+    asked for at every frame. Measures of whole phases stand beside, see `registry.PhaseMeasure`.
 
     Args:
-        run: A run; it may be done, failed or still going on.
         last: Frames to average; "frames averaged" says how many there were.
         definitions: Definitions of the packing fraction, keys of `packing.DEFINITIONS`.
         costly: When to take the costly ones among them, see `measure_run`.
@@ -122,15 +105,11 @@ def summarise_run(
         if phases is not None and part[0].phase not in phases:
             continue
         table = pd.DataFrame(_rows(part[-last:], run, series, definitions, costly))
-        final = table.iloc[-1]
-        kept = [*_LABELS, "phase", "phase type"]
-        summary = {name: final[name] for name in kept}
-        summary |= {"time [s]": final["time [s]"], "frames averaged": len(table)}
+        summary = {name: table[name].iloc[-1] for name in (*_LABELS, "phase", "phase type", "time [s]")}
+        summary["frames averaged"] = len(table)
         for name in table.columns.difference([*summary, "frame"], sort=False):
             mean = mean_with_error(table[name])
-            quantity, _, unit = name.rpartition(" [")
-            summary[name] = mean.value
-            summary[f"{quantity} SE [{unit}"] = mean.standard_error
+            summary |= {name: mean.value, marked(name, "SE"): mean.standard_error}
         if series is not None:
             # Of the whole phase, not of its last frames.
             for measure in phase_measures():
@@ -146,19 +125,15 @@ def packing_change(
     last: int = LAST_FRAMES,
     activity: Collection[str] | None = None,
 ) -> PackingChange:
-    """φ_0 and φ_f of a run: before its first activity and at the end of its last one.
+    """Compute φ_0 and φ_f of a run: before its first activity and at the end of its last one.
 
-    Only frames of the one phase are averaged, even if it has fewer than asked for: those before
-    it belong to another state of the pile.
+    Only frames of the one phase are averaged, even if it has fewer than asked for: those before it belong to another
+    state of the pile.
 
     Args:
-        run: A run; it may be done, failed or still going on.
         definition: Key of `packing.DEFINITIONS`.
         last: Frames to average; the results say how many there were.
         activity: Types of phase that count as activity; all but `PASSIVE_PHASES` if not given.
-
-    Returns:
-        Both means with their errors.
 
     Raises:
         InputError: The run has no activity, has not come to it, or a file is missing or damaged.
@@ -189,13 +164,7 @@ def packing_change(
             msg = f"run {run} has no frame of phase {phase} ({kind}) yet; wait or resume it"
             raise InputError(msg)
         means.append(mean_with_error([packing_of(frame, run, definition=definition) for frame in part]))
-    return PackingChange(
-        before=means[0],
-        after=means[1],
-        definition=definition,
-        phase_before=before,
-        phase_after=after,
-    )
+    return PackingChange(before=means[0], after=means[1], definition=definition, phase_before=before, phase_after=after)
 
 
 def _check_last(last: int) -> None:
@@ -215,7 +184,7 @@ def _open(run: Run, definitions: Iterable[str]) -> tuple[FrameSequence, Series |
 
 
 def _phases(run: Run, frames: FrameSequence) -> list[FrameSequence]:
-    """The frames of each phase that has any."""
+    """Return the frames of each phase that has any."""
     parts = [frames.in_phase(phase.index) for phase in run.phases]
     if sum(map(len, parts)) != len(frames):
         msg = (
@@ -227,21 +196,18 @@ def _phases(run: Run, frames: FrameSequence) -> list[FrameSequence]:
 
 
 def _rows(
-    part: FrameSequence,
-    run: Run,
-    series: Series | None,
-    definitions: Sequence[str],
-    costly: Costly,
-    *,
-    offset: int = 0,
+    part: FrameSequence, run: Run, series: Series | None, definitions: Sequence[str], costly: Costly, *, offset: int = 0
 ) -> list[dict[str, object]]:
-    """One row per frame of a part of one phase; `offset` is the number of its first frame."""
+    """Return one row per frame of a part of one phase; `offset` is the number of its first frame."""
     rows: list[dict[str, object]] = []
-    measures = [measure for measure in frame_measures(definitions) if measure.told_of(run)]
+    measures = [measure for measure in frame_measures(definitions) if measure.available_for(run)]
+    made = run.manifest
+    values = (str(run.path), made.name, made.seed, made.aspect_ratio, made.count, made.fidelity, made.scene_sha256)
+    labels = dict(zip(_LABELS, values, strict=True))
     for number, frame in enumerate(part):
         take_costly = costly == "every-frame" or (costly == "phase-end" and number == len(part) - 1)
-        row: dict[str, object] = _labels(run)
-        row |= {
+        row: dict[str, object] = {
+            **labels,
             "frame": offset + number,
             "time [s]": frame.time,
             "phase": frame.phase,
@@ -253,19 +219,6 @@ def _rows(
             row |= _series_columns(series, frame.time)
         rows.append(row)
     return rows
-
-
-def _labels(run: Run) -> dict[str, object]:
-    values = (
-        str(run.path),
-        run.manifest.name,
-        run.manifest.seed,
-        run.manifest.aspect_ratio,
-        run.manifest.count,
-        run.manifest.fidelity,
-        run.manifest.scene_sha256,
-    )
-    return dict(zip(_LABELS, values, strict=True))
 
 
 def _series_columns(series: Series, time: float) -> dict[str, float]:

@@ -1,4 +1,4 @@
-"""The canvas of a picture: bodies of one or more runs side by side, in parallel projection, drawn by PyVista.
+"""Draw bodies of one or more runs side by side, in parallel projection, by PyVista.
 
 It is drawn at twice its size and scaled down. No display is needed: VTK falls back to EGL.
 """
@@ -12,27 +12,28 @@ import sys
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
+from pathlib import Path
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, Self
+from typing import Any, Self
 
 import numpy as np
 import pyvista as pv
+from matplotlib.colors import Colormap
 from matplotlib.font_manager import FontProperties, findfont
+from numpy.typing import NDArray
 from PIL import Image, ImageDraw
 from vtkmodules.vtkCommonCore import vtkLogger
 from vtkmodules.vtkRenderingCore import vtkTextRenderer
 
 from dem.errors import InputError, RunError, nearest
 from dem.record.frame import Frame
-from dem.record.run import Run
-from postprocess.bodies.colours import PAINTS, ColourScale, colour_field
-from postprocess.bodies.fields import Field
-from postprocess.bodies.meshes import BOX_POINTS, Bodies, owners, solid
+from dem.record.frames import read_frames
+from dem.record.run import Run, open_run
+from postprocess.bodies.colours import PAINTS, ColourScale, colour_field, scalars
+from postprocess.bodies.fields import BY_NAME, IDENTITY, Field
+from postprocess.bodies.meshes import BOX_POINTS, USUAL, Bodies, owners, solid
+from postprocess.geometry.links import Floats
 from postprocess.report import figures
-
-if TYPE_CHECKING:
-    from matplotlib.colors import Colormap
-    from numpy.typing import NDArray
 
 VIEWS: Mapping[str, tuple[float, float]] = MappingProxyType(
     {"front": (-90.0, 14.0), "oblique": (-62.0, 34.0), "top": (-90.0, 90.0)}
@@ -44,17 +45,14 @@ MILLIMETRE = 1e3
 
 _OVERSAMPLING = 2
 _LEAST_SIZE, _LARGEST_SIZE = 200, 8000  # pixel
-_FILL = 0.97  # share of the room that bodies take
+_FILL = 0.97  # share of the view that bodies take
 _EDGE = "#7d8f9f"
-_PALE = 0.15  # opacity of smarticles that let forces be seen
+_PALE = 0.15  # opacity of smarticles in front of forces
 # In hundredths of a picture's shorter side: height of the captions, of scale and colour bar, margin, text.
 _HEAD, _FOOT, _MARGIN, _TITLE, _TEXT = 11.5, 10.0, 2.6, 2.5, 1.9
 _LEAST_UNIT = 4.4  # pixel: smaller text cannot be read
 _LETTER = 0.62  # width of a letter over its height
 _LIGHTS = ((-0.6, 1.1, 0.85), (0.9, 0.35, 0.32), (0.0, 0.0, 0.25))  # right, up, intensity
-
-Rectangle = tuple[float, float, float, float]
-"""Least and largest x, least and largest y in the picture's plane [mm]."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -63,39 +61,66 @@ class Look:
 
     field: Field
     size: tuple[int, int]
-    axes: NDArray[np.float64]
+    axes: Floats
 
     @classmethod
-    def checked(cls, run: Run, *, color_by: str | None, size: tuple[int, int], view: str | None) -> Self:
+    def of(cls, runs: Sequence[Run], *, color_by: str | None, size: tuple[int, int], view: str | None) -> Self:
         """Return a look by names.
 
         Raises:
-            InputError: Unknown field or view, or a bad size.
+            InputError: Unknown field or view, a bad size, or runs that have no view in common.
         """
-        name = view or ("top" if run.manifest.planar else "front")
+        if len({run.manifest.planar for run in runs}) > 1:
+            msg = "a run in a plane and one in space have no view in common; compare runs of one kind"
+            raise InputError(msg)
+        name = view or ("top" if runs[0].manifest.planar else "front")
         if name not in VIEWS:
             msg = f"view {name!r}: is not known; {nearest(name, VIEWS)}"
             raise InputError(msg)
         if not all(_LEAST_SIZE <= side <= _LARGEST_SIZE for side in size):
             msg = f"size must be {_LEAST_SIZE} to {_LARGEST_SIZE} pixels each way: got {size[0]} x {size[1]}"
             raise InputError(msg)
-        return cls(field=colour_field(color_by, run), size=size, axes=axes_from(*VIEWS[name]))
+        return cls(field=colour_field(color_by, runs[0]), size=size, axes=axes_from(*VIEWS[name]))
 
     @property
     def unit(self) -> float:
         """A hundredth of the picture's shorter side, or what can just be read [pixel]."""
         return max(min(self.size) / 100, _LEAST_UNIT)
 
+    def pixel(self, extent: Floats) -> float:
+        """Return the length of a pixel [mm] of a picture that shows an extent (2, 2) [mm]."""
+        width, height = np.diff(extent, axis=0)[0]
+        free = self.size[1] - (_HEAD + _FOOT) * self.unit
+        return float(max(width / (_FILL * self.size[0]), height / (_FILL * free))) or 1.0
 
-@dataclass(frozen=True)
-class Caption:
-    """A title, and lines below it."""
-
-    title: str
-    lines: tuple[str, ...]
+    def panel(self, image: Image.Image) -> Image.Image:
+        """Return the bodies of a picture alone, without what is written around them."""
+        return image.crop((0, round(_HEAD * self.unit), image.width, image.height - round(_FOOT * self.unit)))
 
 
-def axes_from(azimuth: float, elevation: float) -> NDArray[np.float64]:
+class Shot:
+    """A run to be drawn: its frames, and its bodies cut open in front.
+
+    Raises:
+        InputError: Something of it is missing or damaged, or forces are wanted and not recorded.
+    """
+
+    def __init__(self, directory: Path | str, *, forces: bool = False) -> None:
+        self.run = open_run(directory)
+        kinds = (*USUAL, "forces") if forces else USUAL
+        self.bodies = Bodies(self.run, kinds, [BY_NAME[name] for name in IDENTITY], cut=True)
+        self.frames = read_frames(directory)
+
+    def extent(self, indices: Iterable[int], axes: Floats) -> Floats:
+        """Return the part (2, 2) of the picture's plane that some frames take [mm]."""
+        return union([extent(drawn(self.bodies, self.frames[i], axes[2]).values(), axes) for i in indices])
+
+    def values(self, indices: Iterable[int], look: Look) -> list[Floats]:
+        """Return values (N, 3) that the colours of some frames show."""
+        return [scalars(look.field, self.frames[i], self.run) for i in indices]
+
+
+def axes_from(azimuth: float, elevation: float) -> Floats:
     """Return right, up and forward (3, 3) of a camera, by its direction from the pile [degree]."""
     a, e = math.radians(azimuth), math.radians(elevation)
     right = np.array([-math.sin(a), math.cos(a), 0.0])
@@ -103,17 +128,13 @@ def axes_from(azimuth: float, elevation: float) -> NDArray[np.float64]:
     return np.stack([right, np.cross(right, forward), forward])
 
 
-def drawn(
-    bodies: Bodies, frame: Frame, forward: NDArray[np.float64], *, largest: float | None = None
-) -> dict[str, pv.PolyData]:
+def drawn(bodies: Bodies, frame: Frame, forward: Floats, *, largest: float | None = None) -> dict[str, pv.PolyData]:
     """Return what is drawn of a frame, [mm] above the floor: walls cut open in front, lines as tubes.
 
     A wall that was taken away is there as `ghost`.
 
     Args:
-        bodies: Of the run.
-        frame: One of its frames.
-        forward: (3,) direction in which the camera looks; zeros: walls stay whole.
+        forward: (3,) direction of view; zeros: walls stay whole.
         largest: Normal force of the thickest line of force [N].
     """
     made = bodies.at(frame)
@@ -128,30 +149,20 @@ def drawn(
     return found
 
 
-def rectangle(meshes: Iterable[pv.PolyData], axes: NDArray[np.float64]) -> Rectangle:
-    """Return the part of the picture's plane that meshes [mm] take."""
+def extent(meshes: Iterable[pv.PolyData], axes: Floats) -> Floats:
+    """Return the least and the largest x and y (2, 2) of meshes [mm] in the picture's plane."""
     places = np.concatenate([np.asarray(mesh.points) @ axes[:2].T for mesh in meshes])
-    (left, below), (right, above) = places.min(axis=0), places.max(axis=0)
-    return float(left), float(right), float(below), float(above)
+    return np.stack([places.min(axis=0), places.max(axis=0)])
 
 
-def union(parts: Sequence[Rectangle]) -> Rectangle:
-    """Return the rectangle around some."""
-    left, right, below, above = np.array(parts).T
-    return float(left.min()), float(right.max()), float(below.min()), float(above.max())
+def union(extents: Sequence[Floats]) -> Floats:
+    """Return the extent around some."""
+    return np.stack([np.min(extents, axis=0)[0], np.max(extents, axis=0)[1]])
 
 
-def add_bodies(
-    plotter: Any, meshes: Mapping[str, pv.PolyData], colours: NDArray[np.uint8], *, pale: bool = False
-) -> None:
-    """Put meshes into a window in place of those of their kinds that are there.
-
-    Args:
-        plotter: The window.
-        meshes: Of `drawn`.
-        colours: (boxes, 3) of the smarticles, 0 to 255.
-        pale: Whether smarticles are seen through.
-    """
+def add_bodies(plotter: Any, meshes: Mapping[str, pv.PolyData], frame: Frame, colours: NDArray[np.uint8]) -> None:
+    """Put meshes of `drawn` into a window in place of those there, links in colours (N, 3, 3), 0 to 255."""
+    pale = "forces" in meshes
     for kind in (*PAINTS, "ghost"):
         for name in (kind, f"{kind} edges"):
             plotter.renderer.remove_actor(name, render=False)
@@ -164,9 +175,9 @@ def add_bodies(
             line = {"color": _EDGE, "line_width": 1.8 * _OVERSAMPLING, "lighting": False, "opacity": opacity}
             plotter.add_mesh(edges, **(options | line | {"name": f"{kind} edges"}))
         if kind == "smarticles":
-            mesh.point_data["colour"] = np.repeat(colours, BOX_POINTS, axis=0)
+            mesh.point_data["colour"] = np.repeat(colours[owners(mesh, frame)], BOX_POINTS, axis=0)
             options |= {"scalars": "colour", "rgb": True, "opacity": _PALE if pale else 1.0, "specular": 0.12}
-            # Of a closed box nobody sees the faces behind; drawing them took a quarter of a film's time.
+            # The faces behind of a closed box are not seen; drawing them took a quarter of a film's time.
             options |= {"culling": not pale and "back", "ambient": 0.22, "diffuse": 0.85, "specular_power": 20}
             options |= {"show_edges": True, "edge_color": "#101418", "edge_opacity": 0.55, "line_width": _OVERSAMPLING}
         elif kind != "ghost":
@@ -181,15 +192,10 @@ class Canvas:
     """A window of one or more panels with one camera, one scale of colours and one scale bar.
 
     Args:
-        look: Of each panel.
-        room: What the camera has in view.
+        extent: (2, 2) of what the camera has in view [mm].
         run: By whose sizes corners are shaded.
-        columns: Panels side by side.
         scale: Of colours; None: no bar of colours.
         quick: Whether to leave out the shade in corners, which takes most of the time of a picture.
-
-    Attributes:
-        pixel: Length of a pixel [mm].
 
     Raises:
         RunError: This machine lacks the libraries to draw without a display.
@@ -198,7 +204,7 @@ class Canvas:
     def __init__(
         self,
         look: Look,
-        room: Rectangle,
+        extent: Floats,
         run: Run,
         *,
         columns: int = 1,
@@ -208,13 +214,10 @@ class Canvas:
         check_graphics()
         self._look, self._columns = look, columns
         self.size = look.size[0] * columns, look.size[1]
-        width, height = look.size
-        free = height - (_HEAD + _FOOT) * look.unit
-        left, right, below, above = room
-        self.pixel = max((right - left) / (_FILL * width), (above - below) / (_FILL * free)) or 1.0  # mm
+        self.pixel = look.pixel(extent)
         # Captions take more of the picture than the bars do.
         lift = (_HEAD - _FOOT) / 2 * look.unit * self.pixel
-        self._centre = (left + right) / 2, (below + above) / 2 + lift
+        self._centre = extent.mean(axis=0) + np.array([0.0, lift])
         self._reach = 4 * self.pixel * max(self.size)
         with quiet_vtk():
             plotter: Any = pv.Plotter(
@@ -239,7 +242,7 @@ class Canvas:
             self.turn(look.axes)
             if scale is not None and scale.colours is not None:
                 self._add_colour_bar(scale, scale.colours)
-            self._length = round_length(0.2 * width * self.pixel)
+            self._length = round_length(0.2 * look.size[0] * self.pixel)
             at = self._bar[2] + look.unit, self._bar[3]
             self._write(0, "scale", f"{self._length:g} mm", at, _TEXT)
 
@@ -255,7 +258,7 @@ class Canvas:
         unit = self._look.unit
         return _MARGIN * unit, (_FOOT / 2 + 0.9) * unit, _MARGIN * unit + self._length / self.pixel, _FOOT / 2 * unit
 
-    def turn(self, axes: NDArray[np.float64]) -> None:
+    def turn(self, axes: Floats) -> None:
         """Turn all cameras."""
         right, up, forward = axes
         focus = self._centre[0] * right + self._centre[1] * up
@@ -273,28 +276,19 @@ class Canvas:
         frame: Frame,
         meshes: Mapping[str, pv.PolyData],
         colours: NDArray[np.uint8],
-        caption: Caption,
+        caption: Sequence[str] = (),
     ) -> None:
-        """Put a frame into a panel.
-
-        Args:
-            column: The panel, from the left.
-            frame: What to draw.
-            meshes: Of `drawn`.
-            colours: (N, 3, 3) of each link of each smarticle, 0 to 255.
-            caption: What is written above.
-        """
+        """Put meshes of `drawn` into a panel, links in colours (N, 3, 3), a title and lines above."""
         with quiet_vtk():
             self._plotter.subplot(0, column)
-            boxes = colours[owners(meshes["smarticles"], frame)] if "smarticles" in meshes else colours[:0, 0]
-            add_bodies(self._plotter, meshes, boxes, pale="forces" in meshes)
+            add_bodies(self._plotter, meshes, frame, colours)
             unit, down = self._look.unit, self._look.size[1] - 2.0 * self._look.unit
-            for number, text in enumerate((caption.title, *caption.lines)):
+            for number, text in enumerate(caption):
                 size = _TEXT if number else _TITLE
                 down -= 1.4 * size * unit
                 self._write(column, f"line {number}", text, (_MARGIN * unit, down), size, bold=not number)
 
-    def add_patch(self, corners: NDArray[np.float64], colour: str) -> None:
+    def add_patch(self, corners: Floats, colour: str) -> None:
         """Add a flat see-through patch with corners (n, 3) [mm]."""
         patch = pv.PolyData.from_regular_faces(corners, [list(range(len(corners)))])
         self._plotter.add_mesh(patch, color=colour, opacity=0.25, lighting=False, reset_camera=False, render=False)
@@ -307,12 +301,6 @@ class Canvas:
         left, top, right, bottom = self._bar
         ImageDraw.Draw(image).rectangle((left, self.size[1] - top, right, self.size[1] - bottom), fill=figures.BLACK)
         return image
-
-    def panel(self) -> Image.Image:
-        """Return the bodies alone, without what is written around them."""
-        unit = self._look.unit
-        width, height = self.size
-        return self.image().crop((0, round(_HEAD * unit), width, height - round(_FOOT * unit)))
 
     def _write(
         self, column: int, name: str, text: str, at: tuple[float, float], size: float, *, bold: bool = False

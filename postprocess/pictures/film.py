@@ -8,15 +8,14 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field
 from itertools import pairwise
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Self
+from typing import Any, Self
 
 import numpy as np
+from numpy.typing import ArrayLike
 from PIL import Image
 
 from dem.errors import InputError
-
-if TYPE_CHECKING:
-    from numpy.typing import ArrayLike, NDArray
+from postprocess.geometry.links import Floats
 
 KINDS = (".gif", ".webp", ".mp4")
 """Suffixes of films."""
@@ -35,17 +34,11 @@ _H264 = ("-crf", "18", "-movflags", "+faststart", "-vf", "scale=out_color_matrix
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Moments:
-    """Times at equal distances, so that a film plays at one speed.
+    """Times at equal distances, so that a film plays at one speed."""
 
-    Attributes:
-        times: (n,) simulated times [s]; each is shown by the recorded frame nearest to it.
-        every: From one to the next [s].
-        rate: Pictures per second [1/s].
-    """
-
-    times: NDArray[np.float64] = field(repr=False)
-    every: float
-    rate: float
+    times: Floats = field(repr=False)  #: (n,) simulated times [s]; each is shown by the recorded frame nearest to it
+    every: float  #: From one to the next [s]
+    rate: float  #: Pictures per second [1/s]
 
     @property
     def pace(self) -> str:
@@ -63,21 +56,15 @@ class Moments:
         rate: float = RATE,
         most: int = MOST,
     ) -> Self:
-        """Return the moments of a film.
-
-        Args:
-            recorded: (m,) times of the frames, ascending [s].
-            start: First moment [s]; the first frame if not given.
-            end: Last moment at most [s]; the last frame if not given.
-            every: From one moment to the next [s]; if not given the time between frames, or a multiple of it that
-                makes no more than `most`.
-            rate: Pictures per second [1/s].
-            most: See `every`.
+        """Choose the moments of a film of frames at (m,) ascending times [s]; arguments as in `render_film`.
 
         Raises:
             InputError: Fewer than two moments, or times out of order or out of the run.
         """
         recorded = np.asarray(recorded, dtype=np.float64)
+        if most < 2:
+            msg = f"a film needs most_frames of at least 2: got {most}; leave it out for {MOST}"
+            raise InputError(msg)
         if len(recorded) < 2:
             msg = f"a film needs at least 2 frames: got {len(recorded)}; draw a picture, .png"
             raise InputError(msg)
@@ -105,19 +92,14 @@ class Moments:
             raise InputError(msg)
         return cls(times=low + every * np.arange(steps + 1.0), every=every, rate=rate)
 
-    def indices(self, recorded: NDArray[np.float64]) -> list[int]:
+    def indices(self, recorded: Floats) -> list[int]:
         """Return the frame nearest to each moment, of frames at (m,) times [s]."""
         nearest: list[int] = np.abs(recorded[None] - self.times[:, None]).argmin(axis=1).tolist()
         return nearest
 
 
 def durations(count: int, rate: float, unit: float) -> list[int]:
-    """Return how long each of some pictures is shown, in whole units of time, right to half a unit in sum.
-
-    Args:
-        count: Pictures.
-        rate: Pictures per second [1/s].
-        unit: [s].
+    """Return how long each picture is shown, in whole units of time [s], right to half a unit in sum.
 
     Example:
         >>> durations(4, 15.0, 0.01)
@@ -127,10 +109,10 @@ def durations(count: int, rate: float, unit: float) -> list[int]:
 
 
 def check_film(path: Path, size: tuple[int, int]) -> None:
-    """Complain before anything is drawn.
+    """Reject a film that cannot be written here, before anything is drawn.
 
     Raises:
-        InputError: Such a film cannot be written here: a package is missing, or the size [pixel] does not suit.
+        InputError: A package is missing, or the size [pixel] does not suit.
     """
     if path.suffix != ".mp4":
         return
@@ -145,14 +127,7 @@ def check_film(path: Path, size: tuple[int, int]) -> None:
 
 
 def write_film(path: Path, images: Iterable[Image.Image], *, count: int, rate: float) -> None:
-    """Write a film, one picture at a time.
-
-    Args:
-        path: With a suffix of `KINDS`.
-        images: All of one size.
-        count: How many.
-        rate: Pictures per second [1/s].
-    """
+    """Write a film of so many pictures of one size, one at a time, at a rate [1/s]."""
     frames = iter(images)
     first = next(frames)
     if path.suffix == ".mp4":

@@ -9,8 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from postprocess.bodies.colours import ColourScale
-from postprocess.pictures.canvas import Canvas, Caption, Look, drawn, union
-from postprocess.pictures.shot import Shot
+from postprocess.pictures.canvas import Canvas, Look, Shot, drawn, union
 from postprocess.report import figures
 
 _SIZE = (400, 400)  # pixel, of a picture with its caption, which is left out
@@ -18,27 +17,19 @@ _SIZE = (400, 400)  # pixel, of a picture with its caption, which is left out
 
 @dataclass(frozen=True, kw_only=True)
 class Row:
-    """Pictures of one run.
+    """Pictures of one run."""
 
-    Attributes:
-        directory: The run.
-        label: What is written beside them.
-        times: Simulated times [s]; of each the nearest frame is drawn.
-    """
-
-    directory: Path
-    label: str
-    times: tuple[float, ...]
+    directory: Path  #: The run
+    label: str  #: What is written beside them
+    times: tuple[float, ...]  #: Simulated times [s]; of each the nearest frame is drawn
 
 
 def draw_strip(rows: Sequence[Row], output: Path, *, columns: Sequence[str], footer: Sequence[str]) -> Path:
     """Draw a picture of each run at each of its times, and write them as one figure.
 
-    A smarticle has the same colour in all pictures of a run.
+    A smarticle has one colour in all pictures of a run.
 
     Args:
-        rows: The runs, from above.
-        output: File to write, `.png`.
         columns: What is written above the pictures, one each.
         footer: Origin, one statement each.
 
@@ -46,33 +37,31 @@ def draw_strip(rows: Sequence[Row], output: Path, *, columns: Sequence[str], foo
         InputError: A run has no frames.
         RunError: This machine lacks the libraries to draw without a display.
     """
-    shots = [Shot.of(row.directory) for row in rows]
+    shots = [Shot(row.directory) for row in rows]
+    look = Look.of([shot.run for shot in shots[:1]], color_by="id", size=_SIZE, view="front")
     shown = [
         [int(np.argmin(np.abs(shot.frames.times - time))) for time in row.times]
         for shot, row in zip(shots, rows, strict=True)
     ]
-    look = Look.checked(shots[0].run, color_by="id", size=_SIZE, view="front")
     for shot, indices in zip(shots, shown, strict=True):
         shot.bodies.hold(shot.frames[i] for i in indices)
-    room = union([shot.room(indices, look.axes) for shot, indices in zip(shots, shown, strict=True)])
-    scale, pictures, width = ColourScale.of(look.field, (0.0, 1.0)), [], 1.0
+    extent = union([shot.extent(indices, look.axes) for shot, indices in zip(shots, shown, strict=True)])
+    scale, pictures = ColourScale.of(look.field, (0.0, 1.0)), []
     for shot, indices in zip(shots, shown, strict=True):
-        with Canvas(look, room, shot.run) as canvas:
+        with Canvas(look, extent, shot.run) as canvas:
             for index, values in zip(indices, shot.values(indices, look), strict=True):
                 frame = shot.frames[index]
-                meshes = drawn(shot.bodies, frame, look.axes[2])
-                canvas.show(0, frame, meshes, scale.painted(values), Caption("", ()))
-                pictures.append(np.asarray(canvas.panel()))
-            width = canvas.pixel * _SIZE[0]
+                canvas.show(0, frame, drawn(shot.bodies, frame, look.axes[2]), scale.painted(values))
+                pictures.append(np.asarray(look.panel(canvas.image())))
     inked = np.flatnonzero((np.array(pictures) < 255).any(axis=(0, 2, 3)))
     part = slice(inked[0], inked[-1] + 1)
-    wide = 2 * figures.COLUMN_WIDTH
-    high = wide * len(rows) * (inked[-1] - inked[0] + 1) / (len(columns) * _SIZE[0])
+    height, width = inked[-1] + 1 - inked[0], look.pixel(extent) * _SIZE[0]
     with figures.style():
-        figure = figures.blank_figure(wide + 0.3, high)
+        wide = 2 * figures.COLUMN_WIDTH
+        figure = figures.blank_figure(wide + 0.3, wide * len(rows) * height / (len(columns) * _SIZE[0]))
         grid = figure.subplots(len(rows), len(columns), squeeze=False)
         for number, (axes, picture) in enumerate(zip(grid.flat, pictures, strict=True)):
-            axes.imshow(picture[part], extent=(0, width, 0, width * len(picture[part]) / _SIZE[0]))
+            axes.imshow(picture[part], extent=(0, width, 0, width * height / _SIZE[0]))
             axes.set(xticks=[], yticks=[], frame_on=False)
             if number < len(columns):
                 axes.set_title(columns[number], fontsize=7)

@@ -1,1 +1,1 @@
-"""Figures, tables and texts on disk. On statistics alone; pictures are drawn with it, never the other way."""
+"""Figures, tables and texts on disk."""

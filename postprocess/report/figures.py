@@ -1,4 +1,4 @@
-"""The look of every figure: size, colours, footer, and how a figure reaches the disk whole.
+"""The style of every figure: size, colours, footer, limits that hide nothing, whole files.
 
 A figure is drawn inside `style()`, gets its provenance from `add_footer` and is written by `save`.
 """
@@ -9,9 +9,8 @@ import textwrap
 import warnings
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -26,13 +25,12 @@ with warnings.catch_warnings():
     import matplotlib.style
 
 from matplotlib import rc_context
+from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.colors import BoundaryNorm, Colormap, ListedColormap, to_hex
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
-    from numpy.typing import NDArray
+from matplotlib.collections import FillBetweenPolyCollection, LineCollection
+from matplotlib.colors import to_hex
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
 
 COLUMN_WIDTH = 3.5
 """Width of a journal column [inch]."""
@@ -46,7 +44,7 @@ SKY = "#56b4e9"
 ORANGE = "#d55e00"
 GREEN = "#009e73"
 GREY = "#6e6e6e"
-"""Okabe and Ito's colours: told apart with every common colour blindness, and in grey print."""
+"""Okabe and Ito's colours: distinct with every common colour blindness, and in grey print."""
 
 _STYLE: dict[Any, Any] = {
     "axes.edgecolor": BLACK,
@@ -83,62 +81,34 @@ _FOOTER_MARGIN = 0.06  # inch above and below it together
 _FOOTER_COLUMNS = 97  # characters of that size across one column width
 
 FOOTER_SHARE = 0.2
-"""The most of a figure's height that its footer takes [-]: what a figure is of stands beside it, see `add_footer`."""
+"""The most of a figure's height that its footer takes [-]."""
 
 
 @contextmanager
 def style() -> Iterator[None]:
-    """Matplotlib's settings for our figures, restored afterwards."""
+    """Set Matplotlib's settings for our figures, and restore them afterwards."""
     with rc_context(_STYLE):
         yield
 
 
 def new_figure(*, width: float = COLUMN_WIDTH, height: float = 2.6) -> tuple[Figure, Axes]:
-    """An empty figure with one pair of axes, drawn by Agg whatever the machine's display.
-
-    Args:
-        width: [inch].
-        height: of the axes with their labels, without the footer [inch].
-
-    Returns:
-        The figure and its axes.
-    """
+    """Make a figure with one pair of axes; the height [inch] is without the footer."""
     figure = blank_figure(width, height)
     return figure, figure.add_subplot()
 
 
-def blank_figure(width: float, height: float, *, dpi: int = RESOLUTION) -> Figure:
-    """A figure without axes.
-
-    Args:
-        width: [inch].
-        height: [inch].
-        dpi: Pixels per inch on screen.
-
-    Returns:
-        The figure.
-    """
-    figure = matplotlib.figure.Figure(figsize=(width, height), dpi=dpi, facecolor="white")
+def blank_figure(width: float, height: float) -> Figure:
+    """Make a figure without axes, of a size [inch], drawn by Agg whatever the machine's display."""
+    figure = matplotlib.figure.Figure(figsize=(width, height), dpi=RESOLUTION, facecolor="white")
     FigureCanvasAgg(figure)
     return figure
 
 
-def pixels(figure: Figure) -> NDArray[np.uint8]:
-    """The figure as (height, width, 3) colours, 0 to 255."""
-    canvas: Any = FigureCanvasAgg(figure)
-    canvas.draw()
-    return np.asarray(canvas.buffer_rgba(), dtype=np.uint8)[..., :3].copy()
-
-
 def add_footer(figure: Figure, lines: Sequence[str]) -> None:
-    """Put the provenance below the axes; the figure grows by the height of the text.
+    """Put the provenance below a figure drawn completely, which grows by the height of the text.
 
-    The footer takes `FOOTER_SHARE` of the figure at most: of what is longer the last statement stays, which tells where
+    The footer takes `FOOTER_SHARE` of the figure at most: of what is longer the last statement stays, which says where
     the rest is to be read, and the others are cut at "…".
-
-    Args:
-        figure: drawn completely; its layout is settled here.
-        lines: one statement each; a long one is broken.
     """
     width, height = figure.get_size_inches()
     text = _fitting(lines, int(_FOOTER_COLUMNS * width / COLUMN_WIDTH), _most_lines(height))
@@ -147,26 +117,19 @@ def add_footer(figure: Figure, lines: Sequence[str]) -> None:
     base = below / (height + below)
     figure.set_layout_engine("constrained", rect=(0.0, base, 1.0, 1.0 - base))
     figure.text(
-        0.015,
-        _FOOTER_MARGIN / 2 / (height + below),
-        "\n".join(text),
-        fontsize=_FOOTER_SIZE,
-        color=GREY,
-        va="bottom",
-        ha="left",
-        linespacing=1.25,
-        parse_math=False,
-    )
+        0.015, _FOOTER_MARGIN / 2 / (height + below), "\n".join(text), fontsize=_FOOTER_SIZE, color=GREY,
+        va="bottom", ha="left", linespacing=1.25, parse_math=False,
+    )  # fmt: skip
 
 
 def _most_lines(height: float) -> int:
-    """How many lines of footer a figure of some height [inch] bears, one at least."""
+    """Return how many lines of footer a figure of some height [inch] bears, one at least."""
     room = height * FOOTER_SHARE / (1 - FOOTER_SHARE)
     return max(int((room - _FOOTER_MARGIN) / _FOOTER_LINE), 1)
 
 
 def _fitting(lines: Sequence[str], columns: int, most: int) -> list[str]:
-    """Statements broken at a number of columns, and cut but for the last where there are more lines than `most`."""
+    """Break statements at a number of columns, and cut all but the last beyond `most` lines."""
     broken = [textwrap.wrap(line, columns, break_on_hyphens=False) or [""] for line in lines]
     text = [part for parts in broken for part in parts]
     if len(text) <= most:
@@ -179,42 +142,27 @@ def _fitting(lines: Sequence[str], columns: int, most: int) -> list[str]:
 
 
 def save(figure: Figure, path: Path, *, formats: Sequence[str] = ("png", "svg", "pdf")) -> list[Path]:
-    """Write a figure in several formats, each beside and then renamed.
+    """Write a figure in several formats, each beside and then renamed; the path has no suffix.
 
-    The files hold no date: the same figure gives the same bytes.
-
-    Args:
-        figure: to write.
-        path: without suffix.
-        formats: suffixes without the dot.
-
-    Returns:
-        The files written.
+    The files hold no date: one figure always gives the same bytes.
     """
-    metadata: dict[str, dict[str, str | None]] = {
-        "svg": {"Date": None},
-        "pdf": {"CreationDate": None, "ModDate": None},
-    }
+    dates: dict[str, dict[str, None]] = {"svg": {"Date": None}, "pdf": {"CreationDate": None, "ModDate": None}}
     written = []
     for suffix in formats:
         target = path.with_name(f"{path.name}.{suffix}")
         with whole_file(target) as temporary:
-            figure.savefig(temporary, format=suffix, metadata=metadata.get(suffix))
+            figure.savefig(temporary, format=suffix, metadata=dates.get(suffix))
         written.append(target)
     return written
 
 
 @contextmanager
 def whole_file(path: Path, *, overwrite: bool = True) -> Iterator[Path]:
-    """A temporary path beside `path`, renamed to it when the block ends well.
-
-    Args:
-        path: the file to be made.
-        overwrite: whether an existing file may be replaced.
+    """Give a temporary path beside `path`, renamed to it when the block ends well.
 
     Raises:
-        InputError: the file exists and must not be replaced, or its folder does not exist.
-        RunError: the disk is full, or the folder cannot be written.
+        InputError: The file exists and must not be replaced, or its folder does not exist.
+        RunError: The disk is full, or the folder cannot be written.
     """
     refuse_to_overwrite(path, overwrite=overwrite)
     if not path.parent.is_dir():
@@ -229,60 +177,85 @@ def whole_file(path: Path, *, overwrite: bool = True) -> Iterator[Path]:
 
 
 def refuse_to_overwrite(path: Path, *, overwrite: bool) -> None:
-    """Complain early about an output that exists.
+    """Reject early an output that exists.
 
     Raises:
-        InputError: the file exists and `overwrite` is false.
+        InputError: The file exists and `overwrite` is false.
     """
     if path.exists() and not overwrite:
         msg = f"{path}: exists already and is left as it is; choose another name, or let it be replaced (--overwrite)"
         raise InputError(msg)
 
 
-@dataclass(frozen=True, kw_only=True)
-class CountColours:
-    """Colours for whole numbers 0 … top, the last one open-ended if `clipped`."""
-
-    colours: Colormap
-    norm: BoundaryNorm
-    ticks: tuple[int, ...]
-    labels: tuple[str, ...]
-
-
-def sequence(colours: int, *, first: float = 0.16, last: float = 1.0) -> list[str]:
-    """Equally spaced colours of viridis, lightened so that shading stays visible on them.
+def sequence(colours: int, *, last: float = 1.0) -> list[str]:
+    """Return hexadecimal colours, dark to light: steps of viridis, lightened so that shading shows.
 
     Args:
-        colours: how many.
-        first: place of the first one in the map, 0 … 1.
-        last: place of the last one.
-
-    Returns:
-        Hexadecimal colours, dark to light.
+        last: Place of the last one in the map, up to 1.
     """
-    steps = [first + (last - first) * i / max(colours - 1, 1) for i in range(colours)]
+    steps = [0.16 + (last - 0.16) * i / max(colours - 1, 1) for i in range(colours)]
     plain = np.array([matplotlib.colormaps["viridis"](step)[:3] for step in steps])
     return [to_hex(colour) for colour in 1 - 0.86 * (1 - plain)]
 
 
-def count_colours(largest: int, *, classes: int = 13) -> CountColours:
-    """One colour per whole number, with a neutral grey for zero.
+_MARGIN = 0.03  # of the axis, beyond what would be cut: what ends at the frame looks cut
 
-    Args:
-        largest: the largest number to show.
-        classes: the most colours; larger numbers share the last one.
+
+def hold_everything(figure: Figure) -> list[str]:
+    """Widen limits that cut what was drawn, of a figure drawn completely but for its footer.
+
+    On a logarithmic axis nothing at or below 0 has a place: bars that reach there end at the axis, which is stated.
 
     Returns:
-        Colour map, norm, and the ticks of a colour bar.
+        What could not be shown whole, one statement each, for the footer.
     """
-    top = max(1, min(largest, classes - 1))
-    colours = ["#c9c9c9", *sequence(top)]
-    labels = [str(i) for i in range(top + 1)]
-    if largest > top:
-        labels[-1] = f"≥ {top}"
-    return CountColours(
-        colours=ListedColormap(colours),
-        norm=BoundaryNorm([i - 0.5 for i in range(top + 2)], top + 1),
-        ticks=tuple(range(top + 1)),
-        labels=tuple(labels),
-    )
+    cut = 0
+    for axes in figure.axes:
+        for place, scale in enumerate((axes.get_xscale(), axes.get_yscale())):
+            _hold(axes, place, log=scale == "log")
+            cut += scale == "log" and sum(float(ends[:, place].min()) <= 0 for ends in _bars(axes))
+    if not cut:
+        return []
+    return [f"{cut} error bar{'s' if cut > 1 else ''} reach{'' if cut > 1 else 'es'} to 0 or below: cut by the axis."]
+
+
+def _hold(axes: Axes, place: int, *, log: bool) -> None:
+    """Widen one axis, x (0) or y (1)."""
+    values = np.concatenate([np.empty(0), *(points[:, place] for points in _drawn(axes))])
+    values = values[np.isfinite(values) & ((values > 0) if log else True)]
+    if not len(values):
+        return
+    limits = axes.get_ylim() if place else axes.get_xlim()
+    least, most = min(limits), max(limits)
+    low, high = min(least, float(values.min())), max(most, float(values.max()))
+    if (low, high) == (least, most):
+        return
+    ends = np.log10([low, high]) if log else np.array([low, high])
+    ends += _MARGIN * (ends[1] - ends[0]) * np.array([-1.0 if low < least else 0.0, 1.0 if high > most else 0.0])
+    wider = [float(end) for end in (10**ends if log else ends)]
+    (axes.set_ylim if place else axes.set_xlim)(*(wider[::-1] if limits[0] > limits[1] else wider))
+
+
+def _drawn(axes: Axes) -> list[NDArray[np.float64]]:
+    """Return points (n, 2) of lines, error bars and bands that stand in coordinates of the data.
+
+    Not `Axes.dataLim`: of error bars it knows the corners of them all together, not the least that is above 0.
+    """
+    lines = [line for line in axes.lines if line.get_transform() == axes.transData]
+    bands = [band for band in axes.collections if isinstance(band, FillBetweenPolyCollection)]
+    return [
+        *(np.asarray(line.get_xydata(), dtype=np.float64) for line in lines),
+        *_bars(axes),
+        *(np.asarray(path.vertices, dtype=np.float64) for band in bands for path in band.get_paths()),
+    ]
+
+
+def _bars(axes: Axes) -> list[NDArray[np.float64]]:
+    """Return ends (n, 2) of error bars."""
+    return [
+        np.asarray(ends, dtype=np.float64)
+        for bars in axes.collections
+        if isinstance(bars, LineCollection)
+        for ends in bars.get_segments()
+        if len(ends)
+    ]

@@ -1,27 +1,18 @@
-"""Tables on disk, whole or absent."""
+"""Tables on disk, whole or absent, and as lines of Markdown."""
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+
+import pandas as pd
 
 from dem.errors import InputError, RunError
 from dem.record.files import whole
 
-if TYPE_CHECKING:
-    import pandas as pd
-
 
 def write_table(table: pd.DataFrame, path: Path | str, *, overwrite: bool = False) -> Path:
-    """Writes a table as CSV beside its place and renames it, so that it is whole or absent.
-
-    Args:
-        table: The table; its column names carry the units.
-        path: Where to, ending in `.csv`.
-        overwrite: Whether an existing file may be replaced.
-
-    Returns:
-        The path written.
+    """Write a table as CSV beside its place and rename it, so that it is whole or absent.
 
     Raises:
         InputError: The file exists already, its folder does not, or it is no `.csv`.
@@ -44,3 +35,14 @@ def write_table(table: pd.DataFrame, path: Path | str, *, overwrite: bool = Fals
         msg = f"cannot write table {path}: {error.strerror or error}; free space or choose another folder"
         raise RunError(msg) from error
     return path
+
+
+def table_lines(header: Sequence[str], rows: Iterable[Sequence[str]]) -> list[str]:
+    """Return the lines of a table."""
+    lines = [f"| {' | '.join(header)} |", "| --- " * len(header) + "|"]
+    return [*lines, *(f"| {' | '.join(row)} |" for row in rows)]
+
+
+def meaning_lines(file: str, meanings: Mapping[str, str]) -> list[str]:
+    """Return lines that say what the columns of a file are."""
+    return ["", f"What the columns of `{file}` are:", "", *(f"- `{name}`: {text}" for name, text in meanings.items())]

@@ -1,1 +1,1 @@
-"""Means, errors and comparisons: of numbers, with no idea of what they measure. On NumPy, SciPy and pandas alone."""
+"""Means, errors and comparisons of numbers, by NumPy, SciPy and pandas alone."""

@@ -1,35 +1,33 @@
-"""Findings of a paper, each judged by our own runs: an effect with its error, a verdict, and words for both."""
+"""Judge findings of a paper by our own runs: an effect with its error, a verdict, and words for both."""
 
 from __future__ import annotations
 
 import math
+from bisect import bisect_left
+from dataclasses import replace
 from typing import Literal
 
 from scipy.special import stdtrit
 
-from postprocess.statistics.seeds import CONFIDENCE, SeedMean, Slope
-
-Effect = SeedMean | Slope
+from postprocess.statistics.seeds import CONFIDENCE, SeedMean
 
 _MOST_RUNS = 1 << 20  # counted up to
-_TELLING = 100  # times as many runs that are told as a number
+_MOST_TIMES = 100  # times as many runs that are stated as a number
 
 
 class Unresolved(str):
-    """The verdict `not resolved`, and what it would take.
-
-    Attributes:
-        more: So many times as many runs of the same scatter would resolve an effect as large as the one seen [-].
-    """
+    """The verdict `not resolved`, and what it would take."""
 
     __slots__ = ("more",)
 
     def __new__(cls, more: float) -> Unresolved:
-        """A verdict; `more` is infinite where no effect is seen at all, NaN where one run has no scatter."""
+        """Make the verdict."""
         verdict = super().__new__(cls, "not resolved")
         verdict.more = more
         return verdict
 
+    # So many times as many runs of the same scatter would resolve an effect as large as the one seen [-]; infinite
+    # where no effect is seen at all, NaN where one run has no scatter
     more: float
 
 
@@ -43,8 +41,8 @@ CRITERION = (
 """How verdicts come about, for footers."""
 
 
-def judge(effect: Effect, *, threshold: float = 0.0) -> Verdict:
-    """Whether an effect is clearly above a threshold."""
+def judge(effect: SeedMean, *, threshold: float = 0.0) -> Verdict:
+    """Decide whether an effect is clearly above a threshold."""
     if math.isnan(effect.value):
         return "no data"
     if effect.value - effect.half_width > threshold:
@@ -54,45 +52,36 @@ def judge(effect: Effect, *, threshold: float = 0.0) -> Verdict:
     return Unresolved(more=_runs_needed(effect, abs(effect.value - threshold)) / max(effect.count, 1))
 
 
-def _runs_needed(effect: Effect, size: float) -> float:
-    """How many runs of the same scatter have a 95 % half-width below some size; inf beyond a million."""
+def _runs_needed(effect: SeedMean, size: float) -> float:
+    """Count runs of this scatter whose 95 % half-width is no larger than a size; inf beyond a million."""
     scatter = effect.standard_error * math.sqrt(effect.count)
     if not math.isfinite(scatter):
         return math.nan
-    few, many = 1, 2
-    while scatter * stdtrit(many - 1, (1 + CONFIDENCE) / 2) / math.sqrt(many) > size:
-        few, many = many, 2 * many
-        if many > _MOST_RUNS:
-            return math.inf
-    while many - few > 1:
-        middle = (few + many) // 2
-        enough = middle > 1 and scatter * stdtrit(middle - 1, (1 + CONFIDENCE) / 2) / math.sqrt(middle) <= size
-        few, many = (few, middle) if enough else (middle, many)
-    return float(many)
+
+    def enough(runs: int) -> bool:
+        return bool(scatter * stdtrit(runs - 1, (1 + CONFIDENCE) / 2) / math.sqrt(runs) <= size)
+
+    counts = range(2, _MOST_RUNS + 1)
+    place = bisect_left(counts, True, key=enough)
+    return float(counts[place]) if place < len(counts) else math.inf
 
 
 def told_more(verdict: Verdict) -> str:
-    """`an effect of this size would take 3.1 times as many runs` of a verdict that is not resolved; else nothing."""
+    """Write `an effect of this size would take 3.1 times as many runs` if unresolved; else nothing."""
     more = verdict.more if isinstance(verdict, Unresolved) else math.nan
     if math.isnan(more):
         return ""
-    if more > _TELLING:
-        return f"an effect of this size would take more than {_TELLING} times as many runs"
-    return f"an effect of this size would take {more:.2g} times as many runs"
+    times = f"more than {_MOST_TIMES}" if more > _MOST_TIMES else f"{more:.2g}"
+    return f"an effect of this size would take {times} times as many runs"
 
 
-def negative(effect: Effect) -> SeedMean:
-    """The same effect with the other sign."""
-    return SeedMean(
-        value=-effect.value,
-        standard_error=effect.standard_error,
-        half_width=effect.half_width,
-        count=effect.count,
-    )
+def negative(effect: SeedMean) -> SeedMean:
+    """Return the effect with the other sign."""
+    return replace(effect, value=-effect.value)
 
 
-def told(effect: Effect, digits: int = 4, unit: str = "") -> str:
-    """`+0.0123 ± 0.0011 (n = 15)`: a signed number with its standard error."""
+def told(effect: SeedMean, digits: int = 4, unit: str = "") -> str:
+    """Write `+0.0123 ± 0.0011 (n = 15)`: a signed number with its standard error."""
     if math.isnan(effect.value):
         return "no data"
     error = f" ± {effect.standard_error:.{digits}g}" if math.isfinite(effect.standard_error) else " without an error"

@@ -115,7 +115,7 @@ def export_run(arguments: argparse.Namespace) -> int:
     """Export a run, or a scene for LAMMPS."""
     if arguments.to == _LAMMPS:
         return _export_scene(arguments)
-    from postprocess.export import export  # noqa: PLC0415  (imports PyVista)
+    from postprocess import export  # noqa: PLC0415  (imports PyVista)
 
     def show_progress(done: int, number: int) -> None:
         if sys.stderr.isatty() and number > 1:
@@ -130,7 +130,7 @@ def export_run(arguments: argparse.Namespace) -> int:
         wanted=arguments.wanted,
         unwanted=arguments.unwanted,
         color_by=arguments.color_by,
-        tell=show_progress,
+        progress=show_progress,
     )
     print(written)
     return 0

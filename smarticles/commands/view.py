@@ -41,7 +41,7 @@ def _port(text: str) -> int:
 
 def view_run(arguments: argparse.Namespace) -> int:
     """Serve the page until its window closes."""
-    from postprocess.view.page import view_run as serve  # noqa: PLC0415  (imports PyVista and the server)
+    from postprocess.view import view_run as serve  # noqa: PLC0415  (imports PyVista and the server)
 
     def opened(address: str) -> None:
         print(address, flush=True)

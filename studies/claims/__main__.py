@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pandas as pd
 
-from postprocess.report.markdown import table_lines
+from postprocess.report.tables import table_lines
 from studies.claims.verdicts import Claim, Tested, claims
 
 HEAD = """\

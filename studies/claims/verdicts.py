@@ -17,7 +17,7 @@ import pandas as pd
 import yaml
 
 from dem.errors import InputError
-from postprocess.statistics.columns import ASPECT, SEED, SEEDS
+from postprocess.statistics.points import ASPECT, SEED, SEEDS
 
 CLAIMS = Path(__file__).with_name("claims.yaml")
 

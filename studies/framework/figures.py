@@ -20,7 +20,7 @@ from matplotlib.container import ErrorbarContainer
 from dem.errors import InputError
 from dem.record.run import Run
 from postprocess.report import figures as style
-from postprocess.report.limits import hold_everything
+from postprocess.report.figures import hold_everything
 from postprocess.statistics.points import marked
 from studies.framework.procedures import EXTERNAL, INTERNAL, SHAPE, STATIC, of_procedure
 from studies.framework.runs import ENGINE_NAMES, Quantity, engines_of, judging, of_engine

@@ -16,9 +16,8 @@ from enum import StrEnum
 import numpy as np
 import pandas as pd
 
-from postprocess.statistics.columns import ASPECT, SEED
 from postprocess.statistics.findings import CRITERION, Unresolved, judge, told, told_more
-from postprocess.statistics.pairs import pairs
+from postprocess.statistics.points import ASPECT, SEED, pairs
 from postprocess.statistics.ranks import correlation_within
 from postprocess.statistics.seeds import SeedMean, Slope, mean_over_seeds, slope_within
 from studies.framework.procedures import CROSSINGS, ENERGY, PHI, PHI_ACTIVE, PROCEDURE, THETA, of_procedure

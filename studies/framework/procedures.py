@@ -22,8 +22,7 @@ from dem.record.run import Run
 from dem.record.series import Series
 from postprocess.measures.motors import APART, SAMPLED_WORK
 from postprocess.measures.table import PASSIVE_PHASES, summarise_run
-from postprocess.statistics.columns import ASPECT, SEED
-from postprocess.statistics.pairs import mean_difference
+from postprocess.statistics.points import ASPECT, SEED, mean_difference
 from postprocess.statistics.seeds import SeedMean
 from studies.framework.runs import DEFINITION, duration, last_columns, run_columns
 

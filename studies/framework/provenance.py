@@ -15,7 +15,7 @@ from dem.errors import InputError
 from postprocess.measures.packing import DEFINITIONS
 from postprocess.measures.table import LAST_FRAMES
 from postprocess.report.figures import whole_file
-from postprocess.report.markdown import table_lines
+from postprocess.report.tables import table_lines
 from studies.framework.runs import DEFINITION, Collected
 
 

@@ -12,7 +12,7 @@ from dem.record.frame import Frame
 from dem.record.frames import FrameSequence
 from dem.record.run import Run
 from postprocess.measures.table import PASSIVE_PHASES
-from postprocess.statistics.columns import ASPECT, SEED
+from postprocess.statistics.points import ASPECT, SEED
 from studies.framework.figures import Analysis
 from studies.framework.procedures import EXTERNAL, INTERNAL, PROCEDURE, PROCEDURES, SHAPE, STATIC
 from studies.framework.runs import run_columns

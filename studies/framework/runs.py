@@ -19,8 +19,7 @@ from dem.record.document import Phase
 from dem.record.run import Run, open_run
 from dem.run.run import manifest
 from dem.scene.reading import load_scene
-from postprocess.statistics.columns import ASPECT, SEED
-from postprocess.statistics.points import marked, told_number
+from postprocess.statistics.points import ASPECT, SEED, marked, told_number
 from postprocess.statistics.seeds import mean_over_seeds
 
 Row = Mapping[str, object]

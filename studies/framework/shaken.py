@@ -15,7 +15,7 @@ from dem.errors import InputError
 from dem.record.run import Run, SceneData
 from postprocess.measures.packing import COSTLY_DEFINITIONS, DEFINITIONS
 from postprocess.measures.table import LAST_FRAMES, packing_change, summarise_run
-from postprocess.statistics.columns import ASPECT
+from postprocess.statistics.points import ASPECT
 from studies.framework.figures import History
 from studies.framework.provenance import Reference
 from studies.framework.runs import DEFINITION, duration, last_columns, run_columns

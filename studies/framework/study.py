@@ -10,9 +10,8 @@ import pandas as pd
 
 from dem.record.run import Run
 from postprocess.report import figures as style
-from postprocess.report.markdown import meaning_lines, table_lines
-from postprocess.statistics.columns import ASPECT, SEED, SEEDS
-from postprocess.statistics.points import averaged, seeds_of
+from postprocess.report.tables import meaning_lines, table_lines
+from postprocess.statistics.points import ASPECT, SEED, SEEDS, averaged, seeds_of
 from studies.framework.figures import BARS, Analysis, Figure
 from studies.framework.findings import CRITERION, Finding, Judged, findings_table
 from studies.framework.provenance import SAVOIE, Origin, Reference, make_folder

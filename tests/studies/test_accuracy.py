@@ -13,8 +13,7 @@ import pytest
 from synthetic import SyntheticRun, write_run
 from synthetic.hooked import weight, write_hooked_run
 
-from postprocess.statistics.columns import ASPECT, SEED
-from postprocess.statistics.points import marked
+from postprocess.statistics.points import ASPECT, SEED, marked
 from studies.accuracy import (
     ACTIVITY,
     COMPARED,

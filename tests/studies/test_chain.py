@@ -14,8 +14,7 @@ from synthetic.strained import WIDTH, write_strained_run
 
 from dem.record.run import open_run
 from postprocess.measures.strain import AT_PEAK, BEND, DROP, FRACTURE, PEAK, QUANTITIES, STIFFNESS, WIDENING, YIELD
-from postprocess.statistics.columns import SEED
-from postprocess.statistics.points import marked
+from postprocess.statistics.points import SEED, marked
 from studies.chain import CONFINEMENT, COUNT, SPEED, STUDY, VARIANT
 
 ORIGIN = {"note": "the full study as shipped", "command": "smarticles study chain --out chain"}

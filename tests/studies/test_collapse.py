@@ -13,7 +13,7 @@ from synthetic.columns import H0, WITH_WALL, Column, F, write_column
 
 from dem.record.run import Run, open_run
 from postprocess.measures.collapse import COM, CORE, HEIGHTS, REMAINING, column_history, period_means, vibration
-from postprocess.statistics.columns import ASPECT, SEED, SEEDS
+from postprocess.statistics.points import ASPECT, SEED, SEEDS
 from studies.collapse import (
     ACTIVATION,
     AT_LEAST,

@@ -12,7 +12,7 @@ import pytest
 from synthetic import SyntheticRun, write_run
 
 from dem.record.run import open_run
-from postprocess.statistics.columns import ASPECT, SEED, SEEDS
+from postprocess.statistics.points import ASPECT, SEED, SEEDS
 from studies.contacts import (
     CALLED,
     CROSSED,

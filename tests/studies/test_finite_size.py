@@ -16,7 +16,7 @@ from synthetic.shapes import RADIUS, W
 
 from dem.record.run import Run, open_run
 from postprocess.measures.table import summarise_run
-from postprocess.statistics.columns import ASPECT, SEED
+from postprocess.statistics.points import ASPECT, SEED
 from studies.finite_size import (
     AFTER,
     BEFORE,

@@ -15,7 +15,7 @@ from synthetic.hooked import HELD as GOES_ON
 
 from dem.record.run import open_run
 from postprocess.measures.pull import WINDOW
-from postprocess.statistics.columns import ASPECT, SEED
+from postprocess.statistics.points import ASPECT, SEED
 from studies.fracture import (
     ABOVE,
     ACCOUNT,

@@ -12,7 +12,7 @@ from synthetic import SyntheticRun, write_manifest
 
 from dem.errors import InputError
 from dem.record.run import Run
-from postprocess.statistics.columns import ASPECT, SEED
+from postprocess.statistics.points import ASPECT, SEED
 from studies.framework.figures import Means, one_by_one
 from studies.framework.findings import mean
 from studies.framework.provenance import NOTHING

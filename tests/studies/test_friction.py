@@ -12,7 +12,7 @@ import pandas as pd
 import pytest
 from synthetic import SyntheticRun, write_run
 
-from postprocess.statistics.columns import ASPECT
+from postprocess.statistics.points import ASPECT
 from postprocess.statistics.seeds import Scatter
 from studies.framework.shaken import DIGITISING_ERROR, FRICTION, phi
 from studies.friction import GROWTHS, STUDY, Curve

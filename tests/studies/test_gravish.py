@@ -10,7 +10,7 @@ import pandas as pd
 import pytest
 from synthetic import SyntheticRun, write_run
 
-from postprocess.statistics.columns import ASPECT, SEED
+from postprocess.statistics.points import ASPECT, SEED
 from studies.framework.shaken import phi, read_gravish
 from studies.gravish import STUDY, deviations, steps
 

@@ -17,7 +17,7 @@ from synthetic.shapes import W
 
 from dem.record.run import open_run
 from postprocess.measures.pull import WINDOW
-from postprocess.statistics.columns import ASPECT, SEED
+from postprocess.statistics.points import ASPECT, SEED
 from studies import landscape
 from studies.framework.findings import Judged
 from studies.framework.procedures import ACTIVE, CROSSINGS, EXTERNAL, INTERNAL, PHI, PROCEDURE, SHAPE, STATIC, THETA

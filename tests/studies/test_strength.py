@@ -15,7 +15,7 @@ from synthetic.shapes import W
 
 from dem.record.run import open_run
 from postprocess.measures.pull import WINDOW
-from postprocess.statistics.columns import SEED
+from postprocess.statistics.points import SEED
 from studies.framework.procedures import EXTERNAL, INTERNAL, SHAPE, STATIC
 from studies.strength import ABOVE, BEFORE, BREAK, CARRIED, HELD_FAST, KEPT, LIMIT, PEAK, RAISED, STUDY, THROUGH, WORK
 

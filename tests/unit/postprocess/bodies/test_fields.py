@@ -1,7 +1,5 @@
 """What bodies carry: names, units and values."""
 
-import json
-
 import numpy as np
 import pytest
 from synthetic import RADIUS, SyntheticRun, mesh_of, u_shape, write_manifest, write_run
@@ -47,11 +45,9 @@ def test_cells_of_local_packing_fill_the_container(pile):
     assert (solid / local[:, 0]).sum() > np.pi * RADIUS**2 * top
 
 
-def test_local_packing_has_no_value_without_a_wall(pile):
-    for name in ("run.json", "done.json"):
-        content = json.loads((pile / name).read_text())
-        content["phases"][3]["type"] = "remove-container"
-        (pile / name).write_text(json.dumps(content))
+def test_local_packing_has_no_value_without_a_wall(tmp_path):
+    kinds = ("deposit", "relax", "shake", "remove-container")
+    pile = write_run(tmp_path, SyntheticRun(frames_per_phase=1, phases=kinds))
     assert np.isnan(values(pile, "local_packing_fraction")[1]).all()
 
 
@@ -63,7 +59,7 @@ def test_a_lone_smarticle_has_no_local_packing(tmp_path):
     assert np.isnan(values(tmp_path, "local_packing_fraction")[1]).all()
 
 
-def test_actuated_frames_tell_angles_per_link(tmp_path):
+def test_actuated_frames_have_angles_per_link(tmp_path):
     run = SyntheticRun(count=2, frames_per_phase=1, phases=("relax",), packing=(0.1,))
     write_run(tmp_path, run)
     angle = np.array([0.1, np.nan, 0.2, 0.3, np.nan, 0.4])
@@ -83,7 +79,7 @@ def test_runs_in_a_plane_have_fewer_fields(pile):
         colour_field("crossings", run)
 
 
-def test_unknown_field_is_refused():
+def test_unknown_field_is_rejected():
     with pytest.raises(InputError, match=r"'crosings' is no field; did you mean 'crossings'\?"):
         checked_field("crosings")
 

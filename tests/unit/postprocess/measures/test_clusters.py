@@ -3,12 +3,13 @@
 import numpy as np
 import pytest
 
+from postprocess import touching_pairs
 from postprocess.measures.clusters import (
     contact_clusters,
     entanglement_clusters,
+    joined_clusters,
     spans_height,
     spans_width,
-    touching_clusters,
 )
 
 D = 1e-3
@@ -61,17 +62,22 @@ def upright(at, low=0.0, long=0.02):
     )
 
 
+def touching(vertices):
+    pairs = touching_pairs(vertices, D)
+    return joined_clusters(len(vertices), pairs.i, pairs.j)
+
+
 def test_a_stack_spans_the_height_until_one_is_missing():
     ladder = np.concatenate([upright([[k * D / 2, 0]], low=0.015 * k) for k in range(5)])
-    clusters = touching_clusters(ladder, D)
+    clusters = touching(ladder)
     assert clusters.sizes.tolist() == [5]
     assert spans_height(clusters, ladder, diameter=D, floor_z=0.0)
     broken = ladder[[0, 1, 3, 4]]
-    clusters = touching_clusters(broken, D)
+    clusters = touching(broken)
     assert clusters.sizes.tolist() == [2, 2]
     assert not spans_height(clusters, broken, diameter=D, floor_z=0.0)
     # Hanging in the air it spans nothing.
-    assert not spans_height(touching_clusters(ladder, D), ladder, diameter=D, floor_z=-0.01)
+    assert not spans_height(touching(ladder), ladder, diameter=D, floor_z=-0.01)
 
 
 def spokes(angles, start=0.0, end=0.03):
@@ -95,7 +101,7 @@ def spokes(angles, start=0.0, end=0.03):
 )
 def test_a_cluster_spans_the_width_where_no_half_of_the_wall_has_all_its_ends(angles, start, spans):
     star = spokes(angles, start)
-    clusters = touching_clusters(star, D)
+    clusters = touching(star)
     assert len(clusters.sizes) == (1 if start == 0 else 3)
     assert spans_width(clusters, star, diameter=D, wall_radius=0.03) is spans
     # The same star without the wall.

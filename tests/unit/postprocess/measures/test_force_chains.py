@@ -14,7 +14,7 @@ from dem.errors import InputError
 from dem.record.forces import has_forces, read_forces
 from dem.record.frames import read_frames
 from dem.record.run import Run, open_run
-from postprocess.errors import UndefinedMeasureError
+from postprocess.geometry.links import UndefinedMeasureError
 from postprocess.measures.force_chains import (
     MEASURES,
     force_chains,
@@ -51,7 +51,7 @@ def test_forces_that_are_alike_share_alike_and_none_is_strong(count: int) -> Non
     assert not strong_contacts([2.0] * count).any()
 
 
-def test_no_contact_has_no_chain_and_bad_bins_are_refused() -> None:
+def test_no_contact_has_no_chain_and_bad_bins_are_rejected() -> None:
     with pytest.raises(UndefinedMeasureError, match="at least 1 contact"):
         force_participation([])
     with pytest.raises(InputError, match="edges must be numbers that ascend"):
@@ -73,7 +73,7 @@ def test_chains_are_joined_by_strong_contacts_alone(run: Path) -> None:
 
 def test_a_run_that_records_none_has_no_such_columns_and_says_how_to(run: Path) -> None:
     assert not has_forces(run)
-    assert not MEASURE.told_of(open_run(run))
+    assert not MEASURE.available_for(open_run(run))
     assert not [name for name in measure_run(Run(run)).columns if "force" in name and "chain" in name]
     with pytest.raises(InputError, match=r"cannot read forces .*force_000000.vtu: .*recording.contact_forces: true"):
         read_forces(read_frames(run)[0])

@@ -7,7 +7,6 @@ import pytest
 from scipy.integrate import dblquad
 from scipy.spatial.transform import Rotation
 
-from postprocess import linking_pairs
 from postprocess.measures.linking import gauss_integral, linking
 
 SQUARE = np.array([[1.0, 1, 0], [-1, 1, 0], [-1, -1, 0], [1, -1, 0], [1, 1, 0]])
@@ -53,32 +52,21 @@ def test_a_mirror_turns_the_sign_and_a_motion_nothing(scene):
     assert gauss_integral(*moved) == pytest.approx(number, rel=1e-10)
 
 
-def test_closed_across_their_mouths_smarticles_have_the_whole_numbers_of_linking_pairs(scene):
-    """By solid angles here, by counted passages there."""
+def test_closed_across_their_mouths_smarticles_have_whole_numbers(scene):
     vertices = scene(40, 0, box=1.2, angles=(90, 90))
-    counted = linking_pairs(vertices)
     i, j = np.triu_indices(40, k=1)
     closed = np.concatenate([vertices, vertices[:, :1]], axis=1)
     number = gauss_integral(closed[i], closed[j])
     np.testing.assert_allclose(number, number.round(), atol=1e-12)
-    linked = number.round() != 0
-    assert linked.sum() > 50
-    assert np.array_equal(np.stack([i, j])[:, linked], np.stack([counted.i, counted.j]))
-    assert np.array_equal(number[linked].round(), counted.number)
+    assert (number.round() != 0).sum() > 50
 
 
-def test_all_pairs_of_a_pile_and_the_mean_of_their_sizes(scene):
+def test_near_pairs_of_a_pile_and_the_mean_of_their_sizes(scene):
     vertices = scene(60, 3, box=2.0, angles=(90, 90))
-    near, every = linking(vertices), linking(vertices, far=True)
-    assert len(every.number) == 60 * 59 / 2
-    k = 777
-    assert every.number[k] == pytest.approx(gauss_integral(vertices[every.i[k]], vertices[every.j[k]]))
-    assert every.mean == pytest.approx(2 * np.abs(every.number).sum() / 60)
-    assert every.per_smarticle[7] == pytest.approx(np.abs(every.number[(every.i == 7) | (every.j == 7)]).sum())
-    # Near pairs are some of them, with the same numbers.
-    assert 0 < len(near.number) < len(every.number)
-    assert 0 < near.mean < every.mean
-    told = {(i, j): n for i, j, n in zip(every.i, every.j, every.number, strict=True)}
-    assert all(told[i, j] == n for i, j, n in zip(near.i, near.j, near.number, strict=True))
+    near = linking(vertices)
+    assert 0 < len(near.number) < 60 * 59 / 2
+    assert near.number == pytest.approx(gauss_integral(vertices[near.i], vertices[near.j]))
+    assert near.mean == pytest.approx(2 * np.abs(near.number).sum() / 60)
+    assert near.per_smarticle[7] == pytest.approx(np.abs(near.number[(near.i == 7) | (near.j == 7)]).sum())
     assert math.isnan(linking(np.empty((0, 4, 3))).mean)
     assert linking(vertices[:1]).mean == 0

@@ -6,9 +6,8 @@ from scipy.spatial.transform import Rotation
 
 from dem.errors import InputError
 from postprocess import DEFINITIONS, packing_fraction
-from postprocess.geometry.region import Region
 from postprocess.geometry.voronoi import local_packing
-from postprocess.geometry.voxel import solid_fraction
+from postprocess.geometry.voxel import Region, solid_fraction
 
 T1, T2 = 0.11, 0.05
 SOLID = T1 * T2 * 2.4
@@ -16,7 +15,7 @@ SOLID = T1 * T2 * 2.4
 UNION = SOLID - T1 * T2**2 / 2
 
 
-def lattice(shape, cell, *, radius, layers, floor_z=0.0, turn=None, axis=(0.0, 0.0)):
+def lattice(shape, cell, *, radius, layers, floor_z=0.0, turn=None):
     """Equal smarticles at every point of a rectangular lattice inside a cylinder."""
     a, b, c = cell
     steps = np.arange(-int(radius / min(a, b)) - 1, int(radius / min(a, b)) + 2)
@@ -26,19 +25,19 @@ def lattice(shape, cell, *, radius, layers, floor_z=0.0, turn=None, axis=(0.0, 0
     form = shape(1.0, 0.7) - shape(1.0, 0.7).mean(axis=0)
     if turn is not None:
         form = form @ turn.T
-    return form + places[:, None] + [*axis, floor_z]
+    return form + places[:, None] + [0.0, 0.0, floor_z]
 
 
 CELL = (1.2, 0.9, 0.8)
 DENSITY = SOLID / math.prod(CELL)
-FLOOR, AXIS = 3.0, (2.0, -1.0)
+FLOOR = 3.0
 
 
 @pytest.fixture(scope="module")
 def pile(shape):
-    """Smarticles of known density, turned oddly, in a cylinder of radius 4 off the origin."""
+    """Smarticles of known density, turned oddly, in a cylinder of radius 4."""
     turn = Rotation.from_rotvec([0.4, 0.9, -0.2]).as_matrix()
-    return lattice(shape, CELL, radius=4.0, layers=6, floor_z=FLOOR, turn=turn, axis=AXIS)
+    return lattice(shape, CELL, radius=4.0, layers=6, floor_z=FLOOR, turn=turn)
 
 
 def phi(pile, definition, **changes):
@@ -46,10 +45,8 @@ def phi(pile, definition, **changes):
         "radius": 4.0,
         "solid_volume": SOLID,
         "floor_z": FLOOR,
-        "axis": AXIS,
         "thickness_normal": T1,
         "thickness_in_plane": T2,
-        "spacing": 0.25 if definition == "voronoi" else None,
     }
     return packing_fraction(pile, definition=definition, **(arguments | changes))
 
@@ -109,12 +106,13 @@ def test_voronoi_cells_fill_the_container(scene):
         ({"radius": 0.0}, "radius must be above 0 m: got 0.0 m"),
         ({"solid_volume": float("nan")}, "solid_volume must be above 0 m³"),
         ({"definition": "voxel", "thickness_normal": None}, "needs thickness_normal"),
-        ({"definition": "voxel", "spacing": 1.0}, "pitch"),
-        ({"definition": "voronoi", "spacing": -1.0}, "spacing of the points"),
-        ({"definition": "voxel", "inner": 1.5}, "inner must be"),
-        ({"definition": "voronoi", "low": 0.9}, "low and high"),
     ],
 )
 def test_bad_arguments(pile, changes, message):
     with pytest.raises(InputError, match=message):
         phi(pile, **({"definition": "top-percentile"} | changes))
+    region = Region(radius=2.0, bottom=3.0, top=7.0)
+    with pytest.raises(InputError, match="pitch"):
+        solid_fraction(pile, region, thickness_normal=T1, thickness_in_plane=T2, pitch=1.0)
+    with pytest.raises(InputError, match="spacing of the points"):
+        local_packing(pile, region, region, solid_volume=SOLID, spacing=-1.0)

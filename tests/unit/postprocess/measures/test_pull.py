@@ -11,14 +11,7 @@ from synthetic.hooked import AFTER_REST, INTERVAL, SPEED, write_hooked_run
 from dem.errors import InputError
 from dem.record.run import Run, open_run
 from dem.record.series import read_series
-from postprocess.measures.pull import (
-    FREE,
-    WINDOW,
-    freed,
-    moving_mean,
-    peak,
-    read_pull,
-)
+from postprocess.measures.pull import FREE, WINDOW, freed, moving_mean, peak, read_pull
 from postprocess.measures.table import summarise_run
 
 HEIGHT, APEX, BASE = 0.02, 0.6, 0.5  # N; s; s to either side

@@ -53,7 +53,7 @@ def test_a_new_file_is_a_new_measure_in_every_table(tmp_path: Path, add_measure)
     assert "newest height SE [m]" in summarise_run(Run(run), costly="never")
 
 
-def test_columns_that_are_there_already_are_refused(add_measure) -> None:
+def test_columns_that_are_there_already_are_rejected(add_measure) -> None:
     add_measure("contacts mean")
     with pytest.raises(ValueError, match=r"measures share a header: contacts mean \[-\]"):
         registered()

@@ -46,10 +46,7 @@ def shown(path):
     return np.array(pictures), times
 
 
-# Moments
-
-
-def test_every_frame_is_shown_at_the_speed_that_is_told():
+def test_every_frame_is_shown_at_the_stated_speed():
     recorded = 0.04 * np.arange(1, 101)
     moments = Moments.chosen(recorded, rate=25.0)
     assert moments.indices(recorded) == list(range(100))
@@ -58,7 +55,7 @@ def test_every_frame_is_shown_at_the_speed_that_is_told():
 
 
 def test_frames_at_odd_times_are_shown_nearest_to_theirs():
-    """One that is missing is made up for by its neighbour: the speed stays what it is told to be."""
+    """One that is missing is made up for by its neighbour: the speed stays."""
     recorded = np.array([0.0, 1.0, 2.0, 2.2, 3.0, 6.0, 7.0])
     moments = Moments.chosen(recorded, rate=10.0)
     assert moments.every == 1.0
@@ -87,12 +84,6 @@ def test_a_film_of_rounded_durations_is_as_long_as_it_should_be(rate, unit):
     shown_for = durations(1000, rate, unit)
     assert sum(shown_for) * unit == pytest.approx(1000 / rate, abs=unit / 2)
     assert max(shown_for) - min(shown_for) <= 1
-
-
-# Colours
-
-
-# Films
 
 
 @pytest.mark.parametrize(("suffix", "unit"), [(".gif", 10), (".webp", 1)])
@@ -137,10 +128,7 @@ def test_failed_film_leaves_nothing_behind(run, tmp_path, monkeypatch):
     assert list(tmp_path.iterdir()) == []
 
 
-# MP4
-
-
-def test_mp4_without_an_encoder_is_refused_before_drawing(run, tmp_path, monkeypatch):
+def test_mp4_without_an_encoder_is_rejected_before_drawing(run, tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, "imageio_ffmpeg", None)
     with pytest.raises(InputError, match=r"\.mp4 needs an encoder .*imageio-ffmpeg, or choose \.gif or \.webp"):
         render_film(run, tmp_path / "a.mp4", size=SIZE)

@@ -7,9 +7,7 @@ import math
 import pandas as pd
 import pytest
 
-from postprocess.statistics.columns import ASPECT, SEED, SEEDS
-from postprocess.statistics.pairs import mean_difference, pairs
-from postprocess.statistics.points import averaged, seeds_of, told_number
+from postprocess.statistics.points import ASPECT, SEED, SEEDS, averaged, mean_difference, pairs, seeds_of, told_number
 
 FORCE = "force [N]"
 
@@ -42,7 +40,7 @@ def test_means_carry_their_errors(group: pd.DataFrame) -> None:
         (math.nan, ".1f", 1.0, "-"),
     ],
 )
-def test_numbers_are_told_with_what_error_there_is(value: float, form: str, error: float, told: str) -> None:
+def test_numbers_have_the_error_that_there_is(value: float, form: str, error: float, told: str) -> None:
     assert told_number(value, form, error) == told
 
 

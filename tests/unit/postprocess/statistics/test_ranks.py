@@ -9,13 +9,7 @@ import pytest
 from numpy.typing import NDArray
 from scipy.stats import spearmanr
 
-from postprocess.statistics.ranks import (
-    common_slopes,
-    correlation_within,
-    interval,
-    rank_correlations,
-    resampled,
-)
+from postprocess.statistics.ranks import common_slopes, correlation_within, interval, rank_correlations, resampled
 from postprocess.statistics.seeds import slope_within
 
 Floats = NDArray[np.float64]

@@ -1,4 +1,4 @@
-"""Means over seeds and their differences, against printed tables and repeated trials."""
+"""Means with their errors, against printed tables, SciPy and repeated trials."""
 
 import math
 
@@ -6,12 +6,8 @@ import numpy as np
 import pytest
 from scipy.stats import linregress, ttest_ind
 
-from postprocess.statistics.seeds import (
-    difference,
-    mean_over_seeds,
-    parabola,
-    slope_within,
-)
+from postprocess import mean_with_error
+from postprocess.statistics.seeds import difference, mean_over_seeds, parabola, slope_within
 
 
 def test_half_width_is_student_t():
@@ -24,14 +20,6 @@ def test_half_width_is_student_t():
     assert mean_over_seeds([1.0, 3.0]).half_width == pytest.approx(12.706205)
 
 
-def test_half_width_covers_the_truth_as_often_as_it_says():
-    random = np.random.default_rng(5)
-    means = [mean_over_seeds(random.normal(1.0, 0.1, 3)) for _ in range(2000)]
-    covered = np.mean([abs(mean.value - 1.0) < mean.half_width for mean in means])
-    # Standard error of the share: 0.005. The normal distribution's 1.96 would cover 0.81.
-    assert covered == pytest.approx(0.95, abs=0.015)
-
-
 def test_difference_is_welchs():
     first, second = [4.0, 5.0, 6.0], [1.0, 2.0, 3.0, 5.0]
     found = difference(mean_over_seeds(first), mean_over_seeds(second))
@@ -40,17 +28,6 @@ def test_difference_is_welchs():
     assert found.value + found.half_width == pytest.approx(interval.high)
     assert found.value == pytest.approx(2.25)
     assert not found.clear
-
-
-def test_difference_covers_the_truth_as_often_as_it_says():
-    """With spreads that differ by a factor of ten, where the pooled test of Student fails."""
-    random = np.random.default_rng(8)
-    inside = 0
-    for _ in range(2000):
-        narrow, wide = random.normal(1.0, 0.01, 6), random.normal(0.7, 0.1, 3)
-        found = difference(mean_over_seeds(wide), mean_over_seeds(narrow))
-        inside += abs(found.value - -0.3) < found.half_width
-    assert inside / 2000 == pytest.approx(0.95, abs=0.02)
 
 
 def test_slope_is_that_of_a_straight_line():
@@ -74,3 +51,36 @@ def test_parabola_is_that_of_numpy():
     assert found.slope.half_width == pytest.approx(2.178813 * found.slope.standard_error)  # t(0.975; 12), printed
     assert found.slope.count == 15
     assert found.top == pytest.approx(np.polynomial.Polynomial.fit(x, y, 2).deriv().roots()[0])
+
+
+def test_mean_of_independent_samples():
+    samples = np.random.default_rng(1).normal(3.0, 2.0, 4000)
+    mean = mean_with_error(samples)
+    assert mean.value == samples.mean()
+    assert mean.standard_error == pytest.approx(2 / 4000**0.5, rel=0.15)
+    assert mean.count == 4000
+
+
+def test_error_allows_for_correlation():
+    # AR(1) with a = 0.8: correlation time (1 + a) / (1 - a) = 9 samples.
+    noise = np.random.default_rng(2).standard_normal(20000)
+    samples = np.zeros(20000)
+    for k in range(1, 20000):
+        samples[k] = 0.8 * samples[k - 1] + noise[k]
+    mean = mean_with_error(samples)
+    assert mean.effective_count == pytest.approx(20000 / 9, rel=0.2)
+    naive = samples.std(ddof=1) / 20000**0.5
+    assert mean.standard_error == pytest.approx(3 * naive, rel=0.1)
+
+
+@pytest.mark.parametrize(
+    ("samples", "value"),
+    [([1.0, np.inf, 2.0], np.inf), ([np.inf], np.inf), ([-np.inf, 1.0, np.nan], -np.inf), ([np.inf, -np.inf], np.nan)],
+)
+def test_infinite_samples_have_an_infinite_mean_without_an_error(samples, value):
+    """Warnings are errors here: none may come of it."""
+    mean = mean_with_error(samples)
+    assert mean.value == pytest.approx(value, nan_ok=True)
+    assert np.isnan(mean.standard_error)
+    assert np.isnan(mean.effective_count)
+    assert mean.count == np.count_nonzero(~np.isnan(samples))

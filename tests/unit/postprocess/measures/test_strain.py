@@ -3,10 +3,15 @@
 from __future__ import annotations
 
 import math
+from pathlib import Path
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
+from synthetic.strained import write_strained_run
 
+from dem.record.run import Run
+from postprocess import measure_run, summarise_run
 from postprocess.measures.strain import (
     AT_PEAK,
     BEND,
@@ -45,7 +50,7 @@ def pull(*, yields: bool, jolt: float = 0.0) -> StrainTest:
 
 
 @pytest.mark.parametrize("jolt", [0.0, 0.05])
-def test_a_yield_drop_is_told_from_the_fracture(jolt: float) -> None:
+def test_a_yield_drop_is_not_the_fracture(jolt: float) -> None:
     found = measured(pull(yields=True, jolt=jolt))
     assert found[PEAK] == pytest.approx(1.8, rel=1e-3)
     assert found[AT_PEAK] == found[FRACTURE] == pytest.approx(0.7, rel=1e-3)
@@ -73,3 +78,25 @@ def test_a_first_drop_needs_a_tenth_of_the_force() -> None:
     assert first_drop(np.concatenate([rise, [0.95], 1 + rise]))[1] == 0.0
     top, loss = first_drop(np.concatenate([rise, [0.8, 0.7], 1 + rise]))
     assert (top, loss) == (100, pytest.approx(0.3))
+
+
+HIGHEST = 0.6  # strain up to which the chain below holds
+
+
+def force(strains: NDArray[np.float64]) -> NDArray[np.float64]:
+    """3 N times strain, until it parts."""
+    return np.where(strains <= HIGHEST, 3 * strains, 0.0)
+
+
+def test_a_chain_has_its_force_and_strain(tmp_path: Path) -> None:
+    row = summarise_run(Run(write_strained_run(tmp_path / "a", force))).iloc[0]
+    assert row[PEAK] == pytest.approx(3 * HIGHEST, rel=1e-3)
+    assert row[AT_PEAK] == row[FRACTURE] == pytest.approx(HIGHEST, rel=1e-3)
+    assert np.isnan(row[YIELD])
+    assert row[WIDENING] == pytest.approx(0.1 * HIGHEST, rel=1e-3)
+
+
+def test_a_plane_has_nothing_that_needs_a_height_or_a_container(tmp_path: Path) -> None:
+    columns = set(measure_run(Run(write_strained_run(tmp_path / "a", force))).columns)
+    assert {"smarticles [-]", "contacts mean [-]", "pulled string force x [N]", "chain length [m]"} <= columns
+    assert not [name for name in columns if any(word in name for word in ("phi", "height", "crossings", "cluster"))]

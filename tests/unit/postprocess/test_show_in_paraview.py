@@ -15,7 +15,7 @@ from synthetic.forces import pressed
 from dem.record.forces import force_mesh
 from dem.record.frames import FrameWriter, read_frames
 from dem.record.names import FORCE
-from postprocess.export.export import export_run
+from postprocess.export import export_run
 from postprocess.geometry.links import centres_of_mass
 
 PVPYTHON = os.environ.get("PVPYTHON") or shutil.which("pvpython")

@@ -12,8 +12,7 @@ from dem.body.particle import Boxes, Particle, SphereChain
 from dem.body.state import State
 from dem.record.frames import FrameWriter, read_frames
 from dem.record.run import open_run
-from postprocess.bodies.meshes import Bodies
-from postprocess.bodies.surroundings import read_surroundings
+from postprocess.bodies.meshes import Bodies, read_surroundings
 
 W, T, GAP, LENGTH, SPEED = 0.0467, 0.0095, 0.00105, 0.1, 0.02
 BOXES = Boxes(middle_length=W, barb_length=W, thickness_normal=0.021, thickness_in_plane=T, density=1250.0)

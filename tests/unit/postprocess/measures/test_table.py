@@ -1,3 +1,5 @@
+"""Tables of runs: a row per frame, a row per phase."""
+
 import h5py
 import numpy as np
 import pytest

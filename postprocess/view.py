@@ -1,4 +1,4 @@
-"""The page of a run and its server, for whoever has the address with its token, on this machine."""
+"""A run in a page of the browser, to look around in: a server on this machine, drawing in the page."""
 
 from __future__ import annotations
 
@@ -10,9 +10,10 @@ import signal
 import threading
 from collections.abc import Awaitable, Callable
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
+import pyvista as pv
 from aiohttp import web
 from trame.app import get_server
 from trame.ui.html import DivLayout
@@ -21,12 +22,22 @@ from trame.widgets import vtk as vtk_widgets
 from vtkmodules.vtkCommonCore import vtkLogger
 
 from dem.errors import InputError
-from postprocess.view.run_view import RunView, colour_names
+from dem.record.frames import read_frames
+from dem.record.run import open_run
+from postprocess.bodies.colours import ColourScale, colour_field, scalars, span
+from postprocess.bodies.fields import IDENTITY, fields_of, link_values
+from postprocess.bodies.meshes import BOX_FACES, USUAL, Bodies
+from postprocess.geometry.links import Floats
+from postprocess.pictures.canvas import VIEWS, add_bodies, axes_from, drawn
 
 HOST = "127.0.0.1"
-"""The loopback interface: nobody else's machine reaches it."""
+"""The loopback interface, which no other machine reaches."""
 
-# The page's script compiles its templates as it runs; it may speak to this server and to nobody else.
+PICKED = (255, 0, 170)
+"""Colour of the smarticle that is picked, which no palette has."""
+
+_SAMPLES, _COSTLY_SAMPLES = 12, 3  # frames that a scale of colours is taken from
+# The page's script compiles its templates as it runs; it may speak to this server alone.
 _HEADERS = {
     "Content-Security-Policy": "default-src 'self' 'unsafe-inline' 'unsafe-eval' data: blob:; connect-src 'self' {own} "
     "data: blob:; frame-ancestors 'none'; base-uri 'self'; form-action 'none'",
@@ -34,7 +45,7 @@ _HEADERS = {
     "X-Content-Type-Options": "nosniff",
     "Cache-Control": "no-store",
 }
-_LOOK_EVERY = 1.0  # s, for new frames
+_FRAMES_EVERY = 1.0  # s, between searches for new frames
 _FILM_STEP = 0.12  # s between frames while it plays
 _CLOSED_FOR = 5  # s without a window until the server ends; a page that is loaded anew comes back sooner
 
@@ -57,11 +68,152 @@ html, body { margin: 0; height: 100%; font: 14px system-ui, sans-serif; color: #
 """
 
 
+class Pick(NamedTuple):
+    """The smarticle that is picked, and which of its links."""
+
+    smarticle_id: int
+    link: int
+
+
+class RunView:
+    """What a page shows of a run: frame, colours, and what is picked.
+
+    Args:
+        directory: A run directory with at least one frame.
+
+    Raises:
+        InputError: There is none, or it is damaged.
+    """
+
+    def __init__(self, directory: Path | str) -> None:
+        self.run = open_run(directory)
+        self.frames = read_frames(directory)
+        self.index = len(self.frames) - 1
+        self.frame = self.frames[-1]
+        self.fields = tuple(
+            field for field in fields_of(self.run) if field.costly or field.take(self.frame, self.run) is not None
+        )
+        self.field = colour_field(None, self.run)
+        self.pick: Pick | None = None
+        window: Any = pv.Plotter(off_screen=True)
+        window.set_background("white")
+        self.plotter = window
+        self._bodies = Bodies(self.run, USUAL, [each for each in self.fields if each.name in IDENTITY])
+        self._meshes: dict[str, pv.PolyData] = {}
+        self._bodies.hold(self.frames[index] for index in self._sampled(_SAMPLES))
+        self._bounds: dict[str, tuple[float, float]] = {}
+
+    @property
+    def phase(self) -> str:
+        """Type of the phase of the frame shown."""
+        phases = self.run.phases
+        return phases[self.frame.phase].type if self.frame.phase < len(phases) else "?"
+
+    @property
+    def ended(self) -> bool:
+        """Whether no more frames will come, by the run directory as it is now; true where it is gone."""
+        try:
+            return open_run(self.run.path).status.state not in ("running", "stopped")
+        except InputError:
+            return True
+
+    def grow(self) -> bool:
+        """Search for new frames; whether there are any."""
+        before, self.frames = len(self.frames), read_frames(self.run.path)
+        return len(self.frames) > before
+
+    def go_to(self, index: int) -> None:
+        """Show another frame.
+
+        Raises:
+            InputError: Its file is damaged; the frame shown stays.
+        """
+        index = min(max(index, 0), len(self.frames) - 1)
+        frame = self.frames[index]
+        self._bodies.hold([frame])
+        self.index, self.frame = index, frame
+
+    def colour_by(self, name: str) -> None:
+        """Colour by another field.
+
+        Raises:
+            InputError: There is none of this name.
+        """
+        self.field = colour_field(name, self.run)
+
+    def draw(self) -> None:
+        """Put all bodies into the window."""
+        values = scalars(self.field, self.frame, self.run)
+        colours = ColourScale.of(self.field, self._widened(values)).painted(values)
+        if self.pick is not None:
+            colours[self.frame.smarticle_ids == self.pick.smarticle_id] = PICKED
+        self._meshes = drawn(self._bodies, self.frame, np.zeros(3))
+        add_bodies(self.plotter, self._meshes, self.frame, colours)
+
+    def aim(self) -> None:
+        """Turn the camera to all that is drawn: from the front, a little from above; at a plane from above."""
+        _, up, forward = axes_from(*VIEWS["top" if self.run.manifest.planar else "front"])
+        camera = self.plotter.camera
+        camera.focal_point, camera.position, camera.up = (0.0, 0.0, 0.0), tuple(-forward), tuple(up)
+        self.plotter.reset_camera(render=False)
+
+    def legend(self) -> list[dict[str, str]]:
+        """Return colours with their labels, from the greatest; none where colours only show identity."""
+        scale = ColourScale.of(self.field, self._bounds.get(self.field.name, (0.0, 1.0)))
+        colours = scale.painted(np.array(list(scale.labels))).tolist()
+        pairs = reversed(list(zip(colours, scale.labels.values(), strict=True)))
+        return [{"colour": "#{:02x}{:02x}{:02x}".format(*colour), "label": label} for colour, label in pairs]
+
+    def pick_along(self, ray: Floats) -> None:
+        """Pick the smarticle that a ray (2, 3) [mm] meets first, or none."""
+        self.pick = None
+        if "smarticles" in self._meshes:
+            mesh = self._meshes["smarticles"]
+            _, faces = mesh.triangulate().ray_trace(ray[0], ray[1], first_point=True)
+            if np.size(faces):
+                face = int(np.atleast_1d(faces)[0]) // (2 * BOX_FACES) * BOX_FACES
+                self.pick = Pick(*(int(mesh.cell_data[name][face]) for name in IDENTITY))
+
+    def describe(self) -> list[dict[str, str]]:
+        """Return all fields of what is picked, as text: name, unit, value; none where nothing is."""
+        if self.pick is None:
+            return []
+        (found,) = np.nonzero(self.frame.smarticle_ids == self.pick.smarticle_id)
+        if not len(found):
+            return []
+        rows = []
+        for field in self.fields:
+            values = link_values(field, self.frame, self.run)
+            if values is not None:
+                value = _text(values[int(found[0]), self.pick.link])
+                rows.append({"name": field.name, "unit": field.unit, "value": value, "meaning": field.meaning})
+        return rows
+
+    def _sampled(self, number: int) -> list[int]:
+        return sorted({round(place) for place in np.linspace(0, len(self.frames) - 1, number)})
+
+    def _widened(self, values: Floats) -> tuple[float, float]:
+        """Return bounds of the field's scale: of some frames of the run and of all that were shown."""
+        name = self.field.name
+        samples = [np.array(self._bounds.get(name, ())), values]
+        if name not in self._bounds:
+            for index in self._sampled(_COSTLY_SAMPLES if self.field.costly else _SAMPLES):
+                with contextlib.suppress(InputError):  # reported when that frame is gone to
+                    samples.append(scalars(self.field, self.frames[index], self.run))
+        self._bounds[name] = span(samples)
+        return self._bounds[name]
+
+
+def _text(value: Any) -> str:
+    if np.ndim(value):
+        return "(" + ", ".join(f"{part:.4g}" for part in value) + ")"
+    return str(int(value)) if isinstance(value, np.integer) else f"{value:.4g}"
+
+
 class Viewer:
     """One run in one page, and the server of that page.
 
     Args:
-        view: The run.
         port: To listen on; 0: any that is free.
         opened: Called with the address once the server listens.
     """
@@ -69,15 +221,33 @@ class Viewer:
     def __init__(self, view: RunView, *, port: int, opened: Callable[[str], None]) -> None:
         self._view = view
         self._port = port
-        self._opened = opened
         self._token = secrets.token_urlsafe(32)
         self._web: Any = None
         self._server: Any = get_server(f"smarticles-{id(self)}", client_type="vue3")
-        self._state = self._server.state
-        self._canvas: Any = None
         self._stopping: asyncio.Future[None] | None = None
-        self._fill_state()
-        self._connect()
+        state = self._state = self._server.state
+        # All texts of the run are values, shown as they are: none becomes part of the page's code.
+        state.trame__title = "smarticles"
+        state.run_name = view.run.manifest.name
+        state.fields = [
+            {"name": each.name, "title": each.name if each.unit == "-" else f"{each.name} [{each.unit}]"}
+            for each in view.fields
+        ]
+        state.field = view.field.name
+        state.index, state.last = view.index, len(view.frames) - 1
+        state.playing, state.following = False, not view.ended
+        state.fault = ""
+        self._describe()
+        view.aim()
+        state.change("index")(self._on_index)
+        state.change("field")(self._on_field)
+        state.change("playing")(self._on_playing)
+        controller = self._server.controller
+        controller.add("on_server_bind")(self._bind)
+        controller.add("on_server_ready")(
+            lambda **_: opened(f"http://{HOST}:{self._server.port}/index.html?token={self._token}")
+        )
+        controller.add("on_client_connected")(self._shorten)
         self._lay_out()
 
     def serve(self) -> None:
@@ -113,30 +283,6 @@ class Viewer:
         if self._stopping is None and self._web is not None:
             self._stopping = asyncio.ensure_future(self._server.stop())
 
-    def _fill_state(self) -> None:
-        view, state = self._view, self._state
-        # All texts of the run are values, shown as they are: none becomes part of the page's code.
-        state.trame__title = "smarticles"
-        state.run_name = view.run.manifest.name
-        state.fields = colour_names(view.fields)
-        state.field = view.field.name
-        state.index, state.last = view.index, len(view.frames) - 1
-        state.playing, state.following = False, not view.ended
-        state.fault = ""
-        self._describe()
-        view.aim()
-
-    def _connect(self) -> None:
-        state, controller = self._state, self._server.controller
-        state.change("index")(self._on_index)
-        state.change("field")(self._on_field)
-        state.change("playing")(self._on_playing)
-        controller.add("on_server_bind")(self._bind)
-        controller.add("on_server_ready")(
-            lambda **_: self._opened(f"http://{HOST}:{self._server.port}/index.html?token={self._token}")
-        )
-        controller.add("on_client_connected")(self._shorten)
-
     def _bind(self, served: Any) -> None:
         self._web = served
         protect(served.app, self._token)
@@ -163,8 +309,8 @@ class Viewer:
                 with html.Div(v_for="(entry, k) in legend", key="k", classes="key"):
                     html.I(style=("{ background: entry.colour }",))
                     html.Span("{{ entry.label }}")
-                html.P("click on a smarticle to see its fields", v_if="!told.length")
-                with html.Dl(v_if="told.length", id="told"), html.Template(v_for="entry in told", key="entry.name"):
+                html.P("click on a smarticle to see its fields", v_if="!picked.length")
+                with html.Dl(v_if="picked.length", id="pick"), html.Template(v_for="entry in picked", key="entry.name"):
                     html.Dt("{{ entry.name }}", title=("entry.meaning",))
                     html.Dd("{{ entry.value }} {{ entry.unit == '-' ? '' : entry.unit }}")
             with html.Footer():
@@ -179,14 +325,13 @@ class Viewer:
                     html.Span(" follow the run")
 
     def _describe(self) -> None:
-        """Update what the page says of the frame shown."""
+        """Draw the frame shown, and update what the page says of it."""
         view, state = self._view, self._state
-        frame = view.frame
         view.draw()
-        state.caption = f"N = {frame.count} of {view.run.manifest.count}, {view.phase}"
-        state.clock = f"t = {frame.time:.4g} s, frame {view.index} of {len(view.frames) - 1}"
+        state.caption = f"N = {view.frame.count} of {view.run.manifest.count}, {view.phase}"
+        state.clock = f"t = {view.frame.time:.4g} s, frame {view.index} of {len(view.frames) - 1}"
         state.legend = view.legend()
-        state.told = view.describe()
+        state.picked = view.describe()
         state.growing = not view.ended
 
     def _redraw(self) -> None:
@@ -194,11 +339,10 @@ class Viewer:
         self._canvas.update()
 
     def _on_index(self, index: Any, **_: Any) -> None:
-        wanted = int(index)
-        if wanted == self._view.index:
+        if int(index) == self._view.index:
             return
         try:
-            self._view.go_to(wanted)
+            self._view.go_to(int(index))
             self._state.fault = ""
         except InputError as error:
             self._state.fault = str(error)
@@ -206,10 +350,9 @@ class Viewer:
         self._redraw()
 
     def _on_field(self, field: str, **_: Any) -> None:
-        if field == self._view.field.name:
-            return
-        self._view.colour_by(field)
-        self._redraw()
+        if field != self._view.field.name:
+            self._view.colour_by(field)
+            self._redraw()
 
     def _on_click(self, event: Any) -> None:
         ray = np.asarray((event or {}).get("ray", ()), dtype=np.float64)
@@ -230,9 +373,9 @@ class Viewer:
             await asyncio.sleep(_FILM_STEP)
 
     async def _watch(self) -> None:
-        """New frames of a run that goes on."""
+        """Follow a run that goes on."""
         while True:
-            await asyncio.sleep(_LOOK_EVERY)
+            await asyncio.sleep(_FRAMES_EVERY)
             try:
                 grown = self._view.grow()
             except InputError:  # just being rewritten, or gone: what was read stays
@@ -246,7 +389,7 @@ class Viewer:
 
 
 def view_run(directory: Path | str, *, port: int = 0, opened: Callable[[str], None]) -> None:
-    """Serves a page of a run, until its window is closed.
+    """Serve a page of a run, until its window is closed.
 
     Args:
         directory: A run directory with at least one frame; the run may still go on.
@@ -256,7 +399,7 @@ def view_run(directory: Path | str, *, port: int = 0, opened: Callable[[str], No
     Raises:
         InputError: There is no frame, or it is damaged; or the port is taken.
     """
-    # Says that there is no display, which nothing here needs.
+    # VTK warns that there is no display, which nothing here needs.
     vtkLogger.SetStderrVerbosity(vtkLogger.VERBOSITY_ERROR)
     Viewer(RunView(directory), port=port, opened=opened).serve()
 

@@ -1,4 +1,4 @@
-"""Shows an exported run in ParaView: boxes coloured by crossings, the wall cut open in front, time ready to run.
+"""Show an exported run in ParaView: boxes by crossings, the wall cut open, time ready to run.
 
     paraview --script=show_in_paraview.py                     in its window; then press play
     pvpython show_in_paraview.py FOLDER --picture last.png    the last frame, without a window
@@ -17,16 +17,10 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any
 
-
-def paraview_here() -> Any:
-    """ParaView's module; None where this script is looked at, not run."""
-    try:
-        return import_module("paraview.simple")
-    except ImportError:
-        return None
-
-
-simple = paraview_here()
+try:
+    simple: Any = import_module("paraview.simple")
+except ImportError:  # where this script is imported, not run
+    simple = None
 
 COLOURS = {
     "wall": "#9db4c8",
@@ -41,12 +35,12 @@ KINDS = ("smarticles", "wall", "floor", "hooks", "strings", "crossings", "forces
 
 
 def rgb(colour: str) -> list[float]:
-    """Shares of red, green and blue of a hexadecimal colour."""
+    """Return shares of red, green and blue of a hexadecimal colour."""
     return [int(colour[k : k + 2], 16) / 255 for k in (1, 3, 5)]
 
 
 def folder_of_export(given: str | None) -> Path:
-    """Where the .pvd files are: as given, else of what is open, else beside this script, else here."""
+    """Find the .pvd files: as given, else of what is open, else beside this script, else here."""
     source = simple.GetActiveSource()
     places = [Path(given)] if given else []
     if source is not None and hasattr(source, "FileName"):
@@ -86,7 +80,7 @@ def show(folder: Path) -> tuple[Any, Any]:
 
 
 def plain(kind: str, source: Any, view: Any) -> Any:
-    """One colour."""
+    """Show in one colour."""
     shown = simple.Show(source, view)
     shown.ColorArrayName = ["POINTS", ""]
     shown.DiffuseColor = shown.AmbientColor = rgb(COLOURS[kind])
@@ -94,36 +88,36 @@ def plain(kind: str, source: Any, view: Any) -> Any:
 
 
 def times(source: Any) -> list[float]:
-    """All times of a collection, the last one first; one alone is no list in ParaView."""
-    told = source.TimestepValues
-    return list(reversed([told] if isinstance(told, float) else list(told)))
+    """Return all times of a collection, the last one first; one alone is no list in ParaView."""
+    found = source.TimestepValues
+    return [found] if isinstance(found, float) else list(found)[::-1]
 
 
 def data_at(source: Any, time: float) -> Any:
-    """What is there at a time, itself: what ParaView tells of it may be of another time."""
+    """Fetch the data of a time itself: what ParaView reports of it may be of another time."""
     source.UpdatePipeline(time)
     found = simple.servermanager.Fetch(source)
     return found.GetBlock(0) if found.IsA("vtkMultiBlockDataSet") else found
 
 
 def points_at(source: Any, time: float) -> int:
-    """How many points it has at a time, which is read."""
+    """Read a time, and count its points."""
     return int(data_at(source, time).GetNumberOfPoints())
 
 
 def size(source: Any, name: str) -> float:
-    """A length of all smarticles [m]."""
+    """Return a length of all smarticles [m]."""
     return float(data_at(source, times(source)[0]).GetFieldData().GetArray(name).GetValue(0))
 
 
 def largest_at(source: Any, time: float, name: str) -> float:
-    """The largest value of a field of cells at a time; 0 where there is none."""
+    """Return the largest value of a field of cells at a time; 0 where there is none."""
     values = data_at(source, time).GetCellData().GetArray(name)
     return float(values.GetRange()[1]) if values is not None and values.GetNumberOfTuples() else 0.0
 
 
 def boxes(_kind: str, source: Any, view: Any) -> None:
-    """Coloured by crossings, one scale for all times; of motion in a plane, which has none, by number."""
+    """Colour by crossings, one scale for all times; of motion in a plane, which has none, by number."""
     shown = simple.Show(source, view)
     name = colouring(source)
     simple.ColorBy(shown, ("CELLS", name))
@@ -145,13 +139,13 @@ def boxes(_kind: str, source: Any, view: Any) -> None:
 
 
 def colouring(source: Any) -> str:
-    """Name of the field that the boxes are coloured by."""
+    """Name the field that the boxes are coloured by."""
     source.UpdatePipeline()
     return "crossings" if source.CellData.GetArray("crossings") is not None else "smarticle_id"
 
 
 def wall(kind: str, source: Any, view: Any) -> None:
-    """The half behind the pile, seen from the front; of a plane all of it."""
+    """Show the half behind the pile, seen from the front; of a plane all of it."""
     # One that was taken away is none at the end.
     next(time for time in times(source) if points_at(source, time))
     low_x, high_x, low_y, high_y = source.GetDataInformation().GetBounds()[:4]
@@ -166,12 +160,12 @@ def wall(kind: str, source: Any, view: Any) -> None:
 
 
 def strings(kind: str, source: Any, view: Any) -> None:
-    """As thin tubes."""
+    """Show as thin tubes."""
     plain(kind, source, view).LineWidth = 3.0
 
 
 def arrows(kind: str, source: Any, view: Any) -> None:
-    """One arrow per passage."""
+    """Show one arrow per passage."""
     glyph = simple.Glyph(registrationName="passages", Input=source, GlyphType="Arrow")
     glyph.OrientationArray = ["POINTS", "direction"]
     glyph.ScaleArray = ["POINTS", "No scale array"]
@@ -181,7 +175,7 @@ def arrows(kind: str, source: Any, view: Any) -> None:
 
 
 def forces(kind: str, source: Any, view: Any) -> None:
-    """Lines through the smarticles, the darker the larger the normal force, one scale for all times.
+    """Show lines through the smarticles, the darker the larger the normal force, one scale for all times.
 
     Not tubes whose radius is the force: ParaView 5.11 forgets which field that is where a time has no force.
     """
@@ -208,7 +202,7 @@ SHOWERS: dict[str, Callable[[str, Any, Any], Any]] = {
 
 
 def look(view: Any, source: Any) -> None:
-    """From the front, a little from above; at a chain in a plane from above."""
+    """Look from the front, a little from above; at a chain in a plane from above."""
     low_x, high_x, low_y, high_y, low_z, high_z = source.GetDataInformation().GetBounds()
     focus = [(low_x + high_x) / 2, (low_y + high_y) / 2, (low_z + high_z) / 2]
     flat = colouring(source) != "crossings"
@@ -219,7 +213,7 @@ def look(view: Any, source: Any) -> None:
 
 
 def main() -> None:
-    """What the command line asks for."""
+    """Do what the command line asks for."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("folder", nargs="?")
     parser.add_argument("--picture", metavar="FILE.png")

@@ -1,4 +1,4 @@
-"""The page in a real browser: what it shows, what it does, and that it speaks to nobody else."""
+"""The page in a real browser: what it shows, what it does, and that it calls no other host."""
 
 import io
 import json
@@ -46,10 +46,6 @@ class Window:
         self.page.wait_for_selector("canvas")
         self.settled()
 
-    def _heard(self, said):
-        if said.type in {"error", "warning"}:
-            self.faults.append(said.text)
-
     def picture(self):
         shot = io.BytesIO(self.page.locator("main").screenshot())
         return np.asarray(Image.open(shot).convert("RGB")).astype(int)
@@ -66,12 +62,12 @@ class Window:
         raise AssertionError("the picture does not settle")
 
     def pick(self, shares):
-        """Clicks along the middle column, at shares of its height, until something is told.
+        """Clicks along the middle column, at shares of its height, until a smarticle is described.
 
         On a busy machine the answer comes when a place or two farther on have been clicked, whose own answers take it
         away again: so the last places are clicked once more, with time.
         """
-        box, told = self.page.locator("main").bounding_box(), self.page.locator("#told")
+        box, told = self.page.locator("main").bounding_box(), self.page.locator("#pick")
         tried = []
         for share in shares:
             tried.append(share)
@@ -120,9 +116,9 @@ def test_page(flat, browser):
         page.wait_for_function("document.querySelector('#clock').innerText.startsWith('t = 0.5 s')")
         # Picking: places are tried along the middle column until the smarticle is met; there is one.
         window.pick(np.linspace(0.35, 0.95, 40))
-        assert window.text("#told").split()[:2] == ["smarticle_id", "0"]
-        assert "link\n1" in window.text("#told")
-        assert "local_packing_fraction" in window.text("#told")
+        assert window.text("#pick").split()[:2] == ["smarticle_id", "0"]
+        assert "link\n1" in window.text("#pick")
+        assert "local_packing_fraction" in window.text("#pick")
         picture = window.settled()
         magenta = (picture[..., 0] > 120) & (picture[..., 1] < 60) & (picture[..., 2] > 60)
         assert magenta.sum() > 100
@@ -133,7 +129,7 @@ def test_page(flat, browser):
         page.click("#play")
         page.wait_for_function("document.querySelector('#clock').innerText.startsWith('t = 0.25 s')")
         page.click("#play")
-        # It says nothing to anybody else, and nothing went wrong.
+        # It calls no other host, and nothing went wrong.
         assert window.hosts == {address.split("/")[2]}
         assert window.faults == []
         page.context.close()

@@ -1,7 +1,5 @@
 """True bodies: sizes and places of what is known exactly."""
 
-import json
-
 import numpy as np
 import pytest
 import yaml
@@ -12,7 +10,7 @@ from dem.errors import InputError
 from dem.record.frames import read_frames
 from dem.record.run import open_run
 from postprocess.bodies.fields import fields_of
-from postprocess.bodies.meshes import KINDS, Bodies, checked_kinds, solid
+from postprocess.bodies.meshes import KINDS, Bodies, checked_kinds, link_boxes, solid
 from postprocess.measures.entanglement import link_crossings, link_passages
 
 ALL = checked_kinds(["crossings"], [])
@@ -30,15 +28,6 @@ def bodies_at(directory, index=-1, kinds=ALL):
 def changed(directory, **keys):
     path = directory / "scene.yaml"
     path.write_text(yaml.safe_dump(yaml.safe_load(path.read_text()) | keys))
-    return directory
-
-
-def removing(directory):
-    """The same run, whose last phase takes the wall away."""
-    for name in ("run.json", "done.json"):
-        content = json.loads((directory / name).read_text())
-        content["phases"][-1]["type"] = "remove-container"
-        (directory / name).write_text(json.dumps(content))
     return directory
 
 
@@ -63,6 +52,34 @@ def test_boxes_of_one_smarticle_have_its_volume_and_place(tmp_path):
     low, high = vertices.min(axis=0), vertices.max(axis=0)
     assert mesh.bounds[::2] == pytest.approx(low - [T2 / 2, T2 / 2, T1 / 2], abs=1e-8)
     assert mesh.bounds[1::2] == pytest.approx(high + np.array([T2 / 2, 0.0, T1 / 2]), abs=1e-8)
+
+
+def test_boxes_carry_their_smarticle_and_link():
+    scene = SyntheticRun(count=5)
+    vertices = scene.vertices(0.1)
+    mesh = link_boxes(vertices, thickness_normal=T1, thickness_in_plane=T2)
+    centres = mesh.cell_centers().points.reshape(15, 6, 3).mean(axis=1)
+    smarticle, link = mesh.cell_data["smarticle"][::6], mesh.cell_data["link"][::6]
+    middles = (vertices[smarticle, link] + vertices[smarticle, link + 1]) / 2
+    assert centres == pytest.approx(middles, abs=1e-6 * W)
+    assert sorted(zip(smarticle, link, strict=True)) == [(i, k) for i in range(5) for k in range(3)]
+
+
+def test_rods_have_one_box():
+    scene = SyntheticRun(aspect_ratio=0.0, count=4)
+    mesh = link_boxes(scene.vertices(0.1) * 1e3, thickness_normal=1e3 * T1, thickness_in_plane=1e3 * T2)
+    assert mesh.n_cells == 4 * 6
+    assert mesh.triangulate().volume * 1e-9 == pytest.approx(4 * T1 * T2 * W, rel=1e-6)
+
+
+def test_boxes_are_as_thick_as_their_links():
+    barb, body, length, t1 = 0.0095, 0.0213, 0.042, 0.021
+    vertices = u_shape(length, 0.0467)
+    mesh = link_boxes(vertices[None] * 1e3, thickness_normal=1e3 * t1, thickness_in_plane=[9.5, 21.3, 9.5])
+    low, high = mesh.points.min(axis=0) / 1e3, mesh.points.max(axis=0) / 1e3
+    # The body shows below the hinges, barbs beside them.
+    assert high - low == pytest.approx([0.0467 + barb, length + body / 2, t1])
+    assert mesh.triangulate().volume * 1e-9 == pytest.approx(t1 * (0.0467 * body + 2 * length * barb), rel=1e-6)
 
 
 def test_wall_and_floor_are_the_container(pile):
@@ -96,19 +113,19 @@ def test_tiers_are_steps_with_ceilings(pile):
         (round(radius, 6), round(z - FLOOR, 6))
         for radius, z in zip(np.hypot(*points[:, :2].T).tolist(), points[:, 2].tolist(), strict=True)
     }
-    assert corners == {
-        (RADIUS, 0.0), (RADIUS, 0.006), (0.018, 0.006), (0.018, 0.014), (0.0125, 0.014), (0.0125, 0.074),
-    }  # fmt: skip
+    steps = [(RADIUS, (0.0, 0.006)), (0.018, (0.006, 0.014)), (0.0125, (0.014, 0.074))]
+    assert corners == {(radius, height) for radius, heights in steps for height in heights}
     # Cylinders and the two rings that close the steps, not cones between them.
     rings = np.pi * (RADIUS**2 - 0.018**2 + 0.018**2 - 0.0125**2)
     sides = 2 * np.pi * sum(radius * height for radius, height in TIERS)
     assert wall.area == pytest.approx(rings + sides, rel=2e-3)
 
 
-def test_a_wall_that_is_taken_away_is_gone_and_the_floor_holds_the_pile(pile):
-    removing(changed(pile, phases=[{"type": "relax"}] * 3 + [{"type": "remove-container", "speed_m_per_s": None}]))
+def test_a_wall_that_is_taken_away_is_gone_and_the_floor_holds_the_pile(tmp_path):
+    kinds = ("deposit", "relax", "shake", "remove-container")
+    pile = write_run(tmp_path / "pile", SyntheticRun(frames_per_phase=1, phases=kinds))
     far = read_frames(pile)[-1].vertices + np.array([0.05, 0.0, 0.0])
-    write_frame(pile / "frames/frame_000003.vtu", far, time=22.0, phase=3, floor_z=FLOOR)
+    write_frame(pile / "frames/frame_000003.vtu", far, time=22.0, phase=3)
     assert "wall" in bodies_at(pile, 2)
     found = bodies_at(pile, 3)
     assert "wall" not in found
@@ -159,7 +176,7 @@ def test_there_are_as_many_passages_as_crossings(scene):
     assert np.bincount(found.i, minlength=40).tolist() == link_crossings(vertices).tolist()
 
 
-def test_refusals_name_what_is_meant():
+def test_unknown_kinds_are_named():
     with pytest.raises(InputError, match=r"'wal' is nothing to export; did you mean 'wall'\?"):
         checked_kinds([], ["wal"])
     with pytest.raises(InputError, match="nothing is left to export"):

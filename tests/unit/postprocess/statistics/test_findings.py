@@ -42,7 +42,7 @@ def test_the_size_is_counted_from_the_threshold() -> None:
     assert above.more == shifted.more == below.more
 
 
-def test_no_effect_takes_runs_without_end_and_one_run_tells_nothing() -> None:
+def test_no_effect_takes_runs_without_end_and_one_run_gives_no_number() -> None:
     nothing, alone = judge(effect(0.0, 1.0, 8)), judge(mean_over_seeds([0.5]))
     assert isinstance(nothing, Unresolved)
     assert isinstance(alone, Unresolved)

@@ -1,1 +1,0 @@
-"""True bodies of runs with their fields, as files for other programs."""

@@ -1,1 +1,0 @@
-"""A run in a page of the browser, to look around in: a server on this machine, drawing in the page."""

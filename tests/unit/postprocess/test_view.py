@@ -1,0 +1,209 @@
+"""The page of a run: what it shows, and who gets in, what its server listens on, how it ends."""
+
+import asyncio
+import http.cookiejar
+import os
+import re
+import signal
+import socket
+import urllib.error
+import urllib.request
+
+import aiohttp
+import msgpack
+import numpy as np
+import pytest
+from synthetic import T1, SyntheticRun, W, mesh_of, u_shape, write_frame, write_run
+from synthetic.viewing import serving
+
+from dem.errors import InputError
+from dem.record.frames import FrameWriter, read_frames
+from postprocess.view import PICKED, RunView
+from smarticles.main import main
+
+
+@pytest.fixture
+def pile(tmp_path):
+    return write_run(tmp_path / "pile", SyntheticRun(frames_per_phase=2, floor_z=-0.003))
+
+
+@pytest.fixture
+def two(tmp_path):
+    """Two flat smarticles one above the other, 20 mm apart, over a floor at -3 mm."""
+    directory = tmp_path / "two"
+    write_run(directory, SyntheticRun(count=2, frames_per_phase=1, phases=("relax",), packing=(0.001,)))
+    vertices = u_shape(0.7 * W) + np.array([[[0.0, 0.0, 0.0]], [[0.0, 0.0, 0.02]]])
+    write_frame(directory / "frames/frame_000000.vtu", vertices, time=0.5, phase=0, floor_z=-0.003)
+    return directory
+
+
+def colours(view):
+    view.draw()
+    return view._meshes["smarticles"].point_data["colour"]
+
+
+def test_a_ray_picks_the_smarticle_that_it_meets_first(two):
+    view = RunView(two)
+    view.draw()
+    y = 1e3 * u_shape(0.7 * W)[1, 1]  # of the middle links, in mm; heights in the page are above the floor
+    view.pick_along(np.array([[0.0, y, 100.0], [0.0, y, -100.0]]))
+    assert (view.pick.smarticle_id, view.pick.link) == (1, 1)
+    view.pick_along(np.array([[0.0, y, 10.0], [0.0, y, -100.0]]))
+    assert (view.pick.smarticle_id, view.pick.link) == (0, 1)
+    barb = 1e3 * u_shape(0.7 * W)[0]
+    view.pick_along(np.array([[barb[0], barb[1] - 1.0, 100.0], [barb[0], barb[1] - 1.0, -100.0]]))
+    assert (view.pick.smarticle_id, view.pick.link) == (1, 0)
+    view.pick_along(np.array([[50.0, 50.0, 100.0], [50.0, 50.0, -100.0]]))
+    assert view.pick is None
+
+
+def test_what_is_picked_is_described_and_coloured(two):
+    view = RunView(two)
+    assert view.describe() == []
+    view.draw()
+    y = 1e3 * u_shape(0.7 * W)[1, 1]
+    view.pick_along(np.array([[0.0, y, 100.0], [0.0, y, -100.0]]))
+    told = {row["name"]: row["value"] for row in view.describe()}
+    assert told["smarticle_id"] == "1"
+    assert float(told["height_m"]) == pytest.approx(0.023, rel=1e-3)
+    assert told["crossings"] == "0"
+    assert told["velocity_m_per_s"] == "(0, 0, 0)"
+    picked = (colours(view) == PICKED).all(axis=1)
+    assert picked.tolist() == [False] * 24 + [True] * 24
+
+
+def test_bodies_stand_on_the_floor_in_millimetres(two):
+    view = RunView(two)
+    view.draw()
+    bounds = view._meshes["smarticles"].bounds
+    assert bounds[4:] == pytest.approx((3.0 - 1e3 * T1 / 2, 23.0 + 1e3 * T1 / 2), abs=1e-3)
+    assert view._meshes["floor"].bounds[4] == pytest.approx(0.0, abs=1e-6)
+
+
+def test_colours_follow_the_field(pile):
+    view = RunView(pile)
+    before = colours(view).copy()
+    view.colour_by("height")
+    assert (colours(view) != before).any()
+    legend = view.legend()
+    assert len(legend) == 5
+    shown = [float(row["label"]) for row in legend]
+    assert shown == sorted(shown, reverse=True)
+    view.colour_by("smarticle_id")
+    assert view.legend() == []
+    with pytest.raises(InputError, match="is no field"):
+        view.colour_by("colour")
+
+
+def test_new_frames_are_found(pile):
+    view = RunView(pile)
+    assert not view.grow()
+    writer = FrameWriter(pile, times=read_frames(pile).times.tolist())
+    writer.write(mesh_of(SyntheticRun().vertices(0.1), time=23.0, phase=3), 23.0)
+    assert view.grow()
+    view.go_to(len(view.frames) - 1)
+    assert view.frame.time == 23.0
+
+
+def test_a_damaged_frame_leaves_what_is_shown(pile):
+    view = RunView(pile)
+    os.truncate(pile / "frames/frame_000002.vtu", 300)
+    with pytest.raises(InputError, match=r"frame_000002\.vtu: truncated"):
+        view.go_to(2)
+    assert view.index == 7
+    view.colour_by("speed")
+    view.draw()
+
+
+ADDRESS = re.compile(r"http://127\.0\.0\.1:(\d+)/index\.html\?token=([\w-]{43})")
+
+
+@pytest.fixture(scope="module")
+def served(tmp_path_factory):
+    return write_run(tmp_path_factory.mktemp("runs") / "pile", SyntheticRun(frames_per_phase=1))
+
+
+@pytest.fixture(scope="module")
+def page(served):
+    with serving(served) as (process, address):
+        yield process, address
+
+
+def asked(url, *, cookies=None, method="GET"):
+    """Status, headers and text of an answer."""
+    opener = urllib.request.build_opener(urllib.request.HTTPCookieProcessor(cookies))
+    try:
+        with opener.open(urllib.request.Request(url, method=method), timeout=10) as answer:
+            return answer.status, answer.headers, answer.read().decode("utf-8", "replace")
+    except urllib.error.HTTPError as error:
+        return error.code, error.headers, error.read().decode()
+
+
+@pytest.mark.parametrize("path", ["", "index.html", "vue.global.js", "logo.png", "ws", "__trame_vtk/trame-vtk.js"])
+@pytest.mark.parametrize("token", [None, "", "wrong"])
+def test_nothing_is_given_without_the_token(page, path, token):
+    base = page[1].partition("index.html")[0]
+    status, headers, text = asked(base + path + ("" if token is None else f"?token={token}"))
+    assert status == 403
+    assert "Set-Cookie" not in headers
+    assert "with its token" in text
+    assert ADDRESS.fullmatch(page[1])[2] not in text
+
+
+def test_messages_need_it_too(page):
+    base, _, _ = page[1].partition("index.html")
+    assert asked(base + "paraview/", method="POST")[0] == 403
+    token = ADDRESS.fullmatch(page[1])[2]
+
+    async def greeted(secret):
+        async with (
+            aiohttp.ClientSession(cookies={f"smarticles-{ADDRESS.fullmatch(page[1])[1]}": token}) as session,
+            session.ws_connect(base.replace("http", "ws") + "ws") as socket_,
+        ):
+            hello = {"wslink": "1.0", "id": "system:c0:0", "method": "wslink.hello", "args": [{"secret": secret}]}
+            body = msgpack.packb(hello)
+            head = os.urandom(4) + (0).to_bytes(4, "little") + len(body).to_bytes(4, "little")
+            await socket_.send_bytes(head + body)
+            answer = await socket_.receive_bytes(timeout=10)
+            return msgpack.unpackb(answer[12:])
+
+    assert "result" in asyncio.run(greeted(token))
+    assert "error" in asyncio.run(greeted("wslink-secret"))
+
+
+def test_the_token_opens_the_page_and_then_a_cookie_does(page):
+    jar = http.cookiejar.CookieJar()
+    status, headers, text = asked(page[1], cookies=jar)
+    assert status == 200
+    assert '<div id="app">' in text
+    cookie = headers["Set-Cookie"]
+    assert "HttpOnly" in cookie
+    assert "SameSite=Strict" in cookie
+    assert headers["Referrer-Policy"] == "no-referrer"
+    assert "connect-src 'self' ws://127.0.0.1:" in headers["Content-Security-Policy"]
+    assert asked(page[1].partition("index.html")[0] + "vue.global.js", cookies=jar)[0] == 200
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_ctrl_c_ends_it_well(served, number):
+    with serving(served) as (process, address):
+        assert ADDRESS.fullmatch(address)
+        process.send_signal(number)
+        _, said = process.communicate(timeout=30)
+        assert process.returncode == 0
+        assert said == "close its window, or press Ctrl-C, to end\n"
+
+
+def test_a_port_that_is_taken_is_one_line(served, capsys):
+    with socket.create_server(("127.0.0.1", 0)) as taken:
+        port = taken.getsockname()[1]
+        assert main(["view", str(served), "--no-browser", "--port", str(port)]) == 2
+    assert capsys.readouterr().err == (
+        f"smarticles: error: --port {port}: cannot listen there (Address already in use); leave it out, or choose "
+        "another\n"
+    )
+
+
+def test_a_directory_that_is_no_run_is_rejected(tmp_path, capsys):
+    assert main(["view", str(tmp_path)]) == 2
+    assert "cannot read run directory" in capsys.readouterr().err
