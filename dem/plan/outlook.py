@@ -2,24 +2,20 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator, Mapping
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass, field, replace
 from typing import Any, Self
 
 from dem.engine.demand import Activity
 from dem.engine.effect import Adds, EffectName
 from dem.engine.kinds import engine_kind
-from dem.phases.shake import Shake
-from dem.physics.contact import typical_effective_mass
 from dem.plan.effects import Decision, decide
 from dem.plan.steps import stable_step, time_steps
 from dem.scene.scene import Scene
+from dem.scene.stiffness import expected_overlaps, too_soft
 from dem.setting.fidelity import Fidelity, fidelities
 from dem.setting.protocol import PARTS, PROTOCOLS, leaves_alone
 
-# Diameters: overlaps above the one cause a warning, contacts are linear up to the other.
-SOFT, LINEAR = 0.5, 0.25
 _LEFT_OUT = {
     "series_interval_s": "one sample is taken, at the start",
     "frame_interval_s": "no frame is written",
@@ -66,10 +62,8 @@ class Plan:
     """Factor that wall times have been corrected by."""
     protocol: tuple[str, ...] = ()
     """Lines of what the scene has by its protocol."""
-    overlap_impact: float = 0.0
-    """Of the hardest impact, estimated, in diameters [1]."""
-    overlap_weight: float = 0.0
-    """Under the pile's weight, estimated, in diameters [1]."""
+    overlaps: Mapping[str, float] = field(default_factory=dict)
+    """Expected overlaps by cause, in diameters [1]."""
 
     def corrected(self, factor: float) -> Self:
         """Return this plan with wall times `factor` times as long [1]."""
@@ -90,8 +84,8 @@ class Plan:
             *self._engine_to_text(),
             *self.protocol,
             self._steps_to_text(),
-            f"contacts give way by about {self.overlap_impact:.2g} d in the hardest impact, "
-            f"{self.overlap_weight:.2g} d under the pile's weight",
+            "contacts give way by about "
+            + ", ".join(f"{overlap:.2g} d in {cause}" for cause, overlap in self.overlaps.items()),
             "",
             f"{'phase':<24}{'simulated':>12}{'expected wall time':>22}",
         ]
@@ -160,7 +154,6 @@ def plan(scene: Scene) -> Plan:
         wall = kind.seconds_per_second(scene, dt, _activity(scene, index)) * estimate
         phases.append(PlannedPhase(index, phase.kind, phase.known_duration, estimate, wall, dt))
     effects = decide(scene)
-    impact, weight = expected_overlaps(scene)
     engines = Adds.together(effect.adds for effect in effects).engines
     return Plan(
         name=scene.name,
@@ -182,8 +175,7 @@ def plan(scene: Scene) -> Plan:
         stiffness_N_per_m=scene.fidelity.stiffness_N_per_m,
         strands=scene.fidelity.rows if scene.smooth else 0,
         protocol=protocol_lines(scene),
-        overlap_impact=impact / particle.chain.diameter,
-        overlap_weight=weight / particle.chain.diameter,
+        overlaps={overlap.cause: overlap.diameters for overlap in expected_overlaps(scene)},
     )
 
 
@@ -200,38 +192,11 @@ def warnings_of(scene: Scene) -> tuple[str, ...]:
     """Return all warnings of a scene, for `plan` and the beginning of a run: what, where, value with unit, way out."""
     of_phases = (warning for index, phase in enumerate(scene.phases) for warning in phase.warnings(scene, index))
     # Several phases may give the warning about one thing.
-    return (*dict.fromkeys(of_phases), *recording_warnings(scene), *engine_warnings(scene), *stiffness_warnings(scene))
-
-
-def expected_overlaps(scene: Scene) -> tuple[float, float]:
-    """Estimate overlaps [m]: of an impact at the scene's greatest speed on one contact, and under the pile's weight.
-
-    The impact is that of `typical_effective_mass` after a fall by w, at the greatest speed that a phase gives besides.
-    The weight, times 1 + Γ, is borne by as many contacts as smarticles can lie on the floor.
-    """
-    gravity, width, boxes = scene.gravity_m_per_s2, scene.smarticle.middle_length_m, scene.smarticle.boxes
-    stiffness = scene.fidelity.stiffness_N_per_m
-    given = max(phase.peak_speed(gravity) for phase in scene.phases)
-    speed = math.sqrt(given**2 + 2 * gravity * width)
-    shaken = max((phase.peak_acceleration_g for phase in scene.phases if isinstance(phase, Shake)), default=0.0)
-    bearing = max(1.0, min(scene.count, math.pi * scene.cylinder.radius**2 / width**2))
-    weight = scene.count * boxes.mass * gravity * (1 + shaken) / bearing
-    return speed * math.sqrt(typical_effective_mass(scene.particle) / stiffness), weight / stiffness
-
-
-def stiffness_warnings(scene: Scene) -> tuple[str, ...]:
-    """Warn of contacts that are likely to be deeper than half a diameter, with the stiffness that they need."""
-    diameter = scene.sphere_diameter
-    impact, weight = (depth / diameter for depth in expected_overlaps(scene))
-    if max(impact, weight) <= SOFT:
-        return ()
-    # The overlap of an impact falls with the root of the stiffness.
-    factor = max((impact / LINEAR) ** 2, weight / LINEAR)
-    cause = "the hardest impact" if impact > weight else "the pile's weight"
     return (
-        f"fidelity.stiffness_N_per_m: at {scene.fidelity.stiffness_N_per_m:g} N/m {cause} presses contacts in by about "
-        f"{max(impact, weight):.2g} of their thickness; use about {factor * scene.fidelity.stiffness_N_per_m:.2g} N/m "
-        f"for {LINEAR:g} of it",
+        *dict.fromkeys(of_phases),
+        *recording_warnings(scene),
+        *engine_warnings(scene),
+        *filter(None, [too_soft(scene)]),
     )
 
 

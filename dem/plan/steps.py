@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from dem.engine.kinds import engine_kind
 from dem.errors import InputError
 from dem.scene.scene import Scene
+from dem.scene.stiffness import too_soft
 
 # Sphere diameters by which a phase may move walls, hooks or strings in a step. Measured with a hook drawn out of piles
 # of 30, draft and standard, 3 to 4 seeds: the deepest contact is 0.29 to 0.55 diameters deep at 0.03, 0.42 to 0.70 at
@@ -27,6 +28,10 @@ def time_step(scene: Scene) -> float:
         InputError: the given `time_step_s` is above the stable one, the recording intervals do not fit, or a phase
             moves something so fast that contacts cannot follow.
     """
+    # On links the barrier bears any load, but not where it should: sub-steps then take the time.
+    if scene.smooth and (soft := too_soft(scene)):
+        msg = f"{soft}, or leave it out"
+        raise InputError(msg)
     stable = stable_step(scene)
     given = scene.fidelity.time_step_s
     if given is not None and given > stable:

@@ -14,7 +14,7 @@ from typing import Any, Literal, Self
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import Field, ValidationInfo, field_validator, model_validator
+from pydantic import Field, ModelWrapValidatorHandler, ValidationInfo, field_validator, model_validator
 
 from dem.body.particle import Particle, SphereChain, chain_mean_width, mean_width
 from dem.engine.effect import EffectName
@@ -22,6 +22,7 @@ from dem.errors import nearest, shown
 from dem.phases.kinds import AnyPhase
 from dem.phases.pull_hook import with_pull_defaults
 from dem.scene.rules import check
+from dem.scene.stiffness import stiffness_for
 from dem.setting.contact import Contact
 from dem.setting.container import Container, Cylinder
 from dem.setting.fidelity import FIDELITIES, Fidelity, fidelities
@@ -109,6 +110,21 @@ class Scene(Part):
         if not isinstance(value, list | tuple):
             return value
         return [with_pull_defaults(phase, info.data.get("smarticle") or Smarticle()) for phase in value]
+
+    @model_validator(mode="wrap")
+    @classmethod
+    def _stiff_enough(cls, data: Any, handler: ModelWrapValidatorHandler[Self]) -> Self:
+        """Raise the stiffness that a fidelity has by its name, where the scene's loads and speeds need more."""
+        scene = handler(data)
+        given = data.get("fidelity") if isinstance(data, Mapping) else scene.fidelity
+        chosen = given is not None and not isinstance(given, str | Mapping)
+        if not scene.smooth or chosen or (isinstance(given, Mapping) and "stiffness_N_per_m" in given):
+            return scene
+        needed = stiffness_for(scene)
+        if needed <= scene.fidelity.stiffness_N_per_m:
+            return scene
+        knobs = {"base": given} if isinstance(given, str) else dict(given or {})
+        return handler({**data, "fidelity": {**knobs, "stiffness_N_per_m": needed}})
 
     @model_validator(mode="after")
     def _consistent(self) -> Self:
