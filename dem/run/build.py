@@ -37,6 +37,9 @@ BARRIER_LIMIT = 0.9
 MISSED_LIMIT = 0.05
 # Sphere diameters by which energy from nowhere could lift all smarticles: less than any height in the results resolves.
 RISE_LIMIT = 0.5
+# Of the kinetic energy at the greatest speed that a phase gives, which collisions without loss keep within a time step's
+# error.
+KEPT_WITHIN = 0.01
 
 
 def build_engine(scene: Scene, dt: float) -> Engine:
@@ -86,14 +89,15 @@ def build_watchdog(scene: Scene) -> Watchdog:
     """Return the watchdog of a scene, with its limits."""
     gravity, diameter = scene.gravity_m_per_s2, scene.sphere_diameter
     fall = math.sqrt(2 * gravity * (scene.cylinder.height + sum(phase.raises for phase in scene.phases)))
+    fastest, mass = max(phase.peak_speed(gravity) for phase in scene.phases), scene.count * scene.smarticle.boxes.mass
     return Watchdog(
         cylinder=scene.cylinder,
-        speed=SPEED_MARGIN * max(fall, *(phase.peak_speed(gravity) for phase in scene.phases)),
+        speed=SPEED_MARGIN * max(fall, fastest),
         gap=GAP_LIMIT * diameter,
         depth=(BARRIER_LIMIT if scene.smooth else DEPTH_LIMIT) * diameter,
         missed=MISSED_LIMIT if scene.smooth else math.inf,
         # Without gravity there is no such measure.
-        energy=RISE_LIMIT * diameter * scene.count * scene.smarticle.boxes.mass * gravity or math.inf,
+        energy=mass * max(RISE_LIMIT * diameter * gravity, KEPT_WITHIN * fastest**2 / 2) if gravity else math.inf,
     )
 
 
