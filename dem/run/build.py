@@ -37,8 +37,7 @@ BARRIER_LIMIT = 0.9
 MISSED_LIMIT = 0.05
 # Sphere diameters by which energy from nowhere could lift all smarticles: less than any height in the results resolves.
 RISE_LIMIT = 0.5
-# Of the kinetic energy at the greatest speed that a phase gives, which collisions without loss keep within a time step's
-# error.
+# Of the kinetic energy at the greatest speed that a phase gives: collisions without loss keep it so well.
 KEPT_WITHIN = 0.01
 
 
