@@ -22,7 +22,7 @@ from dem.engine.interface import Engine
 from dem.engine.links.arrays import FLOOR, WALL
 from dem.engine.links.engine import LinksEngine
 from dem.engine.links.motion.planar import lay_out
-from dem.engine.links.motors import LAWS
+from dem.physics.motor import LAWS
 from dem.engine.links.shape import shape_of
 from dem.engine.yade.construction import SMARTICLE_MATERIAL, WALL_MATERIAL
 from dem.engine.yade.engine import YadeEngine

@@ -67,33 +67,28 @@ class LinksBoundaries:
 
     @property
     def floor(self) -> float:
-        """See the interface."""
         return float(self._ground.place[FLOOR])
 
     @property
     def velocity(self) -> float:
-        """See the interface."""
         return float(self._ground.speed[FLOOR])
 
     @property
     def walled(self) -> bool:
-        """See the interface; true between the walls of a channel as well."""
+        """Whether there is a wall, or walls of a channel."""
         channel = self._world.channel
         return bool(self._ground.flags[0]) or (channel is not None and math.isfinite(channel[0]))
 
     @property
     def wall_bottom(self) -> float:
-        """See the interface."""
         return float(self._ground.place[WALL] + self._ground.bottoms[0]) if self._ground.flags[0] else math.inf
 
     @property
     def enclosed(self) -> bool:
-        """See the interface."""
         return bool(self._ground.flags[0]) and self.wall_bottom < self.floor
 
     @property
     def raised(self) -> float | None:
-        """See the interface."""
         if not self.enclosed:
             return None
         if self._world.hooks is None:
@@ -103,13 +98,11 @@ class LinksBoundaries:
 
     @property
     def upper_height(self) -> float:
-        """See the interface."""
         return float(self._ground.place[UPPER])
 
     # -- how they move -----------------------------------------------------------------------------------------
 
     def shake(self, *, amplitude: float, frequency: float, walls: bool = True) -> None:
-        """See the interface."""
         if not self._shaken:
             msg = "the engine was built without a shaker"
             raise RunError(msg)
@@ -120,24 +113,20 @@ class LinksBoundaries:
         ground.wave[:] = amplitude, 2 * math.pi * frequency, self._world.time
 
     def lift_wall(self, speed: float) -> None:
-        """See the interface."""
         self._ground.speed[WALL] = speed
         if not self._ground.flags[1]:
             self._ground.flags[1] = 1
             self._world.add_rim(float(self._ground.bottoms[0]), float(self._ground.radii[0]))
 
     def raise_upper(self, speed: float) -> None:
-        """See the interface."""
         self._ground.speed[UPPER] = speed
 
     def stop(self) -> None:
-        """See the interface."""
         self._ground.speed[:] = 0.0
         self._ground.shaken[:] = 0
         self._ground.wave[:] = 0.0
 
     def remove_wall(self) -> None:
-        """See the interface."""
         self._removed(self._remove_wall)
 
     def _remove_wall(self) -> None:
@@ -150,12 +139,10 @@ class LinksBoundaries:
 
     @property
     def hook_sums(self) -> Array:
-        """See the interface."""
         return self._ground.sums[LOWER : UPPER + 1].copy() if self._world.hooks is not None else np.zeros((0, 3))
 
     @property
     def channel_sums(self) -> Array:
-        """See the interface."""
         channel = self._world.channel
         there = channel is not None and math.isfinite(channel[0])
         return self._ground.sums[CHANNEL:].copy() if there else np.zeros((0, 3))

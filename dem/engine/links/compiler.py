@@ -22,6 +22,8 @@ import numpy as np
 from numba.core.caching import CompileResultCacheImpl, _CacheLocator
 from numba.core.caching import FunctionCache as NumbaCache
 
+from dem.physics import motor
+
 F = TypeVar("F", bound=Callable[..., Any])
 
 LOG = logging.getLogger(__name__)
@@ -58,9 +60,9 @@ def kernel(function: F) -> F:
 
 @cache
 def stamp() -> str:
-    """Hash of everything that compiled code depends on: these sources, the options, Numba, NumPy."""
+    """Return the hash of all that compiled code depends on: these sources, the motor law, the options, Numba, NumPy."""
     digest = hashlib.sha256()
-    for path in sorted(Path(__file__).parent.rglob("*.py")):
+    for path in (*sorted(Path(__file__).parent.rglob("*.py")), Path(motor.__file__)):
         digest.update(path.name.encode() + b"\0" + path.read_bytes() + b"\0")
     digest.update(repr((sorted((OPTIONS | NOT_FROM_PYTHON).items()), numba.__version__, np.__version__)).encode())
     return digest.hexdigest()[:16]

@@ -6,7 +6,6 @@ import io
 import json
 import math
 import zipfile
-from itertools import combinations
 from pathlib import Path
 from typing import Any
 
@@ -29,7 +28,7 @@ from dem.engine.links.world import World
 from dem.errors import InputError
 from dem.physics.contact import ContactLaw
 from dem.physics.motor import MotorLaw
-from dem.physics.overlaps import APART, Glance, Held, Overlaps
+from dem.physics.overlaps import APART, Glance, Held, Overlaps, held_between
 from dem.setting.container import Cylinder
 from dem.setting.hooks import Cross
 from dem.setting.plane import Channel
@@ -77,13 +76,9 @@ class LinksEngine:
         strengths: Array | None = None,
     ) -> None:
         self.particle = particle
-        """See the interface."""
         self.cylinder = cylinder
-        """See the interface."""
         self.gravity = gravity
-        """See the interface."""
         self.cpu_elsewhere = 0.0
-        """See the interface."""
         self._world = World(
             particle=particle,
             contact=law,
@@ -99,13 +94,9 @@ class LinksEngine:
         if channel is not None:
             self._world.channel = np.array([math.inf if channel.width is None else channel.width / 2])
         self.ledger = LinksLedger(self._world)
-        """See the interface."""
         self.boundaries = LinksBoundaries(self._world, cylinder, shaken=shaken, removed=self.ledger.removed)
-        """See the interface."""
         self.motors = LinksMotors(self._world, motor_law, strengths)
-        """See the interface."""
         self.strings = LinksStrings(self._world)
-        """See the interface."""
         self._smarticle_seconds = 0.0
         self._thrown = 0.0
         self._world.set_time_step(time_step)
@@ -114,21 +105,18 @@ class LinksEngine:
 
     @property
     def time(self) -> float:
-        """See the interface."""
         return self._world.time
 
     @property
     def steps(self) -> int:
-        """See the interface."""
         return self._world.steps
 
     @property
     def time_step(self) -> float:
-        """See the interface."""
         return self._world.time_step
 
     def set_time_step(self, time_step: float) -> None:
-        """See the interface.
+        """Set the time step.
 
         Velocities belong to the middles of steps: a change of the length by Δ puts them in error by Δ/2 times the
         acceleration at this moment, next to nothing in a pile at rest.
@@ -137,7 +125,6 @@ class LinksEngine:
             self._world.set_time_step(time_step)
 
     def advance(self, steps: int) -> None:
-        """See the interface."""
         if steps > 0:
             self._world.advance(steps)
             self._smarticle_seconds += steps * self.time_step * self.count
@@ -146,18 +133,15 @@ class LinksEngine:
 
     @property
     def count(self) -> int:
-        """See the interface."""
         return self._world.count
 
     def add(self, poses: Poses, *, speed: float = 0.0) -> None:
-        """See the interface."""
         self._world.add(poses, speed=speed)
         mass, new = self.particle.boxes.mass, len(poses.positions)
         self.ledger.added += mass * (self.gravity * float(poses.positions[:, 2].sum()) + new * speed**2 / 2)
         self._thrown += mass * new * speed
 
     def still(self) -> None:
-        """See the interface."""
         assert not self.motors.articulated  # links that are at rest would be told otherwise by their motors
         world = self._world
         world.totals[LOST] += self.state().kinetic_energy
@@ -165,16 +149,13 @@ class LinksEngine:
             moving[:] = 0.0
 
     def state(self) -> State:
-        """See the interface."""
         return self._world.state()
 
     @property
     def impulse(self) -> float:
-        """See the interface."""
         return self._smarticle_seconds * self.particle.boxes.mass * self.gravity + self._thrown
 
     def unbalanced_force(self) -> float:
-        """See the interface."""
         if not self.count or not self.gravity:
             return math.inf
         weight = self.particle.boxes.mass * self.gravity
@@ -182,14 +163,12 @@ class LinksEngine:
         return float(np.linalg.norm(forces, axis=1).mean() / weight)
 
     def neighbours(self) -> NDArray[np.int64]:
-        """See the interface."""
         pairs = self._world.contacts().pairs
         # Two numbers as one: rows are sorted twenty times slower.
         both = np.unique(pairs[:, 0] * self.count + pairs[:, 1])
         return np.bincount(np.concatenate(np.divmod(both, max(1, self.count))), minlength=self.count)
 
     def touches(self) -> NDArray[np.int64]:
-        """See the interface."""
         return self._world.contacts().touches
 
     def overlaps(self, limit: float) -> Overlaps:
@@ -223,7 +202,7 @@ class LinksEngine:
         )
 
     def glance(self, state: State) -> Glance | None:
-        """See the interface; hinges do not give way."""
+        """Return the extremes; hinges do not give way."""
         found, bodies = self._world.extremes(state.link_velocities), self._world.bodies
         diameter = self.particle.chain.diameter
         if not (found[BETWEEN] <= PASSES * diameter and found[DEEPEST] <= HOLDS * diameter):
@@ -242,19 +221,12 @@ class LinksEngine:
     def _held(self, held: NDArray[np.bool_], deep: NDArray[np.bool_], least: float) -> tuple[Held, ...]:
         """Smarticles among the `deep` ones (N,) that touch two boundaries which have moved apart by `least` [m]."""
         parts = self.boundaries.parts() if deep.any() else {}
-        found = []
-        for k in np.flatnonzero(deep):
-            touched = [name for name, (part, _) in parts.items() if held[k, part]]
-            for first, second in combinations(touched, 2):
-                apart = abs(parts[first][1] - parts[second][1])
-                if apart > least:
-                    found.append(Held(int(k), (first, second), apart))
-        return tuple(found)
+        touched = {int(k): [name for name, (part, _) in parts.items() if held[k, part]] for k in np.flatnonzero(deep)}
+        return held_between(touched, {name: raised for name, (_, raised) in parts.items()}, least)
 
     # -- checkpoints -------------------------------------------------------------------------------------------
 
     def save(self, scratch: Path) -> Saved:
-        """See the interface; needs no files."""
         content = io.BytesIO()
         motors = {f"motors.{name}": array for name, array in self.motors.arrays.items()}
         np.savez(content, **self._world.arrays, **motors)  # type: ignore[arg-type] # the stubs take any keyword for allow_pickle
@@ -268,7 +240,7 @@ class LinksEngine:
         return Saved(content=content.getvalue(), memory=json.loads(json.dumps(memory)))
 
     def load(self, saved: Saved, scratch: Path) -> None:
-        """See the interface.
+        """Go on from what `save` gave.
 
         Raises:
             InputError: it was not saved by this engine.

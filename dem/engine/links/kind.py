@@ -24,7 +24,7 @@ class LinksKind:
     order = ORDER
 
     def version(self) -> str:
-        """See the interface: the sources' own hash, and the compiler."""
+        """Return the hash of the sources, and the compiler."""
         return f"{stamp()} (Numba {numba.__version__})"
 
     def threads(self) -> int:
@@ -32,7 +32,6 @@ class LinksKind:
         return 1
 
     def stable_step(self, scene: Demand, *, articulated: bool) -> float:
-        """See the interface."""
         return links_stable_time_step(
             scene.particle,
             contact_law_of(scene),
@@ -42,11 +41,9 @@ class LinksKind:
         )
 
     def seconds_per_second(self, scene: Demand, time_step: float, activity: Activity) -> float:
-        """See the interface."""
         return seconds_per_second(scene, time_step, activity)
 
     def build(self, scene: Demand, time_step: float) -> LinksEngine:
-        """See the interface."""
         return LinksEngine(
             particle=scene.particle,
             cylinder=scene.cylinder,

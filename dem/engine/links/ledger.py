@@ -18,29 +18,25 @@ class LinksLedger:
     def __init__(self, world: World) -> None:
         self._world = world
         self.added = 0.0
-        """See the interface."""
 
     @property
     def container_work(self) -> float:
-        """See the interface."""
         return float(self._world.totals[WORK])
 
     @property
     def dissipated(self) -> float:
-        """See the interface; by contacts only where the scene asks for it, by welding always."""
+        """By contacts where the scene asks for it, and by welding [J]."""
         return float(self._world.totals[LOST])
 
     @property
     def given(self) -> float:
-        """See the interface."""
         return self.added + self.container_work
 
     def elastic(self) -> tuple[float, float]:
-        """See the interface; hinges have no springs."""
+        """Return the energies; hinges have no springs."""
         return self._world.contacts().elastic_energy, 0.0
 
     def take_in(self) -> None:
-        """See the interface."""
         self.added += self.elastic()[0]
 
     def removed(self, remove: Callable[[], None]) -> None:

@@ -12,11 +12,10 @@ from dem.engine.links.arrays import Motoring
 from dem.engine.links.motion.motoring import engage, release, work_so_far
 from dem.engine.links.world import World
 from dem.errors import InputError
-from dem.physics.motor import MotorLaw
+from dem.physics.motor import LAWS, MotorLaw
 
 Array = NDArray[np.float64]
 
-LAWS = ("halt", "stall", "ease", "slip", "servo")
 LOOKS = 64  # that may be told at once: so many that a call of the kernel costs nothing beside them
 
 
@@ -42,21 +41,17 @@ class LinksMotors:
 
     @property
     def present(self) -> bool:
-        """See the interface."""
         return self._law is not None
 
     @property
     def looks_at_once(self) -> int:
-        """See the interface."""
         return LOOKS
 
     @property
     def articulated(self) -> bool:
-        """See the interface."""
         return self._world.articulated
 
     def articulate(self) -> None:
-        """See the interface."""
         world = self._world
         if world.articulated:
             return
@@ -68,7 +63,6 @@ class LinksMotors:
         world.motors.due[1] = -1
 
     def weld(self) -> None:
-        """See the interface."""
         world = self._world
         if world.articulated:
             assert world.motors is not None
@@ -88,7 +82,6 @@ class LinksMotors:
 
     @property
     def readings(self) -> MotorReadings | None:
-        """See the interface."""
         motors = self._world.motors
         if motors is None:
             return None
@@ -102,7 +95,6 @@ class LinksMotors:
 
     @property
     def work(self) -> float:
-        """See the interface."""
         world = self._world
         if world.motors is None:
             return 0.0
@@ -111,7 +103,7 @@ class LinksMotors:
         return float(work_so_far(world.shape, world.bodies, world.motors))
 
     def gaps(self) -> Array:
-        """See the interface: hinges do not give way."""
+        """Return zeros: hinges do not give way."""
         return np.zeros((self._world.count, 2))
 
     def _made(self, law: MotorLaw) -> Motoring:

@@ -29,11 +29,9 @@ class LinksStrings:
 
     @property
     def tied(self) -> bool:
-        """See the interface."""
         return self._world.cords is not None
 
     def tie(self, ties: Sequence[Tie], law: StringLaw, speeds: Sequence[float]) -> None:
-        """See the interface."""
         count = len(ties)
         cords = Cords(
             owner=np.array([(tie.smarticle, tie.link) for tie in ties], dtype=np.int64).reshape(count, 2),
@@ -55,23 +53,19 @@ class LinksStrings:
         self._world.cords = cords
 
     def untie(self) -> None:
-        """See the interface."""
         self._world.cords = None
 
     @property
     def sums(self) -> Array:
-        """See the interface."""
         return self._at_work.sums.copy()
 
     @property
     def pulled(self) -> float:
-        """See the interface."""
         cords = self._at_work
         return float(np.ptp(cords.anchor[:, 0]) - np.ptp(cords.start[:, 0]))
 
     @property
     def ties(self) -> Array:
-        """See the interface."""
         cords = self._at_work
         find_knots(self._world.shape, self._world.posed(), cords)
         return cords.knot.copy()

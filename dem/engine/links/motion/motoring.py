@@ -34,11 +34,10 @@ from dem.engine.links.motion.planar import (
 )
 from dem.engine.links.motion.poses import SLIP, along_normal, turn_axes
 from dem.engine.links.shape import Shape
+from dem.physics import motor
 
-HALT, STALL, EASE = range(3)
 BRAKING = 0.5  # of the greatest deceleration is used on the way to a target, so that it is not passed
-# As in `dem.physics.motor`, which is no source that compiled code is named after; a test holds the two together.
-EASED, PATIENCE = 0.5, 20  # of the speed at τ_max; findings in a row, of both barbs, after which a motor stops
+_halts, _speed_factor = inlined(motor.halts), inlined(motor.speed_factor)
 ITERATIONS = 3  # of the implicit midpoint rule; each gains the factor of the turn in a step
 
 
@@ -168,17 +167,12 @@ def _prescribed(bodies: Bodies, motors: Motoring, i: int, k: int, target: float,
     catch_up = min(abs(behind) / interval, math.sqrt(2 * BRAKING * most * abs(behind)))
     rate = (target - motors.schedule[i, k]) / interval + math.copysign(catch_up, behind)
     torque = motors.torque[i, k]
-    over, speed = abs(torque) >= motors.limit[i, k], motors.speed
-    if motors.law == EASE:
-        motors.over[i] = motors.over[i] + 1 if over else 0
-        if over:
-            speed = EASED * motors.speed
+    over = abs(torque) >= motors.limit[i, k]
+    motors.over[i] = motors.over[i] + 1 if over else 0
+    speed = motors.speed * _speed_factor(motors.law, over)
     rate = min(speed, max(-speed, rate))
     rate = min(before + most * interval, max(before - most * interval, rate))
-    if motors.law == EASE:
-        halted = over and motors.over[i] >= PATIENCE
-    else:
-        halted = over and (motors.law == STALL or rate * torque > 0.0)
+    halted = _halts(motors.law, over, rate, torque, motors.over[i])
     motors.halted[i, k] = halted
     return 0.0 if halted else rate
 
