@@ -22,12 +22,12 @@ from dem.engine.interface import Engine
 from dem.engine.links.arrays import FLOOR, WALL
 from dem.engine.links.engine import LinksEngine
 from dem.engine.links.motion.planar import lay_out
-from dem.physics.motor import LAWS
 from dem.engine.links.shape import shape_of
 from dem.engine.yade.construction import SMARTICLE_MATERIAL, WALL_MATERIAL
 from dem.engine.yade.engine import YadeEngine
 from dem.engine.yade.kind import hinge_law
 from dem.physics.contact import ContactLaw
+from dem.physics.motor import LAWS
 from dem.plan.steps import time_step
 from dem.scene.scene import Scene
 from dem.setting.container import Cylinder

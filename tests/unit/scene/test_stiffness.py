@@ -1,0 +1,64 @@
+"""Stiffness from loads and speeds: raised where a name leaves it open, rejected where it is given too soft."""
+
+from __future__ import annotations
+
+import math
+import re
+from typing import Any
+
+import pytest
+from scenes import small
+
+from dem.errors import InputError
+from dem.plan.steps import time_step
+from dem.scene.scene import Scene
+from dem.scene.stiffness import LIMIT, WANTED, expected_overlaps, stiffness_for
+
+THROWN = {"type": "deposit", "thrown_at_m_per_s": 3.0}
+
+
+def links(**changes: Any) -> Scene:
+    return small({"engine": "links", "fidelity": "draft", **changes})
+
+
+def deepest(scene: Scene) -> float:
+    return max(overlap.diameters for overlap in expected_overlaps(scene))
+
+
+def test_ordinary_scenes_keep_the_stiffness_of_their_name() -> None:
+    assert links().fidelity.stiffness_N_per_m == 250.0
+    assert deepest(links()) < WANTED
+
+
+@pytest.mark.parametrize("changes", [{"phases": [THROWN]}, {"gravity_m_per_s2": 100.0}])
+def test_hard_scenes_get_what_they_need(changes: dict[str, Any]) -> None:
+    scene = links(**changes)
+    assert scene.fidelity.stiffness_N_per_m > 1000.0
+    assert 0.9 * WANTED < deepest(scene) <= WANTED
+    assert scene.fidelity.base == "draft"
+    # A resolved scene says its stiffness, and stays as it is when it is read again.
+    again = Scene.model_validate(scene.model_dump(mode="json"))
+    assert again.fidelity == scene.fidelity
+
+
+def test_a_given_stiffness_is_kept_or_rejected_with_the_number_that_is_needed() -> None:
+    needed = links(phases=[THROWN]).fidelity.stiffness_N_per_m
+    softer = links(phases=[THROWN], fidelity={"base": "draft", "stiffness_N_per_m": needed / 2})
+    assert softer.fidelity.stiffness_N_per_m == needed / 2
+    time_step(softer)
+    with pytest.raises(InputError, match=re.escape(f"use about {needed:.2g} N/m, or leave it out")):
+        time_step(links(phases=[THROWN], fidelity={"base": "draft", "stiffness_N_per_m": 100.0}))
+    assert deepest(softer) < LIMIT
+
+
+def test_overlaps_fall_with_the_root_of_the_stiffness_in_impacts_and_with_itself_under_weight() -> None:
+    soft, stiff = (links(fidelity={"base": "draft", "stiffness_N_per_m": kn}) for kn in (250.0, 1000.0))
+    (impact, weight), (less, lighter) = (expected_overlaps(scene) for scene in (soft, stiff))
+    assert impact.diameters == pytest.approx(2 * less.diameters)
+    assert weight.diameters == pytest.approx(4 * lighter.diameters)
+    assert less.stiffness == pytest.approx(impact.stiffness)
+    assert math.isclose(stiffness_for(soft), stiffness_for(stiff))
+
+
+def test_other_engines_keep_theirs() -> None:
+    assert small({"fidelity": "draft", "phases": [THROWN]}).fidelity.stiffness_N_per_m == 250.0
