@@ -91,21 +91,13 @@ PHI_QUANTITY = Quantity(
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Curve:
-    """φ against friction at one l/w and stage, with what it is compared with.
+    """φ against friction at one l/w and stage, with what it is compared with."""
 
-    Attributes:
-        friction: (n,) coefficients, ascending [-].
-        packing: (n,) means of φ [-].
-        half_widths: (n,) of their 95 % intervals [-]; NaN where unknown.
-        reference: Gravish's φ [-], read to `DIGITISING_ERROR`.
-        scatter: Relative, of the stage.
-    """
-
-    friction: Array
-    packing: Array
-    half_widths: Array
-    reference: float
-    scatter: Scatter
+    friction: Array  #: (n,) coefficients, ascending [-]
+    packing: Array  #: (n,) means of φ [-]
+    half_widths: Array  #: (n,) of their 95 % intervals [-]; NaN where unknown
+    reference: float  #: Gravish's φ [-], read to `DIGITISING_ERROR`
+    scatter: Scatter  #: Relative, of the stage
 
     def deviation(self, friction: Array) -> Array:
         """Interpolate φ less Gravish's [-]."""

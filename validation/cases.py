@@ -20,23 +20,14 @@ LEAPFROG = "leapfrog is of second order"
 
 @dataclass(frozen=True)
 class Answer:
-    """One quantity, measured and in theory.
+    """One quantity, measured and in theory."""
 
-    Args:
-        what: quantity and unit, as in `speed [m/s]`.
-        theory: the answer on paper [unit].
-        measured: what the engine gave [unit].
-        tolerance: largest error that passes, relative to the scale [1].
-        reason: of the tolerance.
-        scale: what the error is relative to [unit]; 0: the theory itself.
-    """
-
-    what: str
-    theory: float
-    measured: float
-    tolerance: float
-    reason: str = ""
-    scale: float = 0.0
+    what: str  #: Quantity and unit, as in `speed [m/s]`
+    theory: float  #: The answer on paper [unit]
+    measured: float  #: What the engine gave [unit]
+    tolerance: float  #: Largest error that passes, relative to the scale [1]
+    reason: str = ""  #: Of the tolerance
+    scale: float = 0.0  #: What the error is relative to [unit]; 0: the theory itself
 
     @property
     def error(self) -> float:

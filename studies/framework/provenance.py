@@ -37,19 +37,12 @@ NOTHING = Reference(statement="none; no published numbers", facts=MappingProxyTy
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Origin:
-    """What the results of a study come from.
+    """What the results of a study come from."""
 
-    Attributes:
-        found: The runs used, and those that could not be used.
-        note: How these runs differ from the full study.
-        command: Command line.
-        reference: What they are compared with.
-    """
-
-    found: Collected
-    note: str
-    command: str
-    reference: Reference
+    found: Collected  #: The runs used, and those that could not be used
+    note: str  #: How these runs differ from the full study
+    command: str  #: Command line
+    reference: Reference  #: What they are compared with
 
     @property
     def whole_note(self) -> str:

@@ -66,19 +66,12 @@ def named_columns(run: Run) -> dict[str, object]:
 
 @dataclass(frozen=True, kw_only=True)
 class Pictures:
-    """A row of pictures for the first seed of each procedure: with the wall, 0.1 s after, and later.
+    """A row of pictures for the first seed of each procedure: with the wall, 0.1 s after, and later."""
 
-    Attributes:
-        labels: Labels by procedure.
-        after: When the last picture is, after the wall began to go [s]; None: at the end.
-        select: Selects the runs; the first one of each procedure is drawn.
-        name: Of the file.
-    """
-
-    labels: Mapping[str, str]
-    after: float | None = None
-    select: Sequence[str] = ()
-    name: str = "pictures"
+    labels: Mapping[str, str]  #: Labels by procedure
+    after: float | None = None  #: When the last picture is, after the wall began to go [s]; None: at the end
+    select: Sequence[str] = ()  #: Selects the runs; the first one of each procedure is drawn
+    name: str = "pictures"  #: Of the file
 
     def draw(self, path: Path, analysis: Analysis) -> list[Path]:
         """Draw the runs whose directories are there."""

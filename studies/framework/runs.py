@@ -44,25 +44,15 @@ PAIRS = "pairs [-]"
 
 @dataclass(frozen=True, kw_only=True)
 class Quantity:
-    """A column that is measured, averaged over seeds and shown.
+    """A column that is measured, averaged over seeds and shown."""
 
-    Attributes:
-        column: Name in tables, with its unit.
-        meaning: What it is, for readers of the table.
-        label: Header in the short table; empty: only in the CSV files.
-        form: Format of a number there.
-        scale: Factor of the numbers in the short table and in figures, such as 1e3 for millimetres.
-        axis: Label of an axis of a figure; by default the column's name.
-        bar: Which error of the points stands behind a number: `SE` or `95 %`.
-    """
-
-    column: str
-    meaning: str = ""
-    label: str = ""
-    form: str = ".3g"
-    scale: float = 1.0
-    axis: str = ""
-    bar: str = "SE"
+    column: str  #: Name in tables, with its unit
+    meaning: str = ""  #: What it is, for readers of the table
+    label: str = ""  #: Header in the short table; empty: only in the CSV files
+    form: str = ".3g"  #: Format of a number there
+    scale: float = 1.0  #: Factor of the numbers in the short table and in figures, such as 1e3 for millimetres
+    axis: str = ""  #: Label of an axis of a figure; by default the column's name
+    bar: str = "SE"  #: Which error of the points stands behind a number: `SE` or `95 %`
 
     def cell(self, point: Mapping[str, float]) -> str:
         """Format the mean of a point with its error, where it has one."""
@@ -92,23 +82,14 @@ def declare(
 
 @dataclass(frozen=True, kw_only=True)
 class Key:
-    """A column that names a point: one combination of a sweep's variables.
+    """A column that names a point: one combination of a sweep's variables."""
 
-    Attributes:
-        column: Name in tables.
-        label: Header in the short table, and in statements about the runs.
-        form: Format; empty for words.
-        unit: Behind the number in the short table.
-        scale: Factor of the number shown.
-        order: Order of the values, where it is not their own.
-    """
-
-    column: str
-    label: str
-    form: str = ""
-    unit: str = ""
-    scale: float = 1.0
-    order: Sequence[str] = ()
+    column: str  #: Name in tables
+    label: str  #: Header in the short table, and in statements about the runs
+    form: str = ""  #: Format; empty for words
+    unit: str = ""  #: Behind the number in the short table
+    scale: float = 1.0  #: Factor of the number shown
+    order: Sequence[str] = ()  #: Order of the values, where it is not their own
 
     def text(self, value: object) -> str:
         """Format a value; empty where a point has none, such as θ of a pile at rest."""
@@ -195,17 +176,11 @@ def compared_engines(runs: pd.DataFrame, keys: Sequence[str], quantities: Iterab
 
 @dataclass(frozen=True, kw_only=True)
 class MissingRun:
-    """A run directory that could not be used.
+    """A run directory that could not be used."""
 
-    Attributes:
-        directory: As given.
-        status: "not started", "unfinished", "failed", "interrupted", or "unusable" for one that cannot be measured.
-        cause: Why, as far as it is known.
-    """
-
-    directory: str
-    status: str
-    cause: str
+    directory: str  #: As given
+    status: str  #: "not started", "unfinished", "failed", "interrupted", or "unusable" for one that cannot be measured
+    cause: str  #: Why, as far as it is known
 
     @property
     def common_cause(self) -> str:
@@ -215,15 +190,12 @@ class MissingRun:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class MeasuredRun:
-    """A finished run and what was measured of it.
-
-    Attributes:
-        rows: Its rows of the table of runs: one, unless a study measures a run in several ways.
-        history: Quantities against time by the names of columns, (n,) each; empty where a study has none.
-    """
+    """A finished run and what was measured of it."""
 
     run: Run
+    #: Its rows of the table of runs: one, unless a study measures a run in several ways
     rows: Sequence[Row] = field(repr=False)
+    #: Quantities against time by the names of columns, (n,) each; empty where a study has none
     history: Mapping[str, NDArray[Any]] = field(default_factory=dict, repr=False)
 
     @property
@@ -234,13 +206,9 @@ class MeasuredRun:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Collected:
-    """The runs of a study that are done and were measured, in the order given, and the others.
+    """The runs of a study that are done and were measured, in the order given, and the others."""
 
-    Attributes:
-        study: Name of the study, for messages.
-    """
-
-    study: str
+    study: str  #: Name of the study, for messages
     runs: Sequence[MeasuredRun]
     missing: Sequence[MissingRun]
 

@@ -35,19 +35,12 @@ COARSER = "contact begins and ends within a step, which is some 1/150 of it"
 
 @dataclass(frozen=True)
 class Touch:
-    """What was measured from the first step with a contact force on the floor to the last.
+    """What was measured from the first step with a contact force on the floor to the last."""
 
-    Args:
-        velocity: (3,) after [m/s].
-        spin: (3,) after [rad/s].
-        steps: with a force [1].
-        deepest: largest overlap of the lowest point of the first sphere [m].
-    """
-
-    velocity: Array
-    spin: Array
-    steps: int
-    deepest: float
+    velocity: Array  #: (3,) after [m/s]
+    spin: Array  #: (3,) after [rad/s]
+    steps: int  #: With a force [1]
+    deepest: float  #: Largest overlap of the lowest point of the first sphere [m]
 
 
 def touch(access: EngineAccess, engine: Engine, *, most: int) -> Touch:
