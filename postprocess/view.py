@@ -30,11 +30,8 @@ from postprocess.bodies.meshes import BOX_FACES, USUAL, Bodies
 from postprocess.geometry.links import Floats
 from postprocess.pictures.canvas import VIEWS, add_bodies, axes_from, drawn
 
-HOST = "127.0.0.1"
-"""The loopback interface, which no other machine reaches."""
-
-PICKED = (255, 0, 170)
-"""Colour of the smarticle that is picked, which no palette has."""
+HOST = "127.0.0.1"  #: The loopback interface, which no other machine reaches
+PICKED = (255, 0, 170)  #: Colour of the smarticle that is picked, which no palette has
 
 _SAMPLES, _COSTLY_SAMPLES = 12, 3  # frames that a scale of colours is taken from
 # The page's script compiles its templates as it runs; it may speak to this server alone.

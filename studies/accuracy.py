@@ -37,14 +37,12 @@ from studies.framework.study import Study
 from templates.sweep.render import Value, render_yaml
 from templates.sweep.sweep_file import Sweep, SweepFile
 
-BASE = "base"
-"""Setting of the scene as it stands, which the others are variants of."""
+BASE = "base"  #: Setting of the scene as it stands, which the others are variants of
 
 KNOBS = ("time-step", "stiffness", "section", "restitution", "control", "hinge", "fidelity", "engine")
 """Knobs in order; `smarticles accuracy --help` says what they are."""
 
-ACTUATED = frozenset({"actuate", "shape-change", "internal-oscillation"})
-"""Types of phase in which barbs move."""
+ACTUATED = frozenset({"actuate", "shape-change", "internal-oscillation"})  #: Types of phase in which barbs move
 
 ACTIVITIES = ACTUATED | {"shake"}
 """Types of phase that do something to the pile in its container; packing is compared before and after them."""

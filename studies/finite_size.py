@@ -48,8 +48,7 @@ PHASES = ("deposit", "relax", "shake", "relax")
 PAPER_ASPECT, PAPER_COUNT = 0.7, 270
 """The paper's pile that is asked about: its l/w, and its number of smarticles there."""
 
-LARGEST = 0.2
-"""l/w up to which piles are taken as near the threshold."""
+LARGEST = 0.2  #: l/w up to which piles are taken as near the threshold
 
 AT_THRESHOLD = -0.155
 """Power of N with which the largest cluster's share falls just at the threshold of percolation in three dimensions,

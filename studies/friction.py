@@ -153,8 +153,7 @@ class Curve:
         return float(upper - lower)
 
 
-Curves = Mapping[tuple[str, float], Curve]
-"""By stage and l/w; those that Gravish has a point of."""
+Curves = Mapping[tuple[str, float], Curve]  #: By stage and l/w; those that Gravish has a point of
 
 
 def measure(run: Run) -> Row:

@@ -82,8 +82,7 @@ def _scripts() -> list[Script]:
     return found
 
 
-STUDIES: Mapping[str, Script] = MappingProxyType({study.name: study for study in _scripts()})
-"""By name."""
+STUDIES: Mapping[str, Script] = MappingProxyType({study.name: study for study in _scripts()})  #: By name
 
 
 def shipped(name: str) -> Script:

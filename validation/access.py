@@ -116,10 +116,8 @@ class Pushed(LinksEngine):
 
     def __init__(self, **keys: Any) -> None:
         super().__init__(**keys)
-        self.forces: dict[tuple[int, int], Array] = {}
-        """On the centre of a link, by smarticle and link [N]."""
-        self.grown = (0.0, 0.0)
-        """When forces begin to grow, and how long they do [s]."""
+        self.forces: dict[tuple[int, int], Array] = {}  #: On the centre of a link, by smarticle and link [N]
+        self.grown = (0.0, 0.0)  #: When forces begin to grow, and how long they do [s]
 
     def advance(self, steps: int) -> None:
         """Advance; forces are applied step by step."""

@@ -29,8 +29,7 @@ from postprocess.geometry.links import (
 )
 from postprocess.measures.registry import FrameMeasure, Quantity, Shown, in_space
 
-STRAIGHT = 0.99
-"""Tip-to-tip distance over unfolded length above which a smarticle counts as straight [-]."""
+STRAIGHT = 0.99  #: Tip-to-tip distance over unfolded length above which a smarticle counts as straight [-]
 
 _TOLERANCE = 1e-9
 # Pairs of smarticles held in memory at a time.

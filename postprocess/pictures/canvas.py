@@ -40,8 +40,7 @@ VIEWS: Mapping[str, tuple[float, float]] = MappingProxyType(
 )
 """Named views: the camera's azimuth and elevation [degree], seen from the pile."""
 
-MILLIMETRE = 1e3
-"""Drawn in mm: VTK's tolerances do not suit scenes of centimetres in m."""
+MILLIMETRE = 1e3  #: Drawn in mm: VTK's tolerances do not suit scenes of centimetres in m
 
 _OVERSAMPLING = 2
 _LEAST_SIZE, _LARGEST_SIZE = 200, 8000  # pixel

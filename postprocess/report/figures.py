@@ -32,11 +32,8 @@ from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-COLUMN_WIDTH = 3.5
-"""Width of a journal column [inch]."""
-
-RESOLUTION = 300
-"""Of bitmaps [dots per inch]."""
+COLUMN_WIDTH = 3.5  #: Width of a journal column [inch]
+RESOLUTION = 300  #: Of bitmaps [dots per inch]
 
 BLACK = "#1a1a1a"
 BLUE = "#0072b2"
@@ -80,8 +77,7 @@ _FOOTER_LINE = 0.082  # inch per line of footer
 _FOOTER_MARGIN = 0.06  # inch above and below it together
 _FOOTER_COLUMNS = 97  # characters of that size across one column width
 
-FOOTER_SHARE = 0.2
-"""The most of a figure's height that its footer takes [-]."""
+FOOTER_SHARE = 0.2  #: The most of a figure's height that its footer takes [-]
 
 
 @contextmanager

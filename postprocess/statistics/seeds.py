@@ -29,8 +29,7 @@ class SeedMean:
     count: int  #: n, runs or points
 
 
-Slope = SeedMean
-"""A slope that several blocks of points share; NaN where x is the same throughout every block."""
+Slope = SeedMean  #: A slope that several blocks of points share; NaN where x is the same throughout every block
 
 
 @dataclass(frozen=True, kw_only=True)

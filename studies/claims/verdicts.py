@@ -116,8 +116,7 @@ def claims(results: Path, listed: Path = CLAIMS) -> tuple[Claim, ...]:
     return tuple(found)
 
 
-_Findings = tuple[Mapping[str, Mapping[str, str]], str]
-"""Row of each finding by id; what all of them rest on."""
+_Findings = tuple[Mapping[str, Mapping[str, str]], str]  #: Row of each finding by id; what all of them rest on
 
 
 def _tested(

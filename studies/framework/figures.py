@@ -77,8 +77,7 @@ class History:
     active: float = 0.0  #: Time at which the activity ended [s]
 
 
-Split = Callable[[pd.DataFrame], list[Series]]
-"""Makes the series of a table of points or runs."""
+Split = Callable[[pd.DataFrame], list[Series]]  #: Makes the series of a table of points or runs
 
 
 class Figure(Protocol):

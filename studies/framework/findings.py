@@ -26,8 +26,7 @@ __all__ = ["CRITERION"]
 
 _SYMBOLS = {ASPECT: "l/w", SEED: "seed", THETA: "θ", PHI: "φ", PHI_ACTIVE: "φ_f", CROSSINGS: "⟨N⟩", ENERGY: "energy"}
 
-Rows = Callable[[pd.DataFrame], pd.DataFrame]
-"""Selects or derives the rows that a finding is about."""
+Rows = Callable[[pd.DataFrame], pd.DataFrame]  #: Selects or derives the rows that a finding is about
 
 
 class Verdict(StrEnum):

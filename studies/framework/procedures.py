@@ -33,8 +33,7 @@ PROCEDURES: Mapping[str, str] = MappingProxyType(
 )
 """Procedure of each type of activity."""
 
-AMPLITUDE = 10.0
-"""θ of the internal oscillation where procedures are compared, as in the paper [deg]."""
+AMPLITUDE = 10.0  #: θ of the internal oscillation where procedures are compared, as in the paper [deg]
 
 PROCEDURE, THETA, ACTIVE = "procedure", "theta [deg]", "time active [s]"
 PHI, CROSSINGS = f"phi {DEFINITION} [-]", "crossings [-]"

@@ -17,8 +17,7 @@ from studies.framework.figures import Analysis
 from studies.framework.procedures import EXTERNAL, INTERNAL, PROCEDURE, PROCEDURES, SHAPE, STATIC
 from studies.framework.runs import run_columns
 
-ORDER = (STATIC, EXTERNAL, INTERNAL, SHAPE)
-"""Procedures in the order of tables and pictures."""
+ORDER = (STATIC, EXTERNAL, INTERNAL, SHAPE)  #: Procedures in the order of tables and pictures
 
 _REMOVAL = "remove-container"
 

@@ -22,22 +22,19 @@ from dem.scene.reading import load_scene
 from postprocess.statistics.points import ASPECT, SEED, marked, told_number
 from postprocess.statistics.seeds import mean_over_seeds
 
-Row = Mapping[str, object]
-"""Cells of one row of a table, by the names of its columns."""
+Row = Mapping[str, object]  #: Cells of one row of a table, by the names of its columns
 
 # Runs without a relaxation at the end lack columns, and would put them behind these.
 _TAIL = ["escaped at the end [-]", "frames averaged [-]", "scene_sha256", "run"]
 _REMEDY = "give the results folder of an earlier analysis of this study, with runs.csv and provenance.json"
 
 
-ENGINE = "engine"
-"""Column of tables of runs of several engines."""
+ENGINE = "engine"  #: Column of tables of runs of several engines
 
 ENGINE_NAMES: Mapping[str, str] = MappingProxyType({"links": "links", "yade": "YADE"})
 """Engines in the order of tables and figures, the one that judges first, with their names in text."""
 
-DEFINITION = "second-highest-com"
-"""Definition of the packing fraction that is compared with Gravish's."""
+DEFINITION = "second-highest-com"  #: Definition of the packing fraction that is compared with Gravish's
 
 PAIRS = "pairs [-]"
 

@@ -24,8 +24,7 @@ SHAKEN = "time shaken [s]"
 SHAKE_TIME = 20.0
 """How long Gravish et al. shook [s]."""
 
-DIGITISING_ERROR = 0.003
-"""Taken as the error of each of Gravish's points [-]."""
+DIGITISING_ERROR = 0.003  #: Taken as the error of each of Gravish's points [-]
 
 GRAVISH_COLUMNS: Mapping[str, str] = MappingProxyType(
     {"phi_0": "phi_initial", "phi_f": "phi_final", "phi_f relaxed": "phi_final"}
@@ -57,11 +56,8 @@ WHEN = f"before shaking and at the end of shaking, means over the last {LAST_FRA
 
 FRICTION = "friction [-]"
 
-TIMES = (5.0, 10.0, 20.0)
-"""When φ is taken in the course of shaking [s]."""
-
-WINDOW = 1.0
-"""Over how long before those times it is averaged [s]: 30 periods of shaking."""
+TIMES = (5.0, 10.0, 20.0)  #: When φ is taken in the course of shaking [s]
+WINDOW = 1.0  #: Over how long before those times it is averaged [s]: 30 periods of shaking
 
 _SHAKE, _SERIES = "shake", "packing_fraction"
 

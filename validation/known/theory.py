@@ -45,10 +45,8 @@ def _impact(
 class Impact(NamedTuple):
     """A body on a spring and dashpot that never pulls, thrown at them."""
 
-    restitution: float
-    """Speed after over speed before [1]."""
-    duration: float
-    """From first touch until the force is zero [s]."""
+    restitution: float  #: Speed after over speed before [1]
+    duration: float  #: From first touch until the force is zero [s]
 
 
 def dashpot_impact(*, stiffness: float, damping: float, mass: float) -> Impact:
