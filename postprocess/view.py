@@ -73,10 +73,7 @@ class Pick(NamedTuple):
 
 
 class RunView:
-    """What a page shows of a run: frame, colours, and what is picked.
-
-    Args:
-        directory: A run directory with at least one frame.
+    """What a page shows of a run with at least one frame: frame, colours, and what is picked.
 
     Raises:
         InputError: There is none, or it is damaged.
@@ -208,11 +205,9 @@ def _text(value: Any) -> str:
 
 
 class Viewer:
-    """One run in one page, and the server of that page.
+    """One run in one page, and the server of that page, on a port or, if 0, on any that is free.
 
-    Args:
-        port: To listen on; 0: any that is free.
-        opened: Called with the address once the server listens.
+    Once it listens `opened` is called with the address.
     """
 
     def __init__(self, view: RunView, *, port: int, opened: Callable[[str], None]) -> None:

@@ -549,12 +549,7 @@ def _finding(knob: str, *, sensitivity: bool) -> Finding:
 
 
 def study(rungs: Sequence[Rung], expected_s: Mapping[str, float] = MappingProxyType({})) -> Study:
-    """Make the study of a ladder.
-
-    Args:
-        rungs: Each knob's rungs from coarse to fine.
-        expected_s: Expected wall time of a run by its name, for the ratio of measured to expected [s].
-    """
+    """Make the study of a ladder: each knob's rungs, coarse to fine; expected wall times of runs by name [s]."""
     knobs = {rung.knob: rung.sensitivity for rung in rungs}
 
     def tables(runs: pd.DataFrame) -> dict[str, pd.DataFrame]:

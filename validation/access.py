@@ -108,11 +108,7 @@ POINTS = 400  # that stand for a link
 
 
 class Pushed(LinksEngine):
-    """The links engine under forces that no run has.
-
-    Args:
-        keys: of the engine.
-    """
+    """The links engine under forces that no run has."""
 
     def __init__(self, **keys: Any) -> None:
         super().__init__(**keys)
@@ -231,12 +227,9 @@ class LinksAccess(_Access):
             self.force(own, 0, 1, (0.0, 0.0, world.shape.mass * own.gravity))
 
     def swing(self, engine: Engine, links: Iterable[tuple[float, float, float]]) -> None:
-        """Set the links of smarticle 0, articulated and not turned, in motion in their plane.
+        """Set the links of smarticle 0, articulated and not turned, in motion in their plane, as the hinges allow.
 
-        Args:
-            engine: the simulation.
-            links: velocities along x and y [m/s] and spin about z [rad/s] of barb 1, middle link, barb 2, which the
-                hinges allow.
+        Velocities along x and y [m/s] and spin about z [rad/s] are those of barb 1, middle link, barb 2.
         """
         world = _links(engine)._world
         motors, (first, middle, second) = world.motors, np.array(list(links))

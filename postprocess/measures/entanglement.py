@@ -160,13 +160,7 @@ def _passing(vertices: Floats, i: Whole, j: Whole) -> Flags:
 
 
 def _winding(points: Floats, corners: Floats, tolerance: Floats) -> Whole:
-    """Count how often the outline of each quadrilateral winds around its point; 0 on an edge.
-
-    Args:
-        points: (n, 2) [m].
-        corners: (n, 4, 2) [m].
-        tolerance: (n,) [m], distance from an edge up to which a point lies on it.
-    """
+    """Count how often outlines with corners (n, 4, 2) wind around points (n, 2) [m]; 0 as near an edge as (n,) [m]."""
     starts = corners - points[:, None]
     ends = np.roll(starts, -1, axis=1)
     edges = ends - starts

@@ -36,9 +36,7 @@ _NEAR = 1e-3  # share of the interval by which a frame may be off; frames fall o
 def sampled_work(angles: Floats, torques: Floats) -> float:
     """Sum τ Δα over all barbs [J], with Δα since the sample before; NaN of fewer than two samples.
 
-    Args:
-        angles: (samples, N, 2) of the barbs [rad].
-        torques: (samples, N, 2) of their motors [N m].
+    Angles [rad] and torques of the motors [N m] are (samples, N, 2).
 
     Raises:
         InputError: The two are not of one shape.

@@ -186,8 +186,7 @@ def refuse_to_overwrite(path: Path, *, overwrite: bool) -> None:
 def sequence(colours: int, *, last: float = 1.0) -> list[str]:
     """Return hexadecimal colours, dark to light: steps of viridis, lightened so that shading shows.
 
-    Args:
-        last: Place of the last one in the map, up to 1.
+    The last one has the place `last` in the map, up to 1.
     """
     steps = [0.16 + (last - 0.16) * i / max(colours - 1, 1) for i in range(colours)]
     plain = np.array([matplotlib.colormaps["viridis"](step)[:3] for step in steps])

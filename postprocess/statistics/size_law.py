@@ -98,12 +98,7 @@ def scatter_of(counts: Floats, values: Floats) -> Scatter:
 
 
 def size_law(counts: Floats, values: Floats) -> SizeLaw:
-    """Fit the law to runs of two sizes at least.
-
-    Args:
-        counts: (n,) smarticles of each run.
-        values: (n,) of the quantity, finite.
-    """
+    """Fit the law to runs of two sizes at least, by their counts of smarticles (n,) and finite values (n,)."""
     scatter = scatter_of(counts, values)
     bulk, slope, left = _fit(counts, values, scatter, POWER)
     sizes = len(np.unique(counts))
@@ -189,12 +184,9 @@ class Profile:
 
 
 def profiles(x: Floats, having: Floats, groups: NDArray[np.int64]) -> dict[int, Profile]:
-    """Compute the profile likelihoods of x_c of each group, on common places.
+    """Compute the profile likelihoods of x_c of each group, such as a size, on common places.
 
-    Args:
-        x: (n,) finite, of each run.
-        having: (n,) 0 or 1.
-        groups: (n,) such as the size.
+    Runs have a finite x (n,), the property or not, 0 or 1 (n,), and a group (n,).
     """
     span = float(np.ptp(x)) or 1.0
     places = np.linspace(x.min() - span / 2, x.max() + span / 2, _PLACES)

@@ -84,11 +84,7 @@ class Claim:
 
 
 def claims(results: Path, listed: Path = CLAIMS) -> tuple[Claim, ...]:
-    """Judge all claims by what the studies found.
-
-    Args:
-        results: Folder of the studies' results.
-        listed: The list of claims.
+    """Judge all claims of a list by what the studies found.
 
     Raises:
         InputError: A study or a finding that the list names is not there.

@@ -365,10 +365,7 @@ PROCEDURE_LABELS: Mapping[str, str] = MappingProxyType(
 def by_procedure(labels: Mapping[str, str] = PROCEDURE_LABELS, *, apart: float = 0.0, line: bool = True) -> Split:
     """Make a series of each procedure, the internal oscillation at the amplitude that procedures are compared at.
 
-    Args:
-        labels: Labels by procedure, in the order of the legend.
-        apart: Distance of neighbouring series along x.
-        line: Whether a line joins the points.
+    Labels are in the order of the legend; `apart` is the distance of neighbouring series along x.
     """
 
     def split(table: pd.DataFrame) -> list[Series]:
@@ -457,16 +454,9 @@ def draw_means(
     label: str,
     across: ArrayLike | None = None,
 ) -> None:
-    """Draw means with their error bars.
+    """Draw means (n,) with their error bars, the half-widths (n,) of the 95 % intervals of y, NaN where there is none.
 
-    Args:
-        axes: To draw in.
-        x: (n,) places, or means.
-        y: (n,) means, or places.
-        half_widths: (n,) of the 95 % intervals of `y`, NaN where there is none; None: `y` are no means.
-        look: Marker and line, see `marker`.
-        label: For the legend.
-        across: (n,) or, below and above, (2, n) half-widths of `x`.
+    Without half-widths y are no means; `across` are half-widths of x, (n,) or, below and above, (2, n).
     """
     bars = axes.errorbar(
         x, y, yerr=half_widths, xerr=across, **{"markersize": 3.4, "linewidth": 0.7, **look}, label=label
@@ -486,14 +476,9 @@ def draw_bounds(axes: Axes, x: ArrayLike, least: ArrayLike, lengths: ArrayLike, 
 
 
 def finish(figure: Canvas, path: Path, notes: Sequence[str], footer: Sequence[str], *, bars: str = BARS) -> list[Path]:
-    """Put legend and footer to a figure and write it; no limit of an axis hides anything.
+    """Put legend and footer to a figure, and write it; no limit of an axis hides anything.
 
-    Args:
-        figure: Drawn completely.
-        path: Without suffix.
-        notes: What is to be known of this figure.
-        footer: Origin.
-        bars: What error bars are, stated where there are any.
+    The path has no suffix; `bars` says what error bars are, where there are any.
     """
     fullest = max(figure.axes, key=lambda axes: len(axes.get_legend_handles_labels()[1]))
     handles, labels = fullest.get_legend_handles_labels()

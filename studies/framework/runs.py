@@ -269,13 +269,9 @@ def collect_runs(
     *,
     earlier: Mapping[str, MeasuredRun] | None = None,
 ) -> Collected:
-    """Measure the finished runs, and list the others.
+    """Measure the finished runs, and list the others; an InputError while measuring makes a run unusable.
 
-    Args:
-        study: Its name, for messages.
-        run_dirs: Run directories.
-        measure: Measures one run; an InputError makes the run unusable.
-        earlier: Runs measured before by the names of their directories, for those whose directories are not there.
+    Of directories that are not there the runs of an earlier analysis stand in, by name.
 
     Raises:
         InputError: No run is done.
@@ -315,12 +311,8 @@ class Wanted:
 def earlier_runs(results: Path | str, wanted: Mapping[str, Wanted]) -> dict[str, MeasuredRun]:
     """Read those runs of an earlier analysis that are of the scenes wanted, by name.
 
-    What was measured comes from its table of runs, to the six digits that are there; versions and command come from its
-    provenance. Only a run of the very scene counts, by name and hash. The rest of a manifest follows from the scene.
-
-    Args:
-        results: Folder with `runs.csv` and `provenance.json`.
-        wanted: The runs planned, by name.
+    What was measured comes from `runs.csv` in the results, to the six digits that are there; versions and command come
+    from `provenance.json`. Only a run of the very scene counts, by name and hash.
 
     Raises:
         InputError: The folder holds no such files, they are damaged, or none of its runs is wanted.

@@ -99,12 +99,8 @@ class Study:
     ) -> Report:
         """Measure runs, and write tables, text, provenance and figures; earlier files are replaced.
 
-        Args:
-            run_dirs: Run directories; runs that are not done, or cannot be read, are listed as missing.
-            output: Folder for the results; made if needed.
-            note: How these runs differ from the full study.
-            command: Command line.
-            earlier: Runs of an earlier analysis by name, for directories that are not there.
+        Runs that are not done, or cannot be read, are listed as missing; the note says how runs differ from the full
+        study.
 
         Raises:
             InputError: No run is done, runs must not be averaged or compared, or the output is no folder.

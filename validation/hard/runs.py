@@ -123,14 +123,10 @@ def whole(
     steps: Callable[[Scene], Sequence[float]] = time_steps,
     spoil: Callable[[Engine], None] | None = None,
 ) -> Watched:
-    """Run a scene into a run directory.
+    """Run plain data of a scene into a run directory, with time steps by phase [s].
 
-    Args:
-        data: plain data of the scene.
-        out: the run directory.
-        note: whether the watchdog checks closely every time and notes how near its limits are.
-        steps: time step of each phase [s].
-        spoil: done to the engine before each record.
+    With `note` the watchdog checks closely every time and notes how near its limits are; `spoil` is done to the engine
+    before each record.
     """
     nearest: dict[str, float] = {}
     checks: list[float] = []  # processor time of each of the watchdog's [s]
