@@ -116,10 +116,8 @@ def ladder(  # noqa: PLR0917 # a row of a table
     """Register a function as a ladder: it returns the error of a trajectory at each of some time steps.
 
     Its size is that of the motion, in the unit of the quantity, its steps go from coarse to fine [s], its scheme has
-    the
-    order in this motion [1] and the reason, of all engines or by engine. `phases` of the onset within a step are those
-    of
-    the quick form (None: the function has no such option); other keywords are the function's.
+    the order in this motion [1] and the reason, of all engines or by engine. `phases` of the onset within a step are
+    those of the quick form (None: the function has no such option); other keywords are the function's.
     """
     by_engine = scheme if isinstance(scheme, dict) else dict.fromkeys(ENGINES, scheme)
     return _register(LADDERS, name, options, about, quantity, size, steps, by_engine, phases)

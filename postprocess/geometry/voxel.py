@@ -97,8 +97,7 @@ def solid_points(
     """Return points (n, 3) [m] of a cubic grid inside a link's box, each once, and their pitch [m].
 
     Thicknesses [m] are t1, along the normal of the smarticle's plane, and t2, in it; a point stands for its cube, as
-    wide
-    as the pitch [m] or, without one, as half the smaller thickness.
+    wide as the pitch [m] or, without one, as half the smaller thickness.
 
     Raises:
         InputError: Bad sizes.

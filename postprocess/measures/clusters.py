@@ -67,8 +67,7 @@ def spans_height(clusters: Clusters, vertices: Vertices, *, diameter: float, flo
     """Whether one cluster reaches from the floor, at a height [m], to the top of the pile.
 
     The top is where 95 % of the links' material lie below; alone on top there may be one smarticle. Links are swept by
-    a
-    sphere of a diameter [m].
+    a sphere of a diameter [m].
 
     Source:
         Stauffer & Aharony, Introduction to Percolation Theory (1994), section 2: a cluster percolates if it joins

@@ -143,12 +143,9 @@ def tilt(vertices: Vertices, *, foot: tuple[float, float] = (0.0, 0.0), floor_z:
 
     A pile that is turned rigidly about its foot by an angle has that tilt; one that spreads evenly to all sides has
     none. The principal axis of the pile's inertia would not do: it lies level in every pile that is lower than about
-    1.7
-    times its radius (a solid cylinder's axes change places there), and a leaning pile has the axis of a sheared one.
-    The
-    foot, x and y [m] on a floor of a height [m], is not the middle of what now lies on it: a column that has fallen
-    over
-    lies above the middle of its side, and would be upright.
+    1.7 times its radius (a solid cylinder's axes change places there), and a leaning pile has the axis of a sheared
+    one. The foot, x and y [m] on a floor of a height [m], is not the middle of what now lies on it: a column that has
+    fallen over lies above the middle of its side, and would be upright.
 
     Raises:
         UndefinedMeasureError: There is no smarticle, or the centre of mass is not above the floor.

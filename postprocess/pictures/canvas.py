@@ -131,8 +131,7 @@ def drawn(bodies: Bodies, frame: Frame, forward: Floats, *, largest: float | Non
     """Return what is drawn of a frame, [mm] above the floor: walls cut open in front, lines as tubes.
 
     A wall that was taken away is there as `ghost`. With a direction of view (3,) of zeros walls stay whole; `largest`
-    is
-    the normal force of the thickest line of force [N].
+    is the normal force of the thickest line of force [N].
     """
     made = bodies.at(frame)
     if "wall" in bodies.kinds and "wall" not in made and bodies.around.removed is not None:

@@ -84,11 +84,7 @@ class Claim:
 
 
 def claims(results: Path, listed: Path = CLAIMS) -> tuple[Claim, ...]:
-    """Judge all claims of a list by what the studies found.
-
-    Raises:
-        InputError: A study or a finding that the list names is not there.
-    """
+    """Judge all claims of a list by what the studies found; InputError where a study or a finding is not there."""
 
     @cache
     def read(study: str) -> _Findings:

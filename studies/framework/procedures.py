@@ -87,11 +87,7 @@ def paired(table: pd.DataFrame, quantity: str, one: str, other: str) -> SeedMean
 
 
 def activity(run: Run) -> Phase:
-    """Find the one activity of a run.
-
-    Raises:
-        InputError: There is not exactly one of a known kind between two rests.
-    """
+    """Find the one activity of a run; InputError unless there is exactly one, of a known kind, between two rests."""
     active = [phase for phase in run.phases if phase.type not in PASSIVE_PHASES]
     around = run.phases[active[0].index - 1 : active[0].index + 2] if active else ()
     if len(active) != 1 or active[0].type not in PROCEDURES or len(around) != 3 or around[2].type != "relax":
@@ -102,11 +98,7 @@ def activity(run: Run) -> Phase:
 
 
 def procedure_row(run: Run) -> dict[str, object]:
-    """Measure one activity between two rests: a row of the table of runs.
-
-    Raises:
-        InputError: It is not one activity between two rests, or cannot be read.
-    """
+    """Measure one activity between two rests: a row of the table of runs; InputError where it is none."""
     active = activity(run)
     settings = run.scene["phases"][active.index]
     if settings["type"] != active.type:

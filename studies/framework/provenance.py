@@ -162,11 +162,7 @@ class Origin:
 
 
 def make_folder(path: Path | str) -> Path:
-    """Make a folder for results.
-
-    Raises:
-        InputError: It is a file, or cannot be made.
-    """
+    """Make a folder for results; InputError where it is a file, or cannot be made."""
     path = Path(path)
     try:
         path.mkdir(parents=True, exist_ok=True)

@@ -23,11 +23,7 @@ _REMOVAL = "remove-container"
 
 
 def removal(run: Run) -> Phase:
-    """Find the phase that takes the wall away.
-
-    Raises:
-        InputError: It is not the last one, or no rest goes before it.
-    """
+    """Find the phase that takes the wall away; InputError unless it is the last one, after a rest."""
     last = run.phases[-1]
     if last.type != _REMOVAL or len(run.phases) < 3 or run.phases[-2].type != "relax":
         types = ", ".join(phase.type for phase in run.phases)
@@ -37,11 +33,7 @@ def removal(run: Run) -> Phase:
 
 
 def around(run: Run) -> tuple[Frame, FrameSequence]:
-    """Read the last frame with the wall, and all those since it began to go.
-
-    Raises:
-        InputError: There are none.
-    """
+    """Read the last frame with the wall, and all those since it began to go; InputError where there are none."""
     phase, frames = removal(run), run.frames
     rest, after = frames.in_phase(phase.index - 1), frames.in_phase(phase.index)
     if not rest or not after:
@@ -51,11 +43,7 @@ def around(run: Run) -> tuple[Frame, FrameSequence]:
 
 
 def named_columns(run: Run) -> dict[str, object]:
-    """Give the cells of the columns that name a run.
-
-    Raises:
-        InputError: The run has more than one activity, or an unknown one.
-    """
+    """Give the cells that name a run; InputError where it has several activities, or an unknown one."""
     active = [phase.type for phase in run.phases if phase.type not in {*PASSIVE_PHASES, _REMOVAL}]
     if len(active) > 1 or not set(active) <= set(PROCEDURES):
         msg = f"{run.path}: not one activity ({', '.join(PROCEDURES)}) or none: it has {', '.join(active)}"

@@ -230,11 +230,7 @@ class Collected:
         *,
         within: Callable[[MeasuredRun], Hashable] = lambda _: None,
     ) -> None:
-        """Reject runs that differ in some quantity within a group.
-
-        Raises:
-            InputError: Two runs differ in it.
-        """
+        """Reject runs that differ in some quantity within a group, by an InputError."""
         firsts: dict[Hashable, MeasuredRun] = {}
         for run in self.runs:
             first = firsts.setdefault(within(run), run)
@@ -246,11 +242,7 @@ class Collected:
                 raise InputError(msg)
 
     def reject_repeats(self, point: Callable[[MeasuredRun], str]) -> None:
-        """Reject two runs with the same seed of the same point.
-
-        Raises:
-            InputError: There are two.
-        """
+        """Reject two runs with the same seed of the same point, by an InputError."""
         seen: dict[tuple[str, int, str], MeasuredRun] = {}
         for run in self.runs:
             key = (point(run), run.run.manifest.seed, run.run.manifest.engine)
@@ -340,11 +332,7 @@ def earlier_runs(results: Path | str, wanted: Mapping[str, Wanted]) -> dict[str,
 
 
 def read_runs(results: Path) -> pd.DataFrame:
-    """Read the table of runs as a study wrote it.
-
-    Raises:
-        InputError: There is none, or it lacks the columns that name a run.
-    """
+    """Read the table of runs as a study wrote it; InputError where it is none."""
     path = results / "runs.csv"
     try:
         table = pd.read_csv(path, comment="#", dtype={"run": str, "scene_sha256": str, SEED: int})

@@ -93,11 +93,7 @@ def at_time(time: float) -> str:
 
 
 def contact_of(run: Run) -> SceneData:
-    """Read what the scene of a run says of its contacts.
-
-    Raises:
-        InputError: It says nothing.
-    """
+    """Read what the scene of a run says of its contacts; InputError where it says nothing."""
     contact: SceneData | None = run.scene.get("contact")
     if contact is None:
         msg = f"{run.path}: scene.yaml has no contact; give runs of a study of friction"
@@ -106,11 +102,7 @@ def contact_of(run: Run) -> SceneData:
 
 
 def common_friction(run: Run) -> float:
-    """Read the one coefficient of friction of a run [-].
-
-    Raises:
-        InputError: Its walls have another one than its smarticles.
-    """
+    """Read the one coefficient of friction of a run [-]; InputError where its walls have another one."""
     contact = contact_of(run)
     between, wall = contact["friction_smarticle"], contact["friction_wall"]
     if between != wall:
@@ -181,11 +173,7 @@ def measured_row(run: Run, definitions: Sequence[str]) -> dict[str, object]:
 
 
 def packing_history(run: Run) -> History:
-    """Read φ of a shaken run against the time since shaking began [-].
-
-    Raises:
-        InputError: It was not shaken, or recorded no φ.
-    """
+    """Read φ of a run against the time since shaking began [-]; InputError where none was recorded."""
     shakes = [phase for phase in run.phases if phase.type == _SHAKE]
     start, end = (shakes[0].start_s, shakes[-1].end_s) if shakes else (None, None)
     series = run.series

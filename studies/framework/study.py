@@ -141,11 +141,7 @@ class Study:
         return MeasuredRun(run=run, rows=[measured] if isinstance(measured, Mapping) else measured)
 
     def reject_unlike(self, found: Collected) -> None:
-        """Reject runs that must not be averaged or compared.
-
-        Raises:
-            InputError: Fidelities, counts or constants differ, or a point has the same seed twice.
-        """
+        """Reject runs that must not be averaged or compared, and seeds given twice, by an InputError."""
 
         def cells(columns: Sequence[str]) -> Callable[[MeasuredRun], tuple[object, ...]]:
             return lambda run: tuple(run.row[name] for name in columns)
