@@ -311,7 +311,6 @@ class Scatter:
     split: Split  #: Makes the series of runs and of points; its look has a marker and a colour
     bounds: str  #: Column that is above 0 where y is a lower bound, drawn as an arrow
     means: bool = True
-    notes: Sequence[str] = ()
 
     def draw(self, path: Path, analysis: Analysis) -> list[Path]:
         """Draw runs, then means with the error bars of both quantities."""
@@ -335,7 +334,7 @@ class Scatter:
             axes.set_ylabel(self.y.axis or y)
             axes.set_ylim(bottom=0)
         note = "Small: runs, with an arrow: a lower bound; large: means over seeds."
-        return finish(figure, path, [note, *self.notes], analysis.footer)
+        return finish(figure, path, [note], analysis.footer)
 
 
 def one_by_one(column: str, label: Callable[[Any], str], *, last: float = 0.85) -> Split:

@@ -261,18 +261,17 @@ def mean(
     label: str,
     *,
     rows: Rows = lambda table: table,
-    sign: int = 1,
     threshold: float = 0.0,
     shown: Sequence[str] = (),
     by: str = PROCEDURE,
 ) -> Finding:
-    """Judge whether a value of each row is above (sign 1) or below (−1) a threshold in the mean.
+    """Judge whether a value of each row is above a threshold in the mean.
 
     Means of the columns `shown` at each value of the column `by` are shown, not judged.
     """
 
     def outcome(table: pd.DataFrame) -> Outcome:
-        effect = Effect(label=label, value=mean_over_seeds(values(table)), sign=sign, threshold=threshold)
+        effect = Effect(label=label, value=mean_over_seeds(values(table)), threshold=threshold)
         note = "; ".join(f"{symbol(column)}: {means_by(table, column, by, '.3g')}" for column in shown)
         return Outcome(effects=[effect], note=note)
 

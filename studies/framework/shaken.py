@@ -75,9 +75,11 @@ def gravish_at(aspect: float, stage: str) -> float:
     return float(points.loc[same, GRAVISH_COLUMNS[stage]].iloc[0]) if same.any() else math.nan
 
 
-def gravish_note(aspects: Sequence[float], stages: Sequence[str] = ("phi_0", "phi_f")) -> str:
+def gravish_note(aspects: Sequence[float]) -> str:
     """State what Gravish's points are, and at which l/w there are none, for figures that show them."""
-    lacking = {stage: [f"{one:g}" for one in aspects if math.isnan(gravish_at(one, stage))] for stage in stages}
+    lacking = {
+        stage: [f"{one:g}" for one in aspects if math.isnan(gravish_at(one, stage))] for stage in ("phi_0", "phi_f")
+    }
     gaps = [f"no {stage.replace('phi', 'φ')} at l/w = {', '.join(some)}" for stage, some in lacking.items() if some]
     return f"{_CITATION}, read to ±{DIGITISING_ERROR:g}; {'; '.join(gaps) or 'at every l/w shown'}."
 
