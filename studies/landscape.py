@@ -29,7 +29,7 @@ from postprocess.geometry.links import centres_of_mass
 from postprocess.measures.pull import PULL, WINDOW, held_fast, peak, read_pull, weight_of_one
 from postprocess.measures.table import summarise_run
 from postprocess.report import figures as style
-from postprocess.statistics.findings import judge, told
+from postprocess.statistics.findings import effect_text, judge
 from postprocess.statistics.points import ASPECT, SEED, averaged, told_number
 from postprocess.statistics.ranks import (
     Floats,
@@ -436,7 +436,7 @@ def _as_strong(runs: pd.DataFrame, costs: pd.DataFrame) -> Outcome:
     nearest = min(lacks, key=lambda name: math.inf if math.isnan(lacks[name].value) else lacks[name].value)
     stronger = all(judge(effect) == "found" for effect in lacks.values())
     return Outcome(
-        note=f"shape change less the strongest, {nearest}: {told(lacks[nearest], 3)} n W_s over l/w and seeds; it "
+        note=f"shape change less the strongest, {nearest}: {effect_text(lacks[nearest], 3)} n W_s over l/w and seeds; it "
         f"spends {shape.iloc[0][LIFTS]:.3g} W_s w per smarticle",
         verdict=decide(judge(lacks[nearest]) == "not found", stronger),
     )

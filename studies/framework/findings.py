@@ -16,13 +16,11 @@ from enum import StrEnum
 import numpy as np
 import pandas as pd
 
-from postprocess.statistics.findings import CRITERION, Unresolved, judge, told, told_more
+from postprocess.statistics.findings import Unresolved, effect_text, judge, more_runs_text
 from postprocess.statistics.points import ASPECT, SEED, pairs
 from postprocess.statistics.ranks import correlation_within
 from postprocess.statistics.seeds import SeedMean, Slope, mean_over_seeds, slope_within
 from studies.framework.procedures import CROSSINGS, ENERGY, PHI, PHI_ACTIVE, PROCEDURE, THETA, of_procedure
-
-__all__ = ["CRITERION"]
 
 _SYMBOLS = {ASPECT: "l/w", SEED: "seed", THETA: "θ", PHI: "φ", PHI_ACTIVE: "φ_f", CROSSINGS: "⟨N⟩", ENERGY: "energy"}
 
@@ -76,7 +74,7 @@ class Effect:
     def __str__(self) -> str:
         """`shape-change less internal +0.12 ± 0.01 (n = 8)`."""
         beside = "" if self.sign else ", not judged"
-        return f"{self.label} {self.text or told(self.value, 3, self.unit)}{self.note}{beside}"
+        return f"{self.label} {self.text or effect_text(self.value, 3, self.unit)}{self.note}{beside}"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -127,7 +125,7 @@ class Judged:
     @property
     def needed(self) -> str:
         """What it would take to resolve the finding; empty where that does not apply."""
-        return told_more(Unresolved(more=self.more))
+        return more_runs_text(Unresolved(more=self.more))
 
 
 def _verdict(effects: Sequence[Effect]) -> tuple[Verdict, float]:
@@ -307,7 +305,7 @@ def ranks(
         note = f"{int(held.sum())} values are lower bounds" if held.any() else ""
         return Outcome(
             effects=[
-                Effect(label="rank correlation", value=found, text=told(found, 2)),
+                Effect(label="rank correlation", value=found, text=effect_text(found, 2)),
                 Effect(label="slope", value=line, sign=0, unit=f" {unit}"),
             ],
             note=note,

@@ -114,10 +114,7 @@ def engines_of(table: pd.DataFrame) -> tuple[str, ...]:
     """List the engines of a table of runs, the one that judges first; none where the table has one engine."""
     if ENGINE not in table.columns:
         return ()
-    order = list(ENGINE_NAMES)
-    return tuple(
-        sorted(set(table[ENGINE]), key=lambda name: (order.index(name) if name in order else len(order), name))
-    )
+    return tuple(sorted(set(table[ENGINE]), key=lambda name: (name not in ENGINE_NAMES, name)))
 
 
 def of_engine(table: pd.DataFrame, engine: str) -> pd.DataFrame:
