@@ -299,20 +299,13 @@ def growth(runs: pd.DataFrame) -> pd.DataFrame:
     for name, (one, other) in zip(GROWTHS, itertools.pairwise(names), strict=True):
         grown[name] = 100 * (grown[other] / grown[one] - 1)
     groups = grown.groupby([ASPECT, FRICTION])
-    widths = {}
+    table = groups.size().to_frame(SEEDS)
+    table[[f"{at_time(time)} [-]" for time in TIMES]] = groups[names].mean()
     for name in GROWTHS:
-        scatter = pooled_scatter([group[name].tolist() for _, group in groups])
-        widths[name] = _per_error(scatter) * scatter.value
-    rows = []
-    for (aspect, friction), group in groups:
-        row = {ASPECT: aspect, FRICTION: friction, SEEDS: len(group)}
-        row |= {f"{at_time(time)} [-]": float(group[name].mean()) for time, name in zip(TIMES, names, strict=True)}
-        for name in GROWTHS:
-            count = int(group[name].notna().sum())
-            row[name] = float(group[name].mean())
-            row[marked(name, "95 %")] = widths[name] / math.sqrt(count) if count else math.nan
-        rows.append(row)
-    return pd.DataFrame(rows)
+        scatter = pooled_scatter([group.tolist() for _, group in groups[name]])
+        width = _per_error(scatter) * scatter.value
+        table[name], table[marked(name, "95 %")] = groups[name].mean(), width / np.sqrt(groups[name].count())
+    return table.reset_index()
 
 
 def _crossings_note(found: pd.DataFrame) -> str:

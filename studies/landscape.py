@@ -436,8 +436,8 @@ def _as_strong(runs: pd.DataFrame, costs: pd.DataFrame) -> Outcome:
     nearest = min(lacks, key=lambda name: math.inf if math.isnan(lacks[name].value) else lacks[name].value)
     stronger = all(judge(effect) == "found" for effect in lacks.values())
     return Outcome(
-        note=f"shape change less the strongest, {nearest}: {effect_text(lacks[nearest], 3)} n W_s over l/w and seeds; it "
-        f"spends {shape.iloc[0][LIFTS]:.3g} W_s w per smarticle",
+        note=f"shape change less the strongest, {nearest}: {effect_text(lacks[nearest], 3)} n W_s over l/w and seeds; "
+        f"it spends {shape.iloc[0][LIFTS]:.3g} W_s w per smarticle",
         verdict=decide(judge(lacks[nearest]) == "not found", stronger),
     )
 
