@@ -300,11 +300,12 @@ def growth(runs: pd.DataFrame) -> pd.DataFrame:
         grown[name] = 100 * (grown[other] / grown[one] - 1)
     groups = grown.groupby([ASPECT, FRICTION])
     table = groups.size().to_frame(SEEDS)
-    table[[f"{at_time(time)} [-]" for time in TIMES]] = groups[names].mean()
+    means = groups[[*names, *GROWTHS]].agg(lambda column: column.mean())  # not rounded as those of `mean` are
+    table[[f"{at_time(time)} [-]" for time in TIMES]] = means[names]
     for name in GROWTHS:
         scatter = pooled_scatter([group.tolist() for _, group in groups[name]])
         width = _per_error(scatter) * scatter.value
-        table[name], table[marked(name, "95 %")] = groups[name].mean(), width / np.sqrt(groups[name].count())
+        table[name], table[marked(name, "95 %")] = means[name], width / np.sqrt(groups[name].count())
     return table.reset_index()
 
 

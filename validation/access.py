@@ -258,15 +258,13 @@ class LinksAccess(_Access):
     def floor_force(self, engine: Engine) -> Array:
         """Return the force of the smarticles on floor and wall in the last step, (3,) [N]."""
         force = _links(engine)._world.ground.force
-        total: Array = force[FLOOR] + force[WALL]
-        return total
+        return np.asarray(force[FLOOR] + force[WALL])
 
     def torques(self, engine: Engine) -> Array:
         """Return the torques of the motors of smarticle 0, (2,) [N m]."""
         readings = engine.motors.readings  # the mean since the last control update
         assert readings is not None
-        torques: Array = readings.torques[0].copy()
-        return torques
+        return np.array(readings.torques[0])
 
     def spoil(self, engine: Engine, what: str) -> None:
         """Spoil the second smarticle, or its last link: see `validation.hard.broken`."""
@@ -374,8 +372,7 @@ class YadeAccess(_Access):
         return _yade(engine).container_force()
 
     def torques(self, engine: Engine) -> Array:
-        torques: Array = _yade(engine).motors._hinges.torques()[0]
-        return torques
+        return np.asarray(_yade(engine).motors._hinges.torques()[0])
 
     def spoil(self, engine: Engine, what: str) -> None:
         own = _yade(engine)

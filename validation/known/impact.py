@@ -311,11 +311,6 @@ def _spread(law: ContactLaw, number: int) -> tuple[ContactLaw, float]:
     return dataclasses.replace(law, **springs), 1e-4 + SPREAD * (0.754878 * number % 1)
 
 
-def _roots(squares: Array) -> list[float]:
-    found: list[float] = np.sqrt(squares).tolist()
-    return found
-
-
 @ladder(
     "bounce, e = 0.5",
     "a ball bounces once under gravity",
@@ -349,7 +344,7 @@ def bounce_errors(access: EngineAccess, steps: Sequence[float], *, restitution: 
             access.push(engine, 0, velocity=(0, 0, -speed + G * dt / 2))
             engine.advance(round(time / dt))
             squares[k] += (float(engine.state().positions[0, 2]) - BALL_RADIUS - exact) ** 2
-    return _roots(squares / phases)
+    return [math.sqrt(square) for square in squares / phases]
 
 
 def _collided(access: EngineAccess, law: ContactLaw, dt: float, gap: float, *, tilted: bool) -> Array:
@@ -409,4 +404,4 @@ def collision_errors(
         for k, dt in enumerate(steps):
             away = _collided(access, one, dt, gap, tilted=not smooth) - reference
             squares[k] += float((away**2).sum(axis=1).mean())
-    return _roots(squares / phases)
+    return [math.sqrt(square) for square in squares / phases]
