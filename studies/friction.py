@@ -11,7 +11,7 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pandas as pd
@@ -22,13 +22,14 @@ from dem.record.run import Run
 from postprocess.statistics.points import ASPECT, SEED, SEEDS, marked, seeds_of, told_number
 from postprocess.statistics.seeds import CONFIDENCE as LEVEL
 from postprocess.statistics.seeds import Scatter, mean_over_seeds, pooled_scatter, slope_within
-from studies.framework.figures import POOLED, Histories, Means, one_by_one
+from studies.framework.figures import POOLED, Means, one_by_one
 from studies.framework.findings import Effect, Finding, Outcome, Verdict, decide
 from studies.framework.runs import ASPECT_KEY, DEFINITION, Key, Quantity, Row
 from studies.framework.shaken import (
     DIGITISING_ERROR,
     FRICTION,
     GRAVISH,
+    PHI_TIME,
     SHAKE_TIME,
     STAGES,
     TIMES,
@@ -40,7 +41,6 @@ from studies.framework.shaken import (
     gravish_note,
     phi,
     timed_row,
-    while_shaken,
 )
 from studies.framework.study import Study
 
@@ -456,15 +456,7 @@ STUDY = Study(
             bars=POOLED,
             notes=[gravish_note((0.4, 0.7, 1.0))],
         ),
-        Histories(
-            name="phi_time",
-            history=while_shaken,
-            split=one_by_one(FRICTION, r"$\mu$ = {:g}".format),
-            panels=ASPECT,
-            log=True,
-            x_label="time since shaking began [s]",
-            quantities={"": r"packing fraction $\phi$ [-]"},
-        ),
+        replace(PHI_TIME, panels=ASPECT),
     ),
     extra=tabulate,
     shown=lambda means: means[means[STAGE] == "phi_f"],

@@ -520,29 +520,22 @@ def _scopes(table: pd.DataFrame) -> list[Series]:
     return [Series(rows=table[table[SCOPE] == scope], label=scope, look=look) for scope, look in styles.items()]
 
 
+_over_energy = partial(Means, x=ENERGY, x_label="energy per\nsmarticle [J]", log_x=True, share_y=True)
 FIGURES = (
-    Means(
+    _over_energy(
         name="maps",
         quantities=[QUANTITIES[name] for name in _MAPPED],
-        x=ENERGY,
-        x_label="energy per\nsmarticle [J]",
-        log_x=True,
         rows=_swung,
         split=_by_aspect,
         panels=THETA,
         panel="θ = {:g}°",
-        share_y=True,
     ),
-    Means(
+    _over_energy(
         name="strength_energy",
         quantities=[QUANTITIES[PEAK]],
-        x=ENERGY,
-        x_label="energy per\nsmarticle [J]",
-        log_x=True,
         split=_bought,
         panels=ASPECT,
         levels=_poured,
-        share_y=True,
     ),
     Scatter(
         name="strength_measures",

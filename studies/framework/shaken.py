@@ -16,7 +16,7 @@ from dem.record.run import Run, SceneData
 from postprocess.measures.packing import COSTLY_DEFINITIONS, DEFINITIONS
 from postprocess.measures.table import LAST_FRAMES, packing_change, summarise_run
 from postprocess.statistics.points import ASPECT
-from studies.framework.figures import History
+from studies.framework.figures import Histories, History, one_by_one
 from studies.framework.provenance import Reference
 from studies.framework.runs import DEFINITION, duration, last_columns, run_columns
 
@@ -186,3 +186,13 @@ def packing_history(run: Run) -> History:
             return History(times=series.time[shown] - start, values=values[shown], active=end - start)
     msg = f"{run.path}: no packing fraction was recorded while shaking"
     raise InputError(msg)
+
+
+PHI_TIME = Histories(
+    name="phi_time",
+    history=while_shaken,
+    split=one_by_one(FRICTION, r"$\mu$ = {:g}".format),
+    log=True,
+    x_label="time since shaking began [s]",
+    quantities={"": r"packing fraction $\phi$ [-]"},
+)
