@@ -191,15 +191,11 @@ def gained(work: NDArray[np.float64], before: NDArray[np.bool_]) -> float:
 
 
 def half_compaction(time: NDArray[np.float64], height: NDArray[np.float64], duration: float) -> float:
-    """Find the share of the activity after which the centre of mass has come down by half of what it does in the end.
+    """Find the share of the activity [-] after which the centre of mass has come down by half of what it does in all.
 
-    Args:
-        time: (n,) since the activity began, with the rests before and after [s].
-        height: (n,) over that before the activity [-].
-        duration: Of the activity [s].
-
-    Returns:
-        The share [-]; NaN if the centre of mass is not lower in the end.
+    Times (n,) [s] are since the activity began, with the rests before and after, heights (n,) over that before it [-];
+    NaN
+    if the centre of mass is not lower in the end.
     """
     final = height[time > duration]
     moving = (time >= 0) & (time <= duration)
