@@ -26,9 +26,7 @@ MEASURED = 1  # index of the phase that is compared; phase 0 pours
 def pairs(seconds: float, hinged_step: float) -> list[tuple[str, str, Changes, Changes]]:
     """Return effect, cause of the cost, and the changes to a pile without and with it.
 
-    Args:
-        seconds: length of the phase that is compared [s].
-        hinged_step: time step of the same scene with hinges [s].
+    The phase that is compared takes `seconds`; `hinged_step` is the time step of that scene with hinges [s].
     """
     rest = {"type": "relax", "duration_s": seconds}
     still = {"type": "shake", "duration_s": seconds, "peak_acceleration_g": 0}

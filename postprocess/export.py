@@ -28,8 +28,7 @@ SUFFIXES = ("stl", "obj", "gltf", "glb")
 FORMATS = ("vtp", *SUFFIXES)
 """What a run can be exported to."""
 
-SCRIPT = "show_in_paraview.py"
-"""Name of the script beside the collections."""
+SCRIPT = "show_in_paraview.py"  #: Name of the script beside the collections
 
 _FIELDLESS = ("stl", "obj")
 _Y_UP = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])  # rows: x, y, z of glTF in ours

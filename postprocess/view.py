@@ -30,11 +30,8 @@ from postprocess.bodies.meshes import BOX_FACES, USUAL, Bodies
 from postprocess.geometry.links import Floats
 from postprocess.pictures.canvas import VIEWS, add_bodies, axes_from, drawn
 
-HOST = "127.0.0.1"
-"""The loopback interface, which no other machine reaches."""
-
-PICKED = (255, 0, 170)
-"""Colour of the smarticle that is picked, which no palette has."""
+HOST = "127.0.0.1"  #: The loopback interface, which no other machine reaches
+PICKED = (255, 0, 170)  #: Colour of the smarticle that is picked, which no palette has
 
 _SAMPLES, _COSTLY_SAMPLES = 12, 3  # frames that a scale of colours is taken from
 # The page's script compiles its templates as it runs; it may speak to this server alone.
@@ -76,10 +73,7 @@ class Pick(NamedTuple):
 
 
 class RunView:
-    """What a page shows of a run: frame, colours, and what is picked.
-
-    Args:
-        directory: A run directory with at least one frame.
+    """What a page shows of a run with at least one frame: frame, colours, and what is picked.
 
     Raises:
         InputError: There is none, or it is damaged.
@@ -211,11 +205,9 @@ def _text(value: Any) -> str:
 
 
 class Viewer:
-    """One run in one page, and the server of that page.
+    """One run in one page, and the server of that page, on a port or, if 0, on any that is free.
 
-    Args:
-        port: To listen on; 0: any that is free.
-        opened: Called with the address once the server listens.
+    Once it listens `opened` is called with the address.
     """
 
     def __init__(self, view: RunView, *, port: int, opened: Callable[[str], None]) -> None:

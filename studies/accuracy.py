@@ -37,14 +37,12 @@ from studies.framework.study import Study
 from templates.sweep.render import Value, render_yaml
 from templates.sweep.sweep_file import Sweep, SweepFile
 
-BASE = "base"
-"""Setting of the scene as it stands, which the others are variants of."""
+BASE = "base"  #: Setting of the scene as it stands, which the others are variants of
 
 KNOBS = ("time-step", "stiffness", "section", "restitution", "control", "hinge", "fidelity", "engine")
 """Knobs in order; `smarticles accuracy --help` says what they are."""
 
-ACTUATED = frozenset({"actuate", "shape-change", "internal-oscillation"})
-"""Types of phase in which barbs move."""
+ACTUATED = frozenset({"actuate", "shape-change", "internal-oscillation"})  #: Types of phase in which barbs move
 
 ACTIVITIES = ACTUATED | {"shake"}
 """Types of phase that do something to the pile in its container; packing is compared before and after them."""
@@ -551,12 +549,7 @@ def _finding(knob: str, *, sensitivity: bool) -> Finding:
 
 
 def study(rungs: Sequence[Rung], expected_s: Mapping[str, float] = MappingProxyType({})) -> Study:
-    """Make the study of a ladder.
-
-    Args:
-        rungs: Each knob's rungs from coarse to fine.
-        expected_s: Expected wall time of a run by its name, for the ratio of measured to expected [s].
-    """
+    """Make the study of a ladder: each knob's rungs, coarse to fine; expected wall times of runs by name [s]."""
     knobs = {rung.knob: rung.sensitivity for rung in rungs}
 
     def tables(runs: pd.DataFrame) -> dict[str, pd.DataFrame]:

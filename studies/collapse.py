@@ -47,14 +47,9 @@ ACTIVATION, AT_LEAST = "Delta [-]", "Delta at least [-]"
 CENSORED, USED = "runs with a bound [-]", "Gamma used [g]"
 REFERENCE, DEVIATION, DEVIATION_95 = "Delta Gravish [-]", "deviation [%]", "deviation 95 % [%]"
 
-INTERMEDIATE = 0.40
-"""l/w of Gravish's greatest Δ [-]."""
-
-CONSTANT = 0.20
-"""How much Γ ln(fτ) may change from the least Γ to the greatest where the law holds, over its mean [-]."""
-
-CLOSE = 0.20
-"""How far from Gravish's Δ ours may be, over it [-]: neighbouring points of theirs differ as much."""
+INTERMEDIATE = 0.40  #: l/w of Gravish's greatest Δ [-]
+CONSTANT = 0.20  #: How much Γ ln(fτ) may change from the least Γ to the greatest where the law holds, over its mean [-]
+CLOSE = 0.20  #: How far from Gravish's Δ ours may be, over it [-]: neighbouring points of theirs differ as much
 
 _DIGITISED = files("postprocess") / "reference" / "gravish2012_collapse.csv"
 KEYS = (

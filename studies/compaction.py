@@ -20,12 +20,12 @@ from scipy.optimize import least_squares
 from dem.record.run import Run
 from postprocess.statistics.points import ASPECT, SEED, told_number
 from postprocess.statistics.seeds import mean_over_seeds
-from studies.framework.figures import Histories, one_by_one
 from studies.framework.findings import Effect, Finding
 from studies.framework.runs import ASPECT_KEY, Key, Quantity, Row
 from studies.framework.shaken import (
     FRICTION,
     GRAVISH,
+    PHI_TIME,
     SHAKE_TIME,
     common_friction,
     packing_history,
@@ -189,16 +189,7 @@ STUDY = Study(
         *(Quantity(column=of(law, name), meaning=f"{law}: {_MEANINGS[name]}") for law in LAWS for name in _MEANINGS),
     ),
     findings=FINDINGS,
-    figures=(
-        Histories(
-            name="phi_time",
-            history=while_shaken,
-            split=one_by_one(FRICTION, r"$\mu$ = {:g}".format),
-            log=True,
-            x_label="time since shaking began [s]",
-            quantities={"": r"packing fraction $\phi$ [-]"},
-        ),
-    ),
+    figures=(PHI_TIME,),
     order=(ASPECT, FRICTION, SEED),
     one_engine=True,
     remarks=(

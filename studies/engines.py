@@ -64,20 +64,14 @@ QUANTITIES = declare(
 
 
 class Compared(NamedTuple):
-    """A quantity that both engines give.
-
-    Attributes:
-        cases: Cases whose runs give it; several where all begin with the same pile: a seed's mean counts once.
-        column: Of the table of runs.
-        margin: By how much the engines may differ, in per cent of YADE's mean; chosen before the first run.
-        why: Why that much.
-    """
+    """A quantity that both engines give."""
 
     label: str
+    #: Cases whose runs give it; several where all begin with the same pile: a seed's mean counts once
     cases: tuple[str, ...]
-    column: str
-    margin: float
-    why: str
+    column: str  #: Of the table of runs
+    margin: float  #: By how much the engines may differ, in per cent of YADE's mean; chosen before the first run
+    why: str  #: Why that much
 
 
 _PHI_WHY = "half of the 10 % within which the study gravish calls φ near Gravish's"

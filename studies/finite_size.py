@@ -48,8 +48,7 @@ PHASES = ("deposit", "relax", "shake", "relax")
 PAPER_ASPECT, PAPER_COUNT = 0.7, 270
 """The paper's pile that is asked about: its l/w, and its number of smarticles there."""
 
-LARGEST = 0.2
-"""l/w up to which piles are taken as near the threshold."""
+LARGEST = 0.2  #: l/w up to which piles are taken as near the threshold
 
 AT_THRESHOLD = -0.155
 """Power of N with which the largest cluster's share falls just at the threshold of percolation in three dimensions,
@@ -177,7 +176,7 @@ def laws(runs: pd.DataFrame) -> pd.DataFrame:
             "a [-]": law.slope,
             "a 95 % [-]": law.error(0, 1),
             "left over scatter [-]": law.excess,
-            "p of the law [-]": law.refused,
+            "p of the law [-]": law.p_value,
             **dict(zip(("power [-]", "power from [-]", "power to [-]"), law.powers, strict=True)),
             "scatter falls as N to the [-]": law.scatter.fall,
         }
@@ -249,12 +248,12 @@ def _bias(runs: pd.DataFrame, quantity: str) -> Outcome:
 
 def _law(runs: pd.DataFrame, quantity: str) -> Outcome:
     law = fitted(runs, PAPER_ASPECT, quantity)
-    if law is None or math.isnan(law.refused):
+    if law is None or math.isnan(law.p_value):
         return Outcome(verdict=Verdict.NO_DATA)
     best, low, high = law.powers
-    wrong = law.refused < _REJECTED
+    wrong = law.p_value < _REJECTED
     right = low >= _DISTINCT[0] and high <= _DISTINCT[1]
-    note = f"it leaves {law.excess:.2g} times what scatter explains, p = {law.refused:.2g}; power {best:.2f} "
+    note = f"it leaves {law.excess:.2g} times what scatter explains, p = {law.p_value:.2g}; power {best:.2f} "
     ends = "" if POWERS[0] < low and high < POWERS[-1] else ", the end of what is tried"
     return Outcome(note=f"{note}({low:.2f} to {high:.2f}{ends})", verdict=decide(right and not wrong, wrong))
 

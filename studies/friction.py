@@ -11,7 +11,7 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pandas as pd
@@ -22,13 +22,14 @@ from dem.record.run import Run
 from postprocess.statistics.points import ASPECT, SEED, SEEDS, marked, seeds_of, told_number
 from postprocess.statistics.seeds import CONFIDENCE as LEVEL
 from postprocess.statistics.seeds import Scatter, mean_over_seeds, pooled_scatter, slope_within
-from studies.framework.figures import POOLED, Histories, Means, one_by_one
+from studies.framework.figures import POOLED, Means, one_by_one
 from studies.framework.findings import Effect, Finding, Outcome, Verdict, decide
 from studies.framework.runs import ASPECT_KEY, DEFINITION, Key, Quantity, Row
 from studies.framework.shaken import (
     DIGITISING_ERROR,
     FRICTION,
     GRAVISH,
+    PHI_TIME,
     SHAKE_TIME,
     STAGES,
     TIMES,
@@ -40,7 +41,6 @@ from studies.framework.shaken import (
     gravish_note,
     phi,
     timed_row,
-    while_shaken,
 )
 from studies.framework.study import Study
 
@@ -91,21 +91,13 @@ PHI_QUANTITY = Quantity(
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Curve:
-    """φ against friction at one l/w and stage, with what it is compared with.
+    """φ against friction at one l/w and stage, with what it is compared with."""
 
-    Attributes:
-        friction: (n,) coefficients, ascending [-].
-        packing: (n,) means of φ [-].
-        half_widths: (n,) of their 95 % intervals [-]; NaN where unknown.
-        reference: Gravish's φ [-], read to `DIGITISING_ERROR`.
-        scatter: Relative, of the stage.
-    """
-
-    friction: Array
-    packing: Array
-    half_widths: Array
-    reference: float
-    scatter: Scatter
+    friction: Array  #: (n,) coefficients, ascending [-]
+    packing: Array  #: (n,) means of φ [-]
+    half_widths: Array  #: (n,) of their 95 % intervals [-]; NaN where unknown
+    reference: float  #: Gravish's φ [-], read to `DIGITISING_ERROR`
+    scatter: Scatter  #: Relative, of the stage
 
     def deviation(self, friction: Array) -> Array:
         """Interpolate φ less Gravish's [-]."""
@@ -161,8 +153,7 @@ class Curve:
         return float(upper - lower)
 
 
-Curves = Mapping[tuple[str, float], Curve]
-"""By stage and l/w; those that Gravish has a point of."""
+Curves = Mapping[tuple[str, float], Curve]  #: By stage and l/w; those that Gravish has a point of
 
 
 def measure(run: Run) -> Row:
@@ -308,20 +299,14 @@ def growth(runs: pd.DataFrame) -> pd.DataFrame:
     for name, (one, other) in zip(GROWTHS, itertools.pairwise(names), strict=True):
         grown[name] = 100 * (grown[other] / grown[one] - 1)
     groups = grown.groupby([ASPECT, FRICTION])
-    widths = {}
+    table = groups.size().to_frame(SEEDS)
+    means = groups[[*names, *GROWTHS]].agg(lambda column: column.mean())  # not rounded as those of `mean` are
+    table[[f"{at_time(time)} [-]" for time in TIMES]] = means[names]
     for name in GROWTHS:
-        scatter = pooled_scatter([group[name].tolist() for _, group in groups])
-        widths[name] = _per_error(scatter) * scatter.value
-    rows = []
-    for (aspect, friction), group in groups:
-        row = {ASPECT: aspect, FRICTION: friction, SEEDS: len(group)}
-        row |= {f"{at_time(time)} [-]": float(group[name].mean()) for time, name in zip(TIMES, names, strict=True)}
-        for name in GROWTHS:
-            count = int(group[name].notna().sum())
-            row[name] = float(group[name].mean())
-            row[marked(name, "95 %")] = widths[name] / math.sqrt(count) if count else math.nan
-        rows.append(row)
-    return pd.DataFrame(rows)
+        scatter = pooled_scatter([group.tolist() for _, group in groups[name]])
+        width = _per_error(scatter) * scatter.value
+        table[name], table[marked(name, "95 %")] = means[name], width / np.sqrt(groups[name].count())
+    return table.reset_index()
 
 
 def _crossings_note(found: pd.DataFrame) -> str:
@@ -471,15 +456,7 @@ STUDY = Study(
             bars=POOLED,
             notes=[gravish_note((0.4, 0.7, 1.0))],
         ),
-        Histories(
-            name="phi_time",
-            history=while_shaken,
-            split=one_by_one(FRICTION, r"$\mu$ = {:g}".format),
-            panels=ASPECT,
-            log=True,
-            x_label="time since shaking began [s]",
-            quantities={"": r"packing fraction $\phi$ [-]"},
-        ),
+        replace(PHI_TIME, panels=ASPECT),
     ),
     extra=tabulate,
     shown=lambda means: means[means[STAGE] == "phi_f"],

@@ -153,13 +153,12 @@ def near(stage: str) -> Finding:
         percent = found["deviation [%]"]
         half_width = float(np.hypot.reduce(found["deviation 95 % [%]"])) / len(found)
         worst = found.loc[percent.abs().idxmax()]
-        value = SeedMean(value=percent.abs().mean(), standard_error=math.nan, half_width=half_width, count=len(found))
+        mean = percent.abs().mean()
         error = f"± {half_width:.1f} % (95 %)" if math.isfinite(half_width) else "without an error bar"
-        note = f"the largest {worst['deviation [%]']:+.1f} % at l/w = {worst[ASPECT]:g}; reading Gravish's points is "
-        note += f"uncertain by about {100 * DIGITISING_ERROR / found['phi Gravish [-]'].mean():.1f} %"
-        effect = Effect(label="mean absolute deviation", value=value, sign=0, text=f"{value.value:.1f} % {error}")
-        near = value.value <= ACCEPTED
-        return Outcome(effects=[effect], note=note, verdict=decide(near, not near))
+        note = f"mean absolute deviation {mean:.1f} % {error}, not judged; the largest {worst['deviation [%]']:+.1f} % "
+        note += f"at l/w = {worst[ASPECT]:g}; reading Gravish's points is uncertain by about "
+        note += f"{100 * DIGITISING_ERROR / found['phi Gravish [-]'].mean():.1f} %"
+        return Outcome(note=note, verdict=decide(mean <= ACCEPTED, mean > ACCEPTED))
 
     return Finding(
         id=f"{_id(stage)}-near",

@@ -27,9 +27,7 @@ ALL = "all"
 def hours(folder: Path, studies: Sequence[str] = ()) -> pd.DataFrame:
     """Sum hours of one core, planned and taken [h], by study and engine, and of all together.
 
-    Args:
-        folder: Whose folders are those of studies or sweeps; others are passed over.
-        studies: Names of the folders wanted; all if there are none.
+    Folders that are not those of studies or sweeps are passed over; of those that are named all count.
 
     Raises:
         InputError: No folder of a sweep is there, one that is named is none, or a manifest is damaged.

@@ -29,7 +29,7 @@ from postprocess.geometry.links import centres_of_mass
 from postprocess.measures.pull import PULL, WINDOW, held_fast, peak, read_pull, weight_of_one
 from postprocess.measures.table import summarise_run
 from postprocess.report import figures as style
-from postprocess.statistics.findings import judge, told
+from postprocess.statistics.findings import effect_text, judge
 from postprocess.statistics.points import ASPECT, SEED, averaged, told_number
 from postprocess.statistics.ranks import (
     Floats,
@@ -436,8 +436,8 @@ def _as_strong(runs: pd.DataFrame, costs: pd.DataFrame) -> Outcome:
     nearest = min(lacks, key=lambda name: math.inf if math.isnan(lacks[name].value) else lacks[name].value)
     stronger = all(judge(effect) == "found" for effect in lacks.values())
     return Outcome(
-        note=f"shape change less the strongest, {nearest}: {told(lacks[nearest], 3)} n W_s over l/w and seeds; it "
-        f"spends {shape.iloc[0][LIFTS]:.3g} W_s w per smarticle",
+        note=f"shape change less the strongest, {nearest}: {effect_text(lacks[nearest], 3)} n W_s over l/w and seeds; "
+        f"it spends {shape.iloc[0][LIFTS]:.3g} W_s w per smarticle",
         verdict=decide(judge(lacks[nearest]) == "not found", stronger),
     )
 
@@ -520,29 +520,22 @@ def _scopes(table: pd.DataFrame) -> list[Series]:
     return [Series(rows=table[table[SCOPE] == scope], label=scope, look=look) for scope, look in styles.items()]
 
 
+_over_energy = partial(Means, x=ENERGY, x_label="energy per\nsmarticle [J]", log_x=True, share_y=True)
 FIGURES = (
-    Means(
+    _over_energy(
         name="maps",
         quantities=[QUANTITIES[name] for name in _MAPPED],
-        x=ENERGY,
-        x_label="energy per\nsmarticle [J]",
-        log_x=True,
         rows=_swung,
         split=_by_aspect,
         panels=THETA,
         panel="θ = {:g}°",
-        share_y=True,
     ),
-    Means(
+    _over_energy(
         name="strength_energy",
         quantities=[QUANTITIES[PEAK]],
-        x=ENERGY,
-        x_label="energy per\nsmarticle [J]",
-        log_x=True,
         split=_bought,
         panels=ASPECT,
         levels=_poured,
-        share_y=True,
     ),
     Scatter(
         name="strength_measures",

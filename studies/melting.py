@@ -7,6 +7,8 @@ are compared pair by pair.
 
 from __future__ import annotations
 
+from functools import partial
+
 import numpy as np
 import pandas as pd
 
@@ -138,42 +140,39 @@ def _lifted(runs: pd.DataFrame) -> Outcome:
     return Outcome(effects=effects, verdict=Verdict.FOUND if clear else None)
 
 
+_mean, _above = partial(mean, rows=at_once), partial(above, rows=at_once)
 FINDINGS = (
-    mean(
+    _mean(
         "holds-together",
         "Shape change: the pile does not break apart",
         lambda runs: of_procedure(runs, SHAPE)[CONTACT],
         "largest cluster by contact in the end, after shape change,",
-        rows=at_once,
         threshold=WHOLE,
         shown=[CONTACT],
     ),
-    above(
+    _above(
         "entangled",
         "Shape change holds together by entanglement, more than internal oscillation",
         ENTANGLED,
         SHAPE,
         (INTERNAL, STATIC),
-        rows=at_once,
         shown=[ENTANGLED],
     ),
-    above(
+    _above(
         "keeps-its-edge",
         "Shape change: smarticles at the edge do not come off, unlike after internal oscillation",
         SLOUGHED,
         SHAPE,
         (INTERNAL,),
         sign=-1,
-        rows=at_once,
         shown=[SLOUGHED],
     ),
-    above(
+    _above(
         "narrow-and-high",
         "Shape change narrows the base and raises the pile",
         {BASE: -1, TOP: 1},
         SHAPE,
         (STATIC,),
-        rows=at_once,
     ),
     Finding(
         id="topples",
@@ -182,12 +181,11 @@ FINDINGS = (
         rows=at_once,
         found_if="the centre of mass of at least one pile ends beyond its base",
     ),
-    mean(
+    _mean(
         "sloughs",
         "Internal oscillation: some smarticles slough off the outer edge",
         lambda runs: of_procedure(runs, INTERNAL)[SLOUGHED],
         "sloughed share",
-        rows=at_once,
     ),
     Finding(
         id="low-and-wide",
@@ -196,13 +194,12 @@ FINDINGS = (
         rows=at_once,
         found_if=f"com height below that of static, radius within {SAME_WIDTH:.0%} of it, paired by l/w and seed",
     ),
-    above(
+    _above(
         "more-stable",
         "Internal oscillation makes the pile more stable than it was as poured",
         HEIGHT,
         INTERNAL,
         (STATIC,),
-        rows=at_once,
         shown=[HEIGHT],
     ),
     Finding(

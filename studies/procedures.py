@@ -275,6 +275,7 @@ def _energies(suffix: str, how: str, quantity: str) -> tuple[Finding, Finding, F
 
 BY_SAMPLES = f", summed every {APART:g} s"
 
+_of_shape = partial(mean, rows=only(SHAPE), by=ASPECT)
 PACKING = (
     with_aspect("poured-falls", "φ_0 of the poured pile falls with l/w", only(STATIC), PHI, -1),
     with_aspect("shaken-falls", "External oscillation: φ_f falls with l/w", only(EXTERNAL), PHI_ACTIVE, -1),
@@ -291,37 +292,31 @@ PACKING = (
         "φ_f − φ_0",
         rows=gains(EXTERNAL),
     ),
-    mean(
+    _of_shape(
         "straight-rises",
         "Shape change: the centre of mass rises when the smarticles straighten",
         lambda table: table[STRAIGHT] - 1,
         "h/h0 − 1 while straight",
-        rows=only(SHAPE),
         shown=[STRAIGHT],
-        by=ASPECT,
     ),
-    mean(
+    _of_shape(
         "sinks-while-closing",
         "Shape change: the pile sinks at first when the barbs close",
         lambda table: table[STRAIGHT] - table[LOWEST],
         "h/h0 while straight less the lowest while closing",
-        rows=only(SHAPE),
     ),
-    mean(
+    _of_shape(
         "stays-up",
         "Shape change: the centre of mass does not come back to h0",
         lambda table: table[HEIGHT] - 1,
         "h/h0 − 1 at rest again",
-        rows=only(SHAPE),
         shown=[HEIGHT],
-        by=ASPECT,
     ),
-    mean(
+    _of_shape(
         "rises-after-the-drop",
         "Shape change: after that drop the pile grows upwards again",
         lambda table: table[HEIGHT] - table[LOWEST],
         "h/h0 at rest again less the lowest while closing",
-        rows=only(SHAPE),
     ),
     with_aspect("shape-change-falls", "Shape change: φ_f falls with l/w", only(SHAPE), PHI_ACTIVE, -1),
     mean(

@@ -52,11 +52,7 @@ class Script:
         return replace(study, name=self.name)
 
     def sweep_file(self, *, quick: bool = False) -> Path:
-        """Name the sweep file with its variants, as `load_sweep` reads it.
-
-        Raises:
-            InputError: There is no quick variant.
-        """
+        """Name the sweep file with its variants, as `load_sweep` reads it; InputError without a quick variant."""
         if quick and not self.quick:
             msg = f"study {self.name} has no quick variant; leave --quick out"
             raise InputError(msg)
@@ -82,16 +78,11 @@ def _scripts() -> list[Script]:
     return found
 
 
-STUDIES: Mapping[str, Script] = MappingProxyType({study.name: study for study in _scripts()})
-"""By name."""
+STUDIES: Mapping[str, Script] = MappingProxyType({study.name: study for study in _scripts()})  #: By name
 
 
 def shipped(name: str) -> Script:
-    """Find a shipped study.
-
-    Raises:
-        InputError: There is none of this name.
-    """
+    """Find a shipped study; InputError where there is none of this name."""
     if name not in STUDIES:
         msg = f"study {name!r} does not exist; {nearest(name, sorted(STUDIES))}"
         raise InputError(msg)

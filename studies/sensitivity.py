@@ -14,9 +14,9 @@ import pandas as pd
 from dem.errors import InputError
 from dem.record.run import Run
 from postprocess.statistics.points import ASPECT, SEED, marked, seeds_of
-from postprocess.statistics.seeds import SeedMean, mean_over_seeds, relative_difference
+from postprocess.statistics.seeds import Difference, mean_over_seeds, relative_difference
 from studies.framework.figures import Rows
-from studies.framework.findings import Effect, Finding, Outcome, decide
+from studies.framework.findings import Finding, Outcome, decide
 from studies.framework.runs import DEFINITION, Key, Row, declare
 from studies.framework.shaken import GRAVISH, SHAKEN, WHEN, gravish_at, gravish_note, measured_row, phi
 from studies.framework.study import Study
@@ -58,15 +58,11 @@ def measure(run: Run) -> Row:
     return {VARIANT: found[1], **measured_row(run, [DEFINITION])}
 
 
-def changes(runs: pd.DataFrame, column: str) -> dict[str, SeedMean]:
+def changes(runs: pd.DataFrame, column: str) -> dict[str, Difference]:
     """Change of the mean of each variant against the baseline's, which is taken as exact, by Welch [%]."""
     means = {str(name): mean_over_seeds(part[column]) for name, part in runs.groupby(VARIANT, sort=False)}
     first, *others = means
-    found = {name: relative_difference(means[name], means[first]) for name in others}
-    return {
-        name: SeedMean(value=one.value, standard_error=math.nan, half_width=one.half_width, count=means[name].count)
-        for name, one in found.items()
-    }
+    return {name: relative_difference(means[name], means[first]) for name in others}
 
 
 def summarise(runs: pd.DataFrame) -> dict[str, pd.DataFrame]:
@@ -80,7 +76,7 @@ def summarise(runs: pd.DataFrame) -> dict[str, pd.DataFrame]:
             row |= {column: mean.value, marked(column, "95 %"): mean.half_width}
             row[f"{name} change [%]"] = change.value if change else math.nan
             row[f"{name} change 95 % [%]"] = change.half_width if change else math.nan
-            row[f"{name} clear"] = bool(change and abs(change.value) > change.half_width)
+            row[f"{name} clear"] = bool(change and change.clear)
         rows.append(row)
     return {"summary": pd.DataFrame(rows)}
 
@@ -91,12 +87,12 @@ def owes(name: str) -> Finding:
 
     def outcome(runs: pd.DataFrame) -> Outcome:
         found = changes(runs, column)
-        clear = {variant: abs(change.value) > change.half_width for variant, change in found.items()}
-        effects = []
-        for variant, change in found.items():
-            text = f"{change.value:+.1f} ± {change.half_width:.1f} %{', clear' if clear[variant] else ''}"
-            effects.append(Effect(label=variant, value=change, sign=0, text=text))
-        return Outcome(effects=effects, verdict=decide(any(clear.values()), data=bool(found)))
+        texts = [
+            f"{variant} {one.value:+.1f} ± {one.half_width:.1f} %{', clear' * one.clear}, not judged"
+            for variant, one in found.items()
+        ]
+        clear = any(one.clear for one in found.values())
+        return Outcome(note="; ".join(texts), verdict=decide(clear, data=bool(found)))
 
     return Finding(
         id=f"{name.replace(' ', '-').replace('_', '-')}-changes",

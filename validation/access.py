@@ -108,18 +108,12 @@ POINTS = 400  # that stand for a link
 
 
 class Pushed(LinksEngine):
-    """The links engine under forces that no run has.
-
-    Args:
-        keys: of the engine.
-    """
+    """The links engine under forces that no run has."""
 
     def __init__(self, **keys: Any) -> None:
         super().__init__(**keys)
-        self.forces: dict[tuple[int, int], Array] = {}
-        """On the centre of a link, by smarticle and link [N]."""
-        self.grown = (0.0, 0.0)
-        """When forces begin to grow, and how long they do [s]."""
+        self.forces: dict[tuple[int, int], Array] = {}  #: On the centre of a link, by smarticle and link [N]
+        self.grown = (0.0, 0.0)  #: When forces begin to grow, and how long they do [s]
 
     def advance(self, steps: int) -> None:
         """Advance; forces are applied step by step."""
@@ -233,12 +227,9 @@ class LinksAccess(_Access):
             self.force(own, 0, 1, (0.0, 0.0, world.shape.mass * own.gravity))
 
     def swing(self, engine: Engine, links: Iterable[tuple[float, float, float]]) -> None:
-        """Set the links of smarticle 0, articulated and not turned, in motion in their plane.
+        """Set the links of smarticle 0, articulated and not turned, in motion in their plane, as the hinges allow.
 
-        Args:
-            engine: the simulation.
-            links: velocities along x and y [m/s] and spin about z [rad/s] of barb 1, middle link, barb 2, which the
-                hinges allow.
+        Velocities along x and y [m/s] and spin about z [rad/s] are those of barb 1, middle link, barb 2.
         """
         world = _links(engine)._world
         motors, (first, middle, second) = world.motors, np.array(list(links))
@@ -267,15 +258,13 @@ class LinksAccess(_Access):
     def floor_force(self, engine: Engine) -> Array:
         """Return the force of the smarticles on floor and wall in the last step, (3,) [N]."""
         force = _links(engine)._world.ground.force
-        total: Array = force[FLOOR] + force[WALL]
-        return total
+        return np.asarray(force[FLOOR] + force[WALL])
 
     def torques(self, engine: Engine) -> Array:
         """Return the torques of the motors of smarticle 0, (2,) [N m]."""
         readings = engine.motors.readings  # the mean since the last control update
         assert readings is not None
-        torques: Array = readings.torques[0].copy()
-        return torques
+        return np.array(readings.torques[0])
 
     def spoil(self, engine: Engine, what: str) -> None:
         """Spoil the second smarticle, or its last link: see `validation.hard.broken`."""
@@ -383,8 +372,7 @@ class YadeAccess(_Access):
         return _yade(engine).container_force()
 
     def torques(self, engine: Engine) -> Array:
-        torques: Array = _yade(engine).motors._hinges.torques()[0]
-        return torques
+        return np.asarray(_yade(engine).motors._hinges.torques()[0])
 
     def spoil(self, engine: Engine, what: str) -> None:
         own = _yade(engine)

@@ -20,23 +20,14 @@ LEAPFROG = "leapfrog is of second order"
 
 @dataclass(frozen=True)
 class Answer:
-    """One quantity, measured and in theory.
+    """One quantity, measured and in theory."""
 
-    Args:
-        what: quantity and unit, as in `speed [m/s]`.
-        theory: the answer on paper [unit].
-        measured: what the engine gave [unit].
-        tolerance: largest error that passes, relative to the scale [1].
-        reason: of the tolerance.
-        scale: what the error is relative to [unit]; 0: the theory itself.
-    """
-
-    what: str
-    theory: float
-    measured: float
-    tolerance: float
-    reason: str = ""
-    scale: float = 0.0
+    what: str  #: Quantity and unit, as in `speed [m/s]`
+    theory: float  #: The answer on paper [unit]
+    measured: float  #: What the engine gave [unit]
+    tolerance: float  #: Largest error that passes, relative to the scale [1]
+    reason: str = ""  #: Of the tolerance
+    scale: float = 0.0  #: What the error is relative to [unit]; 0: the theory itself
 
     @property
     def error(self) -> float:
@@ -106,12 +97,7 @@ def case(
 ) -> Callable[[Function], Function]:
     """Register a function as a known answer: it simulates with the access that it is given, and returns answers.
 
-    Args:
-        name: unique.
-        about: what happens in it.
-        theory: formula, and its source.
-        absent: why it has no meaning, by engine.
-        options: of the function.
+    `absent` says why it has no meaning, by engine; other keywords are the function's.
     """
     return _register(CASES, name, options, about, theory, absent or {})
 
@@ -129,15 +115,9 @@ def ladder(  # noqa: PLR0917 # a row of a table
 ) -> Callable[[Function], Function]:
     """Register a function as a ladder: it returns the error of a trajectory at each of some time steps.
 
-    Args:
-        name: unique.
-        about: what moves.
-        quantity: the error that is measured, with its unit.
-        size: of the motion, to which errors are compared [unit].
-        steps: from coarse to fine [s].
-        scheme: its order in this motion [1], and the reason; of all engines, or by engine.
-        phases: of the onset within a step, in the quick form; None: the function has no such option.
-        options: of the function.
+    Its size is that of the motion, in the unit of the quantity, its steps go from coarse to fine [s], its scheme has
+    the order in this motion [1] and the reason, of all engines or by engine. `phases` of the onset within a step are
+    those of the quick form (None: the function has no such option); other keywords are the function's.
     """
     by_engine = scheme if isinstance(scheme, dict) else dict.fromkeys(ENGINES, scheme)
     return _register(LADDERS, name, options, about, quantity, size, steps, by_engine, phases)
@@ -151,10 +131,7 @@ def hard(
 ) -> Callable[[Function], Function]:
     """Register a function as a hard case: it simulates with an access and in a folder, and returns checks.
 
-    Args:
-        name: unique.
-        short: its options in continuous integration; None: the long form only.
-        long: what differs from that in the long form.
-        absent: why it has no meaning, by engine.
+    `short` are its options in continuous integration (None: the long form only), `long` what differs in the long form;
+    `absent` says why it has no meaning, by engine.
     """
     return _register(HARD, name, {}, short, long or {}, absent or {})

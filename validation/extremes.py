@@ -35,15 +35,7 @@ SECONDS = 0.3  # of each phase after the pour
 
 
 def draw_scene(number: int, engine: str = "links") -> dict[str, Any]:
-    """Draw scene `number`; equal numbers give equal scenes.
-
-    Args:
-        number: also the scene's seed.
-        engine: that computes it.
-
-    Returns:
-        Plain data of a scene file.
-    """
+    """Draw plain data of a scene; equal numbers, which are also the seeds, give equal scenes."""
     rng = np.random.default_rng([28, number])
 
     def span(low: float, high: float) -> float:
@@ -130,30 +122,16 @@ INSIDE = 1e-3  # of a segment's length: a crossing is at least so far from both 
 
 
 def segments(vertices: Array) -> Array:
-    """Return the axes of all links.
-
-    Args:
-        vertices: (N, 4, 3) barb tip, hinge, hinge, barb tip [m].
-
-    Returns:
-        (3N, 2, 3) ends of each link's axis [m].
-    """
+    """Return ends (3N, 2, 3) of the axes of all links of vertices (N, 4, 3) [m]."""
     found: Array = np.stack([vertices[:, :-1], vertices[:, 1:]], axis=2).reshape(-1, 2, 3)
     return found
 
 
 def surface(vertices: Array, thickness: float) -> tuple[Array, Array]:
-    """Return points of all axes, and how much material surrounds each.
+    """Return points (M, 3) of the axes of vertices (N, 4, 3), and radii (M,) of the material about each [m].
 
     A link ends at its tip, where there is nothing beyond the axis; half a thickness from there on it is a thickness
     wide. So neither a square nor a rounded end is taken for more than it is.
-
-    Args:
-        vertices: (N, 4, 3) barb tip, hinge, hinge, barb tip [m].
-        thickness: of a link [m].
-
-    Returns:
-        (M, 3) points [m], (M,) radius of the material about each [m].
     """
     ends = segments(vertices)
     along = ends[:, 1] - ends[:, 0]
@@ -166,17 +144,10 @@ def surface(vertices: Array, thickness: float) -> tuple[Array, Array]:
 
 
 def crossings(before: Array, after: Array) -> list[tuple[int, int]]:
-    """Find axes of different smarticles that pass through each other while vertices move along straight lines.
+    """Find axes of different smarticles that pass through each other between vertices (N, 4, 3) of two frames [m].
 
-    While two axes pass through each other the volume that their four ends span changes its sign, and both axes'
-    common point is inside of both.
-
-    Args:
-        before: (N, 4, 3) vertices in a frame [m].
-        after: (N, 4, 3) vertices in the next one [m].
-
-    Returns:
-        Pairs of links, numbered along `segments`.
+    Vertices move along straight lines. While two axes pass through each other the volume that their four ends span
+    changes its sign, and both axes' common point is inside of both. Gives pairs of links, numbered along `segments`.
     """
     one, two = segments(before), segments(after)
     # A link without length, of l/w = 0, has no axis to cross.
@@ -225,11 +196,7 @@ def crossings(before: Array, after: Array) -> list[tuple[int, int]]:
 
 
 def check_run(path: Path, scene: Mapping[str, Any]) -> dict[str, Any]:
-    """Check one finished run.
-
-    Args:
-        path: the run directory.
-        scene: plain data of the scene, as `draw_scene` gives it.
+    """Check one finished run of a scene of `draw_scene`.
 
     Returns:
         What was measured, and under "wrong" what is not as it must be, "" if nothing.
@@ -315,17 +282,7 @@ RIGHT, REJECTED, STOPPED, WRONG, LATE = "right", "rejected by plan", "stopped wi
 
 
 def run_one(number: int, out: Path, tree: Path, limit: float) -> dict[str, Any]:
-    """Plan, run and check one scene.
-
-    Args:
-        number: of the scene.
-        out: folder of scene and run.
-        tree: source tree whose `smarticles` runs it.
-        limit: wall time allowed [s].
-
-    Returns:
-        A row of the table.
-    """
+    """Plan, run and check one scene by the `smarticles` of a source tree, each within a limit of wall time [s]."""
     scene, path, run = draw_scene(number), out / f"{number:04d}.yaml", out / f"{number:04d}"
     path.write_text(yaml.safe_dump(scene, sort_keys=False), encoding="utf-8")
     shutil.rmtree(run, ignore_errors=True)

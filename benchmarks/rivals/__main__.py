@@ -86,11 +86,7 @@ def perform(task: Path) -> None:
 
 
 def run(folder: Path, setting: Setting, activity: str, seed: int, given: argparse.Namespace) -> Any:
-    """Simulate in a process of its own and measure; return a row of the table.
-
-    Raises:
-        subprocess.CalledProcessError: it failed; its message is on stderr.
-    """
+    """Simulate in a process of its own and measure; return a row of the table; CalledProcessError where it failed."""
     count, seconds, poured = given.count, given.seconds, folder / f"pile-{given.count}-{seed}"
     if not (poured / "done.json").exists():
         run_child(folder, poured.name, data_of(count, seed, {"type": "relax", "duration_s": 0.3}, **POUR))

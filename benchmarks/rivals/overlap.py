@@ -15,6 +15,7 @@ from scipy.spatial import cKDTree
 
 from dem.body.particle import LINKS, Boxes, Particle
 from dem.engine.links.shape import shape_of
+from postprocess.measures.contacts import segment_distances
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
@@ -70,29 +71,8 @@ class Swept:
     def depths(self, pairs: Indices) -> Array:
         """Compute (P,) overlaps of pairs of parts [m]; not positive where they are apart."""
         one, other = pairs.T
-        return 2 * self.radius - distances(self.starts[one], self.ends[one], self.starts[other], self.ends[other])
-
-
-def distances(starts: Array, ends: Array, others: Array, other_ends: Array) -> Array:
-    """Compute (P,) distances [m] of pairs of segments, (P, 3) [m] each; segments may be points.
-
-    The least is between the points that the infinite lines have nearest, where both are on their segments, or at one of
-    the four ends.
-    """
-    u, v, w = ends - starts, other_ends - others, starts - others
-    uu, uv, vv = (np.einsum("pi,pi->p", a, b) for a, b in ((u, u), (u, v), (v, v)))
-    uw, vw = np.einsum("pi,pi->p", u, w), np.einsum("pi,pi->p", v, w)
-    determinant = uu * vv - uv**2
-    crossing = determinant > PARALLEL * uu * vv
-    safe = np.where(crossing, determinant, 1.0)
-    s, t = (uv * vw - vv * uw) / safe, (uu * vw - uv * uw) / safe
-    inside = crossing & (s >= 0) & (s <= 1) & (t >= 0) & (t <= 1)
-    lines = np.linalg.norm(w + s[:, None] * u - t[:, None] * v, axis=1)
-    ends_to = [_to_segment(point, others, other_ends) for point in (starts, ends)]
-    ends_to += [_to_segment(point, starts, ends) for point in (others, other_ends)]
-    at_ends = np.min(ends_to, axis=0)
-    nearest: Array = np.where(inside, np.minimum(lines, at_ends), at_ends)
-    return nearest
+        ends = self.starts[one], self.ends[one], self.starts[other], self.ends[other]
+        return 2 * self.radius - segment_distances(*ends)
 
 
 def deepest(solid: Bars | Swept) -> float:
@@ -100,15 +80,6 @@ def deepest(solid: Bars | Swept) -> float:
     pairs = solid.candidates()
     pairs = pairs[solid.owners[pairs[:, 0]] != solid.owners[pairs[:, 1]]]
     return max(0.0, float(solid.depths(pairs).max())) if len(pairs) else 0.0
-
-
-def _to_segment(points: Array, starts: Array, ends: Array) -> Array:
-    along = ends - starts
-    squared = np.einsum("pi,pi->p", along, along)
-    share = np.einsum("pi,pi->p", points - starts, along) / np.where(squared > 0, squared, 1.0)
-    nearest = starts + np.clip(share, 0.0, 1.0)[:, None] * along
-    apart: Array = np.linalg.norm(points - nearest, axis=1)
-    return apart
 
 
 def _near(centres: Array, reaches: Array) -> Indices:

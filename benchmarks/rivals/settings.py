@@ -18,25 +18,15 @@ ACTIVITIES: Mapping[str, Mapping[str, Any]] = {
 
 @dataclass(frozen=True)
 class Setting:
-    """One row of the table.
+    """One row of the table."""
 
-    Args:
-        engine: a key of `ENGINES`.
-        name: of the setting.
-        shape: what it keeps apart, see `benchmarks.rivals.overlap`.
-        activities: that it can do.
-        scene: keys of the scene that differ.
-        knobs: that are not of the scene.
-        costly: whether one seed must do.
-    """
-
-    engine: str
-    name: str
-    shape: str = "boxes"
-    activities: Sequence[str] = (SHAKE,)
-    scene: Mapping[str, Any] = field(default_factory=dict)
-    knobs: Mapping[str, Any] = field(default_factory=dict)
-    costly: bool = False
+    engine: str  #: A key of `ENGINES`
+    name: str  #: Of the setting
+    shape: str = "boxes"  #: What it keeps apart, see `benchmarks.rivals.overlap`
+    activities: Sequence[str] = (SHAKE,)  #: That it can do
+    scene: Mapping[str, Any] = field(default_factory=dict)  #: Keys of the scene that differ
+    knobs: Mapping[str, Any] = field(default_factory=dict)  #: That are not of the scene
+    costly: bool = False  #: Whether one seed must do
 
     @property
     def key(self) -> str:

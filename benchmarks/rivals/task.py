@@ -31,16 +31,11 @@ CREEP = 0.1  # s at the end of the rest in which it is measured whether the pile
 
 @dataclass(frozen=True, eq=False)
 class Task:
-    """A scene of three phases, take-over, relax and an activity.
-
-    Args:
-        folder: where an engine may leave files.
-        sample_s: time between two samples of the poses [s].
-    """
+    """A scene of three phases, take-over, relax and an activity."""
 
     scene: Scene
-    folder: Path
-    sample_s: float
+    folder: Path  #: Where an engine may leave files
+    sample_s: float  #: Time between two samples of the poses [s]
 
     @cached_property
     def state(self) -> State:
@@ -119,22 +114,15 @@ class Task:
 
 @dataclass(frozen=True, eq=False)
 class Outcome:
-    """What a simulation gave.
+    """What a simulation gave."""
 
-    Args:
-        time_step: dt of the activity [s].
-        processor_s: processor time that the activity took.
-        positions: (2 + F, N, 3, 3) centres of the links, seen from the container [m]: `CREEP` before the end of the
-            rest, at its end, and at each sample during the activity.
-        frames: (2 + F, N, 3, 3, 3) their axes as columns.
-        version: of the engine.
-    """
-
-    time_step: float
-    processor_s: float
+    time_step: float  #: Dt of the activity [s]
+    processor_s: float  #: Processor time that the activity took
+    #: (2 + F, N, 3, 3) centres of the links, seen from the container [m]: `CREEP` before the end of the rest, at its
+    #: end, and at each sample during the activity
     positions: Array
-    frames: Array
-    version: str
+    frames: Array  #: (2 + F, N, 3, 3, 3) their axes as columns
+    version: str  #: Of the engine
 
 
 class World:

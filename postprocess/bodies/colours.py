@@ -25,8 +25,7 @@ ALIASES: Mapping[str, str] = MappingProxyType({"speed": "speed_m_per_s", "height
 
 _MOST_COUNTS = 12  # with colours of their own; larger ones share the last
 
-UNKNOWN = (201, 201, 201)
-"""Where a field has no value."""
+UNKNOWN = (201, 201, 201)  #: Where a field has no value
 
 Span = tuple[float, float]
 

@@ -24,8 +24,7 @@ from postprocess.measures.registry import in_space
 
 LINKS = 3
 
-IDENTITY = ("smarticle_id", "link")
-"""Fields that are never left out."""
+IDENTITY = ("smarticle_id", "link")  #: Fields that are never left out
 
 CELLS_PER_LENGTH = 4
 """Points per w along a link for local packing fractions: half as many as the mean's, in a third of the time.

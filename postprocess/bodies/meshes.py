@@ -229,10 +229,7 @@ def checked_kinds(wanted: Sequence[str], unwanted: Sequence[str], *, also: Seque
 
 
 class Bodies:
-    """The bodies of one run, frame after frame.
-
-    Args:
-        cut: Whether walls end a little above the pile, as in pictures.
+    """The bodies of one run, frame after frame; with `cut` walls end a little above the pile, as in pictures.
 
     Raises:
         InputError: The scene or the series is damaged, or forces are wanted and not recorded.

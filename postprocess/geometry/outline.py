@@ -27,8 +27,7 @@ It must not fit between links that are packed as loosely as poured ones: of stra
 length per volume of U-shapes at φ = 0.1, 0.158 /mm², none comes within r of a point with probability exp(-0.158 π r²);
 with the links' own half thickness r = 3.5 mm, that is 0.2 %. At half of that density it is 5 %."""
 
-FINENESS = 4
-"""Voxels to the ball's radius."""
+FINENESS = 4  #: Voxels to the ball's radius
 
 _MOST_VOXELS = 40_000_000
 

@@ -22,8 +22,7 @@ from postprocess.geometry.links import (
 )
 from postprocess.geometry.voxel import Region
 
-TOGETHER = 60_000
-"""Most points whose cells are found at once: they take 15 kB each while they are."""
+TOGETHER = 60_000  #: Most points whose cells are found at once: they take 15 kB each while they are
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -125,16 +124,12 @@ def _mirrored(points: Floats, container: Region, lid: float, band: float) -> Flo
 
 
 def _cell_volumes(points: Floats, count: int, *, reach: float, together: int = TOGETHER) -> Floats:
-    """Compute volumes (count,) of the Voronoi cells of the first points, infinite for open ones.
+    """Compute volumes (count,) of the Voronoi cells of the first of points (n, 3) [m], infinite for open ones.
 
     Cells are found slab by slab along x, among all points within a reach [m] of it. A point's cell among them is its
     cell among all points where the spheres around its corners through the point, in which there must be no other, do
     not go beyond. The few others are found again among all points within twice the reach of one of them, where those
     spheres lie if the reach is twice the distance of the farthest corner; and so on.
-
-    Args:
-        points: (n, 3) [m].
-        count: Of the points whose cells are wanted; the others bound cells.
     """
     if count <= together:
         return _cells(points)[0][:count]

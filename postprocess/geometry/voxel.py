@@ -96,11 +96,8 @@ def solid_points(
 ) -> tuple[Floats, float]:
     """Return points (n, 3) [m] of a cubic grid inside a link's box, each once, and their pitch [m].
 
-    Args:
-        thickness_normal: t1, along the normal of the smarticle's plane [m].
-        thickness_in_plane: t2, in the smarticle's plane [m].
-        pitch: Spacing of the points [m]; half the smaller thickness if not given. A point stands for its cube.
-        region: Only points inside it; all if not given.
+    Thicknesses [m] are t1, along the normal of the smarticle's plane, and t2, in it; a point stands for its cube, as
+    wide as the pitch [m] or, without one, as half the smaller thickness.
 
     Raises:
         InputError: Bad sizes.

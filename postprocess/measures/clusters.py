@@ -64,13 +64,10 @@ def contact_graph(frame: Frame, run: Run) -> Clusters:
 
 
 def spans_height(clusters: Clusters, vertices: Vertices, *, diameter: float, floor_z: float) -> bool:
-    """Whether one cluster reaches from the floor to the top of the pile.
+    """Whether one cluster reaches from the floor, at a height [m], to the top of the pile.
 
-    The top is where 95 % of the links' material lie below; alone on top there may be one smarticle.
-
-    Args:
-        diameter: Of the sphere that sweeps the links [m].
-        floor_z: Height of the floor [m].
+    The top is where 95 % of the links' material lie below; alone on top there may be one smarticle. Links are swept by
+    a sphere of a diameter [m].
 
     Source:
         Stauffer & Aharony, Introduction to Percolation Theory (1994), section 2: a cluster percolates if it joins
@@ -86,11 +83,8 @@ def spans_height(clusters: Clusters, vertices: Vertices, *, diameter: float, flo
 def spans_width(clusters: Clusters, vertices: Vertices, *, diameter: float, wall_radius: float) -> bool:
     """Whether one cluster reaches from wall to wall: no half of the wall has all its contacts with it.
 
-    A round wall has no opposite faces, and what touches it on one side alone is not wedged.
-
-    Args:
-        diameter: Of the sphere that sweeps the links [m].
-        wall_radius: Of the wall about the axis x = y = 0 [m].
+    A round wall, of a radius [m] about x = y = 0, has no opposite faces, and what touches it on one side alone is not
+    wedged. Links are swept by a sphere of a diameter [m].
     """
     vertices = checked_vertices(vertices)
     smarticle, vertex = np.nonzero(at_wall(vertices, diameter=diameter, wall_radius=wall_radius))

@@ -40,14 +40,9 @@ _KNOWN_ENDS: Mapping[str, Mapping[str, float]] = MappingProxyType({REMAINING: {"
 """Start and end of the fitted curve [-] where they are known: in the end all have left. The other heights bounce up at
 the start and hop in the end, so theirs are fitted."""
 
-REST = 0.1
-"""How long before vibration the height is averaged that others are taken over [s]."""
-
-LEAST_FALL = 0.25
-"""A column that has lost less of its height than this share still stands [-]."""
-
-WORST_ERROR = 0.5
-"""Relative error beyond which a time is not taken for known [-]."""
+REST = 0.1  #: How long before vibration the height is averaged that others are taken over [s]
+LEAST_FALL = 0.25  #: A column that has lost less of its height than this share still stands [-]
+WORST_ERROR = 0.5  #: Relative error beyond which a time is not taken for known [-]
 
 _LEAST_SAMPLES = 10
 _EXPONENTS = (0.3, 3.0)

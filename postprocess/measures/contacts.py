@@ -70,13 +70,10 @@ def contact_pairs(vertices: Vertices, distance: float) -> ContactPairs:
 
 
 def touching_pairs(vertices: Vertices, diameter: float) -> ContactPairs:
-    """Find pairs of smarticles that touch where each is what a sphere sweeps along its links, sorted.
+    """Find pairs of smarticles that touch where each is what a sphere of a diameter [m] sweeps along its links, sorted.
 
     On the engine "links" with links of one row these are the pairs that touch. YADE's chains have gaps between their
     beads, where others rest, and there this finds too many, see `pairs_in_contact`, which knows a run's chains.
-
-    Args:
-        diameter: Of the sphere [m], `Run.sphere_diameter`.
 
     Raises:
         InputError: Bad diameter.

@@ -29,8 +29,7 @@ from postprocess.geometry.links import (
 )
 from postprocess.measures.registry import FrameMeasure, Quantity, Shown, in_space
 
-STRAIGHT = 0.99
-"""Tip-to-tip distance over unfolded length above which a smarticle counts as straight [-]."""
+STRAIGHT = 0.99  #: Tip-to-tip distance over unfolded length above which a smarticle counts as straight [-]
 
 _TOLERANCE = 1e-9
 # Pairs of smarticles held in memory at a time.
@@ -161,13 +160,7 @@ def _passing(vertices: Floats, i: Whole, j: Whole) -> Flags:
 
 
 def _winding(points: Floats, corners: Floats, tolerance: Floats) -> Whole:
-    """Count how often the outline of each quadrilateral winds around its point; 0 on an edge.
-
-    Args:
-        points: (n, 2) [m].
-        corners: (n, 4, 2) [m].
-        tolerance: (n,) [m], distance from an edge up to which a point lies on it.
-    """
+    """Count how often outlines with corners (n, 4, 2) wind around points (n, 2) [m]; 0 as near an edge as (n,) [m]."""
     starts = corners - points[:, None]
     ends = np.roll(starts, -1, axis=1)
     edges = ends - starts

@@ -58,14 +58,10 @@ def least_reaching(growing: Callable[[float], float], level: float, low: float, 
 
 
 def material_height(vertices: Vertices, *, floor_z: float = 0.0, percentile: float = 95.0) -> float:
-    """Find the height above the floor [m] below which a given share of the links' material lies.
+    """Find the height above the floor [m] below which a percentile, above 0, of the links' material lies.
 
     The material is spread evenly along each link's centreline. The share below a height is then a sum over links of
     clipped straight lines, and the height is found by bisection: exact, without sampling points along the links.
-
-    Args:
-        floor_z: Height of the floor [m].
-        percentile: Share of the material [%], above 0 and up to 100.
 
     Raises:
         InputError: Bad percentile.

@@ -21,18 +21,14 @@ from dem.record.series import Series
 from postprocess.geometry.links import Floats
 from postprocess.measures.registry import PhaseMeasure, Quantity
 
-APART = 0.1
-"""Between two samples, as in the paper's code [s]."""
-
-ACTUATED = ("actuate", "internal-oscillation", "shape-change")
-"""Types of phase in which motors move barbs."""
+APART = 0.1  #: Between two samples, as in the paper's code [s]
+ACTUATED = ("actuate", "internal-oscillation", "shape-change")  #: Types of phase in which motors move barbs
 
 _SAMPLED = f"motor work sampled every {APART:g} s"
 _WORK = Quantity(_SAMPLED, "J")
 _EXTREMES = Quantity(f"{_SAMPLED} least", "J"), Quantity(f"{_SAMPLED} greatest", "J")
 
-SAMPLED_WORK = _WORK.header
-"""Its column in tables of phases."""
+SAMPLED_WORK = _WORK.header  #: Its column in tables of phases
 
 _NEAR = 1e-3  # share of the interval by which a frame may be off; frames fall on the nearest step
 
@@ -40,9 +36,7 @@ _NEAR = 1e-3  # share of the interval by which a frame may be off; frames fall o
 def sampled_work(angles: Floats, torques: Floats) -> float:
     """Sum τ Δα over all barbs [J], with Δα since the sample before; NaN of fewer than two samples.
 
-    Args:
-        angles: (samples, N, 2) of the barbs [rad].
-        torques: (samples, N, 2) of their motors [N m].
+    Angles [rad] and torques of the motors [N m] are (samples, N, 2).
 
     Raises:
         InputError: The two are not of one shape.

@@ -89,8 +89,7 @@ def packing_profile(
 def profile_table(run: Run, *, rings: int = 6, layer: float | None = None) -> pd.DataFrame:
     """Compute φ(r, z) of the last frame of each phase of a run: a row per phase, ring and layer.
 
-    Args:
-        layer: Thickness of the layers [m]; a ring's width if not given.
+    Layers are as thick as a ring is wide, unless given [m].
 
     Raises:
         InputError: The run is in a plane, its container is no one cylinder, or as `packing_profile`.

@@ -18,17 +18,13 @@ from dem.record.series import Series
 from postprocess.geometry.links import Floats
 from postprocess.measures.registry import PhaseMeasure, Quantity, Shown
 
-PULL = "pull-hook"
-"""Type of the phase."""
+PULL = "pull-hook"  #: Type of the phase
 
 WINDOW = 0.04
 """Over which forces are averaged for a peak [s]: at w per second the hook rises by 0.47 mm meanwhile, less than t2."""
 
-FREE = 0.1
-"""A hook is free once its force stays below this share of the peak [-]."""
-
-END = 0.1
-"""At the end of the pull, over which the force is averaged that is left [s]."""
+FREE = 0.1  #: A hook is free once its force stays below this share of the peak [-]
+END = 0.1  #: At the end of the pull, over which the force is averaged that is left [s]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

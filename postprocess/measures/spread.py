@@ -96,14 +96,11 @@ def centre_of_mass(vertices: Vertices) -> Floats:
 
 
 def spread_radius(vertices: Vertices, *, share: float, axis: tuple[float, float] | None = None) -> float:
-    """Find the radius [m] about a vertical axis that holds a given share of the links' material.
+    """Find the radius [m] about a vertical axis that holds a share of the links' material, above 0 and up to 1.
 
-    The material is spread evenly along each link's centreline. What of a link lies within a radius is where a
-    straight line is inside a circle, seen from above; the radius is found by bisection: exact, without sampling.
-
-    Args:
-        share: Of the material [-], above 0 and up to 1.
-        axis: x and y of the axis [m]; that of the pile's centre of mass if not given.
+    The material is spread evenly along each link's centreline. What of a link lies within a radius is where a straight
+    line is inside a circle, seen from above; the radius is found by bisection: exact, without sampling. The axis, x and
+    y [m], is that of the pile's centre of mass if not given.
 
     Raises:
         InputError: Bad share.
@@ -142,17 +139,13 @@ def middle(vertices: Vertices) -> tuple[float, float]:
 
 
 def tilt(vertices: Vertices, *, foot: tuple[float, float] = (0.0, 0.0), floor_z: float = 0.0) -> float:
-    """Return the angle [rad] from the vertical to the line from a pile's foot to its centre of mass.
+    """Return the angle [rad] from the vertical to the line from a pile's foot on the floor to its centre of mass.
 
     A pile that is turned rigidly about its foot by an angle has that tilt; one that spreads evenly to all sides has
-    none. The principal axis of the pile's inertia would not do: it lies level in every pile that is lower than
-    about 1.7 times its radius (a solid cylinder's axes change places there), and a leaning pile has the axis of a
-    sheared one. The foot is a place on the floor and not the middle of what now lies on it: a column that has fallen
-    over lies above the middle of its side, and would be upright.
-
-    Args:
-        foot: x and y of the point of the floor that the pile stood on [m].
-        floor_z: Height of the floor [m].
+    none. The principal axis of the pile's inertia would not do: it lies level in every pile that is lower than about
+    1.7 times its radius (a solid cylinder's axes change places there), and a leaning pile has the axis of a sheared
+    one. The foot, x and y [m] on a floor of a height [m], is not the middle of what now lies on it: a column that has
+    fallen over lies above the middle of its side, and would be upright.
 
     Raises:
         UndefinedMeasureError: There is no smarticle, or the centre of mass is not above the floor.
@@ -167,12 +160,9 @@ def tilt(vertices: Vertices, *, foot: tuple[float, float] = (0.0, 0.0), floor_z:
 def has_toppled(offset: float, base_radius: float) -> bool:
     """Whether a pile has fallen over: its centre of mass is no longer above the base that it stood on.
 
-    A body stands as long as the vertical through its centre of mass meets its base; beyond its edge, weight turns it
-    over. A pile that spreads or sheds smarticles to all sides keeps its centre of mass where it was.
-
-    Args:
-        offset: Distance of the centre of mass from the vertical through the foot [m].
-        base_radius: Radius of the base before the pile was free, such as that which holds 95 % of it [m].
+    A body stands as long as the vertical through its centre of mass, at an offset [m] from that through the foot, meets
+    its base, of a radius [m] before the pile was free. A pile that spreads or sheds smarticles to all sides keeps its
+    centre of mass where it was.
     """
     return offset > base_radius
 

@@ -19,8 +19,7 @@ from dem.record.series import Series
 from postprocess.geometry.links import Floats
 from postprocess.measures.registry import PhaseMeasure, Quantity, Shown
 
-STRAIN = "strain"
-"""Type of the phase."""
+STRAIN = "strain"  #: Type of the phase
 
 _MEANINGS = {
     Quantity(

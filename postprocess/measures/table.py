@@ -18,14 +18,12 @@ from postprocess.measures.registry import frame_measures, phase_measures
 from postprocess.statistics.points import ASPECT, SEED, marked
 from postprocess.statistics.seeds import Mean, mean_with_error
 
-Costly = Literal["never", "phase-end", "every-frame"]
-"""When to take the packing fractions of `COSTLY_DEFINITIONS`."""
+Costly = Literal["never", "phase-end", "every-frame"]  #: When to take the packing fractions of `COSTLY_DEFINITIONS`
 
 PASSIVE_PHASES = frozenset({"deposit", "take-over", "relax"})
 """Types of phase in which nothing drives the pile; all others count as activity."""
 
-LAST_FRAMES = 20
-"""Frames averaged at the end of a phase, as in Savoie et al."""
+LAST_FRAMES = 20  #: Frames averaged at the end of a phase, as in Savoie et al
 
 _LABELS = ("run", "name", SEED, ASPECT, "count", "fidelity", "scene_sha256")
 # What the columns of a series of vectors are, by their number.

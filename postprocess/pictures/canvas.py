@@ -40,8 +40,7 @@ VIEWS: Mapping[str, tuple[float, float]] = MappingProxyType(
 )
 """Named views: the camera's azimuth and elevation [degree], seen from the pile."""
 
-MILLIMETRE = 1e3
-"""Drawn in mm: VTK's tolerances do not suit scenes of centimetres in m."""
+MILLIMETRE = 1e3  #: Drawn in mm: VTK's tolerances do not suit scenes of centimetres in m
 
 _OVERSAMPLING = 2
 _LEAST_SIZE, _LARGEST_SIZE = 200, 8000  # pixel
@@ -131,11 +130,8 @@ def axes_from(azimuth: float, elevation: float) -> Floats:
 def drawn(bodies: Bodies, frame: Frame, forward: Floats, *, largest: float | None = None) -> dict[str, pv.PolyData]:
     """Return what is drawn of a frame, [mm] above the floor: walls cut open in front, lines as tubes.
 
-    A wall that was taken away is there as `ghost`.
-
-    Args:
-        forward: (3,) direction of view; zeros: walls stay whole.
-        largest: Normal force of the thickest line of force [N].
+    A wall that was taken away is there as `ghost`. With a direction of view (3,) of zeros walls stay whole; `largest`
+    is the normal force of the thickest line of force [N].
     """
     made = bodies.at(frame)
     if "wall" in bodies.kinds and "wall" not in made and bodies.around.removed is not None:

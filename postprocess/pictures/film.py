@@ -17,14 +17,9 @@ from PIL import Image
 from dem.errors import InputError
 from postprocess.geometry.links import Floats
 
-KINDS = (".gif", ".webp", ".mp4")
-"""Suffixes of films."""
-
-MOST = 150
-"""Pictures of a film, unless a time between them is asked for."""
-
-RATE = 15.0
-"""Pictures per second of a film [1/s], unless asked for."""
+KINDS = (".gif", ".webp", ".mp4")  #: Suffixes of films
+MOST = 150  #: Pictures of a film, unless a time between them is asked for
+RATE = 15.0  #: Pictures per second of a film [1/s], unless asked for
 
 _TICKS = {".gif": 0.01, ".webp": 0.001}  # unit of the time that a picture is shown [s]
 _BT709 = (*("-colorspace", "bt709"), *("-color_primaries", "bt709"), *("-color_trc", "bt709"))

@@ -187,12 +187,7 @@ def pictures(
     quick: bool = False,
     pace: str = "",
 ) -> Iterator[Image.Image]:
-    """Draw runs side by side under one camera, in one scale of colours, picture after picture.
-
-    Args:
-        indices: Of the frames of each that are shown.
-        pace: For the captions of a film.
-    """
+    """Draw runs side by side under one camera, in one scale of colours, frame after frame by its index."""
     titles = titles_of([shot.run for shot in shots])
     pairs = list(zip(shots, indices, strict=True))
     for shot, shown in pairs:
@@ -339,9 +334,7 @@ def titles_of(runs: Sequence[Run]) -> list[str]:
 def caption_of(frame: Frame, run: Run, *, title: str, pace: str = "", force: float | None = None) -> list[str]:
     """Return the lines of the caption of a frame.
 
-    Args:
-        pace: How fast a film plays; empty for a picture.
-        force: Normal force of the thickest line of force [N]; None where none are drawn.
+    The pace of a film is how fast it plays; the force is that of the thickest line [N], None where none are drawn.
     """
     count = f"{run.manifest.count}" if frame.count == run.manifest.count else f"{frame.count} of {run.manifest.count}"
     phase = run.phases[frame.phase].type if frame.phase < len(run.phases) else "?"

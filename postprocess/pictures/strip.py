@@ -25,13 +25,9 @@ class Row:
 
 
 def draw_strip(rows: Sequence[Row], output: Path, *, columns: Sequence[str], footer: Sequence[str]) -> Path:
-    """Draw a picture of each run at each of its times, and write them as one figure.
+    """Draw a picture of each run at each of its times, and write them as one figure, columns named above.
 
     A smarticle has one colour in all pictures of a run.
-
-    Args:
-        columns: What is written above the pictures, one each.
-        footer: Origin, one statement each.
 
     Raises:
         InputError: A run has no frames.

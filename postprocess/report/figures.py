@@ -32,11 +32,8 @@ from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-COLUMN_WIDTH = 3.5
-"""Width of a journal column [inch]."""
-
-RESOLUTION = 300
-"""Of bitmaps [dots per inch]."""
+COLUMN_WIDTH = 3.5  #: Width of a journal column [inch]
+RESOLUTION = 300  #: Of bitmaps [dots per inch]
 
 BLACK = "#1a1a1a"
 BLUE = "#0072b2"
@@ -80,8 +77,7 @@ _FOOTER_LINE = 0.082  # inch per line of footer
 _FOOTER_MARGIN = 0.06  # inch above and below it together
 _FOOTER_COLUMNS = 97  # characters of that size across one column width
 
-FOOTER_SHARE = 0.2
-"""The most of a figure's height that its footer takes [-]."""
+FOOTER_SHARE = 0.2  #: The most of a figure's height that its footer takes [-]
 
 
 @contextmanager
@@ -190,8 +186,7 @@ def refuse_to_overwrite(path: Path, *, overwrite: bool) -> None:
 def sequence(colours: int, *, last: float = 1.0) -> list[str]:
     """Return hexadecimal colours, dark to light: steps of viridis, lightened so that shading shows.
 
-    Args:
-        last: Place of the last one in the map, up to 1.
+    The last one has the place `last` in the map, up to 1.
     """
     steps = [0.16 + (last - 0.16) * i / max(colours - 1, 1) for i in range(colours)]
     plain = np.array([matplotlib.colormaps["viridis"](step)[:3] for step in steps])

@@ -66,7 +66,7 @@ def _runs_needed(effect: SeedMean, size: float) -> float:
     return float(counts[place]) if place < len(counts) else math.inf
 
 
-def told_more(verdict: Verdict) -> str:
+def more_runs_text(verdict: Verdict) -> str:
     """Write `an effect of this size would take 3.1 times as many runs` if unresolved; else nothing."""
     more = verdict.more if isinstance(verdict, Unresolved) else math.nan
     if math.isnan(more):
@@ -80,7 +80,7 @@ def negative(effect: SeedMean) -> SeedMean:
     return replace(effect, value=-effect.value)
 
 
-def told(effect: SeedMean, digits: int = 4, unit: str = "") -> str:
+def effect_text(effect: SeedMean, digits: int = 4, unit: str = "") -> str:
     """Write `+0.0123 ± 0.0011 (n = 15)`: a signed number with its standard error."""
     if math.isnan(effect.value):
         return "no data"

@@ -19,11 +19,7 @@ from postprocess.statistics.seeds import SeedMean, mean_over_seeds
 ASPECT, SEED, SEEDS = "aspect ratio [-]", "seed", "seeds [-]"
 
 
-ToldTable = tuple[list[str], list[list[str]]]
-"""Header and rows of a table for a person to read."""
-
-RUNS = "runs [-]"
-"""Column with the number of runs that a row is the mean of."""
+RUNS = "runs [-]"  #: Column with the number of runs that a row is the mean of
 
 
 def marked(quantity: str, mark: str) -> str:

@@ -107,9 +107,7 @@ def common_slopes(x: Floats, y: Floats, strata: Whole) -> Floats:
 def resamples(blocks: Whole, strata: Whole, *, count: int, seed: int) -> Iterator[Whole]:
     """Draw rows of tables: of each stratum as many blocks as it has, with replacement.
 
-    Args:
-        blocks: (n,) block of each row; a block lies in one stratum.
-        strata: (n,) its stratum.
+    Blocks and strata (n,) are those of each row; a block lies in one stratum.
     """
     random = np.random.default_rng(seed)
     rows = {block: np.nonzero(blocks == block)[0] for block in np.unique(blocks)}

@@ -29,8 +29,7 @@ class SeedMean:
     count: int  #: n, runs or points
 
 
-Slope = SeedMean
-"""A slope that several blocks of points share; NaN where x is the same throughout every block."""
+Slope = SeedMean  #: A slope that several blocks of points share; NaN where x is the same throughout every block
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -65,14 +64,11 @@ class Mean:
 
 
 def mean_with_error(samples: ArrayLike) -> Mean:
-    """Average successive samples, with an error that allows for their correlation.
+    """Average successive samples (n,) in time order, with an error that allows for their correlation, without NaN.
 
     The naive error s/√n is too small. It is widened by the square root of the integrated correlation time, summed up to
     where pairs of correlations turn negative. From some 20 samples that time is itself known only to tens of per cent
     and rather too short: read the error as a lower bound for slow drifts.
-
-    Args:
-        samples: (n,), in time order; NaN are left out.
 
     Source:
         Geyer, Statistical Science 7 (1992) 473 (initial positive sequence).
@@ -150,8 +146,7 @@ def _estimate(value: float, error: float, freedom: int, count: int) -> SeedMean:
 def difference(mean: SeedMean, baseline: SeedMean, *, scatter: Scatter | None = None) -> Difference:
     """Subtract an independent mean from another one.
 
-    Args:
-        scatter: That of a single seed, common to both; None: each has its own, by Welch.
+    The scatter of a single seed may be common to both; without it each has its own, by Welch.
 
     Source:
         Welch, Biometrika 34 (1947) 28; degrees of freedom after Satterthwaite.

@@ -55,7 +55,7 @@ class SizeLaw:
     scatter: Scatter  #: Of one run
     #: Variance that the law leaves of the means of sizes, over what scatter explains; NaN below three sizes
     excess: float
-    refused: float  #: Probability of so much, were the law true [1]; likewise
+    p_value: float  #: Probability of so much, were the law true [1]; likewise
     powers: tuple[float, float, float]  #: Best power of N and its 95 % interval [1]; likewise
     sizes: int  #: How many sizes
     runs: int  #: How many runs
@@ -98,20 +98,15 @@ def scatter_of(counts: Floats, values: Floats) -> Scatter:
 
 
 def size_law(counts: Floats, values: Floats) -> SizeLaw:
-    """Fit the law to runs of two sizes at least.
-
-    Args:
-        counts: (n,) smarticles of each run.
-        values: (n,) of the quantity, finite.
-    """
+    """Fit the law to runs of two sizes at least, by their counts of smarticles (n,) and finite values (n,)."""
     scatter = scatter_of(counts, values)
     bulk, slope, left = _fit(counts, values, scatter, POWER)
     sizes = len(np.unique(counts))
-    excess = refused = math.nan
+    excess = p_value = math.nan
     powers = (math.nan, math.nan, math.nan)
     if sizes > 2 and scatter.freedom and scatter.variance:
         excess = left / scatter.variance / (sizes - 2)
-        refused = float(fdtrc(sizes - 2, scatter.freedom, excess))
+        p_value = float(fdtrc(sizes - 2, scatter.freedom, excess))
         powers = _powers(counts, values, scatter)
     larger = max(excess, 1.0) if math.isfinite(excess) else 1.0
     matrix = np.stack([np.ones(len(counts)), counts**-POWER], axis=1)
@@ -122,7 +117,7 @@ def size_law(counts: Floats, values: Floats) -> SizeLaw:
         covariance=inverse * scatter.variance * larger,
         scatter=scatter,
         excess=excess,
-        refused=refused,
+        p_value=p_value,
         powers=powers,
         sizes=sizes,
         runs=len(values),
@@ -189,12 +184,9 @@ class Profile:
 
 
 def profiles(x: Floats, having: Floats, groups: NDArray[np.int64]) -> dict[int, Profile]:
-    """Compute the profile likelihoods of x_c of each group, on common places.
+    """Compute the profile likelihoods of x_c of each group, such as a size, on common places.
 
-    Args:
-        x: (n,) finite, of each run.
-        having: (n,) 0 or 1.
-        groups: (n,) such as the size.
+    Runs have a finite x (n,), the property or not, 0 or 1 (n,), and a group (n,).
     """
     span = float(np.ptp(x)) or 1.0
     places = np.linspace(x.min() - span / 2, x.max() + span / 2, _PLACES)

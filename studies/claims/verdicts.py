@@ -31,24 +31,15 @@ _FOUND = {
 
 @dataclass(frozen=True, kw_only=True)
 class Tested:
-    """What one study says of a claim.
+    """What one study says of a claim."""
 
-    Attributes:
-        study: Folder under `results/`.
-        verdict: `reproduced`, `not`, `not resolved` or `no data`.
-        ours: Its numbers.
-        criterion: What its verdict asks for.
-        basis: Smarticles, seeds and engine that it rests on.
-        needed: What it would take, where the verdict is not resolved and that is known; else empty.
-        instead: What a test of ours says where the paper's own cannot decide; None where there is none.
-    """
-
-    study: str
-    verdict: str
-    ours: str
-    criterion: str
-    basis: str
-    needed: str = ""
+    study: str  #: Folder under `results/`
+    verdict: str  #: `reproduced`, `not`, `not resolved` or `no data`
+    ours: str  #: Its numbers
+    criterion: str  #: What its verdict asks for
+    basis: str  #: Smarticles, seeds and engine that it rests on
+    needed: str = ""  #: What it would take, where the verdict is not resolved and that is known; else empty
+    #: What a test of ours says where the paper's own cannot decide; None where there is none
     instead: Tested | None = None
 
     @property
@@ -60,22 +51,15 @@ class Tested:
 
 @dataclass(frozen=True, kw_only=True)
 class Claim:
-    """One claim of the paper.
+    """One claim of the paper."""
 
-    Attributes:
-        number: In the paper's order, from 1.
-        part: Of the paper.
-        says: The claim.
-        tested: By the rules of the `text` and of the paper's `code`, and each `on YADE` from results of its own; None
-            where that was not tested.
-        why: What decides the verdict, or why there is none.
-    """
-
-    number: int
-    part: str
-    says: str
+    number: int  #: In the paper's order, from 1
+    part: str  #: Of the paper
+    says: str  #: The claim
+    #: By the rules of the `text` and of the paper's `code`, and each `on YADE` from results of its own; None where that
+    #: was not tested
     tested: Mapping[str, Tested | None]
-    why: str
+    why: str  #: What decides the verdict, or why there is none
 
     @property
     def verdict(self) -> str:
@@ -100,15 +84,7 @@ class Claim:
 
 
 def claims(results: Path, listed: Path = CLAIMS) -> tuple[Claim, ...]:
-    """Judge all claims by what the studies found.
-
-    Args:
-        results: Folder of the studies' results.
-        listed: The list of claims.
-
-    Raises:
-        InputError: A study or a finding that the list names is not there.
-    """
+    """Judge all claims of a list by what the studies found; InputError where a study or a finding is not there."""
 
     @cache
     def read(study: str) -> _Findings:
@@ -132,8 +108,7 @@ def claims(results: Path, listed: Path = CLAIMS) -> tuple[Claim, ...]:
     return tuple(found)
 
 
-_Findings = tuple[Mapping[str, Mapping[str, str]], str]
-"""Row of each finding by id; what all of them rest on."""
+_Findings = tuple[Mapping[str, Mapping[str, str]], str]  #: Row of each finding by id; what all of them rest on
 
 
 def _tested(

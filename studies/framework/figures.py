@@ -47,15 +47,11 @@ Select = Callable[[pd.DataFrame], pd.DataFrame]
 
 @dataclass(frozen=True, kw_only=True)
 class Analysis:
-    """What figures are drawn from.
-
-    Attributes:
-        footer: Origin, one statement each.
-    """
+    """What figures are drawn from."""
 
     tables: Mapping[str, pd.DataFrame] = field(repr=False)
     manifests: Mapping[str, Run] = field(repr=False)
-    footer: Sequence[str]
+    footer: Sequence[str]  #: Origin, one statement each
 
     def table(self, name: str) -> pd.DataFrame:
         """Select the rows of the engine that judges; empty where there is no such table."""
@@ -64,37 +60,24 @@ class Analysis:
 
 @dataclass(frozen=True, kw_only=True)
 class Series:
-    """Rows that are drawn alike.
+    """Rows that are drawn alike."""
 
-    Attributes:
-        rows: Points or runs, in the order of a line through them.
-        look: Marker and line, see `marker`.
-        shift: Along x, to keep error bars apart.
-    """
-
-    rows: pd.DataFrame = field(repr=False)
+    rows: pd.DataFrame = field(repr=False)  #: Points or runs, in the order of a line through them
     label: str
-    look: Mapping[str, Any]
-    shift: float = 0.0
+    look: Mapping[str, Any]  #: Marker and line, see `marker`
+    shift: float = 0.0  #: Along x, to keep error bars apart
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class History:
-    """A quantity of one run from the phase before its activity to the end.
+    """A quantity of one run from the phase before its activity to the end."""
 
-    Attributes:
-        times: (n,) since the activity began [s].
-        values: (n,).
-        active: Time at which the activity ended [s].
-    """
-
-    times: NDArray[np.float64]
-    values: NDArray[np.float64]
-    active: float = 0.0
+    times: NDArray[np.float64]  #: (n,) since the activity began [s]
+    values: NDArray[np.float64]  #: (n,)
+    active: float = 0.0  #: Time at which the activity ended [s]
 
 
-Split = Callable[[pd.DataFrame], list[Series]]
-"""Makes the series of a table of points or runs."""
+Split = Callable[[pd.DataFrame], list[Series]]  #: Makes the series of a table of points or runs
 
 
 class Figure(Protocol):
@@ -110,17 +93,7 @@ class Figure(Protocol):
 
 @dataclass(frozen=True, kw_only=True)
 class Means:
-    """Means with their error bars against a variable: a panel for each quantity and each value of a column.
-
-    Attributes:
-        panels: Column with a column of panels for each value; empty: none.
-        panel: Title of a panel, with `{}` for its value.
-        transform: What is drawn of x.
-        ticks: Whether the x axis has ticks at the values of x alone.
-        levels: Horizontal lines of a panel's rows, by label.
-        bounds: Lower bounds for the quantities without a mean, by column.
-        reference: Published values by the column that they are set against: places and values.
-    """
+    """Means with their error bars against a variable: a panel for each quantity and each value of a column."""
 
     name: str
     quantities: Sequence[Quantity]
@@ -129,16 +102,19 @@ class Means:
     split: Split
     table: str = "points"
     rows: Select = lambda table: table
-    panels: str = ""
-    panel: str = "l/w = {:g}"
-    transform: Callable[[Any], Any] = lambda x: x
+    panels: str = ""  #: Column with a column of panels for each value; empty: none
+    panel: str = "l/w = {:g}"  #: Title of a panel, with `{}` for its value
+    transform: Callable[[Any], Any] = lambda x: x  #: What is drawn of x
     log: bool = False
     log_x: bool = False
     marks: Sequence[float] = ()
-    ticks: bool = False
+    ticks: bool = False  #: Whether the x axis has ticks at the values of x alone
     share_y: bool = False
+    #: Horizontal lines of a panel's rows, by label
     levels: Callable[[pd.DataFrame], Mapping[str, float]] = lambda _: {}
+    #: Lower bounds for the quantities without a mean, by column
     bounds: Mapping[str, str] = field(default_factory=dict)
+    #: Published values by the column that they are set against: places and values
     reference: Mapping[str, tuple[pd.Series, pd.Series]] = field(default_factory=dict)
     notes: Sequence[str] = ()
     bars: str = BARS
@@ -208,23 +184,16 @@ class Means:
 
 @dataclass(frozen=True, kw_only=True)
 class Rows:
-    """Means with their error bars across, a row for each name and a panel for each quantity.
-
-    Attributes:
-        row: Column with the names of the rows, or a function of a row of the table.
-        rows: Selects what is drawn, in the order of the rows.
-        ends: Columns of the ends of the intervals; empty: means with half-widths.
-        margin: Column with the half-width of a band about 0.
-    """
+    """Means with their error bars across, a row for each name and a panel for each quantity."""
 
     name: str
     quantities: Sequence[Quantity]
-    row: str | Callable[[pd.Series], str]
+    row: str | Callable[[pd.Series], str]  #: Column with the names of the rows, or a function of a row of the table
     table: str = "points"
     split: Split = lambda table: [Series(rows=table, label="mean over seeds", look=marker("o", style.BLUE, style.BLUE))]
-    rows: Select = lambda table: table
-    ends: Sequence[str] = ()
-    margin: str = ""
+    rows: Select = lambda table: table  #: Selects what is drawn, in the order of the rows
+    ends: Sequence[str] = ()  #: Columns of the ends of the intervals; empty: means with half-widths
+    margin: str = ""  #: Column with the half-width of a band about 0
     levels: Mapping[str, float] = field(default_factory=dict)
     columns: int = 2
     notes: Sequence[str] = ()
@@ -264,33 +233,22 @@ class Rows:
 
 @dataclass(frozen=True, kw_only=True)
 class Histories:
-    """Quantities of runs against time or another variable: means over seeds, lowest to highest seed as a band.
-
-    Attributes:
-        quantities: Label of the y axis by column of the table `times`, or "" for what `history` reads.
-        history: Reads the history of a run; an InputError leaves the run out. None: the table `times`.
-        x: Column of the time in the table `times`.
-        split: Makes the series of the runs; its look has a colour.
-        panels: Column with a panel for each value; empty: none.
-        panel: Title of a panel, with `{}` for its value times `panel_scale`.
-        width: Of the intervals that are averaged over; 0: a hundredth of the longest activity.
-        unit: Of that width.
-        log: Whether x and its intervals are logarithmic.
-    """
+    """Quantities of runs against time or another variable: means over seeds, lowest to highest seed as a band."""
 
     name: str
-    quantities: Mapping[str, str]
+    quantities: Mapping[str, str]  #: Label of the y axis by column of the table `times`, or "" for what `history` reads
     x_label: str
-    split: Split
+    split: Split  #: Makes the series of the runs; its look has a colour
+    #: Reads the history of a run; an InputError leaves the run out. None: the table `times`.
     history: Callable[[Run], History] | None = None
-    x: str = ""
+    x: str = ""  #: Column of the time in the table `times`
     rows: Select = lambda runs: runs
-    panels: str = ""
-    panel: str = "l/w = {:g}"
+    panels: str = ""  #: Column with a panel for each value; empty: none
+    panel: str = "l/w = {:g}"  #: Title of a panel, with `{}` for its value times `panel_scale`
     panel_scale: float = 1.0
-    width: float = 0.0
-    unit: str = "s"
-    log: bool = False
+    width: float = 0.0  #: Of the intervals that are averaged over; 0: a hundredth of the longest activity
+    unit: str = "s"  #: Of that width
+    log: bool = False  #: Whether x and its intervals are logarithmic
     level: float | None = None
     notes: Sequence[str] = ()
 
@@ -345,20 +303,14 @@ class Histories:
 
 @dataclass(frozen=True, kw_only=True)
 class Scatter:
-    """A quantity against others, a panel each: every run as a small marker, means over seeds as large ones.
-
-    Attributes:
-        split: Makes the series of runs and of points; its look has a marker and a colour.
-        bounds: Column that is above 0 where y is a lower bound, drawn as an arrow.
-    """
+    """A quantity against others, a panel each: every run as a small marker, means over seeds as large ones."""
 
     name: str
     xs: Sequence[Quantity]
     y: Quantity
-    split: Split
-    bounds: str
+    split: Split  #: Makes the series of runs and of points; its look has a marker and a colour
+    bounds: str  #: Column that is above 0 where y is a lower bound, drawn as an arrow
     means: bool = True
-    notes: Sequence[str] = ()
 
     def draw(self, path: Path, analysis: Analysis) -> list[Path]:
         """Draw runs, then means with the error bars of both quantities."""
@@ -382,7 +334,7 @@ class Scatter:
             axes.set_ylabel(self.y.axis or y)
             axes.set_ylim(bottom=0)
         note = "Small: runs, with an arrow: a lower bound; large: means over seeds."
-        return finish(figure, path, [note, *self.notes], analysis.footer)
+        return finish(figure, path, [note], analysis.footer)
 
 
 def one_by_one(column: str, label: Callable[[Any], str], *, last: float = 0.85) -> Split:
@@ -412,10 +364,7 @@ PROCEDURE_LABELS: Mapping[str, str] = MappingProxyType(
 def by_procedure(labels: Mapping[str, str] = PROCEDURE_LABELS, *, apart: float = 0.0, line: bool = True) -> Split:
     """Make a series of each procedure, the internal oscillation at the amplitude that procedures are compared at.
 
-    Args:
-        labels: Labels by procedure, in the order of the legend.
-        apart: Distance of neighbouring series along x.
-        line: Whether a line joins the points.
+    Labels are in the order of the legend; `apart` is the distance of neighbouring series along x.
     """
 
     def split(table: pd.DataFrame) -> list[Series]:
@@ -504,16 +453,9 @@ def draw_means(
     label: str,
     across: ArrayLike | None = None,
 ) -> None:
-    """Draw means with their error bars.
+    """Draw means (n,) with their error bars, the half-widths (n,) of the 95 % intervals of y, NaN where there is none.
 
-    Args:
-        axes: To draw in.
-        x: (n,) places, or means.
-        y: (n,) means, or places.
-        half_widths: (n,) of the 95 % intervals of `y`, NaN where there is none; None: `y` are no means.
-        look: Marker and line, see `marker`.
-        label: For the legend.
-        across: (n,) or, below and above, (2, n) half-widths of `x`.
+    Without half-widths y are no means; `across` are half-widths of x, (n,) or, below and above, (2, n).
     """
     bars = axes.errorbar(
         x, y, yerr=half_widths, xerr=across, **{"markersize": 3.4, "linewidth": 0.7, **look}, label=label
@@ -533,14 +475,9 @@ def draw_bounds(axes: Axes, x: ArrayLike, least: ArrayLike, lengths: ArrayLike, 
 
 
 def finish(figure: Canvas, path: Path, notes: Sequence[str], footer: Sequence[str], *, bars: str = BARS) -> list[Path]:
-    """Put legend and footer to a figure and write it; no limit of an axis hides anything.
+    """Put legend and footer to a figure, and write it; no limit of an axis hides anything.
 
-    Args:
-        figure: Drawn completely.
-        path: Without suffix.
-        notes: What is to be known of this figure.
-        footer: Origin.
-        bars: What error bars are, stated where there are any.
+    The path has no suffix; `bars` says what error bars are, where there are any.
     """
     fullest = max(figure.axes, key=lambda axes: len(axes.get_legend_handles_labels()[1]))
     handles, labels = fullest.get_legend_handles_labels()

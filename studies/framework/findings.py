@@ -16,18 +16,15 @@ from enum import StrEnum
 import numpy as np
 import pandas as pd
 
-from postprocess.statistics.findings import CRITERION, Unresolved, judge, told, told_more
+from postprocess.statistics.findings import Unresolved, effect_text, judge, more_runs_text
 from postprocess.statistics.points import ASPECT, SEED, pairs
 from postprocess.statistics.ranks import correlation_within
 from postprocess.statistics.seeds import SeedMean, Slope, mean_over_seeds, slope_within
 from studies.framework.procedures import CROSSINGS, ENERGY, PHI, PHI_ACTIVE, PROCEDURE, THETA, of_procedure
 
-__all__ = ["CRITERION"]
-
 _SYMBOLS = {ASPECT: "l/w", SEED: "seed", THETA: "θ", PHI: "φ", PHI_ACTIVE: "φ_f", CROSSINGS: "⟨N⟩", ENERGY: "energy"}
 
-Rows = Callable[[pd.DataFrame], pd.DataFrame]
-"""Selects or derives the rows that a finding is about."""
+Rows = Callable[[pd.DataFrame], pd.DataFrame]  #: Selects or derives the rows that a finding is about
 
 
 class Verdict(StrEnum):
@@ -41,29 +38,18 @@ class Verdict(StrEnum):
 
 @dataclass(frozen=True, kw_only=True)
 class Effect:
-    """A number with its error.
+    """A number with its error."""
 
-    Attributes:
-        label: What it is.
-        value: The estimate.
-        sign: +1 where the statement asks for more than the threshold, −1 for less, 0 where it is shown, not judged.
-        threshold: In the unit of the estimate.
-        unit: Of the number shown, with a space before.
-        text: The number as shown, where it is not the estimate itself, such as that of a logarithm.
-        note: What is shown behind it.
-        may_be_higher: Whether the estimate is a lower bound.
-        may_be_lower: Whether it is an upper bound.
-    """
-
-    label: str
-    value: SeedMean | Slope
+    label: str  #: What it is
+    value: SeedMean | Slope  #: The estimate
+    #: +1 where the statement asks for more than the threshold, −1 for less, 0 where it is shown, not judged
     sign: int = 1
-    threshold: float = 0.0
-    unit: str = ""
-    text: str = ""
-    note: str = ""
-    may_be_higher: bool = False
-    may_be_lower: bool = False
+    threshold: float = 0.0  #: In the unit of the estimate
+    unit: str = ""  #: Of the number shown, with a space before
+    text: str = ""  #: The number as shown, where it is not the estimate itself, such as that of a logarithm
+    note: str = ""  #: What is shown behind it
+    may_be_higher: bool = False  #: Whether the estimate is a lower bound
+    may_be_lower: bool = False  #: Whether it is an upper bound
 
     @property
     def verdict(self) -> Verdict:
@@ -88,43 +74,28 @@ class Effect:
     def __str__(self) -> str:
         """`shape-change less internal +0.12 ± 0.01 (n = 8)`."""
         beside = "" if self.sign else ", not judged"
-        return f"{self.label} {self.text or told(self.value, 3, self.unit)}{self.note}{beside}"
+        return f"{self.label} {self.text or effect_text(self.value, 3, self.unit)}{self.note}{beside}"
 
 
 @dataclass(frozen=True, kw_only=True)
 class Outcome:
-    """What a finding comes to.
+    """What a finding comes to."""
 
-    Attributes:
-        effects: All those with a sign must have it.
-        note: What is shown besides.
-        verdict: Where it does not follow from the effects.
-    """
-
-    effects: Sequence[Effect] = ()
-    note: str = ""
-    verdict: Verdict | None = None
+    effects: Sequence[Effect] = ()  #: All those with a sign must have it
+    note: str = ""  #: What is shown besides
+    verdict: Verdict | None = None  #: Where it does not follow from the effects
 
 
 @dataclass(frozen=True, kw_only=True)
 class Finding:
-    """A statement and how it is judged.
+    """A statement and how it is judged."""
 
-    Attributes:
-        id: Short name, unique in its study.
-        says: The statement, as the paper has it or our own.
-        found_if: What makes it true, where that is more than all effects beyond their thresholds.
-        outcome: Effects of a table of runs or samples.
-        rows: Applied to the table before.
-        tables: Names of the study's tables that `outcome` takes instead, one argument each.
-    """
-
-    id: str
-    says: str
-    outcome: Callable[..., Outcome | Sequence[Effect]] = field(repr=False)
-    rows: Rows = field(default=lambda table: table, repr=False)
-    tables: Sequence[str] = ()
-    found_if: str = ""
+    id: str  #: Short name, unique in its study
+    says: str  #: The statement, as the paper has it or our own
+    outcome: Callable[..., Outcome | Sequence[Effect]] = field(repr=False)  #: Effects of a table of runs or samples
+    rows: Rows = field(default=lambda table: table, repr=False)  #: Applied to the table before
+    tables: Sequence[str] = ()  #: Names of the study's tables that `outcome` takes instead, one argument each
+    found_if: str = ""  #: What makes it true, where that is more than all effects beyond their thresholds
 
     def judge(self, samples: pd.DataFrame, tables: Mapping[str, pd.DataFrame] | None = None) -> Judged:
         """Judge the finding by a table of samples, or by the study's tables that it names."""
@@ -143,24 +114,18 @@ class Finding:
 
 @dataclass(frozen=True, kw_only=True)
 class Judged:
-    """A finding with its verdict.
-
-    Attributes:
-        ours: Our numbers; errors are standard errors.
-        more: How many times as many runs would resolve it; NaN where that does not apply.
-        criterion: What makes the finding true.
-    """
+    """A finding with its verdict."""
 
     finding: Finding
-    ours: str
+    ours: str  #: Our numbers; errors are standard errors
     verdict: Verdict
-    more: float = math.nan
-    criterion: str = ""
+    more: float = math.nan  #: How many times as many runs would resolve it; NaN where that does not apply
+    criterion: str = ""  #: What makes the finding true
 
     @property
     def needed(self) -> str:
         """What it would take to resolve the finding; empty where that does not apply."""
-        return told_more(Unresolved(more=self.more))
+        return more_runs_text(Unresolved(more=self.more))
 
 
 def _verdict(effects: Sequence[Effect]) -> tuple[Verdict, float]:
@@ -294,18 +259,17 @@ def mean(
     label: str,
     *,
     rows: Rows = lambda table: table,
-    sign: int = 1,
     threshold: float = 0.0,
     shown: Sequence[str] = (),
     by: str = PROCEDURE,
 ) -> Finding:
-    """Judge whether a value of each row is above (sign 1) or below (−1) a threshold in the mean.
+    """Judge whether a value of each row is above a threshold in the mean.
 
     Means of the columns `shown` at each value of the column `by` are shown, not judged.
     """
 
     def outcome(table: pd.DataFrame) -> Outcome:
-        effect = Effect(label=label, value=mean_over_seeds(values(table)), sign=sign, threshold=threshold)
+        effect = Effect(label=label, value=mean_over_seeds(values(table)), threshold=threshold)
         note = "; ".join(f"{symbol(column)}: {means_by(table, column, by, '.3g')}" for column in shown)
         return Outcome(effects=[effect], note=note)
 
@@ -341,7 +305,7 @@ def ranks(
         note = f"{int(held.sum())} values are lower bounds" if held.any() else ""
         return Outcome(
             effects=[
-                Effect(label="rank correlation", value=found, text=told(found, 2)),
+                Effect(label="rank correlation", value=found, text=effect_text(found, 2)),
                 Effect(label="slope", value=line, sign=0, unit=f" {unit}"),
             ],
             note=note,

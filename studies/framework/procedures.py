@@ -33,8 +33,7 @@ PROCEDURES: Mapping[str, str] = MappingProxyType(
 )
 """Procedure of each type of activity."""
 
-AMPLITUDE = 10.0
-"""θ of the internal oscillation where procedures are compared, as in the paper [deg]."""
+AMPLITUDE = 10.0  #: θ of the internal oscillation where procedures are compared, as in the paper [deg]
 
 PROCEDURE, THETA, ACTIVE = "procedure", "theta [deg]", "time active [s]"
 PHI, CROSSINGS = f"phi {DEFINITION} [-]", "crossings [-]"
@@ -88,11 +87,7 @@ def paired(table: pd.DataFrame, quantity: str, one: str, other: str) -> SeedMean
 
 
 def activity(run: Run) -> Phase:
-    """Find the one activity of a run.
-
-    Raises:
-        InputError: There is not exactly one of a known kind between two rests.
-    """
+    """Find the one activity of a run; InputError unless there is exactly one, of a known kind, between two rests."""
     active = [phase for phase in run.phases if phase.type not in PASSIVE_PHASES]
     around = run.phases[active[0].index - 1 : active[0].index + 2] if active else ()
     if len(active) != 1 or active[0].type not in PROCEDURES or len(around) != 3 or around[2].type != "relax":
@@ -103,11 +98,7 @@ def activity(run: Run) -> Phase:
 
 
 def procedure_row(run: Run) -> dict[str, object]:
-    """Measure one activity between two rests: a row of the table of runs.
-
-    Raises:
-        InputError: It is not one activity between two rests, or cannot be read.
-    """
+    """Measure one activity between two rests: a row of the table of runs; InputError where it is none."""
     active = activity(run)
     settings = run.scene["phases"][active.index]
     if settings["type"] != active.type:
@@ -200,15 +191,11 @@ def gained(work: NDArray[np.float64], before: NDArray[np.bool_]) -> float:
 
 
 def half_compaction(time: NDArray[np.float64], height: NDArray[np.float64], duration: float) -> float:
-    """Find the share of the activity after which the centre of mass has come down by half of what it does in the end.
+    """Find the share of the activity [-] after which the centre of mass has come down by half of what it does in all.
 
-    Args:
-        time: (n,) since the activity began, with the rests before and after [s].
-        height: (n,) over that before the activity [-].
-        duration: Of the activity [s].
-
-    Returns:
-        The share [-]; NaN if the centre of mass is not lower in the end.
+    Times (n,) [s] are since the activity began, with the rests before and after, heights (n,) over that before it [-];
+    NaN
+    if the centre of mass is not lower in the end.
     """
     final = height[time > duration]
     moving = (time >= 0) & (time <= duration)

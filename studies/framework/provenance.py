@@ -37,19 +37,12 @@ NOTHING = Reference(statement="none; no published numbers", facts=MappingProxyTy
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Origin:
-    """What the results of a study come from.
+    """What the results of a study come from."""
 
-    Attributes:
-        found: The runs used, and those that could not be used.
-        note: How these runs differ from the full study.
-        command: Command line.
-        reference: What they are compared with.
-    """
-
-    found: Collected
-    note: str
-    command: str
-    reference: Reference
+    found: Collected  #: The runs used, and those that could not be used
+    note: str  #: How these runs differ from the full study
+    command: str  #: Command line
+    reference: Reference  #: What they are compared with
 
     @property
     def whole_note(self) -> str:
@@ -74,12 +67,7 @@ class Origin:
         return f"Study {self.found.study}, fidelity {fidelities}{engines}: {used} of {used + missing} runs{lacking}"
 
     def below_figures(self, points: str, text_name: str) -> list[str]:
-        """Make the short footer of a figure.
-
-        Args:
-            points: Which runs there are; goes on from "… of … runs; ".
-            text_name: Name of the Markdown file with the rest.
-        """
+        """Make the short footer of a figure; which runs there are goes on from "… of … runs; "."""
         first, *more = (f"planned: {self.note}" if self.found.missing else self.note).split("; ")
         commits = self._versions("git")
         made = f"{len(commits)} commits" if len(commits) > 2 else f"Commit {', '.join(commits)}"
@@ -89,12 +77,7 @@ class Origin:
         ]
 
     def footer(self, points: str, *statements: str) -> list[str]:
-        """Make the footer of tables and texts, one statement each.
-
-        Args:
-            points: Which runs there are; goes on from "… of … runs; ".
-            statements: What else is to be known, such as definitions.
-        """
+        """Make the footer of tables and texts, one statement each; `points` goes on from "… of … runs; "."""
         named = [("smarticles", ""), ("git", ""), *((engine, engine) for engine in self._engines)]
         versions = "; ".join(f"{name} {', '.join(self._versions(name, engine))}" for name, engine in named)
         return [
@@ -115,14 +98,8 @@ class Origin:
     ) -> dict[str, Path]:
         """Write tables, text and provenance; CSV files have the footer as comments, to be read with `comment="#"`.
 
-        Args:
-            output: Folder.
-            footer: See `footer`.
-            tables: By name, without suffix.
-            text: Name of the Markdown file, and its lines; missing runs and footer are put below.
-
-        Returns:
-            The files, by name.
+        Tables go by name, without suffix; missing runs and footer are put below the lines of the text. Gives files by
+        name.
         """
         missing = pd.DataFrame([asdict(run) for run in self.found.missing], columns=["directory", "status", "cause"])
         below = "".join(f"# {line}\n" for line in footer)
@@ -185,11 +162,7 @@ class Origin:
 
 
 def make_folder(path: Path | str) -> Path:
-    """Make a folder for results.
-
-    Raises:
-        InputError: It is a file, or cannot be made.
-    """
+    """Make a folder for results; InputError where it is a file, or cannot be made."""
     path = Path(path)
     try:
         path.mkdir(parents=True, exist_ok=True)

@@ -17,18 +17,13 @@ from studies.framework.figures import Analysis
 from studies.framework.procedures import EXTERNAL, INTERNAL, PROCEDURE, PROCEDURES, SHAPE, STATIC
 from studies.framework.runs import run_columns
 
-ORDER = (STATIC, EXTERNAL, INTERNAL, SHAPE)
-"""Procedures in the order of tables and pictures."""
+ORDER = (STATIC, EXTERNAL, INTERNAL, SHAPE)  #: Procedures in the order of tables and pictures
 
 _REMOVAL = "remove-container"
 
 
 def removal(run: Run) -> Phase:
-    """Find the phase that takes the wall away.
-
-    Raises:
-        InputError: It is not the last one, or no rest goes before it.
-    """
+    """Find the phase that takes the wall away; InputError unless it is the last one, after a rest."""
     last = run.phases[-1]
     if last.type != _REMOVAL or len(run.phases) < 3 or run.phases[-2].type != "relax":
         types = ", ".join(phase.type for phase in run.phases)
@@ -38,11 +33,7 @@ def removal(run: Run) -> Phase:
 
 
 def around(run: Run) -> tuple[Frame, FrameSequence]:
-    """Read the last frame with the wall, and all those since it began to go.
-
-    Raises:
-        InputError: There are none.
-    """
+    """Read the last frame with the wall, and all those since it began to go; InputError where there are none."""
     phase, frames = removal(run), run.frames
     rest, after = frames.in_phase(phase.index - 1), frames.in_phase(phase.index)
     if not rest or not after:
@@ -52,11 +43,7 @@ def around(run: Run) -> tuple[Frame, FrameSequence]:
 
 
 def named_columns(run: Run) -> dict[str, object]:
-    """Give the cells of the columns that name a run.
-
-    Raises:
-        InputError: The run has more than one activity, or an unknown one.
-    """
+    """Give the cells that name a run; InputError where it has several activities, or an unknown one."""
     active = [phase.type for phase in run.phases if phase.type not in {*PASSIVE_PHASES, _REMOVAL}]
     if len(active) > 1 or not set(active) <= set(PROCEDURES):
         msg = f"{run.path}: not one activity ({', '.join(PROCEDURES)}) or none: it has {', '.join(active)}"
@@ -66,19 +53,12 @@ def named_columns(run: Run) -> dict[str, object]:
 
 @dataclass(frozen=True, kw_only=True)
 class Pictures:
-    """A row of pictures for the first seed of each procedure: with the wall, 0.1 s after, and later.
+    """A row of pictures for the first seed of each procedure: with the wall, 0.1 s after, and later."""
 
-    Attributes:
-        labels: Labels by procedure.
-        after: When the last picture is, after the wall began to go [s]; None: at the end.
-        select: Selects the runs; the first one of each procedure is drawn.
-        name: Of the file.
-    """
-
-    labels: Mapping[str, str]
-    after: float | None = None
-    select: Sequence[str] = ()
-    name: str = "pictures"
+    labels: Mapping[str, str]  #: Labels by procedure
+    after: float | None = None  #: When the last picture is, after the wall began to go [s]; None: at the end
+    select: Sequence[str] = ()  #: Selects the runs; the first one of each procedure is drawn
+    name: str = "pictures"  #: Of the file
 
     def draw(self, path: Path, analysis: Analysis) -> list[Path]:
         """Draw the runs whose directories are there."""

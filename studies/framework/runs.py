@@ -22,47 +22,34 @@ from dem.scene.reading import load_scene
 from postprocess.statistics.points import ASPECT, SEED, marked, told_number
 from postprocess.statistics.seeds import mean_over_seeds
 
-Row = Mapping[str, object]
-"""Cells of one row of a table, by the names of its columns."""
+Row = Mapping[str, object]  #: Cells of one row of a table, by the names of its columns
 
 # Runs without a relaxation at the end lack columns, and would put them behind these.
 _TAIL = ["escaped at the end [-]", "frames averaged [-]", "scene_sha256", "run"]
 _REMEDY = "give the results folder of an earlier analysis of this study, with runs.csv and provenance.json"
 
 
-ENGINE = "engine"
-"""Column of tables of runs of several engines."""
+ENGINE = "engine"  #: Column of tables of runs of several engines
 
 ENGINE_NAMES: Mapping[str, str] = MappingProxyType({"links": "links", "yade": "YADE"})
 """Engines in the order of tables and figures, the one that judges first, with their names in text."""
 
-DEFINITION = "second-highest-com"
-"""Definition of the packing fraction that is compared with Gravish's."""
+DEFINITION = "second-highest-com"  #: Definition of the packing fraction that is compared with Gravish's
 
 PAIRS = "pairs [-]"
 
 
 @dataclass(frozen=True, kw_only=True)
 class Quantity:
-    """A column that is measured, averaged over seeds and shown.
+    """A column that is measured, averaged over seeds and shown."""
 
-    Attributes:
-        column: Name in tables, with its unit.
-        meaning: What it is, for readers of the table.
-        label: Header in the short table; empty: only in the CSV files.
-        form: Format of a number there.
-        scale: Factor of the numbers in the short table and in figures, such as 1e3 for millimetres.
-        axis: Label of an axis of a figure; by default the column's name.
-        bar: Which error of the points stands behind a number: `SE` or `95 %`.
-    """
-
-    column: str
-    meaning: str = ""
-    label: str = ""
-    form: str = ".3g"
-    scale: float = 1.0
-    axis: str = ""
-    bar: str = "SE"
+    column: str  #: Name in tables, with its unit
+    meaning: str = ""  #: What it is, for readers of the table
+    label: str = ""  #: Header in the short table; empty: only in the CSV files
+    form: str = ".3g"  #: Format of a number there
+    scale: float = 1.0  #: Factor of the numbers in the short table and in figures, such as 1e3 for millimetres
+    axis: str = ""  #: Label of an axis of a figure; by default the column's name
+    bar: str = "SE"  #: Which error of the points stands behind a number: `SE` or `95 %`
 
     def cell(self, point: Mapping[str, float]) -> str:
         """Format the mean of a point with its error, where it has one."""
@@ -92,23 +79,14 @@ def declare(
 
 @dataclass(frozen=True, kw_only=True)
 class Key:
-    """A column that names a point: one combination of a sweep's variables.
+    """A column that names a point: one combination of a sweep's variables."""
 
-    Attributes:
-        column: Name in tables.
-        label: Header in the short table, and in statements about the runs.
-        form: Format; empty for words.
-        unit: Behind the number in the short table.
-        scale: Factor of the number shown.
-        order: Order of the values, where it is not their own.
-    """
-
-    column: str
-    label: str
-    form: str = ""
-    unit: str = ""
-    scale: float = 1.0
-    order: Sequence[str] = ()
+    column: str  #: Name in tables
+    label: str  #: Header in the short table, and in statements about the runs
+    form: str = ""  #: Format; empty for words
+    unit: str = ""  #: Behind the number in the short table
+    scale: float = 1.0  #: Factor of the number shown
+    order: Sequence[str] = ()  #: Order of the values, where it is not their own
 
     def text(self, value: object) -> str:
         """Format a value; empty where a point has none, such as θ of a pile at rest."""
@@ -136,10 +114,7 @@ def engines_of(table: pd.DataFrame) -> tuple[str, ...]:
     """List the engines of a table of runs, the one that judges first; none where the table has one engine."""
     if ENGINE not in table.columns:
         return ()
-    order = list(ENGINE_NAMES)
-    return tuple(
-        sorted(set(table[ENGINE]), key=lambda name: (order.index(name) if name in order else len(order), name))
-    )
+    return tuple(sorted(set(table[ENGINE]), key=lambda name: (name not in ENGINE_NAMES, name)))
 
 
 def of_engine(table: pd.DataFrame, engine: str) -> pd.DataFrame:
@@ -195,17 +170,11 @@ def compared_engines(runs: pd.DataFrame, keys: Sequence[str], quantities: Iterab
 
 @dataclass(frozen=True, kw_only=True)
 class MissingRun:
-    """A run directory that could not be used.
+    """A run directory that could not be used."""
 
-    Attributes:
-        directory: As given.
-        status: "not started", "unfinished", "failed", "interrupted", or "unusable" for one that cannot be measured.
-        cause: Why, as far as it is known.
-    """
-
-    directory: str
-    status: str
-    cause: str
+    directory: str  #: As given
+    status: str  #: "not started", "unfinished", "failed", "interrupted", or "unusable" for one that cannot be measured
+    cause: str  #: Why, as far as it is known
 
     @property
     def common_cause(self) -> str:
@@ -215,15 +184,12 @@ class MissingRun:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class MeasuredRun:
-    """A finished run and what was measured of it.
-
-    Attributes:
-        rows: Its rows of the table of runs: one, unless a study measures a run in several ways.
-        history: Quantities against time by the names of columns, (n,) each; empty where a study has none.
-    """
+    """A finished run and what was measured of it."""
 
     run: Run
+    #: Its rows of the table of runs: one, unless a study measures a run in several ways
     rows: Sequence[Row] = field(repr=False)
+    #: Quantities against time by the names of columns, (n,) each; empty where a study has none
     history: Mapping[str, NDArray[Any]] = field(default_factory=dict, repr=False)
 
     @property
@@ -234,13 +200,9 @@ class MeasuredRun:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Collected:
-    """The runs of a study that are done and were measured, in the order given, and the others.
+    """The runs of a study that are done and were measured, in the order given, and the others."""
 
-    Attributes:
-        study: Name of the study, for messages.
-    """
-
-    study: str
+    study: str  #: Name of the study, for messages
     runs: Sequence[MeasuredRun]
     missing: Sequence[MissingRun]
 
@@ -265,11 +227,7 @@ class Collected:
         *,
         within: Callable[[MeasuredRun], Hashable] = lambda _: None,
     ) -> None:
-        """Reject runs that differ in some quantity within a group.
-
-        Raises:
-            InputError: Two runs differ in it.
-        """
+        """Reject runs that differ in some quantity within a group, by an InputError."""
         firsts: dict[Hashable, MeasuredRun] = {}
         for run in self.runs:
             first = firsts.setdefault(within(run), run)
@@ -281,11 +239,7 @@ class Collected:
                 raise InputError(msg)
 
     def reject_repeats(self, point: Callable[[MeasuredRun], str]) -> None:
-        """Reject two runs with the same seed of the same point.
-
-        Raises:
-            InputError: There are two.
-        """
+        """Reject two runs with the same seed of the same point, by an InputError."""
         seen: dict[tuple[str, int, str], MeasuredRun] = {}
         for run in self.runs:
             key = (point(run), run.run.manifest.seed, run.run.manifest.engine)
@@ -304,13 +258,9 @@ def collect_runs(
     *,
     earlier: Mapping[str, MeasuredRun] | None = None,
 ) -> Collected:
-    """Measure the finished runs, and list the others.
+    """Measure the finished runs, and list the others; an InputError while measuring makes a run unusable.
 
-    Args:
-        study: Its name, for messages.
-        run_dirs: Run directories.
-        measure: Measures one run; an InputError makes the run unusable.
-        earlier: Runs measured before by the names of their directories, for those whose directories are not there.
+    Of directories that are not there the runs of an earlier analysis stand in, by name.
 
     Raises:
         InputError: No run is done.
@@ -350,12 +300,8 @@ class Wanted:
 def earlier_runs(results: Path | str, wanted: Mapping[str, Wanted]) -> dict[str, MeasuredRun]:
     """Read those runs of an earlier analysis that are of the scenes wanted, by name.
 
-    What was measured comes from its table of runs, to the six digits that are there; versions and command come from its
-    provenance. Only a run of the very scene counts, by name and hash. The rest of a manifest follows from the scene.
-
-    Args:
-        results: Folder with `runs.csv` and `provenance.json`.
-        wanted: The runs planned, by name.
+    What was measured comes from `runs.csv` in the results, to the six digits that are there; versions and command come
+    from `provenance.json`. Only a run of the very scene counts, by name and hash.
 
     Raises:
         InputError: The folder holds no such files, they are damaged, or none of its runs is wanted.
@@ -383,11 +329,7 @@ def earlier_runs(results: Path | str, wanted: Mapping[str, Wanted]) -> dict[str,
 
 
 def read_runs(results: Path) -> pd.DataFrame:
-    """Read the table of runs as a study wrote it.
-
-    Raises:
-        InputError: There is none, or it lacks the columns that name a run.
-    """
+    """Read the table of runs as a study wrote it; InputError where it is none."""
     path = results / "runs.csv"
     try:
         table = pd.read_csv(path, comment="#", dtype={"run": str, "scene_sha256": str, SEED: int})

@@ -16,7 +16,7 @@ from dem.record.run import Run, SceneData
 from postprocess.measures.packing import COSTLY_DEFINITIONS, DEFINITIONS
 from postprocess.measures.table import LAST_FRAMES, packing_change, summarise_run
 from postprocess.statistics.points import ASPECT
-from studies.framework.figures import History
+from studies.framework.figures import Histories, History, one_by_one
 from studies.framework.provenance import Reference
 from studies.framework.runs import DEFINITION, duration, last_columns, run_columns
 
@@ -24,8 +24,7 @@ SHAKEN = "time shaken [s]"
 SHAKE_TIME = 20.0
 """How long Gravish et al. shook [s]."""
 
-DIGITISING_ERROR = 0.003
-"""Taken as the error of each of Gravish's points [-]."""
+DIGITISING_ERROR = 0.003  #: Taken as the error of each of Gravish's points [-]
 
 GRAVISH_COLUMNS: Mapping[str, str] = MappingProxyType(
     {"phi_0": "phi_initial", "phi_f": "phi_final", "phi_f relaxed": "phi_final"}
@@ -57,11 +56,8 @@ WHEN = f"before shaking and at the end of shaking, means over the last {LAST_FRA
 
 FRICTION = "friction [-]"
 
-TIMES = (5.0, 10.0, 20.0)
-"""When φ is taken in the course of shaking [s]."""
-
-WINDOW = 1.0
-"""Over how long before those times it is averaged [s]: 30 periods of shaking."""
+TIMES = (5.0, 10.0, 20.0)  #: When φ is taken in the course of shaking [s]
+WINDOW = 1.0  #: Over how long before those times it is averaged [s]: 30 periods of shaking
 
 _SHAKE, _SERIES = "shake", "packing_fraction"
 
@@ -79,9 +75,11 @@ def gravish_at(aspect: float, stage: str) -> float:
     return float(points.loc[same, GRAVISH_COLUMNS[stage]].iloc[0]) if same.any() else math.nan
 
 
-def gravish_note(aspects: Sequence[float], stages: Sequence[str] = ("phi_0", "phi_f")) -> str:
+def gravish_note(aspects: Sequence[float]) -> str:
     """State what Gravish's points are, and at which l/w there are none, for figures that show them."""
-    lacking = {stage: [f"{one:g}" for one in aspects if math.isnan(gravish_at(one, stage))] for stage in stages}
+    lacking = {
+        stage: [f"{one:g}" for one in aspects if math.isnan(gravish_at(one, stage))] for stage in ("phi_0", "phi_f")
+    }
     gaps = [f"no {stage.replace('phi', 'φ')} at l/w = {', '.join(some)}" for stage, some in lacking.items() if some]
     return f"{_CITATION}, read to ±{DIGITISING_ERROR:g}; {'; '.join(gaps) or 'at every l/w shown'}."
 
@@ -97,11 +95,7 @@ def at_time(time: float) -> str:
 
 
 def contact_of(run: Run) -> SceneData:
-    """Read what the scene of a run says of its contacts.
-
-    Raises:
-        InputError: It says nothing.
-    """
+    """Read what the scene of a run says of its contacts; InputError where it says nothing."""
     contact: SceneData | None = run.scene.get("contact")
     if contact is None:
         msg = f"{run.path}: scene.yaml has no contact; give runs of a study of friction"
@@ -110,11 +104,7 @@ def contact_of(run: Run) -> SceneData:
 
 
 def common_friction(run: Run) -> float:
-    """Read the one coefficient of friction of a run [-].
-
-    Raises:
-        InputError: Its walls have another one than its smarticles.
-    """
+    """Read the one coefficient of friction of a run [-]; InputError where its walls have another one."""
     contact = contact_of(run)
     between, wall = contact["friction_smarticle"], contact["friction_wall"]
     if between != wall:
@@ -185,11 +175,7 @@ def measured_row(run: Run, definitions: Sequence[str]) -> dict[str, object]:
 
 
 def packing_history(run: Run) -> History:
-    """Read φ of a shaken run against the time since shaking began [-].
-
-    Raises:
-        InputError: It was not shaken, or recorded no φ.
-    """
+    """Read φ of a run against the time since shaking began [-]; InputError where none was recorded."""
     shakes = [phase for phase in run.phases if phase.type == _SHAKE]
     start, end = (shakes[0].start_s, shakes[-1].end_s) if shakes else (None, None)
     series = run.series
@@ -200,3 +186,13 @@ def packing_history(run: Run) -> History:
             return History(times=series.time[shown] - start, values=values[shown], active=end - start)
     msg = f"{run.path}: no packing fraction was recorded while shaking"
     raise InputError(msg)
+
+
+PHI_TIME = Histories(
+    name="phi_time",
+    history=while_shaken,
+    split=one_by_one(FRICTION, r"$\mu$ = {:g}".format),
+    log=True,
+    x_label="time since shaking began [s]",
+    quantities={"": r"packing fraction $\phi$ [-]"},
+)

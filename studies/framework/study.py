@@ -11,9 +11,10 @@ import pandas as pd
 from dem.record.run import Run
 from postprocess.report import figures as style
 from postprocess.report.tables import meaning_lines, table_lines
+from postprocess.statistics.findings import CRITERION
 from postprocess.statistics.points import ASPECT, SEED, SEEDS, averaged, seeds_of
 from studies.framework.figures import BARS, Analysis, Figure
-from studies.framework.findings import CRITERION, Finding, Judged, findings_table
+from studies.framework.findings import Finding, Judged, findings_table
 from studies.framework.provenance import SAVOIE, Origin, Reference, make_folder
 from studies.framework.runs import (
     ENGINE,
@@ -39,76 +40,54 @@ _MEANS = "Means over seeds ± standard error."
 
 @dataclass(frozen=True, kw_only=True)
 class Report:
-    """Results of a study.
-
-    Attributes:
-        lines: Below it: what the numbers are, and every finding with its verdict.
-        tables: All tables by name, `runs`, `points` and `findings` among them.
-        missing: Runs that were given and are not in the tables.
-        footer: Origin of the results, one statement each.
-        files: Everything that was written, by name.
-    """
+    """Results of a study."""
 
     header: Sequence[str]
     rows: Sequence[Sequence[str]] = field(repr=False)
-    lines: Sequence[str]
+    lines: Sequence[str]  #: Below it: what the numbers are, and every finding with its verdict
+    #: All tables by name, `runs`, `points` and `findings` among them
     tables: Mapping[str, pd.DataFrame] = field(repr=False)
     judged: Sequence[Judged]
-    missing: Sequence[MissingRun]
-    footer: Sequence[str] = field(repr=False)
-    files: Mapping[str, Path] = field(repr=False)
+    missing: Sequence[MissingRun]  #: Runs that were given and are not in the tables
+    footer: Sequence[str] = field(repr=False)  #: Origin of the results, one statement each
+    files: Mapping[str, Path] = field(repr=False)  #: Everything that was written, by name
     output: Path
 
 
 @dataclass(frozen=True, kw_only=True)
 class Study:
-    """A study.
+    """A study."""
 
-    Attributes:
-        name: For the command line, and in provenance.
-        measure: Measures one finished run: its row of the table of runs, several rows, or a `MeasuredRun` with a
-            history. An InputError lists the run as missing.
-        keys: Columns that name a point: one combination of the sweep's variables.
-        quantities: Columns that are averaged over seeds.
-        findings: What is judged, in the paper's order.
-        samples: Makes the table that is averaged and judged from the table of runs of one engine.
-        extra: Makes further tables by name from the table of runs; one called `points` replaces the means over seeds.
-        shown: Selects the points of the short table.
-        same_count: Columns within which all runs must have the same number of smarticles.
-        same_fidelity: Columns within which all runs must have the same fidelity.
-        order: Columns that the table of runs is sorted by; none: as given.
-        constant: Columns that must be equal within groups, with the columns that make the groups.
-        bounds: Column that is above 0 where a run's quantities are lower bounds, with the word for such runs.
-        count_values: Whether the points have the number of seeds with a value of each quantity.
-        one_engine: Whether runs of several engines are rejected.
-        from_tables: Whether the table of runs is enough for everything but figures of histories, so that runs of an
-            earlier analysis need not be there.
-        remarks: Paragraphs for the text and statements of footers: definitions, and what to beware of.
-        reference: What the runs are compared with.
-        pictured: Values of the run that a picture is drawn of.
-    """
-
-    name: str
+    name: str  #: For the command line, and in provenance
     title: str
+    #: Measures one finished run: its row of the table of runs, several rows, or a `MeasuredRun` with a history. An
+    #: InputError lists the run as missing.
     measure: Callable[[Run], Row | Sequence[Row] | MeasuredRun]
-    keys: Sequence[Key]
-    quantities: Sequence[Quantity]
-    findings: Sequence[Finding]
+    keys: Sequence[Key]  #: Columns that name a point: one combination of the sweep's variables
+    quantities: Sequence[Quantity]  #: Columns that are averaged over seeds
+    findings: Sequence[Finding]  #: What is judged, in the paper's order
     figures: Sequence[Figure] = ()
+    #: Makes the table that is averaged and judged from the table of runs of one engine
     samples: Callable[[pd.DataFrame], pd.DataFrame] = lambda runs: runs
+    #: Makes further tables by name from the table of runs; one called `points` replaces the means over seeds
     extra: Callable[[pd.DataFrame], Mapping[str, pd.DataFrame]] = lambda _: {}
-    shown: Callable[[pd.DataFrame], pd.DataFrame] = lambda points: points
-    same_count: Sequence[str] = (ASPECT,)
-    same_fidelity: Sequence[str] = ()
-    order: Sequence[str]
+    shown: Callable[[pd.DataFrame], pd.DataFrame] = lambda points: points  #: Selects the points of the short table
+    same_count: Sequence[str] = (ASPECT,)  #: Columns within which all runs must have the same number of smarticles
+    same_fidelity: Sequence[str] = ()  #: Columns within which all runs must have the same fidelity
+    order: Sequence[str]  #: Columns that the table of runs is sorted by; none: as given
+    #: Columns that must be equal within groups, with the columns that make the groups
     constant: Mapping[str, Sequence[str]] = field(default_factory=dict)
+    #: Column that is above 0 where a run's quantities are lower bounds, with the word for such runs
     bounds: tuple[str, str] | None = None
-    count_values: bool = False
-    one_engine: bool = False
+    count_values: bool = False  #: Whether the points have the number of seeds with a value of each quantity
+    one_engine: bool = False  #: Whether runs of several engines are rejected
+    #: Whether the table of runs is enough for everything but figures of histories, so that runs of an earlier analysis
+    #: need not be there
     from_tables: bool = False
+    #: Paragraphs for the text and statements of footers: definitions, and what to beware of
     remarks: Sequence[str] = ()
-    reference: Reference = SAVOIE
-    pictured: Mapping[str, object] = field(default_factory=dict)
+    reference: Reference = SAVOIE  #: What the runs are compared with
+    pictured: Mapping[str, object] = field(default_factory=dict)  #: Values of the run that a picture is drawn of
 
     def analyse(
         self,
@@ -121,12 +100,8 @@ class Study:
     ) -> Report:
         """Measure runs, and write tables, text, provenance and figures; earlier files are replaced.
 
-        Args:
-            run_dirs: Run directories; runs that are not done, or cannot be read, are listed as missing.
-            output: Folder for the results; made if needed.
-            note: How these runs differ from the full study.
-            command: Command line.
-            earlier: Runs of an earlier analysis by name, for directories that are not there.
+        Runs that are not done, or cannot be read, are listed as missing; the note says how runs differ from the full
+        study.
 
         Raises:
             InputError: No run is done, runs must not be averaged or compared, or the output is no folder.
@@ -167,11 +142,7 @@ class Study:
         return MeasuredRun(run=run, rows=[measured] if isinstance(measured, Mapping) else measured)
 
     def reject_unlike(self, found: Collected) -> None:
-        """Reject runs that must not be averaged or compared.
-
-        Raises:
-            InputError: Fidelities, counts or constants differ, or a point has the same seed twice.
-        """
+        """Reject runs that must not be averaged or compared, and seeds given twice, by an InputError."""
 
         def cells(columns: Sequence[str]) -> Callable[[MeasuredRun], tuple[object, ...]]:
             return lambda run: tuple(run.row[name] for name in columns)

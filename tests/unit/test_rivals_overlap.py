@@ -12,7 +12,8 @@ from hypothesis.extra.numpy import arrays
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from benchmarks.rivals.overlap import Bars, distances
+from benchmarks.rivals.overlap import Bars
+from postprocess.measures.contacts import segment_distances
 
 Array = NDArray[np.float64]
 PAIR = np.array([[0, 1]])
@@ -49,7 +50,7 @@ def test_segments_are_as_far_apart_as_their_nearest_points(points: Array) -> Non
     one = points[0] + shares * (points[1] - points[0])
     other = points[2] + shares * (points[3] - points[2])
     nearest = float(np.linalg.norm(one[:, None] - other[None], axis=-1).min())
-    found = float(distances(*(point[None] for point in points))[0])
+    found = float(segment_distances(*(point[None] for point in points))[0])
     # A point is at most half a piece of each segment from the nearest one that was tried.
     pieces = (np.linalg.norm(points[1] - points[0]) + np.linalg.norm(points[3] - points[2])) / 800
     assert nearest - pieces - 1e-12 <= found <= nearest + 1e-12

@@ -41,23 +41,14 @@ FACTOR, SPEED, RISE = (
 
 @dataclass(frozen=True)
 class Setting:
-    """What is let go.
+    """What is let go."""
 
-    Args:
-        placed: "stack": flat, all alike; "crossed": flat, every other one turned; "pile": at random.
-        ratio: l/w.
-        fidelity: draft, standard or reference.
-        keys: further keys of the scene.
-        count: smarticles.
-        articulated: hinged links, their motors holding, or welded.
-    """
-
-    placed: str
-    ratio: float = 0.7
-    fidelity: str = "draft"
-    keys: str = ""
-    count: int = 6
-    articulated: bool = False
+    placed: str  #: "stack": flat, all alike; "crossed": flat, every other one turned; "pile": at random
+    ratio: float = 0.7  #: L/w
+    fidelity: str = "draft"  #: Draft, standard or reference
+    keys: str = ""  #: Further keys of the scene
+    count: int = 6  #: Smarticles
+    articulated: bool = False  #: Hinged links, their motors holding, or welded
 
     @property
     def name(self) -> str:

@@ -27,13 +27,9 @@ from validation.cases import Check, below, near
 
 @dataclass(kw_only=True)
 class Noting(Watchdog):
-    """A watchdog that notes how near smarticles came to its limits.
+    """A watchdog that notes how near smarticles came to its limits."""
 
-    Args:
-        nearest: largest share of each limit.
-    """
-
-    nearest: dict[str, float] = field(default_factory=dict)
+    nearest: dict[str, float] = field(default_factory=dict)  #: Largest share of each limit
 
     def _note(self, limit: str, share: float) -> None:
         self.nearest[limit] = max(self.nearest.get(limit, 0.0), float(share))
@@ -62,23 +58,15 @@ class Noting(Watchdog):
 
 @dataclass
 class Watched:
-    """A run that has ended.
+    """A run that has ended."""
 
-    Args:
-        scene: what was run; None: it is not valid.
-        error: kind and text of the error that it ended in; None: it was done.
-        series: by name.
-        nearest: largest share of each limit of the watchdog that was reached.
-        cost: share of the processor time that the watchdog took, but for its first check [1].
-        first_check: processor time of that, in which compiled code is loaded [s].
-    """
-
-    scene: Scene | None
-    error: tuple[str, str] | None = None
-    series: dict[str, np.ndarray] = field(default_factory=dict)
+    scene: Scene | None  #: What was run; None: it is not valid
+    error: tuple[str, str] | None = None  #: Kind and text of the error that it ended in; None: it was done
+    series: dict[str, np.ndarray] = field(default_factory=dict)  #: By name
+    #: Largest share of each limit of the watchdog that was reached
     nearest: dict[str, float] = field(default_factory=dict)
-    cost: float = 0.0
-    first_check: float = 0.0
+    cost: float = 0.0  #: Share of the processor time that the watchdog took, but for its first check [1]
+    first_check: float = 0.0  #: Processor time of that, in which compiled code is loaded [s]
 
     @property
     def weight(self) -> float:
@@ -135,14 +123,10 @@ def whole(
     steps: Callable[[Scene], Sequence[float]] = time_steps,
     spoil: Callable[[Engine], None] | None = None,
 ) -> Watched:
-    """Run a scene into a run directory.
+    """Run plain data of a scene into a run directory, with time steps by phase [s].
 
-    Args:
-        data: plain data of the scene.
-        out: the run directory.
-        note: whether the watchdog checks closely every time and notes how near its limits are.
-        steps: time step of each phase [s].
-        spoil: done to the engine before each record.
+    With `note` the watchdog checks closely every time and notes how near its limits are; `spoil` is done to the engine
+    before each record.
     """
     nearest: dict[str, float] = {}
     checks: list[float] = []  # processor time of each of the watchdog's [s]

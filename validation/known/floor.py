@@ -140,8 +140,7 @@ def roll_errors(access: EngineAccess, steps: Sequence[float], *, phases: int = 5
     for number in range(phases):
         reference = way(min(steps) / 4, number)
         squares += [float(((way(dt, number) - reference) ** 2).sum()) for dt in steps]
-    found: list[float] = np.sqrt(squares / phases).tolist()
-    return found
+    return [math.sqrt(square) for square in squares / phases]
 
 
 # -- a stack -----------------------------------------------------------------------------------------------------------

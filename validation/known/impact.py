@@ -35,19 +35,12 @@ COARSER = "contact begins and ends within a step, which is some 1/150 of it"
 
 @dataclass(frozen=True)
 class Touch:
-    """What was measured from the first step with a contact force on the floor to the last.
+    """What was measured from the first step with a contact force on the floor to the last."""
 
-    Args:
-        velocity: (3,) after [m/s].
-        spin: (3,) after [rad/s].
-        steps: with a force [1].
-        deepest: largest overlap of the lowest point of the first sphere [m].
-    """
-
-    velocity: Array
-    spin: Array
-    steps: int
-    deepest: float
+    velocity: Array  #: (3,) after [m/s]
+    spin: Array  #: (3,) after [rad/s]
+    steps: int  #: With a force [1]
+    deepest: float  #: Largest overlap of the lowest point of the first sphere [m]
 
 
 def touch(access: EngineAccess, engine: Engine, *, most: int) -> Touch:
@@ -318,11 +311,6 @@ def _spread(law: ContactLaw, number: int) -> tuple[ContactLaw, float]:
     return dataclasses.replace(law, **springs), 1e-4 + SPREAD * (0.754878 * number % 1)
 
 
-def _roots(squares: Array) -> list[float]:
-    found: list[float] = np.sqrt(squares).tolist()
-    return found
-
-
 @ladder(
     "bounce, e = 0.5",
     "a ball bounces once under gravity",
@@ -356,7 +344,7 @@ def bounce_errors(access: EngineAccess, steps: Sequence[float], *, restitution: 
             access.push(engine, 0, velocity=(0, 0, -speed + G * dt / 2))
             engine.advance(round(time / dt))
             squares[k] += (float(engine.state().positions[0, 2]) - BALL_RADIUS - exact) ** 2
-    return _roots(squares / phases)
+    return [math.sqrt(square) for square in squares / phases]
 
 
 def _collided(access: EngineAccess, law: ContactLaw, dt: float, gap: float, *, tilted: bool) -> Array:
@@ -416,4 +404,4 @@ def collision_errors(
         for k, dt in enumerate(steps):
             away = _collided(access, one, dt, gap, tilted=not smooth) - reference
             squares[k] += float((away**2).sum(axis=1).mean())
-    return _roots(squares / phases)
+    return [math.sqrt(square) for square in squares / phases]

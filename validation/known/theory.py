@@ -45,10 +45,8 @@ def _impact(
 class Impact(NamedTuple):
     """A body on a spring and dashpot that never pulls, thrown at them."""
 
-    restitution: float
-    """Speed after over speed before [1]."""
-    duration: float
-    """From first touch until the force is zero [s]."""
+    restitution: float  #: Speed after over speed before [1]
+    duration: float  #: From first touch until the force is zero [s]
 
 
 def dashpot_impact(*, stiffness: float, damping: float, mass: float) -> Impact:
@@ -63,12 +61,8 @@ def dashpot_impact(*, stiffness: float, damping: float, mass: float) -> Impact:
 def bounced(*, gap: float, speed: float, time: float, gravity: float, **springs: float) -> float:
     """Return the height of a body that bounced once on a spring and dashpot that never pulls, over first touch [m].
 
-    Args:
-        gap: free way at t = 0 [m].
-        speed: downwards at t = 0 [m/s].
-        time: after which the body has bounced once [s].
-        gravity: [m/s²].
-        springs: stiffness [N/m], damping [N s/m] and mass [kg].
+    At t = 0 it has a gap below [m] and falls at a speed [m/s]; at the time [s] it has bounced once. Springs: stiffness
+    [N/m], damping [N s/m] and mass [kg].
     """
     met = (math.sqrt(speed**2 + 2 * gravity * gap) - speed) / gravity
     # A little below first touch, so that an elastic contact does not end where it begins.
@@ -78,16 +72,10 @@ def bounced(*, gap: float, speed: float, time: float, gravity: float, **springs:
 
 
 def free_rotation(*, inertia: Array, start: Rotation, spin: Array, times: Array) -> tuple[Rotation, Array]:
-    """Integrate Euler's equations of a rigid body without torque.
+    """Integrate Euler's equations of a rigid body of principal moments (3,) [kg m²] without torque.
 
-    Args:
-        inertia: (3,) principal moments [kg m²].
-        start: body frame to laboratory frame at t = 0.
-        spin: (3,) angular velocity at t = 0, laboratory frame [rad/s].
-        times: (n,) rising, from above 0 [s].
-
-    Returns:
-        Rotations at these times, and angular velocities in the body frame (n, 3) [rad/s].
+    At t = 0 it has a rotation, body frame to laboratory frame, and a spin (3,) in the laboratory frame [rad/s]. Returns
+    rotations at rising times (n,) above 0 [s], and angular velocities in the body frame (n, 3) [rad/s].
     """
 
     def slope(_: float, y: Array) -> Array:
@@ -105,17 +93,12 @@ def falling_on_springs(
 ) -> tuple[Array, float]:
     """Integrate the fall of a flat rigid body, lying flat, on springs and dashpots under its points; small tilts.
 
-    Args:
-        points: (n, 2) x and y of the contacts from the centre of mass [m].
-        stiffness: of one contact [N/m].
-        damping: of one contact [N s/m].
-        mass: [kg].
-        inertia: (2,) about x and y [kg m²].
-        speed: downwards, at first touch [m/s].
-
-    Returns:
-        Velocity upwards and spins about x and y afterwards (3,) [m/s, rad/s], and the time from the first touch to the
-        end of the last contact [s].
+    Points (n, 2) are x and y of the contacts from the centre of mass [m], stiffness [N/m] and damping [N s/m] those of
+    one contact, the inertia (2,) that about x and y [kg m²]; the speed is downwards, at first touch [m/s]. Returns
+    velocity
+    upwards and spins about x and y afterwards (3,) [m/s, rad/s], and the time from the first touch to the end of the
+    last
+    contact [s].
     """
     lift = np.stack([np.ones(len(points)), points[:, 1], -points[:, 0]], axis=1)  # heights of the points
     masses = np.array([mass, *inertia])

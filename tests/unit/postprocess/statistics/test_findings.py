@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from postprocess.statistics.findings import Unresolved, judge, told_more
+from postprocess.statistics.findings import Unresolved, judge, more_runs_text
 from postprocess.statistics.seeds import SeedMean, mean_over_seeds
 
 
@@ -47,6 +47,6 @@ def test_no_effect_takes_runs_without_end_and_one_run_gives_no_number() -> None:
     assert isinstance(nothing, Unresolved)
     assert isinstance(alone, Unresolved)
     assert math.isinf(nothing.more)
-    assert told_more(nothing) == "an effect of this size would take more than 100 times as many runs"
+    assert more_runs_text(nothing) == "an effect of this size would take more than 100 times as many runs"
     assert math.isnan(alone.more)
-    assert told_more(alone) == told_more("found") == told_more("not resolved") == ""
+    assert more_runs_text(alone) == more_runs_text("found") == more_runs_text("not resolved") == ""

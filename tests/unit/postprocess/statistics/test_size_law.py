@@ -27,7 +27,7 @@ def test_the_law_that_made_the_runs_comes_out_again() -> None:
     # Errors far below what is to be resolved.
     assert law.error(1, 0) < 0.002
     assert law.error(0, 1) < 0.02
-    assert law.refused > 0.05
+    assert law.p_value > 0.05
     best, low, high = law.powers
     assert low < 1 / 3 < high
     assert low < best < high
@@ -41,14 +41,14 @@ def test_intervals_hold_what_they_are_to_hold() -> None:
     laws = [size_law(COUNTS, piles(0.15, -0.12, seed=seed)) for seed in range(150)]
     assert 0.897 < np.mean([abs(law.bulk - 0.15) <= law.error(1, 0) for law in laws])
     # As many laws are rejected as chance has it, no more.
-    assert 0 < np.mean([law.refused < 0.05 for law in laws]) < 0.103
+    assert 0 < np.mean([law.p_value < 0.05 for law in laws]) < 0.103
 
 
 @pytest.mark.parametrize("power", [0.1, 1.0])
 def test_another_law_is_rejected(power: float) -> None:
     values = piles(0.15, -0.12 * 5 ** (3 * power - 1), power=power)
     law = size_law(COUNTS, values)
-    assert law.refused < 0.05
+    assert law.p_value < 0.05
     assert law.excess > 3
     assert not law.powers[1] < 1 / 3 < law.powers[2]
     assert law.powers[1] <= power <= law.powers[2]
@@ -70,7 +70,7 @@ def test_one_seed_of_each_size_has_no_error() -> None:
     law = size_law(counts, 0.15 - 0.12 * counts ** (-1 / 3))
     assert law.bulk == pytest.approx(0.15)
     assert math.isnan(law.error(1, 0))
-    assert math.isnan(law.refused)
+    assert math.isnan(law.p_value)
 
 
 RATIOS = (0.09, 0.10, 0.11, 0.12, 0.13)
