@@ -75,11 +75,10 @@ def passive(scene: Scene) -> PassiveScene:
     """
     found = list(_foreign(scene))
     if found:
-        msg = (
+        raise InputError(
             f"cannot be carried over to LAMMPS: {'; '.join(found)}; leave that out, or run the scene here "
             "(smarticles run)"
         )
-        raise InputError(msg)
     first, *others = scene.phases
     assert isinstance(first, TakeOver)  # all others were named
     first.ready(scene)
@@ -99,12 +98,11 @@ def passive(scene: Scene) -> PassiveScene:
     pairs = near.query_pairs(scene.sphere_diameter * (1 - DEEPEST), output_type="ndarray")
     deep = pairs[owners[pairs[:, 0]] != owners[pairs[:, 1]]]
     if len(deep):
-        msg = (
+        raise InputError(
             f"phases.0.run: {len(deep)} pairs of spheres in {first.taken} overlap by more than {DEEPEST:g} diameters, "
             "as those of another engine or fidelity do, and would fly apart in LAMMPS; run this scene's take-over "
             "and a relax phase here (engine: yade), and take over that run"
         )
-        raise InputError(msg)
     return given
 
 
@@ -129,13 +127,11 @@ def write_deck(scene: Scene, folder: Path) -> None:
     """
     given = passive(scene)
     if folder.exists():
-        msg = f"--output {folder}: exists; choose another name"
-        raise InputError(msg)
+        raise InputError(f"--output {folder}: exists; choose another name")
     try:
         folder.mkdir()
     except OSError as error:
-        msg = f"--output {folder}: cannot be made ({error.strerror}); choose another place"
-        raise InputError(msg) from None
+        raise InputError(f"--output {folder}: cannot be made ({error.strerror}); choose another place") from None
     spheres, state = given.spheres, given.state
     still = np.zeros((state.count, 3))
     title = f"Spheres of {len(spheres)} smarticles, {spheres.shape[1]} each: {_one_line(scene.name)}"

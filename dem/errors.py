@@ -28,8 +28,7 @@ def refuse(concerned: Any, time: float, cause: str, way_out: str) -> None:
     if concerned.any():
         ids = concerned.nonzero()[0]
         shown = ", ".join(str(k) for k in ids[:5]) + (", …" if len(ids) > 5 else "")
-        msg = f"at t = {time:.4f} s: {len(ids)} smarticle(s) ({shown}): {cause}; {way_out}"
-        raise RunError(msg)
+        raise RunError(f"at t = {time:.4f} s: {len(ids)} smarticle(s) ({shown}): {cause}; {way_out}")
 
 
 def shown(value: object) -> str:

@@ -86,15 +86,12 @@ class Strict(BaseModel):
             annotation = known[key].annotation
             for item in value if isinstance(value, list) else [value]:
                 if isinstance(item, bool) and annotation not in (bool, Any):
-                    msg = f"{key}: got the boolean {str(item).lower()}, expected {_kind(annotation)}"
-                    raise ValueError(msg)
+                    raise ValueError(f"{key}: got the boolean {str(item).lower()}, expected {_kind(annotation)}")
                 if isinstance(item, str) and _kind(annotation) == "a number":
-                    msg = f"{key}: got the text {shown(item)}, expected a number; {_as_a_number(item)}"
-                    raise ValueError(msg)
+                    raise ValueError(f"{key}: got the text {shown(item)}, expected a number; {_as_a_number(item)}")
         for key in data:
             if key not in known:
-                msg = f"unknown key {shown(key)}; {cls.nearest_key(str(key))}"
-                raise ValueError(msg)
+                raise ValueError(f"unknown key {shown(key)}; {cls.nearest_key(str(key))}")
         return data
 
 

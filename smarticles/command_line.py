@@ -36,8 +36,7 @@ class Parser(argparse.ArgumentParser):
             what = message.partition(":")[0].removeprefix("argument ")
             message = f"{what}: {invalid[1]!r} is not known; {nearest(invalid[1], known)}"
         message = re.sub(r"invalid (?:float|int) value: ('.*')", r"\1 is not a number", message, flags=re.DOTALL)
-        msg = f"{message}; see `{self.prog} --help`"
-        raise InputError(msg)
+        raise InputError(f"{message}; see `{self.prog} --help`")
 
     def reject_unknown(self, words: Sequence[str]) -> NoReturn:
         """Reject arguments that the command does not have.
@@ -148,8 +147,7 @@ def scene_settings(arguments: argparse.Namespace) -> list[str]:
     for setting in settings:
         key, _, value = setting.partition("=")
         if key.strip() == "engine" and value.strip() != arguments.engine:
-            msg = f"--engine {arguments.engine}: --set {setting} says another one; leave one of them out"
-            raise InputError(msg)
+            raise InputError(f"--engine {arguments.engine}: --set {setting} says another one; leave one of them out")
     return [*settings, f"engine={arguments.engine}"]
 
 
@@ -160,8 +158,7 @@ def reject_existing(option: str, path: Path | None, *, overwrite: bool) -> None:
         InputError: it exists and must not be replaced.
     """
     if path is not None and path.exists() and not overwrite:
-        msg = f"{option} {path}: exists; choose another name or give --overwrite"
-        raise InputError(msg)
+        raise InputError(f"{option} {path}: exists; choose another name or give --overwrite")
 
 
 def positive_number(text: str) -> float:
@@ -171,8 +168,7 @@ def positive_number(text: str) -> float:
     except ValueError:
         number = 0.0
     if not 0 < number < math.inf:
-        msg = f"must be a number above 0: got {text!r}"
-        raise argparse.ArgumentTypeError(msg)
+        raise argparse.ArgumentTypeError(f"must be a number above 0: got {text!r}")
     return number
 
 
@@ -183,8 +179,7 @@ def positive_int(text: str) -> int:
     except ValueError:
         number = 0
     if number < 1:
-        msg = f"must be a whole number from 1: got {text!r}"
-        raise argparse.ArgumentTypeError(msg)
+        raise argparse.ArgumentTypeError(f"must be a whole number from 1: got {text!r}")
     return number
 
 

@@ -137,6 +137,5 @@ def grouped(table: pd.DataFrame, by: Sequence[str]) -> pd.DataFrame:
     for name in by:
         if name not in table.columns:
             known = [str(column) for column in table.columns if not str(column).endswith("]")]
-            msg = f"{name!r} is no column of these runs; {nearest(name, known)}"
-            raise InputError(msg)
+            raise InputError(f"{name!r} is no column of these runs; {nearest(name, known)}")
     return means_by(table, [*by, *(name for name in PHASE if name not in by)])

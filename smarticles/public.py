@@ -69,8 +69,7 @@ class SweepDirectory(Sequence[Run]):
             InputError: no run has frames yet, there is no such column, or groups of frames are asked for.
         """
         if by is not None and frames:
-            msg = "by: averages over phases of runs; leave frames out"
-            raise InputError(msg)
+            raise InputError("by: averages over phases of runs; leave frames out")
         table = measured([self.path], frames=frames)
         return table if by is None else grouped(table, [by] if isinstance(by, str) else list(by))
 
@@ -166,8 +165,7 @@ def sweep(
     """
     with tempfile.TemporaryDirectory(prefix="smarticles-") as scratch:
         if vary is None and isinstance(what, Scene):
-            msg = "vary: is missing; give the keys of the scene that change, e.g. vary={'seed': [1, 2, 3]}"
-            raise InputError(msg)
+            raise InputError("vary: is missing; give the keys of the scene that change, e.g. vary={'seed': [1, 2, 3]}")
         file = write_sweep(what, vary, Path(scratch)) if vary is not None else Path(str(what))
         # The scenes of a sweep without a file are in its directory, and `resume` needs no more.
         words = ["sweep", str(file), "--out", str(out), "--submit", "local"] if vary is None else ["resume", str(out)]
@@ -193,15 +191,13 @@ def write_sweep(scene: Scene | Path | str, vary: Mapping[str, Sequence[Any]], fo
             vary.
     """
     if not vary:
-        msg = "vary: is empty; give a key of the scene and its values, e.g. {'seed': [1, 2, 3]}"
-        raise InputError(msg)
+        raise InputError("vary: is empty; give a key of the scene and its values, e.g. {'seed': [1, 2, 3]}")
     data = _plain(scene) if isinstance(scene, Scene) else _read(Path(scene))
     text = yaml.safe_dump(data, sort_keys=False, allow_unicode=True)
     for mark in ("{{", "{%", "{#"):
         if mark in text:
             name = "scene" if isinstance(scene, Scene) else scene
-            msg = f"{name}: holds {mark!r}, which a template would take for its own; write it without"
-            raise InputError(msg)
+            raise InputError(f"{name}: holds {mark!r}, which a template would take for its own; write it without")
     # The last word of a key names its variable, or all of its words where another key ends alike.
     last = [key.rpartition(".")[2] for key in vary]
     names = {
@@ -245,8 +241,7 @@ def _read(path: Path) -> dict[str, Any]:
         msg = f"{path}: cannot be read ({' '.join(str(error).split())}); give a scene or the path of a scene file"
         raise InputError(msg) from None
     if not isinstance(data, dict):
-        msg = f"{path}: a scene is a mapping of keys to values, got {type(data).__name__}"
-        raise InputError(msg)
+        raise InputError(f"{path}: a scene is a mapping of keys to values, got {type(data).__name__}")
     for phase in data["phases"] if isinstance(data.get("phases"), list) else ():
         # Relative to the scene file; the template lies elsewhere.
         if isinstance(phase, dict) and isinstance(phase.get("run"), str):

@@ -81,8 +81,7 @@ def compute(folder: Folder, *, jobs: int | None, command: str) -> list[Outcome]:
     try:
         return run_folder(folder, Display(Console(stderr=True)), slots=jobs)
     except KeyboardInterrupt:
-        msg = f"finished runs are kept; go on with: {command}"
-        raise KeyboardInterrupt(msg) from None
+        raise KeyboardInterrupt(f"finished runs are kept; go on with: {command}") from None
 
 
 def raise_failures(folder: Folder, outcomes: Sequence[Outcome]) -> None:
@@ -94,11 +93,10 @@ def raise_failures(folder: Folder, outcomes: Sequence[Outcome]) -> None:
     failed = [outcome for outcome in outcomes if outcome.missing]
     if failed:
         causes = "; ".join(f"{outcome.name}: {outcome.cause}" for outcome in failed)
-        msg = (
+        raise RunError(
             f"{folder.path}: {len(failed)} of {len(outcomes)} runs are missing: {causes}; "
             f"logs are in {folder.path / 'logs'}, start them again: smarticles resume {folder.path}"
         )
-        raise RunError(msg)
 
 
 def complete_here(folder: Folder, arguments: argparse.Namespace) -> int:
@@ -158,8 +156,7 @@ def wants_queue(arguments: argparse.Namespace, *, one_run: bool = False) -> bool
     for name in _OPTIONS:
         if getattr(arguments, name) is not None and not (one_run and name == "ranks"):
             option = f"--{name.replace('_', '-')}"
-            msg = f"{option}: is for a cluster; give --submit slurm, or --submit none with --cluster NAME"
-            raise InputError(msg)
+            raise InputError(f"{option}: is for a cluster; give --submit slurm, or --submit none with --cluster NAME")
     return False
 
 

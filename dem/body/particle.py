@@ -244,11 +244,10 @@ class Particle:
     def __post_init__(self) -> None:
         d, w = self.chain.diameter, self.boxes.middle_length
         if d > w / 2:
-            msg = (
+            raise InputError(
                 f"fidelity.diameter_m: spheres of {d:g} m do not fit a middle link of {w:g} m; "
                 f"use at most half its length, {w / 2:g} m"
             )
-            raise InputError(msg)
 
     @cached_property
     def _rows(self) -> Array:

@@ -94,11 +94,10 @@ def place_layer(
             height *= 1 + GROWTH
             grown += 1
             if grown > MOST_GROWTH:
-                msg = (
+                raise RunError(
                     f"only {len(positions)} of {count} smarticles of a layer found room in a container of radius "
                     f"{radius:g} m; lower phases.0.per_layer or widen container.radius_m"
                 )
-                raise RunError(msg)
     return Poses(np.array(positions), tuple(rotations))
 
 

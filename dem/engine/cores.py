@@ -46,9 +46,8 @@ def check_ranks(wanted: int) -> None:
     """
     most = most_ranks()
     if wanted > most:
-        msg = (
+        raise InputError(
             f"--ranks {wanted}: there are {most} core{'s' if most > 1 else ''} for this process, and each rank waits "
             f"for all others at every step; use at most {most}, or more machines: smarticles sweep … --submit slurm "
             f"--ranks {wanted}"
         )
-        raise InputError(msg)

@@ -77,5 +77,4 @@ def engine_kind(name: str) -> EngineKind:
         from dem.engine.lammps.kind import LammpsKind  # noqa: PLC0415
 
         return LammpsKind()
-    msg = f"engine: {name!r} is not built into this version; use yade, links or lammps"
-    raise InputError(msg)
+    raise InputError(f"engine: {name!r} is not built into this version; use yade, links or lammps")

@@ -219,10 +219,9 @@ def has_settled(settle: Settle, memory: Memory, engine: Engine) -> bool:
     if memory["still"] > settle.hold_s:
         return True
     if memory["waited"] > settle.timeout_s:
-        msg = (
+        raise RunError(
             f"the pile has not settled after {settle.timeout_s:g} s: speed {speed:.3g} m/s (limit "
             f"{settle.speed_m_per_s:g} m/s), unbalanced force {unbalanced:.3g} (limit "
             f"{settle.unbalanced_force:g}); raise phases.0.settle.timeout_s or its limits"
         )
-        raise RunError(msg)
     return False

@@ -74,11 +74,10 @@ def write_checkpoint(folder: Path, checkpoint: Checkpoint) -> None:
             file.flush()
             os.fsync(file.fileno())
     except OSError as error:
-        msg = (
+        raise RunError(
             f"{newest}: cannot be written ({error.strerror or error}); free space and go on with "
             "`smarticles run … --resume`; the checkpoint before is whole"
-        )
-        raise RunError(msg) from error
+        ) from error
 
 
 def read_checkpoint(folder: Path, *, scene_sha256: str, made_by: tuple[str, str]) -> tuple[Checkpoint, str | None]:
@@ -111,8 +110,7 @@ def read_checkpoint(folder: Path, *, scene_sha256: str, made_by: tuple[str, str]
         warning = f"damaged: {', '.join(damaged)}; going on from {name}" if damaged else None
         return checkpoint, warning
     cause = f"damaged: {', '.join(damaged)}" if damaged else "no checkpoint was written"
-    msg = f"{folder}: cannot be resumed, {cause}; start the run anew in another --out"
-    raise InputError(msg)
+    raise InputError(f"{folder}: cannot be resumed, {cause}; start the run anew in another --out")
 
 
 def has_checkpoint(folder: Path) -> bool:

@@ -125,8 +125,7 @@ class Manifest(Document):
     @model_validator(mode="after")
     def _numbered(self) -> Self:
         if [phase.index for phase in self.phases] != list(range(len(self.phases))):
-            msg = "'phases' must be numbered 0, 1, 2, …"
-            raise ValueError(msg)
+            raise ValueError("'phases' must be numbered 0, 1, 2, …")
         return self
 
     @property

@@ -52,17 +52,15 @@ def write_whole(path: Path, write: Callable[[Path], object], *, make_folder: boo
         with whole(path) as temporary:
             write(temporary)
     except FileNotFoundError as error:
-        msg = (
+        raise RunError(
             f"{path}: cannot be written, its folder is gone; if it was moved, what is written in it is whole, and a "
             "run goes on from there: smarticles resume DIR"
-        )
-        raise RunError(msg) from error
+        ) from error
     except OSError as error:
-        msg = (
+        raise RunError(
             f"{path}: cannot be written ({error.strerror or error}); free space or choose another --out; "
             "everything written before is whole"
-        )
-        raise RunError(msg) from error
+        ) from error
 
 
 def write_text(path: Path, text: str, *, make_folder: bool = True) -> None:
@@ -87,5 +85,4 @@ def cannot_read(what: str, path: Path, cause: BaseException | str, remedy: str) 
         named = ": ".join([type(cause).__name__, *lines[:1]])
         # The system's own words say enough, and str() would repeat the path.
         cause = getattr(cause, "strerror", None) or named
-    msg = f"cannot read {what} {path}: {cause}; {remedy}"
-    raise InputError(msg) from None
+    raise InputError(f"cannot read {what} {path}: {cause}; {remedy}") from None

@@ -106,8 +106,7 @@ class FrameSequence(Sequence[Frame]):
         first, last = float(self.times[0]), float(self.times[-1])
         slack = 1e-9 * max(abs(first), abs(last), 1.0)
         if not first - slack <= time <= last + slack:
-            msg = f"time must be between {first:g} s and {last:g} s, the run's frames: got {time:g} s"
-            raise InputError(msg)
+            raise InputError(f"time must be between {first:g} s and {last:g} s, the run's frames: got {time:g} s")
         return int(np.argmin(np.abs(self.times - time)))
 
     def after(self, time: float) -> FrameSequence:

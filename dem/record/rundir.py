@@ -53,8 +53,7 @@ def _check_content(out: Path, *, resume: bool) -> None:
         out.mkdir(parents=True, exist_ok=True)
         held = sorted(path.name for path in out.iterdir() if path.name != LOCK and not is_partial(path.name))
     except OSError as error:
-        msg = f"--out {out}: cannot be made ({error.strerror}); choose another directory"
-        raise InputError(msg) from None
+        raise InputError(f"--out {out}: cannot be made ({error.strerror}); choose another directory") from None
     problem = None
     if MANIFEST in held:
         if not resume:
@@ -65,8 +64,7 @@ def _check_content(out: Path, *, resume: bool) -> None:
     elif resume:
         problem = "holds no run to resume; leave --resume out to start one"
     if problem:
-        msg = f"--out {out}: {problem}"
-        raise InputError(msg)
+        raise InputError(f"--out {out}: {problem}")
 
 
 def in_use(out: Path) -> bool:

@@ -52,8 +52,7 @@ class SeriesWriter:
     def add(self, row: Mapping[str, Any]) -> None:
         """Add one row: a number, (2,) or (3,) values for each column."""
         if row.keys() != self._rows.keys():
-            msg = f"a row has other columns than the series: {sorted(row.keys() ^ self._rows.keys())}"
-            raise ValueError(msg)
+            raise ValueError(f"a row has other columns than the series: {sorted(row.keys() ^ self._rows.keys())}")
         for name, value in row.items():
             self._rows[name].append(value)
 
@@ -126,8 +125,7 @@ class Series:
         try:
             return self.data[name]
         except KeyError:
-            msg = f"{self.path} holds no series '{name}'; choose one of: {', '.join(self.data)}"
-            raise InputError(msg) from None
+            raise InputError(f"{self.path} holds no series '{name}'; choose one of: {', '.join(self.data)}") from None
 
     def __len__(self) -> int:
         return len(self.time)

@@ -118,16 +118,14 @@ def _check_scene(scene: Scene, out: Path) -> None:
     except InputError:
         there = None
     if there is None or scene_hash(there) != made:
-        msg = (
+        raise InputError(
             f"--out {out}: {out / SCENE} is not the scene that this run was made from (its hash is not the "
             f"{made[:12]} of {MANIFEST}); put it back as it was, or run it in another directory"
         )
-        raise InputError(msg)
-    msg = (
+    raise InputError(
         f"--out {out}: was made from another scene: {difference(there, scene)}; resume with {out / SCENE} and no "
         "--set, or run the changed scene in another directory"
     )
-    raise InputError(msg)
 
 
 def _restore(simulation: Simulation, saved: tuple[Checkpoint, str | None] | None, threads: int) -> None:

@@ -196,8 +196,7 @@ class Watchdog:
         text = f"the energy ledger misses {residual:.3g} J, {share:.2g} % of the {dissipated:.3g} J dissipated"
         # At the beginning, when next to nothing was dissipated, a fraction has no meaning.
         if abs(residual) > self.missed * dissipated + (self.energy if math.isfinite(self.energy) else 0.0):
-            msg = f"at t = {time:.4f} s {text} (limit {100 * self.missed:.2g} %); {LOWER_STEP}"
-            raise RunError(msg)
+            raise RunError(f"at t = {time:.4f} s {text} (limit {100 * self.missed:.2g} %); {LOWER_STEP}")
         return f"{text}; {LOWER_STEP}"
 
 

@@ -86,16 +86,14 @@ class Scene(Part):
             return value
         base = value.get("base", "standard")
         if not isinstance(base, str) or base not in FIDELITIES:
-            msg = f"unknown fidelity {shown(base)}; {nearest(str(base), FIDELITIES)}"
-            raise ValueError(msg)
+            raise ValueError(f"unknown fidelity {shown(base)}; {nearest(str(base), FIDELITIES)}")
         return {"base": base, **fidelities(info.data.get("engine", ""))[base], **value}
 
     @field_validator("gravity_m_per_s2")
     @classmethod
     def _some_or_none(cls, value: float) -> float:
         if 0 < value < _LEAST_GRAVITY:
-            msg = f"{value:g} m/s² is out of range; use 0 m/s² or at least {_LEAST_GRAVITY:g} m/s²"
-            raise ValueError(msg)
+            raise ValueError(f"{value:g} m/s² is out of range; use 0 m/s² or at least {_LEAST_GRAVITY:g} m/s²")
         return value
 
     @field_validator("hooks", mode="before")

@@ -68,9 +68,8 @@ def check_stiffness(scene: SceneView) -> None:
     """
     worst = max(expected_overlaps(scene), key=lambda overlap: overlap.diameters)
     if worst.diameters > LIMIT:
-        msg = (
+        raise ValueError(
             f"fidelity.stiffness_N_per_m: at {scene.fidelity.stiffness_N_per_m:g} N/m {worst.cause} presses contacts "
             f"in by about {worst.diameters:.2g} of their thickness; use about {stiffness_for(scene):.2g} N/m, or leave "
             "it out"
         )
-        raise ValueError(msg)

@@ -62,18 +62,16 @@ class Container(Part):
             raise ValueError(msg)
         for number, (below, tier) in enumerate(pairwise(tiers), 1):
             if tier.radius_m > below.radius_m:
-                msg = (
+                raise ValueError(
                     f"tiers.{number}.radius_m: {tier.radius_m:g} m is wider than the tier below, {below.radius_m:g} m; "
                     "a mould is filled from the top and lifted off: order tiers from wide to narrow"
                 )
-                raise ValueError(msg)
         if tiers:
             whole = math.fsum(tier.height_m for tier in tiers)
             for key, own in (("radius_m", tiers[0].radius_m), ("height_m", whole)):
                 given = getattr(self, key)
                 if given is not None and not math.isclose(given, own, rel_tol=1e-9):
-                    msg = f"{key}: {given:g} m, but tiers make it {own:g} m; leave {key} out"
-                    raise ValueError(msg)
+                    raise ValueError(f"{key}: {given:g} m, but tiers make it {own:g} m; leave {key} out")
         return self
 
     @property

@@ -285,16 +285,14 @@ class Sequence(BaseMotion):
     @model_validator(mode="after")
     def _steps_end(self) -> Self:
         if not self.steps:
-            msg = "steps: is empty; give at least one motion"
-            raise ValueError(msg)
+            raise ValueError("steps: is empty; give at least one motion")
         once = self.repeat == 1
         for number, step in enumerate(self.steps[:-1] if once else self.steps):
             if math.isinf(step.duration):
                 where = "each step but the last" if once else "each step of a sequence that is repeated"
                 # What is missing in a sequence stands in the sequence: it repeats for ever, or its last step does.
                 key = "finite repeat" if isinstance(step, Sequence) and step.repeat is None else "duration_s"
-                msg = f"steps.{number}: {step.type} has no end; give it a {key}, as {where} needs one"
-                raise ValueError(msg)
+                raise ValueError(f"steps.{number}: {step.type} has no end; give it a {key}, as {where} needs one")
         return self
 
     @property

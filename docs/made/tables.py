@@ -62,8 +62,7 @@ def series_columns() -> str:
     sets = {title: getattr(columns, name) for title, name in _SETS}
     missing = set(columns.EVERY) - {name for one in sets.values() for name in one}
     if missing:
-        msg = f"docs/made/tables.py: no set has {sorted(missing)}; add it to _SETS"
-        raise LookupError(msg)
+        raise LookupError(f"docs/made/tables.py: no set has {sorted(missing)}; add it to _SETS")
     return "\n".join(f"### {title}\n\n{_described(found, 'dataset')}" for title, found in sets.items())
 
 

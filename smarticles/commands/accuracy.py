@@ -98,8 +98,7 @@ def run_accuracy(arguments: argparse.Namespace) -> int:
     sweep = ladder_sweep(scene, ladder, seeds)
     points = expand(sweep)
     if not arguments.dry_run and arguments.out is None:
-        msg = "accuracy: --out DIR is missing; give a directory, or --dry-run to only show the ladder"
-        raise InputError(msg)
+        raise InputError("accuracy: --out DIR is missing; give a directory, or --dry-run to only show the ladder")
     print(_listing(ladder, expected_s, len(seeds), arguments.jobs), flush=True)
     if len(seeds) < 2:
         warning = "one seed has no scatter, so nothing can be resolved; give --seeds 1,2,3"

@@ -132,8 +132,7 @@ def compare(one: Path, other: Path) -> dict[str, Any]:
 
     kinds = [_kind(path) for path in (one, other)]
     if kinds[0] != kinds[1]:
-        msg = f"{one} is a {kinds[0]} and {other} a {kinds[1]}; give two of a kind"
-        raise InputError(msg)
+        raise InputError(f"{one} is a {kinds[0]} and {other} a {kinds[1]}; give two of a kind")
     if kinds[0] == "sweep":
         found = _sweeps(open_folder(one), open_folder(other))
     else:

@@ -81,8 +81,7 @@ def measure_runs(arguments: argparse.Namespace) -> int:
     reject_existing("--table", output, overwrite=arguments.overwrite)
     reject_existing("--profile", profile, overwrite=arguments.overwrite)
     if output is not None and output == profile:
-        msg = f"--profile {profile}: is the file of --table too; choose another name"
-        raise InputError(msg)
+        raise InputError(f"--profile {profile}: is the file of --table too; choose another name")
     by = _groups(arguments)
     directories = list(sources(arguments.directories))
     for warning in filter(None, (open_run(directory).lost_series for directory in directories)):
@@ -92,8 +91,7 @@ def measure_runs(arguments: argparse.Namespace) -> int:
         try:
             table = grouped(table, by)
         except InputError as error:
-            msg = f"--by {arguments.by}: {error}"
-            raise InputError(msg) from None
+            raise InputError(f"--by {arguments.by}: {error}") from None
     if output is not None:
         write_table(table, output, overwrite=arguments.overwrite)
     if profile is not None:
@@ -124,11 +122,9 @@ def _groups(arguments: argparse.Namespace) -> list[str]:
         return []
     names = [name.strip() for name in arguments.by.split(",") if name.strip()]
     if not names:
-        msg = f"--by {arguments.by!r}: names no column; e.g. --by seed, or a variable of the sweep"
-        raise InputError(msg)
+        raise InputError(f"--by {arguments.by!r}: names no column; e.g. --by seed, or a variable of the sweep")
     if arguments.frames:
-        msg = f"--by {arguments.by}: averages over phases of runs; leave --frames out"
-        raise InputError(msg)
+        raise InputError(f"--by {arguments.by}: averages over phases of runs; leave --frames out")
     return names
 
 

@@ -80,14 +80,12 @@ def _chosen(scene: Scene, arguments: argparse.Namespace) -> Choice | None:
     if arguments.max_error is None and arguments.max_hours is None:
         for option, value in (("--table", arguments.table), ("--of", arguments.of)):
             if value is not None:
-                msg = f"{option} {value}: is for --max-error or --max-hours; give one of them"
-                raise InputError(msg)
+                raise InputError(f"{option} {value}: is for --max-error or --max-hours; give one of them")
         return None
     of = PACKING if arguments.of is None else tuple(word.strip() for word in arguments.of.split(","))
     for word in of:
         if word not in QUANTITIES:
-            msg = f"--of {arguments.of}: {word!r} is not measured; known: {', '.join(QUANTITIES)}"
-            raise InputError(msg)
+            raise InputError(f"--of {arguments.of}: {word!r} is not measured; known: {', '.join(QUANTITIES)}")
     return choose(
         scene,
         read_table(arguments.table, of=of, engine=arguments.engine),

@@ -103,8 +103,7 @@ def render_run(arguments: argparse.Namespace) -> int:
             if film:
                 why = "a film shows all times" if name == "time" else "is drawn alone, in a picture"
                 way_out = f"{why}; leave it out, or write .png"
-            msg = f"{option} {value:g}: {way_out}"
-            raise InputError(msg)
+            raise InputError(f"{option} {value:g}: {way_out}")
     from postprocess.pictures import render  # noqa: PLC0415  (imports PyVista)
 
     options: dict[str, Any] = {
@@ -145,8 +144,7 @@ def _limits(text: str) -> tuple[float, float] | str:
     except ValueError:
         limits = math.nan, math.nan
     if not -math.inf < limits[0] < limits[1] < math.inf:
-        msg = f"must be LOW:HIGH, two numbers in order, or run: got {text!r}"
-        raise argparse.ArgumentTypeError(msg)
+        raise argparse.ArgumentTypeError(f"must be LOW:HIGH, two numbers in order, or run: got {text!r}")
     return limits
 
 
@@ -158,6 +156,5 @@ def _size(text: str) -> tuple[int, int]:
     except ValueError:
         size = 0, 0
     if min(size) < 1:
-        msg = f"must be a number of pixels from 1, or two as in 1280x720: got {text!r}"
-        raise argparse.ArgumentTypeError(msg)
+        raise argparse.ArgumentTypeError(f"must be a number of pixels from 1, or two as in 1280x720: got {text!r}")
     return size

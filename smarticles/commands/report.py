@@ -43,8 +43,7 @@ def write_report(arguments: argparse.Namespace) -> int:
     directory: Path = arguments.directory
     output: Path = arguments.output or directory / "report.html"
     if output.suffix != ".html":
-        msg = f"--output {output}: a report is HTML; let its name end in .html"
-        raise InputError(msg)
+        raise InputError(f"--output {output}: a report is HTML; let its name end in .html")
     # Before a minute of measuring, not after it.
     refuse_to_overwrite(output, overwrite=arguments.overwrite)
     if arguments.output is not None and not output.parent.is_dir():

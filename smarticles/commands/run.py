@@ -115,8 +115,7 @@ def resume_directory(arguments: argparse.Namespace) -> int:
     folder = open_folder(directory)
     if arguments.threads is not None:
         given = f"--threads {arguments.threads}"
-        msg = f"{given}: is for one run, and {directory} is a sweep, of runs of one thread; leave it out"
-        raise InputError(msg)
+        raise InputError(f"{given}: is for one run, and {directory} is a sweep, of runs of one thread; leave it out")
     if queue:
         return sweeps.enqueue(folder, arguments)
     if arguments.submit == "none":
@@ -134,8 +133,7 @@ def read_scene(scene_file: Path, settings: Sequence[str]) -> Scene:
     try:
         time_steps(scene)
     except InputError as error:
-        msg = f"{scene_file}: {error}"
-        raise InputError(msg) from None
+        raise InputError(f"{scene_file}: {error}") from None
     return scene
 
 

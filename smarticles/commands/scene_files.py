@@ -47,8 +47,7 @@ def write_scene(arguments: argparse.Namespace) -> int:
         with output.open("x", encoding="utf-8") as file:
             file.write(starter(arguments.kind))
     except FileExistsError:
-        msg = f"--output {output}: exists; choose another name"
-        raise InputError(msg) from None
+        raise InputError(f"--output {output}: exists; choose another name") from None
     except FileNotFoundError:
         msg = f"--output {output}: the folder {output.parent} does not exist; make it, or choose another one"
         raise InputError(msg) from None

@@ -54,11 +54,9 @@ def show_status(arguments: argparse.Namespace) -> int:
     """Print the state of a directory, once or again and again."""
     directory: Path = arguments.directory
     if arguments.json and arguments.watch:
-        msg = "--watch: is for a person; leave it out with --json"
-        raise InputError(msg)
+        raise InputError("--watch: is for a person; leave it out with --json")
     if arguments.every is not None and not arguments.watch:
-        msg = f"--every {arguments.every:g}: is how often --watch checks; add --watch"
-        raise InputError(msg)
+        raise InputError(f"--every {arguments.every:g}: is how often --watch checks; add --watch")
     if arguments.watch:
         _watch(directory, arguments.every or _EVERY_S)
     elif arguments.json:

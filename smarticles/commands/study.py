@@ -116,8 +116,7 @@ def compute_and_analyse(
     outcomes = [] if arguments.analyse else compute(needed, jobs=arguments.jobs, command=arguments.command_line)
     finished = [entry for entry in folder.entries if folder.is_done(entry)]
     if arguments.analyse and not finished and not earlier:
-        msg = f"--analyse: no run of {folder.path} is finished; leave --analyse out to start them"
-        raise InputError(msg)
+        raise InputError(f"--analyse: no run of {folder.path} is finished; leave --analyse out to start them")
     if finished or earlier:
         results = folder.path / "results"
         # All runs: those that are not done are listed as missing in every table.
@@ -153,8 +152,7 @@ def _earlier(results: Path, folder: Folder, study: Study) -> Mapping[str, Measur
     from studies.framework.runs import Wanted, earlier_runs  # noqa: PLC0415
 
     if not study.from_tables:
-        msg = f"--earlier {results}: study {study.name} draws from the runs themselves; leave --earlier out"
-        raise InputError(msg)
+        raise InputError(f"--earlier {results}: study {study.name} draws from the runs themselves; leave --earlier out")
     wanted = {
         entry.name: Wanted(scene=folder.scene(entry), scene_sha256=entry.scene_sha256) for entry in folder.entries
     }
@@ -172,8 +170,7 @@ def _fidelity(name: str, file: Path, fidelity: str) -> dict[str, str]:
     from templates.sweep.sweep_file import load_sweep, with_constants  # noqa: PLC0415
 
     if fidelity not in FIDELITIES:
-        msg = f"--fidelity {fidelity}: is not known; known: {', '.join(FIDELITIES)}"
-        raise InputError(msg)
+        raise InputError(f"--fidelity {fidelity}: is not known; known: {', '.join(FIDELITIES)}")
     sweep, changed = load_sweep(file), {"fidelity": fidelity}
     shipped = sweep.content.constants.get("fidelity")
     if shipped == fidelity:

@@ -98,8 +98,7 @@ def run_sweep(arguments: argparse.Namespace) -> int:
 def _place(arguments: argparse.Namespace) -> Path:
     out: Path | None = arguments.out
     if out is None:
-        msg = "sweep: --out DIR is missing; give a directory, or --dry-run to only list the runs"
-        raise InputError(msg)
+        raise InputError("sweep: --out DIR is missing; give a directory, or --dry-run to only list the runs")
     return out
 
 
@@ -110,11 +109,10 @@ def _draft(name: str, points: Sequence[Point], arguments: argparse.Namespace) ->
 
     out = _place(arguments)
     if arguments.ranks and (others := {point.scene.engine for point in points} - {"lammps"}):
-        msg = (
+        raise InputError(
             f"--ranks {arguments.ranks}: engine: {', '.join(sorted(others))} is one process; leave it out, or give "
             "--engine lammps"
         )
-        raise InputError(msg)
     entries = [entry_of(point, sweeps.expected_wall_s(point.scene)) for point in points]
     if (out / OF_SWEEP).exists():
         # Where nothing is missing, the limits are checked for all runs.

@@ -34,8 +34,7 @@ for its fields. A run that goes on is followed. Ends with its window, or by Ctrl
 def _port(text: str) -> int:
     number = int(text) if text.isdecimal() else -1
     if not 0 <= number <= 65535:
-        msg = f"must be a whole number from 0 to 65535: got {text!r}"
-        raise argparse.ArgumentTypeError(msg)
+        raise argparse.ArgumentTypeError(f"must be a whole number from 0 to 65535: got {text!r}")
     return number
 
 

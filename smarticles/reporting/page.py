@@ -124,8 +124,7 @@ def embedded(path: Path) -> str:
     try:
         return address(path.read_bytes(), _MIMES[path.suffix])
     except (KeyError, OSError) as error:
-        msg = f"{path}: cannot be put into a report ({error}); use {', '.join(_MIMES)}"
-        raise InputError(msg) from None
+        raise InputError(f"{path}: cannot be put into a report ({error}); use {', '.join(_MIMES)}") from None
 
 
 def address(content: bytes, mime: str) -> str:

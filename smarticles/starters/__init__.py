@@ -20,8 +20,7 @@ def starter(kind: str) -> str:
         InputError: there is no such kind.
     """
     if kind not in KINDS:
-        msg = f"{kind!r} is no kind of scene; {nearest(kind, KINDS)}"
-        raise InputError(msg)
+        raise InputError(f"{kind!r} is no kind of scene; {nearest(kind, KINDS)}")
     return Path(__file__).with_name(f"{kind}.yaml").read_text(encoding="utf-8")
 
 

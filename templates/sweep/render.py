@@ -88,8 +88,7 @@ def evaluate(expression: str, values: Mapping[str, Value], source: str) -> Value
         _reject(error, f"{source} = {expression!r}", values)
     if not _plain(result):
         what = type(result).__name__
-        msg = f"{source} = {expression!r}: gives {what}; it must give numbers or text"
-        raise InputError(msg)
+        raise InputError(f"{source} = {expression!r}: gives {what}; it must give numbers or text")
     return result
 
 

@@ -104,12 +104,10 @@ class LammpsBoundaries:
         self._omega = 0.0
 
     def lift_wall(self, speed: float) -> None:
-        msg = "engine: lammps cannot lift the wall"
-        raise RunError(msg)
+        raise RunError("engine: lammps cannot lift the wall")
 
     def raise_upper(self, speed: float) -> None:
-        msg = "engine: lammps has no hooks"
-        raise RunError(msg)
+        raise RunError("engine: lammps has no hooks")
 
     def remove_wall(self) -> None:
         self.walled = False

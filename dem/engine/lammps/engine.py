@@ -43,8 +43,7 @@ def absent(what: str) -> NoReturn:
     Raises:
         RunError: always.
     """
-    msg = f"engine: lammps has no {what}"
-    raise RunError(msg)
+    raise RunError(f"engine: lammps has no {what}")
 
 
 class NoMotors:
@@ -197,8 +196,7 @@ class LammpsEngine:
         if time_step == self.time_step:
             return
         if self.boundaries.moving:
-            msg = "engine: lammps cannot change the time step while the container moves"
-            raise RunError(msg)
+            raise RunError("engine: lammps cannot change the time step while the container moves")
         self.time_step = time_step
         self._send(iter((f"timestep {time_step:.17g}",)))
 
@@ -208,8 +206,7 @@ class LammpsEngine:
         if self.count:
             self._run(steps)
         elif self._box:
-            msg = "engine: lammps lost its smarticles"
-            raise RunError(msg)
+            raise RunError("engine: lammps lost its smarticles")
         self.steps += steps
         self.time += steps * self.time_step
         self._seconds += steps * self.time_step * self.count
@@ -223,8 +220,7 @@ class LammpsEngine:
                 f"run {steps} pre {'yes' if self._fresh else 'no'} post no",
             )
         except RunError as error:
-            msg = f"at t = {self.time:.4f} s to {self.time + steps * self.time_step:.4f} s: {error}"
-            raise RunError(msg) from None
+            raise RunError(f"at t = {self.time:.4f} s to {self.time + steps * self.time_step:.4f} s: {error}") from None
         if self._frames is None:
             # Written when the run was set up, of poses that are known: where LAMMPS has its axes.
             own = _turns(self._read(self.steps))
@@ -247,8 +243,7 @@ class LammpsEngine:
         rows = np.array(lines[HEAD].split(), dtype=np.float64).reshape(-1, len(text.WRITTEN.split()))
         file.unlink()
         if len(rows) != self.count:
-            msg = f"LAMMPS wrote {len(rows)} of {self.count} smarticles at step {step}"
-            raise RunError(msg)
+            raise RunError(f"LAMMPS wrote {len(rows)} of {self.count} smarticles at step {step}")
         ordered: Array = rows[np.argsort(rows[:, 0])]
         return ordered
 
@@ -368,11 +363,10 @@ class LammpsEngine:
         """
         memory = saved.memory
         if memory.get("format") != FORMAT:
-            msg = (
+            raise InputError(
                 f"checkpoint: format {memory.get('format')!r}, here is {FORMAT!r}; it was made by another engine or "
                 "version: resume with that, or start anew"
             )
-            raise InputError(msg)
         try:
             with zipfile.ZipFile(io.BytesIO(saved.content)) as archive:
                 files = {name: archive.read(name) for name in archive.namelist()}
@@ -380,8 +374,7 @@ class LammpsEngine:
                 with np.load(io.BytesIO(files[STATE])) as arrays:
                     self._moving = Moving(**arrays)
         except (zipfile.BadZipFile, KeyError, TypeError, ValueError) as error:
-            msg = f"checkpoint: not readable by the lammps engine ({error}); start the run anew"
-            raise InputError(msg) from error
+            raise InputError(f"checkpoint: not readable by the lammps engine ({error}); start the run anew") from error
         self.time, self.steps, self.time_step = memory["time"], memory["steps"], memory["time_step"]
         self._seconds, self._thrown = memory["seconds"], memory["thrown"]
         self.ledger.added, self.ledger.dissipated = memory["account"]

@@ -143,8 +143,7 @@ class YadeBoundaries:
 
     def shake(self, *, amplitude: float, frequency: float, walls: bool = True) -> None:
         if self._shaker is None:
-            msg = "the engine was built without a shaker"
-            raise RunError(msg)
+            raise RunError("the engine was built without a shaker")
         # YADE sets v(t) = -Aω sin(ωt + φ) before the integrator moves by v dt. Half a step is added to the phase, so
         # that each move uses the velocity at its middle and the position follows z(t) to second order, without drift.
         omega, simulation = 2 * math.pi * frequency, self._yade.omega

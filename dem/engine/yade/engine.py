@@ -144,11 +144,10 @@ class YadeEngine:
         try:
             self._omega.save(str(file))
         except RuntimeError as error:  # of the stream that YADE's library writes into
-            msg = (
+            raise RunError(
                 f"{file}: the state cannot be written ({error}); free space, or raise the limit of a file's size, and "
                 "go on with `smarticles run … --resume`; the checkpoint before is whole"
-            )
-            raise RunError(msg) from error
+            ) from error
 
     def _load(self, file: Path, saved: Saved) -> None:
         memory = saved.memory

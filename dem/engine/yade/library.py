@@ -95,9 +95,8 @@ def import_yade() -> Any:
         with contextlib.redirect_stdout(io.StringIO()):
             return importlib.import_module("yade")
     except ImportError as error:
-        msg = (
+        raise RunError(
             f"YADE cannot be imported ({error}); install it with `make setup` or `apt-get install yade`, see "
             "environment.md, or run the scene on the engine that needs none: --engine links; `smarticles doctor` "
             "reports what is missing"
-        )
-        raise RunError(msg) from None
+        ) from None
