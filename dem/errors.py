@@ -19,8 +19,6 @@ def refuse(concerned: Any, time: float, cause: str, way_out: str) -> None:
     Args:
         concerned: (N,) bool array.
         time: simulated time [s].
-        cause: what is wrong with them.
-        way_out: what to do about it.
 
     Raises:
         RunError: cause, smarticles concerned, time and the way out.

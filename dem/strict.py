@@ -122,8 +122,6 @@ def explained(error: ValidationError, data: Any, *, described: str) -> str:
     """Return pydantic's errors as `key: value and what is wrong with it; way out`, the first few of them in one line.
 
     Args:
-        error: what pydantic found.
-        data: what it was given.
         described: where the keys are described, for one that is missing.
     """
     texts: dict[str, str] = {}

@@ -62,8 +62,6 @@ class Commands:
         """Add a subcommand.
 
         Args:
-            name: its name.
-            handler: does its work.
             summary: one line for the list of commands.
             text: what it does and what to expect, for its own help.
             examples: command lines that work, with what they do.

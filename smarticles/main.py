@@ -121,12 +121,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def guarded(action: Callable[[], int], *, debug: bool = False) -> int:
-    """Return the exit status of an action; every way in which it can end becomes one line and a status here.
-
-    Args:
-        action: what to do; returns its exit status.
-        debug: whether to show the traceback of an error.
-    """
+    """Return the exit status of an action; every way in which it can end becomes one line and a status here."""
     try:
         with orderly_stop():
             status = action()

@@ -79,8 +79,6 @@ def measured(
     """Return measures of runs and sweeps, one row per run and phase, with what a sweep varies beside the run.
 
     Args:
-        directories: of runs and sweeps.
-        frames: one row per frame instead.
         costly: when to take the costly packing fractions, see `postprocess.measure_run`.
         jobs: runs that are measured at once, each in a process of its own; more than one only in programs from which
             processes may be started: not in a script without a guarded main.
@@ -127,7 +125,6 @@ def grouped(table: pd.DataFrame, by: Sequence[str]) -> pd.DataFrame:
 
     Args:
         table: of `measured`, one row per run and phase.
-        by: columns whose values make a group.
 
     Raises:
         InputError: there is no such column.

@@ -82,10 +82,8 @@ def run(
     Of its own, because YADE and PyVista must not be loaded in one process.
 
     Args:
-        scene: a scene, or the file of one.
         out: the run directory; must not exist or be empty, or with `resume` hold an unfinished run of this scene.
         threads: of the engine; only one gives the same bits again.
-        ranks: processes of the engine lammps; default: one.
         resume: go on from the last checkpoint.
 
     Raises:
@@ -121,7 +119,6 @@ def measure(run: Run | Path | str, *, frames: bool = False) -> pd.DataFrame:
     """Return all measures of a run as a table, units in its column names, as `smarticles measure` does.
 
     Args:
-        run: a run, or its directory.
         frames: one row per frame; else one per phase, means over its last frames with their standard errors.
 
     Raises:
@@ -182,9 +179,7 @@ def write_sweep(scene: Scene | Path | str, vary: Mapping[str, Sequence[Any]], fo
     """Write `sweep.yaml` and `scene.yaml.j2`, and return the former.
 
     Args:
-        scene: a scene, or the file of one.
         vary: keys of the scene, dots for nesting, and the values of each; all combinations are runs.
-        folder: where to write them.
 
     Raises:
         InputError: the scene cannot be read, has no such place or holds marks of a template, or there is nothing to

@@ -141,7 +141,6 @@ def wants_queue(arguments: argparse.Namespace, *, one_run: bool = False) -> bool
     """Return whether the runs are for a cluster.
 
     Args:
-        arguments: of the command.
         one_run: whether they name one run, which may have ranks here too.
 
     Raises:

@@ -176,10 +176,7 @@ def run_folder(
     set aside and run anew.
 
     Args:
-        folder: the sweep's directory.
-        display: shows how it goes.
         slots: how many runs at once; by default one per core.
-        command: the command of one run.
         poll_s: between updates of the display [s].
         grace_s: between asking a process to stop and making it stop [s].
 

@@ -230,10 +230,6 @@ class SphereChain:
 class Particle:
     """A smarticle as the engine sees it.
 
-    Args:
-        boxes: exact geometry, mass and inertia.
-        chain: the sphere chains that carry contact.
-
     Raises:
         InputError: the spheres are thicker than the link is wide, or too many for the link.
     """

@@ -48,13 +48,10 @@ def place_layer(
     slab that is too full grows upwards.
 
     Args:
-        particle: one smarticle.
-        count: number of smarticles.
         radius: inner radius of the cylinder [m].
         bottom: height below which no sphere comes [m].
         height: height of the slab [m], in which the lowest spheres of the smarticles lie.
         obstacles: (n, 3) centres of present spheres of the same diameter [m].
-        rng: source of randomness.
         narrower: returns inner radii of the cylinder [m] at heights [m]; it must not be wider higher up.
 
     Raises:
@@ -107,7 +104,6 @@ def fitted_poses(boxes: Boxes, vertices: Array) -> tuple[Poses, Array]:
     The turn of a straight shape about its length is unknown; the choice depends on the vertices alone.
 
     Args:
-        boxes: the shape.
         vertices: (N, 4, 3) barb tip, hinge, hinge, barb tip of each smarticle [m].
 
     Returns:

@@ -20,7 +20,6 @@ class State:
     Welded or articulated, a smarticle is three links; link 0 is barb 1, 1 the middle link, 2 barb 2.
 
     Args:
-        boxes: one smarticle; lengths and masses of the links.
         link_positions: (N, 3, 3) centres of the links [m].
         link_rotations: (N, 3, 3, 3) link frames, see `Boxes.link_rotations` [1].
         link_velocities: (N, 3, 3) of the links' centres [m/s].
@@ -47,7 +46,6 @@ class State:
         """Return the state of rigid smarticles.
 
         Args:
-            boxes: one smarticle.
             positions: (N, 3) centres of mass [m].
             rotations: (N, 3, 3) body frame to laboratory frame [1].
             velocities: (N, 3) of the centres of mass [m/s].

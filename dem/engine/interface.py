@@ -186,8 +186,6 @@ class Strings(Protocol):
         """Tie taut strings to points of articulated smarticles, their other ends outwards on the x-axis.
 
         Args:
-            ties: the points.
-            law: of all strings.
             speeds: of the other ends, away from the origin [m/s].
         """
 

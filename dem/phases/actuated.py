@@ -38,8 +38,6 @@ class Gait:
     """What the barbs of smarticles do in a phase.
 
     Args:
-        motions: of barb 1 and of barb 2.
-        keys: of the motions in a phase of type actuate.
         duration: length of the phase [s].
         active_fraction: share of the smarticles that move [1].
         offsets: "random": each begins at another point of the period.

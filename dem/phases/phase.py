@@ -36,9 +36,6 @@ class Stage:
     """A phase while it runs.
 
     Args:
-        phase: the phase.
-        scene: its scene.
-        index: its number.
         memory: all that the stage remembers: plain data, JSON-able without loss. `warning` is reported at its end.
     """
 
@@ -205,9 +202,7 @@ def has_settled(settle: Settle, memory: Memory, engine: Engine) -> bool:
     """Check a pile once, every `CHECK_INTERVAL`.
 
     Args:
-        settle: the limits.
         memory: of the stage: `waited` [s] for the pile so far, which the stage adds up; `still` [s] that it has been.
-        engine: the simulation.
 
     Raises:
         RunError: it takes too long.

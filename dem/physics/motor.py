@@ -80,7 +80,6 @@ class Motors:
     of an elastic contact stays when the motor stops.
 
     Args:
-        law: what all motors have in common.
         angles: (N, 2) angles at the start [rad].
         strengths: (N, 2) factors on torque limit and stiffness [1]; None: all are equal.
     """

@@ -17,8 +17,6 @@ class Held:
     """A smarticle between two boundaries that have moved apart, so that only its contacts can give way.
 
     Args:
-        smarticle: its number.
-        between: names of the two boundaries.
         apart: by how much they have moved against each other since the start [m].
     """
 

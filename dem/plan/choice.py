@@ -45,7 +45,6 @@ class Error:
     """A relative error.
 
     Args:
-        of: symbol of the quantity.
         value: against the reference fidelity [1]; NaN if unknown.
         band: half-width of its 95 % interval over seeds [1]; NaN if unknown.
     """
@@ -70,7 +69,6 @@ class Measured:
 
     Args:
         errors: of the quantities asked for; `others` are those of the others.
-        seeds: how many runs it was measured with.
         ratio: measured processor time over the planned wall time [1].
         is_reference: whether the errors of the others are against it.
         hours: expected wall time on the scene at hand, on one core of the table's machine [h].
@@ -249,7 +247,6 @@ def choose(
 
     Args:
         scene: the scene; its own engine and fidelity do not matter.
-        table: what was measured.
         max_error: largest relative error of what `table` was read for, against the reference fidelity [1].
         max_hours: longest wall time on one core [h].
 

@@ -36,11 +36,8 @@ class Checkpoint:
     """What a run needs to be resumed.
 
     Args:
-        scene_sha256: hash of the scene.
         made_by: name and version of the engine.
         state: plain data: phase, stage, recorder, clock.
-        series: columns of the series so far.
-        engine: what the engine saved.
     """
 
     scene_sha256: str

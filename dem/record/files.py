@@ -17,7 +17,6 @@ def whole(path: Path, *, before: Path | None = None, shared: bool = False) -> It
     """Yield a temporary path beside `path`, renamed to it when the block ends well, removed otherwise.
 
     Args:
-        path: the file to be made or replaced.
         before: where the replaced file is kept; None: nowhere.
         shared: whether several processes may write the file at once.
     """
@@ -39,8 +38,6 @@ def write_whole(path: Path, write: Callable[[Path], object], *, make_folder: boo
     """Make or replace a file by `write`, which is called with a temporary path of the suffix of `path`.
 
     Args:
-        path: the file.
-        write: makes the content.
         make_folder: whether its folder is made if needed; not where a missing folder was moved away.
 
     Raises:
@@ -73,9 +70,7 @@ def cannot_read(what: str, path: Path, cause: BaseException | str, remedy: str) 
 
     Args:
         what: kind of the file, e.g. "frame".
-        path: the file.
         cause: why it cannot be used; of an exception its first line.
-        remedy: the way out.
 
     Raises:
         InputError: always.

@@ -27,10 +27,8 @@ def force_mesh(found: ContactForces, positions: Array, *, time: float, phase: in
     """Return contacts as lines from the first smarticle's centre of mass to the second's, or the point at a boundary.
 
     Args:
-        found: the contacts.
         positions: (N, 3) centres of mass of the smarticles at the same instant [m].
         time: simulated time [s].
-        phase: index of the phase.
     """
     number, between = len(found.forces), found.boundaries == NONE
     ends = np.empty((number, 2, 3))

@@ -55,7 +55,6 @@ def centreline_mesh(
         contacts: (N,) how many others each smarticle touches.
         time: simulated time [s].
         floor: height of the container's floor [m].
-        phase: index of the phase.
         extra: (3N,) further values, one per link, such as `motor_fields`.
     """
     n, number = len(vertices), LINKS * len(vertices)
@@ -86,7 +85,6 @@ def motor_fields(
         angles: of the barbs [rad].
         torques: of the motors on the barbs [N m].
         work: of the motors since the start [J].
-        halted: whether a motor is halted.
     """
     none = np.full(angles.shape, np.nan)
     fields = {
@@ -230,8 +228,6 @@ def read_mesh(path: Path, what: str = "frame", remedy: str | None = None) -> Any
     """Read a VTK file by meshio.
 
     Args:
-        path: the file.
-        what: its kind, for messages.
         remedy: the way out if it cannot be read; None: that of frames.
 
     Raises:

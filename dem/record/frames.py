@@ -28,7 +28,6 @@ class FrameWriter:
     """Writes frames into a run directory, and rewrites their list, `frames.pvd`, at each.
 
     Args:
-        folder: the run directory.
         noun: name of one file; "sphere" gives `spheres.pvd` and `spheres/sphere_000000.vtu`.
         times: times of the frames written so far [s].
     """

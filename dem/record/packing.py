@@ -22,7 +22,6 @@ def filled(count: int, *, solid_volume: float, radius: float, height: float) -> 
     """Return N V_s / (pi r² z) [1].
 
     Args:
-        count: smarticles.
         solid_volume: of one smarticle [m³].
         radius: of the container [m].
         height: of the pile [m].

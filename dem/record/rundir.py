@@ -20,7 +20,6 @@ def claimed(out: Path, *, resume: bool) -> Iterator[None]:
     The lock is the kernel's: it ends with the process that holds it, so that it is never stale.
 
     Args:
-        out: the directory; made if needed.
         resume: whether a run is to be resumed in it; otherwise it must be empty.
 
     Raises:

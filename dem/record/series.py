@@ -35,9 +35,7 @@ class SeriesWriter:
     """Keeps rows, and rewrites `series.h5` whole when asked.
 
     Args:
-        folder: the run directory.
         described: what the columns are; every row has a value for each of them.
-        attributes: root attributes: scene hash, seed.
     """
 
     folder: Path

@@ -29,17 +29,12 @@ class Recorder:
     """Records at fixed intervals of time, which are whole numbers of samples of the series.
 
     Args:
-        sampler: makes the rows of the series.
-        series: writes them.
-        frames: writes the frames.
         watchdog: checks the state at intervals, at every checkpoint and at the end.
         points: returns (N, P, 3) points of a state that must stay inside the container [m].
-        progress: reports every sample.
         interval: time between samples [s].
         frame_every: samples between frames.
         watch_every: samples between checks of the watchdog; None: about `WATCH_STEPS` steps.
         forces: writes the forces at contacts, with each frame.
-        spheres: writes the spheres as points.
         sphere_every: samples between these.
     """
 

@@ -38,10 +38,8 @@ def run_scene(
     """Run a scene into a run directory.
 
     Args:
-        scene: what to run.
         out: the run directory; must not exist, or be empty, or with `resume` hold an unfinished run of this scene.
         command: the command line, for the manifest.
-        progress: whether to draw progress on standard error.
         resume: go on from the newest checkpoint that is whole, or from the start where none was written.
         builders: makers of its parts, where they differ from the usual ones.
 
@@ -187,12 +185,8 @@ def manifest(
     """Return what made a run, and the numbers that measures need.
 
     Args:
-        scene: what is run.
-        out: the run directory.
         steps: time step of each phase [s].
-        command: the command line.
         made_by: name and version of the engine.
-        threads: number of threads of the engine.
     """
     particle, boxes, origin = scene.particle, scene.smarticle.boxes, scene.phases[0].origin
     if origin is not None:  # a path that holds where both runs are moved

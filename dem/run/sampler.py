@@ -45,7 +45,6 @@ class Sampler:
 
     Args:
         radius: of the container [m].
-        effects: what the scene calls for.
     """
 
     radius: float

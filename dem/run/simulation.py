@@ -34,11 +34,6 @@ class Simulation:
     """One run while it runs.
 
     Args:
-        scene: what is run.
-        engine: the physics.
-        recorder: what is written.
-        folder: the run directory.
-        log: its log.
         made_by: name and version of the engine, stored in the checkpoints.
         time_steps: of each phase [s].
     """

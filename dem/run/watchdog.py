@@ -68,7 +68,6 @@ class Watchdog:
         """Check speeds, hinges and places of all smarticles.
 
         Args:
-            state: the smarticles.
             points: (N, P, 3) centres of their spheres, or points of their links' axes [m]; None: their centres of
                 mass. Contacts with wall and floor are no measure: YADE takes those deeper than the centre for
                 shallower.

@@ -33,8 +33,6 @@ def parse_scene(data: Any, *, source: str, folder: Path | None = None) -> Scene:
     """Validate plain data.
 
     Args:
-        data: the content of a scene file.
-        source: file name for messages.
         folder: folder that directories of other runs are relative to; by default the working directory.
 
     Raises:
@@ -68,7 +66,6 @@ def load_scene(path: Path | str, overrides: Sequence[str] = ()) -> Scene:
     """Read a scene file.
 
     Args:
-        path: YAML file.
         overrides: `KEY=VALUE` with dots for nesting, e.g. `phases.1.duration_s=2`; the value is read as YAML.
 
     Raises:
@@ -153,7 +150,6 @@ def dump_scene(scene: Scene, folder: Path | None = None) -> str:
     """Return the resolved scene as YAML, every default written out.
 
     Args:
-        scene: the scene.
         folder: folder that directories of other runs are written relative to; None: they are written in full.
     """
     data = _plain(scene)

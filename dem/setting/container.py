@@ -86,8 +86,6 @@ class Cylinder:
 
     Args:
         radius: of the lowest tier.
-        height: of the whole wall.
-        facets: around the wall.
         upper: (bottom, radius) of the tiers above the lowest, from below; each one ends where the next begins.
     """
 

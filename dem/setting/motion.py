@@ -33,7 +33,6 @@ class Leg:
 
     Args:
         key: of the motion below the one that it is a leg of, "" or e.g. "steps.1".
-        motion: the motion of this stretch.
         start: angles [rad] at its beginning.
         home: angles [rad] at the beginning of the phase.
         until: its length [s].

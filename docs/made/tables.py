@@ -40,7 +40,6 @@ def table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
     """A table.
 
     Args:
-        head: titles of its columns.
         rows: cells, escaped already where they are data.
     """
     return "\n".join(table_lines(head, rows)) + "\n"

@@ -101,8 +101,6 @@ def compute_and_analyse(
     """Run what a sweep is missing unless --analyse forbids it, then analyse the finished runs.
 
     Args:
-        folder: the sweep's directory.
-        arguments: of the command.
         load: gives the study that analyses the runs, once there are any: its libraries are large.
         note: how the runs differ from the full study.
         pictured: values of the run that a picture is drawn of.

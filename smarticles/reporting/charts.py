@@ -30,7 +30,6 @@ def against_time(
     Args:
         times: (n,) [s].
         values: (n,) in the unit of the label.
-        label: of the vertical axis, with its unit.
         phases: start, end [s] and type of each phase.
     """
     with style():
@@ -52,8 +51,6 @@ def against_variable(variable: str, label: str, groups: Groups) -> str:
     """Return a chart of means with their errors against a variable.
 
     Args:
-        variable: of the horizontal axis.
-        label: of the vertical axis, with its unit.
         groups: by the name of each curve: x, means and errors, NaN where there is none.
     """
     values = [x for xs, _, _ in groups.values() for x in xs]

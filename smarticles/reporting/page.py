@@ -40,10 +40,8 @@ def page(title: str, about: str, lead: Iterable[tuple[str, str]], sections: Iter
     """Return a whole page.
 
     Args:
-        title: its heading.
         about: what it is of: "run", "sweep", "study", "results of a study".
         lead: the most important facts, label and value.
-        sections: in order.
         source: the directory that it is made from.
     """
     try:
@@ -81,9 +79,7 @@ def figure(caption: str, alt: str, picture: str, kind: str) -> Markup:
     """Return a picture.
 
     Args:
-        caption: below it.
         alt: what it shows.
-        picture: its data address.
         kind: "chart", of which the colours are turned round on a dark page; "card", on a light ground; "card wide".
     """
     return Markup(_blocks.figure(caption, alt, picture, kind))
@@ -95,8 +91,6 @@ def turntable(caption: str, alt: str, views: Sequence[str]) -> Markup:
     It is a group of radio buttons, one per picture, so that the page needs no script.
 
     Args:
-        caption: below it.
-        alt: what it shows.
         views: data addresses of pictures of one size, at equal angles, the first one from the front.
     """
     angles = [round(360 * number / len(views)) for number in range(len(views))]

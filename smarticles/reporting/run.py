@@ -49,10 +49,6 @@ _MOST_WARNINGS = 30
 def run_page(directory: Path, accuracy: Path | None) -> str:
     """Return the page of a run, done or not.
 
-    Args:
-        directory: a run directory.
-        accuracy: measured errors, see `accuracy_blocks`.
-
     Raises:
         InputError: it is no run directory, or a file of it is damaged.
     """
@@ -109,8 +105,6 @@ def short_table(found: pd.DataFrame, named: Sequence[str], caption: str) -> Mark
 
     Args:
         found: of `measured` or `grouped`.
-        named: columns that identify a row.
-        caption: of the table.
     """
     present = found.columns[found.notna().any()]
     wanted = [(quantity.header, shown) for quantity, shown in shown_quantities() if quantity.header in present]
@@ -136,9 +130,7 @@ def picture_blocks(directory: Path, *, name: str = "", turn: bool = True) -> lis
     """Return a picture of the last frame of a run, and one to turn; or why there is none.
 
     Args:
-        directory: a run directory.
         name: of the run, for the captions; empty: what the picture shows.
-        turn: whether to add pictures from all around.
     """
     from postprocess.pictures.render import render_run  # noqa: PLC0415  (imports PyVista)
     from postprocess.pictures.render import turntable as from_all_around  # noqa: PLC0415

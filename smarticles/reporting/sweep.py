@@ -52,11 +52,6 @@ _DRAWN = 4  # quantities that are drawn against each variable
 def sweep_page(folder: Folder, accuracy: Path | None, *, jobs: int) -> str:
     """Return the page of a sweep, or of a study with what its analysis found.
 
-    Args:
-        folder: its directory.
-        accuracy: measured errors, see `accuracy_blocks`.
-        jobs: runs that are measured at once.
-
     Raises:
         InputError: a file of it is damaged.
     """

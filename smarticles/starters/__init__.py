@@ -13,9 +13,6 @@ KINDS = ("shaken", "actuated", "hook", "melting", "casting", "collapse", "chain"
 def starter(kind: str) -> str:
     """Return the text of a scene.
 
-    Args:
-        kind: one of `KINDS`.
-
     Raises:
         InputError: there is no such kind.
     """

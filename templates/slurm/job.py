@@ -190,12 +190,7 @@ def render_script(
     """Return the text of an array job's script; what is not plain is quoted for the shell.
 
     Args:
-        cluster: where it is to run.
-        request: what it asks for.
-        sweep: the sweep's directory.
         number: number of the submission, the name of its folder in `jobs/`.
-        name: the job's name.
-        count: how many runs it computes.
         command: the words of the command `smarticles`.
 
     Raises:

@@ -104,10 +104,7 @@ def draft(
 
     Args:
         path: the sweep's directory; it may be absent.
-        name: the sweep's name.
-        entries: runs to compute.
         reference: a shipped cluster's name, or a file that ends in .toml.
-        wishes: options of the user.
         token: makes the job's name unique; by default a random one.
 
     Raises:

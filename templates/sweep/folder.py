@@ -198,10 +198,6 @@ def create_folder(
 
     Args:
         path: the directory; absent, empty, or made by the same sweep.
-        sweep: the sweep.
-        points: its points.
-        command: the command line, for the manifest.
-        versions: of what made it, for the manifest.
         expected_s: expected wall time [s] of a scene.
         extend: whether a directory that holds some of these runs, and no others, takes up the rest.
 

@@ -73,8 +73,6 @@ def evaluate(expression: str, values: Mapping[str, Value], source: str) -> Value
 
     Args:
         expression: the expression, without braces.
-        values: the variables it may use.
-        source: file and key, for error messages.
 
     Raises:
         InputError: it uses an unknown name, fails, or gives something that is not plain data.

@@ -353,9 +353,6 @@ def matching(
     """Return the rows, or points, whose variables hold one of the values wanted.
 
     Args:
-        rows: values by the name of their variable.
-        only: values wanted, by variable.
-        where: file and key, for error messages.
         nouns: of a variable and of a row, for error messages.
 
     Raises:

@@ -29,8 +29,6 @@ class LammpsBoundaries:
     """`dem.engine.interface.Boundaries` on LAMMPS. Heights are sines of the step, as LAMMPS's variables are.
 
     Args:
-        cylinder: the container.
-        send: sends commands to LAMMPS.
         clock: returns the steps made and the time step [s].
     """
 

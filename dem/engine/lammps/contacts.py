@@ -20,7 +20,6 @@ class Contacts:
     """All contacts at one instant.
 
     Args:
-        count: N.
         pairs: (C, 2) smarticles that touch by two spheres, as often as they do.
         depths: (C,) overlap of each [m].
         fixed: (F,) smarticles that touch floor or wall by a sphere, as often as they do.

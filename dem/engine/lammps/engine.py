@@ -109,7 +109,6 @@ class LammpsEngine:
     after each advance.
 
     Args:
-        cylinder: the container; its floor is at z = 0 at the start.
         gravity: g, downwards [m/s²].
         time_step: dt [s], until another is set.
     """

@@ -310,9 +310,7 @@ def clump(
     """Make a rigid body of existing spheres, with a mass and an inertia of its own.
 
     Args:
-        yade: the simulation.
-        members: ids of its spheres and hinge nodes.
-        local: (k, 3) their centres in the body's principal frame [m].
+        local: (k, 3) centres of `members` in the body's principal frame [m].
         mass: [kg].
         inertia: (3,) principal moments [kg m²].
         position: (3,) centre of mass [m].

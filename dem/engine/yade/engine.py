@@ -43,12 +43,10 @@ class YadeEngine:
     """`dem.engine.interface.Engine` on YADE.
 
     Args:
-        cylinder: the container; its floor is at z = 0 at the start.
         gravity: g, downwards [m/s²].
         time_step: dt [s], until another is set.
         shaken: whether the container will move; the engine that moves it exists only then.
         hinge_law: with `motor_law`, None where smarticles stay welded: then nothing of a hinge exists.
-        track_work: whether to add up the work of the moving container.
         dissipation_interval: time between samples of what is dissipated [s]; None: never.
         hooks: the lower and the upper hook; None: nothing of a hook exists.
         channel: table and walls instead of the container; all motion is then confined to a plane.

@@ -91,7 +91,6 @@ class YadeLedger:
     """`dem.engine.interface.EnergyLedger` on YADE.
 
     Args:
-        works: whether to add up the work of moving boundaries.
         dissipation_interval: time between samples of what is dissipated [s]; None: never.
     """
 

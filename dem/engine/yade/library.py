@@ -23,8 +23,6 @@ class Yade:
     """What this project uses of YADE.
 
     Args:
-        classes: YADE's classes: bodies, shapes, engines, functors.
-        utils: its helpers that make bodies and interactions.
         omega: the simulation; YADE has one per process.
         vector: constructor of a vector from three numbers.
         quaternion: constructor of a unit quaternion from (w, x, y, z).
