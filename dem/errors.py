@@ -13,7 +13,7 @@ class RunError(RuntimeError):
     """A run failed: unstable, not settled, out of disk. Exit status 1."""
 
 
-def refuse(concerned: Any, time: float, cause: str, way_out: str) -> None:
+def reject(concerned: Any, time: float, cause: str, way_out: str) -> None:
     """Stop a run if any of the smarticles is concerned.
 
     Args:

@@ -25,7 +25,7 @@ from dem.body.particle import Particle
 from dem.body.placement import Poses
 from dem.body.state import State
 from dem.physics.contact import StringLaw
-from dem.physics.overlaps import Glance, Overlaps
+from dem.physics.overlaps import Extremes, Overlaps
 from dem.setting.container import Cylinder
 
 Array = NDArray[np.float64]
@@ -151,14 +151,14 @@ class Motors(Protocol):
         """Make each smarticle rigid in its present shape; nothing while welded already."""
 
     @property
-    def looks_at_once(self) -> int:
+    def updates_at_once(self) -> int:
         """Most control updates that `actuate` takes at once."""
 
     def actuate(self, targets: Array, interval: float) -> None:
         """Make a control update, which acts for a control period, and others at the ends of the periods that follow.
 
         Args:
-            targets: (updates, N, 2) angles at the end of each period according to the schedule [rad]; `looks_at_once`
+            targets: (updates, N, 2) angles at the end of each period according to the schedule [rad]; `updates_at_once`
                 of them at most.
             interval: length of a period [s].
         """
@@ -328,7 +328,7 @@ class Engine(Protocol):
     def contact_forces(self) -> ContactForces:
         """Return forces at all contacts, at present or in the last step; a pair of links has one contact."""
 
-    def glance(self, state: State) -> Glance | None:
+    def extremes(self, state: State) -> Extremes | None:
         """Return the extremes of all smarticles, cheaper than from each one, in the present state.
 
         None where the engine has no such way, or knows of something that needs a full check.

@@ -23,7 +23,7 @@ class EngineKind(Protocol):
         """What a run on several cores has several of: threads, or ranks, which are processes."""
 
     @property
-    def damps_once_per_look(self) -> bool:
+    def damps_once_per_update(self) -> bool:
         """Whether a servo's damper acts on the rates of the last control update, so that one is needed every step."""
 
     @property

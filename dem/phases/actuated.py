@@ -104,21 +104,21 @@ class ActuatedPhase(Phase):
 
         After each `halt_every` updates it returns, so that the caller can check the pile.
         """
-        look: int = stage.memory["look"]
-        if look == 0:
+        update: int = stage.memory["look"]
+        if update == 0:
             engine.motors.articulate()
         schedule: Drive = stage.prepared
         interval = stage.scene.fidelity.control_interval_s
         last = math.ceil(schedule.duration / interval - 1e-9)
         every = halt_every or last
         # The last update only adds up the work since the one before.
-        stop = min(look + engine.motors.looks_at_once, (look // every + 1) * every, last)
-        looks = range(look, max(look + 1, stop))
-        targets = [schedule.targets(min((k + 1) * interval, schedule.duration)) for k in looks]
+        stop = min(update + engine.motors.updates_at_once, (update // every + 1) * every, last)
+        updates = range(update, max(update + 1, stop))
+        targets = [schedule.targets(min((k + 1) * interval, schedule.duration)) for k in updates]
         engine.motors.actuate(np.stack(targets), interval)
-        stage.memory["look"] = looks.stop
+        stage.memory["look"] = updates.stop
         period = max(1, round(interval / engine.time_step)) * engine.time_step
-        return len(looks) * period if look < last else 0.0
+        return len(updates) * period if update < last else 0.0
 
     def prepare(self, scene: SceneView, index: int) -> Drive:
         return drive(scene, index)

@@ -43,7 +43,7 @@ class Overlaps:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Glance:
+class Extremes:
     """The extremes of all smarticles at one instant; NaN is within no limit.
 
     Args:

@@ -38,7 +38,7 @@ def time_step(scene: Scene) -> float:
     wanted = given if given is not None else scene.fidelity.time_step_fraction * stable
     whole = scene.fidelity.control_interval_s if scene.actuates else scene.recording.series_interval_s
     steps = _steps_in(whole, wanted)
-    if scene.actuates and scene.motor.law == "servo" and steps > 1 and engine_kind(scene.engine).damps_once_per_look:
+    if scene.actuates and scene.motor.law == "servo" and steps > 1 and engine_kind(scene.engine).damps_once_per_update:
         # A damper that acts a period late drives vibrations that are faster than the period.
         raise InputError(
             f"fidelity.control_interval_s: {whole:g} s is {steps} time steps, but a servo (motor.law) must damp in "

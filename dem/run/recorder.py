@@ -108,9 +108,9 @@ class Recorder:
             RunError: it stopped the run.
         """
         state, time, watchdog = state or engine.state(), engine.time, self.watchdog
-        floor, raised, glance = engine.boundaries.floor, engine.boundaries.raised, engine.glance(state)
-        if glance is not None and watchdog.content(glance, floor=floor, raised=raised):
-            elastic = glance.elastic_energy
+        floor, raised, extremes = engine.boundaries.floor, engine.boundaries.raised, engine.extremes(state)
+        if extremes is not None and watchdog.content(extremes, floor=floor, raised=raised):
+            elastic = extremes.elastic_energy
         else:
             gaps = engine.motors.gaps() if engine.motors.articulated else None
             watchdog.check(state, floor=floor, time=time, points=self.points(state), raised=raised, gaps=gaps)

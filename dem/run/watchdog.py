@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dem.body.state import State
-from dem.errors import RunError, refuse
-from dem.physics.overlaps import Glance, Overlaps
+from dem.errors import RunError, reject
+from dem.physics.overlaps import Extremes, Overlaps
 from dem.setting.container import Cylinder
 
 Array = NDArray[np.float64]
@@ -42,18 +42,18 @@ class Watchdog:
     missed: float = math.inf
     _ceiling: float = math.inf  # limit of kinetic and potential energy less the work done [J]
 
-    def content(self, glance: Glance, *, floor: float, raised: float | None = 0.0) -> bool:
+    def content(self, extremes: Extremes, *, floor: float, raised: float | None = 0.0) -> bool:
         """Return whether the extremes of all smarticles are certainly within all limits but that of the energy.
 
         `floor` and `raised` are as in `check`.
         """
-        inside = glance.lowest >= floor
+        inside = extremes.lowest >= floor
         if raised is not None:
             cylinder = self.cylinder
             narrowest = min([cylinder.radius, *(radius for _, radius in cylinder.upper)])
-            inside &= glance.widest <= cylinder.corner_radius_of(narrowest)
-            inside &= glance.highest - floor < cylinder.height
-        return inside and glance.fastest <= self.speed and glance.gap <= self.gap and glance.deepest <= self.depth
+            inside &= extremes.widest <= cylinder.corner_radius_of(narrowest)
+            inside &= extremes.highest - floor < cylinder.height
+        return inside and extremes.fastest <= self.speed and extremes.gap <= self.gap and extremes.deepest <= self.depth
 
     def check(
         self,
@@ -83,8 +83,8 @@ class Watchdog:
         speeds = _speeds(state)
         heights = positions[:, 2] - floor
         broken = ~(np.isfinite(positions).all(axis=1) & np.isfinite(speeds))
-        refuse(broken, time, "a position or velocity that is no number", LOWER_STEP)
-        refuse(
+        reject(broken, time, "a position or velocity that is no number", LOWER_STEP)
+        reject(
             speeds > self.speed,
             time,
             f"a speed above {self.speed:.3g} m/s (fastest {speeds.max(initial=0):.3g} m/s), "
@@ -93,7 +93,7 @@ class Watchdog:
         )
         if gaps is not None:
             # A gap that is no number is not below the limit either.
-            refuse(
+            reject(
                 (~np.less_equal(gaps, self.gap)).any(axis=1),
                 time,
                 f"links more than {self.gap:.3g} m apart at a hinge (most {gaps.max(initial=0):.3g} m)",
@@ -108,8 +108,8 @@ class Watchdog:
             corners = self.cylinder.radii(above - raised) * (self.cylinder.corner_radius / self.cylinder.radius)
             outside |= (np.hypot(points[..., 0], points[..., 1]) > corners) & (above < height)
             height += raised
-        refuse(outside.any(axis=1), time, "left through the wall or the floor", "raise fidelity.stiffness_N_per_m")
-        refuse(
+        reject(outside.any(axis=1), time, "left through the wall or the floor", "raise fidelity.stiffness_N_per_m")
+        reject(
             heights > height,
             time,
             f"thrown out over the wall of {self.cylinder.height:.3g} m",
@@ -141,7 +141,7 @@ class Watchdog:
                 if first.between == BOTH_HOOKS
                 else "give the hook more room: a smaller hooks.length_m or a wider container"
             )
-        refuse(overlaps.deep, time, cause, way_out)
+        reject(overlaps.deep, time, cause, way_out)
 
     def check_energy(self, state: State, *, energy: float, elastic: float, time: float) -> None:
         """Check that no energy comes from nowhere.
@@ -166,7 +166,7 @@ class Watchdog:
         rise = energy - self._ceiling
         if rise > self.energy:
             speeds = _speeds(state)
-            refuse(
+            reject(
                 speeds >= speeds.max() / 2,
                 time,
                 f"an energy that has risen by {rise:.3g} J more than gravity, motors and springs explain (limit "

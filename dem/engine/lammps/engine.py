@@ -51,7 +51,7 @@ class NoMotors:
 
     present = False
     articulated = False
-    looks_at_once = 1
+    updates_at_once = 1
     readings: MotorReadings | None = None
     work = 0.0
 
@@ -316,7 +316,7 @@ class LammpsEngine:
     def overlaps(self, limit: float) -> Overlaps:
         return self.contacts.overlaps(limit, self._law)
 
-    def glance(self, state: State) -> None:
+    def extremes(self, state: State) -> None:
         """Return None: LAMMPS has no shorter way."""
 
     def contact_forces(self) -> NoReturn:

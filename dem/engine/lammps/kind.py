@@ -38,7 +38,7 @@ class LammpsKind:
 
     name = "lammps"
     workers = "ranks"
-    damps_once_per_look = False
+    damps_once_per_update = False
     idle_knobs: tuple[str, ...] = ("wall_facets", "hinge_stiffness_N_per_m", "control_interval_s")
     adds = ADDS
     order = ORDER

@@ -46,7 +46,7 @@ class LinksMotors:
         return self._law is not None
 
     @property
-    def looks_at_once(self) -> int:
+    def updates_at_once(self) -> int:
         """See the interface."""
         return LOOKS
 

@@ -19,7 +19,7 @@ from dem.body.state import State
 from dem.engine.yade.construction import SMARTICLE_MATERIAL
 from dem.engine.yade.hinges import HingeLaw, Hinges, add_nodes, hinge_nodes
 from dem.engine.yade.library import Yade, rows_of
-from dem.errors import refuse
+from dem.errors import reject
 
 Array = NDArray[np.float64]
 
@@ -150,7 +150,7 @@ class Assembly:
 
     def _check(self, table: Array) -> None:
         broken = ~np.isfinite(table).all(axis=1) | ~table[:, 9:].any(axis=1)
-        refuse(
+        reject(
             broken.reshape(self.count, 1 if self.hinges is None else LINKS).any(axis=1),
             self._yade.omega.time,
             "positions or velocities are no numbers, the simulation has blown up",

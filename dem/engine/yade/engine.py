@@ -249,7 +249,7 @@ class YadeEngine:
     def contact_forces(self) -> ContactForces:
         return contact_forces(self._yade, self._assembly, self.boundaries)
 
-    def glance(self, state: State) -> None:
+    def extremes(self, state: State) -> None:
         """Return None: YADE has no shorter way."""
 
     def container_force(self) -> Array:

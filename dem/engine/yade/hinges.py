@@ -29,7 +29,7 @@ SHAFT_FORCE = 1e-4  # N along the axis, that the cap on a slipping shaft's torqu
 DAMPER_SHARE = 0.25  # of the pin's stiffness
 DAMPER_VISCOSITY = 0.15  # N s/m; at the stiffness of the named fidelities it relaxes over a few time steps
 DAMPER_TIME = 4e-5  # s; no shorter with stiffer pins, since a step must not relax it twice over
-LOOKS_PER_TILT = 10  # control updates between corrections of the tilt's drift
+UPDATES_PER_TILT = 10  # control updates between corrections of the tilt's drift
 # Turning a barb inwards (α up) turns barb 1 and barb 2 in opposite directions about the smarticle's normal.
 SENSE = np.array([1.0, -1.0])
 BARBS = (0, 2)  # links that hinge 1 and hinge 2 join to the middle link
@@ -108,7 +108,7 @@ class Hinges:
         self._ends: list[tuple[Any, Any]] = []
         # What YADE computes of the bonds in each step, and does not save: twists (2N,) [rad], gaps (2N,) [m].
         self._loaded: tuple[Array, Array] | None = None
-        self._looks = 0
+        self._updates = 0
 
     def make(self, strengths: Array | None = None) -> None:
         """Make the bonds; `strengths` are factors (N, 2) on stiffness and cap of the shafts [1], None: all equal."""
@@ -195,9 +195,9 @@ class Hinges:
         moments = (-SENSE * torques).ravel().tolist()
         for (geom, phys), moment in zip(self._shafts, moments, strict=True):
             phys.moment_twist = geom.normal * moment
-        if self._looks % LOOKS_PER_TILT == 0:
+        if self._updates % UPDATES_PER_TILT == 0:
             self._set_tilts(time_step)
-        self._looks += 1
+        self._updates += 1
 
     def _set_tilts(self, time_step: float) -> None:
         # From the axes themselves: YADE splits a turn into twist and tilt by its rotation vector, which is right only
@@ -245,7 +245,7 @@ class Hinges:
             # Not in YADE's own file.
             "twists": self._twists().tolist(),
             "gaps": self._gaps().tolist(),
-            "looks": self._looks,
+            "looks": self._updates,
         }
 
     @classmethod
@@ -254,5 +254,5 @@ class Hinges:
         hinges = cls(yade, law, memory["nodes"], np.array(memory["angles"]).reshape(-1, 2))
         hinges.bind()
         hinges._loaded = np.array(memory["twists"]), np.array(memory["gaps"])
-        hinges._looks = memory["looks"]
+        hinges._updates = memory["looks"]
         return hinges

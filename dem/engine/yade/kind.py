@@ -23,7 +23,7 @@ class YadeKind:
 
     name = "yade"
     workers = "threads"
-    damps_once_per_look = True
+    damps_once_per_update = True
     idle_knobs: tuple[str, ...] = ()
     adds = ADDS
     order = ORDER

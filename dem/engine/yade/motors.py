@@ -21,7 +21,7 @@ Array = NDArray[np.float64]
 class YadeMotors:
     """`dem.engine.interface.Motors` on YADE; `strengths` are factors (N, 2) on torque limit and stiffness [1]."""
 
-    looks_at_once = 1  # between two control updates YADE comes back to Python anyhow
+    updates_at_once = 1  # between two control updates YADE comes back to Python anyhow
 
     def __init__(
         self, yade: Yade, assembly: Assembly, ledger: YadeLedger, law: MotorLaw | None, strengths: Array | None
