@@ -58,8 +58,7 @@ class PassiveScene:
     def turns(self) -> Array:
         """(N, 3, 3) body frame to laboratory frame."""
         own = self.scene.particle.boxes.link_rotations[1]
-        turns: Array = self.state.link_rotations[:, 1] @ own.T
-        return turns
+        return np.asarray(self.state.link_rotations[:, 1] @ own.T)
 
     @property
     def spheres(self) -> Array:

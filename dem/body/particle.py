@@ -179,8 +179,7 @@ class Boxes:
         t1, length = self.thickness_normal, self.lengths
         t2_squared = np.array([t2**2 for t2 in self.thicknesses_in_plane])
         squares = np.stack([t1**2 + t2_squared, length**2 + t1**2, length**2 + t2_squared], axis=1)
-        moments: Array = self.link_masses[:, None] * squares / 12
-        return moments
+        return np.asarray(self.link_masses[:, None] * squares / 12)
 
     @cached_property
     def link_centres(self) -> Array:
@@ -321,8 +320,7 @@ class Particle:
     def local_centres(self) -> Array:
         """(S, 3) float64 [m]: sphere centres, each in the frame of its link (see `Boxes.link_rotations`)."""
         arms = self.centres - self.boxes.link_centres[self.links]
-        local: Array = np.einsum("sij,si->sj", self.boxes.link_rotations[self.links], arms)
-        return local
+        return np.asarray(np.einsum("sij,si->sj", self.boxes.link_rotations[self.links], arms))
 
     @property
     def radius(self) -> float:

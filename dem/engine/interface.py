@@ -234,17 +234,12 @@ class EnergyLedger(Protocol):
 class Engine(Protocol):
     """A running simulation; one per process, since an engine may be a process-wide singleton."""
 
-    @property
-    def particle(self) -> Particle:
-        """One smarticle."""
-
-    @property
-    def cylinder(self) -> Cylinder:
-        """The container as it was built."""
-
-    @property
-    def gravity(self) -> float:
-        """g, downwards [m/s²]."""
+    particle: Particle
+    """One smarticle."""
+    cylinder: Cylinder
+    """The container as it was built."""
+    gravity: float
+    """g, downwards [m/s²]."""
 
     @property
     def boundaries(self) -> Boundaries:

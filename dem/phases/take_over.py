@@ -357,8 +357,7 @@ def _in_cross(cross: Cross, vertices: Array) -> NDArray[np.bool_]:
     points = (ends[:, :, :1] * (1 - shares) + ends[:, :, 1:] * shares).reshape(len(vertices), -1, 3)
     above = points - [0.0, 0.0, cross.height]
     inside = [(np.abs(above - [*bar.middle, 0.0]) < bar.half).all(axis=-1).any(axis=-1) for bar in cross.bars]
-    found: NDArray[np.bool_] = np.logical_or.reduce(inside)
-    return found
+    return np.asarray(np.logical_or.reduce(inside))
 
 
 def _angles(taken: Taken) -> Array:

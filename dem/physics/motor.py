@@ -148,8 +148,7 @@ class Motors:
         return float((self.work + self._work_since_update(angles)).sum())
 
     def _work_since_update(self, angles: Array) -> Array:
-        work: Array = (self._torque(self._begun) + self._torque(angles)) / 2 * (angles - self._begun)
-        return work
+        return np.asarray((self._torque(self._begun) + self._torque(angles)) / 2 * (angles - self._begun))
 
     def _torque(self, angles: Array) -> Array:
         torque: Array = self._stiffness * (self.commands - angles)

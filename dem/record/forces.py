@@ -69,8 +69,7 @@ class RecordedForces:
     @property
     def between(self) -> NDArray[np.bool_]:
         """(M,) which contacts are between two smarticles."""
-        found: NDArray[np.bool_] = self.contacts.boundaries == NONE
-        return found
+        return np.asarray(self.contacts.boundaries == NONE)
 
 
 def has_forces(directory: Path) -> bool:

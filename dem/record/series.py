@@ -131,8 +131,7 @@ class Series:
     @property
     def time(self) -> NDArray[np.float64]:
         """(n,) float64 [s], simulated time of each sample."""
-        times: NDArray[np.float64] = self.data["time_s"]
-        return times
+        return np.asarray(self.data["time_s"])
 
     def table(self) -> pd.DataFrame:
         """Return the series as a table: one row per sample, units in its column names."""

@@ -14,29 +14,11 @@ from dem.body.chain import extent
 from dem.body.state import State
 from dem.engine.effect import EffectName
 from dem.engine.interface import Engine
-from dem.record.columns import (
-    COLUMNS,
-    ENERGY_COLUMNS,
-    HOOK_COLUMNS,
-    LEDGER_COLUMNS,
-    MOTOR_COLUMNS,
-    RELEASE_COLUMNS,
-    STRAIN_COLUMNS,
-    Columns,
-)
+from dem.plan.effects import ADDS
+from dem.record.columns import COLUMNS, EVERY, STRAIN_COLUMNS, Columns
 from dem.record.packing import packing_fraction
 
 Array = NDArray[np.float64]
-
-COLUMNS_OF: Mapping[EffectName, Columns] = {
-    EffectName.MOTORS: MOTOR_COLUMNS,
-    EffectName.ENERGIES: ENERGY_COLUMNS,
-    EffectName.ENERGY_ACCOUNT: LEDGER_COLUMNS,
-    EffectName.HOOKS: HOOK_COLUMNS,
-    EffectName.WALL_REMOVAL: RELEASE_COLUMNS,
-    EffectName.STRINGS: STRAIN_COLUMNS,
-}
-"""What effects add to the rows."""
 
 
 @dataclass
@@ -56,11 +38,8 @@ class Sampler:
     @property
     def described(self) -> Columns:
         """The columns of its rows."""
-        columns = dict(COLUMNS)
-        for effect, more in COLUMNS_OF.items():
-            if effect in self.effects:
-                columns |= more
-        return columns
+        added = {name for effect in self.effects if effect in ADDS for name in ADDS[effect].series}
+        return {name: column for name, column in EVERY.items() if name in COLUMNS or name in added}
 
     def sample(self, engine: Engine, state: State, phase: int) -> dict[str, Any]:
         """Return one row, of an engine with its present state and the index of the phase."""

@@ -117,8 +117,7 @@ class Cylinder:
     def radii(self, heights: Array) -> Array:
         """Return the radii [m] of the tiers at heights above the floor [m]; a tier begins above its bottom."""
         steps, radii = [bottom for bottom, _ in self.upper], [self.radius, *(radius for _, radius in self.upper)]
-        found: Array = np.array(radii)[np.searchsorted(steps, heights, side="left")]
-        return found
+        return np.asarray(np.array(radii)[np.searchsorted(steps, heights, side="left")])
 
     def inner_radii(self, heights: Array) -> Array:
         """Return the distances [m] of the flats from the axis, at heights above the floor [m]."""

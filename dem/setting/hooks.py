@@ -118,5 +118,4 @@ class Cross:
                 for middle, half in zip((*bar.middle, 0.0), bar.half, strict=True)
             ]
             points += list(itertools.product(*axes))
-        grid: Array = np.array(points) + np.array([0.0, 0.0, self.height])
-        return grid
+        return np.asarray(np.array(points) + np.array([0.0, 0.0, self.height]))

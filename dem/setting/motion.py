@@ -227,8 +227,7 @@ def sine_of(cycles: Array) -> Array:
         odd, even = odd * square + s, even * square + c
     sine, cosine = x + x * square * odd, 1 - square / 2 + square * square * even
     turn = np.mod(quarters, 4)
-    found: Array = np.where(turn == 0, sine, np.where(turn == 1, cosine, np.where(turn == 2, -sine, -cosine)))
-    return found
+    return np.asarray(np.where(turn == 0, sine, np.where(turn == 1, cosine, np.where(turn == 2, -sine, -cosine))))
 
 
 class Sine(_Wave):

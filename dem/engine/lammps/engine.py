@@ -243,8 +243,7 @@ class LammpsEngine:
         file.unlink()
         if len(rows) != self.count:
             raise RunError(f"LAMMPS wrote {len(rows)} of {self.count} smarticles at step {step}")
-        ordered: Array = rows[np.argsort(rows[:, 0])]
-        return ordered
+        return np.asarray(rows[np.argsort(rows[:, 0])])
 
     # -- smarticles --------------------------------------------------------------------------------------------
 
@@ -395,5 +394,4 @@ class LammpsEngine:
 
 def _turns(rows: Array) -> Array:
     """(N, 3, 3) rotations of rows whose quaternions (w, x, y, z) begin at column 7."""
-    turns: Array = Rotation.from_quat(rows[:, [8, 9, 10, 7]]).as_matrix()
-    return turns
+    return np.asarray(Rotation.from_quat(rows[:, [8, 9, 10, 7]]).as_matrix())

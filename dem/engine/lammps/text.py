@@ -63,8 +63,7 @@ def sphere_masses(particle: Particle) -> Array:
     rows = np.concatenate([np.ones((1, count)), particle.centres.T / particle.boxes.middle_length])
     wanted = np.array([particle.boxes.mass, 0.0, 0.0, 0.0])
     equal = np.full(count, particle.boxes.mass / count)
-    masses: Array = equal + np.linalg.pinv(rows) @ (wanted - rows @ equal)
-    return masses
+    return np.asarray(equal + np.linalg.pinv(rows) @ (wanted - rows @ equal))
 
 
 def sphere_lines(

@@ -177,15 +177,13 @@ class Hinges:
 
     def angles(self) -> Array:
         """Return the barbs' angles (N, 2) [rad], from the twist of the shafts."""
-        result: Array = self._angles + SENSE * self._twists().reshape(-1, 2)
-        return result
+        return np.asarray(self._angles + SENSE * self._twists().reshape(-1, 2))
 
     def rates(self) -> Array:
         """Return the rates (N, 2) of the barbs' angles [rad/s], half a step behind the angles."""
         up = self._yade.vector(0, 0, 1)
         turning = [(barb.angVel - middle.angVel).dot(middle.ori * up) for barb, middle in self._ends]
-        result: Array = -SENSE * np.array(turning).reshape(-1, 2)
-        return result
+        return np.asarray(-SENSE * np.array(turning).reshape(-1, 2))
 
     def set_torques(self, torques: Array, time_step: float) -> None:
         """Twist the shafts so that they exert (N, 2) torques on the barbs [N m], positive ones raising the angle.
@@ -212,8 +210,7 @@ class Hinges:
     def torques(self) -> Array:
         """Return YADE's present torques (N, 2) on the barbs [N m]."""
         moments = [geom.normal.dot(phys.moment_twist) for geom, phys in self._shafts]
-        result: Array = -SENSE * np.array(moments).reshape(-1, 2)
-        return result
+        return np.asarray(-SENSE * np.array(moments).reshape(-1, 2))
 
     def gaps(self) -> Array:
         """Return the distances (N, 2) of the two links of each hinge [m]."""
