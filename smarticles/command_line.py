@@ -6,9 +6,10 @@ import argparse
 import json
 import math
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from pathlib import Path
-from typing import Any, NoReturn
+from typing import Any, NoReturn, TypeVar
 
 from dem.engine import ENGINES
 from dem.errors import InputError, nearest
@@ -73,27 +74,47 @@ class Commands:
             epilog=f"examples:\n{examples.rstrip()}",
         )
         parser.set_defaults(handler=handler)
-        add_debug(parser, default=argparse.SUPPRESS)
+        add_shared(parser, "--debug", default=argparse.SUPPRESS)
         self.parsers[name] = parser
         return parser
+
+
+# -- arguments ---------------------------------------------------------------------------------------------------------
+
+Read = TypeVar("Read")
+
+
+def reader(convert: Callable[[str], Read], what: str, valid: Callable[[Read], bool]) -> Callable[[str], Read]:
+    """Return the reader of an argument, which rejects what cannot be converted or is not valid."""
+
+    def read(text: str) -> Read:
+        with suppress(ValueError):
+            if valid(value := convert(text)):
+                return value
+        raise argparse.ArgumentTypeError(f"must be {what}: got {text!r}")
+
+    return read
+
+
+positive_number = reader(float, "a number above 0", lambda number: 0 < number < math.inf)
+positive_int = reader(int, "a whole number from 1", lambda number: number >= 1)
 
 
 # -- options that several commands have --------------------------------------------------------------------------------
 
 
-def add_debug(parser: Parser, default: Any = False) -> None:
-    """Add --debug."""
-    parser.add_argument("--debug", action="store_true", default=default, help="show the traceback of an error")
+_SHARED: Mapping[str, Mapping[str, Any]] = {
+    "--debug": {"action": "store_true", "help": "show the traceback of an error"},
+    "--json": {"action": "store_true", "help": "print JSON, for programs"},
+    "--overwrite": {"action": "store_true", "help": "replace a file that exists"},
+    "--jobs": {"type": positive_int, "metavar": "N", "help": "runs at once; default: one per core"},
+}
 
 
-def add_json(parser: Parser) -> None:
-    """Add --json."""
-    parser.add_argument("--json", action="store_true", help="print JSON, for programs")
-
-
-def add_overwrite(parser: Parser) -> None:
-    """Add --overwrite."""
-    parser.add_argument("--overwrite", action="store_true", help="replace a file that exists")
+def add_shared(parser: Parser, *options: str, **settings: Any) -> None:
+    """Add options that several commands have, by their names."""
+    for option in options:
+        parser.add_argument(option, **_SHARED[option], **settings)
 
 
 def add_scene(parser: Parser, what: str) -> None:
@@ -116,11 +137,6 @@ def add_engine(parser: Parser, what: str) -> None:
         choices=ENGINES,
         help=f"{what}: yade, sphere chains on YADE, links, swept links, or lammps, sphere chains on several processes",
     )
-
-
-def add_jobs(parser: Parser) -> None:
-    """Add --jobs."""
-    parser.add_argument("--jobs", type=positive_int, metavar="N", help="runs at once; default: one per core")
 
 
 def add_ranks(parser: argparse._ActionsContainer, default: str) -> None:
@@ -157,28 +173,6 @@ def reject_existing(option: str, path: Path | None, *, overwrite: bool) -> None:
     """
     if path is not None and path.exists() and not overwrite:
         raise InputError(f"{option} {path}: exists; choose another name or give --overwrite")
-
-
-def positive_number(text: str) -> float:
-    """Read a finite number above 0."""
-    try:
-        number = float(text)
-    except ValueError:
-        number = 0.0
-    if not 0 < number < math.inf:
-        raise argparse.ArgumentTypeError(f"must be a number above 0: got {text!r}")
-    return number
-
-
-def positive_int(text: str) -> int:
-    """Read a whole number from 1."""
-    try:
-        number = int(text)
-    except ValueError:
-        number = 0
-    if number < 1:
-        raise argparse.ArgumentTypeError(f"must be a whole number from 1: got {text!r}")
-    return number
 
 
 # -- output ------------------------------------------------------------------------------------------------------------

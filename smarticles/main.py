@@ -20,7 +20,7 @@ from types import FrameType
 from typing import Any
 
 from dem.errors import InputError, RunError
-from smarticles.command_line import Commands, Parser, add_debug
+from smarticles.command_line import Commands, Parser, add_shared
 from smarticles.commands import (
     accuracy,
     compare,
@@ -87,7 +87,7 @@ def build_parser() -> tuple[Parser, Commands]:
         metavar="SHELL",
         help=f"print the completion script of a shell ({', '.join(_SHELLS)}) and end",
     )
-    add_debug(parser)
+    add_shared(parser, "--debug")
     commands = Commands(parser)
     for add in COMMANDS:
         add(commands)

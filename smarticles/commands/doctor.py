@@ -19,7 +19,7 @@ from collections.abc import Iterator
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
-from smarticles.command_line import Commands, add_json
+from smarticles.command_line import Commands, add_shared
 
 EXTRAS = {
     **dict.fromkeys(("matplotlib", "PIL", "pyvista", "vtk", "vtkmodules", "imageio_ffmpeg"), "viz"),
@@ -121,7 +121,7 @@ with the way out.""",
   smarticles doctor --json
 """,
     )
-    add_json(doctor)
+    add_shared(doctor, "--json")
 
 
 def way_to_install(module: str) -> str:

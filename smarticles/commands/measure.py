@@ -10,7 +10,7 @@ from textwrap import wrap
 from typing import TYPE_CHECKING
 
 from dem.errors import InputError
-from smarticles.command_line import Cell, Commands, add_json, add_overwrite, as_json, columns, reject_existing
+from smarticles.command_line import Cell, Commands, add_shared, as_json, columns, reject_existing
 from smarticles.measuring import grouped, measured, sources
 
 if TYPE_CHECKING:
@@ -64,8 +64,7 @@ its own in CSV and JSON. --by averages over the runs that are alike in a variabl
         metavar="FILE.csv",
         help="write φ(r, z), rings and layers at the end of each phase, as CSV",
     )
-    add_overwrite(measure)
-    add_json(measure)
+    add_shared(measure, "--overwrite", "--json")
 
 
 def measure_runs(arguments: argparse.Namespace) -> int:

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from dem.errors import InputError
-from smarticles.command_line import Commands, add_json, add_scene, as_json, positive_number, scene_settings
+from smarticles.command_line import Commands, add_scene, add_shared, as_json, positive_number, scene_settings
 from smarticles.commands.run import read_scene
 
 if TYPE_CHECKING:
@@ -53,7 +53,7 @@ table that `smarticles accuracy SCENE --knobs engine` writes.""",
     plan.add_argument(
         "--table", type=Path, metavar="FILE.csv", help="measured errors; default: those that ship, if any do"
     )
-    add_json(plan)
+    add_shared(plan, "--json")
 
 
 def plan_scene(arguments: argparse.Namespace) -> int:

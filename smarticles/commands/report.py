@@ -7,7 +7,7 @@ from pathlib import Path
 
 from dem.errors import InputError
 from dem.record.names import MANIFEST, OF_SWEEP
-from smarticles.command_line import Commands, add_jobs, add_overwrite
+from smarticles.command_line import Commands, add_shared
 
 
 def add(commands: Commands) -> None:
@@ -32,8 +32,7 @@ repeat it. The file holds all that it shows: it can be sent, kept, and opened wi
     report.add_argument(
         "--accuracy", type=Path, metavar="FILE.csv", help="measured errors of fidelities; default: those that ship"
     )
-    add_jobs(report)
-    add_overwrite(report)
+    add_shared(report, "--jobs", "--overwrite")
 
 
 def write_report(arguments: argparse.Namespace) -> int:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 from dem.errors import InputError
 from smarticles import sweeps
-from smarticles.command_line import Commands, add_jobs, add_ranks, add_scene, positive_int, scene_settings
+from smarticles.command_line import Commands, add_ranks, add_scene, add_shared, positive_int, scene_settings
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -91,7 +91,7 @@ For a study, give the study's command again: it also makes the tables and figure
         metavar="N",
         help="threads of one run; default: what it began with. Another number is logged, and changes the last bits",
     )
-    add_jobs(resume)
+    add_shared(resume, "--jobs")
     sweeps.add_cluster_options(resume)
 
 

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from dem.errors import InputError
 from dem.record.names import MANIFEST, OF_SWEEP
-from smarticles.command_line import Commands, add_json, as_json, columns, positive_number
+from smarticles.command_line import Commands, add_shared, as_json, columns, positive_number
 
 if TYPE_CHECKING:
     from templates.sweep.folder import RunStatus
@@ -47,7 +47,7 @@ run came, `checkpoint s` from where it would go on.""",
     status.add_argument(
         "--every", type=positive_number, metavar="S", help="with --watch: seconds between checks; default: 2"
     )
-    add_json(status)
+    add_shared(status, "--json")
 
 
 def show_status(arguments: argparse.Namespace) -> int:

@@ -9,7 +9,7 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING
 
 from dem.errors import InputError
-from smarticles.command_line import Commands, add_engine, add_jobs, columns
+from smarticles.command_line import Commands, add_engine, add_shared, columns
 from smarticles.measuring import follows
 from smarticles.sweeps import changed_sweep, compute, folder_of, raise_failures
 from studies import registry
@@ -60,7 +60,7 @@ same command again goes on where it stopped. `smarticles status DIR` shows how f
         help="results of an earlier analysis: runs of the same scenes in its tables are not computed again",
     )
     study.add_argument("--out", type=Path, required=True, metavar="DIR", help="directory of the study")
-    add_jobs(study)
+    add_shared(study, "--jobs")
 
 
 def run_study(arguments: argparse.Namespace) -> int:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 from dem.errors import InputError
 from dem.record.names import OF_SWEEP
 from smarticles import sweeps
-from smarticles.command_line import Commands, add_engine, add_jobs, columns, positive_int
+from smarticles.command_line import Commands, add_engine, add_shared, columns, positive_int
 
 if TYPE_CHECKING:
     from templates.slurm.submission import Draft
@@ -66,7 +66,7 @@ def add(commands: Commands) -> None:
         "--max-points", type=positive_int, metavar="N", help="reject a sweep of more runs; default: 10000"
     )
     add_engine(sweep, "all runs on this engine: its constant `engine` is set to it")
-    add_jobs(sweep)
+    add_shared(sweep, "--jobs")
     sweeps.add_cluster_options(sweep)
 
 
