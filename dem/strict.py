@@ -119,11 +119,7 @@ def _kind(annotation: Any) -> str:
 
 
 def explained(error: ValidationError, data: Any, *, described: str) -> str:
-    """Return pydantic's errors as `key: value and what is wrong with it; way out`, the first few of them in one line.
-
-    Args:
-        described: where the keys are described, for one that is missing.
-    """
+    """Return pydantic's first errors as `key: value and what is wrong; way out`, in one line."""
     texts: dict[str, str] = {}
     filled: set[str] = set()  # places of values that the file does not hold
     for found in error.errors(include_url=False):

@@ -32,10 +32,7 @@ def has_frames(directory: Path) -> bool:
 
 
 def sources(directories: Sequence[Path]) -> dict[Path, Mapping[str, Any]]:
-    """Return the run directories among, or inside, the given ones, with what their sweeps varied.
-
-    Args:
-        directories: of runs; a sweep's stands for its runs with frames.
+    """Return runs, and of each sweep its runs with frames, with what their sweeps varied.
 
     Raises:
         InputError: a sweep has no run with frames yet.
@@ -121,10 +118,7 @@ def _table(directory: Path, values: Mapping[str, Any], *, frames: bool, costly: 
 
 
 def grouped(table: pd.DataFrame, by: Sequence[str]) -> pd.DataFrame:
-    """Return means over runs, one row per group and phase; see `postprocess.statistics.points.means_by`.
-
-    Args:
-        table: of `measured`, one row per run and phase.
+    """Return means of `measured` over runs, one row per group and phase.
 
     Raises:
         InputError: there is no such column.

@@ -153,9 +153,6 @@ def sweep(
             columns `aspect_ratio` and `seed`.
         jobs: runs at once; by default one per core.
 
-    Returns:
-        The runs, in the sweep's order.
-
     Raises:
         InputError: a scene or the sweep is not valid, or the directory holds something else.
         RunError: a run failed.
@@ -176,10 +173,7 @@ def sweep(
 
 
 def write_sweep(scene: Scene | Path | str, vary: Mapping[str, Sequence[Any]], folder: Path) -> Path:
-    """Write `sweep.yaml` and `scene.yaml.j2`, and return the former.
-
-    Args:
-        vary: keys of the scene, dots for nesting, and the values of each; all combinations are runs.
+    """Write `sweep.yaml` and `scene.yaml.j2` for all combinations of `vary`; return the former.
 
     Raises:
         InputError: the scene cannot be read, has no such place or holds marks of a template, or there is nothing to

@@ -138,10 +138,7 @@ def add_cluster_options(parser: Parser) -> None:
 
 
 def wants_queue(arguments: argparse.Namespace, *, one_run: bool = False) -> bool:
-    """Return whether the runs are for a cluster.
-
-    Args:
-        one_run: whether they name one run, which may have ranks here too.
+    """Return whether the runs are for a cluster; one run may have ranks here too.
 
     Raises:
         InputError: an option for a cluster is given although they are not, or there is no Slurm here to submit to.

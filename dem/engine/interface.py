@@ -33,12 +33,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, kw_only=True)
 class Saved:
-    """A simulation at one instant, as its engine saves it.
-
-    Args:
-        content: the engine's own serialisation.
-        memory: plain data that JSON keeps without loss.
-    """
+    """A simulation at one instant: the engine's own bytes, and plain data that JSON keeps without loss."""
 
     content: bytes
     memory: Mapping[str, Any]
@@ -183,11 +178,7 @@ class Strings(Protocol):
         """Whether they exist at present."""
 
     def tie(self, ties: Sequence[Tie], law: StringLaw, speeds: Sequence[float]) -> None:
-        """Tie taut strings to points of articulated smarticles, their other ends outwards on the x-axis.
-
-        Args:
-            speeds: of the other ends, away from the origin [m/s].
-        """
+        """Tie taut strings to smarticles; their other ends move outwards along x at `speeds` [m/s]."""
 
     def untie(self) -> None:
         """Remove all strings."""
@@ -332,11 +323,7 @@ class Engine(Protocol):
     # -- checkpoints -------------------------------------------------------------------------------------------
 
     def save(self, scratch: Path) -> Saved:
-        """Return everything that `load` needs; the simulation goes on with the bits of one that was loaded.
-
-        Args:
-            scratch: folder for temporary files.
-        """
+        """Return all that `load` needs; a loaded simulation goes on with the bits of the saved one."""
 
     def load(self, saved: Saved, scratch: Path) -> None:
         """Replace the simulation by a saved one of the same scene."""

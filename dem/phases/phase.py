@@ -33,11 +33,7 @@ Memory = dict[str, Any]
 
 @dataclass
 class Stage:
-    """A phase while it runs.
-
-    Args:
-        memory: all that the stage remembers: plain data, JSON-able without loss. `warning` is reported at its end.
-    """
+    """A phase while it runs; its memory is plain data for JSON, `warning` is reported at its end."""
 
     phase: Phase
     scene: SceneView
@@ -141,10 +137,7 @@ class Phase:
         """Return what its stage computes only once."""
 
     def proceed(self, stage: Stage, engine: Engine) -> float:
-        """Do what is due now.
-
-        Returns:
-            Time [s] until the next call; 0: the phase is over.
+        """Do what is due now; return the time [s] until the next call, 0 where the phase is over.
 
         Raises:
             RunError: the phase did not end as it should; the message says by how much.

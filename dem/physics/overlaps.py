@@ -14,11 +14,7 @@ APART = 0.1  # of the depth that is too deep; boundaries that have moved against
 
 @dataclass(frozen=True)
 class Held:
-    """A smarticle between two boundaries that have moved apart, so that only its contacts can give way.
-
-    Args:
-        apart: by how much they have moved against each other since the start [m].
-    """
+    """A smarticle between boundaries that have moved `apart` [m]: only its contacts give way."""
 
     smarticle: int
     between: tuple[str, str]

@@ -33,12 +33,7 @@ _YADE, _YADE_MEMBER = "yade", "engine.yade"
 
 @dataclass(frozen=True, kw_only=True)
 class Checkpoint:
-    """What a run needs to be resumed.
-
-    Args:
-        made_by: name and version of the engine.
-        state: plain data: phase, stage, recorder, clock.
-    """
+    """What a run needs to be resumed; `made_by` is name and version of the engine, `state` plain data."""
 
     scene_sha256: str
     made_by: tuple[str, str]

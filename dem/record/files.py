@@ -35,10 +35,7 @@ def whole(path: Path, *, before: Path | None = None, shared: bool = False) -> It
 
 
 def write_whole(path: Path, write: Callable[[Path], object], *, make_folder: bool = True) -> None:
-    """Make or replace a file by `write`, which is called with a temporary path of the suffix of `path`.
-
-    Args:
-        make_folder: whether its folder is made if needed; not where a missing folder was moved away.
+    """Make or replace a file: `write` fills a temporary path; its folder is made, if wanted.
 
     Raises:
         RunError: the disk is full or the folder cannot be written; the file that was there is untouched.
@@ -66,11 +63,7 @@ def write_text(path: Path, text: str, *, make_folder: bool = True) -> None:
 
 
 def cannot_read(what: str, path: Path, cause: BaseException | str, remedy: str) -> NoReturn:
-    """Report in one line that a file is missing, truncated or not what it should be.
-
-    Args:
-        what: kind of the file, e.g. "frame".
-        cause: why it cannot be used; of an exception its first line.
+    """Report that a file, e.g. a "frame", is missing, truncated or not what it should be.
 
     Raises:
         InputError: always.

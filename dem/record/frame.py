@@ -158,10 +158,7 @@ class Frame:
 
 
 def read_frame(path: Path | str) -> Frame:
-    """Read one frame file.
-
-    Args:
-        path: A `.vtu` file as described in docs/reference/files.md.
+    """Read one frame file, a `.vtu` as described in docs/reference/files.md.
 
     Raises:
         InputError: The file is missing, damaged, or lacks what a frame must have.
@@ -226,9 +223,6 @@ def read_frame(path: Path | str) -> Frame:
 
 def read_mesh(path: Path, what: str = "frame", remedy: str | None = None) -> Any:
     """Read a VTK file by meshio.
-
-    Args:
-        remedy: the way out if it cannot be read; None: that of frames.
 
     Raises:
         InputError: it cannot be read.

@@ -15,12 +15,9 @@ from dem.record.names import LOCK, LOG, MANIFEST, is_partial
 
 @contextmanager
 def claimed(out: Path, *, resume: bool) -> Iterator[None]:
-    """Hold a run directory while a run writes into it.
+    """Hold a run directory, new or empty unless a run is resumed, while a run writes into it.
 
     The lock is the kernel's: it ends with the process that holds it, so that it is never stale.
-
-    Args:
-        resume: whether a run is to be resumed in it; otherwise it must be empty.
 
     Raises:
         InputError: it is not empty, or has nothing to resume, or another process writes into it.

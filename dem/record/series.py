@@ -32,11 +32,7 @@ _REMEDY = "give the directory of a run that has recorded its series, or run it a
 
 @dataclass
 class SeriesWriter:
-    """Keeps rows, and rewrites `series.h5` whole when asked.
-
-    Args:
-        described: what the columns are; every row has a value for each of them.
-    """
+    """Keeps rows, with values of all `described` columns; rewrites `series.h5` whole when asked."""
 
     folder: Path
     described: Columns

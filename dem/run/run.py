@@ -35,16 +35,13 @@ from dem.scene.scene import Scene
 def run_scene(
     scene: Scene, out: Path, *, command: str, progress: bool, resume: bool = False, builders: Builders | None = None
 ) -> Done | None:
-    """Run a scene into a run directory.
+    """Run a scene into a run directory; return times and cost, None where it was done already.
 
     Args:
         out: the run directory; must not exist, or be empty, or with `resume` hold an unfinished run of this scene.
         command: the command line, for the manifest.
         resume: go on from the newest checkpoint that is whole, or from the start where none was written.
         builders: makers of its parts, where they differ from the usual ones.
-
-    Returns:
-        Times and cost; None where the run was done already and there was nothing to resume.
 
     Raises:
         InputError: `out` holds something else, or another process runs in it.
@@ -182,12 +179,7 @@ def _mark_ended(simulation: Simulation | None, out: Path, log: logging.Logger, e
 def manifest(
     scene: Scene, out: Path, *, steps: Sequence[float], command: str, made_by: tuple[str, str], threads: int
 ) -> Manifest:
-    """Return what made a run, and the numbers that measures need.
-
-    Args:
-        steps: time step of each phase [s].
-        made_by: name and version of the engine.
-    """
+    """Return what made a run, and the numbers that measures need; time steps in s."""
     particle, boxes, origin = scene.particle, scene.smarticle.boxes, scene.phases[0].origin
     if origin is not None:  # a path that holds where both runs are moved
         origin = {**origin, "run": os.path.relpath(origin["run"], out.resolve())}

@@ -23,11 +23,7 @@ Array = NDArray[np.float64]
 
 @dataclass
 class Sampler:
-    """Makes rows of the series from an engine; for means between samples it remembers the sample before.
-
-    Args:
-        radius: of the container [m].
-    """
+    """Makes rows of the series and keeps the sample before, for means; container's radius in m."""
 
     radius: float
     effects: Set[EffectName] = frozenset()

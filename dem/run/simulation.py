@@ -31,12 +31,7 @@ class StopRequestedError(Exception):
 
 @dataclass
 class Simulation:
-    """One run while it runs.
-
-    Args:
-        made_by: name and version of the engine, stored in the checkpoints.
-        time_steps: of each phase [s].
-    """
+    """One run while it runs, with name and version of its engine and the time step of each phase [s]."""
 
     scene: Scene
     engine: Engine

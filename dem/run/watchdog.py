@@ -176,15 +176,12 @@ class Watchdog:
         self._ceiling = min(self._ceiling, energy + elastic)
 
     def check_residual(self, residual: float, *, dissipated: float, time: float) -> str | None:
-        """Check the residual of the energy ledger.
+        """Check the residual of the energy ledger; return a warning for the end of the run, if any.
 
         Args:
             residual: energy added and work done, less everything stored and dissipated [J].
             dissipated: by contacts, hinges and welding since the start [J].
             time: simulated time [s].
-
-        Returns:
-            A warning for the end of the run; None where the residual is small.
 
         Raises:
             RunError: the residual is too large, with cause and way out.

@@ -30,10 +30,7 @@ YOUNGER: Mapping[str, Mapping[str, Any]] = MappingProxyType(
 
 
 def parse_scene(data: Any, *, source: str, folder: Path | None = None) -> Scene:
-    """Validate plain data.
-
-    Args:
-        folder: folder that directories of other runs are relative to; by default the working directory.
+    """Validate plain data; other runs are relative to `folder`, by default the working directory.
 
     Raises:
         InputError: one line with file, key, value and the way out.
@@ -63,10 +60,7 @@ def _not_a_scene(data: Any) -> str | None:
 
 
 def load_scene(path: Path | str, overrides: Sequence[str] = ()) -> Scene:
-    """Read a scene file.
-
-    Args:
-        overrides: `KEY=VALUE` with dots for nesting, e.g. `phases.1.duration_s=2`; the value is read as YAML.
+    """Read a scene file and change keys by `KEY=VALUE`, e.g. `phases.1.duration_s=2`.
 
     Raises:
         InputError: unreadable file, bad YAML, bad override or invalid scene.
@@ -147,11 +141,7 @@ def _plain(scene: Scene) -> dict[str, Any]:
 
 
 def dump_scene(scene: Scene, folder: Path | None = None) -> str:
-    """Return the resolved scene as YAML, every default written out.
-
-    Args:
-        folder: folder that directories of other runs are written relative to; None: they are written in full.
-    """
+    """Return the resolved scene as YAML with every default; other runs are relative to `folder`."""
     data = _plain(scene)
     if folder is not None:
         for phase in data["phases"]:

@@ -37,11 +37,7 @@ def code(text: str) -> str:
 
 
 def table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
-    """A table.
-
-    Args:
-        rows: cells, escaped already where they are data.
-    """
+    """Return a table; cells are escaped already where they are data."""
     return "\n".join(table_lines(head, rows)) + "\n"
 
 

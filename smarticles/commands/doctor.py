@@ -93,12 +93,7 @@ _OPTIONAL = {**{name: name for name in ("matplotlib", "trimesh", "trame", "aioht
 
 @dataclass(frozen=True, kw_only=True)
 class Check:
-    """What was found about one part.
-
-    Attributes:
-        found: version and place, or the cause of the failure.
-        way_out: what to do if it does not work; empty if it does.
-    """
+    """What was found about one part: version and place, or why it fails and what to do then."""
 
     name: str
     ok: bool

@@ -48,11 +48,7 @@ def against_time(
 
 
 def against_variable(variable: str, label: str, groups: Groups) -> str:
-    """Return a chart of means with their errors against a variable.
-
-    Args:
-        groups: by the name of each curve: x, means and errors, NaN where there is none.
-    """
+    """Return a chart of x, means and errors of each curve, by its name; NaN for an unknown error."""
     values = [x for xs, _, _ in groups.values() for x in xs]
     numeric = all(isinstance(x, int | float) for x in values)
     names = list(dict.fromkeys(map(str, values)))

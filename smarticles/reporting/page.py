@@ -86,12 +86,9 @@ def figure(caption: str, alt: str, picture: str, kind: str) -> Markup:
 
 
 def turntable(caption: str, alt: str, views: Sequence[str]) -> Markup:
-    """Return pictures of one thing from all around, turned by pointer, finger or arrow keys.
+    """Return `views` from equal angles, data addresses, turned by pointer, finger or arrow keys.
 
     It is a group of radio buttons, one per picture, so that the page needs no script.
-
-    Args:
-        views: data addresses of pictures of one size, at equal angles, the first one from the front.
     """
     angles = [round(360 * number / len(views)) for number in range(len(views))]
     return Markup(_blocks.turntable(caption, alt, list(zip(views, angles, strict=True))))

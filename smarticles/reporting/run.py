@@ -101,11 +101,7 @@ def _measures(directory: Path) -> list[Markup]:
 
 
 def short_table(found: pd.DataFrame, named: Sequence[str], caption: str) -> Markup:
-    """Return the quantities that short tables have, each as `mean ± SE`.
-
-    Args:
-        found: of `measured` or `grouped`.
-    """
+    """Return the quantities of short tables, as `mean ± SE`, from `measured` or `grouped`."""
     present = found.columns[found.notna().any()]
     wanted = [(quantity.header, shown) for quantity, shown in shown_quantities() if quantity.header in present]
     rows = [
@@ -127,11 +123,7 @@ def frame_table(found: pd.DataFrame, caption: str) -> Markup:
 
 
 def picture_blocks(directory: Path, *, name: str = "", turn: bool = True) -> list[Markup]:
-    """Return a picture of the last frame of a run, and one to turn; or why there is none.
-
-    Args:
-        name: of the run, for the captions; empty: what the picture shows.
-    """
+    """Return a picture of a run's last frame, and one to turn, with its name; or why not."""
     from postprocess.pictures.render import render_run  # noqa: PLC0415  (imports PyVista)
     from postprocess.pictures.render import turntable as from_all_around  # noqa: PLC0415
 

@@ -156,10 +156,7 @@ def shipped_clusters() -> list[str]:
 
 
 def load_cluster(reference: str) -> Cluster:
-    """Read the facts about a cluster.
-
-    Args:
-        reference: a shipped cluster's name, or a file that ends in .toml.
+    """Read the facts about a cluster, by a shipped one's name or from a file that ends in .toml.
 
     Raises:
         InputError: unknown name, unreadable file, unknown key, bad value.

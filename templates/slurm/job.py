@@ -189,10 +189,6 @@ def render_script(
 ) -> str:
     """Return the text of an array job's script; what is not plain is quoted for the shell.
 
-    Args:
-        number: number of the submission, the name of its folder in `jobs/`.
-        command: the words of the command `smarticles`.
-
     Raises:
         InputError: a template fails, or a path cannot stand in a script.
     """

@@ -308,11 +308,7 @@ def parse_job_id(answer: str, script: Path) -> int:
 
 
 def _ask_queue(names: Sequence[str]) -> list[Task]:
-    """Return the tasks of some jobs that Slurm still knows, ended ones included for a while.
-
-    Args:
-        names: names of the jobs. By name, since a number that Slurm has forgotten is an error.
-    """
+    """Return tasks of jobs by name: a number that Slurm has forgotten is an error."""
     if not names:
         return []
     asked = ("--noheader", "--array", "--states=all", f"--name={','.join(names)}", "--format=%j|%F|%K|%T|%r")

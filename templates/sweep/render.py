@@ -71,9 +71,6 @@ _FAILURES = (jinja2.TemplateError, ArithmeticError, TypeError, ValueError, Looku
 def evaluate(expression: str, values: Mapping[str, Value], source: str) -> Value:
     """Return the value of a Jinja2 expression such as `(n / 2) | round | int`, evaluated in a sandbox.
 
-    Args:
-        expression: the expression, without braces.
-
     Raises:
         InputError: it uses an unknown name, fails, or gives something that is not plain data.
     """

@@ -179,10 +179,7 @@ class Sweep:
 
 
 def load_sweep(path: Path) -> Sweep:
-    """Read a sweep file, its template and its table.
-
-    Args:
-        path: The file; `FILE@VARIANT` applies one of its variants, `FILE@VARIANT,VARIANT` several in this order.
+    """Read a sweep file, template and table; FILE@VARIANT,VARIANT applies variants in order.
 
     Raises:
         InputError: a file is missing or malformed, a key or variant unknown, a value out of range.
@@ -350,10 +347,7 @@ def _read_table(path: Path, table: Table | None) -> tuple[list[dict[str, Value]]
 def matching(
     rows: Sequence[dict[str, Value]], only: Mapping[str, Sequence[Value]], where: str, nouns: tuple[str, str]
 ) -> list[dict[str, Value]]:
-    """Return the rows, or points, whose variables hold one of the values wanted.
-
-    Args:
-        nouns: of a variable and of a row, for error messages.
+    """Return the rows, or points, with one of the values wanted; `nouns` are for messages.
 
     Raises:
         InputError: a variable is unknown, no row has one of its values, or no row has all of them.

@@ -26,11 +26,7 @@ class Part:
 
 @dataclass
 class LammpsBoundaries:
-    """`dem.engine.interface.Boundaries` on LAMMPS. Heights are sines of the step, as LAMMPS's variables are.
-
-    Args:
-        clock: returns the steps made and the time step [s].
-    """
+    """`dem.engine.interface.Boundaries` on LAMMPS; `clock` returns steps made and the time step [s]."""
 
     cylinder: Cylinder
     send: Callable[[Iterator[str]], None]

@@ -107,10 +107,6 @@ class LammpsEngine:
 
     LAMMPS moves smarticles; what is asked of them at one instant follows from their poses, which it writes to a file
     after each advance.
-
-    Args:
-        gravity: g, downwards [m/s²].
-        time_step: dt [s], until another is set.
     """
 
     def __init__(

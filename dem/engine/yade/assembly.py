@@ -191,11 +191,7 @@ class Assembly:
         self.hinges.make(self._strengths)
 
     def weld(self) -> float:
-        """Make every smarticle one rigid body of the shape that it has; nothing while welded already.
-
-        Returns:
-            Kinetic energy of the links' motion against each other [J], which is lost.
-        """
+        """Make articulated smarticles rigid in their present shapes; return the lost kinetic energy [J]."""
         if self.hinges is None:
             return 0.0
         boxes, state = self._particle.boxes, self.state()

@@ -206,11 +206,7 @@ class YadeBoundaries:
 
 
 def add_container(yade: Yade, cylinder: Cylinder) -> list[int]:
-    """Add the container, its floor at z = 0.
-
-    Returns:
-        Ids of its bodies: the wall from below, and the floor last.
-    """
+    """Add the container, its floor at z = 0; return ids of bodies, wall from below, floor last."""
     # A polygon of the same area as the circle; it starts below the floor so that no gap opens at the edge.
     bottoms = [cylinder.bottom, *(bottom for bottom, _ in cylinder.upper), cylinder.height]
     rings = [_ring(cylinder, radius) for radius in (cylinder.radius, *(radius for _, radius in cylinder.upper))]
@@ -242,11 +238,7 @@ def _band(yade: Yade, one: tuple[Array, float], other: tuple[Array, float]) -> I
 
 
 def add_channel(yade: Yade, channel: Channel) -> list[int]:
-    """Add walls and table, the centrelines' plane at z = 0.
-
-    Returns:
-        Ids of the lower and the upper wall, where there are walls, and of the table last.
-    """
+    """Add walls and table, centrelines at z = 0; return ids: lower, upper wall if any, table last."""
     bodies = []
     if channel.width is not None:
         # As the container's floor, each pushes to its own side whatever happens.

@@ -88,11 +88,7 @@ class Contacts:
 
 
 class YadeLedger:
-    """`dem.engine.interface.EnergyLedger` on YADE.
-
-    Args:
-        dissipation_interval: time between samples of what is dissipated [s]; None: never.
-    """
+    """`dem.engine.interface.EnergyLedger` on YADE; None as `dissipation_interval` [s]: nothing is sampled."""
 
     def __init__(
         self,

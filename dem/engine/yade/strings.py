@@ -74,11 +74,7 @@ class YadeStrings:
         self._bind(ends, [end.anchor for end in ends], [(0, 0, 0) for _ in ends])
 
     def pull(self, time_step: float) -> float:
-        """Set the forces of the step that begins, of a length dt [s], and move the anchors on.
-
-        Returns:
-            Work of the strings on the links in the step [J], to first order in dt.
-        """
+        """Set the forces of a step dt [s] and move the anchors on; return the work on the links [J]."""
         assert self._law is not None  # called while strings are tied only
         work = 0.0
         forces, vector = self._yade.omega.forces, self._yade.vector
