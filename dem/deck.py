@@ -13,9 +13,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
+from dem.arrays import Array
 from dem.body.state import State
 from dem.engine.demand import contact_law_of
 from dem.engine.lammps import text
@@ -32,7 +32,6 @@ from dem.scene.reading import scene_hash
 from dem.scene.rules import foreign
 from dem.scene.scene import Scene
 
-Array = NDArray[np.float64]
 PassivePhase = TakeOver | Relax | Shake | RemoveContainer
 
 

@@ -18,12 +18,10 @@ from functools import cached_property, lru_cache
 from itertools import product
 
 import numpy as np
-from numpy.typing import NDArray
 
+from dem.arrays import Array, Numbers
 from dem.body.linear import eigen_symmetric, matrix_product
 from dem.errors import InputError
-
-Array = NDArray[np.float64]
 
 LINKS = 3
 # Free distance between a barb's first sphere and the hinge's, in diameters: a loaded hinge may give way by as much
@@ -292,7 +290,7 @@ class Particle:
         return np.linspace(start, end, count)
 
     @cached_property
-    def _layout(self) -> tuple[Array, NDArray[np.int64]]:
+    def _layout(self) -> tuple[Array, Numbers]:
         vertices = self.boxes._plain_vertices
         starts = vertices[[1, 1, 2]]
         centres: list[Array] = []
@@ -312,7 +310,7 @@ class Particle:
         return self._layout[0]
 
     @property
-    def links(self) -> NDArray[np.int64]:
+    def links(self) -> Numbers:
         """(S,) int64: link of each sphere; 0 barb 1, 1 middle link, 2 barb 2."""
         return self._layout[1]
 

@@ -7,15 +7,13 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
 
+from dem.arrays import Array
 from dem.body.linear import applied, eigen_symmetric
 from dem.body.particle import Boxes, Particle
 from dem.errors import RunError
-
-Array = NDArray[np.float64]
 
 CLEARANCE = 0.02  # free distance kept between surfaces, in sphere diameters
 ATTEMPTS = 200  # poses tried per smarticle before the slab is made higher

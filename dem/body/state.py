@@ -6,11 +6,9 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
+from dem.arrays import Array, Numbers
 from dem.body.particle import LINKS, Boxes, Particle
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -93,7 +91,7 @@ class State:
         )
         return np.stack([np.arctan2(across1, -along1), np.arctan2(across2, along2)], axis=1)
 
-    def spheres(self, particle: Particle, which: NDArray[np.int64] | None = None) -> Array:
+    def spheres(self, particle: Particle, which: Numbers | None = None) -> Array:
         """Return (N, S, 3) centres of the spheres [m], or of those with the numbers `which`."""
         links, local = particle.links, particle.local_centres
         if which is not None:

@@ -6,9 +6,7 @@ from collections.abc import Sequence
 from enum import Enum, auto
 from typing import Protocol
 
-import numpy as np
-from numpy.typing import NDArray
-
+from dem.arrays import Array
 from dem.body.particle import Particle
 from dem.engine.effect import EffectName
 from dem.physics.contact import ContactLaw, contact_law
@@ -72,7 +70,7 @@ class Demand(Protocol):
     def torque_limit(self) -> float: ...
 
     @property
-    def motor_strengths(self) -> NDArray[np.float64] | None: ...
+    def motor_strengths(self) -> Array | None: ...
 
     @property
     def actuates(self) -> bool: ...

@@ -16,9 +16,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Protocol
 
-import numpy as np
-from numpy.typing import NDArray
-
+from dem.arrays import Array, Flags, Numbers
 from dem.body.chain import Tie
 from dem.body.forces import ContactForces
 from dem.body.particle import Particle
@@ -27,8 +25,6 @@ from dem.body.state import State
 from dem.physics.contact import StringLaw
 from dem.physics.overlaps import Extremes, Overlaps
 from dem.setting.container import Cylinder
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -55,7 +51,7 @@ class MotorReadings:
     commands: Array
     torques: Array
     work: Array
-    halted: NDArray[np.bool_]
+    halted: Flags
 
 
 class Boundaries(Protocol):
@@ -302,10 +298,10 @@ class Engine(Protocol):
     def unbalanced_force(self) -> float:
         """Return the mean net force on a smarticle over its weight [1]: 0 at rest, 1 in free fall, inf when empty."""
 
-    def neighbours(self) -> NDArray[np.int64]:
+    def neighbours(self) -> Numbers:
         """Return for each smarticle (N,) how many others it touches."""
 
-    def touches(self) -> NDArray[np.int64]:
+    def touches(self) -> Numbers:
         """Return the number (N,) of contacts of each smarticle, with smarticles and boundaries."""
 
     def overlaps(self, limit: float) -> Overlaps:

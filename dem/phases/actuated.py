@@ -12,8 +12,8 @@ from dataclasses import dataclass
 from typing import ClassVar, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from dem.arrays import Array, Flags, Numbers
 from dem.body.particle import HINGE_CLEARANCE
 from dem.engine.effect import EffectName
 from dem.engine.interface import Engine
@@ -23,8 +23,6 @@ from dem.setting.motion import Course, Motion, SimpleMotion, Sine, Triangle
 from dem.setting.motor import Motor
 from dem.setting.part import HINGE_RANGE
 from dem.setting.smarticle import Smarticle
-
-Array = NDArray[np.float64]
 
 BARBS = 2
 BARB_LINKS = (0, 2)
@@ -153,13 +151,13 @@ class Drive:
     """
 
     duration: float
-    active: NDArray[np.bool_]
+    active: Flags
     start: Array
     # Barbs that always have one target share an entry: `_entries` has those of barbs that do not move, then those of
     # each track; `_which` (N, 2) is the entry of each barb.
     _entries: Array
     _tracks: tuple[_Track, ...]
-    _which: NDArray[np.int64]
+    _which: Numbers
 
     def targets(self, time: float) -> Array:
         """Return (N, 2) target angles [rad] at a time [s] after the phase began; beyond its end those of its end."""

@@ -17,9 +17,9 @@ from pathlib import Path
 from typing import Annotated, Any, ClassVar, Literal, Self, cast
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field, ModelWrapValidatorHandler, ValidationInfo, field_validator, model_validator
 
+from dem.arrays import Array, Flags
 from dem.body.placement import Poses, fitted_poses
 from dem.engine.interface import Engine
 from dem.errors import InputError, RunError, shown
@@ -28,8 +28,6 @@ from dem.record.frame import Frame
 from dem.record.run import Run, open_run
 from dem.setting.hooks import Cross
 from dem.setting.part import Part
-
-Array = NDArray[np.float64]
 
 LAST = "last"  # the frame at the end of a run that is done
 TAKEN_SECONDS = 0.05  # until a pile that was taken over is still, about
@@ -349,7 +347,7 @@ def _within_tips(vertices: Array, radius: float) -> Array:
     return moved
 
 
-def _in_cross(cross: Cross, vertices: Array) -> NDArray[np.bool_]:
+def _in_cross(cross: Cross, vertices: Array) -> Flags:
     """Return (N,) whether the axis of a link passes through a bar, checked in steps of a quarter of its side."""
     ends = np.stack([vertices[:, :-1], vertices[:, 1:]], axis=2)  # (N, 3, 2, 3)
     longest = float(np.linalg.norm(ends[:, :, 1] - ends[:, :, 0], axis=-1).max())

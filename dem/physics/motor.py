@@ -7,9 +7,8 @@ from dataclasses import dataclass
 from typing import Any, Literal, get_args
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from dem.arrays import Array, Flags
 
 Law = Literal["halt", "stall", "ease", "slip", "servo"]
 LAWS: tuple[Law, ...] = get_args(Law)
@@ -104,7 +103,7 @@ class Motors:
         """(N, 2) actual angles at the last control update [rad]."""
         self.torques: Array = np.zeros_like(angles)
         """(N, 2) torques on the barbs since the last control update [N m]; positive ones raise the angle."""
-        self.halted: NDArray[np.bool_] = np.zeros(angles.shape, dtype=bool)
+        self.halted: Flags = np.zeros(angles.shape, dtype=bool)
         """(N, 2) whether a motor wanted to advance at the last control update and did not."""
         self._begun: Array = angles.copy()
         self._rates: Array = np.zeros_like(angles)

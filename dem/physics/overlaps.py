@@ -6,8 +6,7 @@ from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from itertools import combinations
 
-import numpy as np
-from numpy.typing import NDArray
+from dem.arrays import Flags
 
 APART = 0.1  # of the depth that is too deep; boundaries that have moved against each other by less have not
 
@@ -33,7 +32,7 @@ class Overlaps:
     """
 
     deepest: float
-    deep: NDArray[np.bool_]
+    deep: Flags
     elastic_energy: float
     held: tuple[Held, ...] = ()
 

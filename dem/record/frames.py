@@ -13,8 +13,8 @@ from xml.sax.saxutils import quoteattr
 
 import meshio
 import numpy as np
-from numpy.typing import NDArray
 
+from dem.arrays import Array
 from dem.errors import InputError
 from dem.record import names
 from dem.record.files import cannot_read, write_text, write_whole
@@ -72,7 +72,7 @@ class FrameSequence(Sequence[Frame]):
         paths: The files, in time order.
     """
 
-    def __init__(self, times: NDArray[np.float64], paths: tuple[Path, ...]) -> None:
+    def __init__(self, times: Array, paths: tuple[Path, ...]) -> None:
         self.times = times
         self.paths = paths
 

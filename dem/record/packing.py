@@ -5,10 +5,11 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
+
+from dem.arrays import Array
 
 
-def second_highest(heights: NDArray[np.float64]) -> float:
+def second_highest(heights: Array) -> float:
     """Return the second-highest of (N,) heights; NaN for fewer than two.
 
     Example:
@@ -29,7 +30,7 @@ def filled(count: int, *, solid_volume: float, radius: float, height: float) -> 
     return float(count * solid_volume / (math.pi * radius**2 * height))
 
 
-def packing_fraction(heights: NDArray[np.float64], *, solid_volume: float, radius: float) -> float:
+def packing_fraction(heights: Array, *, solid_volume: float, radius: float) -> float:
     """Return φ of (N,) centres of mass above the floor [m]; NaN for fewer than two, and for none above the floor."""
     height = second_highest(heights)
     return filled(len(heights), solid_volume=solid_volume, radius=radius, height=height) if height > 0 else math.nan

@@ -15,6 +15,7 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
+from dem.arrays import Array
 from dem.errors import InputError
 from dem.record import names
 from dem.record.columns import Columns
@@ -125,7 +126,7 @@ class Series:
         return len(self.time)
 
     @property
-    def time(self) -> NDArray[np.float64]:
+    def time(self) -> Array:
         """(n,) float64 [s], simulated time of each sample."""
         return np.asarray(self.data["time_s"])
 

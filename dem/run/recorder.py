@@ -7,9 +7,9 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-import numpy as np
 from numpy.typing import NDArray
 
+from dem.arrays import Array
 from dem.body.state import State
 from dem.engine.interface import Engine
 from dem.record.forces import force_mesh
@@ -42,7 +42,7 @@ class Recorder:
     series: SeriesWriter
     frames: FrameWriter
     watchdog: Watchdog
-    points: Callable[[State], NDArray[np.float64]]
+    points: Callable[[State], Array]
     progress: ProgressWriter
     interval: float
     frame_every: int

@@ -8,8 +8,8 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from dem.arrays import Array
 from dem.body.chain import extent
 from dem.body.state import State
 from dem.engine.effect import EffectName
@@ -17,8 +17,6 @@ from dem.engine.interface import Engine
 from dem.plan.effects import ADDS
 from dem.record.columns import COLUMNS, EVERY, STRAIN_COLUMNS, Columns
 from dem.record.packing import packing_fraction
-
-Array = NDArray[np.float64]
 
 
 @dataclass

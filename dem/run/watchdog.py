@@ -6,14 +6,12 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from dem.arrays import Array, Flags
 from dem.body.state import State
 from dem.errors import RunError, reject
 from dem.physics.overlaps import Extremes, Overlaps
 from dem.setting.container import Cylinder
-
-Array = NDArray[np.float64]
 
 LOWER_STEP = "lower fidelity.time_step_fraction"
 WARNED_SHARE = 0.2  # of the limit of what the energy ledger may miss: from here on a run warns at its end
@@ -101,7 +99,7 @@ class Watchdog:
             )
         points = positions[:, None] if points is None else points
         above = points[..., 2] - floor
-        outside: NDArray[np.bool_] = np.less(above, 0)
+        outside: Flags = np.less(above, 0)
         height = math.inf
         if raised is not None:
             height = self.cylinder.height

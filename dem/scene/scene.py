@@ -13,9 +13,9 @@ from itertools import pairwise
 from typing import Any, Literal, Self
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field, ValidationInfo, field_validator, model_validator
 
+from dem.arrays import Array
 from dem.body.particle import Particle, SphereChain, chain_mean_width, mean_width
 from dem.engine.effect import EffectName
 from dem.errors import nearest, shown
@@ -189,7 +189,7 @@ class Scene(Part):
         return paper.mass * self.gravity_m_per_s2 * paper.middle_length
 
     @cached_property
-    def motor_strengths(self) -> NDArray[np.float64] | None:
+    def motor_strengths(self) -> Array | None:
         """(N, 2) factors on τ_max and stiffness of the motors [1]; None where all are alike."""
         spread = self.motor.strength_spread
         if not spread:

@@ -8,12 +8,10 @@ from itertools import pairwise
 from typing import Any, Self
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
+from dem.arrays import Array
 from dem.setting.part import Length, Part
-
-Array = NDArray[np.float64]
 
 
 class Tier(Part):

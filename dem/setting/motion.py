@@ -16,12 +16,10 @@ from itertools import accumulate
 from typing import Annotated, ClassVar, Literal, Self
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
+from dem.arrays import Array
 from dem.setting.part import Duration, Frequency, HingeAngle, Part, Turning
-
-Array = NDArray[np.float64]
 
 Angles = Array | float
 Course = Callable[[Array], Array]  # a motion that has begun: times [s] since then to angles [rad]

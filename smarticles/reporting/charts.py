@@ -15,16 +15,15 @@ from smarticles.reporting.page import address
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
-    from numpy.typing import NDArray
+
+    from dem.arrays import Array
 
 _BAND = "#f0f1f2"
 _MOST_POINTS = 400
 Groups = Mapping[str, tuple[Sequence[object], Sequence[float], Sequence[float]]]
 
 
-def against_time(
-    times: NDArray[np.float64], values: NDArray[np.float64], label: str, phases: Sequence[tuple[float, float, str]]
-) -> str:
+def against_time(times: Array, values: Array, label: str, phases: Sequence[tuple[float, float, str]]) -> str:
     """Return a chart of a quantity against time.
 
     Args:
@@ -75,7 +74,7 @@ def against_variable(variable: str, label: str, groups: Groups) -> str:
         return _svg(figure)
 
 
-def thinned(times: NDArray[np.float64], values: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def thinned(times: Array, values: Array) -> tuple[Array, Array]:
     """Return at most some hundred points of a curve: the least and the largest of each stretch, NaN left out."""
     known = np.isfinite(values)
     times, values = times[known], values[known]

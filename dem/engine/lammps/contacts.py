@@ -5,14 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
+from dem.arrays import Array, Numbers
 from dem.engine.lammps.boundaries import LammpsBoundaries
 from dem.physics.contact import ContactLaw
 from dem.physics.overlaps import Overlaps
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -27,9 +25,9 @@ class Contacts:
     """
 
     count: int
-    pairs: NDArray[np.int64]
+    pairs: Numbers
     depths: Array
-    fixed: NDArray[np.int64]
+    fixed: Numbers
     fixed_depths: Array
 
     @classmethod
@@ -56,13 +54,13 @@ class Contacts:
             fixed_depths=np.concatenate([depths[k] for depths, k in zip(beside, touching, strict=True)]),
         )
 
-    def neighbours(self) -> NDArray[np.int64]:
+    def neighbours(self) -> Numbers:
         """Return for each smarticle (N,) how many others it touches."""
         ordered = np.sort(self.pairs, axis=1)
         both = np.unique(ordered[:, 0] * self.count + ordered[:, 1])
         return np.bincount(np.concatenate(np.divmod(both, max(1, self.count))), minlength=self.count)
 
-    def touches(self) -> NDArray[np.int64]:
+    def touches(self) -> Numbers:
         """Return the number (N,) of contacts of each smarticle, sphere by sphere."""
         return np.bincount(np.concatenate([self.pairs.ravel(), self.fixed]), minlength=self.count)
 

@@ -12,9 +12,9 @@ from pathlib import Path
 from typing import Any, NoReturn
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from dem.arrays import Array, Numbers
 from dem.body.chain import Tie
 from dem.body.particle import Particle
 from dem.body.placement import Poses
@@ -29,8 +29,6 @@ from dem.errors import InputError, RunError
 from dem.physics.contact import ContactLaw, StringLaw
 from dem.physics.overlaps import Overlaps
 from dem.setting.container import Cylinder
-
-Array = NDArray[np.float64]
 
 FORMAT = "lammps-2"
 SPHERES, BODIES, RESTART, STATE = "spheres.data", "bodies.txt", "restart", "state.npz"
@@ -302,10 +300,10 @@ class LammpsEngine:
             self._contacts = Contacts.of(self.state().spheres(self.particle), self.particle.radius, self.boundaries)
         return self._contacts
 
-    def neighbours(self) -> NDArray[np.int64]:
+    def neighbours(self) -> Numbers:
         return self.contacts.neighbours()
 
-    def touches(self) -> NDArray[np.int64]:
+    def touches(self) -> Numbers:
         return self.contacts.touches()
 
     def overlaps(self, limit: float) -> Overlaps:

@@ -10,9 +10,9 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from dem.arrays import Array
 from dem.body.particle import LINKS, Particle
 from dem.body.placement import Poses
 from dem.body.state import State
@@ -20,8 +20,6 @@ from dem.engine.yade.construction import SMARTICLE_MATERIAL
 from dem.engine.yade.hinges import HingeLaw, Hinges, add_nodes, hinge_nodes
 from dem.engine.yade.library import Yade, rows_of
 from dem.errors import reject
-
-Array = NDArray[np.float64]
 
 
 class Assembly:

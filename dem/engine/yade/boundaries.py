@@ -8,8 +8,8 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from dem.arrays import Array
 from dem.body.forces import CHANNEL, FLOOR, LOWER_HOOK, WALL
 from dem.engine.yade.construction import WALL_MATERIAL
 from dem.engine.yade.library import Yade, rows_of
@@ -17,8 +17,6 @@ from dem.errors import RunError
 from dem.setting.container import Cylinder
 from dem.setting.hooks import Cross
 from dem.setting.plane import Channel
-
-Array = NDArray[np.float64]
 
 
 class YadeBoundaries:

@@ -9,8 +9,8 @@ import math
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from dem.arrays import Array, Numbers
 from dem.body.forces import ContactForces
 from dem.body.particle import Particle
 from dem.body.placement import Poses
@@ -33,8 +33,6 @@ from dem.physics.overlaps import Overlaps
 from dem.setting.container import Cylinder
 from dem.setting.hooks import Cross
 from dem.setting.plane import Channel
-
-Array = NDArray[np.float64]
 
 SCRATCH = ".engine.partial.yade"
 
@@ -223,7 +221,7 @@ class YadeEngine:
     def impulse(self) -> float:
         return self._smarticle_seconds * self.particle.boxes.mass * self.gravity + self._thrown
 
-    def neighbours(self) -> NDArray[np.int64]:
+    def neighbours(self) -> Numbers:
         touching: set[tuple[int, int]] = set()
         smarticle_of = self._assembly.smarticle_of
         for interaction in self._omega.interactions:
@@ -236,7 +234,7 @@ class YadeEngine:
         pairs = np.array(list(touching), dtype=np.int64).ravel()
         return np.bincount(pairs, minlength=self.count)
 
-    def touches(self) -> NDArray[np.int64]:
+    def touches(self) -> Numbers:
         # Contacts of spheres are counted one by one.
         smarticle_of = self._assembly.smarticle_of
         bodies = (body for i in self._omega.interactions if i.isReal for body in (i.id1, i.id2))

@@ -12,12 +12,10 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from dem.arrays import Array
 from dem.body.particle import Boxes
 from dem.engine.yade.library import Yade
-
-Array = NDArray[np.float64]
 
 HINGE_MATERIAL = "hinge"
 NODE_RADIUS = 1e-4  # m; cancels in every force, but YADE wants one

@@ -14,14 +14,13 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from dem.arrays import Array
 from dem.engine.yade.assembly import Assembly
 from dem.engine.yade.boundaries import YadeBoundaries
 from dem.engine.yade.contacts import contacts_of
 from dem.engine.yade.library import Yade
 
-Array = NDArray[np.float64]
 Velocities = Mapping[tuple[int, int], tuple[float, float, float]]
 _SUMS = ("container_work", "added", "dissipated")
 

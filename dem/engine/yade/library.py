@@ -13,8 +13,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from dem.arrays import Array
 from dem.errors import RunError
 
 
@@ -35,7 +35,7 @@ class Yade:
     quaternion: Any
 
 
-def rows_of(vectors: Iterable[Any]) -> NDArray[np.float64]:
+def rows_of(vectors: Iterable[Any]) -> Array:
     """(n, 3) components of YADE's vectors, five times faster than NumPy's own conversion."""
     return np.array([(v[0], v[1], v[2]) for v in vectors], dtype=np.float64).reshape(-1, 3)
 

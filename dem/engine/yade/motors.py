@@ -6,16 +6,14 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from dem.arrays import Array
 from dem.engine.interface import MotorReadings
 from dem.engine.yade.assembly import Assembly
 from dem.engine.yade.hinges import Hinges
 from dem.engine.yade.ledger import YadeLedger
 from dem.engine.yade.library import Yade
 from dem.physics.motor import MotorLaw, Motors
-
-Array = NDArray[np.float64]
 
 
 class YadeMotors:

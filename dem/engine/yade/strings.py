@@ -12,14 +12,12 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from dem.arrays import Array
 from dem.body.chain import Tie
 from dem.engine.yade.assembly import Assembly
 from dem.engine.yade.library import Yade, rows_of
 from dem.physics.contact import StringLaw
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, kw_only=True)
