@@ -14,14 +14,11 @@ class RunError(RuntimeError):
 
 
 def reject(concerned: Any, time: float, cause: str, way_out: str) -> None:
-    """Stop a run if any of the smarticles is concerned.
+    """Stop a run by RunError if any of the smarticles is concerned.
 
     Args:
         concerned: (N,) bool array.
         time: simulated time [s].
-
-    Raises:
-        RunError: cause, smarticles concerned, time and the way out.
     """
     if concerned.any():
         ids = concerned.nonzero()[0]

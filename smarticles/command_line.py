@@ -26,11 +26,7 @@ class Parser(argparse.ArgumentParser):
         super().__init__(allow_abbrev=False, **options)
 
     def error(self, message: str) -> NoReturn:
-        """Reject the command line.
-
-        Raises:
-            InputError: always.
-        """
+        """Reject the command line."""
         invalid = re.search(r"invalid choice: '(.*?)' \(choose from (.*)\)", message)
         if invalid:
             known = re.findall(r"[\w-]+", invalid[2])
@@ -40,11 +36,7 @@ class Parser(argparse.ArgumentParser):
         raise InputError(f"{message}; see `{self.prog} --help`")
 
     def reject_unknown(self, words: Sequence[str]) -> NoReturn:
-        """Reject arguments that the command does not have.
-
-        Raises:
-            InputError: always.
-        """
+        """Reject arguments that the command does not have."""
         word = words[0].partition("=")[0]
         if not word.startswith("-"):
             self.error(f"one argument too many: {words[0]!r}")
@@ -150,11 +142,7 @@ def add_ranks(parser: argparse._ActionsContainer, default: str) -> None:
 
 
 def scene_settings(arguments: argparse.Namespace) -> list[str]:
-    """Return --set and --engine as `KEY=VALUE`.
-
-    Raises:
-        InputError: they contradict each other.
-    """
+    """Return --set and --engine as `KEY=VALUE`."""
     settings: list[str] = list(arguments.set)
     if arguments.engine is None:
         return settings
@@ -166,11 +154,7 @@ def scene_settings(arguments: argparse.Namespace) -> list[str]:
 
 
 def reject_existing(option: str, path: Path | None, *, overwrite: bool) -> None:
-    """Reject an output that exists, before the work and not after it.
-
-    Raises:
-        InputError: it exists and must not be replaced.
-    """
+    """Reject an output that exists, before the work and not after it."""
     if path is not None and path.exists() and not overwrite:
         raise InputError(f"{option} {path}: exists; choose another name or give --overwrite")
 

@@ -24,11 +24,7 @@ if TYPE_CHECKING:
 
 
 def make_folder(file: Path, out: Path, command: str) -> Folder:
-    """Expand a sweep file into its directory, or take up the directory that holds it already.
-
-    Raises:
-        InputError: the sweep is not valid, or the directory holds something else.
-    """
+    """Expand a sweep file into its directory, or take up the directory that holds it already."""
     from templates.sweep.expand import expand  # noqa: PLC0415
 
     sweep = changed_sweep(file)
@@ -85,11 +81,7 @@ def compute(folder: Folder, *, jobs: int | None, command: str) -> list[Outcome]:
 
 
 def raise_failures(folder: Folder, outcomes: Sequence[Outcome]) -> None:
-    """Raise if runs are missing.
-
-    Raises:
-        RunError: a run failed.
-    """
+    """Raise if runs are missing."""
     failed = [outcome for outcome in outcomes if outcome.missing]
     if failed:
         causes = "; ".join(f"{outcome.name}: {outcome.cause}" for outcome in failed)
@@ -157,11 +149,7 @@ def wants_queue(arguments: argparse.Namespace, *, one_run: bool = False) -> bool
 
 
 def draft_of(path: Path, name: str, entries: Sequence[Entry], arguments: argparse.Namespace) -> Draft:
-    """Render a submission of some runs as a command asks for it, see `templates.slurm.submission.draft`.
-
-    Raises:
-        InputError: unknown cluster, or a request beyond its limits.
-    """
+    """Render a submission of some runs as a command asks for it, see `templates.slurm.submission.draft`."""
     from templates.slurm.cluster import shipped_clusters  # noqa: PLC0415
     from templates.slurm.job import Wishes  # noqa: PLC0415
     from templates.slurm.submission import draft, submissions  # noqa: PLC0415

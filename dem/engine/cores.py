@@ -39,11 +39,7 @@ def most_ranks() -> int:
 
 
 def check_ranks(wanted: int) -> None:
-    """Reject more ranks than there are cores: each waits for the others at every step.
-
-    Raises:
-        InputError: there are fewer cores.
-    """
+    """Reject more ranks than there are cores: each waits for the others at every step."""
     most = most_ranks()
     if wanted > most:
         raise InputError(

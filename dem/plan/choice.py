@@ -277,9 +277,6 @@ def pick(expected: Sequence[Measured], *, max_error: float | None, max_hours: fl
 
     Of those that the hours allow the most exact is taken: the reference, else the finest of an engine, and of several
     engines' finest the one whose error is known and least.
-
-    Raises:
-        InputError: as in `choose`.
     """
     quick = [one for one in expected if max_hours is None or one.hours <= max_hours]
     if max_error is None:

@@ -164,11 +164,7 @@ class Done(Document):
     phases: tuple[Phase, ...]
 
     def mark(self, out: Path) -> None:
-        """Write it into a run directory.
-
-        Raises:
-            RunError: It cannot be written.
-        """
+        """Write it into a run directory."""
         (out / FAILED).unlink(missing_ok=True)
         self.write(out / DONE)
 

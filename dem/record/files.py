@@ -63,11 +63,7 @@ def write_text(path: Path, text: str, *, make_folder: bool = True) -> None:
 
 
 def cannot_read(what: str, path: Path, cause: BaseException | str, remedy: str) -> NoReturn:
-    """Report that a file, e.g. a "frame", is missing, truncated or not what it should be.
-
-    Raises:
-        InputError: always.
-    """
+    """Raise InputError: a file, e.g. a "frame", is missing, truncated or not what it should be."""
     if isinstance(cause, BaseException):
         lines = str(cause).strip().splitlines()
         named = ": ".join([type(cause).__name__, *lines[:1]])

@@ -61,11 +61,7 @@ class SeriesWriter:
         self._rows = {name: list(columns[name]) for name in self.described}
 
     def keep_up(self) -> None:
-        """Rewrite the file, unless it was written less than `PERIOD` ago: it is always written whole.
-
-        Raises:
-            RunError: it cannot be written.
-        """
+        """Rewrite the file, unless it was written less than `PERIOD` ago: it is always written whole."""
         if time.monotonic() - self._written >= PERIOD:
             self.write()
 

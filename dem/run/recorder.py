@@ -102,11 +102,7 @@ class Recorder:
         self.next_step = engine.steps + max(1, round((self.samples * self.interval - engine.time) / engine.time_step))
 
     def watch(self, engine: Engine, state: State | None = None) -> None:
-        """Let the watchdog check everything.
-
-        Raises:
-            RunError: it stopped the run.
-        """
+        """Let the watchdog check everything."""
         state, time, watchdog = state or engine.state(), engine.time, self.watchdog
         floor, raised, extremes = engine.boundaries.floor, engine.boundaries.raised, engine.extremes(state)
         if extremes is not None and watchdog.content(extremes, floor=floor, raised=raised):

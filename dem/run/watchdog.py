@@ -115,11 +115,7 @@ class Watchdog:
         )
 
     def check_depths(self, overlaps: Overlaps, *, time: float) -> None:
-        """Check the depths of all contacts at a simulated time [s].
-
-        Raises:
-            RunError: cause, smarticles concerned, time and the way out.
-        """
+        """Check the depths of all contacts at a simulated time [s]."""
         cause = (
             f"contacts more than {self.depth:.3g} m deep (deepest {overlaps.deepest:.3g} m), so that links pass "
             "through each other or through the container"
@@ -154,9 +150,6 @@ class Watchdog:
                 where the work is unknown at present: the ceiling is then forgotten.
             elastic: energy of the springs of contacts and hinges at most [J].
             time: simulated time [s].
-
-        Raises:
-            RunError: cause, smarticles concerned, time and the way out.
         """
         if math.isnan(energy):
             self._ceiling = math.inf

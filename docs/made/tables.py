@@ -47,11 +47,7 @@ def _described(columns: Mapping[str, Any], what: str) -> str:
 
 
 def series_columns() -> str:
-    """Return the datasets of `series.h5`, set by set.
-
-    Raises:
-        LookupError: a dataset is in none of the sets.
-    """
+    """Return the datasets of `series.h5`, set by set."""
     from dem.record import columns  # noqa: PLC0415
 
     sets = {title: getattr(columns, name) for title, name in _SETS}

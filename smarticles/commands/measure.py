@@ -112,11 +112,7 @@ def measure_runs(arguments: argparse.Namespace) -> int:
 
 
 def _groups(arguments: argparse.Namespace) -> list[str]:
-    """Return the columns that --by names.
-
-    Raises:
-        InputError: it names none, or frames are wanted one by one.
-    """
+    """Return the columns that --by names."""
     if arguments.by is None:
         return []
     names = [name.strip() for name in arguments.by.split(",") if name.strip()]

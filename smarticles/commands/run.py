@@ -164,11 +164,7 @@ def _run(
 
 
 def _set_workers(scene: Scene, out: Path, *, resume: bool, threads: int | None, ranks: int | None) -> None:
-    """Set the number of threads, or ranks, by variables that the engine reads when it is loaded.
-
-    Raises:
-        InputError: the engine has none of them, or there are not so many cores.
-    """
+    """Set the number of threads, or ranks, by variables that the engine reads when it is loaded."""
     from dem.engine.cores import (  # noqa: PLC0415
         RANKS,
         check_ranks,

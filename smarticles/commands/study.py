@@ -142,11 +142,7 @@ def _draw(folder: Folder, finished: Sequence[Entry], values: Mapping[str, object
 
 
 def _earlier(results: Path, folder: Folder, study: Study) -> Mapping[str, MeasuredRun]:
-    """Return the runs of a sweep that an earlier analysis measured.
-
-    Raises:
-        InputError: its tables are not enough for this study, cannot be read, or are of other scenes.
-    """
+    """Return the runs of a sweep that an earlier analysis measured."""
     from studies.framework.runs import Wanted, earlier_runs  # noqa: PLC0415
 
     if not study.from_tables:
@@ -158,11 +154,7 @@ def _earlier(results: Path, folder: Folder, study: Study) -> Mapping[str, Measur
 
 
 def _fidelity(name: str, file: Path, fidelity: str) -> dict[str, str]:
-    """Return the constant of a study that --fidelity changes.
-
-    Raises:
-        InputError: there is no such fidelity, the study sets its own, or its scenes are not valid at it.
-    """
+    """Return the constant of a study that --fidelity changes."""
     from dem.setting.fidelity import FIDELITIES  # noqa: PLC0415
     from templates.sweep.expand import expand  # noqa: PLC0415
     from templates.sweep.sweep_file import load_sweep, with_constants  # noqa: PLC0415

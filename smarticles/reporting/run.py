@@ -47,11 +47,7 @@ _MOST_WARNINGS = 30
 
 
 def run_page(directory: Path, accuracy: Path | None) -> str:
-    """Return the page of a run, done or not.
-
-    Raises:
-        InputError: it is no run directory, or a file of it is damaged.
-    """
+    """Return the page of a run, done or not."""
     directory = directory.resolve()
     run, scene = open_run(directory), None
     why_not = ""

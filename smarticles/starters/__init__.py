@@ -11,11 +11,7 @@ KINDS = ("shaken", "actuated", "hook", "melting", "casting", "collapse", "chain"
 
 
 def starter(kind: str) -> str:
-    """Return the text of a scene.
-
-    Raises:
-        InputError: there is no such kind.
-    """
+    """Return the text of a scene."""
     if kind not in KINDS:
         raise InputError(f"{kind!r} is no kind of scene; {nearest(kind, KINDS)}")
     return Path(__file__).with_name(f"{kind}.yaml").read_text(encoding="utf-8")

@@ -279,11 +279,7 @@ class Task:
 
 
 def require_sbatch() -> None:
-    """Reject to submit where Slurm is not installed.
-
-    Raises:
-        InputError: there is no sbatch.
-    """
+    """Reject to submit where Slurm is not installed."""
     if shutil.which("sbatch") is None:
         raise InputError(
             "--submit slurm: there is no `sbatch` on this machine; submit on the cluster, "

@@ -79,11 +79,7 @@ def _check_count(sweep: Sweep, count: int, most: int) -> None:
 
 
 def _sources(sweep: Sweep) -> list[Sequence[Mapping[str, Value]]]:
-    """Return lists of values that are crossed with each other; later ones vary faster.
-
-    Raises:
-        InputError: a variable is set in two of them.
-    """
+    """Return lists of values that are crossed with each other; later ones vary faster."""
     points = sweep.content.points
     sources: dict[str, Sequence[Sequence[Mapping[str, Value]]]] = {
         "constants": [[sweep.content.constants]],

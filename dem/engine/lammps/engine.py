@@ -36,11 +36,7 @@ HEAD = 9  # lines of a dump before its rows
 
 
 def absent(what: str) -> NoReturn:
-    """Reject a call for what LAMMPS has none of here; scenes that call for it are rejected before there is an engine.
-
-    Raises:
-        RunError: always.
-    """
+    """Reject a call for what LAMMPS has none of here; scenes that call for it are rejected before there is an engine."""
     raise RunError(f"engine: lammps has no {what}")
 
 

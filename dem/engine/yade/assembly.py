@@ -111,11 +111,7 @@ class Assembly:
         self._turns = np.concatenate([self._turns, np.tile(boxes.link_rotations, (new, 1, 1, 1))])
 
     def state(self) -> State:
-        """Return poses and velocities of all links.
-
-        Raises:
-            RunError: the simulation has blown up.
-        """
+        """Return poses and velocities of all links."""
         rows = []
         for body, to_body in zip(self._states, self._to_body, strict=True):
             x, v, w, q = body.pos, body.vel, body.angVel, body.ori * to_body

@@ -41,11 +41,7 @@ def rows_of(vectors: Iterable[Any]) -> Array:
 
 
 def load_yade() -> Yade:
-    """Return YADE with an empty simulation.
-
-    Raises:
-        RunError: YADE is not installed.
-    """
+    """Return YADE with an empty simulation."""
     import_yade()
     from yade import utils, wrapper  # noqa: PLC0415 - YADE is imported when an engine is built, not before
     from yade.minieigenHP import Quaternion, Vector3  # noqa: PLC0415
@@ -56,21 +52,13 @@ def load_yade() -> Yade:
 
 
 def yade_version() -> str:
-    """Return the version of the YADE that runs.
-
-    Raises:
-        RunError: YADE is not installed.
-    """
+    """Return the version of the YADE that runs."""
     import_yade()
     return str(importlib.import_module("yade.config").version)
 
 
 def yade_threads() -> int:
-    """Return the number of threads that YADE runs with here: OMP_NUM_THREADS, by default 1.
-
-    Raises:
-        RunError: YADE is not installed.
-    """
+    """Return the number of threads that YADE runs with here: OMP_NUM_THREADS, by default 1."""
     import_yade()
     from yade import wrapper  # noqa: PLC0415
 
