@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -64,7 +65,7 @@ def plan_scene(arguments: argparse.Namespace) -> int:
     choice = _chosen(scene, arguments)
     planned = plan(scene) if choice is None else choice.planned
     if arguments.json:
-        content = planned.to_dict() | ({} if choice is None else {"choice": choice.to_dict()})
+        content = asdict(planned) | ({} if choice is None else {"choice": choice.to_dict()})
         print(as_json(content))
         return 0
     if choice is not None:

@@ -13,13 +13,7 @@ from smarticles.starters import KINDS, about, starter
 
 
 def add(commands: Commands) -> None:
-    """Add the commands."""
-    _add_init(commands)
-    _add_schema(commands)
-
-
-def _add_init(commands: Commands) -> None:
-    """Add `init`."""
+    """Add `init` and `schema`."""
     init = commands.add(
         "init",
         write_scene,
@@ -36,6 +30,17 @@ def _add_init(commands: Commands) -> None:
     )
     init.add_argument(
         "--output", type=Path, default=Path("scene.yaml"), metavar="FILE.yaml", help="default: scene.yaml"
+    )
+    commands.add(
+        "schema",
+        print_schema,
+        summary="print the JSON schema of scene files",
+        text="""
+Every key with its unit, default and meaning. Editors use it to complete and check scenes: put
+`# yaml-language-server: $schema=scene.schema.json` on the first line of a scene.""",
+        examples="""\
+  smarticles schema > scene.schema.json
+""",
     )
 
 
@@ -55,21 +60,6 @@ def write_scene(arguments: argparse.Namespace) -> int:
     print(f"{output}: {about(arguments.kind)}")
     print(f"next: smarticles plan {place}, smarticles run {place} --out {run}")
     return 0
-
-
-def _add_schema(commands: Commands) -> None:
-    """Add `schema`."""
-    commands.add(
-        "schema",
-        print_schema,
-        summary="print the JSON schema of scene files",
-        text="""
-Every key with its unit, default and meaning. Editors use it to complete and check scenes: put
-`# yaml-language-server: $schema=scene.schema.json` on the first line of a scene.""",
-        examples="""\
-  smarticles schema > scene.schema.json
-""",
-    )
 
 
 def print_schema(_: argparse.Namespace) -> int:

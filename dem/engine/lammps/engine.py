@@ -36,7 +36,7 @@ HEAD = 9  # lines of a dump before its rows
 
 
 def absent(what: str) -> NoReturn:
-    """Reject a call for what LAMMPS has none of here; scenes that call for it are rejected before there is an engine."""
+    """Reject a call for what this engine lacks; scenes that need it are rejected before they run."""
     raise RunError(f"engine: lammps has no {what}")
 
 
