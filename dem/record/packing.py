@@ -10,12 +10,7 @@ from dem.arrays import Array
 
 
 def second_highest(heights: Array) -> float:
-    """Return the second-highest of (N,) heights; NaN for fewer than two.
-
-    Example:
-        >>> second_highest(np.array([0.01, 0.04, 0.02, 0.03]))
-        0.03
-    """
+    """Return the second-highest of (N,) heights; NaN for fewer than two."""
     return float(np.partition(heights, -2)[-2]) if len(heights) > 1 else math.nan
 
 

@@ -21,7 +21,7 @@ from dem.engine.effect import EffectName
 from dem.errors import nearest, shown
 from dem.phases.kinds import AnyPhase
 from dem.phases.pull_hook import with_pull_defaults
-from dem.scene.rules import check
+from dem.scene.rules import problems
 from dem.setting.contact import Contact
 from dem.setting.container import Container, Cylinder
 from dem.setting.fidelity import FIDELITIES, Fidelity, fidelities
@@ -110,7 +110,8 @@ class Scene(Part):
 
     @model_validator(mode="after")
     def _consistent(self) -> Self:
-        check(self, self.engine)
+        for problem in problems(self, self.engine):
+            raise ValueError(problem)
         return self
 
     @cached_property

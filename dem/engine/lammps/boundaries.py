@@ -119,11 +119,9 @@ class LammpsBoundaries:
 
     @property
     def memory(self) -> dict[str, Any]:
-        """Plain data that `restore` needs."""
         parts = {name: [part.base, part.amplitude] for name, part in self._parts.items()}
         return {"walled": self.walled, "omega": self._omega, "begun": self._begun, "parts": parts}
 
     def restore(self, memory: Mapping[str, Any]) -> None:
-        """Go on from where `memory` was taken; the caller sends `variables`."""
         self.walled, self._omega, self._begun = memory["walled"], memory["omega"], memory["begun"]
         self._parts = {name: Part(*numbers) for name, numbers in memory["parts"].items()}

@@ -55,17 +55,14 @@ class Contacts:
         )
 
     def neighbours(self) -> Numbers:
-        """Return for each smarticle (N,) how many others it touches."""
         ordered = np.sort(self.pairs, axis=1)
         both = np.unique(ordered[:, 0] * self.count + ordered[:, 1])
         return np.bincount(np.concatenate(np.divmod(both, max(1, self.count))), minlength=self.count)
 
     def touches(self) -> Numbers:
-        """Return the number (N,) of contacts of each smarticle, sphere by sphere."""
         return np.bincount(np.concatenate([self.pairs.ravel(), self.fixed]), minlength=self.count)
 
     def overlaps(self, limit: float, law: ContactLaw) -> Overlaps:
-        """Return the overlaps of all contacts, with the smarticles that have one deeper than a limit [m]."""
         deep = np.zeros(self.count, dtype=np.bool_)
         deep[self.pairs[self.depths > limit]] = True
         deep[self.fixed[self.fixed_depths > limit]] = True

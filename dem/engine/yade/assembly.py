@@ -23,13 +23,7 @@ from dem.errors import reject
 
 
 class Assembly:
-    """All smarticles as bodies of YADE.
-
-    Args:
-        hinge_law: stiffness of the hinges; None: smarticles stay welded.
-        planar: whether all motion is confined to the plane z = 0.
-        strengths: (N, 2) factors on torque limit and stiffness of the motors [1]; None: all are equal.
-    """
+    """All smarticles as bodies of YADE; arguments as in `YadeEngine`."""
 
     def __init__(
         self,
@@ -59,7 +53,6 @@ class Assembly:
 
     @property
     def count(self) -> int:
-        """Number of smarticles."""
         return len(self._spheres)
 
     @property
@@ -83,7 +76,6 @@ class Assembly:
         self._states = [bodies[body].state for body in self._ids]
 
     def add(self, poses: Poses, *, speed: float = 0.0) -> None:
-        """Add smarticles of the particle's own shape, which fall at a speed [m/s] and do not turn."""
         particle, omega, still = self._particle, self._yade.omega, np.zeros(3)
         falling = np.array([0.0, 0.0, -speed])
         for position, rotation in zip(poses.positions, poses.rotations, strict=True):
@@ -111,7 +103,6 @@ class Assembly:
         self._turns = np.concatenate([self._turns, np.tile(boxes.link_rotations, (new, 1, 1, 1))])
 
     def state(self) -> State:
-        """Return poses and velocities of all links."""
         rows = []
         for body, to_body in zip(self._states, self._to_body, strict=True):
             x, v, w, q = body.pos, body.vel, body.angVel, body.ori * to_body
@@ -134,7 +125,6 @@ class Assembly:
         return State.rigid(boxes, positions, rotations, velocities, spins, shapes=(self._arms, self._turns))
 
     def still(self) -> None:
-        """Set all velocities to zero, while welded."""
         assert self.hinges is None  # motors would set links in motion again
         nought, bodies = self._yade.vector(0, 0, 0), self._yade.omega.bodies
         # Contact laws read the members' own velocities, before the integrator has moved them.
@@ -247,7 +237,6 @@ class Assembly:
 
     @property
     def memory(self) -> dict[str, Any]:
-        """Plain data that `restore` needs."""
         return {
             "spheres": self._spheres,
             "bodies": self._ids,
@@ -258,7 +247,6 @@ class Assembly:
         }
 
     def restore(self, memory: Mapping[str, Any]) -> None:
-        """Go on from where `memory` was taken, in a simulation that was loaded."""
         self._spheres = [list(spheres) for spheres in memory["spheres"]]
         self.smarticle_of = {sphere: k for k, spheres in enumerate(self._spheres) for sphere in spheres}
         self._ids = list(memory["bodies"])

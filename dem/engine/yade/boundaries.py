@@ -56,11 +56,9 @@ class YadeBoundaries:
 
     @property
     def memory(self) -> dict[str, Any]:
-        """Plain data that `restore` needs besides the loaded simulation."""
         return {"moving": self.moving, "sums": self._totals.tolist()}
 
     def restore(self, memory: Mapping[str, Any]) -> None:
-        """Go on from where `memory` was taken."""
         self.moving = list(memory["moving"])
         self._sums = [self._yade.vector(*row) for row in memory["sums"]]
 

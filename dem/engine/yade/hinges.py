@@ -233,7 +233,6 @@ class Hinges:
 
     @property
     def memory(self) -> dict[str, Any]:
-        """Plain data that `restored` needs."""
         return {
             "nodes": self._nodes,
             "angles": self._angles.tolist(),

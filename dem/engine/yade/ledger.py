@@ -173,9 +173,7 @@ class YadeLedger:
 
     @property
     def memory(self) -> dict[str, float]:
-        """Plain data that `restore` needs."""
         return {name: getattr(self, name) for name in _SUMS}
 
     def restore(self, memory: Mapping[str, float]) -> None:
-        """Go on from where `memory` was taken."""
         self.container_work, self.added, self.dissipated = (memory[name] for name in _SUMS)

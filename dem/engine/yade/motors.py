@@ -90,11 +90,9 @@ class YadeMotors:
 
     @property
     def memory(self) -> dict[str, Any] | None:
-        """Plain data that `restore` needs besides the loaded simulation."""
         return None if self.control is None else self.control.memory
 
     def restore(self, memory: Mapping[str, Any] | None) -> None:
-        """Go on from where `memory` was taken."""
         if memory is not None:
             assert self._law is not None  # a checkpoint belongs to its scene
             self.control = Motors(self._law, np.zeros((self._assembly.count, 2)), self._strengths)

@@ -112,7 +112,6 @@ class YadeStrings:
 
     @property
     def memory(self) -> dict[str, Any] | None:
-        """Plain data that `restore` needs besides the loaded simulation."""
         if self._law is None or not self.tied:
             return None
         return {
@@ -123,7 +122,6 @@ class YadeStrings:
         }
 
     def restore(self, memory: Mapping[str, Any] | None) -> None:
-        """Go on from where `memory` was taken, in a simulation that was loaded."""
         if memory is not None:
             self._law = StringLaw(**memory["law"])
             self._bind([End(**end) for end in memory["ends"]], memory["anchors"], memory["sums"])
