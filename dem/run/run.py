@@ -88,7 +88,11 @@ def run_scene(
                     simulation.warn(warning)
                 if resume:
                     _restore(simulation, saved, threads)
-                return _finish(simulation)
+                phases, engine = simulation.run(), simulation.engine
+                wall, cpu = simulation.wall, simulation.cpu
+                done = Done(time_s=engine.time, steps=engine.steps, wall_s=wall, cpu_s=cpu, phases=phases)
+                done.mark(out)
+                return done
             except (Exception, KeyboardInterrupt) as error:
                 cause = _mark_ended(simulation, out, log, error)
                 if isinstance(error, RunError):
@@ -141,16 +145,6 @@ def _restore(simulation: Simulation, saved: tuple[Checkpoint, str | None] | None
             "never stopped"
         )
     log.info("resumed from the checkpoint of t = %.4f s", simulation.engine.time)
-
-
-def _finish(simulation: Simulation) -> Done:
-    """Run to the end and mark the run as done."""
-    phases, engine = simulation.run(), simulation.engine
-    done = Done(
-        time_s=engine.time, steps=engine.steps, wall_s=simulation.wall, cpu_s=simulation.cpu, phases=tuple(phases)
-    )
-    done.mark(simulation.folder)
-    return done
 
 
 def _mark_ended(simulation: Simulation | None, out: Path, log: logging.Logger, error: BaseException) -> str:
