@@ -52,13 +52,7 @@ class Commands:
         self.parsers: dict[str, Parser] = {}
 
     def add(self, name: str, handler: Handler, *, summary: str, text: str, examples: str) -> Parser:
-        """Add a subcommand.
-
-        Args:
-            summary: one line for the list of commands.
-            text: what it does and what to expect, for its own help.
-            examples: command lines that work, with what they do.
-        """
+        """Add a subcommand: a line for the list of commands; text and examples for its own help."""
         parser: Parser = self._subparsers.add_parser(
             name,
             help=summary,

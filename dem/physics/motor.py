@@ -44,12 +44,7 @@ class MotorLaw:
 
 
 def speed_factor(law: int, over: Any) -> Any:
-    """Return the factor on a motor's greatest speed [1].
-
-    Args:
-        law: number of the law in `LAWS`.
-        over: whether the torque is at its limit.
-    """
+    """Return the factor on a motor's greatest speed [1]; arguments as in `halts`."""
     return 1.0 - (1.0 - EASED) * over if law == EASE else 1.0
 
 
