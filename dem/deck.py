@@ -13,9 +13,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
+from dem.arrays import Array
 from dem.body.state import State
 from dem.engine.demand import contact_law_of
 from dem.engine.lammps import text
@@ -32,7 +32,6 @@ from dem.scene.reading import scene_hash
 from dem.scene.rules import foreign
 from dem.scene.scene import Scene
 
-Array = NDArray[np.float64]
 PassivePhase = TakeOver | Relax | Shake | RemoveContainer
 
 
@@ -58,8 +57,7 @@ class PassiveScene:
     def turns(self) -> Array:
         """(N, 3, 3) body frame to laboratory frame."""
         own = self.scene.particle.boxes.link_rotations[1]
-        turns: Array = self.state.link_rotations[:, 1] @ own.T
-        return turns
+        return np.asarray(self.state.link_rotations[:, 1] @ own.T)
 
     @property
     def spheres(self) -> Array:
@@ -75,11 +73,10 @@ def passive(scene: Scene) -> PassiveScene:
     """
     found = list(_foreign(scene))
     if found:
-        msg = (
+        raise InputError(
             f"cannot be carried over to LAMMPS: {'; '.join(found)}; leave that out, or run the scene here "
             "(smarticles run)"
         )
-        raise InputError(msg)
     first, *others = scene.phases
     assert isinstance(first, TakeOver)  # all others were named
     first.ready(scene)
@@ -99,12 +96,11 @@ def passive(scene: Scene) -> PassiveScene:
     pairs = near.query_pairs(scene.sphere_diameter * (1 - DEEPEST), output_type="ndarray")
     deep = pairs[owners[pairs[:, 0]] != owners[pairs[:, 1]]]
     if len(deep):
-        msg = (
+        raise InputError(
             f"phases.0.run: {len(deep)} pairs of spheres in {first.taken} overlap by more than {DEEPEST:g} diameters, "
             "as those of another engine or fidelity do, and would fly apart in LAMMPS; run this scene's take-over "
             "and a relax phase here (engine: yade), and take over that run"
         )
-        raise InputError(msg)
     return given
 
 
@@ -129,13 +125,11 @@ def write_deck(scene: Scene, folder: Path) -> None:
     """
     given = passive(scene)
     if folder.exists():
-        msg = f"--output {folder}: exists; choose another name"
-        raise InputError(msg)
+        raise InputError(f"--output {folder}: exists; choose another name")
     try:
         folder.mkdir()
     except OSError as error:
-        msg = f"--output {folder}: cannot be made ({error.strerror}); choose another place"
-        raise InputError(msg) from None
+        raise InputError(f"--output {folder}: cannot be made ({error.strerror}); choose another place") from None
     spheres, state = given.spheres, given.state
     still = np.zeros((state.count, 3))
     title = f"Spheres of {len(spheres)} smarticles, {spheres.shape[1]} each: {_one_line(scene.name)}"

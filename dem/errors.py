@@ -13,23 +13,17 @@ class RunError(RuntimeError):
     """A run failed: unstable, not settled, out of disk. Exit status 1."""
 
 
-def refuse(concerned: Any, time: float, cause: str, way_out: str) -> None:
-    """Stop a run if any of the smarticles is concerned.
+def reject(concerned: Any, time: float, cause: str, way_out: str) -> None:
+    """Stop a run by RunError if any of the smarticles is concerned.
 
     Args:
         concerned: (N,) bool array.
         time: simulated time [s].
-        cause: what is wrong with them.
-        way_out: what to do about it.
-
-    Raises:
-        RunError: cause, smarticles concerned, time and the way out.
     """
     if concerned.any():
         ids = concerned.nonzero()[0]
         shown = ", ".join(str(k) for k in ids[:5]) + (", …" if len(ids) > 5 else "")
-        msg = f"at t = {time:.4f} s: {len(ids)} smarticle(s) ({shown}): {cause}; {way_out}"
-        raise RunError(msg)
+        raise RunError(f"at t = {time:.4f} s: {len(ids)} smarticle(s) ({shown}): {cause}; {way_out}")
 
 
 def shown(value: object) -> str:

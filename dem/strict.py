@@ -86,15 +86,12 @@ class Strict(BaseModel):
             annotation = known[key].annotation
             for item in value if isinstance(value, list) else [value]:
                 if isinstance(item, bool) and annotation not in (bool, Any):
-                    msg = f"{key}: got the boolean {str(item).lower()}, expected {_kind(annotation)}"
-                    raise ValueError(msg)
+                    raise ValueError(f"{key}: got the boolean {str(item).lower()}, expected {_kind(annotation)}")
                 if isinstance(item, str) and _kind(annotation) == "a number":
-                    msg = f"{key}: got the text {shown(item)}, expected a number; {_as_a_number(item)}"
-                    raise ValueError(msg)
+                    raise ValueError(f"{key}: got the text {shown(item)}, expected a number; {_as_a_number(item)}")
         for key in data:
             if key not in known:
-                msg = f"unknown key {shown(key)}; {cls.nearest_key(str(key))}"
-                raise ValueError(msg)
+                raise ValueError(f"unknown key {shown(key)}; {cls.nearest_key(str(key))}")
         return data
 
 
@@ -122,13 +119,7 @@ def _kind(annotation: Any) -> str:
 
 
 def explained(error: ValidationError, data: Any, *, described: str) -> str:
-    """Return pydantic's errors as `key: value and what is wrong with it; way out`, the first few of them in one line.
-
-    Args:
-        error: what pydantic found.
-        data: what it was given.
-        described: where the keys are described, for one that is missing.
-    """
+    """Return pydantic's first errors as `key: value and what is wrong; way out`, in one line."""
     texts: dict[str, str] = {}
     filled: set[str] = set()  # places of values that the file does not hold
     for found in error.errors(include_url=False):

@@ -63,8 +63,7 @@ if not TYPE_CHECKING:  # so that a type checker knows no other names
         elif name in __all__:
             value = getattr(import_module(_MODULES.get(name, "smarticles.public")), name)
         else:
-            msg = f"module {__name__!r} has no attribute {name!r}; known: {', '.join(sorted(__all__))}"
-            raise AttributeError(msg)
+            raise AttributeError(f"module {__name__!r} has no attribute {name!r}; known: {', '.join(sorted(__all__))}")
         globals()[name] = value
         return value
 

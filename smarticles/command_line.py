@@ -6,9 +6,10 @@ import argparse
 import json
 import math
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from pathlib import Path
-from typing import Any, NoReturn
+from typing import Any, NoReturn, TypeVar
 
 from dem.engine import ENGINES
 from dem.errors import InputError, nearest
@@ -25,26 +26,17 @@ class Parser(argparse.ArgumentParser):
         super().__init__(allow_abbrev=False, **options)
 
     def error(self, message: str) -> NoReturn:
-        """Reject the command line.
-
-        Raises:
-            InputError: always.
-        """
+        """Reject the command line."""
         invalid = re.search(r"invalid choice: '(.*?)' \(choose from (.*)\)", message)
         if invalid:
             known = re.findall(r"[\w-]+", invalid[2])
             what = message.partition(":")[0].removeprefix("argument ")
             message = f"{what}: {invalid[1]!r} is not known; {nearest(invalid[1], known)}"
         message = re.sub(r"invalid (?:float|int) value: ('.*')", r"\1 is not a number", message, flags=re.DOTALL)
-        msg = f"{message}; see `{self.prog} --help`"
-        raise InputError(msg)
+        raise InputError(f"{message}; see `{self.prog} --help`")
 
     def reject_unknown(self, words: Sequence[str]) -> NoReturn:
-        """Reject arguments that the command does not have.
-
-        Raises:
-            InputError: always.
-        """
+        """Reject arguments that the command does not have."""
         word = words[0].partition("=")[0]
         if not word.startswith("-"):
             self.error(f"one argument too many: {words[0]!r}")
@@ -60,15 +52,7 @@ class Commands:
         self.parsers: dict[str, Parser] = {}
 
     def add(self, name: str, handler: Handler, *, summary: str, text: str, examples: str) -> Parser:
-        """Add a subcommand.
-
-        Args:
-            name: its name.
-            handler: does its work.
-            summary: one line for the list of commands.
-            text: what it does and what to expect, for its own help.
-            examples: command lines that work, with what they do.
-        """
+        """Add a subcommand: a line for the list of commands; text and examples for its own help."""
         parser: Parser = self._subparsers.add_parser(
             name,
             help=summary,
@@ -76,27 +60,47 @@ class Commands:
             epilog=f"examples:\n{examples.rstrip()}",
         )
         parser.set_defaults(handler=handler)
-        add_debug(parser, default=argparse.SUPPRESS)
+        add_shared(parser, "--debug", default=argparse.SUPPRESS)
         self.parsers[name] = parser
         return parser
+
+
+# -- arguments ---------------------------------------------------------------------------------------------------------
+
+Read = TypeVar("Read")
+
+
+def reader(convert: Callable[[str], Read], what: str, valid: Callable[[Read], bool]) -> Callable[[str], Read]:
+    """Return the reader of an argument, which rejects what cannot be converted or is not valid."""
+
+    def read(text: str) -> Read:
+        with suppress(ValueError):
+            if valid(value := convert(text)):
+                return value
+        raise argparse.ArgumentTypeError(f"must be {what}: got {text!r}")
+
+    return read
+
+
+positive_number = reader(float, "a number above 0", lambda number: 0 < number < math.inf)
+positive_int = reader(int, "a whole number from 1", lambda number: number >= 1)
 
 
 # -- options that several commands have --------------------------------------------------------------------------------
 
 
-def add_debug(parser: Parser, default: Any = False) -> None:
-    """Add --debug."""
-    parser.add_argument("--debug", action="store_true", default=default, help="show the traceback of an error")
+_SHARED: Mapping[str, Mapping[str, Any]] = {
+    "--debug": {"action": "store_true", "help": "show the traceback of an error"},
+    "--json": {"action": "store_true", "help": "print JSON, for programs"},
+    "--overwrite": {"action": "store_true", "help": "replace a file that exists"},
+    "--jobs": {"type": positive_int, "metavar": "N", "help": "runs at once; default: one per core"},
+}
 
 
-def add_json(parser: Parser) -> None:
-    """Add --json."""
-    parser.add_argument("--json", action="store_true", help="print JSON, for programs")
-
-
-def add_overwrite(parser: Parser) -> None:
-    """Add --overwrite."""
-    parser.add_argument("--overwrite", action="store_true", help="replace a file that exists")
+def add_shared(parser: Parser, *options: str, **settings: Any) -> None:
+    """Add options that several commands have, by their names."""
+    for option in options:
+        parser.add_argument(option, **_SHARED[option], **settings)
 
 
 def add_scene(parser: Parser, what: str) -> None:
@@ -121,11 +125,6 @@ def add_engine(parser: Parser, what: str) -> None:
     )
 
 
-def add_jobs(parser: Parser) -> None:
-    """Add --jobs."""
-    parser.add_argument("--jobs", type=positive_int, metavar="N", help="runs at once; default: one per core")
-
-
 def add_ranks(parser: argparse._ActionsContainer, default: str) -> None:
     """Add --ranks; `default` for the help."""
     parser.add_argument(
@@ -137,55 +136,21 @@ def add_ranks(parser: argparse._ActionsContainer, default: str) -> None:
 
 
 def scene_settings(arguments: argparse.Namespace) -> list[str]:
-    """Return --set and --engine as `KEY=VALUE`.
-
-    Raises:
-        InputError: they contradict each other.
-    """
+    """Return --set and --engine as `KEY=VALUE`."""
     settings: list[str] = list(arguments.set)
     if arguments.engine is None:
         return settings
     for setting in settings:
         key, _, value = setting.partition("=")
         if key.strip() == "engine" and value.strip() != arguments.engine:
-            msg = f"--engine {arguments.engine}: --set {setting} says another one; leave one of them out"
-            raise InputError(msg)
+            raise InputError(f"--engine {arguments.engine}: --set {setting} says another one; leave one of them out")
     return [*settings, f"engine={arguments.engine}"]
 
 
 def reject_existing(option: str, path: Path | None, *, overwrite: bool) -> None:
-    """Reject an output that exists, before the work and not after it.
-
-    Raises:
-        InputError: it exists and must not be replaced.
-    """
+    """Reject an output that exists, before the work and not after it."""
     if path is not None and path.exists() and not overwrite:
-        msg = f"{option} {path}: exists; choose another name or give --overwrite"
-        raise InputError(msg)
-
-
-def positive_number(text: str) -> float:
-    """Read a finite number above 0."""
-    try:
-        number = float(text)
-    except ValueError:
-        number = 0.0
-    if not 0 < number < math.inf:
-        msg = f"must be a number above 0: got {text!r}"
-        raise argparse.ArgumentTypeError(msg)
-    return number
-
-
-def positive_int(text: str) -> int:
-    """Read a whole number from 1."""
-    try:
-        number = int(text)
-    except ValueError:
-        number = 0
-    if number < 1:
-        msg = f"must be a whole number from 1: got {text!r}"
-        raise argparse.ArgumentTypeError(msg)
-    return number
+        raise InputError(f"{option} {path}: exists; choose another name or give --overwrite")
 
 
 # -- output ------------------------------------------------------------------------------------------------------------

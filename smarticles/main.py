@@ -20,7 +20,7 @@ from types import FrameType
 from typing import Any
 
 from dem.errors import InputError, RunError
-from smarticles.command_line import Commands, Parser, add_debug
+from smarticles.command_line import Commands, Parser, add_shared
 from smarticles.commands import (
     accuracy,
     compare,
@@ -87,7 +87,7 @@ def build_parser() -> tuple[Parser, Commands]:
         metavar="SHELL",
         help=f"print the completion script of a shell ({', '.join(_SHELLS)}) and end",
     )
-    add_debug(parser)
+    add_shared(parser, "--debug")
     commands = Commands(parser)
     for add in COMMANDS:
         add(commands)
@@ -121,12 +121,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def guarded(action: Callable[[], int], *, debug: bool = False) -> int:
-    """Return the exit status of an action; every way in which it can end becomes one line and a status here.
-
-    Args:
-        action: what to do; returns its exit status.
-        debug: whether to show the traceback of an error.
-    """
+    """Return the exit status of an action; every way in which it can end becomes one line and a status here."""
     try:
         with orderly_stop():
             status = action()

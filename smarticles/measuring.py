@@ -32,10 +32,7 @@ def has_frames(directory: Path) -> bool:
 
 
 def sources(directories: Sequence[Path]) -> dict[Path, Mapping[str, Any]]:
-    """Return the run directories among, or inside, the given ones, with what their sweeps varied.
-
-    Args:
-        directories: of runs; a sweep's stands for its runs with frames.
+    """Return runs, and of each sweep its runs with frames, with what their sweeps varied.
 
     Raises:
         InputError: a sweep has no run with frames yet.
@@ -79,8 +76,6 @@ def measured(
     """Return measures of runs and sweeps, one row per run and phase, with what a sweep varies beside the run.
 
     Args:
-        directories: of runs and sweeps.
-        frames: one row per frame instead.
         costly: when to take the costly packing fractions, see `postprocess.measure_run`.
         jobs: runs that are measured at once, each in a process of its own; more than one only in programs from which
             processes may be started: not in a script without a guarded main.
@@ -123,11 +118,7 @@ def _table(directory: Path, values: Mapping[str, Any], *, frames: bool, costly: 
 
 
 def grouped(table: pd.DataFrame, by: Sequence[str]) -> pd.DataFrame:
-    """Return means over runs, one row per group and phase; see `postprocess.statistics.points.means_by`.
-
-    Args:
-        table: of `measured`, one row per run and phase.
-        by: columns whose values make a group.
+    """Return means of `measured` over runs, one row per group and phase.
 
     Raises:
         InputError: there is no such column.
@@ -137,6 +128,5 @@ def grouped(table: pd.DataFrame, by: Sequence[str]) -> pd.DataFrame:
     for name in by:
         if name not in table.columns:
             known = [str(column) for column in table.columns if not str(column).endswith("]")]
-            msg = f"{name!r} is no column of these runs; {nearest(name, known)}"
-            raise InputError(msg)
+            raise InputError(f"{name!r} is no column of these runs; {nearest(name, known)}")
     return means_by(table, [*by, *(name for name in PHASE if name not in by)])

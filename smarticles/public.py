@@ -69,8 +69,7 @@ class SweepDirectory(Sequence[Run]):
             InputError: no run has frames yet, there is no such column, or groups of frames are asked for.
         """
         if by is not None and frames:
-            msg = "by: averages over phases of runs; leave frames out"
-            raise InputError(msg)
+            raise InputError("by: averages over phases of runs; leave frames out")
         table = measured([self.path], frames=frames)
         return table if by is None else grouped(table, [by] if isinstance(by, str) else list(by))
 
@@ -83,10 +82,8 @@ def run(
     Of its own, because YADE and PyVista must not be loaded in one process.
 
     Args:
-        scene: a scene, or the file of one.
         out: the run directory; must not exist or be empty, or with `resume` hold an unfinished run of this scene.
         threads: of the engine; only one gives the same bits again.
-        ranks: processes of the engine lammps; default: one.
         resume: go on from the last checkpoint.
 
     Raises:
@@ -122,7 +119,6 @@ def measure(run: Run | Path | str, *, frames: bool = False) -> pd.DataFrame:
     """Return all measures of a run as a table, units in its column names, as `smarticles measure` does.
 
     Args:
-        run: a run, or its directory.
         frames: one row per frame; else one per phase, means over its last frames with their standard errors.
 
     Raises:
@@ -157,17 +153,13 @@ def sweep(
             columns `aspect_ratio` and `seed`.
         jobs: runs at once; by default one per core.
 
-    Returns:
-        The runs, in the sweep's order.
-
     Raises:
         InputError: a scene or the sweep is not valid, or the directory holds something else.
         RunError: a run failed.
     """
     with tempfile.TemporaryDirectory(prefix="smarticles-") as scratch:
         if vary is None and isinstance(what, Scene):
-            msg = "vary: is missing; give the keys of the scene that change, e.g. vary={'seed': [1, 2, 3]}"
-            raise InputError(msg)
+            raise InputError("vary: is missing; give the keys of the scene that change, e.g. vary={'seed': [1, 2, 3]}")
         file = write_sweep(what, vary, Path(scratch)) if vary is not None else Path(str(what))
         # The scenes of a sweep without a file are in its directory, and `resume` needs no more.
         words = ["sweep", str(file), "--out", str(out), "--submit", "local"] if vary is None else ["resume", str(out)]
@@ -181,27 +173,20 @@ def sweep(
 
 
 def write_sweep(scene: Scene | Path | str, vary: Mapping[str, Sequence[Any]], folder: Path) -> Path:
-    """Write `sweep.yaml` and `scene.yaml.j2`, and return the former.
-
-    Args:
-        scene: a scene, or the file of one.
-        vary: keys of the scene, dots for nesting, and the values of each; all combinations are runs.
-        folder: where to write them.
+    """Write `sweep.yaml` and `scene.yaml.j2` for all combinations of `vary`; return the former.
 
     Raises:
         InputError: the scene cannot be read, has no such place or holds marks of a template, or there is nothing to
             vary.
     """
     if not vary:
-        msg = "vary: is empty; give a key of the scene and its values, e.g. {'seed': [1, 2, 3]}"
-        raise InputError(msg)
+        raise InputError("vary: is empty; give a key of the scene and its values, e.g. {'seed': [1, 2, 3]}")
     data = _plain(scene) if isinstance(scene, Scene) else _read(Path(scene))
     text = yaml.safe_dump(data, sort_keys=False, allow_unicode=True)
     for mark in ("{{", "{%", "{#"):
         if mark in text:
             name = "scene" if isinstance(scene, Scene) else scene
-            msg = f"{name}: holds {mark!r}, which a template would take for its own; write it without"
-            raise InputError(msg)
+            raise InputError(f"{name}: holds {mark!r}, which a template would take for its own; write it without")
     # The last word of a key names its variable, or all of its words where another key ends alike.
     last = [key.rpartition(".")[2] for key in vary]
     names = {
@@ -245,8 +230,7 @@ def _read(path: Path) -> dict[str, Any]:
         msg = f"{path}: cannot be read ({' '.join(str(error).split())}); give a scene or the path of a scene file"
         raise InputError(msg) from None
     if not isinstance(data, dict):
-        msg = f"{path}: a scene is a mapping of keys to values, got {type(data).__name__}"
-        raise InputError(msg)
+        raise InputError(f"{path}: a scene is a mapping of keys to values, got {type(data).__name__}")
     for phase in data["phases"] if isinstance(data.get("phases"), list) else ():
         # Relative to the scene file; the template lies elsewhere.
         if isinstance(phase, dict) and isinstance(phase.get("run"), str):

@@ -24,11 +24,7 @@ if TYPE_CHECKING:
 
 
 def make_folder(file: Path, out: Path, command: str) -> Folder:
-    """Expand a sweep file into its directory, or take up the directory that holds it already.
-
-    Raises:
-        InputError: the sweep is not valid, or the directory holds something else.
-    """
+    """Expand a sweep file into its directory, or take up the directory that holds it already."""
     from templates.sweep.expand import expand  # noqa: PLC0415
 
     sweep = changed_sweep(file)
@@ -81,24 +77,18 @@ def compute(folder: Folder, *, jobs: int | None, command: str) -> list[Outcome]:
     try:
         return run_folder(folder, Display(Console(stderr=True)), slots=jobs)
     except KeyboardInterrupt:
-        msg = f"finished runs are kept; go on with: {command}"
-        raise KeyboardInterrupt(msg) from None
+        raise KeyboardInterrupt(f"finished runs are kept; go on with: {command}") from None
 
 
 def raise_failures(folder: Folder, outcomes: Sequence[Outcome]) -> None:
-    """Raise if runs are missing.
-
-    Raises:
-        RunError: a run failed.
-    """
+    """Raise if runs are missing."""
     failed = [outcome for outcome in outcomes if outcome.missing]
     if failed:
         causes = "; ".join(f"{outcome.name}: {outcome.cause}" for outcome in failed)
-        msg = (
+        raise RunError(
             f"{folder.path}: {len(failed)} of {len(outcomes)} runs are missing: {causes}; "
             f"logs are in {folder.path / 'logs'}, start them again: smarticles resume {folder.path}"
         )
-        raise RunError(msg)
 
 
 def complete_here(folder: Folder, arguments: argparse.Namespace) -> int:
@@ -140,11 +130,7 @@ def add_cluster_options(parser: Parser) -> None:
 
 
 def wants_queue(arguments: argparse.Namespace, *, one_run: bool = False) -> bool:
-    """Return whether the runs are for a cluster.
-
-    Args:
-        arguments: of the command.
-        one_run: whether they name one run, which may have ranks here too.
+    """Return whether the runs are for a cluster; one run may have ranks here too.
 
     Raises:
         InputError: an option for a cluster is given although they are not, or there is no Slurm here to submit to.
@@ -158,17 +144,12 @@ def wants_queue(arguments: argparse.Namespace, *, one_run: bool = False) -> bool
     for name in _OPTIONS:
         if getattr(arguments, name) is not None and not (one_run and name == "ranks"):
             option = f"--{name.replace('_', '-')}"
-            msg = f"{option}: is for a cluster; give --submit slurm, or --submit none with --cluster NAME"
-            raise InputError(msg)
+            raise InputError(f"{option}: is for a cluster; give --submit slurm, or --submit none with --cluster NAME")
     return False
 
 
 def draft_of(path: Path, name: str, entries: Sequence[Entry], arguments: argparse.Namespace) -> Draft:
-    """Render a submission of some runs as a command asks for it, see `templates.slurm.submission.draft`.
-
-    Raises:
-        InputError: unknown cluster, or a request beyond its limits.
-    """
+    """Render a submission of some runs as a command asks for it, see `templates.slurm.submission.draft`."""
     from templates.slurm.cluster import shipped_clusters  # noqa: PLC0415
     from templates.slurm.job import Wishes  # noqa: PLC0415
     from templates.slurm.submission import draft, submissions  # noqa: PLC0415

@@ -170,21 +170,15 @@ def run_folder(
     poll_s: float = 0.25,
     grace_s: float = 60.0,
 ) -> list[Outcome]:
-    """Run what a sweep's directory is missing.
+    """Run what a sweep's directory is missing; return one outcome per run, in the manifest's order.
 
     Finished runs are kept. Unfinished ones go on from their checkpoint; those without one, and those that failed, are
     set aside and run anew.
 
     Args:
-        folder: the sweep's directory.
-        display: shows how it goes.
         slots: how many runs at once; by default one per core.
-        command: the command of one run.
         poll_s: between updates of the display [s].
         grace_s: between asking a process to stop and making it stop [s].
-
-    Returns:
-        One outcome per run, in the manifest's order.
 
     Raises:
         InputError: another process computes this sweep already.

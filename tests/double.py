@@ -28,7 +28,7 @@ from dem.engine.interface import Engine, MotorReadings, Saved
 from dem.engine.kinds import EngineKind
 from dem.errors import RunError
 from dem.physics.contact import StringLaw
-from dem.physics.overlaps import Glance, Overlaps
+from dem.physics.overlaps import Extremes, Overlaps
 from dem.setting.container import Cylinder
 
 Array = NDArray[np.float64]
@@ -116,7 +116,7 @@ class MotorsDouble:
     readings: MotorReadings | None = None
     work: float = 0.0
     angles: Array = field(default_factory=lambda: np.zeros((0, 2)))
-    looks_at_once: int = 1
+    updates_at_once: int = 1
     targets: list[Array] = field(default_factory=list)
 
     def articulate(self) -> None:
@@ -133,7 +133,7 @@ class MotorsDouble:
 
     def actuate(self, targets: Array, interval: float) -> None:
         assert self.articulated
-        assert len(targets) <= self.looks_at_once
+        assert len(targets) <= self.updates_at_once
         self.told.append(("actuate", interval))
         self.targets += list(targets)
         self._hold(targets[-1])
@@ -366,7 +366,7 @@ class EngineDouble:
             forces=weight * up,
         )
 
-    def glance(self, state: State) -> Glance | None:
+    def extremes(self, state: State) -> Extremes | None:
         return None
 
     # -- checkpoints -------------------------------------------------------------------------------------------
@@ -390,7 +390,7 @@ class KindDouble:
 
     name = "double"
     workers = "threads"
-    damps_once_per_look = False
+    damps_once_per_update = False
     idle_knobs: tuple[str, ...] = ()
     adds: Mapping[EffectName, Adds] = {}
     order: tuple[str, ...] = ()

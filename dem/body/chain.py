@@ -11,9 +11,9 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from dem.arrays import Array
 from dem.body.particle import Particle
 from dem.body.placement import Poses
 from dem.body.state import State
@@ -93,7 +93,7 @@ def extent(state: State, diameter: float) -> float:
     return float(np.ptp(places) + diameter)
 
 
-def _corners(state: State) -> NDArray[np.float64]:
+def _corners(state: State) -> Array:
     """Return (N, V, 3) tips and hinges, and of thicker middle links the ends of the rows at their faces [m]."""
     bulge, vertices = state.boxes.bulge, state.vertices
     if not bulge:

@@ -11,12 +11,10 @@ from dataclasses import dataclass
 from typing import TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
+from dem.arrays import Array, Numbers
 from dem.body.particle import LINKS
 
-Array = NDArray[np.float64]
-Numbers = NDArray[np.int64]
 Number = TypeVar("Number", int, Numbers)
 
 BOUNDARIES = ("floor", "wall", "lower hook", "upper hook", "channel's lower wall", "channel's upper wall")

@@ -7,9 +7,8 @@ second. Everything here is made of NumPy's elementwise operations and of sums in
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from dem.arrays import Array, Flags
 
 SWEEPS = 12  # of Jacobi's method, which converges quadratically: five are enough for 4 × 4
 
@@ -55,7 +54,7 @@ def eigen_symmetric(matrices: Array) -> tuple[Array, Array]:
     return np.einsum("nii->ni", a).copy(), vectors
 
 
-def positive_definite(matrices: Array) -> NDArray[np.bool_]:
+def positive_definite(matrices: Array) -> Flags:
     """Return for each of the symmetric matrices (n, k, k) whether it is positive definite, by elimination."""
     a = np.array(matrices, dtype=np.float64)
     good = np.ones(len(a), np.bool_)

@@ -18,12 +18,10 @@ from functools import cached_property, lru_cache
 from itertools import product
 
 import numpy as np
-from numpy.typing import NDArray
 
+from dem.arrays import Array, Numbers
 from dem.body.linear import eigen_symmetric, matrix_product
 from dem.errors import InputError
-
-Array = NDArray[np.float64]
 
 LINKS = 3
 # Free distance between a barb's first sphere and the hinge's, in diameters: a loaded hinge may give way by as much
@@ -179,8 +177,7 @@ class Boxes:
         t1, length = self.thickness_normal, self.lengths
         t2_squared = np.array([t2**2 for t2 in self.thicknesses_in_plane])
         squares = np.stack([t1**2 + t2_squared, length**2 + t1**2, length**2 + t2_squared], axis=1)
-        moments: Array = self.link_masses[:, None] * squares / 12
-        return moments
+        return np.asarray(self.link_masses[:, None] * squares / 12)
 
     @cached_property
     def link_centres(self) -> Array:
@@ -230,10 +227,6 @@ class SphereChain:
 class Particle:
     """A smarticle as the engine sees it.
 
-    Args:
-        boxes: exact geometry, mass and inertia.
-        chain: the sphere chains that carry contact.
-
     Raises:
         InputError: the spheres are thicker than the link is wide, or too many for the link.
     """
@@ -244,11 +237,10 @@ class Particle:
     def __post_init__(self) -> None:
         d, w = self.chain.diameter, self.boxes.middle_length
         if d > w / 2:
-            msg = (
+            raise InputError(
                 f"fidelity.diameter_m: spheres of {d:g} m do not fit a middle link of {w:g} m; "
                 f"use at most half its length, {w / 2:g} m"
             )
-            raise InputError(msg)
 
     @cached_property
     def _rows(self) -> Array:
@@ -298,7 +290,7 @@ class Particle:
         return np.linspace(start, end, count)
 
     @cached_property
-    def _layout(self) -> tuple[Array, NDArray[np.int64]]:
+    def _layout(self) -> tuple[Array, Numbers]:
         vertices = self.boxes._plain_vertices
         starts = vertices[[1, 1, 2]]
         centres: list[Array] = []
@@ -318,7 +310,7 @@ class Particle:
         return self._layout[0]
 
     @property
-    def links(self) -> NDArray[np.int64]:
+    def links(self) -> Numbers:
         """(S,) int64: link of each sphere; 0 barb 1, 1 middle link, 2 barb 2."""
         return self._layout[1]
 
@@ -326,8 +318,7 @@ class Particle:
     def local_centres(self) -> Array:
         """(S, 3) float64 [m]: sphere centres, each in the frame of its link (see `Boxes.link_rotations`)."""
         arms = self.centres - self.boxes.link_centres[self.links]
-        local: Array = np.einsum("sij,si->sj", self.boxes.link_rotations[self.links], arms)
-        return local
+        return np.asarray(np.einsum("sij,si->sj", self.boxes.link_rotations[self.links], arms))
 
     @property
     def radius(self) -> float:

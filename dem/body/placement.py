@@ -7,15 +7,13 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
 
+from dem.arrays import Array
 from dem.body.linear import applied, eigen_symmetric
 from dem.body.particle import Boxes, Particle
 from dem.errors import RunError
-
-Array = NDArray[np.float64]
 
 CLEARANCE = 0.02  # free distance kept between surfaces, in sphere diameters
 ATTEMPTS = 200  # poses tried per smarticle before the slab is made higher
@@ -48,13 +46,10 @@ def place_layer(
     slab that is too full grows upwards.
 
     Args:
-        particle: one smarticle.
-        count: number of smarticles.
         radius: inner radius of the cylinder [m].
         bottom: height below which no sphere comes [m].
         height: height of the slab [m], in which the lowest spheres of the smarticles lie.
         obstacles: (n, 3) centres of present spheres of the same diameter [m].
-        rng: source of randomness.
         narrower: returns inner radii of the cylinder [m] at heights [m]; it must not be wider higher up.
 
     Raises:
@@ -94,11 +89,10 @@ def place_layer(
             height *= 1 + GROWTH
             grown += 1
             if grown > MOST_GROWTH:
-                msg = (
+                raise RunError(
                     f"only {len(positions)} of {count} smarticles of a layer found room in a container of radius "
                     f"{radius:g} m; lower phases.0.per_layer or widen container.radius_m"
                 )
-                raise RunError(msg)
     return Poses(np.array(positions), tuple(rotations))
 
 
@@ -108,7 +102,6 @@ def fitted_poses(boxes: Boxes, vertices: Array) -> tuple[Poses, Array]:
     The turn of a straight shape about its length is unknown; the choice depends on the vertices alone.
 
     Args:
-        boxes: the shape.
         vertices: (N, 4, 3) barb tip, hinge, hinge, barb tip of each smarticle [m].
 
     Returns:

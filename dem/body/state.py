@@ -6,11 +6,9 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
+from dem.arrays import Array, Numbers
 from dem.body.particle import LINKS, Boxes, Particle
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -20,7 +18,6 @@ class State:
     Welded or articulated, a smarticle is three links; link 0 is barb 1, 1 the middle link, 2 barb 2.
 
     Args:
-        boxes: one smarticle; lengths and masses of the links.
         link_positions: (N, 3, 3) centres of the links [m].
         link_rotations: (N, 3, 3, 3) link frames, see `Boxes.link_rotations` [1].
         link_velocities: (N, 3, 3) of the links' centres [m/s].
@@ -47,7 +44,6 @@ class State:
         """Return the state of rigid smarticles.
 
         Args:
-            boxes: one smarticle.
             positions: (N, 3) centres of mass [m].
             rotations: (N, 3, 3) body frame to laboratory frame [1].
             velocities: (N, 3) of the centres of mass [m/s].
@@ -95,7 +91,7 @@ class State:
         )
         return np.stack([np.arctan2(across1, -along1), np.arctan2(across2, along2)], axis=1)
 
-    def spheres(self, particle: Particle, which: NDArray[np.int64] | None = None) -> Array:
+    def spheres(self, particle: Particle, which: Numbers | None = None) -> Array:
         """Return (N, S, 3) centres of the spheres [m], or of those with the numbers `which`."""
         links, local = particle.links, particle.local_centres
         if which is not None:

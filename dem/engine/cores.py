@@ -39,16 +39,11 @@ def most_ranks() -> int:
 
 
 def check_ranks(wanted: int) -> None:
-    """Reject more ranks than there are cores: each waits for the others at every step.
-
-    Raises:
-        InputError: there are fewer cores.
-    """
+    """Reject more ranks than there are cores: each waits for the others at every step."""
     most = most_ranks()
     if wanted > most:
-        msg = (
+        raise InputError(
             f"--ranks {wanted}: there are {most} core{'s' if most > 1 else ''} for this process, and each rank waits "
             f"for all others at every step; use at most {most}, or more machines: smarticles sweep … --submit slurm "
             f"--ranks {wanted}"
         )
-        raise InputError(msg)

@@ -6,9 +6,7 @@ from collections.abc import Sequence
 from enum import Enum, auto
 from typing import Protocol
 
-import numpy as np
-from numpy.typing import NDArray
-
+from dem.arrays import Array
 from dem.body.particle import Particle
 from dem.engine.effect import EffectName
 from dem.physics.contact import ContactLaw, contact_law
@@ -33,70 +31,54 @@ class Activity(Enum):
 
 
 class Demand(Protocol):
-    """A scene, as far as an engine has to know it: what is given, and what phases call for, not what they are."""
+    """A scene, as far as an engine has to know it; `dem.scene.scene.Scene` describes the members."""
 
     @property
-    def smarticle(self) -> Smarticle:
-        """Geometry and material of one smarticle."""
+    def smarticle(self) -> Smarticle: ...
 
     @property
-    def count(self) -> int:
-        """Number of smarticles."""
+    def count(self) -> int: ...
 
     @property
-    def hooks(self) -> Hooks | None:
-        """Hooks in the pile."""
+    def hooks(self) -> Hooks | None: ...
 
     @property
-    def contact(self) -> Contact:
-        """Friction and restitution."""
+    def contact(self) -> Contact: ...
 
     @property
-    def motor(self) -> Motor:
-        """The motors of the hinges."""
+    def motor(self) -> Motor: ...
 
     @property
-    def gravity_m_per_s2(self) -> float:
-        """Gravity, g [m/s²]."""
+    def gravity_m_per_s2(self) -> float: ...
 
     @property
-    def fidelity(self) -> Fidelity:
-        """Accuracy against cost."""
+    def fidelity(self) -> Fidelity: ...
 
     @property
-    def recording(self) -> Recording:
-        """Frames and series."""
+    def recording(self) -> Recording: ...
 
     @property
-    def particle(self) -> Particle:
-        """One smarticle as the engine takes it."""
+    def particle(self) -> Particle: ...
 
     @property
-    def cylinder(self) -> Cylinder:
-        """The container as it is to be built."""
+    def cylinder(self) -> Cylinder: ...
 
     @property
-    def channel(self) -> Channel | None:
-        """Table and walls, where motion is confined to a plane."""
+    def channel(self) -> Channel | None: ...
 
     @property
-    def torque_limit(self) -> float:
-        """τ_max [N m]."""
+    def torque_limit(self) -> float: ...
 
     @property
-    def motor_strengths(self) -> NDArray[np.float64] | None:
-        """(N, 2) factors on torque limit and stiffness of the motors [1]; None where all are equal."""
+    def motor_strengths(self) -> Array | None: ...
 
     @property
-    def actuates(self) -> bool:
-        """Whether motors act in any phase."""
+    def actuates(self) -> bool: ...
 
     @property
-    def pulled_by(self) -> Sequence[tuple[float, float]]:
-        """Stiffness [N/m] and damping [N s/m] of the strings of each phase that pulls by some."""
+    def pulled_by(self) -> Sequence[tuple[float, float]]: ...
 
-    def calls_for(self, effect: EffectName) -> bool:
-        """Return whether a phase calls for an effect."""
+    def calls_for(self, effect: EffectName) -> bool: ...
 
 
 def contact_law_of(scene: Demand) -> ContactLaw:

@@ -40,11 +40,9 @@ class Adds:
     Args:
         engines: what an engine runs in every step, by its own names.
         functors: what these are given to work with.
-        materials: labels.
         shapes: kinds of bodies.
         series: datasets of `series.h5`.
         arrays: cell data of every frame.
-        files: of the run directory.
         python: what Python does for it, how often, and other costs.
     """
 

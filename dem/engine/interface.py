@@ -16,29 +16,20 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Protocol
 
-import numpy as np
-from numpy.typing import NDArray
-
+from dem.arrays import Array, Flags, Numbers
 from dem.body.chain import Tie
 from dem.body.forces import ContactForces
 from dem.body.particle import Particle
 from dem.body.placement import Poses
 from dem.body.state import State
 from dem.physics.contact import StringLaw
-from dem.physics.overlaps import Glance, Overlaps
+from dem.physics.overlaps import Extremes, Overlaps
 from dem.setting.container import Cylinder
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, kw_only=True)
 class Saved:
-    """A simulation at one instant, as its engine saves it.
-
-    Args:
-        content: the engine's own serialisation.
-        memory: plain data that JSON keeps without loss.
-    """
+    """A simulation at one instant: the engine's own bytes, and plain data that JSON keeps without loss."""
 
     content: bytes
     memory: Mapping[str, Any]
@@ -60,7 +51,7 @@ class MotorReadings:
     commands: Array
     torques: Array
     work: Array
-    halted: NDArray[np.bool_]
+    halted: Flags
 
 
 class Boundaries(Protocol):
@@ -151,14 +142,14 @@ class Motors(Protocol):
         """Make each smarticle rigid in its present shape; nothing while welded already."""
 
     @property
-    def looks_at_once(self) -> int:
+    def updates_at_once(self) -> int:
         """Most control updates that `actuate` takes at once."""
 
     def actuate(self, targets: Array, interval: float) -> None:
         """Make a control update, which acts for a control period, and others at the ends of the periods that follow.
 
         Args:
-            targets: (updates, N, 2) angles at the end of each period according to the schedule [rad]; `looks_at_once`
+            targets: (updates, N, 2) angles at the end of each period according to the schedule [rad]; `updates_at_once`
                 of them at most.
             interval: length of a period [s].
         """
@@ -183,13 +174,7 @@ class Strings(Protocol):
         """Whether they exist at present."""
 
     def tie(self, ties: Sequence[Tie], law: StringLaw, speeds: Sequence[float]) -> None:
-        """Tie taut strings to points of articulated smarticles, their other ends outwards on the x-axis.
-
-        Args:
-            ties: the points.
-            law: of all strings.
-            speeds: of the other ends, away from the origin [m/s].
-        """
+        """Tie taut strings to smarticles; their other ends move outwards along x at `speeds` [m/s]."""
 
     def untie(self) -> None:
         """Remove all strings."""
@@ -236,17 +221,12 @@ class EnergyLedger(Protocol):
 class Engine(Protocol):
     """A running simulation; one per process, since an engine may be a process-wide singleton."""
 
-    @property
-    def particle(self) -> Particle:
-        """One smarticle."""
-
-    @property
-    def cylinder(self) -> Cylinder:
-        """The container as it was built."""
-
-    @property
-    def gravity(self) -> float:
-        """g, downwards [m/s²]."""
+    particle: Particle
+    """One smarticle."""
+    cylinder: Cylinder
+    """The container as it was built."""
+    gravity: float
+    """g, downwards [m/s²]."""
 
     @property
     def boundaries(self) -> Boundaries:
@@ -318,10 +298,10 @@ class Engine(Protocol):
     def unbalanced_force(self) -> float:
         """Return the mean net force on a smarticle over its weight [1]: 0 at rest, 1 in free fall, inf when empty."""
 
-    def neighbours(self) -> NDArray[np.int64]:
+    def neighbours(self) -> Numbers:
         """Return for each smarticle (N,) how many others it touches."""
 
-    def touches(self) -> NDArray[np.int64]:
+    def touches(self) -> Numbers:
         """Return the number (N,) of contacts of each smarticle, with smarticles and boundaries."""
 
     def overlaps(self, limit: float) -> Overlaps:
@@ -330,7 +310,7 @@ class Engine(Protocol):
     def contact_forces(self) -> ContactForces:
         """Return forces at all contacts, at present or in the last step; a pair of links has one contact."""
 
-    def glance(self, state: State) -> Glance | None:
+    def extremes(self, state: State) -> Extremes | None:
         """Return the extremes of all smarticles, cheaper than from each one, in the present state.
 
         None where the engine has no such way, or knows of something that needs a full check.
@@ -339,11 +319,7 @@ class Engine(Protocol):
     # -- checkpoints -------------------------------------------------------------------------------------------
 
     def save(self, scratch: Path) -> Saved:
-        """Return everything that `load` needs; the simulation goes on with the bits of one that was loaded.
-
-        Args:
-            scratch: folder for temporary files.
-        """
+        """Return all that `load` needs; a loaded simulation goes on with the bits of the saved one."""
 
     def load(self, saved: Saved, scratch: Path) -> None:
         """Replace the simulation by a saved one of the same scene."""

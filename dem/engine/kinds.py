@@ -14,25 +14,16 @@ from dem.errors import InputError
 class EngineKind(Protocol):
     """One engine: what it is, what scenes cost on it, and how a simulation on it begins."""
 
-    @property
-    def name(self) -> str:
-        """Its name in scenes."""
-
-    @property
-    def workers(self) -> str:
-        """What a run on several cores has several of: threads, or ranks, which are processes."""
-
-    @property
-    def damps_once_per_look(self) -> bool:
-        """Whether a servo's damper acts on the rates of the last control update, so that one is needed every step."""
-
-    @property
-    def idle_knobs(self) -> tuple[str, ...]:
-        """Knobs of the fidelity that have no meaning on it."""
-
-    @property
-    def adds(self) -> Mapping[EffectName, Adds]:
-        """What an effect adds to its work; effects without an entry add nothing."""
+    name: str
+    """Its name in scenes."""
+    workers: str
+    """What a run on several cores has several of: threads, or ranks, which are processes."""
+    damps_once_per_update: bool
+    """Whether a servo's damper acts on the rates of the last control update, so that one is needed every step."""
+    idle_knobs: tuple[str, ...]
+    """Knobs of the fidelity that have no meaning on it."""
+    adds: Mapping[EffectName, Adds]
+    """What an effect adds to its work; effects without an entry add nothing."""
 
     @property
     def order(self) -> tuple[str, ...]:
@@ -77,5 +68,4 @@ def engine_kind(name: str) -> EngineKind:
         from dem.engine.lammps.kind import LammpsKind  # noqa: PLC0415
 
         return LammpsKind()
-    msg = f"engine: {name!r} is not built into this version; use yade, links or lammps"
-    raise InputError(msg)
+    raise InputError(f"engine: {name!r} is not built into this version; use yade, links or lammps")

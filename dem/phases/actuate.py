@@ -65,20 +65,17 @@ class Actuate(Part, ActuatedPhase):
             raise ValueError(msg)
         for key, motion in self._named().items():
             if motion.duration < self.duration_s * (1 - 1e-9):
-                msg = (
+                raise ValueError(
                     f"{key}: the motion ends after {motion.duration:g} s, before duration_s = {self.duration_s:g} s; "
                     "shorten the phase or end the motion with a step that holds"
                 )
-                raise ValueError(msg)
             if self.offsets == "random" and motion.period is None and not isinstance(motion, Hold):
-                msg = (
+                raise ValueError(
                     f"offsets: random, but {key} ({motion.type}) has no period; use 'none', a sine, a triangle or a "
                     "sequence with repeat"
                 )
-                raise ValueError(msg)
         if self.offsets == "random" and all(motion.period is None for motion in self.motions):
-            msg = "offsets: random, but both barbs hold; use 'none'"
-            raise ValueError(msg)
+            raise ValueError("offsets: random, but both barbs hold; use 'none'")
         return self
 
     def _named(self) -> dict[str, Motion]:

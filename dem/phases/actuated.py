@@ -12,8 +12,8 @@ from dataclasses import dataclass
 from typing import ClassVar, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from dem.arrays import Array, Flags, Numbers
 from dem.body.particle import HINGE_CLEARANCE
 from dem.engine.effect import EffectName
 from dem.engine.interface import Engine
@@ -23,8 +23,6 @@ from dem.setting.motion import Course, Motion, SimpleMotion, Sine, Triangle
 from dem.setting.motor import Motor
 from dem.setting.part import HINGE_RANGE
 from dem.setting.smarticle import Smarticle
-
-Array = NDArray[np.float64]
 
 BARBS = 2
 BARB_LINKS = (0, 2)
@@ -38,8 +36,6 @@ class Gait:
     """What the barbs of smarticles do in a phase.
 
     Args:
-        motions: of barb 1 and of barb 2.
-        keys: of the motions in a phase of type actuate.
         duration: length of the phase [s].
         active_fraction: share of the smarticles that move [1].
         offsets: "random": each begins at another point of the period.
@@ -106,21 +102,21 @@ class ActuatedPhase(Phase):
 
         After each `halt_every` updates it returns, so that the caller can check the pile.
         """
-        look: int = stage.memory["look"]
-        if look == 0:
+        update: int = stage.memory["look"]
+        if update == 0:
             engine.motors.articulate()
         schedule: Drive = stage.prepared
         interval = stage.scene.fidelity.control_interval_s
         last = math.ceil(schedule.duration / interval - 1e-9)
         every = halt_every or last
         # The last update only adds up the work since the one before.
-        stop = min(look + engine.motors.looks_at_once, (look // every + 1) * every, last)
-        looks = range(look, max(look + 1, stop))
-        targets = [schedule.targets(min((k + 1) * interval, schedule.duration)) for k in looks]
+        stop = min(update + engine.motors.updates_at_once, (update // every + 1) * every, last)
+        updates = range(update, max(update + 1, stop))
+        targets = [schedule.targets(min((k + 1) * interval, schedule.duration)) for k in updates]
         engine.motors.actuate(np.stack(targets), interval)
-        stage.memory["look"] = looks.stop
+        stage.memory["look"] = updates.stop
         period = max(1, round(interval / engine.time_step)) * engine.time_step
-        return len(looks) * period if look < last else 0.0
+        return len(updates) * period if update < last else 0.0
 
     def prepare(self, scene: SceneView, index: int) -> Drive:
         return drive(scene, index)
@@ -155,13 +151,13 @@ class Drive:
     """
 
     duration: float
-    active: NDArray[np.bool_]
+    active: Flags
     start: Array
     # Barbs that always have one target share an entry: `_entries` has those of barbs that do not move, then those of
     # each track; `_which` (N, 2) is the entry of each barb.
     _entries: Array
     _tracks: tuple[_Track, ...]
-    _which: NDArray[np.int64]
+    _which: Numbers
 
     def targets(self, time: float) -> Array:
         """Return (N, 2) target angles [rad] at a time [s] after the phase began; beyond its end those of its end."""

@@ -112,11 +112,10 @@ class Deposit(Part, Phase):
         if fastest < limit and engine.touches()[-size:].min() > 0:
             memory.update(layer=0, waited=0.0)
         elif memory["waited"] > LAYER_TIMEOUT:
-            msg = (
+            raise RunError(
                 f"a layer of {size} had not come down {LAYER_TIMEOUT:g} s after it was poured: the fastest falls at "
                 f"{fastest:.3g} m/s, limit {limit:g} m/s; raise phases.0.landed_speed_m_per_s"
             )
-            raise RunError(msg)
 
     def _pour(self, stage: Stage, engine: Engine) -> None:
         scene, memory = stage.scene, stage.memory
@@ -146,10 +145,9 @@ class Deposit(Part, Phase):
         highest = poses.positions[:, 2].max() + particle.reach
         if highest > cylinder.height:
             key = "container.height_m" if scene.container.tiers is None else "height_m of the top tier"
-            msg = (
+            raise RunError(
                 f"{scene.count} smarticles do not fit: after {engine.count} the next layer would reach {highest:.3g} "
                 f"m, above container.height_m = {cylinder.height:.3g} m; lower count or raise {key}"
             )
-            raise RunError(msg)
         engine.add(poses, speed=self.thrown_at_m_per_s)
         memory.update(left=memory["left"] - size, layer=size, waited=0.0, random=rng.bit_generator.state)

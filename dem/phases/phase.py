@@ -33,14 +33,7 @@ Memory = dict[str, Any]
 
 @dataclass
 class Stage:
-    """A phase while it runs.
-
-    Args:
-        phase: the phase.
-        scene: its scene.
-        index: its number.
-        memory: all that the stage remembers: plain data, JSON-able without loss. `warning` is reported at its end.
-    """
+    """A phase while it runs; its memory is plain data for JSON, `warning` is reported at its end."""
 
     phase: Phase
     scene: SceneView
@@ -144,10 +137,7 @@ class Phase:
         """Return what its stage computes only once."""
 
     def proceed(self, stage: Stage, engine: Engine) -> float:
-        """Do what is due now.
-
-        Returns:
-            Time [s] until the next call; 0: the phase is over.
+        """Do what is due now; return the time [s] until the next call, 0 where the phase is over.
 
         Raises:
             RunError: the phase did not end as it should; the message says by how much.
@@ -205,9 +195,7 @@ def has_settled(settle: Settle, memory: Memory, engine: Engine) -> bool:
     """Check a pile once, every `CHECK_INTERVAL`.
 
     Args:
-        settle: the limits.
         memory: of the stage: `waited` [s] for the pile so far, which the stage adds up; `still` [s] that it has been.
-        engine: the simulation.
 
     Raises:
         RunError: it takes too long.
@@ -219,10 +207,9 @@ def has_settled(settle: Settle, memory: Memory, engine: Engine) -> bool:
     if memory["still"] > settle.hold_s:
         return True
     if memory["waited"] > settle.timeout_s:
-        msg = (
+        raise RunError(
             f"the pile has not settled after {settle.timeout_s:g} s: speed {speed:.3g} m/s (limit "
             f"{settle.speed_m_per_s:g} m/s), unbalanced force {unbalanced:.3g} (limit "
             f"{settle.unbalanced_force:g}); raise phases.0.settle.timeout_s or its limits"
         )
-        raise RunError(msg)
     return False

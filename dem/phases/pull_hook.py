@@ -38,11 +38,10 @@ class PullHook(Part, Phase):
     def _arrives(self) -> Self:
         needed = self.distance_m / self.speed_m_per_s
         if self.duration_s < needed * (1 - TOLERANCE):
-            msg = (
+            raise ValueError(
                 f"duration_s: {self.duration_s:g} s is too short to raise the hook by distance_m = "
                 f"{self.distance_m:g} m at speed_m_per_s = {self.speed_m_per_s:g} m/s; use at least {needed:.6g} s"
             )
-            raise ValueError(msg)
         return self
 
     def check(self, scene: SceneView, index: int) -> Iterator[str]:

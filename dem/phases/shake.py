@@ -70,12 +70,11 @@ class Shake(Part, Phase):
             return 0.0
         if _freed(stage.scene, stage.index) and engine.boundaries.walled:
             edge = engine.boundaries.wall_bottom - engine.boundaries.floor
-            msg = (
+            raise RunError(
                 f"the wall is still around the pile, its edge {edge:.3g} m over the floor that is to be shaken: it was "
                 "not clear of the pile when remove-container ended; lengthen that phase's duration_s or raise its "
                 "speed_m_per_s"
             )
-            raise RunError(msg)
         stage.memory["begun"] = True
         engine.motors.weld()
         amplitude = self.amplitude(stage.scene.gravity_m_per_s2)

@@ -74,9 +74,9 @@ class Strain(Part, ActuatedPhase):
         }
 
     def proceed(self, stage: Stage, engine: Engine) -> float:
-        chain, look = chain_of(stage.scene), stage.memory["look"]
+        chain, update = chain_of(stage.scene), stage.memory["look"]
         every = max(1, round(CHECK_INTERVAL / stage.scene.fidelity.control_interval_s))
-        if look == 0:
+        if update == 0:
             engine.motors.articulate()
             law = StringLaw(
                 length=self.string_length_m,
@@ -84,7 +84,7 @@ class Strain(Part, ActuatedPhase):
                 damping=self.string_damping_N_s_per_m,
             )
             engine.strings.tie(chain.ties(self.tied_at), law, (0.0, self.speed_m_per_s))
-        over = look % every == 0 and parted(engine.state(), 2 * chain.particle.radius)
+        over = update % every == 0 and parted(engine.state(), 2 * chain.particle.radius)
         wait = 0.0 if over else self.follow(stage, engine, every)
         if not wait:
             engine.strings.untie()

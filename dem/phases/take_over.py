@@ -17,9 +17,9 @@ from pathlib import Path
 from typing import Annotated, Any, ClassVar, Literal, Self, cast
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field, ModelWrapValidatorHandler, ValidationInfo, field_validator, model_validator
 
+from dem.arrays import Array, Flags
 from dem.body.placement import Poses, fitted_poses
 from dem.engine.interface import Engine
 from dem.errors import InputError, RunError, shown
@@ -28,8 +28,6 @@ from dem.record.frame import Frame
 from dem.record.run import Run, open_run
 from dem.setting.hooks import Cross
 from dem.setting.part import Part
-
-Array = NDArray[np.float64]
 
 LAST = "last"  # the frame at the end of a run that is done
 TAKEN_SECONDS = 0.05  # until a pile that was taken over is still, about
@@ -78,8 +76,7 @@ def take(path: Path, frame: int | str) -> Taken:
         run = open_run(path)
         frames, state = run.frames, run.status.state
     except InputError as error:
-        msg = f"run: {error}"
-        raise InputError(msg) from None
+        raise InputError(f"run: {error}") from None
     number = len(frames) - 1 if frame == LAST else int(frame)
     msg = ""
     if state == "running":
@@ -96,8 +93,7 @@ def take(path: Path, frame: int | str) -> Taken:
     try:
         return Taken(run, number, frames[number])
     except InputError as error:
-        msg = f"frame: {error}"
-        raise InputError(msg) from None
+        raise InputError(f"frame: {error}") from None
 
 
 class TakeOver(Part, Phase):
@@ -123,8 +119,7 @@ class TakeOver(Part, Phase):
     @classmethod
     def _seen_from_the_scene(cls, value: str, info: ValidationInfo) -> str:
         if not value.isprintable():
-            msg = f"{shown(value)} has characters that cannot be printed; give the path of a run directory"
-            raise ValueError(msg)
+            raise ValueError(f"{shown(value)} has characters that cannot be printed; give the path of a run directory")
         folder = (info.context or {}).get("folder") or Path()
         return str((Path(folder) / value).resolve())
 
@@ -132,16 +127,14 @@ class TakeOver(Part, Phase):
     @classmethod
     def _number_or_last(cls, value: Any) -> Any:
         if value != LAST and (not isinstance(value, int) or isinstance(value, bool) or value < 0):
-            msg = f"{shown(value)} is no frame; use its number, from 0, or {LAST}"
-            raise ValueError(msg)
+            raise ValueError(f"{shown(value)} is no frame; use its number, from 0, or {LAST}")
         return value
 
     @field_validator("sha256")
     @classmethod
     def _a_hash(cls, value: str | None) -> str | None:
         if value is not None and not re.fullmatch("[0-9a-f]{64}", value):
-            msg = f"{shown(value)} is no SHA-256 of 64 digits; leave it out, it is filled in"
-            raise ValueError(msg)
+            raise ValueError(f"{shown(value)} is no SHA-256 of 64 digits; leave it out, it is filled in")
         return value
 
     @model_validator(mode="wrap")
@@ -161,11 +154,10 @@ class TakeOver(Part, Phase):
         """The frame; an InputError if it is missing, or not the one that the scene was made from."""
         taken = take(Path(self.run), self.frame)
         if taken.sha256 != self.sha256:
-            msg = (
+            raise InputError(
                 f"sha256: {taken} has other poses than those that the scene was made from ({taken.sha256[:12]}… "
                 f"instead of {str(self.sha256)[:12]}…); put that run back, or leave sha256 out to take what is there"
             )
-            raise InputError(msg)
         return taken
 
     def check(self, scene: SceneView, index: int) -> Iterator[str]:
@@ -181,8 +173,7 @@ class TakeOver(Part, Phase):
         try:
             taken = self.taken
         except InputError as error:
-            msg = f"phases.0.{error}"
-            raise InputError(msg) from None
+            raise InputError(f"phases.0.{error}") from None
         poses_of(scene, taken)
 
     @property
@@ -242,12 +233,11 @@ class TakeOver(Part, Phase):
             fastest = float(np.linalg.norm(engine.state().link_velocities, axis=-1).max())
             if fastest > settle.speed_m_per_s + stride * engine.gravity:
                 if memory["waited"] > settle.timeout_s:
-                    msg = (
+                    raise RunError(
                         f"the smarticles still push each other apart {settle.timeout_s:g} s after they were put in, up "
                         f"to {fastest:.3g} m/s in {STRIDE} steps (limit {settle.speed_m_per_s:g} m/s); raise "
                         "phases.0.settle.speed_m_per_s, or pour on this engine"
                     )
-                    raise RunError(msg)
                 engine.still()
                 memory["stops"] += 1
                 return stride
@@ -357,7 +347,7 @@ def _within_tips(vertices: Array, radius: float) -> Array:
     return moved
 
 
-def _in_cross(cross: Cross, vertices: Array) -> NDArray[np.bool_]:
+def _in_cross(cross: Cross, vertices: Array) -> Flags:
     """Return (N,) whether the axis of a link passes through a bar, checked in steps of a quarter of its side."""
     ends = np.stack([vertices[:, :-1], vertices[:, 1:]], axis=2)  # (N, 3, 2, 3)
     longest = float(np.linalg.norm(ends[:, :, 1] - ends[:, :, 0], axis=-1).max())
@@ -365,8 +355,7 @@ def _in_cross(cross: Cross, vertices: Array) -> NDArray[np.bool_]:
     points = (ends[:, :, :1] * (1 - shares) + ends[:, :, 1:] * shares).reshape(len(vertices), -1, 3)
     above = points - [0.0, 0.0, cross.height]
     inside = [(np.abs(above - [*bar.middle, 0.0]) < bar.half).all(axis=-1).any(axis=-1) for bar in cross.bars]
-    found: NDArray[np.bool_] = np.logical_or.reduce(inside)
-    return found
+    return np.asarray(np.logical_or.reduce(inside))
 
 
 def _angles(taken: Taken) -> Array:

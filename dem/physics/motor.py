@@ -7,9 +7,8 @@ from dataclasses import dataclass
 from typing import Any, Literal, get_args
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from dem.arrays import Array, Flags
 
 Law = Literal["halt", "stall", "ease", "slip", "servo"]
 LAWS: tuple[Law, ...] = get_args(Law)
@@ -45,12 +44,7 @@ class MotorLaw:
 
 
 def speed_factor(law: int, over: Any) -> Any:
-    """Return the factor on a motor's greatest speed [1].
-
-    Args:
-        law: number of the law in `LAWS`.
-        over: whether the torque is at its limit.
-    """
+    """Return the factor on a motor's greatest speed [1]; arguments as in `halts`."""
     return 1.0 - (1.0 - EASED) * over if law == EASE else 1.0
 
 
@@ -80,7 +74,6 @@ class Motors:
     of an elastic contact stays when the motor stops.
 
     Args:
-        law: what all motors have in common.
         angles: (N, 2) angles at the start [rad].
         strengths: (N, 2) factors on torque limit and stiffness [1]; None: all are equal.
     """
@@ -105,7 +98,7 @@ class Motors:
         """(N, 2) actual angles at the last control update [rad]."""
         self.torques: Array = np.zeros_like(angles)
         """(N, 2) torques on the barbs since the last control update [N m]; positive ones raise the angle."""
-        self.halted: NDArray[np.bool_] = np.zeros(angles.shape, dtype=bool)
+        self.halted: Flags = np.zeros(angles.shape, dtype=bool)
         """(N, 2) whether a motor wanted to advance at the last control update and did not."""
         self._begun: Array = angles.copy()
         self._rates: Array = np.zeros_like(angles)
@@ -149,8 +142,7 @@ class Motors:
         return float((self.work + self._work_since_update(angles)).sum())
 
     def _work_since_update(self, angles: Array) -> Array:
-        work: Array = (self._torque(self._begun) + self._torque(angles)) / 2 * (angles - self._begun)
-        return work
+        return np.asarray((self._torque(self._begun) + self._torque(angles)) / 2 * (angles - self._begun))
 
     def _torque(self, angles: Array) -> Array:
         torque: Array = self._stiffness * (self.commands - angles)

@@ -6,21 +6,14 @@ from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from itertools import combinations
 
-import numpy as np
-from numpy.typing import NDArray
+from dem.arrays import Flags
 
 APART = 0.1  # of the depth that is too deep; boundaries that have moved against each other by less have not
 
 
 @dataclass(frozen=True)
 class Held:
-    """A smarticle between two boundaries that have moved apart, so that only its contacts can give way.
-
-    Args:
-        smarticle: its number.
-        between: names of the two boundaries.
-        apart: by how much they have moved against each other since the start [m].
-    """
+    """A smarticle between boundaries that have moved `apart` [m]: only its contacts give way."""
 
     smarticle: int
     between: tuple[str, str]
@@ -39,13 +32,13 @@ class Overlaps:
     """
 
     deepest: float
-    deep: NDArray[np.bool_]
+    deep: Flags
     elastic_energy: float
     held: tuple[Held, ...] = ()
 
 
 @dataclass(frozen=True, kw_only=True)
-class Glance:
+class Extremes:
     """The extremes of all smarticles at one instant; NaN is within no limit.
 
     Args:

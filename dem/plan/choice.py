@@ -45,7 +45,6 @@ class Error:
     """A relative error.
 
     Args:
-        of: symbol of the quantity.
         value: against the reference fidelity [1]; NaN if unknown.
         band: half-width of its 95 % interval over seeds [1]; NaN if unknown.
     """
@@ -70,7 +69,6 @@ class Measured:
 
     Args:
         errors: of the quantities asked for; `others` are those of the others.
-        seeds: how many runs it was measured with.
         ratio: measured processor time over the planned wall time [1].
         is_reference: whether the errors of the others are against it.
         hours: expected wall time on the scene at hand, on one core of the table's machine [h].
@@ -127,14 +125,12 @@ def read_table(path: Path | None, *, of: Sequence[str] = PACKING, engine: str | 
     """
     file = SHIPPED if path is None else path
     if path is None and not file.is_file():
-        msg = f"--table: no table of measured errors ships at {file}; {_HOW}"
-        raise InputError(msg)
+        raise InputError(f"--table: no table of measured errors ships at {file}; {_HOW}")
     try:
         lines = file.read_text(encoding="utf-8").splitlines()
     except (OSError, UnicodeDecodeError) as error:
         why = error.strerror if isinstance(error, OSError) else "not a text file"
-        msg = f"--table {file}: cannot be read ({why}); {_HOW}"
-        raise InputError(msg) from None
+        raise InputError(f"--table {file}: cannot be read ({why}); {_HOW}") from None
     reader = csv.DictReader(line for line in lines if line and not line.startswith("#"))
     for column in _COLUMNS:
         if column not in (reader.fieldnames or ()):
@@ -148,8 +144,7 @@ def read_table(path: Path | None, *, of: Sequence[str] = PACKING, engine: str | 
         references = [row for row in rows if row[_KNOB] in knobs and row[_VERDICT] == "reference"]
         reference = next((row[_VALUE] for row in references if int(row[_SEEDS]) > 0), None)
         if reference is None or len(every) < 2:
-            msg = f"--table {file}: has fewer than two named fidelities with runs; {_HOW}"
-            raise InputError(msg)
+            raise InputError(f"--table {file}: has fewer than two named fidelities with runs; {_HOW}")
         found = tuple(one for one in every if engine in (None, one.engine))
         if not found:
             there = ", ".join(dict.fromkeys(one.engine for one in every))
@@ -167,8 +162,7 @@ def read_table(path: Path | None, *, of: Sequence[str] = PACKING, engine: str | 
     except (TypeError, ValueError) as error:
         if isinstance(error, InputError):
             raise
-        msg = f"--table {file}: a row of knob fidelity does not hold numbers ({error}); {_HOW}"
-        raise InputError(msg) from None
+        raise InputError(f"--table {file}: a row of knob fidelity does not hold numbers ({error}); {_HOW}") from None
 
 
 def _named_fidelities(rows: Sequence[dict[str, str]]) -> dict[tuple[str, str], dict[str, str]]:
@@ -253,7 +247,6 @@ def choose(
 
     Args:
         scene: the scene; its own engine and fidelity do not matter.
-        table: what was measured.
         max_error: largest relative error of what `table` was read for, against the reference fidelity [1].
         max_hours: longest wall time on one core [h].
 
@@ -284,9 +277,6 @@ def pick(expected: Sequence[Measured], *, max_error: float | None, max_hours: fl
 
     Of those that the hours allow the most exact is taken: the reference, else the finest of an engine, and of several
     engines' finest the one whose error is known and least.
-
-    Raises:
-        InputError: as in `choose`.
     """
     quick = [one for one in expected if max_hours is None or one.hours <= max_hours]
     if max_error is None:
@@ -295,19 +285,17 @@ def pick(expected: Sequence[Measured], *, max_error: float | None, max_hours: fl
             exact = min(finest, key=lambda one: (not one.is_reference, one.worst.size))
             return exact, f"the most exact within --max-hours {max_hours:g}"
         least = min(expected, key=lambda one: one.hours)
-        msg = (
+        raise InputError(
             f"--max-hours {max_hours:g}: even {least.name} is expected to take {least.hours:.2g} h; "
             f"give --max-hours {_above(least.hours)} or a smaller scene"
         )
-        raise InputError(msg)
     within = [one for one in expected if one.worst.size <= max_error]
     if not within:
         best = min(expected, key=lambda one: one.worst.size)
-        msg = (
+        raise InputError(
             f"--max-error {max_error:g}: no fidelity of the table is known to be within; the best is {best.name}, "
             f"{best.worst}; give --max-error {_above(best.worst.size)} or a table with finished reference runs"
         )
-        raise InputError(msg)
     need = min(within, key=lambda one: one.hours)
     if max_hours is None or need.hours <= max_hours:
         limits = f"--max-error {max_error:g}" + ("" if max_hours is None else f" and --max-hours {max_hours:g}")

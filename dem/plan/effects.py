@@ -16,10 +16,12 @@ from dem.phases.arrange import chain_of
 from dem.record.columns import (
     COLUMNS,
     ENERGY_COLUMNS,
+    FIELDS,
     FORCE_FIELDS,
     HOOK_COLUMNS,
     LEDGER_COLUMNS,
     MOTOR_COLUMNS,
+    MOTOR_FIELDS,
     RELEASE_COLUMNS,
     STRAIN_COLUMNS,
 )
@@ -29,9 +31,7 @@ _NOTHING = Adds()
 
 ADDS: Mapping[EffectName, Adds] = {
     EffectName.STRINGS: Adds(series=tuple(STRAIN_COLUMNS)),
-    EffectName.MOTORS: Adds(
-        series=tuple(MOTOR_COLUMNS), arrays=("angle_rad", "motor_torque_N_m", "motor_work_J", "halted")
-    ),
+    EffectName.MOTORS: Adds(series=tuple(MOTOR_COLUMNS), arrays=tuple(MOTOR_FIELDS)),
     EffectName.HOOKS: Adds(series=tuple(HOOK_COLUMNS)),
     EffectName.WALL_REMOVAL: Adds(
         series=tuple(RELEASE_COLUMNS), python="checks the pile's top every 10 ms while the wall is lifted"
@@ -42,16 +42,7 @@ ADDS: Mapping[EffectName, Adds] = {
         series=tuple(COLUMNS), files=("series.h5",), python="reads the state of all smarticles once per sample"
     ),
     EffectName.FRAMES: Adds(
-        arrays=(
-            "smarticle_id",
-            "link",
-            "velocity_m_per_s",
-            "angular_velocity_rad_per_s",
-            "contacts",
-            "time_s",
-            "floor_z_m",
-            "phase",
-        ),
+        arrays=tuple(FIELDS),
         files=("frames.pvd", "frames"),
         python="reads all contacts and writes one file per frame",
     ),

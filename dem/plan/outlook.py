@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import dataclass, field, replace
 from typing import Any, Self
 
 from dem.engine.demand import Activity
@@ -69,10 +69,6 @@ class Plan:
         """Return this plan with wall times `factor` times as long [1]."""
         phases = tuple(replace(phase, wall_s=factor * phase.wall_s) for phase in self.phases)
         return replace(self, phases=phases, wall_s=factor * self.wall_s, correction=factor * self.correction)
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return plain data for `--json`."""
-        return asdict(self)
 
     def to_text(self) -> str:
         """Return a table for the terminal."""

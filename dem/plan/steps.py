@@ -36,21 +36,19 @@ def time_step(scene: Scene) -> float:
     given = scene.fidelity.time_step_s
     if given is not None and given > stable:
         # Half a percent less, so that the three digits are not above it.
-        msg = (
+        raise InputError(
             f"fidelity.time_step_s: {given:g} s is above the stable step {stable:.4g} s of this smarticle at "
             f"{scene.fidelity.stiffness_N_per_m:g} N/m; use at most {0.995 * stable:.3g} s or leave it out"
         )
-        raise InputError(msg)
     wanted = given if given is not None else scene.fidelity.time_step_fraction * stable
     whole = scene.fidelity.control_interval_s if scene.actuates else scene.recording.series_interval_s
     steps = _steps_in(whole, wanted)
-    if scene.actuates and scene.motor.law == "servo" and steps > 1 and engine_kind(scene.engine).damps_once_per_look:
+    if scene.actuates and scene.motor.law == "servo" and steps > 1 and engine_kind(scene.engine).damps_once_per_update:
         # A damper that acts a period late drives vibrations that are faster than the period.
-        msg = (
+        raise InputError(
             f"fidelity.control_interval_s: {whole:g} s is {steps} time steps, but a servo (motor.law) must damp in "
             f"each; use at most {wanted:.3g} s, or softer contacts, servos and strings"
         )
-        raise InputError(msg)
     return whole / steps
 
 
@@ -89,9 +87,8 @@ def _check_speeds(scene: Scene, steps: Sequence[float]) -> None:
         speed = phase.pushing_speed
         if speed > most:
             # Half a percent less, so that the three digits are not above it.
-            msg = (
+            raise InputError(
                 f"phases.{index}.speed_m_per_s: {speed:g} m/s ({phase.kind}) is {speed * step / diameter:.3g} sphere "
                 f"diameters in a time step of {step:.3g} s, which contacts cannot follow; use at most "
                 f"{0.995 * most:.3g} m/s or a shorter fidelity.time_step_s"
             )
-            raise InputError(msg)

@@ -33,15 +33,7 @@ _YADE, _YADE_MEMBER = "yade", "engine.yade"
 
 @dataclass(frozen=True, kw_only=True)
 class Checkpoint:
-    """What a run needs to be resumed.
-
-    Args:
-        scene_sha256: hash of the scene.
-        made_by: name and version of the engine.
-        state: plain data: phase, stage, recorder, clock.
-        series: columns of the series so far.
-        engine: what the engine saved.
-    """
+    """What a run needs to be resumed; `made_by` is name and version of the engine, `state` plain data."""
 
     scene_sha256: str
     made_by: tuple[str, str]
@@ -74,11 +66,10 @@ def write_checkpoint(folder: Path, checkpoint: Checkpoint) -> None:
             file.flush()
             os.fsync(file.fileno())
     except OSError as error:
-        msg = (
+        raise RunError(
             f"{newest}: cannot be written ({error.strerror or error}); free space and go on with "
             "`smarticles run … --resume`; the checkpoint before is whole"
-        )
-        raise RunError(msg) from error
+        ) from error
 
 
 def read_checkpoint(folder: Path, *, scene_sha256: str, made_by: tuple[str, str]) -> tuple[Checkpoint, str | None]:
@@ -111,8 +102,7 @@ def read_checkpoint(folder: Path, *, scene_sha256: str, made_by: tuple[str, str]
         warning = f"damaged: {', '.join(damaged)}; going on from {name}" if damaged else None
         return checkpoint, warning
     cause = f"damaged: {', '.join(damaged)}" if damaged else "no checkpoint was written"
-    msg = f"{folder}: cannot be resumed, {cause}; start the run anew in another --out"
-    raise InputError(msg)
+    raise InputError(f"{folder}: cannot be resumed, {cause}; start the run anew in another --out")
 
 
 def has_checkpoint(folder: Path) -> bool:

@@ -25,12 +25,16 @@ Columns = Mapping[str, Column]
 """Datasets by name, in the order of the file."""
 
 
-def _columns(**described: str | tuple[str, str]) -> Columns:
-    """Return columns from descriptions, or labels and descriptions; names spell the unit, and the label by default."""
+def _columns(*, whole_names: bool = False, **described: str | tuple[str, str]) -> Columns:
+    """Return columns from descriptions, or labels and descriptions; names spell the unit, and the label by default.
+
+    With `whole_names` the labels are the names with their units.
+    """
     found = {}
     for name, text in described.items():
         own_label, unit = unit_of(name)
-        label, description = (own_label.replace("_", " "), text) if isinstance(text, str) else text
+        own_label = name if whole_names else own_label.replace("_", " ")
+        label, description = (own_label, text) if isinstance(text, str) else text
         found[name] = Column(unit or "1", label, description)
     return found
 
@@ -68,19 +72,14 @@ ENERGY_COLUMNS = _columns(
     container_work_J="work of the moving container, hook or strings on the smarticles since the start, without "
     "their own weight",
 )
-# In scenes that sample dissipation; their labels are the names of the datasets.
+# In scenes that sample dissipation.
 LEDGER_COLUMNS = _columns(
-    added_energy_J=(
-        "added_energy_J",
-        "gravitational energy that smarticles had when they were poured, above the same height",
-    ),
-    contact_elastic_energy_J=("contact_elastic_energy_J", "in the springs of all contacts"),
-    hinge_elastic_energy_J=("hinge_elastic_energy_J", "in the pins and dampers of all hinges"),
-    dissipated_energy_J=("dissipated_energy_J", "by contacts, hinges and welding since the start, sampled"),
-    energy_residual_J=(
-        "energy_residual_J",
-        "added energy and work less everything stored and dissipated: the ledger's error",
-    ),
+    whole_names=True,
+    added_energy_J="gravitational energy that smarticles had when they were poured, above the same height",
+    contact_elastic_energy_J="in the springs of all contacts",
+    hinge_elastic_energy_J="in the pins and dampers of all hinges",
+    dissipated_energy_J="by contacts, hinges and welding since the start, sampled",
+    energy_residual_J="added energy and work less everything stored and dissipated: the ledger's error",
 )
 # In scenes with hooks.
 HOOK_COLUMNS = _columns(
@@ -96,10 +95,8 @@ HOOK_COLUMNS = _columns(
 )
 # In scenes that take the container away.
 RELEASE_COLUMNS = _columns(
-    outside_count=(
-        "outside_count",
-        "smarticles whose centre of mass is farther from the axis than the container's radius",
-    ),
+    whole_names=True,
+    outside_count="smarticles whose centre of mass is farther from the axis than the container's radius",
 )
 # In scenes that strain a chain. Forces are means since the sample before, and NaN while no string is tied.
 STRAIN_COLUMNS = _columns(

@@ -125,8 +125,7 @@ class Manifest(Document):
     @model_validator(mode="after")
     def _numbered(self) -> Self:
         if [phase.index for phase in self.phases] != list(range(len(self.phases))):
-            msg = "'phases' must be numbered 0, 1, 2, …"
-            raise ValueError(msg)
+            raise ValueError("'phases' must be numbered 0, 1, 2, …")
         return self
 
     @property
@@ -165,11 +164,7 @@ class Done(Document):
     phases: tuple[Phase, ...]
 
     def mark(self, out: Path) -> None:
-        """Write it into a run directory.
-
-        Raises:
-            RunError: It cannot be written.
-        """
+        """Write it into a run directory."""
         (out / FAILED).unlink(missing_ok=True)
         self.write(out / DONE)
 

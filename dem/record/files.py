@@ -17,7 +17,6 @@ def whole(path: Path, *, before: Path | None = None, shared: bool = False) -> It
     """Yield a temporary path beside `path`, renamed to it when the block ends well, removed otherwise.
 
     Args:
-        path: the file to be made or replaced.
         before: where the replaced file is kept; None: nowhere.
         shared: whether several processes may write the file at once.
     """
@@ -36,12 +35,7 @@ def whole(path: Path, *, before: Path | None = None, shared: bool = False) -> It
 
 
 def write_whole(path: Path, write: Callable[[Path], object], *, make_folder: bool = True) -> None:
-    """Make or replace a file by `write`, which is called with a temporary path of the suffix of `path`.
-
-    Args:
-        path: the file.
-        write: makes the content.
-        make_folder: whether its folder is made if needed; not where a missing folder was moved away.
+    """Make or replace a file: `write` fills a temporary path; its folder is made, if wanted.
 
     Raises:
         RunError: the disk is full or the folder cannot be written; the file that was there is untouched.
@@ -52,17 +46,15 @@ def write_whole(path: Path, write: Callable[[Path], object], *, make_folder: boo
         with whole(path) as temporary:
             write(temporary)
     except FileNotFoundError as error:
-        msg = (
+        raise RunError(
             f"{path}: cannot be written, its folder is gone; if it was moved, what is written in it is whole, and a "
             "run goes on from there: smarticles resume DIR"
-        )
-        raise RunError(msg) from error
+        ) from error
     except OSError as error:
-        msg = (
+        raise RunError(
             f"{path}: cannot be written ({error.strerror or error}); free space or choose another --out; "
             "everything written before is whole"
-        )
-        raise RunError(msg) from error
+        ) from error
 
 
 def write_text(path: Path, text: str, *, make_folder: bool = True) -> None:
@@ -71,21 +63,10 @@ def write_text(path: Path, text: str, *, make_folder: bool = True) -> None:
 
 
 def cannot_read(what: str, path: Path, cause: BaseException | str, remedy: str) -> NoReturn:
-    """Report in one line that a file is missing, truncated or not what it should be.
-
-    Args:
-        what: kind of the file, e.g. "frame".
-        path: the file.
-        cause: why it cannot be used; of an exception its first line.
-        remedy: the way out.
-
-    Raises:
-        InputError: always.
-    """
+    """Raise InputError: a file, e.g. a "frame", is missing, truncated or not what it should be."""
     if isinstance(cause, BaseException):
         lines = str(cause).strip().splitlines()
         named = ": ".join([type(cause).__name__, *lines[:1]])
         # The system's own words say enough, and str() would repeat the path.
         cause = getattr(cause, "strerror", None) or named
-    msg = f"cannot read {what} {path}: {cause}; {remedy}"
-    raise InputError(msg) from None
+    raise InputError(f"cannot read {what} {path}: {cause}; {remedy}") from None

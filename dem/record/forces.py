@@ -10,12 +10,11 @@ import meshio
 import numpy as np
 from numpy.typing import NDArray
 
+from dem.arrays import Array, Flags, Numbers
 from dem.body.forces import BOUNDARIES, NONE, ContactForces
 from dem.record.files import cannot_read
 from dem.record.frame import Frame, read_mesh
 from dem.record.names import FORCE, collection, member
-
-Array = NDArray[np.float64]
 
 _HEAD, _EMPTY = 512, b'NumberOfCells="0"'
 NO_FORCES = "a run does where its scene says recording.contact_forces: true"
@@ -27,10 +26,8 @@ def force_mesh(found: ContactForces, positions: Array, *, time: float, phase: in
     """Return contacts as lines from the first smarticle's centre of mass to the second's, or the point at a boundary.
 
     Args:
-        found: the contacts.
         positions: (N, 3) centres of mass of the smarticles at the same instant [m].
         time: simulated time [s].
-        phase: index of the phase.
     """
     number, between = len(found.forces), found.boundaries == NONE
     ends = np.empty((number, 2, 3))
@@ -69,10 +66,9 @@ class RecordedForces:
     ends: Array = field(repr=False)
 
     @property
-    def between(self) -> NDArray[np.bool_]:
+    def between(self) -> Flags:
         """(M,) which contacts are between two smarticles."""
-        found: NDArray[np.bool_] = self.contacts.boundaries == NONE
-        return found
+        return np.asarray(self.contacts.boundaries == NONE)
 
 
 def has_forces(directory: Path) -> bool:
@@ -104,7 +100,7 @@ def read_forces(frame: Frame) -> RecordedForces:
             cannot_read("forces", path, f"cell data '{name}' {wrong}", _REMEDY)
         return found.astype(np.float64)
 
-    def numbers(*names: str, below: int) -> NDArray[np.int64]:
+    def numbers(*names: str, below: int) -> Numbers:
         found = np.column_stack([values(name) for name in names]).astype(np.int64)
         if np.any((found < NONE) | (found >= below)):
             cannot_read("forces", path, f"cell data '{names[0]}' is out of range", _REMEDY)

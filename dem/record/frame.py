@@ -19,12 +19,11 @@ import meshio
 import numpy as np
 from numpy.typing import NDArray
 
+from dem.arrays import Array, Flags, Numbers
 from dem.body.particle import LINKS, Particle
 from dem.body.state import State
 from dem.record.files import cannot_read
 from dem.record.names import FRAME, SCENE, collection
-
-Array = NDArray[np.float64]
 
 VERTICES = 4
 
@@ -40,7 +39,7 @@ def centreline_mesh(
     *,
     velocities: Array,
     spins: Array,
-    contacts: NDArray[np.int64],
+    contacts: Numbers,
     time: float,
     floor: float,
     phase: int,
@@ -55,7 +54,6 @@ def centreline_mesh(
         contacts: (N,) how many others each smarticle touches.
         time: simulated time [s].
         floor: height of the container's floor [m].
-        phase: index of the phase.
         extra: (3N,) further values, one per link, such as `motor_fields`.
     """
     n, number = len(vertices), LINKS * len(vertices)
@@ -78,7 +76,7 @@ def motor_fields(
     angles: Array,
     torques: Array | None = None,
     work: Array | None = None,
-    halted: NDArray[np.bool_] | None = None,
+    halted: Flags | None = None,
 ) -> dict[str, NDArray[Any]]:
     """Return cell data of scenes with motors, from (N, 2) values of the barbs; None while welded.
 
@@ -86,7 +84,6 @@ def motor_fields(
         angles: of the barbs [rad].
         torques: of the motors on the barbs [N m].
         work: of the motors since the start [J].
-        halted: whether a motor is halted.
     """
     none = np.full(angles.shape, np.nan)
     fields = {
@@ -116,7 +113,7 @@ def sphere_mesh(state: State, particle: Particle) -> meshio.Mesh:
     return meshio.Mesh(points, [("vertex", np.arange(number)[:, None])], point_data=data)
 
 
-def _lines(count: int) -> NDArray[np.int64]:
+def _lines(count: int) -> Numbers:
     """Return (3N, 2) the ends of the links of N smarticles, as numbers of vertices."""
     first = VERTICES * np.arange(count)[:, None] + np.arange(LINKS)
     return np.stack([first, first + 1], axis=-1).reshape(-1, 2)
@@ -146,11 +143,11 @@ class Frame:
     time: float
     floor_z: float
     phase: int
-    vertices: NDArray[np.float64] = field(repr=False)
-    smarticle_ids: NDArray[np.int64] = field(repr=False)
-    link_velocity: NDArray[np.float64] = field(repr=False)
-    link_angular_velocity: NDArray[np.float64] = field(repr=False)
-    contacts: NDArray[np.int64] = field(repr=False)
+    vertices: Array = field(repr=False)
+    smarticle_ids: Numbers = field(repr=False)
+    link_velocity: Array = field(repr=False)
+    link_angular_velocity: Array = field(repr=False)
+    contacts: Numbers = field(repr=False)
     cell_data: Mapping[str, NDArray[Any]] = field(repr=False)
 
     @property
@@ -160,10 +157,7 @@ class Frame:
 
 
 def read_frame(path: Path | str) -> Frame:
-    """Read one frame file.
-
-    Args:
-        path: A `.vtu` file as described in docs/reference/files.md.
+    """Read one frame file, a `.vtu` as described in docs/reference/files.md.
 
     Raises:
         InputError: The file is missing, damaged, or lacks what a frame must have.
@@ -228,11 +222,6 @@ def read_frame(path: Path | str) -> Frame:
 
 def read_mesh(path: Path, what: str = "frame", remedy: str | None = None) -> Any:
     """Read a VTK file by meshio.
-
-    Args:
-        path: the file.
-        what: its kind, for messages.
-        remedy: the way out if it cannot be read; None: that of frames.
 
     Raises:
         InputError: it cannot be read.

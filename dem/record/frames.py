@@ -13,8 +13,8 @@ from xml.sax.saxutils import quoteattr
 
 import meshio
 import numpy as np
-from numpy.typing import NDArray
 
+from dem.arrays import Array
 from dem.errors import InputError
 from dem.record import names
 from dem.record.files import cannot_read, write_text, write_whole
@@ -28,7 +28,6 @@ class FrameWriter:
     """Writes frames into a run directory, and rewrites their list, `frames.pvd`, at each.
 
     Args:
-        folder: the run directory.
         noun: name of one file; "sphere" gives `spheres.pvd` and `spheres/sphere_000000.vtu`.
         times: times of the frames written so far [s].
     """
@@ -73,7 +72,7 @@ class FrameSequence(Sequence[Frame]):
         paths: The files, in time order.
     """
 
-    def __init__(self, times: NDArray[np.float64], paths: tuple[Path, ...]) -> None:
+    def __init__(self, times: Array, paths: tuple[Path, ...]) -> None:
         self.times = times
         self.paths = paths
 
@@ -106,8 +105,7 @@ class FrameSequence(Sequence[Frame]):
         first, last = float(self.times[0]), float(self.times[-1])
         slack = 1e-9 * max(abs(first), abs(last), 1.0)
         if not first - slack <= time <= last + slack:
-            msg = f"time must be between {first:g} s and {last:g} s, the run's frames: got {time:g} s"
-            raise InputError(msg)
+            raise InputError(f"time must be between {first:g} s and {last:g} s, the run's frames: got {time:g} s")
         return int(np.argmin(np.abs(self.times - time)))
 
     def after(self, time: float) -> FrameSequence:

@@ -22,12 +22,7 @@ CHECKPOINT_FORMAT = 4
 
 
 def folder(noun: str) -> str:
-    """Return the folder of the files of a noun, `frames` of "frame".
-
-    Example:
-        >>> folder(FRAME), collection(FRAME), member(FRAME, 7)
-        ('frames', 'frames.pvd', 'frames/frame_000007.vtu')
-    """
+    """Return the folder of the files of a noun, `frames` of "frame"."""
     return f"{noun}s"
 
 

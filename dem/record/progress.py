@@ -21,13 +21,7 @@ def _now() -> float:
 
 @dataclass
 class ProgressWriter:
-    """Reports progress at most once per second.
-
-    Args:
-        folder: the run directory.
-        total: smarticles in the scene.
-        show: whether to draw a line on standard error.
-    """
+    """Reports progress at most once per second."""
 
     folder: Path
     total: int
@@ -42,8 +36,6 @@ class ProgressWriter:
         """Begin or resume a phase.
 
         Args:
-            index: number of the phase.
-            phase: its type.
             start: simulated time at which it began [s].
             now: simulated time [s].
             end: simulated time at which it will end [s], if known.

@@ -48,11 +48,7 @@ class Status:
 
 @dataclass(frozen=True)
 class Run:
-    """A run directory, finished or not; each part is read when it is first asked for, once.
-
-    Args:
-        path: the directory.
-    """
+    """A run directory, finished or not; each part is read when it is first asked for, once."""
 
     path: Path
 

@@ -15,13 +15,9 @@ from dem.record.names import LOCK, LOG, MANIFEST, is_partial
 
 @contextmanager
 def claimed(out: Path, *, resume: bool) -> Iterator[None]:
-    """Hold a run directory while a run writes into it.
+    """Hold a run directory, new or empty unless a run is resumed, while a run writes into it.
 
     The lock is the kernel's: it ends with the process that holds it, so that it is never stale.
-
-    Args:
-        out: the directory; made if needed.
-        resume: whether a run is to be resumed in it; otherwise it must be empty.
 
     Raises:
         InputError: it is not empty, or has nothing to resume, or another process writes into it.
@@ -53,8 +49,7 @@ def _check_content(out: Path, *, resume: bool) -> None:
         out.mkdir(parents=True, exist_ok=True)
         held = sorted(path.name for path in out.iterdir() if path.name != LOCK and not is_partial(path.name))
     except OSError as error:
-        msg = f"--out {out}: cannot be made ({error.strerror}); choose another directory"
-        raise InputError(msg) from None
+        raise InputError(f"--out {out}: cannot be made ({error.strerror}); choose another directory") from None
     problem = None
     if MANIFEST in held:
         if not resume:
@@ -65,8 +60,7 @@ def _check_content(out: Path, *, resume: bool) -> None:
     elif resume:
         problem = "holds no run to resume; leave --resume out to start one"
     if problem:
-        msg = f"--out {out}: {problem}"
-        raise InputError(msg)
+        raise InputError(f"--out {out}: {problem}")
 
 
 def in_use(out: Path) -> bool:

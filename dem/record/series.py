@@ -15,6 +15,7 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
+from dem.arrays import Array
 from dem.errors import InputError
 from dem.record import names
 from dem.record.columns import Columns
@@ -32,13 +33,7 @@ _REMEDY = "give the directory of a run that has recorded its series, or run it a
 
 @dataclass
 class SeriesWriter:
-    """Keeps rows, and rewrites `series.h5` whole when asked.
-
-    Args:
-        folder: the run directory.
-        described: what the columns are; every row has a value for each of them.
-        attributes: root attributes: scene hash, seed.
-    """
+    """Keeps rows, with values of all `described` columns; rewrites `series.h5` whole when asked."""
 
     folder: Path
     described: Columns
@@ -52,8 +47,7 @@ class SeriesWriter:
     def add(self, row: Mapping[str, Any]) -> None:
         """Add one row: a number, (2,) or (3,) values for each column."""
         if row.keys() != self._rows.keys():
-            msg = f"a row has other columns than the series: {sorted(row.keys() ^ self._rows.keys())}"
-            raise ValueError(msg)
+            raise ValueError(f"a row has other columns than the series: {sorted(row.keys() ^ self._rows.keys())}")
         for name, value in row.items():
             self._rows[name].append(value)
 
@@ -67,11 +61,7 @@ class SeriesWriter:
         self._rows = {name: list(columns[name]) for name in self.described}
 
     def keep_up(self) -> None:
-        """Rewrite the file, unless it was written less than `PERIOD` ago: it is always written whole.
-
-        Raises:
-            RunError: it cannot be written.
-        """
+        """Rewrite the file, unless it was written less than `PERIOD` ago: it is always written whole."""
         if time.monotonic() - self._written >= PERIOD:
             self.write()
 
@@ -126,17 +116,15 @@ class Series:
         try:
             return self.data[name]
         except KeyError:
-            msg = f"{self.path} holds no series '{name}'; choose one of: {', '.join(self.data)}"
-            raise InputError(msg) from None
+            raise InputError(f"{self.path} holds no series '{name}'; choose one of: {', '.join(self.data)}") from None
 
     def __len__(self) -> int:
         return len(self.time)
 
     @property
-    def time(self) -> NDArray[np.float64]:
+    def time(self) -> Array:
         """(n,) float64 [s], simulated time of each sample."""
-        times: NDArray[np.float64] = self.data["time_s"]
-        return times
+        return np.asarray(self.data["time_s"])
 
     def table(self) -> pd.DataFrame:
         """Return the series as a table: one row per sample, units in its column names."""

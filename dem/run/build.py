@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from dem.arrays import Array
 from dem.body.state import State
 from dem.engine.effect import EffectName
 from dem.engine.interface import Engine
@@ -68,7 +68,7 @@ def build_recorder(scene: Scene, out: Path, progress: ProgressWriter) -> Recorde
     )
 
 
-def watched_points(scene: Scene) -> Callable[[State], NDArray[np.float64]]:
+def watched_points(scene: Scene) -> Callable[[State], Array]:
     """Return the (N, P, 3) points [m] that the watchdog checks: all spheres, or ends and middles of smooth links."""
     particle = scene.particle
     if not scene.smooth:

@@ -7,9 +7,9 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-import numpy as np
 from numpy.typing import NDArray
 
+from dem.arrays import Array
 from dem.body.state import State
 from dem.engine.interface import Engine
 from dem.record.forces import force_mesh
@@ -29,17 +29,12 @@ class Recorder:
     """Records at fixed intervals of time, which are whole numbers of samples of the series.
 
     Args:
-        sampler: makes the rows of the series.
-        series: writes them.
-        frames: writes the frames.
         watchdog: checks the state at intervals, at every checkpoint and at the end.
         points: returns (N, P, 3) points of a state that must stay inside the container [m].
-        progress: reports every sample.
         interval: time between samples [s].
         frame_every: samples between frames.
         watch_every: samples between checks of the watchdog; None: about `WATCH_STEPS` steps.
         forces: writes the forces at contacts, with each frame.
-        spheres: writes the spheres as points.
         sphere_every: samples between these.
     """
 
@@ -47,7 +42,7 @@ class Recorder:
     series: SeriesWriter
     frames: FrameWriter
     watchdog: Watchdog
-    points: Callable[[State], NDArray[np.float64]]
+    points: Callable[[State], Array]
     progress: ProgressWriter
     interval: float
     frame_every: int
@@ -107,15 +102,11 @@ class Recorder:
         self.next_step = engine.steps + max(1, round((self.samples * self.interval - engine.time) / engine.time_step))
 
     def watch(self, engine: Engine, state: State | None = None) -> None:
-        """Let the watchdog check everything.
-
-        Raises:
-            RunError: it stopped the run.
-        """
+        """Let the watchdog check everything."""
         state, time, watchdog = state or engine.state(), engine.time, self.watchdog
-        floor, raised, glance = engine.boundaries.floor, engine.boundaries.raised, engine.glance(state)
-        if glance is not None and watchdog.content(glance, floor=floor, raised=raised):
-            elastic = glance.elastic_energy
+        floor, raised, extremes = engine.boundaries.floor, engine.boundaries.raised, engine.extremes(state)
+        if extremes is not None and watchdog.content(extremes, floor=floor, raised=raised):
+            elastic = extremes.elastic_energy
         else:
             gaps = engine.motors.gaps() if engine.motors.articulated else None
             watchdog.check(state, floor=floor, time=time, points=self.points(state), raised=raised, gaps=gaps)

@@ -35,18 +35,13 @@ from dem.scene.scene import Scene
 def run_scene(
     scene: Scene, out: Path, *, command: str, progress: bool, resume: bool = False, builders: Builders | None = None
 ) -> Done | None:
-    """Run a scene into a run directory.
+    """Run a scene into a run directory; return times and cost, None where it was done already.
 
     Args:
-        scene: what to run.
         out: the run directory; must not exist, or be empty, or with `resume` hold an unfinished run of this scene.
         command: the command line, for the manifest.
-        progress: whether to draw progress on standard error.
         resume: go on from the newest checkpoint that is whole, or from the start where none was written.
         builders: makers of its parts, where they differ from the usual ones.
-
-    Returns:
-        Times and cost; None where the run was done already and there was nothing to resume.
 
     Raises:
         InputError: `out` holds something else, or another process runs in it.
@@ -93,7 +88,11 @@ def run_scene(
                     simulation.warn(warning)
                 if resume:
                     _restore(simulation, saved, threads)
-                return _finish(simulation)
+                phases, engine = simulation.run(), simulation.engine
+                wall, cpu = simulation.wall, simulation.cpu
+                done = Done(time_s=engine.time, steps=engine.steps, wall_s=wall, cpu_s=cpu, phases=phases)
+                done.mark(out)
+                return done
             except (Exception, KeyboardInterrupt) as error:
                 cause = _mark_ended(simulation, out, log, error)
                 if isinstance(error, RunError):
@@ -118,16 +117,14 @@ def _check_scene(scene: Scene, out: Path) -> None:
     except InputError:
         there = None
     if there is None or scene_hash(there) != made:
-        msg = (
+        raise InputError(
             f"--out {out}: {out / SCENE} is not the scene that this run was made from (its hash is not the "
             f"{made[:12]} of {MANIFEST}); put it back as it was, or run it in another directory"
         )
-        raise InputError(msg)
-    msg = (
+    raise InputError(
         f"--out {out}: was made from another scene: {difference(there, scene)}; resume with {out / SCENE} and no "
         "--set, or run the changed scene in another directory"
     )
-    raise InputError(msg)
 
 
 def _restore(simulation: Simulation, saved: tuple[Checkpoint, str | None] | None, threads: int) -> None:
@@ -148,16 +145,6 @@ def _restore(simulation: Simulation, saved: tuple[Checkpoint, str | None] | None
             "never stopped"
         )
     log.info("resumed from the checkpoint of t = %.4f s", simulation.engine.time)
-
-
-def _finish(simulation: Simulation) -> Done:
-    """Run to the end and mark the run as done."""
-    phases, engine = simulation.run(), simulation.engine
-    done = Done(
-        time_s=engine.time, steps=engine.steps, wall_s=simulation.wall, cpu_s=simulation.cpu, phases=tuple(phases)
-    )
-    done.mark(simulation.folder)
-    return done
 
 
 def _mark_ended(simulation: Simulation | None, out: Path, log: logging.Logger, error: BaseException) -> str:
@@ -186,16 +173,7 @@ def _mark_ended(simulation: Simulation | None, out: Path, log: logging.Logger, e
 def manifest(
     scene: Scene, out: Path, *, steps: Sequence[float], command: str, made_by: tuple[str, str], threads: int
 ) -> Manifest:
-    """Return what made a run, and the numbers that measures need.
-
-    Args:
-        scene: what is run.
-        out: the run directory.
-        steps: time step of each phase [s].
-        command: the command line.
-        made_by: name and version of the engine.
-        threads: number of threads of the engine.
-    """
+    """Return what made a run, and the numbers that measures need; time steps in s."""
     particle, boxes, origin = scene.particle, scene.smarticle.boxes, scene.phases[0].origin
     if origin is not None:  # a path that holds where both runs are moved
         origin = {**origin, "run": os.path.relpath(origin["run"], out.resolve())}

@@ -8,45 +8,20 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from dem.arrays import Array
 from dem.body.chain import extent
 from dem.body.state import State
 from dem.engine.effect import EffectName
 from dem.engine.interface import Engine
-from dem.record.columns import (
-    COLUMNS,
-    ENERGY_COLUMNS,
-    HOOK_COLUMNS,
-    LEDGER_COLUMNS,
-    MOTOR_COLUMNS,
-    RELEASE_COLUMNS,
-    STRAIN_COLUMNS,
-    Columns,
-)
+from dem.plan.effects import ADDS
+from dem.record.columns import COLUMNS, EVERY, STRAIN_COLUMNS, Columns
 from dem.record.packing import packing_fraction
-
-Array = NDArray[np.float64]
-
-COLUMNS_OF: Mapping[EffectName, Columns] = {
-    EffectName.MOTORS: MOTOR_COLUMNS,
-    EffectName.ENERGIES: ENERGY_COLUMNS,
-    EffectName.ENERGY_ACCOUNT: LEDGER_COLUMNS,
-    EffectName.HOOKS: HOOK_COLUMNS,
-    EffectName.WALL_REMOVAL: RELEASE_COLUMNS,
-    EffectName.STRINGS: STRAIN_COLUMNS,
-}
-"""What effects add to the rows."""
 
 
 @dataclass
 class Sampler:
-    """Makes rows of the series from an engine; for means between samples it remembers the sample before.
-
-    Args:
-        radius: of the container [m].
-        effects: what the scene calls for.
-    """
+    """Makes rows of the series and keeps the sample before, for means; container's radius in m."""
 
     radius: float
     effects: Set[EffectName] = frozenset()
@@ -57,11 +32,8 @@ class Sampler:
     @property
     def described(self) -> Columns:
         """The columns of its rows."""
-        columns = dict(COLUMNS)
-        for effect, more in COLUMNS_OF.items():
-            if effect in self.effects:
-                columns |= more
-        return columns
+        added = {name for effect in self.effects if effect in ADDS for name in ADDS[effect].series}
+        return {name: column for name, column in EVERY.items() if name in COLUMNS or name in added}
 
     def sample(self, engine: Engine, state: State, phase: int) -> dict[str, Any]:
         """Return one row, of an engine with its present state and the index of the phase."""

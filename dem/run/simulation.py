@@ -31,17 +31,7 @@ class StopRequestedError(Exception):
 
 @dataclass
 class Simulation:
-    """One run while it runs.
-
-    Args:
-        scene: what is run.
-        engine: the physics.
-        recorder: what is written.
-        folder: the run directory.
-        log: its log.
-        made_by: name and version of the engine, stored in the checkpoints.
-        time_steps: of each phase [s].
-    """
+    """One run while it runs, with name and version of its engine and the time step of each phase [s]."""
 
     scene: Scene
     engine: Engine
@@ -160,8 +150,7 @@ class Simulation:
         write_checkpoint(self.folder, checkpoint)
         self._note_checkpoint()
         if self._stop_requested:
-            msg = f"stopped as requested at the checkpoint of t = {self.engine.time:.4f} s"
-            raise StopRequestedError(msg)
+            raise StopRequestedError(f"stopped as requested at the checkpoint of t = {self.engine.time:.4f} s")
 
     def _note_checkpoint(self) -> None:
         self.checkpointed = self.engine.time
@@ -173,11 +162,10 @@ class Simulation:
         needed = 4 * (newest.stat().st_size if newest.exists() else SMALLEST_CHECKPOINT)
         free = shutil.disk_usage(self.folder).free
         if free < needed:
-            msg = (
+            raise RunError(
                 f"{self.folder}: {free / 2**20:.1f} MiB free, a checkpoint needs {needed / 2**20:.1f} MiB; "
                 "free space and go on with --resume"
             )
-            raise RunError(msg)
 
     def restore(self, checkpoint: Checkpoint) -> None:
         """Restore a checkpoint."""

@@ -6,14 +6,12 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from dem.arrays import Array, Flags
 from dem.body.state import State
-from dem.errors import RunError, refuse
-from dem.physics.overlaps import Glance, Overlaps
+from dem.errors import RunError, reject
+from dem.physics.overlaps import Extremes, Overlaps
 from dem.setting.container import Cylinder
-
-Array = NDArray[np.float64]
 
 LOWER_STEP = "lower fidelity.time_step_fraction"
 WARNED_SHARE = 0.2  # of the limit of what the energy ledger may miss: from here on a run warns at its end
@@ -42,18 +40,18 @@ class Watchdog:
     missed: float = math.inf
     _ceiling: float = math.inf  # limit of kinetic and potential energy less the work done [J]
 
-    def content(self, glance: Glance, *, floor: float, raised: float | None = 0.0) -> bool:
+    def content(self, extremes: Extremes, *, floor: float, raised: float | None = 0.0) -> bool:
         """Return whether the extremes of all smarticles are certainly within all limits but that of the energy.
 
         `floor` and `raised` are as in `check`.
         """
-        inside = glance.lowest >= floor
+        inside = extremes.lowest >= floor
         if raised is not None:
             cylinder = self.cylinder
             narrowest = min([cylinder.radius, *(radius for _, radius in cylinder.upper)])
-            inside &= glance.widest <= cylinder.corner_radius_of(narrowest)
-            inside &= glance.highest - floor < cylinder.height
-        return inside and glance.fastest <= self.speed and glance.gap <= self.gap and glance.deepest <= self.depth
+            inside &= extremes.widest <= cylinder.corner_radius_of(narrowest)
+            inside &= extremes.highest - floor < cylinder.height
+        return inside and extremes.fastest <= self.speed and extremes.gap <= self.gap and extremes.deepest <= self.depth
 
     def check(
         self,
@@ -68,7 +66,6 @@ class Watchdog:
         """Check speeds, hinges and places of all smarticles.
 
         Args:
-            state: the smarticles.
             points: (N, P, 3) centres of their spheres, or points of their links' axes [m]; None: their centres of
                 mass. Contacts with wall and floor are no measure: YADE takes those deeper than the centre for
                 shallower.
@@ -84,8 +81,8 @@ class Watchdog:
         speeds = _speeds(state)
         heights = positions[:, 2] - floor
         broken = ~(np.isfinite(positions).all(axis=1) & np.isfinite(speeds))
-        refuse(broken, time, "a position or velocity that is no number", LOWER_STEP)
-        refuse(
+        reject(broken, time, "a position or velocity that is no number", LOWER_STEP)
+        reject(
             speeds > self.speed,
             time,
             f"a speed above {self.speed:.3g} m/s (fastest {speeds.max(initial=0):.3g} m/s), "
@@ -94,7 +91,7 @@ class Watchdog:
         )
         if gaps is not None:
             # A gap that is no number is not below the limit either.
-            refuse(
+            reject(
                 (~np.less_equal(gaps, self.gap)).any(axis=1),
                 time,
                 f"links more than {self.gap:.3g} m apart at a hinge (most {gaps.max(initial=0):.3g} m)",
@@ -102,15 +99,15 @@ class Watchdog:
             )
         points = positions[:, None] if points is None else points
         above = points[..., 2] - floor
-        outside: NDArray[np.bool_] = np.less(above, 0)
+        outside: Flags = np.less(above, 0)
         height = math.inf
         if raised is not None:
             height = self.cylinder.height
             corners = self.cylinder.radii(above - raised) * (self.cylinder.corner_radius / self.cylinder.radius)
             outside |= (np.hypot(points[..., 0], points[..., 1]) > corners) & (above < height)
             height += raised
-        refuse(outside.any(axis=1), time, "left through the wall or the floor", "raise fidelity.stiffness_N_per_m")
-        refuse(
+        reject(outside.any(axis=1), time, "left through the wall or the floor", "raise fidelity.stiffness_N_per_m")
+        reject(
             heights > height,
             time,
             f"thrown out over the wall of {self.cylinder.height:.3g} m",
@@ -118,11 +115,7 @@ class Watchdog:
         )
 
     def check_depths(self, overlaps: Overlaps, *, time: float) -> None:
-        """Check the depths of all contacts at a simulated time [s].
-
-        Raises:
-            RunError: cause, smarticles concerned, time and the way out.
-        """
+        """Check the depths of all contacts at a simulated time [s]."""
         cause = (
             f"contacts more than {self.depth:.3g} m deep (deepest {overlaps.deepest:.3g} m), so that links pass "
             "through each other or through the container"
@@ -142,7 +135,7 @@ class Watchdog:
                 if first.between == BOTH_HOOKS
                 else "give the hook more room: a smaller hooks.length_m or a wider container"
             )
-        refuse(overlaps.deep, time, cause, way_out)
+        reject(overlaps.deep, time, cause, way_out)
 
     def check_energy(self, state: State, *, energy: float, elastic: float, time: float) -> None:
         """Check that no energy comes from nowhere.
@@ -157,9 +150,6 @@ class Watchdog:
                 where the work is unknown at present: the ceiling is then forgotten.
             elastic: energy of the springs of contacts and hinges at most [J].
             time: simulated time [s].
-
-        Raises:
-            RunError: cause, smarticles concerned, time and the way out.
         """
         if math.isnan(energy):
             self._ceiling = math.inf
@@ -167,7 +157,7 @@ class Watchdog:
         rise = energy - self._ceiling
         if rise > self.energy:
             speeds = _speeds(state)
-            refuse(
+            reject(
                 speeds >= speeds.max() / 2,
                 time,
                 f"an energy that has risen by {rise:.3g} J more than gravity, motors and springs explain (limit "
@@ -177,15 +167,12 @@ class Watchdog:
         self._ceiling = min(self._ceiling, energy + elastic)
 
     def check_residual(self, residual: float, *, dissipated: float, time: float) -> str | None:
-        """Check the residual of the energy ledger.
+        """Check the residual of the energy ledger; return a warning for the end of the run, if any.
 
         Args:
             residual: energy added and work done, less everything stored and dissipated [J].
             dissipated: by contacts, hinges and welding since the start [J].
             time: simulated time [s].
-
-        Returns:
-            A warning for the end of the run; None where the residual is small.
 
         Raises:
             RunError: the residual is too large, with cause and way out.
@@ -196,8 +183,7 @@ class Watchdog:
         text = f"the energy ledger misses {residual:.3g} J, {share:.2g} % of the {dissipated:.3g} J dissipated"
         # At the beginning, when next to nothing was dissipated, a fraction has no meaning.
         if abs(residual) > self.missed * dissipated + (self.energy if math.isfinite(self.energy) else 0.0):
-            msg = f"at t = {time:.4f} s {text} (limit {100 * self.missed:.2g} %); {LOWER_STEP}"
-            raise RunError(msg)
+            raise RunError(f"at t = {time:.4f} s {text} (limit {100 * self.missed:.2g} %); {LOWER_STEP}")
         return f"{text}; {LOWER_STEP}"
 
 

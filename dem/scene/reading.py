@@ -30,24 +30,17 @@ YOUNGER: Mapping[str, Mapping[str, Any]] = MappingProxyType(
 
 
 def parse_scene(data: Any, *, source: str, folder: Path | None = None) -> Scene:
-    """Validate plain data.
-
-    Args:
-        data: the content of a scene file.
-        source: file name for messages.
-        folder: folder that directories of other runs are relative to; by default the working directory.
+    """Validate plain data; other runs are relative to `folder`, by default the working directory.
 
     Raises:
         InputError: one line with file, key, value and the way out.
     """
     if problem := _not_a_scene(data):
-        msg = f"{source}: {problem}"
-        raise InputError(msg)
+        raise InputError(f"{source}: {problem}")
     try:
         return Scene.model_validate(data, context={"folder": folder})
     except ValidationError as error:
-        msg = f"{source}: {explained(error, data, described='`smarticles schema`')}"
-        raise InputError(msg) from None
+        raise InputError(f"{source}: {explained(error, data, described='`smarticles schema`')}") from None
 
 
 def _not_a_scene(data: Any) -> str | None:
@@ -67,11 +60,7 @@ def _not_a_scene(data: Any) -> str | None:
 
 
 def load_scene(path: Path | str, overrides: Sequence[str] = ()) -> Scene:
-    """Read a scene file.
-
-    Args:
-        path: YAML file.
-        overrides: `KEY=VALUE` with dots for nesting, e.g. `phases.1.duration_s=2`; the value is read as YAML.
+    """Read a scene file and change keys by `KEY=VALUE`, e.g. `phases.1.duration_s=2`.
 
     Raises:
         InputError: unreadable file, bad YAML, bad override or invalid scene.
@@ -91,8 +80,7 @@ def load_scene(path: Path | str, overrides: Sequence[str] = ()) -> Scene:
     except UnicodeDecodeError:
         problem = "is not a text file"
     if problem:
-        msg = f"{path}: {problem}; {way_out}"
-        raise InputError(msg)
+        raise InputError(f"{path}: {problem}; {way_out}")
     data = parse_yaml(text, str(path))
     for override in overrides if isinstance(data, Mapping) else ():
         apply_override(data, override)
@@ -107,21 +95,18 @@ def apply_override(data: Any, override: str) -> None:
     """
     key, separator, text = override.partition("=")
     if not separator or not key:
-        msg = f"--set {override}: write KEY=VALUE, e.g. --set phases.1.duration_s=2"
-        raise InputError(msg)
+        raise InputError(f"--set {override}: write KEY=VALUE, e.g. --set phases.1.duration_s=2")
     try:
         value = load_yaml(text)
     except yaml.YAMLError:
-        msg = f"--set {override}: the value is not valid YAML"
-        raise InputError(msg) from None
+        raise InputError(f"--set {override}: the value is not valid YAML") from None
     here: Any = data
     parts = key.split(".")
     for number, part in enumerate(parts, 1):
         last = number == len(parts)
         place: Any = int(part) if isinstance(here, list) and part.isdigit() else part
         if not isinstance(here, dict) and not (isinstance(here, list) and isinstance(place, int) and place < len(here)):
-            msg = f"--set {override}: there is no {part!r} in the scene; lists are numbered from 0"
-            raise InputError(msg)
+            raise InputError(f"--set {override}: there is no {part!r} in the scene; lists are numbered from 0")
         if last:
             here[place] = value
         elif isinstance(here, dict):
@@ -156,12 +141,7 @@ def _plain(scene: Scene) -> dict[str, Any]:
 
 
 def dump_scene(scene: Scene, folder: Path | None = None) -> str:
-    """Return the resolved scene as YAML, every default written out.
-
-    Args:
-        scene: the scene.
-        folder: folder that directories of other runs are written relative to; None: they are written in full.
-    """
+    """Return the resolved scene as YAML with every default; other runs are relative to `folder`."""
     data = _plain(scene)
     if folder is not None:
         for phase in data["phases"]:

@@ -16,17 +16,8 @@ from dem.phases.remove_container import RemoveContainer
 from dem.setting.hooks import TOLERANCE, Hooks
 
 
-def check(scene: SceneView, engine: str) -> None:
-    """Check a scene as a whole, for an engine.
-
-    Raises:
-        ValueError: one line with key, value and the way out.
-    """
-    for problem in _problems(scene, engine):
-        raise ValueError(problem)
-
-
-def _problems(scene: SceneView, engine: str) -> Iterator[str]:
+def problems(scene: SceneView, engine: str) -> Iterator[str]:
+    """Yield what is wrong with a scene on an engine: one line each with key, value and the way out."""
     if scene.plane is None:
         yield from _of_order(scene)
         yield from _of_container(scene)

@@ -13,15 +13,15 @@ from itertools import pairwise
 from typing import Any, Literal, Self
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field, ModelWrapValidatorHandler, ValidationInfo, field_validator, model_validator
 
+from dem.arrays import Array
 from dem.body.particle import Particle, SphereChain, chain_mean_width, mean_width
 from dem.engine.effect import EffectName
 from dem.errors import nearest, shown
 from dem.phases.kinds import AnyPhase
 from dem.phases.pull_hook import with_pull_defaults
-from dem.scene.rules import check
+from dem.scene.rules import problems
 from dem.scene.stiffness import stiffness_for
 from dem.setting.contact import Contact
 from dem.setting.container import Container, Cylinder
@@ -87,16 +87,14 @@ class Scene(Part):
             return value
         base = value.get("base", "standard")
         if not isinstance(base, str) or base not in FIDELITIES:
-            msg = f"unknown fidelity {shown(base)}; {nearest(str(base), FIDELITIES)}"
-            raise ValueError(msg)
+            raise ValueError(f"unknown fidelity {shown(base)}; {nearest(str(base), FIDELITIES)}")
         return {"base": base, **fidelities(info.data.get("engine", ""))[base], **value}
 
     @field_validator("gravity_m_per_s2")
     @classmethod
     def _some_or_none(cls, value: float) -> float:
         if 0 < value < _LEAST_GRAVITY:
-            msg = f"{value:g} m/s² is out of range; use 0 m/s² or at least {_LEAST_GRAVITY:g} m/s²"
-            raise ValueError(msg)
+            raise ValueError(f"{value:g} m/s² is out of range; use 0 m/s² or at least {_LEAST_GRAVITY:g} m/s²")
         return value
 
     @field_validator("hooks", mode="before")
@@ -128,7 +126,8 @@ class Scene(Part):
 
     @model_validator(mode="after")
     def _consistent(self) -> Self:
-        check(self, self.engine)
+        for problem in problems(self, self.engine):
+            raise ValueError(problem)
         return self
 
     @cached_property
@@ -207,7 +206,7 @@ class Scene(Part):
         return paper.mass * self.gravity_m_per_s2 * paper.middle_length
 
     @cached_property
-    def motor_strengths(self) -> NDArray[np.float64] | None:
+    def motor_strengths(self) -> Array | None:
         """(N, 2) factors on τ_max and stiffness of the motors [1]; None where all are alike."""
         spread = self.motor.strength_spread
         if not spread:

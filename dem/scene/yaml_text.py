@@ -69,8 +69,7 @@ def load_yaml(text: str, loader: type[StrictLoader] = StrictLoader) -> Any:
         problem = f"a whole number of more than {digits} digits" if lengthy else str(error)
         raise yaml.YAMLError(problem) from error
     except RecursionError as error:
-        msg = "nested too deeply to read"
-        raise yaml.YAMLError(msg) from error
+        raise yaml.YAMLError("nested too deeply to read") from error
 
 
 def parse_yaml(text: str, source: str, loader: type[StrictLoader] = StrictLoader) -> Any:

@@ -8,12 +8,10 @@ from itertools import pairwise
 from typing import Any, Self
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
+from dem.arrays import Array
 from dem.setting.part import Length, Part
-
-Array = NDArray[np.float64]
 
 
 class Tier(Part):
@@ -62,18 +60,16 @@ class Container(Part):
             raise ValueError(msg)
         for number, (below, tier) in enumerate(pairwise(tiers), 1):
             if tier.radius_m > below.radius_m:
-                msg = (
+                raise ValueError(
                     f"tiers.{number}.radius_m: {tier.radius_m:g} m is wider than the tier below, {below.radius_m:g} m; "
                     "a mould is filled from the top and lifted off: order tiers from wide to narrow"
                 )
-                raise ValueError(msg)
         if tiers:
             whole = math.fsum(tier.height_m for tier in tiers)
             for key, own in (("radius_m", tiers[0].radius_m), ("height_m", whole)):
                 given = getattr(self, key)
                 if given is not None and not math.isclose(given, own, rel_tol=1e-9):
-                    msg = f"{key}: {given:g} m, but tiers make it {own:g} m; leave {key} out"
-                    raise ValueError(msg)
+                    raise ValueError(f"{key}: {given:g} m, but tiers make it {own:g} m; leave {key} out")
         return self
 
     @property
@@ -88,8 +84,6 @@ class Cylinder:
 
     Args:
         radius: of the lowest tier.
-        height: of the whole wall.
-        facets: around the wall.
         upper: (bottom, radius) of the tiers above the lowest, from below; each one ends where the next begins.
     """
 
@@ -121,8 +115,7 @@ class Cylinder:
     def radii(self, heights: Array) -> Array:
         """Return the radii [m] of the tiers at heights above the floor [m]; a tier begins above its bottom."""
         steps, radii = [bottom for bottom, _ in self.upper], [self.radius, *(radius for _, radius in self.upper)]
-        found: Array = np.array(radii)[np.searchsorted(steps, heights, side="left")]
-        return found
+        return np.asarray(np.array(radii)[np.searchsorted(steps, heights, side="left")])
 
     def inner_radii(self, heights: Array) -> Array:
         """Return the distances [m] of the flats from the axis, at heights above the floor [m]."""

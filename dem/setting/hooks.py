@@ -9,13 +9,11 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field
 
+from dem.arrays import Array
 from dem.setting.part import Length, Part
 from dem.setting.smarticle import Smarticle
-
-Array = NDArray[np.float64]
 
 TOLERANCE = 1e-9  # relative; lengths and times that meet their limit up to rounding are allowed
 
@@ -118,5 +116,4 @@ class Cross:
                 for middle, half in zip((*bar.middle, 0.0), bar.half, strict=True)
             ]
             points += list(itertools.product(*axes))
-        grid: Array = np.array(points) + np.array([0.0, 0.0, self.height])
-        return grid
+        return np.asarray(np.array(points) + np.array([0.0, 0.0, self.height]))

@@ -16,12 +16,10 @@ from itertools import accumulate
 from typing import Annotated, ClassVar, Literal, Self
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
+from dem.arrays import Array
 from dem.setting.part import Duration, Frequency, HingeAngle, Part, Turning
-
-Array = NDArray[np.float64]
 
 Angles = Array | float
 Course = Callable[[Array], Array]  # a motion that has begun: times [s] since then to angles [rad]
@@ -33,7 +31,6 @@ class Leg:
 
     Args:
         key: of the motion below the one that it is a leg of, "" or e.g. "steps.1".
-        motion: the motion of this stretch.
         start: angles [rad] at its beginning.
         home: angles [rad] at the beginning of the phase.
         until: its length [s].
@@ -228,8 +225,7 @@ def sine_of(cycles: Array) -> Array:
         odd, even = odd * square + s, even * square + c
     sine, cosine = x + x * square * odd, 1 - square / 2 + square * square * even
     turn = np.mod(quarters, 4)
-    found: Array = np.where(turn == 0, sine, np.where(turn == 1, cosine, np.where(turn == 2, -sine, -cosine)))
-    return found
+    return np.asarray(np.where(turn == 0, sine, np.where(turn == 1, cosine, np.where(turn == 2, -sine, -cosine))))
 
 
 class Sine(_Wave):
@@ -285,16 +281,14 @@ class Sequence(BaseMotion):
     @model_validator(mode="after")
     def _steps_end(self) -> Self:
         if not self.steps:
-            msg = "steps: is empty; give at least one motion"
-            raise ValueError(msg)
+            raise ValueError("steps: is empty; give at least one motion")
         once = self.repeat == 1
         for number, step in enumerate(self.steps[:-1] if once else self.steps):
             if math.isinf(step.duration):
                 where = "each step but the last" if once else "each step of a sequence that is repeated"
                 # What is missing in a sequence stands in the sequence: it repeats for ever, or its last step does.
                 key = "finite repeat" if isinstance(step, Sequence) and step.repeat is None else "duration_s"
-                msg = f"steps.{number}: {step.type} has no end; give it a {key}, as {where} needs one"
-                raise ValueError(msg)
+                raise ValueError(f"steps.{number}: {step.type} has no end; give it a {key}, as {where} needs one")
         return self
 
     @property

@@ -46,9 +46,8 @@ class Motor(Part):
     @model_validator(mode="after")
     def _damps_as_a_servo(self) -> Self:
         if self.damping_N_m_s_per_rad and self.law != "servo":
-            msg = (
+            raise ValueError(
                 f"damping_N_m_s_per_rad: {self.damping_N_m_s_per_rad:g} N m s/rad, but law is {self.law}, which has "
                 "none; use law: servo"
             )
-            raise ValueError(msg)
         return self

@@ -44,19 +44,17 @@ def in_hinge_range(angle: float) -> float:
     """Return the angle [deg]; reject one outside the range of the hinges."""
     low, high = HINGE_RANGE
     if not low <= angle <= high:
-        msg = f"{angle:g}° is outside {low:g}° … {high:g}°, the range of the hinges"
-        raise ValueError(msg)
+        raise ValueError(f"{angle:g}° is outside {low:g}° … {high:g}°, the range of the hinges")
     return angle
 
 
 def reject_wrong_unit(value: float) -> float:
     """Return the length [m]; reject one that can only be millimetres."""
     if value > LONGEST_LENGTH:
-        msg = (
+        raise ValueError(
             f"{value:g} means {value:g} m, which no smarticle scene needs; "
             f"lengths are in metres: for {value:g} mm write {value / 1000:g}"
         )
-        raise ValueError(msg)
     return value
 
 

@@ -42,11 +42,7 @@ _PLACE = re.compile(r"^<!-- made here: (.+?) -->$", re.MULTILINE)
 
 
 def filled(text: str) -> str:
-    """Return a page with its tables.
-
-    Raises:
-        KeyError: it asks for an unknown table.
-    """
+    """Return a page with its tables."""
     return _PLACE.sub(lambda place: MADE[place[1]](), text)
 
 

@@ -37,12 +37,7 @@ def code(text: str) -> str:
 
 
 def table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
-    """A table.
-
-    Args:
-        head: titles of its columns.
-        rows: cells, escaped already where they are data.
-    """
+    """Return a table; cells are escaped already where they are data."""
     return "\n".join(table_lines(head, rows)) + "\n"
 
 
@@ -52,18 +47,13 @@ def _described(columns: Mapping[str, Any], what: str) -> str:
 
 
 def series_columns() -> str:
-    """Return the datasets of `series.h5`, set by set.
-
-    Raises:
-        LookupError: a dataset is in none of the sets.
-    """
+    """Return the datasets of `series.h5`, set by set."""
     from dem.record import columns  # noqa: PLC0415
 
     sets = {title: getattr(columns, name) for title, name in _SETS}
     missing = set(columns.EVERY) - {name for one in sets.values() for name in one}
     if missing:
-        msg = f"docs/made/tables.py: no set has {sorted(missing)}; add it to _SETS"
-        raise LookupError(msg)
+        raise LookupError(f"docs/made/tables.py: no set has {sorted(missing)}; add it to _SETS")
     return "\n".join(f"### {title}\n\n{_described(found, 'dataset')}" for title, found in sets.items())
 
 

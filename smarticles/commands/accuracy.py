@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from dem.errors import InputError
-from smarticles.command_line import Commands, add_jobs, add_scene, columns, positive_number, scene_settings
+from smarticles.command_line import Commands, add_scene, add_shared, columns, positive_number, scene_settings
 from smarticles.commands.study import compute_and_analyse
 from smarticles.sweeps import expected_wall_s, folder_of
 
@@ -69,7 +69,7 @@ DIR gets the runs, and results/ with table, figure and advice; its work_precisio
         "--dry-run", action="store_true", help="show the ladder and its expected hours, write nothing"
     )
     accuracy.add_argument("--analyse", action="store_true", help="start no run, analyse those that are finished")
-    add_jobs(accuracy)
+    add_shared(accuracy, "--jobs")
 
 
 def run_accuracy(arguments: argparse.Namespace) -> int:
@@ -98,8 +98,7 @@ def run_accuracy(arguments: argparse.Namespace) -> int:
     sweep = ladder_sweep(scene, ladder, seeds)
     points = expand(sweep)
     if not arguments.dry_run and arguments.out is None:
-        msg = "accuracy: --out DIR is missing; give a directory, or --dry-run to only show the ladder"
-        raise InputError(msg)
+        raise InputError("accuracy: --out DIR is missing; give a directory, or --dry-run to only show the ladder")
     print(_listing(ladder, expected_s, len(seeds), arguments.jobs), flush=True)
     if len(seeds) < 2:
         warning = "one seed has no scatter, so nothing can be resolved; give --seeds 1,2,3"

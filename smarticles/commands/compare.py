@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from dem.errors import InputError
 from dem.record.names import MANIFEST, OF_SWEEP
-from smarticles.command_line import Cell, Commands, add_json, add_overwrite, as_json, columns, reject_existing
+from smarticles.command_line import Cell, Commands, add_shared, as_json, columns, reject_existing
 from smarticles.measuring import PHASE, grouped, has_frames, measured, values_in
 
 if TYPE_CHECKING:
@@ -47,8 +47,7 @@ difference, from those of A and B.""",
     compare.add_argument("a", type=Path, metavar="A", help="a run or a sweep")
     compare.add_argument("b", type=Path, metavar="B", help="another one of the same kind")
     compare.add_argument("--table", type=Path, metavar="FILE.csv", help="write all measures as CSV")
-    add_overwrite(compare)
-    add_json(compare)
+    add_shared(compare, "--overwrite", "--json")
 
 
 def compare_two(arguments: argparse.Namespace) -> int:
@@ -132,8 +131,7 @@ def compare(one: Path, other: Path) -> dict[str, Any]:
 
     kinds = [_kind(path) for path in (one, other)]
     if kinds[0] != kinds[1]:
-        msg = f"{one} is a {kinds[0]} and {other} a {kinds[1]}; give two of a kind"
-        raise InputError(msg)
+        raise InputError(f"{one} is a {kinds[0]} and {other} a {kinds[1]}; give two of a kind")
     if kinds[0] == "sweep":
         found = _sweeps(open_folder(one), open_folder(other))
     else:

@@ -19,7 +19,7 @@ from collections.abc import Iterator
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
-from smarticles.command_line import Commands, add_json
+from smarticles.command_line import Commands, add_shared
 
 EXTRAS = {
     **dict.fromkeys(("matplotlib", "PIL", "pyvista", "vtk", "vtkmodules", "imageio_ffmpeg"), "viz"),
@@ -93,12 +93,7 @@ _OPTIONAL = {**{name: name for name in ("matplotlib", "trimesh", "trame", "aioht
 
 @dataclass(frozen=True, kw_only=True)
 class Check:
-    """What was found about one part.
-
-    Attributes:
-        found: version and place, or the cause of the failure.
-        way_out: what to do if it does not work; empty if it does.
-    """
+    """What was found about one part: version and place, or why it fails and what to do then."""
 
     name: str
     ok: bool
@@ -121,7 +116,7 @@ with the way out.""",
   smarticles doctor --json
 """,
     )
-    add_json(doctor)
+    add_shared(doctor, "--json")
 
 
 def way_to_install(module: str) -> str:

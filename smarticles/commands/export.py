@@ -99,8 +99,7 @@ def _export_scene(arguments: argparse.Namespace) -> int:
         ("--color-by", arguments.color_by),
     ):
         if value is not None:
-            msg = f"{name}: is of frames of a run, and --to {_LAMMPS} writes a scene; leave it out"
-            raise InputError(msg)
+            raise InputError(f"{name}: is of frames of a run, and --to {_LAMMPS} writes a scene; leave it out")
     folder: Path = arguments.output or scene.with_name(f"{scene.stem}-{_LAMMPS}")
     try:
         write_deck(read_scene(scene, ()), folder)

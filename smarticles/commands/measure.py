@@ -10,7 +10,7 @@ from textwrap import wrap
 from typing import TYPE_CHECKING
 
 from dem.errors import InputError
-from smarticles.command_line import Cell, Commands, add_json, add_overwrite, as_json, columns, reject_existing
+from smarticles.command_line import Cell, Commands, add_shared, as_json, columns, reject_existing
 from smarticles.measuring import grouped, measured, sources
 
 if TYPE_CHECKING:
@@ -64,8 +64,7 @@ its own in CSV and JSON. --by averages over the runs that are alike in a variabl
         metavar="FILE.csv",
         help="write φ(r, z), rings and layers at the end of each phase, as CSV",
     )
-    add_overwrite(measure)
-    add_json(measure)
+    add_shared(measure, "--overwrite", "--json")
 
 
 def measure_runs(arguments: argparse.Namespace) -> int:
@@ -81,8 +80,7 @@ def measure_runs(arguments: argparse.Namespace) -> int:
     reject_existing("--table", output, overwrite=arguments.overwrite)
     reject_existing("--profile", profile, overwrite=arguments.overwrite)
     if output is not None and output == profile:
-        msg = f"--profile {profile}: is the file of --table too; choose another name"
-        raise InputError(msg)
+        raise InputError(f"--profile {profile}: is the file of --table too; choose another name")
     by = _groups(arguments)
     directories = list(sources(arguments.directories))
     for warning in filter(None, (open_run(directory).lost_series for directory in directories)):
@@ -92,8 +90,7 @@ def measure_runs(arguments: argparse.Namespace) -> int:
         try:
             table = grouped(table, by)
         except InputError as error:
-            msg = f"--by {arguments.by}: {error}"
-            raise InputError(msg) from None
+            raise InputError(f"--by {arguments.by}: {error}") from None
     if output is not None:
         write_table(table, output, overwrite=arguments.overwrite)
     if profile is not None:
@@ -115,20 +112,14 @@ def measure_runs(arguments: argparse.Namespace) -> int:
 
 
 def _groups(arguments: argparse.Namespace) -> list[str]:
-    """Return the columns that --by names.
-
-    Raises:
-        InputError: it names none, or frames are wanted one by one.
-    """
+    """Return the columns that --by names."""
     if arguments.by is None:
         return []
     names = [name.strip() for name in arguments.by.split(",") if name.strip()]
     if not names:
-        msg = f"--by {arguments.by!r}: names no column; e.g. --by seed, or a variable of the sweep"
-        raise InputError(msg)
+        raise InputError(f"--by {arguments.by!r}: names no column; e.g. --by seed, or a variable of the sweep")
     if arguments.frames:
-        msg = f"--by {arguments.by}: averages over phases of runs; leave --frames out"
-        raise InputError(msg)
+        raise InputError(f"--by {arguments.by}: averages over phases of runs; leave --frames out")
     return names
 
 

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import argparse
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from dem.errors import InputError
-from smarticles.command_line import Commands, add_json, add_scene, as_json, positive_number, scene_settings
+from smarticles.command_line import Commands, add_scene, add_shared, as_json, positive_number, scene_settings
 from smarticles.commands.run import read_scene
 
 if TYPE_CHECKING:
@@ -53,7 +54,7 @@ table that `smarticles accuracy SCENE --knobs engine` writes.""",
     plan.add_argument(
         "--table", type=Path, metavar="FILE.csv", help="measured errors; default: those that ship, if any do"
     )
-    add_json(plan)
+    add_shared(plan, "--json")
 
 
 def plan_scene(arguments: argparse.Namespace) -> int:
@@ -64,7 +65,7 @@ def plan_scene(arguments: argparse.Namespace) -> int:
     choice = _chosen(scene, arguments)
     planned = plan(scene) if choice is None else choice.planned
     if arguments.json:
-        content = planned.to_dict() | ({} if choice is None else {"choice": choice.to_dict()})
+        content = asdict(planned) | ({} if choice is None else {"choice": choice.to_dict()})
         print(as_json(content))
         return 0
     if choice is not None:
@@ -80,14 +81,12 @@ def _chosen(scene: Scene, arguments: argparse.Namespace) -> Choice | None:
     if arguments.max_error is None and arguments.max_hours is None:
         for option, value in (("--table", arguments.table), ("--of", arguments.of)):
             if value is not None:
-                msg = f"{option} {value}: is for --max-error or --max-hours; give one of them"
-                raise InputError(msg)
+                raise InputError(f"{option} {value}: is for --max-error or --max-hours; give one of them")
         return None
     of = PACKING if arguments.of is None else tuple(word.strip() for word in arguments.of.split(","))
     for word in of:
         if word not in QUANTITIES:
-            msg = f"--of {arguments.of}: {word!r} is not measured; known: {', '.join(QUANTITIES)}"
-            raise InputError(msg)
+            raise InputError(f"--of {arguments.of}: {word!r} is not measured; known: {', '.join(QUANTITIES)}")
     return choose(
         scene,
         read_table(arguments.table, of=of, engine=arguments.engine),

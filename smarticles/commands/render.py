@@ -10,13 +10,31 @@ from pathlib import Path
 from typing import Any
 
 from dem.errors import InputError
-from smarticles.command_line import Commands, add_overwrite, positive_number
+from smarticles.command_line import Commands, add_shared, positive_number, reader
 
 _PICTURE_SUFFIX = ".png"
 _FILM_SUFFIXES = (".gif", ".webp", ".mp4")
 # Options of one kind alone, by their names in the parsed arguments: of films, and of pictures.
 _OF_FILMS = {"fps": "--fps", "start": "--from", "end": "--to", "every": "--every"}
 _OF_PICTURES = {"time": "--time", "smarticle": "--smarticle"}
+
+
+def _ends(text: str) -> tuple[float, float] | str:
+    low, _, high = text.partition(":")
+    return text if text == "run" else (float(low), float(high))
+
+
+def _sides(text: str) -> tuple[int, int]:
+    width, _, height = text.partition("x")
+    return int(width), int(height or width)
+
+
+_limits = reader(
+    _ends,
+    "LOW:HIGH, two numbers in order, or run",
+    lambda ends: isinstance(ends, str) or -math.inf < ends[0] < ends[1] < math.inf,
+)
+_size = reader(_sides, "a number of pixels from 1, or two as in 1280x720", lambda sides: min(sides) >= 1)
 
 
 def add(commands: Commands) -> None:
@@ -85,7 +103,7 @@ and .mp4 are films, which play at one speed and show it.""",
         metavar="S",
         help="simulated time from one picture of a film to the next [s]; default: every frame, of many some 150",
     )
-    add_overwrite(render)
+    add_shared(render, "--overwrite")
 
 
 def render_run(arguments: argparse.Namespace) -> int:
@@ -103,8 +121,7 @@ def render_run(arguments: argparse.Namespace) -> int:
             if film:
                 why = "a film shows all times" if name == "time" else "is drawn alone, in a picture"
                 way_out = f"{why}; leave it out, or write .png"
-            msg = f"{option} {value:g}: {way_out}"
-            raise InputError(msg)
+            raise InputError(f"{option} {value:g}: {way_out}")
     from postprocess.pictures import render  # noqa: PLC0415  (imports PyVista)
 
     options: dict[str, Any] = {
@@ -133,31 +150,3 @@ def _track(images: Iterable[Any], count: int) -> Iterable[Any]:
     from rich.progress import track  # noqa: PLC0415
 
     return track(images, "drawing", total=count, console=Console(stderr=True), transient=True)
-
-
-def _limits(text: str) -> tuple[float, float] | str:
-    """Read two numbers in order, or run."""
-    if text == "run":
-        return text
-    low, _, high = text.partition(":")
-    try:
-        limits = float(low), float(high)
-    except ValueError:
-        limits = math.nan, math.nan
-    if not -math.inf < limits[0] < limits[1] < math.inf:
-        msg = f"must be LOW:HIGH, two numbers in order, or run: got {text!r}"
-        raise argparse.ArgumentTypeError(msg)
-    return limits
-
-
-def _size(text: str) -> tuple[int, int]:
-    """Read one side of a square, or two."""
-    width, _, height = text.partition("x")
-    try:
-        size = int(width), int(height or width)
-    except ValueError:
-        size = 0, 0
-    if min(size) < 1:
-        msg = f"must be a number of pixels from 1, or two as in 1280x720: got {text!r}"
-        raise argparse.ArgumentTypeError(msg)
-    return size

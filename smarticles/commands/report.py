@@ -7,7 +7,7 @@ from pathlib import Path
 
 from dem.errors import InputError
 from dem.record.names import MANIFEST, OF_SWEEP
-from smarticles.command_line import Commands, add_jobs, add_overwrite
+from smarticles.command_line import Commands, add_shared
 
 
 def add(commands: Commands) -> None:
@@ -32,8 +32,7 @@ repeat it. The file holds all that it shows: it can be sent, kept, and opened wi
     report.add_argument(
         "--accuracy", type=Path, metavar="FILE.csv", help="measured errors of fidelities; default: those that ship"
     )
-    add_jobs(report)
-    add_overwrite(report)
+    add_shared(report, "--jobs", "--overwrite")
 
 
 def write_report(arguments: argparse.Namespace) -> int:
@@ -43,8 +42,7 @@ def write_report(arguments: argparse.Namespace) -> int:
     directory: Path = arguments.directory
     output: Path = arguments.output or directory / "report.html"
     if output.suffix != ".html":
-        msg = f"--output {output}: a report is HTML; let its name end in .html"
-        raise InputError(msg)
+        raise InputError(f"--output {output}: a report is HTML; let its name end in .html")
     # Before a minute of measuring, not after it.
     refuse_to_overwrite(output, overwrite=arguments.overwrite)
     if arguments.output is not None and not output.parent.is_dir():
@@ -65,11 +63,7 @@ def write_report(arguments: argparse.Namespace) -> int:
 
 
 def _page(directory: Path, accuracy: Path | None, jobs: int | None) -> str:
-    """Return the page of a run, a sweep, a study, or the results of a study.
-
-    Raises:
-        InputError: the directory is none of these, or a file of it is damaged.
-    """
+    """Return the page of a run, a sweep, a study, or the results of a study."""
     from dem.engine.cores import usable_cores  # noqa: PLC0415
     from smarticles.reporting.run import run_page  # noqa: PLC0415  (pandas, matplotlib, PyVista)
     from smarticles.reporting.sweep import PROVENANCE, results_page, sweep_page  # noqa: PLC0415

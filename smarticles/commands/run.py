@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 from dem.errors import InputError
 from smarticles import sweeps
-from smarticles.command_line import Commands, add_jobs, add_ranks, add_scene, positive_int, scene_settings
+from smarticles.command_line import Commands, add_ranks, add_scene, add_shared, positive_int, scene_settings
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -91,7 +91,7 @@ For a study, give the study's command again: it also makes the tables and figure
         metavar="N",
         help="threads of one run; default: what it began with. Another number is logged, and changes the last bits",
     )
-    add_jobs(resume)
+    add_shared(resume, "--jobs")
     sweeps.add_cluster_options(resume)
 
 
@@ -115,8 +115,7 @@ def resume_directory(arguments: argparse.Namespace) -> int:
     folder = open_folder(directory)
     if arguments.threads is not None:
         given = f"--threads {arguments.threads}"
-        msg = f"{given}: is for one run, and {directory} is a sweep, of runs of one thread; leave it out"
-        raise InputError(msg)
+        raise InputError(f"{given}: is for one run, and {directory} is a sweep, of runs of one thread; leave it out")
     if queue:
         return sweeps.enqueue(folder, arguments)
     if arguments.submit == "none":
@@ -134,8 +133,7 @@ def read_scene(scene_file: Path, settings: Sequence[str]) -> Scene:
     try:
         time_steps(scene)
     except InputError as error:
-        msg = f"{scene_file}: {error}"
-        raise InputError(msg) from None
+        raise InputError(f"{scene_file}: {error}") from None
     return scene
 
 
@@ -166,11 +164,7 @@ def _run(
 
 
 def _set_workers(scene: Scene, out: Path, *, resume: bool, threads: int | None, ranks: int | None) -> None:
-    """Set the number of threads, or ranks, by variables that the engine reads when it is loaded.
-
-    Raises:
-        InputError: the engine has none of them, or there are not so many cores.
-    """
+    """Set the number of threads, or ranks, by variables that the engine reads when it is loaded."""
     from dem.engine.cores import (  # noqa: PLC0415
         RANKS,
         check_ranks,

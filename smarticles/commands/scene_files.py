@@ -13,13 +13,7 @@ from smarticles.starters import KINDS, about, starter
 
 
 def add(commands: Commands) -> None:
-    """Add the commands."""
-    _add_init(commands)
-    _add_schema(commands)
-
-
-def _add_init(commands: Commands) -> None:
-    """Add `init`."""
+    """Add `init` and `schema`."""
     init = commands.add(
         "init",
         write_scene,
@@ -37,29 +31,6 @@ def _add_init(commands: Commands) -> None:
     init.add_argument(
         "--output", type=Path, default=Path("scene.yaml"), metavar="FILE.yaml", help="default: scene.yaml"
     )
-
-
-def write_scene(arguments: argparse.Namespace) -> int:
-    """`smarticles init`."""
-    output: Path = arguments.output
-    try:
-        # "x": never over a file that exists, nor through a link.
-        with output.open("x", encoding="utf-8") as file:
-            file.write(starter(arguments.kind))
-    except FileExistsError:
-        msg = f"--output {output}: exists; choose another name"
-        raise InputError(msg) from None
-    except FileNotFoundError:
-        msg = f"--output {output}: the folder {output.parent} does not exist; make it, or choose another one"
-        raise InputError(msg) from None
-    place, run = shlex.quote(str(output)), shlex.quote(f"runs/{output.stem}")
-    print(f"{output}: {about(arguments.kind)}")
-    print(f"next: smarticles plan {place}, smarticles run {place} --out {run}")
-    return 0
-
-
-def _add_schema(commands: Commands) -> None:
-    """Add `schema`."""
     commands.add(
         "schema",
         print_schema,
@@ -71,6 +42,24 @@ Every key with its unit, default and meaning. Editors use it to complete and che
   smarticles schema > scene.schema.json
 """,
     )
+
+
+def write_scene(arguments: argparse.Namespace) -> int:
+    """`smarticles init`."""
+    output: Path = arguments.output
+    try:
+        # "x": never over a file that exists, nor through a link.
+        with output.open("x", encoding="utf-8") as file:
+            file.write(starter(arguments.kind))
+    except FileExistsError:
+        raise InputError(f"--output {output}: exists; choose another name") from None
+    except FileNotFoundError:
+        msg = f"--output {output}: the folder {output.parent} does not exist; make it, or choose another one"
+        raise InputError(msg) from None
+    place, run = shlex.quote(str(output)), shlex.quote(f"runs/{output.stem}")
+    print(f"{output}: {about(arguments.kind)}")
+    print(f"next: smarticles plan {place}, smarticles run {place} --out {run}")
+    return 0
 
 
 def print_schema(_: argparse.Namespace) -> int:

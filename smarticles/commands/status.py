@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from dem.errors import InputError
 from dem.record.names import MANIFEST, OF_SWEEP
-from smarticles.command_line import Commands, add_json, as_json, columns, positive_number
+from smarticles.command_line import Commands, add_shared, as_json, columns, positive_number
 
 if TYPE_CHECKING:
     from templates.sweep.folder import RunStatus
@@ -47,18 +47,16 @@ run came, `checkpoint s` from where it would go on.""",
     status.add_argument(
         "--every", type=positive_number, metavar="S", help="with --watch: seconds between checks; default: 2"
     )
-    add_json(status)
+    add_shared(status, "--json")
 
 
 def show_status(arguments: argparse.Namespace) -> int:
     """Print the state of a directory, once or again and again."""
     directory: Path = arguments.directory
     if arguments.json and arguments.watch:
-        msg = "--watch: is for a person; leave it out with --json"
-        raise InputError(msg)
+        raise InputError("--watch: is for a person; leave it out with --json")
     if arguments.every is not None and not arguments.watch:
-        msg = f"--every {arguments.every:g}: is how often --watch checks; add --watch"
-        raise InputError(msg)
+        raise InputError(f"--every {arguments.every:g}: is how often --watch checks; add --watch")
     if arguments.watch:
         _watch(directory, arguments.every or _EVERY_S)
     elif arguments.json:

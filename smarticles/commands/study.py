@@ -9,7 +9,7 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING
 
 from dem.errors import InputError
-from smarticles.command_line import Commands, add_engine, add_jobs, columns
+from smarticles.command_line import Commands, add_engine, add_shared, columns
 from smarticles.measuring import follows
 from smarticles.sweeps import changed_sweep, compute, folder_of, raise_failures
 from studies import registry
@@ -60,7 +60,7 @@ same command again goes on where it stopped. `smarticles status DIR` shows how f
         help="results of an earlier analysis: runs of the same scenes in its tables are not computed again",
     )
     study.add_argument("--out", type=Path, required=True, metavar="DIR", help="directory of the study")
-    add_jobs(study)
+    add_shared(study, "--jobs")
 
 
 def run_study(arguments: argparse.Namespace) -> int:
@@ -101,8 +101,6 @@ def compute_and_analyse(
     """Run what a sweep is missing unless --analyse forbids it, then analyse the finished runs.
 
     Args:
-        folder: the sweep's directory.
-        arguments: of the command.
         load: gives the study that analyses the runs, once there are any: its libraries are large.
         note: how the runs differ from the full study.
         pictured: values of the run that a picture is drawn of.
@@ -116,8 +114,7 @@ def compute_and_analyse(
     outcomes = [] if arguments.analyse else compute(needed, jobs=arguments.jobs, command=arguments.command_line)
     finished = [entry for entry in folder.entries if folder.is_done(entry)]
     if arguments.analyse and not finished and not earlier:
-        msg = f"--analyse: no run of {folder.path} is finished; leave --analyse out to start them"
-        raise InputError(msg)
+        raise InputError(f"--analyse: no run of {folder.path} is finished; leave --analyse out to start them")
     if finished or earlier:
         results = folder.path / "results"
         # All runs: those that are not done are listed as missing in every table.
@@ -145,16 +142,11 @@ def _draw(folder: Folder, finished: Sequence[Entry], values: Mapping[str, object
 
 
 def _earlier(results: Path, folder: Folder, study: Study) -> Mapping[str, MeasuredRun]:
-    """Return the runs of a sweep that an earlier analysis measured.
-
-    Raises:
-        InputError: its tables are not enough for this study, cannot be read, or are of other scenes.
-    """
+    """Return the runs of a sweep that an earlier analysis measured."""
     from studies.framework.runs import Wanted, earlier_runs  # noqa: PLC0415
 
     if not study.from_tables:
-        msg = f"--earlier {results}: study {study.name} draws from the runs themselves; leave --earlier out"
-        raise InputError(msg)
+        raise InputError(f"--earlier {results}: study {study.name} draws from the runs themselves; leave --earlier out")
     wanted = {
         entry.name: Wanted(scene=folder.scene(entry), scene_sha256=entry.scene_sha256) for entry in folder.entries
     }
@@ -162,18 +154,13 @@ def _earlier(results: Path, folder: Folder, study: Study) -> Mapping[str, Measur
 
 
 def _fidelity(name: str, file: Path, fidelity: str) -> dict[str, str]:
-    """Return the constant of a study that --fidelity changes.
-
-    Raises:
-        InputError: there is no such fidelity, the study sets its own, or its scenes are not valid at it.
-    """
+    """Return the constant of a study that --fidelity changes."""
     from dem.setting.fidelity import FIDELITIES  # noqa: PLC0415
     from templates.sweep.expand import expand  # noqa: PLC0415
     from templates.sweep.sweep_file import load_sweep, with_constants  # noqa: PLC0415
 
     if fidelity not in FIDELITIES:
-        msg = f"--fidelity {fidelity}: is not known; known: {', '.join(FIDELITIES)}"
-        raise InputError(msg)
+        raise InputError(f"--fidelity {fidelity}: is not known; known: {', '.join(FIDELITIES)}")
     sweep, changed = load_sweep(file), {"fidelity": fidelity}
     shipped = sweep.content.constants.get("fidelity")
     if shipped == fidelity:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 from dem.errors import InputError
 from dem.record.names import OF_SWEEP
 from smarticles import sweeps
-from smarticles.command_line import Commands, add_engine, add_jobs, columns, positive_int
+from smarticles.command_line import Commands, add_engine, add_shared, columns, positive_int
 
 if TYPE_CHECKING:
     from templates.slurm.submission import Draft
@@ -66,7 +66,7 @@ def add(commands: Commands) -> None:
         "--max-points", type=positive_int, metavar="N", help="reject a sweep of more runs; default: 10000"
     )
     add_engine(sweep, "all runs on this engine: its constant `engine` is set to it")
-    add_jobs(sweep)
+    add_shared(sweep, "--jobs")
     sweeps.add_cluster_options(sweep)
 
 
@@ -98,8 +98,7 @@ def run_sweep(arguments: argparse.Namespace) -> int:
 def _place(arguments: argparse.Namespace) -> Path:
     out: Path | None = arguments.out
     if out is None:
-        msg = "sweep: --out DIR is missing; give a directory, or --dry-run to only list the runs"
-        raise InputError(msg)
+        raise InputError("sweep: --out DIR is missing; give a directory, or --dry-run to only list the runs")
     return out
 
 
@@ -110,11 +109,10 @@ def _draft(name: str, points: Sequence[Point], arguments: argparse.Namespace) ->
 
     out = _place(arguments)
     if arguments.ranks and (others := {point.scene.engine for point in points} - {"lammps"}):
-        msg = (
+        raise InputError(
             f"--ranks {arguments.ranks}: engine: {', '.join(sorted(others))} is one process; leave it out, or give "
             "--engine lammps"
         )
-        raise InputError(msg)
     entries = [entry_of(point, sweeps.expected_wall_s(point.scene)) for point in points]
     if (out / OF_SWEEP).exists():
         # Where nothing is missing, the limits are checked for all runs.

@@ -8,7 +8,9 @@ import sys
 import webbrowser
 from pathlib import Path
 
-from smarticles.command_line import Commands
+from smarticles.command_line import Commands, reader
+
+_port = reader(int, "a whole number from 0 to 65535", lambda number: 0 <= number <= 65535)
 
 
 def add(commands: Commands) -> None:
@@ -29,14 +31,6 @@ for its fields. A run that goes on is followed. Ends with its window, or by Ctrl
     view.add_argument("directory", type=Path, metavar="DIR", help="run directory")
     view.add_argument("--port", type=_port, default=0, metavar="N", help="to listen on; default: any that is free")
     view.add_argument("--no-browser", action="store_true", help="print the address, and open nothing")
-
-
-def _port(text: str) -> int:
-    number = int(text) if text.isdecimal() else -1
-    if not 0 <= number <= 65535:
-        msg = f"must be a whole number from 0 to 65535: got {text!r}"
-        raise argparse.ArgumentTypeError(msg)
-    return number
 
 
 def view_run(arguments: argparse.Namespace) -> int:

@@ -15,22 +15,20 @@ from smarticles.reporting.page import address
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
-    from numpy.typing import NDArray
+
+    from dem.arrays import Array
 
 _BAND = "#f0f1f2"
 _MOST_POINTS = 400
 Groups = Mapping[str, tuple[Sequence[object], Sequence[float], Sequence[float]]]
 
 
-def against_time(
-    times: NDArray[np.float64], values: NDArray[np.float64], label: str, phases: Sequence[tuple[float, float, str]]
-) -> str:
+def against_time(times: Array, values: Array, label: str, phases: Sequence[tuple[float, float, str]]) -> str:
     """Return a chart of a quantity against time.
 
     Args:
         times: (n,) [s].
         values: (n,) in the unit of the label.
-        label: of the vertical axis, with its unit.
         phases: start, end [s] and type of each phase.
     """
     with style():
@@ -49,13 +47,7 @@ def against_time(
 
 
 def against_variable(variable: str, label: str, groups: Groups) -> str:
-    """Return a chart of means with their errors against a variable.
-
-    Args:
-        variable: of the horizontal axis.
-        label: of the vertical axis, with its unit.
-        groups: by the name of each curve: x, means and errors, NaN where there is none.
-    """
+    """Return a chart of x, means and errors of each curve, by its name; NaN for an unknown error."""
     values = [x for xs, _, _ in groups.values() for x in xs]
     numeric = all(isinstance(x, int | float) for x in values)
     names = list(dict.fromkeys(map(str, values)))
@@ -82,7 +74,7 @@ def against_variable(variable: str, label: str, groups: Groups) -> str:
         return _svg(figure)
 
 
-def thinned(times: NDArray[np.float64], values: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def thinned(times: Array, values: Array) -> tuple[Array, Array]:
     """Return at most some hundred points of a curve: the least and the largest of each stretch, NaN left out."""
     known = np.isfinite(values)
     times, values = times[known], values[known]

@@ -40,10 +40,8 @@ def page(title: str, about: str, lead: Iterable[tuple[str, str]], sections: Iter
     """Return a whole page.
 
     Args:
-        title: its heading.
         about: what it is of: "run", "sweep", "study", "results of a study".
         lead: the most important facts, label and value.
-        sections: in order.
         source: the directory that it is made from.
     """
     try:
@@ -81,23 +79,16 @@ def figure(caption: str, alt: str, picture: str, kind: str) -> Markup:
     """Return a picture.
 
     Args:
-        caption: below it.
         alt: what it shows.
-        picture: its data address.
         kind: "chart", of which the colours are turned round on a dark page; "card", on a light ground; "card wide".
     """
     return Markup(_blocks.figure(caption, alt, picture, kind))
 
 
 def turntable(caption: str, alt: str, views: Sequence[str]) -> Markup:
-    """Return pictures of one thing from all around, turned by pointer, finger or arrow keys.
+    """Return `views` from equal angles, data addresses, turned by pointer, finger or arrow keys.
 
     It is a group of radio buttons, one per picture, so that the page needs no script.
-
-    Args:
-        caption: below it.
-        alt: what it shows.
-        views: data addresses of pictures of one size, at equal angles, the first one from the front.
     """
     angles = [round(360 * number / len(views)) for number in range(len(views))]
     return Markup(_blocks.turntable(caption, alt, list(zip(views, angles, strict=True))))
@@ -124,8 +115,7 @@ def embedded(path: Path) -> str:
     try:
         return address(path.read_bytes(), _MIMES[path.suffix])
     except (KeyError, OSError) as error:
-        msg = f"{path}: cannot be put into a report ({error}); use {', '.join(_MIMES)}"
-        raise InputError(msg) from None
+        raise InputError(f"{path}: cannot be put into a report ({error}); use {', '.join(_MIMES)}") from None
 
 
 def address(content: bytes, mime: str) -> str:

@@ -47,15 +47,7 @@ _MOST_WARNINGS = 30
 
 
 def run_page(directory: Path, accuracy: Path | None) -> str:
-    """Return the page of a run, done or not.
-
-    Args:
-        directory: a run directory.
-        accuracy: measured errors, see `accuracy_blocks`.
-
-    Raises:
-        InputError: it is no run directory, or a file of it is damaged.
-    """
+    """Return the page of a run, done or not."""
     directory = directory.resolve()
     run, scene = open_run(directory), None
     why_not = ""
@@ -105,13 +97,7 @@ def _measures(directory: Path) -> list[Markup]:
 
 
 def short_table(found: pd.DataFrame, named: Sequence[str], caption: str) -> Markup:
-    """Return the quantities that short tables have, each as `mean ± SE`.
-
-    Args:
-        found: of `measured` or `grouped`.
-        named: columns that identify a row.
-        caption: of the table.
-    """
+    """Return the quantities of short tables, as `mean ± SE`, from `measured` or `grouped`."""
     present = found.columns[found.notna().any()]
     wanted = [(quantity.header, shown) for quantity, shown in shown_quantities() if quantity.header in present]
     rows = [
@@ -133,13 +119,7 @@ def frame_table(found: pd.DataFrame, caption: str) -> Markup:
 
 
 def picture_blocks(directory: Path, *, name: str = "", turn: bool = True) -> list[Markup]:
-    """Return a picture of the last frame of a run, and one to turn; or why there is none.
-
-    Args:
-        directory: a run directory.
-        name: of the run, for the captions; empty: what the picture shows.
-        turn: whether to add pictures from all around.
-    """
+    """Return a picture of a run's last frame, and one to turn, with its name; or why not."""
     from postprocess.pictures.render import render_run  # noqa: PLC0415  (imports PyVista)
     from postprocess.pictures.render import turntable as from_all_around  # noqa: PLC0415
 

@@ -50,16 +50,7 @@ _DRAWN = 4  # quantities that are drawn against each variable
 
 
 def sweep_page(folder: Folder, accuracy: Path | None, *, jobs: int) -> str:
-    """Return the page of a sweep, or of a study with what its analysis found.
-
-    Args:
-        folder: its directory.
-        accuracy: measured errors, see `accuracy_blocks`.
-        jobs: runs that are measured at once.
-
-    Raises:
-        InputError: a file of it is damaged.
-    """
+    """Return the page of a sweep, or of a study with what its analysis found."""
     states = folder.status()
     study = folder.name.removesuffix("-quick")
     results = folder.path / "results"
@@ -101,11 +92,7 @@ def sweep_page(folder: Folder, accuracy: Path | None, *, jobs: int) -> str:
 
 
 def results_page(folder: Path) -> str:
-    """Return the page of a folder of results alone, without its runs.
-
-    Raises:
-        InputError: its provenance is damaged.
-    """
+    """Return the page of a folder of results alone, without its runs."""
     origin = _provenance(folder)
     study = str(origin.get("study", folder.name))
     used, missing = (str(len(origin.get(key, []))) for key in ("runs", "missing"))

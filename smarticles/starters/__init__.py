@@ -11,17 +11,9 @@ KINDS = ("shaken", "actuated", "hook", "melting", "casting", "collapse", "chain"
 
 
 def starter(kind: str) -> str:
-    """Return the text of a scene.
-
-    Args:
-        kind: one of `KINDS`.
-
-    Raises:
-        InputError: there is no such kind.
-    """
+    """Return the text of a scene."""
     if kind not in KINDS:
-        msg = f"{kind!r} is no kind of scene; {nearest(kind, KINDS)}"
-        raise InputError(msg)
+        raise InputError(f"{kind!r} is no kind of scene; {nearest(kind, KINDS)}")
     return Path(__file__).with_name(f"{kind}.yaml").read_text(encoding="utf-8")
 
 

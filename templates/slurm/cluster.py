@@ -20,8 +20,7 @@ SHIPPED = Path(__file__).parent / "clusters"
 # These go into lines that Slurm reads without a shell: nothing in them may need quoting.
 def _plain_word(text: str) -> str:
     if not re.fullmatch(r"[A-Za-z0-9][A-Za-z0-9._+/:@=,-]*", text):
-        msg = f"{text!r} would need quoting in a job script; use letters, digits and . _ + / : @ = , - only"
-        raise ValueError(msg)
+        raise ValueError(f"{text!r} would need quoting in a job script; use letters, digits and . _ + / : @ = , - only")
     return text
 
 
@@ -47,14 +46,12 @@ def parse_time(text: str) -> int:
     names = {1: "h", 2: "hm", 3: "hms"} if dash else {1: "m", 2: "ms", 3: "hms"}
     fits = all(re.fullmatch(r"[0-9]{1,6}", part) for part in [*parts, *([days] if dash else [])])
     if not fits or len(parts) not in names:
-        msg = f"{text!r} is not a time; write D-HH:MM:SS, HH:MM:SS or minutes"
-        raise ValueError(msg)
+        raise ValueError(f"{text!r} is not a time; write D-HH:MM:SS, HH:MM:SS or minutes")
     factor = {"h": 3600, "m": 60, "s": 1}
     seconds = int(days or 0) * 86400
     seconds += sum(int(part) * factor[name] for part, name in zip(parts, names[len(parts)], strict=True))
     if seconds == 0:
-        msg = f"{text!r} is no time at all; give at least one minute"
-        raise ValueError(msg)
+        raise ValueError(f"{text!r} is no time at all; give at least one minute")
     return seconds
 
 
@@ -137,8 +134,7 @@ class Cluster(Strict):
     def _check(self) -> Cluster:
         if self.default_partition not in self.partitions:
             advice = nearest(self.default_partition, sorted(self.partitions))
-            msg = f"default_partition: there is no {self.default_partition!r}; {advice}"
-            raise ValueError(msg)
+            raise ValueError(f"default_partition: there is no {self.default_partition!r}; {advice}")
         return self
 
     def partition(self, name: str | None) -> tuple[str, Partition]:
@@ -150,8 +146,7 @@ class Cluster(Strict):
         wanted = name or self.default_partition
         if wanted not in self.partitions:
             advice = nearest(wanted, sorted(self.partitions))
-            msg = f"--partition {wanted}: cluster {self.name} has no such partition; {advice}"
-            raise InputError(msg)
+            raise InputError(f"--partition {wanted}: cluster {self.name} has no such partition; {advice}")
         return wanted, self.partitions[wanted]
 
 
@@ -161,10 +156,7 @@ def shipped_clusters() -> list[str]:
 
 
 def load_cluster(reference: str) -> Cluster:
-    """Read the facts about a cluster.
-
-    Args:
-        reference: a shipped cluster's name, or a file that ends in .toml.
+    """Read the facts about a cluster, by a shipped one's name or from a file that ends in .toml.
 
     Raises:
         InputError: unknown name, unreadable file, unknown key, bad value.
@@ -172,14 +164,12 @@ def load_cluster(reference: str) -> Cluster:
     own = reference.endswith(".toml")
     if not own and reference not in shipped_clusters():
         advice = nearest(reference, shipped_clusters())
-        msg = f"--cluster {reference}: is not known; {advice} or give a file of your own, FILE.toml"
-        raise InputError(msg)
+        raise InputError(f"--cluster {reference}: is not known; {advice} or give a file of your own, FILE.toml")
     path = Path(reference) if own else SHIPPED / f"{reference}.toml"
     try:
         content = tomllib.loads(read_text(path, "cluster file"))
     except tomllib.TOMLDecodeError as error:
-        msg = f"{path}: not valid TOML: {error}; correct the file"
-        raise InputError(msg) from error
+        raise InputError(f"{path}: not valid TOML: {error}; correct the file") from error
     try:
         cluster = Cluster.model_validate(content)
     except ValidationError as error:

@@ -154,20 +154,17 @@ def _time(longest: float, cluster: Cluster, partition: Partition, wanted: str | 
         try:
             time_s = 60 * math.ceil(parse_time(wanted) / 60)
         except ValueError as error:
-            msg = f"--time: {error}"
-            raise InputError(msg) from None
+            raise InputError(f"--time: {error}") from None
         if time_s > partition.max_time_s:
-            msg = (
+            raise InputError(
                 f"--time {wanted}: {where} allows {partition.max_time}; ask for less: a run that needs longer is "
                 "stopped at a checkpoint and queued again"
             )
-            raise InputError(msg)
     if time_s <= cluster.signal_lead_s:
-        msg = (
+        raise InputError(
             f"--time {wanted or partition.max_time}: runs are asked to stop {cluster.signal_lead_s} s before the end "
             f"(signal_lead_s of {cluster.name}), so nothing would be computed; ask for more"
         )
-        raise InputError(msg)
     return time_s
 
 
@@ -191,15 +188,6 @@ def render_script(
     cluster: Cluster, request: Request, *, sweep: Path, number: str, name: str, count: int, command: Sequence[str]
 ) -> str:
     """Return the text of an array job's script; what is not plain is quoted for the shell.
-
-    Args:
-        cluster: where it is to run.
-        request: what it asks for.
-        sweep: the sweep's directory.
-        number: number of the submission, the name of its folder in `jobs/`.
-        name: the job's name.
-        count: how many runs it computes.
-        command: the words of the command `smarticles`.
 
     Raises:
         InputError: a template fails, or a path cannot stand in a script.
@@ -248,13 +236,11 @@ def render_script(
     try:
         return environment.get_template(template).render(values)
     except jinja2.TemplateNotFound as error:
-        msg = (
+        raise InputError(
             f"{cluster.template or TEMPLATES}: cannot read the template {error.name!r}; check `template` of the cluster"
-        )
-        raise InputError(msg) from error
+        ) from error
     except (jinja2.TemplateError, TypeError, ValueError) as error:
         text = " ".join(str(error).split())
         unknown = re.match(r"'([^']+)' is undefined", text)
         advice = nearest(unknown[1], sorted(values)) if unknown else "correct it"
-        msg = f"{cluster.template or TEMPLATES / template}: {text}; {advice}"
-        raise InputError(msg) from error
+        raise InputError(f"{cluster.template or TEMPLATES / template}: {text}; {advice}") from error

@@ -104,10 +104,7 @@ def draft(
 
     Args:
         path: the sweep's directory; it may be absent.
-        name: the sweep's name.
-        entries: runs to compute.
         reference: a shipped cluster's name, or a file that ends in .toml.
-        wishes: options of the user.
         token: makes the job's name unique; by default a random one.
 
     Raises:
@@ -162,11 +159,10 @@ def submit(folder: Folder, draft: Draft) -> Submission:
     try:
         answer = _call(("sbatch", "--parsable", draft.submission.script), folder.path)
     except (OSError, subprocess.SubprocessError) as error:
-        msg = (
+        raise RunError(
             f"{script}: sbatch rejects it: {_reason(error)}; "
             f"correct that, then: smarticles resume {folder.path} --submit slurm"
-        )
-        raise RunError(msg) from error
+        ) from error
     submitted = draft.submission.model_copy(update={"job_id": parse_job_id(answer, script)})
     _store(folder, submitted)
     return submitted
@@ -228,18 +224,16 @@ def reject_queued(folder: Folder) -> None:
         tasks = tasks_of_runs(found)
     except QueueError as error:
         jobs = ", ".join(str(one.job_id or one.job_name) for one in found)
-        msg = (
+        raise InputError(
             f"{folder.path}: was submitted to Slurm (jobs {jobs}), and {error}; resume where the queue can be asked, "
             f"or, if none of these jobs is left, remove {folder.path / JOBS}"
-        )
-        raise InputError(msg) from error
+        ) from error
     busy = sorted({str(task.job_id) for task in tasks.values() if task.state != "ended"})
     if busy:
-        msg = (
+        raise InputError(
             f"{folder.path}: its runs are in Slurm's queue (jobs {', '.join(busy)}); wait for them, or cancel them "
             f"first: scancel {' '.join(busy)}"
         )
-        raise InputError(msg)
 
 
 # -- Slurm's commands --------------------------------------------------------------------------------------------------
@@ -285,17 +279,12 @@ class Task:
 
 
 def require_sbatch() -> None:
-    """Reject to submit where Slurm is not installed.
-
-    Raises:
-        InputError: there is no sbatch.
-    """
+    """Reject to submit where Slurm is not installed."""
     if shutil.which("sbatch") is None:
-        msg = (
+        raise InputError(
             "--submit slurm: there is no `sbatch` on this machine; submit on the cluster, "
             "or write the scripts with --submit none --cluster NAME"
         )
-        raise InputError(msg)
 
 
 def parse_job_id(answer: str, script: Path) -> int:
@@ -307,28 +296,22 @@ def parse_job_id(answer: str, script: Path) -> int:
     lines = [line for line in answer.splitlines() if line.strip()]
     found = re.fullmatch(r"([1-9][0-9]*)(?:;\S+)?", lines[-1].strip()) if lines else None
     if found is None:
-        msg = (
+        raise RunError(
             f"{script}: sbatch answered {answer.strip()!r}, which is no job number; "
             "look with `squeue --me` whether the job is in the queue before submitting again"
         )
-        raise RunError(msg)
     return int(found[1])
 
 
 def _ask_queue(names: Sequence[str]) -> list[Task]:
-    """Return the tasks of some jobs that Slurm still knows, ended ones included for a while.
-
-    Args:
-        names: names of the jobs. By name, since a number that Slurm has forgotten is an error.
-    """
+    """Return tasks of jobs by name: a number that Slurm has forgotten is an error."""
     if not names:
         return []
     asked = ("--noheader", "--array", "--states=all", f"--name={','.join(names)}", "--format=%j|%F|%K|%T|%r")
     try:
         answer = _call(("squeue", *asked), None)
     except (OSError, subprocess.SubprocessError) as error:
-        msg = f"the queue cannot be asked: {_reason(error)}"
-        raise QueueError(msg) from error
+        raise QueueError(f"the queue cannot be asked: {_reason(error)}") from error
     return parse_queue(answer)
 
 
@@ -346,11 +329,10 @@ def parse_queue(answer: str) -> list[Task]:
             raise RunError(msg)
         name, job, index, state, reason = found.groups()
         if state not in STATES:
-            msg = (
+            raise RunError(
                 f"Slurm says that task {job}_{index} is {state}, a state that is not known here, so nothing is assumed "
                 "about its runs; please report it with `squeue --version`"
             )
-            raise RunError(msg)
         reason = "" if reason == "None" else reason
         tasks.append(Task(job_name=name, job_id=int(job), index=int(index), slurm_state=state, reason=reason))
     return tasks

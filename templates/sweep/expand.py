@@ -59,11 +59,10 @@ def expand(sweep: Sweep, *, max_points: int = MAX_POINTS) -> list[Point]:
     for index, values in enumerate([*assigned, *repeated]):
         name = render_text(sweep.content.run_name, values, f"{sweep.path}: run_name")
         if not _RUN_NAME.match(name):
-            msg = (
+            raise InputError(
                 f"{sweep.path}: run_name: gives {name!r}, which cannot be a directory of its own; "
                 "use up to 100 letters, digits and . _ + = -, a letter or digit first"
             )
-            raise InputError(msg)
         data = render_yaml(sweep.template_text, values, str(sweep.template))
         source = f"{sweep.template}, rendered for run {name}"
         scene = parse_scene(data, source=source, folder=sweep.template.parent)
@@ -76,16 +75,11 @@ def expand(sweep: Sweep, *, max_points: int = MAX_POINTS) -> list[Point]:
 def _check_count(sweep: Sweep, count: int, most: int) -> None:
     if count > most:
         advice = f"shorten its lists, or give --max-points {count}"
-        msg = f"{sweep.path}: points: {count} runs, more than {most}; {advice}"
-        raise InputError(msg)
+        raise InputError(f"{sweep.path}: points: {count} runs, more than {most}; {advice}")
 
 
 def _sources(sweep: Sweep) -> list[Sequence[Mapping[str, Value]]]:
-    """Return lists of values that are crossed with each other; later ones vary faster.
-
-    Raises:
-        InputError: a variable is set in two of them.
-    """
+    """Return lists of values that are crossed with each other; later ones vary faster."""
     points = sweep.content.points
     sources: dict[str, Sequence[Sequence[Mapping[str, Value]]]] = {
         "constants": [[sweep.content.constants]],
@@ -99,8 +93,7 @@ def _sources(sweep: Sweep) -> list[Sequence[Mapping[str, Value]]]:
     names["derived"] = set(sweep.content.derived)
     for one, other in itertools.combinations(names, 2):
         for name in sorted(names[one] & names[other]):
-            msg = f"{sweep.path}: {name!r} is set in both {one} and {other}; rename or remove one of them"
-            raise InputError(msg)
+            raise InputError(f"{sweep.path}: {name!r} is set in both {one} and {other}; rename or remove one of them")
     return [rows for parts in crossed.values() for rows in parts]
 
 
@@ -139,18 +132,16 @@ def _reject_twins(sweep: Sweep, points: list[Point]) -> None:
     for point in points:
         twin = names.setdefault(point.name.casefold(), point)
         if twin is not point:
-            msg = (
+            raise InputError(
                 f"{sweep.path}: run_name: two runs are called {point.name!r}: "
                 f"{difference(twin.values, point.values)}; put what differs into run_name"
             )
-            raise InputError(msg)
         twin = scenes.setdefault(point.scene_sha256, point)
         if twin is not point:
-            msg = (
+            raise InputError(
                 f"{sweep.path}: runs {twin.name} and {point.name} are the same scene although "
                 f"{difference(twin.values, point.values)}; use that variable in {sweep.template}"
             )
-            raise InputError(msg)
 
 
 def difference(one: Mapping[str, Value], other: Mapping[str, Value]) -> str:

@@ -166,11 +166,10 @@ class Folder:
             try:
                 fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
             except BlockingIOError as error:
-                msg = (
+                raise InputError(
                     f"{self.path}: runs of this sweep are being computed already; wait for them "
                     f"(smarticles status {self.path}) or stop that process"
-                )
-                raise InputError(msg) from error
+                ) from error
             yield file.fileno()
 
 
@@ -199,10 +198,6 @@ def create_folder(
 
     Args:
         path: the directory; absent, empty, or made by the same sweep.
-        sweep: the sweep.
-        points: its points.
-        command: the command line, for the manifest.
-        versions: of what made it, for the manifest.
         expected_s: expected wall time [s] of a scene.
         extend: whether a directory that holds some of these runs, and no others, takes up the rest.
 
@@ -235,23 +230,20 @@ def create_folder(
                 _some("only in the directory: ", [name for name in present if name not in wanted]),
                 _some("of another scene: ", others),
             ]
-            msg = (
+            raise InputError(
                 f"{path}: holds another sweep ({open_folder(path).name!r}): runs {'; '.join(filter(None, parts))}; "
                 f"give {sweep.path} a directory of its own"
             )
-            raise InputError(msg)
     else:
         wrong = "is a file" if path.exists() and not path.is_dir() else ""
         if path.is_dir() and any(path.iterdir()):
             wrong = "holds other files"
         if wrong:
-            msg = f"{path}: {wrong}; give a directory that is new or holds this sweep"
-            raise InputError(msg)
+            raise InputError(f"{path}: {wrong}; give a directory that is new or holds this sweep")
         try:
             path.mkdir(parents=True, exist_ok=True)
         except OSError as error:
-            msg = f"--out {path}: cannot be made ({error.strerror}); choose another directory"
-            raise InputError(msg) from error
+            raise InputError(f"--out {path}: cannot be made ({error.strerror}); choose another directory") from error
         manifest.write(path / MANIFEST)
     folder = open_folder(path)
     (path / "scenes").mkdir(exist_ok=True)
@@ -277,10 +269,8 @@ def open_folder(path: Path) -> Folder:
     if (path / MANIFEST).is_file():
         return Folder(path, SweepManifest.read(path / MANIFEST))
     if (path / RUN).is_file():
-        msg = f"{path}: is one run; give the directory that a sweep or study made"
-        raise InputError(msg)
+        raise InputError(f"{path}: is one run; give the directory that a sweep or study made")
     what = f"holds neither a run ({RUN}) nor a sweep ({MANIFEST})" if path.is_dir() else "is a file"
     if not path.exists():
         what = "there is no such directory"
-    msg = f"{path}: {what}; give the directory of a run, a sweep or a study"
-    raise InputError(msg)
+    raise InputError(f"{path}: {what}; give the directory of a run, a sweep or a study")

@@ -71,11 +71,6 @@ _FAILURES = (jinja2.TemplateError, ArithmeticError, TypeError, ValueError, Looku
 def evaluate(expression: str, values: Mapping[str, Value], source: str) -> Value:
     """Return the value of a Jinja2 expression such as `(n / 2) | round | int`, evaluated in a sandbox.
 
-    Args:
-        expression: the expression, without braces.
-        values: the variables it may use.
-        source: file and key, for error messages.
-
     Raises:
         InputError: it uses an unknown name, fails, or gives something that is not plain data.
     """
@@ -88,8 +83,7 @@ def evaluate(expression: str, values: Mapping[str, Value], source: str) -> Value
         _reject(error, f"{source} = {expression!r}", values)
     if not _plain(result):
         what = type(result).__name__
-        msg = f"{source} = {expression!r}: gives {what}; it must give numbers or text"
-        raise InputError(msg)
+        raise InputError(f"{source} = {expression!r}: gives {what}; it must give numbers or text")
     return result
 
 

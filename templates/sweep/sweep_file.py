@@ -30,18 +30,16 @@ _RESERVED = {SEED, "loop", "true", "false", "none", "True", "False", "None"}
 def _names(mapping: Mapping[str, Any]) -> Mapping[str, Any]:
     for name in mapping:
         if not _IDENTIFIER.match(name) or name in _RESERVED:
-            msg = (
+            raise ValueError(
                 f"{name!r} cannot name a variable: use letters, digits and _, "
                 f"and none of {', '.join(sorted(_RESERVED))}"
             )
-            raise ValueError(msg)
     return mapping
 
 
 def _finite(value: Value) -> Value:
     if isinstance(value, float) and not math.isfinite(value):
-        msg = f"{value!r} is not a finite number"
-        raise ValueError(msg)
+        raise ValueError(f"{value!r} is not a finite number")
     if isinstance(value, list):
         for item in value:
             _finite(item)
@@ -67,29 +65,24 @@ class Points(Strict):
     def _check(self) -> Points:
         rows, zip_, grid = self.list_ or [], self.zip_ or {}, self.grid or {}
         if not (self.table or rows or zip_ or grid):
-            msg = "no points: give at least one of table, list, zip, grid"
-            raise ValueError(msg)
+            raise ValueError("no points: give at least one of table, list, zip, grid")
         for row in rows:
             if set(_names(row)) != set(rows[0]):
-                msg = f"list: every point needs the same variables: got {row!r}"
-                raise ValueError(msg)
+                raise ValueError(f"list: every point needs the same variables: got {row!r}")
         for source, columns in (("zip", zip_), ("grid", grid)):
             for name, values in _names(columns).items():
                 _finite(values)
                 if not values:
-                    msg = f"{source}: {name} has no values"
-                    raise ValueError(msg)
+                    raise ValueError(f"{source}: {name} has no values")
         lengths = {name: len(values) for name, values in zip_.items()}
         if len(set(lengths.values())) > 1:
-            msg = f"zip: lists of unequal length: got {lengths}"
-            raise ValueError(msg)
+            raise ValueError(f"zip: lists of unequal length: got {lengths}")
         return self
 
 
 def _once_each(seeds: tuple[int, ...]) -> tuple[int, ...]:
     if len(set(seeds)) != len(seeds):
-        msg = f"a seed is given twice: got {list(seeds)}"
-        raise ValueError(msg)
+        raise ValueError(f"a seed is given twice: got {list(seeds)}")
     return seeds
 
 
@@ -120,8 +113,7 @@ class Repeats(Strict):
     def _others(self) -> Repeats:
         shared = [seed for seed in self.more.seeds if seed in self.seeds] if self.more else []
         if shared:
-            msg = f"more.seeds: {shared[0]} is one of `seeds` already; leave it out of one of them"
-            raise ValueError(msg)
+            raise ValueError(f"more.seeds: {shared[0]} is one of `seeds` already; leave it out of one of them")
         return self
 
 
@@ -152,8 +144,7 @@ class SweepFile(Strict):
     def _known(self) -> SweepFile:
         for name in self.again.constants if self.again else ():
             if name not in self.constants:
-                msg = f"again.constants: {name!r} is none of the constants; add it there"
-                raise ValueError(msg)
+                raise ValueError(f"again.constants: {name!r} is none of the constants; add it there")
         return self
 
     @field_validator("derived")
@@ -161,10 +152,9 @@ class SweepFile(Strict):
     def _expressions(cls, mapping: dict[str, Value]) -> dict[str, Value]:
         for name, value in mapping.items():
             if not isinstance(value, str | int | float | bool):
-                msg = (
+                raise ValueError(
                     f'{name}: {value!r} is neither an expression nor a number; write it in quotes, "(count / 2) | int"'
                 )
-                raise ValueError(msg)
         return mapping
 
     @field_validator("constants", "derived")
@@ -189,10 +179,7 @@ class Sweep:
 
 
 def load_sweep(path: Path) -> Sweep:
-    """Read a sweep file, its template and its table.
-
-    Args:
-        path: The file; `FILE@VARIANT` applies one of its variants, `FILE@VARIANT,VARIANT` several in this order.
+    """Read a sweep file, template and table; FILE@VARIANT,VARIANT applies variants in order.
 
     Raises:
         InputError: a file is missing or malformed, a key or variant unknown, a value out of range.
@@ -205,16 +192,13 @@ def load_sweep(path: Path) -> Sweep:
         # The resolved file, so that the record of a sweep is complete.
         text = yaml.safe_dump(data, sort_keys=False, allow_unicode=True)
     if not isinstance(data, dict):
-        msg = f"{path}: a sweep file holds keys such as template and points: got {shown(data)}"
-        raise InputError(msg)
+        raise InputError(f"{path}: a sweep file holds keys such as template and points: got {shown(data)}")
     if "phases" in data and "points" not in data:
-        msg = f"{path}: is one scene, not a sweep file; give it to `smarticles run` or `smarticles plan`"
-        raise InputError(msg)
+        raise InputError(f"{path}: is one scene, not a sweep file; give it to `smarticles run` or `smarticles plan`")
     try:
         content = SweepFile.model_validate(data)
     except ValidationError as error:
-        msg = f"{path}: {explained(error, data, described='`smarticles sweep --help`')}"
-        raise InputError(msg) from error
+        raise InputError(f"{path}: {explained(error, data, described='`smarticles sweep --help`')}") from error
     template = path.parent / content.template
     table, table_text = _read_table(path, content.points.table)
     return Sweep(
@@ -234,8 +218,7 @@ def _varied(path: Path, data: Mapping[str, Any], variants: Sequence[str]) -> dic
     for variant in variants:
         if variant not in patches:
             known = nearest(variant, sorted(patches)) if patches else "it has none"
-            msg = f"{path}: there is no variant {variant!r}; {known}"
-            raise InputError(msg)
+            raise InputError(f"{path}: there is no variant {variant!r}; {known}")
         varied = {
             **merged(varied, patches[variant]),
             "name": patches[variant].get("name", f"{varied['name']}-{variant}"),
@@ -287,11 +270,10 @@ def on_engine(sweep: Sweep, engine: str) -> Sweep:
         msg = f"{sweep.path}: points: 'engine' is a variable, so its runs are on several; leave --engine {engine} out"
         raise InputError(msg)
     if ENGINE not in content.constants:
-        msg = (
+        raise InputError(
             f"{sweep.path}: constants: there is no 'engine' that could be {engine}; add `engine: yade` there, and "
             f"`engine: {{{{ engine }}}}` to {sweep.template}"
         )
-        raise InputError(msg)
     again = content.again
     if again is not None and ENGINE in again.constants:
         again = None
@@ -308,11 +290,9 @@ def read_text(path: Path, what: str) -> str:
     try:
         return path.read_text(encoding="utf-8")
     except UnicodeDecodeError as error:
-        msg = f"{path}: not UTF-8 text (byte {error.start}); a {what} is a text file"
-        raise InputError(msg) from error
+        raise InputError(f"{path}: not UTF-8 text (byte {error.start}); a {what} is a text file") from error
     except OSError as error:
-        msg = f"{path}: cannot read the {what}: {error.strerror}; check the path"
-        raise InputError(msg) from error
+        raise InputError(f"{path}: cannot read the {what}: {error.strerror}; check the path") from error
 
 
 def parse_table(text: str, source: str) -> list[dict[str, int | float | str]]:
@@ -323,16 +303,14 @@ def parse_table(text: str, source: str) -> list[dict[str, int | float | str]]:
     """
     rows = [row for row in csv.reader(io.StringIO(text)) if row]
     if len(rows) < 2:
-        msg = f"{source}: the table has no rows; the first line names the columns, rows follow"
-        raise InputError(msg)
+        raise InputError(f"{source}: the table has no rows; the first line names the columns, rows follow")
     header = [name.strip() for name in rows[0]]
     for name in header:
         if not _IDENTIFIER.match(name) or header.count(name) > 1:
-            msg = (
+            raise InputError(
                 f"{source}, line 1: column {name!r} cannot be a variable; column names are "
                 "letters, digits and _, each once"
             )
-            raise InputError(msg)
     table = []
     for number, row in enumerate(rows[1:], start=2):
         if len(row) != len(header) or not all(cell.strip() for cell in row):
@@ -362,21 +340,14 @@ def _read_table(path: Path, table: Table | None) -> tuple[list[dict[str, Value]]
             for value in _names(row).values():
                 _finite(value)
     except ValueError as error:
-        msg = f"{file}: {error}"
-        raise InputError(msg) from error
+        raise InputError(f"{file}: {error}") from error
     return matching(rows, table.only, f"{path}: points.table.only", ("column", f"row of {file}")), text
 
 
 def matching(
     rows: Sequence[dict[str, Value]], only: Mapping[str, Sequence[Value]], where: str, nouns: tuple[str, str]
 ) -> list[dict[str, Value]]:
-    """Return the rows, or points, whose variables hold one of the values wanted.
-
-    Args:
-        rows: values by the name of their variable.
-        only: values wanted, by variable.
-        where: file and key, for error messages.
-        nouns: of a variable and of a row, for error messages.
+    """Return the rows, or points, with one of the values wanted; `nouns` are for messages.
 
     Raises:
         InputError: a variable is unknown, no row has one of its values, or no row has all of them.
@@ -385,16 +356,13 @@ def matching(
     kept = list(rows)
     for name, wanted in only.items():
         if name not in rows[0]:
-            msg = f"{where}.{name}: no such {variable}; {nearest(name, sorted(rows[0]))}"
-            raise InputError(msg)
+            raise InputError(f"{where}.{name}: no such {variable}; {nearest(name, sorted(rows[0]))}")
         present = [row[name] for row in rows]
         for value in wanted:
             if value not in present:
                 known = ", ".join(dict.fromkeys(map(str, present)))
-                msg = f"{where}.{name}: no {row_} has {value!r}; there are {known}"
-                raise InputError(msg)
+                raise InputError(f"{where}.{name}: no {row_} has {value!r}; there are {known}")
         kept = [row for row in kept if row[name] in wanted]
     if not kept:
-        msg = f"{where}: keeps no {row_}; give fewer conditions"
-        raise InputError(msg)
+        raise InputError(f"{where}: keeps no {row_}; give fewer conditions")
     return kept

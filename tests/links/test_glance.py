@@ -44,9 +44,9 @@ def test_it_finds_what_a_look_at_each_finds(kind: dict[str, Any], monkeypatch: p
     made = shaken(**kind)
     made.overlaps(1.0)  # forget how deep they were as they were poured, which does not know of hooks
     state = made.state()
-    found = made.glance(state)
+    found = made.extremes(state)
     assert found is not None
-    assert made.glance(state) == found  # nothing of the simulation is changed
+    assert made.extremes(state) == found  # nothing of the simulation is changed
     overlaps = made.overlaps(1.0)
     assert found.deepest == overlaps.deepest > 0
     assert found.elastic_energy == pytest.approx(overlaps.elastic_energy, rel=1e-12)
@@ -64,10 +64,10 @@ def test_one_that_may_have_passed_between_two_looks_is_to_be_looked_at() -> None
     made = shaken()
     state = made.state()
     made._world.bodies.deepest[COUNT // 2] = 1.01 * PASSES * made.particle.chain.diameter
-    assert made.glance(state) is None
+    assert made.extremes(state) is None
     # It was not forgotten for that: the close look still tells who.
     assert made.overlaps(0.5 * builds.DIAMETER).deep.tolist() == [k == COUNT // 2 for k in range(COUNT)]
-    assert made.glance(state) is not None
+    assert made.extremes(state) is not None
 
 
 @pytest.mark.parametrize("where", [0, COUNT - 1])
@@ -75,7 +75,7 @@ def test_a_speed_that_is_no_number_is_told(where: int) -> None:
     made = shaken()
     state = made.state()
     state.link_velocities[where, 1, 2] = math.nan
-    found = made.glance(state)
+    found = made.extremes(state)
     assert found is not None
     assert math.isnan(found.fastest)
 
@@ -84,13 +84,13 @@ def test_a_depth_that_is_no_number_is_told() -> None:
     made = shaken()
     state = made.state()
     made._world.bodies.deepest[0] = math.nan
-    found = made.glance(state)
+    found = made.extremes(state)
     assert found is None or math.isnan(found.fastest)
 
 
 def test_nobody_is_within_all_limits() -> None:
     made = builds.engine(gravity=9.81)
-    found = made.glance(made.state())
+    found = made.extremes(made.state())
     assert found is not None
     assert (found.fastest, found.deepest, found.elastic_energy) == (0.0, 0.0, 0.0)
     assert found.lowest == math.inf

@@ -14,7 +14,7 @@ import numpy as np
 from dem.body.state import State
 from dem.engine.interface import Engine
 from dem.errors import InputError, RunError
-from dem.physics.overlaps import Glance, Overlaps
+from dem.physics.overlaps import Extremes, Overlaps
 from dem.plan.steps import time_steps
 from dem.record.progress import ProgressWriter
 from dem.run import build, run
@@ -34,7 +34,7 @@ class Noting(Watchdog):
     def _note(self, limit: str, share: float) -> None:
         self.nearest[limit] = max(self.nearest.get(limit, 0.0), float(share))
 
-    def content(self, glance: Glance, **options: Any) -> bool:
+    def content(self, extremes: Extremes, **options: Any) -> bool:
         """Return False: every check is a close one."""
         return False
 

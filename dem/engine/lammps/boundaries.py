@@ -26,13 +26,7 @@ class Part:
 
 @dataclass
 class LammpsBoundaries:
-    """`dem.engine.interface.Boundaries` on LAMMPS. Heights are sines of the step, as LAMMPS's variables are.
-
-    Args:
-        cylinder: the container.
-        send: sends commands to LAMMPS.
-        clock: returns the steps made and the time step [s].
-    """
+    """`dem.engine.interface.Boundaries` on LAMMPS; `clock` returns steps made and the time step [s]."""
 
     cylinder: Cylinder
     send: Callable[[Iterator[str]], None]
@@ -104,12 +98,10 @@ class LammpsBoundaries:
         self._omega = 0.0
 
     def lift_wall(self, speed: float) -> None:
-        msg = "engine: lammps cannot lift the wall"
-        raise RunError(msg)
+        raise RunError("engine: lammps cannot lift the wall")
 
     def raise_upper(self, speed: float) -> None:
-        msg = "engine: lammps has no hooks"
-        raise RunError(msg)
+        raise RunError("engine: lammps has no hooks")
 
     def remove_wall(self) -> None:
         self.walled = False
@@ -127,11 +119,9 @@ class LammpsBoundaries:
 
     @property
     def memory(self) -> dict[str, Any]:
-        """Plain data that `restore` needs."""
         parts = {name: [part.base, part.amplitude] for name, part in self._parts.items()}
         return {"walled": self.walled, "omega": self._omega, "begun": self._begun, "parts": parts}
 
     def restore(self, memory: Mapping[str, Any]) -> None:
-        """Go on from where `memory` was taken; the caller sends `variables`."""
         self.walled, self._omega, self._begun = memory["walled"], memory["omega"], memory["begun"]
         self._parts = {name: Part(*numbers) for name, numbers in memory["parts"].items()}

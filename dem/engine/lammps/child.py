@@ -37,11 +37,10 @@ def lammps_version() -> str:
     """
     for program, what in ((LMP, "LAMMPS"), (MPIRUN, "Open MPI")):
         if shutil.which(program) is None:
-            msg = (
+            raise RunError(
                 f"engine: lammps needs the program {program} of {what}, which is not installed; {INSTALL}, or use "
                 "engine: yade (the same spheres) or links"
             )
-            raise RunError(msg)
     return _version(str(shutil.which(LMP)))
 
 
@@ -52,20 +51,17 @@ def _version(program: str) -> str:
             [program, "-h"], check=False, capture_output=True, text=True, stdin=subprocess.DEVNULL, timeout=60
         )
     except (OSError, subprocess.TimeoutExpired) as error:
-        msg = f"{program}: LAMMPS does not start ({error}); {INSTALL}"
-        raise RunError(msg) from None
+        raise RunError(f"{program}: LAMMPS does not start ({error}); {INSTALL}") from None
     found = re.search(r"Simulator - (.+)", answer.stdout)
     if answer.returncode or found is None:
         lines = (answer.stderr or answer.stdout).strip().splitlines()
-        msg = f"{program}: is no LAMMPS that starts ({lines[-1] if lines else 'it says nothing'}); {INSTALL}"
-        raise RunError(msg)
+        raise RunError(f"{program}: is no LAMMPS that starts ({lines[-1] if lines else 'it says nothing'}); {INSTALL}")
     words = set(answer.stdout.split())
     if missing := [style for style in NEEDED if style not in words]:
-        msg = (
+        raise RunError(
             f"{program}: LAMMPS {found[1]} was built without {', '.join(missing)} (its packages GRANULAR and RIGID); "
             f"{INSTALL}, which has them"
         )
-        raise RunError(msg)
     return found[1].strip()
 
 
@@ -101,8 +97,7 @@ class Child:
                 )
         except OSError as error:
             shutil.rmtree(self.scratch, ignore_errors=True)
-            msg = f"{MPIRUN}: cannot be started ({error.strerror}); {INSTALL}"
-            raise RunError(msg) from None
+            raise RunError(f"{MPIRUN}: cannot be started ({error.strerror}); {INSTALL}") from None
         self.close = weakref.finalize(self, _end, self._process, self._answers, self.scratch)
         """End it and remove its files; done at the end of the process at the latest."""
 

@@ -5,14 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
+from dem.arrays import Array, Numbers
 from dem.engine.lammps.boundaries import LammpsBoundaries
 from dem.physics.contact import ContactLaw
 from dem.physics.overlaps import Overlaps
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -20,7 +18,6 @@ class Contacts:
     """All contacts at one instant.
 
     Args:
-        count: N.
         pairs: (C, 2) smarticles that touch by two spheres, as often as they do.
         depths: (C,) overlap of each [m].
         fixed: (F,) smarticles that touch floor or wall by a sphere, as often as they do.
@@ -28,9 +25,9 @@ class Contacts:
     """
 
     count: int
-    pairs: NDArray[np.int64]
+    pairs: Numbers
     depths: Array
-    fixed: NDArray[np.int64]
+    fixed: Numbers
     fixed_depths: Array
 
     @classmethod
@@ -57,18 +54,15 @@ class Contacts:
             fixed_depths=np.concatenate([depths[k] for depths, k in zip(beside, touching, strict=True)]),
         )
 
-    def neighbours(self) -> NDArray[np.int64]:
-        """Return for each smarticle (N,) how many others it touches."""
+    def neighbours(self) -> Numbers:
         ordered = np.sort(self.pairs, axis=1)
         both = np.unique(ordered[:, 0] * self.count + ordered[:, 1])
         return np.bincount(np.concatenate(np.divmod(both, max(1, self.count))), minlength=self.count)
 
-    def touches(self) -> NDArray[np.int64]:
-        """Return the number (N,) of contacts of each smarticle, sphere by sphere."""
+    def touches(self) -> Numbers:
         return np.bincount(np.concatenate([self.pairs.ravel(), self.fixed]), minlength=self.count)
 
     def overlaps(self, limit: float, law: ContactLaw) -> Overlaps:
-        """Return the overlaps of all contacts, with the smarticles that have one deeper than a limit [m]."""
         deep = np.zeros(self.count, dtype=np.bool_)
         deep[self.pairs[self.depths > limit]] = True
         deep[self.fixed[self.fixed_depths > limit]] = True

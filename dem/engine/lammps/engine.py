@@ -12,9 +12,9 @@ from pathlib import Path
 from typing import Any, NoReturn
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from dem.arrays import Array, Numbers
 from dem.body.chain import Tie
 from dem.body.particle import Particle
 from dem.body.placement import Poses
@@ -30,21 +30,14 @@ from dem.physics.contact import ContactLaw, StringLaw
 from dem.physics.overlaps import Overlaps
 from dem.setting.container import Cylinder
 
-Array = NDArray[np.float64]
-
 FORMAT = "lammps-2"
 SPHERES, BODIES, RESTART, STATE = "spheres.data", "bodies.txt", "restart", "state.npz"
 HEAD = 9  # lines of a dump before its rows
 
 
 def absent(what: str) -> NoReturn:
-    """Reject a call for what LAMMPS has none of here; scenes that call for it are rejected before there is an engine.
-
-    Raises:
-        RunError: always.
-    """
-    msg = f"engine: lammps has no {what}"
-    raise RunError(msg)
+    """Reject a call for what this engine lacks; scenes that need it are rejected before they run."""
+    raise RunError(f"engine: lammps has no {what}")
 
 
 class NoMotors:
@@ -52,7 +45,7 @@ class NoMotors:
 
     present = False
     articulated = False
-    looks_at_once = 1
+    updates_at_once = 1
     readings: MotorReadings | None = None
     work = 0.0
 
@@ -108,11 +101,6 @@ class LammpsEngine:
 
     LAMMPS moves smarticles; what is asked of them at one instant follows from their poses, which it writes to a file
     after each advance.
-
-    Args:
-        cylinder: the container; its floor is at z = 0 at the start.
-        gravity: g, downwards [m/s²].
-        time_step: dt [s], until another is set.
     """
 
     def __init__(
@@ -197,8 +185,7 @@ class LammpsEngine:
         if time_step == self.time_step:
             return
         if self.boundaries.moving:
-            msg = "engine: lammps cannot change the time step while the container moves"
-            raise RunError(msg)
+            raise RunError("engine: lammps cannot change the time step while the container moves")
         self.time_step = time_step
         self._send(iter((f"timestep {time_step:.17g}",)))
 
@@ -208,8 +195,7 @@ class LammpsEngine:
         if self.count:
             self._run(steps)
         elif self._box:
-            msg = "engine: lammps lost its smarticles"
-            raise RunError(msg)
+            raise RunError("engine: lammps lost its smarticles")
         self.steps += steps
         self.time += steps * self.time_step
         self._seconds += steps * self.time_step * self.count
@@ -223,8 +209,7 @@ class LammpsEngine:
                 f"run {steps} pre {'yes' if self._fresh else 'no'} post no",
             )
         except RunError as error:
-            msg = f"at t = {self.time:.4f} s to {self.time + steps * self.time_step:.4f} s: {error}"
-            raise RunError(msg) from None
+            raise RunError(f"at t = {self.time:.4f} s to {self.time + steps * self.time_step:.4f} s: {error}") from None
         if self._frames is None:
             # Written when the run was set up, of poses that are known: where LAMMPS has its axes.
             own = _turns(self._read(self.steps))
@@ -247,10 +232,8 @@ class LammpsEngine:
         rows = np.array(lines[HEAD].split(), dtype=np.float64).reshape(-1, len(text.WRITTEN.split()))
         file.unlink()
         if len(rows) != self.count:
-            msg = f"LAMMPS wrote {len(rows)} of {self.count} smarticles at step {step}"
-            raise RunError(msg)
-        ordered: Array = rows[np.argsort(rows[:, 0])]
-        return ordered
+            raise RunError(f"LAMMPS wrote {len(rows)} of {self.count} smarticles at step {step}")
+        return np.asarray(rows[np.argsort(rows[:, 0])])
 
     # -- smarticles --------------------------------------------------------------------------------------------
 
@@ -313,16 +296,16 @@ class LammpsEngine:
             self._contacts = Contacts.of(self.state().spheres(self.particle), self.particle.radius, self.boundaries)
         return self._contacts
 
-    def neighbours(self) -> NDArray[np.int64]:
+    def neighbours(self) -> Numbers:
         return self.contacts.neighbours()
 
-    def touches(self) -> NDArray[np.int64]:
+    def touches(self) -> Numbers:
         return self.contacts.touches()
 
     def overlaps(self, limit: float) -> Overlaps:
         return self.contacts.overlaps(limit, self._law)
 
-    def glance(self, state: State) -> None:
+    def extremes(self, state: State) -> None:
         """Return None: LAMMPS has no shorter way."""
 
     def contact_forces(self) -> NoReturn:
@@ -368,11 +351,10 @@ class LammpsEngine:
         """
         memory = saved.memory
         if memory.get("format") != FORMAT:
-            msg = (
+            raise InputError(
                 f"checkpoint: format {memory.get('format')!r}, here is {FORMAT!r}; it was made by another engine or "
                 "version: resume with that, or start anew"
             )
-            raise InputError(msg)
         try:
             with zipfile.ZipFile(io.BytesIO(saved.content)) as archive:
                 files = {name: archive.read(name) for name in archive.namelist()}
@@ -380,8 +362,7 @@ class LammpsEngine:
                 with np.load(io.BytesIO(files[STATE])) as arrays:
                     self._moving = Moving(**arrays)
         except (zipfile.BadZipFile, KeyError, TypeError, ValueError) as error:
-            msg = f"checkpoint: not readable by the lammps engine ({error}); start the run anew"
-            raise InputError(msg) from error
+            raise InputError(f"checkpoint: not readable by the lammps engine ({error}); start the run anew") from error
         self.time, self.steps, self.time_step = memory["time"], memory["steps"], memory["time_step"]
         self._seconds, self._thrown = memory["seconds"], memory["thrown"]
         self.ledger.added, self.ledger.dissipated = memory["account"]
@@ -403,5 +384,4 @@ class LammpsEngine:
 
 def _turns(rows: Array) -> Array:
     """(N, 3, 3) rotations of rows whose quaternions (w, x, y, z) begin at column 7."""
-    turns: Array = Rotation.from_quat(rows[:, [8, 9, 10, 7]]).as_matrix()
-    return turns
+    return np.asarray(Rotation.from_quat(rows[:, [8, 9, 10, 7]]).as_matrix())

@@ -38,16 +38,12 @@ class LammpsKind:
 
     name = "lammps"
     workers = "ranks"
-    damps_once_per_look = False
+    damps_once_per_update = False
     idle_knobs: tuple[str, ...] = ("wall_facets", "hinge_stiffness_N_per_m", "control_interval_s")
     adds = ADDS
     order = ORDER
-
-    def version(self) -> str:
-        return lammps_version()
-
-    def threads(self) -> int:
-        return ranks()
+    version = staticmethod(lammps_version)
+    threads = staticmethod(ranks)
 
     def stable_step(self, scene: Demand, *, articulated: bool) -> float:
         # Spheres, law and scheme of integration are YADE's.

@@ -10,13 +10,11 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from dem.arrays import Array
 from dem.body.particle import Particle
 from dem.physics.contact import ContactLaw
 from dem.setting.container import Cylinder
-
-Array = NDArray[np.float64]
 
 NEVER_PULLS = "limit_damping"
 """Of a contact law: the normal force is zero where spring and dashpot together would pull, as on our other engines."""
@@ -63,8 +61,7 @@ def sphere_masses(particle: Particle) -> Array:
     rows = np.concatenate([np.ones((1, count)), particle.centres.T / particle.boxes.middle_length])
     wanted = np.array([particle.boxes.mass, 0.0, 0.0, 0.0])
     equal = np.full(count, particle.boxes.mass / count)
-    masses: Array = equal + np.linalg.pinv(rows) @ (wanted - rows @ equal)
-    return masses
+    return np.asarray(equal + np.linalg.pinv(rows) @ (wanted - rows @ equal))
 
 
 def sphere_lines(

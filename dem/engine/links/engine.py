@@ -28,7 +28,7 @@ from dem.engine.links.world import World
 from dem.errors import InputError
 from dem.physics.contact import ContactLaw
 from dem.physics.motor import MotorLaw
-from dem.physics.overlaps import APART, Glance, Held, Overlaps, held_between
+from dem.physics.overlaps import APART, Extremes, Held, Overlaps, held_between
 from dem.setting.container import Cylinder
 from dem.setting.hooks import Cross
 from dem.setting.plane import Channel
@@ -201,14 +201,14 @@ class LinksEngine:
             forces=rows[:, queries.WHOLE :],
         )
 
-    def glance(self, state: State) -> Glance | None:
+    def extremes(self, state: State) -> Extremes | None:
         """Return the extremes; hinges do not give way."""
         found, bodies = self._world.extremes(state.link_velocities), self._world.bodies
         diameter = self.particle.chain.diameter
         if not (found[BETWEEN] <= PASSES * diameter and found[DEEPEST] <= HOLDS * diameter):
             return None
         bodies.deepest[:] = 0.0
-        return Glance(
+        return Extremes(
             fastest=found[FASTEST],
             lowest=found[LOWEST],
             highest=found[HIGHEST],

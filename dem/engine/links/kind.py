@@ -18,7 +18,7 @@ class LinksKind:
 
     name = "links"
     workers = "threads"
-    damps_once_per_look = False
+    damps_once_per_update = False
     idle_knobs: tuple[str, ...] = ("pitch", "wall_facets", "hinge_stiffness_N_per_m")
     adds = ADDS
     order = ORDER

@@ -16,7 +16,7 @@ from dem.physics.motor import LAWS, MotorLaw
 
 Array = NDArray[np.float64]
 
-LOOKS = 64  # that may be told at once: so many that a call of the kernel costs nothing beside them
+UPDATES = 64  # control updates scheduled at once: so many that a call of the kernel costs nothing beside them
 
 
 class LinksMotors:
@@ -44,8 +44,8 @@ class LinksMotors:
         return self._law is not None
 
     @property
-    def looks_at_once(self) -> int:
-        return LOOKS
+    def updates_at_once(self) -> int:
+        return UPDATES
 
     @property
     def articulated(self) -> bool:

@@ -49,7 +49,7 @@ from dem.engine.links.motion.planar import lay_out
 from dem.engine.links.motion.poses import find_links, pose
 from dem.engine.links.shape import shape_of
 from dem.engine.links.stepping import PAST, TOTALS, Clock, advance
-from dem.errors import refuse
+from dem.errors import reject
 from dem.physics.contact import ContactLaw
 from dem.setting.hooks import Bar
 
@@ -300,7 +300,7 @@ class World:
         bodies, boxes, n = self.posed(), self.particle.boxes, self.count
         states = (bodies.position, bodies.velocity, bodies.spin)
         broken = ~np.logical_and.reduce([np.isfinite(values).all(axis=1) for values in states])
-        refuse(
+        reject(
             broken,
             self.time,
             "positions or velocities are no numbers, the simulation has blown up",

@@ -10,28 +10,20 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from dem.arrays import Array
 from dem.body.particle import LINKS, Particle
 from dem.body.placement import Poses
 from dem.body.state import State
 from dem.engine.yade.construction import SMARTICLE_MATERIAL
 from dem.engine.yade.hinges import HingeLaw, Hinges, add_nodes, hinge_nodes
 from dem.engine.yade.library import Yade, rows_of
-from dem.errors import refuse
-
-Array = NDArray[np.float64]
+from dem.errors import reject
 
 
 class Assembly:
-    """All smarticles as bodies of YADE.
-
-    Args:
-        hinge_law: stiffness of the hinges; None: smarticles stay welded.
-        planar: whether all motion is confined to the plane z = 0.
-        strengths: (N, 2) factors on torque limit and stiffness of the motors [1]; None: all are equal.
-    """
+    """All smarticles as bodies of YADE; arguments as in `YadeEngine`."""
 
     def __init__(
         self,
@@ -61,7 +53,6 @@ class Assembly:
 
     @property
     def count(self) -> int:
-        """Number of smarticles."""
         return len(self._spheres)
 
     @property
@@ -85,7 +76,6 @@ class Assembly:
         self._states = [bodies[body].state for body in self._ids]
 
     def add(self, poses: Poses, *, speed: float = 0.0) -> None:
-        """Add smarticles of the particle's own shape, which fall at a speed [m/s] and do not turn."""
         particle, omega, still = self._particle, self._yade.omega, np.zeros(3)
         falling = np.array([0.0, 0.0, -speed])
         for position, rotation in zip(poses.positions, poses.rotations, strict=True):
@@ -113,11 +103,6 @@ class Assembly:
         self._turns = np.concatenate([self._turns, np.tile(boxes.link_rotations, (new, 1, 1, 1))])
 
     def state(self) -> State:
-        """Return poses and velocities of all links.
-
-        Raises:
-            RunError: the simulation has blown up.
-        """
         rows = []
         for body, to_body in zip(self._states, self._to_body, strict=True):
             x, v, w, q = body.pos, body.vel, body.angVel, body.ori * to_body
@@ -140,7 +125,6 @@ class Assembly:
         return State.rigid(boxes, positions, rotations, velocities, spins, shapes=(self._arms, self._turns))
 
     def still(self) -> None:
-        """Set all velocities to zero, while welded."""
         assert self.hinges is None  # motors would set links in motion again
         nought, bodies = self._yade.vector(0, 0, 0), self._yade.omega.bodies
         # Contact laws read the members' own velocities, before the integrator has moved them.
@@ -150,7 +134,7 @@ class Assembly:
 
     def _check(self, table: Array) -> None:
         broken = ~np.isfinite(table).all(axis=1) | ~table[:, 9:].any(axis=1)
-        refuse(
+        reject(
             broken.reshape(self.count, 1 if self.hinges is None else LINKS).any(axis=1),
             self._yade.omega.time,
             "positions or velocities are no numbers, the simulation has blown up",
@@ -191,11 +175,7 @@ class Assembly:
         self.hinges.make(self._strengths)
 
     def weld(self) -> float:
-        """Make every smarticle one rigid body of the shape that it has; nothing while welded already.
-
-        Returns:
-            Kinetic energy of the links' motion against each other [J], which is lost.
-        """
+        """Make articulated smarticles rigid in their present shapes; return the lost kinetic energy [J]."""
         if self.hinges is None:
             return 0.0
         boxes, state = self._particle.boxes, self.state()
@@ -257,7 +237,6 @@ class Assembly:
 
     @property
     def memory(self) -> dict[str, Any]:
-        """Plain data that `restore` needs."""
         return {
             "spheres": self._spheres,
             "bodies": self._ids,
@@ -268,7 +247,6 @@ class Assembly:
         }
 
     def restore(self, memory: Mapping[str, Any]) -> None:
-        """Go on from where `memory` was taken, in a simulation that was loaded."""
         self._spheres = [list(spheres) for spheres in memory["spheres"]]
         self.smarticle_of = {sphere: k for k, spheres in enumerate(self._spheres) for sphere in spheres}
         self._ids = list(memory["bodies"])
@@ -310,9 +288,7 @@ def clump(
     """Make a rigid body of existing spheres, with a mass and an inertia of its own.
 
     Args:
-        yade: the simulation.
-        members: ids of its spheres and hinge nodes.
-        local: (k, 3) their centres in the body's principal frame [m].
+        local: (k, 3) centres of `members` in the body's principal frame [m].
         mass: [kg].
         inertia: (3,) principal moments [kg m²].
         position: (3,) centre of mass [m].

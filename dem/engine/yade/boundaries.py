@@ -8,8 +8,8 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from dem.arrays import Array
 from dem.body.forces import CHANNEL, FLOOR, LOWER_HOOK, WALL
 from dem.engine.yade.construction import WALL_MATERIAL
 from dem.engine.yade.library import Yade, rows_of
@@ -17,8 +17,6 @@ from dem.errors import RunError
 from dem.setting.container import Cylinder
 from dem.setting.hooks import Cross
 from dem.setting.plane import Channel
-
-Array = NDArray[np.float64]
 
 
 class YadeBoundaries:
@@ -58,11 +56,9 @@ class YadeBoundaries:
 
     @property
     def memory(self) -> dict[str, Any]:
-        """Plain data that `restore` needs besides the loaded simulation."""
         return {"moving": self.moving, "sums": self._totals.tolist()}
 
     def restore(self, memory: Mapping[str, Any]) -> None:
-        """Go on from where `memory` was taken."""
         self.moving = list(memory["moving"])
         self._sums = [self._yade.vector(*row) for row in memory["sums"]]
 
@@ -143,8 +139,7 @@ class YadeBoundaries:
 
     def shake(self, *, amplitude: float, frequency: float, walls: bool = True) -> None:
         if self._shaker is None:
-            msg = "the engine was built without a shaker"
-            raise RunError(msg)
+            raise RunError("the engine was built without a shaker")
         # YADE sets v(t) = -Aω sin(ωt + φ) before the integrator moves by v dt. Half a step is added to the phase, so
         # that each move uses the velocity at its middle and the position follows z(t) to second order, without drift.
         omega, simulation = 2 * math.pi * frequency, self._yade.omega
@@ -207,11 +202,7 @@ class YadeBoundaries:
 
 
 def add_container(yade: Yade, cylinder: Cylinder) -> list[int]:
-    """Add the container, its floor at z = 0.
-
-    Returns:
-        Ids of its bodies: the wall from below, and the floor last.
-    """
+    """Add the container, its floor at z = 0; return ids of bodies, wall from below, floor last."""
     # A polygon of the same area as the circle; it starts below the floor so that no gap opens at the edge.
     bottoms = [cylinder.bottom, *(bottom for bottom, _ in cylinder.upper), cylinder.height]
     rings = [_ring(cylinder, radius) for radius in (cylinder.radius, *(radius for _, radius in cylinder.upper))]
@@ -243,11 +234,7 @@ def _band(yade: Yade, one: tuple[Array, float], other: tuple[Array, float]) -> I
 
 
 def add_channel(yade: Yade, channel: Channel) -> list[int]:
-    """Add walls and table, the centrelines' plane at z = 0.
-
-    Returns:
-        Ids of the lower and the upper wall, where there are walls, and of the table last.
-    """
+    """Add walls and table, centrelines at z = 0; return ids: lower, upper wall if any, table last."""
     bodies = []
     if channel.width is not None:
         # As the container's floor, each pushes to its own side whatever happens.

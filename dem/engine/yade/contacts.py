@@ -7,8 +7,8 @@ from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from dem.arrays import Flags
 from dem.body.forces import ContactForces, at_boundaries, at_links, contacts_of_points
 from dem.engine.yade.assembly import Assembly
 from dem.engine.yade.boundaries import YadeBoundaries
@@ -84,9 +84,7 @@ def measure_overlaps(
     return Overlaps(deepest, deep, normal + tangential + (0.0 if hinges is None else hinges.elastic_energy()), held)
 
 
-def _held(
-    yade: Yade, assembly: Assembly, boundaries: YadeBoundaries, deep: NDArray[np.bool_], least: float
-) -> tuple[Held, ...]:
+def _held(yade: Yade, assembly: Assembly, boundaries: YadeBoundaries, deep: Flags, least: float) -> tuple[Held, ...]:
     """Smarticles among the `deep` ones (N,) that touch two boundaries which have moved apart by `least` [m] or more."""
     parts = boundaries.parts()
     part_of = {body: name for name, (bodies, _) in parts.items() for body in bodies}

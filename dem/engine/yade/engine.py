@@ -9,8 +9,8 @@ import math
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from dem.arrays import Array, Numbers
 from dem.body.forces import ContactForces
 from dem.body.particle import Particle
 from dem.body.placement import Poses
@@ -34,8 +34,6 @@ from dem.setting.container import Cylinder
 from dem.setting.hooks import Cross
 from dem.setting.plane import Channel
 
-Array = NDArray[np.float64]
-
 SCRATCH = ".engine.partial.yade"
 
 
@@ -43,12 +41,10 @@ class YadeEngine:
     """`dem.engine.interface.Engine` on YADE.
 
     Args:
-        cylinder: the container; its floor is at z = 0 at the start.
         gravity: g, downwards [m/s²].
         time_step: dt [s], until another is set.
         shaken: whether the container will move; the engine that moves it exists only then.
         hinge_law: with `motor_law`, None where smarticles stay welded: then nothing of a hinge exists.
-        track_work: whether to add up the work of the moving container.
         dissipation_interval: time between samples of what is dissipated [s]; None: never.
         hooks: the lower and the upper hook; None: nothing of a hook exists.
         channel: table and walls instead of the container; all motion is then confined to a plane.
@@ -144,11 +140,10 @@ class YadeEngine:
         try:
             self._omega.save(str(file))
         except RuntimeError as error:  # of the stream that YADE's library writes into
-            msg = (
+            raise RunError(
                 f"{file}: the state cannot be written ({error}); free space, or raise the limit of a file's size, and "
                 "go on with `smarticles run … --resume`; the checkpoint before is whole"
-            )
-            raise RunError(msg) from error
+            ) from error
 
     def _load(self, file: Path, saved: Saved) -> None:
         memory = saved.memory
@@ -226,7 +221,7 @@ class YadeEngine:
     def impulse(self) -> float:
         return self._smarticle_seconds * self.particle.boxes.mass * self.gravity + self._thrown
 
-    def neighbours(self) -> NDArray[np.int64]:
+    def neighbours(self) -> Numbers:
         touching: set[tuple[int, int]] = set()
         smarticle_of = self._assembly.smarticle_of
         for interaction in self._omega.interactions:
@@ -239,7 +234,7 @@ class YadeEngine:
         pairs = np.array(list(touching), dtype=np.int64).ravel()
         return np.bincount(pairs, minlength=self.count)
 
-    def touches(self) -> NDArray[np.int64]:
+    def touches(self) -> Numbers:
         # Contacts of spheres are counted one by one.
         smarticle_of = self._assembly.smarticle_of
         bodies = (body for i in self._omega.interactions if i.isReal for body in (i.id1, i.id2))
@@ -252,7 +247,7 @@ class YadeEngine:
     def contact_forces(self) -> ContactForces:
         return contact_forces(self._yade, self._assembly, self.boundaries)
 
-    def glance(self, state: State) -> None:
+    def extremes(self, state: State) -> None:
         """Return None: YADE has no shorter way."""
 
     def container_force(self) -> Array:

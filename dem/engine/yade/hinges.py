@@ -12,12 +12,10 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from dem.arrays import Array
 from dem.body.particle import Boxes
 from dem.engine.yade.library import Yade
-
-Array = NDArray[np.float64]
 
 HINGE_MATERIAL = "hinge"
 NODE_RADIUS = 1e-4  # m; cancels in every force, but YADE wants one
@@ -29,7 +27,7 @@ SHAFT_FORCE = 1e-4  # N along the axis, that the cap on a slipping shaft's torqu
 DAMPER_SHARE = 0.25  # of the pin's stiffness
 DAMPER_VISCOSITY = 0.15  # N s/m; at the stiffness of the named fidelities it relaxes over a few time steps
 DAMPER_TIME = 4e-5  # s; no shorter with stiffer pins, since a step must not relax it twice over
-LOOKS_PER_TILT = 10  # control updates between corrections of the tilt's drift
+UPDATES_PER_TILT = 10  # control updates between corrections of the tilt's drift
 # Turning a barb inwards (α up) turns barb 1 and barb 2 in opposite directions about the smarticle's normal.
 SENSE = np.array([1.0, -1.0])
 BARBS = (0, 2)  # links that hinge 1 and hinge 2 join to the middle link
@@ -108,7 +106,7 @@ class Hinges:
         self._ends: list[tuple[Any, Any]] = []
         # What YADE computes of the bonds in each step, and does not save: twists (2N,) [rad], gaps (2N,) [m].
         self._loaded: tuple[Array, Array] | None = None
-        self._looks = 0
+        self._updates = 0
 
     def make(self, strengths: Array | None = None) -> None:
         """Make the bonds; `strengths` are factors (N, 2) on stiffness and cap of the shafts [1], None: all equal."""
@@ -177,15 +175,13 @@ class Hinges:
 
     def angles(self) -> Array:
         """Return the barbs' angles (N, 2) [rad], from the twist of the shafts."""
-        result: Array = self._angles + SENSE * self._twists().reshape(-1, 2)
-        return result
+        return np.asarray(self._angles + SENSE * self._twists().reshape(-1, 2))
 
     def rates(self) -> Array:
         """Return the rates (N, 2) of the barbs' angles [rad/s], half a step behind the angles."""
         up = self._yade.vector(0, 0, 1)
         turning = [(barb.angVel - middle.angVel).dot(middle.ori * up) for barb, middle in self._ends]
-        result: Array = -SENSE * np.array(turning).reshape(-1, 2)
-        return result
+        return np.asarray(-SENSE * np.array(turning).reshape(-1, 2))
 
     def set_torques(self, torques: Array, time_step: float) -> None:
         """Twist the shafts so that they exert (N, 2) torques on the barbs [N m], positive ones raising the angle.
@@ -195,9 +191,9 @@ class Hinges:
         moments = (-SENSE * torques).ravel().tolist()
         for (geom, phys), moment in zip(self._shafts, moments, strict=True):
             phys.moment_twist = geom.normal * moment
-        if self._looks % LOOKS_PER_TILT == 0:
+        if self._updates % UPDATES_PER_TILT == 0:
             self._set_tilts(time_step)
-        self._looks += 1
+        self._updates += 1
 
     def _set_tilts(self, time_step: float) -> None:
         # From the axes themselves: YADE splits a turn into twist and tilt by its rotation vector, which is right only
@@ -212,8 +208,7 @@ class Hinges:
     def torques(self) -> Array:
         """Return YADE's present torques (N, 2) on the barbs [N m]."""
         moments = [geom.normal.dot(phys.moment_twist) for geom, phys in self._shafts]
-        result: Array = -SENSE * np.array(moments).reshape(-1, 2)
-        return result
+        return np.asarray(-SENSE * np.array(moments).reshape(-1, 2))
 
     def gaps(self) -> Array:
         """Return the distances (N, 2) of the two links of each hinge [m]."""
@@ -238,14 +233,13 @@ class Hinges:
 
     @property
     def memory(self) -> dict[str, Any]:
-        """Plain data that `restored` needs."""
         return {
             "nodes": self._nodes,
             "angles": self._angles.tolist(),
             # Not in YADE's own file.
             "twists": self._twists().tolist(),
             "gaps": self._gaps().tolist(),
-            "looks": self._looks,
+            "looks": self._updates,
         }
 
     @classmethod
@@ -254,5 +248,5 @@ class Hinges:
         hinges = cls(yade, law, memory["nodes"], np.array(memory["angles"]).reshape(-1, 2))
         hinges.bind()
         hinges._loaded = np.array(memory["twists"]), np.array(memory["gaps"])
-        hinges._looks = memory["looks"]
+        hinges._updates = memory["looks"]
         return hinges

@@ -23,16 +23,12 @@ class YadeKind:
 
     name = "yade"
     workers = "threads"
-    damps_once_per_look = True
+    damps_once_per_update = True
     idle_knobs: tuple[str, ...] = ()
     adds = ADDS
     order = ORDER
-
-    def version(self) -> str:
-        return yade_version()
-
-    def threads(self) -> int:
-        return yade_threads()
+    version = staticmethod(yade_version)
+    threads = staticmethod(yade_threads)
 
     def stable_step(self, scene: Demand, *, articulated: bool) -> float:
         law = contact_law_of(scene)

@@ -14,14 +14,13 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from dem.arrays import Array
 from dem.engine.yade.assembly import Assembly
 from dem.engine.yade.boundaries import YadeBoundaries
 from dem.engine.yade.contacts import contacts_of
 from dem.engine.yade.library import Yade
 
-Array = NDArray[np.float64]
 Velocities = Mapping[tuple[int, int], tuple[float, float, float]]
 _SUMS = ("container_work", "added", "dissipated")
 
@@ -88,12 +87,7 @@ class Contacts:
 
 
 class YadeLedger:
-    """`dem.engine.interface.EnergyLedger` on YADE.
-
-    Args:
-        works: whether to add up the work of moving boundaries.
-        dissipation_interval: time between samples of what is dissipated [s]; None: never.
-    """
+    """`dem.engine.interface.EnergyLedger` on YADE; None as `dissipation_interval` [s]: nothing is sampled."""
 
     def __init__(
         self,
@@ -179,9 +173,7 @@ class YadeLedger:
 
     @property
     def memory(self) -> dict[str, float]:
-        """Plain data that `restore` needs."""
         return {name: getattr(self, name) for name in _SUMS}
 
     def restore(self, memory: Mapping[str, float]) -> None:
-        """Go on from where `memory` was taken."""
         self.container_work, self.added, self.dissipated = (memory[name] for name in _SUMS)

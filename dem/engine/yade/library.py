@@ -13,8 +13,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from dem.arrays import Array
 from dem.errors import RunError
 
 
@@ -23,8 +23,6 @@ class Yade:
     """What this project uses of YADE.
 
     Args:
-        classes: YADE's classes: bodies, shapes, engines, functors.
-        utils: its helpers that make bodies and interactions.
         omega: the simulation; YADE has one per process.
         vector: constructor of a vector from three numbers.
         quaternion: constructor of a unit quaternion from (w, x, y, z).
@@ -37,17 +35,13 @@ class Yade:
     quaternion: Any
 
 
-def rows_of(vectors: Iterable[Any]) -> NDArray[np.float64]:
+def rows_of(vectors: Iterable[Any]) -> Array:
     """(n, 3) components of YADE's vectors, five times faster than NumPy's own conversion."""
     return np.array([(v[0], v[1], v[2]) for v in vectors], dtype=np.float64).reshape(-1, 3)
 
 
 def load_yade() -> Yade:
-    """Return YADE with an empty simulation.
-
-    Raises:
-        RunError: YADE is not installed.
-    """
+    """Return YADE with an empty simulation."""
     import_yade()
     from yade import utils, wrapper  # noqa: PLC0415 - YADE is imported when an engine is built, not before
     from yade.minieigenHP import Quaternion, Vector3  # noqa: PLC0415
@@ -58,21 +52,13 @@ def load_yade() -> Yade:
 
 
 def yade_version() -> str:
-    """Return the version of the YADE that runs.
-
-    Raises:
-        RunError: YADE is not installed.
-    """
+    """Return the version of the YADE that runs."""
     import_yade()
     return str(importlib.import_module("yade.config").version)
 
 
 def yade_threads() -> int:
-    """Return the number of threads that YADE runs with here: OMP_NUM_THREADS, by default 1.
-
-    Raises:
-        RunError: YADE is not installed.
-    """
+    """Return the number of threads that YADE runs with here: OMP_NUM_THREADS, by default 1."""
     import_yade()
     from yade import wrapper  # noqa: PLC0415
 
@@ -95,9 +81,8 @@ def import_yade() -> Any:
         with contextlib.redirect_stdout(io.StringIO()):
             return importlib.import_module("yade")
     except ImportError as error:
-        msg = (
+        raise RunError(
             f"YADE cannot be imported ({error}); install it with `make setup` or `apt-get install yade`, see "
             "environment.md, or run the scene on the engine that needs none: --engine links; `smarticles doctor` "
             "reports what is missing"
-        )
-        raise RunError(msg) from None
+        ) from None

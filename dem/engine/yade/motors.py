@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from dem.arrays import Array
 from dem.engine.interface import MotorReadings
 from dem.engine.yade.assembly import Assembly
 from dem.engine.yade.hinges import Hinges
@@ -15,13 +15,11 @@ from dem.engine.yade.ledger import YadeLedger
 from dem.engine.yade.library import Yade
 from dem.physics.motor import MotorLaw, Motors
 
-Array = NDArray[np.float64]
-
 
 class YadeMotors:
     """`dem.engine.interface.Motors` on YADE; `strengths` are factors (N, 2) on torque limit and stiffness [1]."""
 
-    looks_at_once = 1  # between two control updates YADE comes back to Python anyhow
+    updates_at_once = 1  # between two control updates YADE comes back to Python anyhow
 
     def __init__(
         self, yade: Yade, assembly: Assembly, ledger: YadeLedger, law: MotorLaw | None, strengths: Array | None
@@ -92,11 +90,9 @@ class YadeMotors:
 
     @property
     def memory(self) -> dict[str, Any] | None:
-        """Plain data that `restore` needs besides the loaded simulation."""
         return None if self.control is None else self.control.memory
 
     def restore(self, memory: Mapping[str, Any] | None) -> None:
-        """Go on from where `memory` was taken."""
         if memory is not None:
             assert self._law is not None  # a checkpoint belongs to its scene
             self.control = Motors(self._law, np.zeros((self._assembly.count, 2)), self._strengths)

@@ -6,15 +6,13 @@ import math
 from collections.abc import Iterable, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import block_diag, eigh
 from scipy.optimize import brentq
 
+from dem.arrays import Array
 from dem.body.particle import LINKS, Boxes, Particle
 from dem.engine.yade.hinges import HingeLaw
 from dem.physics.contact import ContactLaw
-
-Array = NDArray[np.float64]
 
 # Contacts that push one barb tip along the same line at the same time. A tip sphere between the beads of another
 # smarticle's chain touches two of them; more act along different directions and do not add up in one mode.

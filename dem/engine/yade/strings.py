@@ -12,14 +12,12 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from dem.arrays import Array
 from dem.body.chain import Tie
 from dem.engine.yade.assembly import Assembly
 from dem.engine.yade.library import Yade, rows_of
 from dem.physics.contact import StringLaw
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -74,11 +72,7 @@ class YadeStrings:
         self._bind(ends, [end.anchor for end in ends], [(0, 0, 0) for _ in ends])
 
     def pull(self, time_step: float) -> float:
-        """Set the forces of the step that begins, of a length dt [s], and move the anchors on.
-
-        Returns:
-            Work of the strings on the links in the step [J], to first order in dt.
-        """
+        """Set the forces of a step dt [s] and move the anchors on; return the work on the links [J]."""
         assert self._law is not None  # called while strings are tied only
         work = 0.0
         forces, vector = self._yade.omega.forces, self._yade.vector
@@ -118,7 +112,6 @@ class YadeStrings:
 
     @property
     def memory(self) -> dict[str, Any] | None:
-        """Plain data that `restore` needs besides the loaded simulation."""
         if self._law is None or not self.tied:
             return None
         return {
@@ -129,7 +122,6 @@ class YadeStrings:
         }
 
     def restore(self, memory: Mapping[str, Any] | None) -> None:
-        """Go on from where `memory` was taken, in a simulation that was loaded."""
         if memory is not None:
             self._law = StringLaw(**memory["law"])
             self._bind([End(**end) for end in memory["ends"]], memory["anchors"], memory["sums"])

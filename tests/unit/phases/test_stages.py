@@ -200,7 +200,7 @@ def test_several_control_updates_in_one_call(at_once: int) -> None:
     ends = []
     for looks in (1, at_once):
         scene, engine = begin({"type": "actuate", "barbs": ramp})
-        engine.motors.looks_at_once = looks
+        engine.motors.updates_at_once = looks
         run_phase(scene, engine)
         ends.append((np.array(engine.motors.targets), engine.time))
     assert len(ends[0][0]) == round(0.01 / scene.fidelity.control_interval_s) + 1

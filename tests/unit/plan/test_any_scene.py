@@ -15,6 +15,7 @@ import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from copy import deepcopy
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -178,7 +179,7 @@ def read_and_plan(content: str, folder: Path) -> str | None:
         with at_most(5 * MOST_S):
             planned = plan(read_scene(file, []))
             text = planned.to_text()
-            json.dumps(planned.to_dict(), allow_nan=False)
+            json.dumps(asdict(planned), allow_nan=False)
     except InputError as error:
         line = str(error)
         assert len(line.splitlines()) == 1, line

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import asdict
 from typing import Any
 
 import pytest
@@ -65,7 +66,7 @@ def test_each_effect_is_called_for_by_its_own_part_of_the_scene(changes: dict[st
     assert added != plain  # an effect without any trace would need no declaration
     assert set(plain.engines) <= set(added.engines)
     assert set(planned.engines) == set(added.engines)
-    assert json.loads(json.dumps(planned.to_dict()))["effects"][0]["adds"]["engines"] == list(plain.engines)
+    assert json.loads(json.dumps(asdict(planned)))["effects"][0]["adds"]["engines"] == list(plain.engines)
 
 
 def test_every_column_belongs_to_one_effect() -> None:
@@ -93,7 +94,7 @@ def test_an_interval_longer_than_the_run_gives_a_warning(key: str, left_out: str
     )
     assert warning == warnings_of(scene)[0]
     assert f"warning: {warning}" in plan(scene).to_text().splitlines()
-    assert json.loads(json.dumps(plan(scene).to_dict()))["warnings"] == [warning]
+    assert json.loads(json.dumps(asdict(plan(scene))))["warnings"] == [warning]
 
 
 def test_knobs_that_do_nothing_on_links_give_a_warning_where_they_are_set() -> None:

@@ -16,7 +16,7 @@ from scipy.spatial.transform import Rotation
 
 from dem.body.placement import Poses
 from dem.errors import RunError
-from dem.physics.overlaps import Glance
+from dem.physics.overlaps import Extremes
 from dem.record.forces import read_forces
 from dem.record.frames import read_frames
 from dem.record.progress import ProgressWriter
@@ -140,11 +140,11 @@ def test_where_extremes_are_enough_only_the_energy_is_checked_too(
 ) -> None:
     _, engine, recorder = start(tmp_path)
     told = {"fastest": 0.1, "lowest": 1.0, "highest": 1.0, "widest": 0.0, "gap": 0.0, "deepest": 0.0}
-    seen = Glance(**told, elastic_energy=0.0)
-    monkeypatch.setattr(engine, "glance", lambda state: seen)
+    seen = Extremes(**told, elastic_energy=0.0)
+    monkeypatch.setattr(engine, "extremes", lambda state: seen)
     engine.deepest = recorder.watchdog.depth * 1.1
     monkeypatch.setattr(engine.boundaries, "floor", 0.99)
-    recorder.watch(engine)  # by the glance all is well
+    recorder.watch(engine)  # by the extremes all is well
     monkeypatch.setattr(engine.boundaries, "floor", 1.01)
     with pytest.raises(RunError, match="left through the wall or the floor"):
         recorder.watch(engine)

@@ -11,7 +11,7 @@ from scenes import make_boxes
 
 from dem.body.state import State
 from dem.errors import RunError
-from dem.physics.overlaps import Glance, Held, Overlaps
+from dem.physics.overlaps import Extremes, Held, Overlaps
 from dem.run.watchdog import Watchdog
 from dem.setting.container import Cylinder
 
@@ -164,8 +164,8 @@ STRICT = Watchdog(cylinder=Cylinder(radius=0.0234, height=0.1, facets=64), speed
 
 
 def content(raised: float | None = 0.0, dog: Watchdog = STRICT, **changes: float) -> bool:
-    glance = Glance(**{**GLANCE, "elastic_energy": 0.0, **changes})
-    return dog.content(glance, floor=1.0, raised=raised)
+    extremes = Extremes(**{**GLANCE, "elastic_energy": 0.0, **changes})
+    return dog.content(extremes, floor=1.0, raised=raised)
 
 
 def test_extremes_within_all_limits_need_no_full_check() -> None:
