@@ -25,25 +25,15 @@ NONE = -1
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class ContactForces:
-    """All contacts at one instant that carry a force.
+    """All contacts at one instant that carry a force."""
 
-    Args:
-        smarticles: (M, 2) the two smarticles, the lower number first; the second one is -1 for a boundary.
-        links: (M, 2) their links: 0 barb 1, 1 middle link, 2 barb 2; -1 for a boundary.
-        boundaries: (M,) place in `BOUNDARIES`; -1 between smarticles.
-        points: (M, 3) mean of the points of contact, weighted by their normal forces [m].
-        normal: (M,) sum of the normal forces at the points, positive [N].
-        tangential: (M,) size of the sum of the tangential forces at the points [N].
-        forces: (M, 3) on the first one, the sum over all points [N].
-    """
-
-    smarticles: Numbers
-    links: Numbers
-    boundaries: Numbers
-    points: Array
-    normal: Array
-    tangential: Array
-    forces: Array
+    smarticles: Numbers  #: (M, 2) the two smarticles, the lower number first; the second one is -1 for a boundary
+    links: Numbers  #: (M, 2) their links: 0 barb 1, 1 middle link, 2 barb 2; -1 for a boundary
+    boundaries: Numbers  #: (M,) place in `BOUNDARIES`; -1 between smarticles
+    points: Array  #: (M, 3) mean of the points of contact, weighted by their normal forces [m]
+    normal: Array  #: (M,) sum of the normal forces at the points, positive [N]
+    tangential: Array  #: (M,) size of the sum of the tangential forces at the points [N]
+    forces: Array  #: (M, 3) on the first one, the sum over all points [N]
 
 
 def at_links(smarticle: Number, link: Number) -> Number:

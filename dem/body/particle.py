@@ -211,16 +211,11 @@ class Boxes:
 
 @dataclass(frozen=True, kw_only=True)
 class SphereChain:
-    """Arrangement of spheres along the links. Lengths in m.
+    """Arrangement of spheres along the links. Lengths in m."""
 
-    Args:
-        rows: rows of spheres side by side across t1, the thickness along the normal.
-        pitch: largest distance between neighbouring centres along a link [m].
-    """
-
-    rows: int
+    rows: int  #: Rows of spheres side by side across t1, the thickness along the normal
     diameter: float
-    pitch: float
+    pitch: float  #: Largest distance between neighbouring centres along a link [m]
 
 
 @dataclass(frozen=True)

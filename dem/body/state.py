@@ -16,19 +16,13 @@ class State:
     """Poses and velocities of all links, in the laboratory frame.
 
     Welded or articulated, a smarticle is three links; link 0 is barb 1, 1 the middle link, 2 barb 2.
-
-    Args:
-        link_positions: (N, 3, 3) centres of the links [m].
-        link_rotations: (N, 3, 3, 3) link frames, see `Boxes.link_rotations` [1].
-        link_velocities: (N, 3, 3) of the links' centres [m/s].
-        link_spins: (N, 3, 3) angular velocities of the links [rad/s].
     """
 
     boxes: Boxes
-    link_positions: Array
-    link_rotations: Array
-    link_velocities: Array
-    link_spins: Array
+    link_positions: Array  #: (N, 3, 3) centres of the links [m]
+    link_rotations: Array  #: (N, 3, 3, 3) link frames, see `Boxes.link_rotations` [1]
+    link_velocities: Array  #: (N, 3, 3) of the links' centres [m/s]
+    link_spins: Array  #: (N, 3, 3) angular velocities of the links [rad/s]
 
     @classmethod
     def rigid(

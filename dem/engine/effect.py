@@ -35,25 +35,16 @@ class EffectName(StrEnum):
 
 @dataclass(frozen=True, kw_only=True)
 class Adds:
-    """What an effect adds to a run; nothing of it exists in a run without the effect.
+    """What an effect adds to a run; nothing of it exists in a run without the effect."""
 
-    Args:
-        engines: what an engine runs in every step, by its own names.
-        functors: what these are given to work with.
-        shapes: kinds of bodies.
-        series: datasets of `series.h5`.
-        arrays: cell data of every frame.
-        python: what Python does for it, how often, and other costs.
-    """
-
-    engines: tuple[str, ...] = ()
-    functors: tuple[str, ...] = ()
+    engines: tuple[str, ...] = ()  #: What an engine runs in every step, by its own names
+    functors: tuple[str, ...] = ()  #: What these are given to work with
     materials: tuple[str, ...] = ()
-    shapes: tuple[str, ...] = ()
-    series: tuple[str, ...] = ()
-    arrays: tuple[str, ...] = ()
+    shapes: tuple[str, ...] = ()  #: Kinds of bodies
+    series: tuple[str, ...] = ()  #: Datasets of `series.h5`
+    arrays: tuple[str, ...] = ()  #: Cell data of every frame
     files: tuple[str, ...] = ()
-    python: str = ""
+    python: str = ""  #: What Python does for it, how often, and other costs
 
     @staticmethod
     def together(parts: Iterable[Adds]) -> Adds:

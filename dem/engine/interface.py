@@ -37,21 +37,13 @@ class Saved:
 
 @dataclass(frozen=True, kw_only=True)
 class MotorReadings:
-    """All motors at one instant, (N, 2) each: barb 1 and barb 2 of every smarticle.
+    """All motors at one instant, (N, 2) each: barb 1 and barb 2 of every smarticle."""
 
-    Args:
-        schedule: angles of the schedule at the last control update [rad]; a motor that halts falls behind.
-        commands: angles that they hold [rad].
-        torques: on the barbs since the last control update [N m]; positive ones raise the angle.
-        work: done on the links since the start, ∫ τ dα up to the last control update [J].
-        halted: whether a motor wanted to advance at the last control update and did not.
-    """
-
-    schedule: Array
-    commands: Array
-    torques: Array
-    work: Array
-    halted: Flags
+    schedule: Array  #: Angles of the schedule at the last control update [rad]; a motor that halts falls behind
+    commands: Array  #: Angles that they hold [rad]
+    torques: Array  #: On the barbs since the last control update [N m]; positive ones raise the angle
+    work: Array  #: Done on the links since the start, ∫ τ dα up to the last control update [J]
+    halted: Flags  #: Whether a motor wanted to advance at the last control update and did not
 
 
 class Boundaries(Protocol):

@@ -33,19 +33,13 @@ MOST_OVERSHOOT = 0.5
 
 @dataclass(frozen=True, kw_only=True)
 class Gait:
-    """What the barbs of smarticles do in a phase.
-
-    Args:
-        duration: length of the phase [s].
-        active_fraction: share of the smarticles that move [1].
-        offsets: "random": each begins at another point of the period.
-    """
+    """What the barbs of smarticles do in a phase."""
 
     motions: tuple[Motion, Motion]
     keys: tuple[str, str] = ("barbs", "barbs")
-    duration: float
-    active_fraction: float = 1.0
-    offsets: Literal["none", "random"] = "none"
+    duration: float  #: Length of the phase [s]
+    active_fraction: float = 1.0  #: Share of the smarticles that move [1]
+    offsets: Literal["none", "random"] = "none"  #: "random": each begins at another point of the period
 
     @property
     def period(self) -> float | None:
@@ -127,32 +121,20 @@ class ActuatedPhase(Phase):
 
 @dataclass(frozen=True, eq=False)
 class _Track:
-    """One motion, of all barbs that follow it.
+    """One motion, of all barbs that follow it."""
 
-    Args:
-        span: the K entries of `Drive` that it sets.
-        course: the motion from K starts.
-        shifts: (1,) or (K,) time that the motion is ahead at the beginning of the phase [s].
-    """
-
-    span: slice
-    course: Course
-    shifts: Array
+    span: slice  #: The K entries of `Drive` that it sets
+    course: Course  #: The motion from K starts
+    shifts: Array  #: (1,) or (K,) time that the motion is ahead at the beginning of the phase [s]
 
 
 @dataclass(frozen=True, eq=False)
 class Drive:
-    """Target angles of an actuated phase over time.
+    """Target angles of an actuated phase over time."""
 
-    Args:
-        duration: length of the phase [s].
-        active: (N,) bool, smarticles that move.
-        start: (N, 2) target angles at the end of the actuated phase before, or the smarticle's own [rad].
-    """
-
-    duration: float
-    active: Flags
-    start: Array
+    duration: float  #: Length of the phase [s]
+    active: Flags  #: (N,) bool, smarticles that move
+    start: Array  #: (N, 2) target angles at the end of the actuated phase before, or the smarticle's own [rad]
     # Barbs that always have one target share an entry: `_entries` has those of barbs that do not move, then those of
     # each track; `_which` (N, 2) is the entry of each barb.
     _entries: Array

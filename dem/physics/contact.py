@@ -14,25 +14,15 @@ from dem.setting.contact import Contact
 
 @dataclass(frozen=True, kw_only=True)
 class ContactLaw:
-    """Linear spring, dashpot and Coulomb friction of one contact.
+    """Linear spring, dashpot and Coulomb friction of one contact."""
 
-    Args:
-        normal_stiffness: kn [N/m].
-        tangential_stiffness: ks [N/m].
-        normal_damping: cn between smarticles [N s/m].
-        wall_damping: cn against the container [N s/m].
-        tangential_damping: cs over cn [1].
-        friction: Coulomb coefficient between smarticles [1].
-        wall_friction: Coulomb coefficient against the container [1].
-    """
-
-    normal_stiffness: float
-    tangential_stiffness: float
-    normal_damping: float
-    wall_damping: float
-    tangential_damping: float
-    friction: float
-    wall_friction: float
+    normal_stiffness: float  #: kn [N/m]
+    tangential_stiffness: float  #: ks [N/m]
+    normal_damping: float  #: cn between smarticles [N s/m]
+    wall_damping: float  #: cn against the container [N s/m]
+    tangential_damping: float  #: cs over cn [1]
+    friction: float  #: Coulomb coefficient between smarticles [1]
+    wall_friction: float  #: Coulomb coefficient against the container [1]
 
 
 def typical_effective_mass(particle: Particle) -> float:
@@ -88,17 +78,11 @@ def contact_law(particle: Particle, contact: Contact, stiffness: float) -> Conta
 
 @dataclass(frozen=True, kw_only=True)
 class StringLaw:
-    """A string: a spring with a dashpot that pulls and never pushes.
+    """A string: a spring with a dashpot that pulls and never pushes."""
 
-    Args:
-        length: unstretched [m].
-        stiffness: when taut [N/m].
-        damping: when taut [N s/m].
-    """
-
-    length: float
-    stiffness: float
-    damping: float
+    length: float  #: Unstretched [m]
+    stiffness: float  #: When taut [N/m]
+    damping: float  #: When taut [N s/m]
 
     def tension(self, length: float, rate: float) -> float:
         """Return the tension [N] at a length [m] that grows at a rate [m/s]; 0 for a string that hangs."""

@@ -19,25 +19,18 @@ PATIENCE = 20  # findings in a row, of both barbs of a smarticle one after the o
 
 @dataclass(frozen=True, kw_only=True)
 class MotorLaw:
-    """What all motors of a scene have in common.
+    """What all motors of a scene have in common."""
 
-    Args:
-        torque_limit: τ_max [N m].
-        speed_limit: ω, the greatest speed of a command [rad/s].
-        stiffness: twist stiffness of the shaft between motor and barb [N m/rad].
-        law: "halt": a motor whose torque is at τ_max or above no longer advances against it, and holds with whatever
-            torque it takes; "stall": it does not move at all until its torque has fallen, the rule of the paper's
-            text; "ease": it goes on at half the speed with whatever torque that takes, and stops only when twenty
-            barbs in a row, those of the smarticle in turn, were found there, the rule of the paper's code; "slip": a
-            spring that gives way at τ_max; "servo": a spring with a damper beside it, their torque limited as a whole.
-        damping: a servo's derivative gain [N m s/rad].
-    """
-
-    torque_limit: float
-    speed_limit: float
-    stiffness: float
+    torque_limit: float  #: Τ_max [N m]
+    speed_limit: float  #: ω, the greatest speed of a command [rad/s]
+    stiffness: float  #: Twist stiffness of the shaft between motor and barb [N m/rad]
+    #: "halt": a motor whose torque is at τ_max or above no longer advances against it, and holds with whatever torque
+    #: it takes; "stall": it does not move at all until its torque has fallen, the rule of the paper's text; "ease": it
+    #: goes on at half the speed with whatever torque that takes, and stops only when twenty barbs in a row, those of
+    #: the smarticle in turn, were found there, the rule of the paper's code; "slip": a spring that gives way at τ_max;
+    #: "servo": a spring with a damper beside it, their torque limited as a whole
     law: Law
-    damping: float = 0.0
+    damping: float = 0.0  #: A servo's derivative gain [N m s/rad]
 
 
 # The next two take scalars, or arrays: compiled code calls them for one barb, `Motors` for all barbs of a side.

@@ -22,42 +22,25 @@ class Held:
 
 @dataclass(frozen=True)
 class Overlaps:
-    """All contacts and hinges at one instant.
+    """All contacts and hinges at one instant."""
 
-    Args:
-        deepest: overlap of the deepest contact [m].
-        deep: (N,) smarticles with a contact deeper than the limit asked for.
-        elastic_energy: upper bound of what the springs of all contacts and hinges hold [J].
-        held: those of the deep ones that two boundaries hold.
-    """
-
-    deepest: float
-    deep: Flags
-    elastic_energy: float
-    held: tuple[Held, ...] = ()
+    deepest: float  #: Overlap of the deepest contact [m]
+    deep: Flags  #: (N,) smarticles with a contact deeper than the limit asked for
+    elastic_energy: float  #: Upper bound of what the springs of all contacts and hinges hold [J]
+    held: tuple[Held, ...] = ()  #: Those of the deep ones that two boundaries hold
 
 
 @dataclass(frozen=True, kw_only=True)
 class Extremes:
-    """The extremes of all smarticles at one instant; NaN is within no limit.
+    """The extremes of all smarticles at one instant; NaN is within no limit."""
 
-    Args:
-        fastest: speed of the fastest link's centre [m/s].
-        lowest: height of the lowest point that must stay inside [m].
-        highest: height of the highest one [m].
-        widest: largest distance of such a point from the vertical axis [m].
-        gap: largest distance between the links of a hinge [m].
-        deepest: overlap of the deepest contact [m].
-        elastic_energy: as in `Overlaps` [J].
-    """
-
-    fastest: float
-    lowest: float
-    highest: float
-    widest: float
-    gap: float
-    deepest: float
-    elastic_energy: float
+    fastest: float  #: Speed of the fastest link's centre [m/s]
+    lowest: float  #: Height of the lowest point that must stay inside [m]
+    highest: float  #: Height of the highest one [m]
+    widest: float  #: Largest distance of such a point from the vertical axis [m]
+    gap: float  #: Largest distance between the links of a hinge [m]
+    deepest: float  #: Overlap of the deepest contact [m]
+    elastic_energy: float  #: As in `Overlaps` [J]
 
 
 def held_between(touched: Mapping[int, Collection[str]], raised: Mapping[str, float], least: float) -> tuple[Held, ...]:

@@ -42,16 +42,11 @@ _COLUMNS = (
 
 @dataclass(frozen=True, kw_only=True)
 class Error:
-    """A relative error.
-
-    Args:
-        value: against the reference fidelity [1]; NaN if unknown.
-        band: half-width of its 95 % interval over seeds [1]; NaN if unknown.
-    """
+    """A relative error."""
 
     of: str
-    value: float
-    band: float
+    value: float  #: Against the reference fidelity [1]; NaN if unknown
+    band: float  #: Half-width of its 95 % interval over seeds [1]; NaN if unknown
 
     def __str__(self) -> str:
         band = f" ± {self.band:.3f}" if math.isfinite(self.band) else ", scatter unknown"
@@ -65,23 +60,16 @@ class Error:
 
 @dataclass(frozen=True, kw_only=True)
 class Measured:
-    """One named fidelity of an engine as the table has it.
-
-    Args:
-        errors: of the quantities asked for; `others` are those of the others.
-        ratio: measured processor time over the planned wall time [1].
-        is_reference: whether the errors of the others are against it.
-        hours: expected wall time on the scene at hand, on one core of the table's machine [h].
-    """
+    """One named fidelity of an engine as the table has it."""
 
     fidelity: str
-    errors: tuple[Error, ...]
+    errors: tuple[Error, ...]  #: Of the quantities asked for; `others` are those of the others
     engine: str = "yade"
     others: tuple[Error, ...] = ()
     seeds: int
-    ratio: float
-    is_reference: bool
-    hours: float = math.nan
+    ratio: float  #: Measured processor time over the planned wall time [1]
+    is_reference: bool  #: Whether the errors of the others are against it
+    hours: float = math.nan  #: Expected wall time on the scene at hand, on one core of the table's machine [h]
 
     @property
     def name(self) -> str:
@@ -96,20 +84,14 @@ class Measured:
 
 @dataclass(frozen=True, kw_only=True)
 class AccuracyTable:
-    """What was measured, and of which scene.
-
-    Args:
-        fidelities: those with finished runs, engine by engine, coarse to fine.
-        reference: name of what errors are against.
-        activity: types of phase, separated by spaces.
-    """
+    """What was measured, and of which scene."""
 
     path: Path
-    fidelities: tuple[Measured, ...]
-    reference: str
+    fidelities: tuple[Measured, ...]  #: Those with finished runs, engine by engine, coarse to fine
+    reference: str  #: Name of what errors are against
     aspect_ratio: float
     count: int
-    activity: str
+    activity: str  #: Types of phase, separated by spaces
 
 
 def read_table(path: Path | None, *, of: Sequence[str] = PACKING, engine: str | None = None) -> AccuracyTable:

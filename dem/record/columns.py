@@ -9,15 +9,10 @@ from dem.strict import unit_of
 
 
 class Column(NamedTuple):
-    """One dataset, or one field of the frames.
+    """One dataset, or one field of the frames."""
 
-    Attributes:
-        unit: SI; "1" for a pure number.
-        label: Name in tables, without the unit.
-    """
-
-    unit: str
-    label: str
+    unit: str  #: SI; "1" for a pure number
+    label: str  #: Name in tables, without the unit
     description: str
 
 

@@ -72,25 +72,7 @@ class Phase(Document):
 
 
 class Manifest(Document):
-    """What made a run, `run.json`.
-
-    Attributes:
-        engine: Absent in manifests written before the key was added.
-        threads: Threads of the engine; ranks on lammps.
-        fidelity: Name of the fidelity that the scene's is based on.
-        aspect_ratio: l/w [-].
-        thickness_normal_m: t1, along the normal of the smarticle's plane.
-        thickness_in_plane_m: t2, in the smarticle's plane.
-        middle_thickness_in_plane_m: That of the middle link, where it differs.
-        solid_volume_m3: Volume of one smarticle, t1 t2 (w + 2l), each link with its own t2.
-        container_radius_m: Of the widest tier.
-        packing_radius_m: Radius that packing fractions are computed with, where it is not the container's.
-        container_tiers: Cylinders of different radii that stand on each other.
-        planar: Whether all motion is confined to a plane, without a container.
-        channel_width_m: Distance of the two walls in the plane; None without.
-        time_step_s: The shortest of its phases.
-        taken_over: The source of its smarticles, if from another run.
-    """
+    """What made a run, `run.json`."""
 
     format: Literal[1] = 1
     name: str
@@ -99,28 +81,30 @@ class Manifest(Document):
     command: str
     started: str
     versions: Mapping[str, str]
+    #: Absent in manifests written before the key was added
     engine: str = Field(default_factory=lambda data: "links" if "links" in data["versions"] else "yade")
-    threads: NonNegativeInt
-    fidelity: str
+    threads: NonNegativeInt  #: Threads of the engine; ranks on lammps
+    fidelity: str  #: Name of the fidelity that the scene's is based on
     count: PositiveInt
-    aspect_ratio: NonNegativeFloat
+    aspect_ratio: NonNegativeFloat  #: L/w [-]
     middle_length_m: PositiveFloat
     barb_length_m: NonNegativeFloat
-    thickness_normal_m: PositiveFloat
-    thickness_in_plane_m: PositiveFloat
-    middle_thickness_in_plane_m: PositiveFloat | None = None
+    thickness_normal_m: PositiveFloat  #: T1, along the normal of the smarticle's plane
+    thickness_in_plane_m: PositiveFloat  #: T2, in the smarticle's plane
+    middle_thickness_in_plane_m: PositiveFloat | None = None  #: That of the middle link, where it differs
     smarticle_mass_kg: PositiveFloat
-    solid_volume_m3: PositiveFloat
-    container_radius_m: PositiveFloat
+    solid_volume_m3: PositiveFloat  #: Volume of one smarticle, t1 t2 (w + 2l), each link with its own t2
+    container_radius_m: PositiveFloat  #: Of the widest tier
+    #: Radius that packing fractions are computed with, where it is not the container's
     packing_radius_m: PositiveFloat | None = None
-    container_tiers: PositiveInt = 1
-    planar: bool = False
-    channel_width_m: PositiveFloat | None = None
+    container_tiers: PositiveInt = 1  #: Cylinders of different radii that stand on each other
+    planar: bool = False  #: Whether all motion is confined to a plane, without a container
+    channel_width_m: PositiveFloat | None = None  #: Distance of the two walls in the plane; None without
     sphere_diameter_m: PositiveFloat
     spheres_per_smarticle: PositiveInt
-    time_step_s: PositiveFloat
+    time_step_s: PositiveFloat  #: The shortest of its phases
     phases: tuple[Phase, ...]
-    taken_over: Mapping[str, Any] | None = None
+    taken_over: Mapping[str, Any] | None = None  #: The source of its smarticles, if from another run
 
     @model_validator(mode="after")
     def _numbered(self) -> Self:

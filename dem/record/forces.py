@@ -53,16 +53,11 @@ def force_mesh(found: ContactForces, positions: Array, *, time: float, phase: in
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class RecordedForces:
-    """The forces at contacts at one recorded time.
+    """The forces at contacts at one recorded time."""
 
-    Attributes:
-        path: The file that they came from.
-        contacts: The contacts.
-        ends: (M, 2, 3) centre of mass of the first smarticle, and of the second or the point at a boundary [m].
-    """
-
-    path: Path
-    contacts: ContactForces = field(repr=False)
+    path: Path  #: The file that they came from
+    contacts: ContactForces = field(repr=False)  #: The contacts
+    #: (M, 2, 3) centre of mass of the first smarticle, and of the second or the point at a boundary [m]
     ends: Array = field(repr=False)
 
     @property

@@ -121,33 +121,20 @@ def _lines(count: int) -> Numbers:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Frame:
-    """The smarticles at one recorded time; all arrays are read-only.
+    """The smarticles at one recorded time; all arrays are read-only."""
 
-    Attributes:
-        path: The file it came from.
-        time: Simulated time [s].
-        floor_z: Height of the container's floor [m]; heights are measured from it.
-        phase: Index into `Run.phases`.
-        vertices: (N, 4, 3) float64 [m], barb tip, hinge, hinge, barb tip of each smarticle, in the shape that it has
-            at that time.
-        smarticle_ids: (N,) int64.
-        link_velocity: (N, 3, 3) float64 [m/s], of the centres of barb 1, middle link, barb 2.
-        link_angular_velocity: (N, 3, 3) float64 [rad/s].
-        contacts: (N,) int64, how many other smarticles each one touches, by the engine.
-        cell_data: Further data of the file, (N, 3, …) one value per link, by name. Frames of scenes that actuate have
-            `angle_rad`, `motor_torque_N_m` and `motor_work_J`, NaN on the middle link and on welded smarticles, and
-            `halted`.
-    """
-
-    path: Path
-    time: float
-    floor_z: float
-    phase: int
+    path: Path  #: The file it came from
+    time: float  #: Simulated time [s]
+    floor_z: float  #: Height of the container's floor [m]; heights are measured from it
+    phase: int  #: Index into `Run.phases`
+    #: (N, 4, 3) float64 [m], barb tip, hinge, hinge, barb tip of each smarticle, in the shape that it has at that time
     vertices: Array = field(repr=False)
-    smarticle_ids: Numbers = field(repr=False)
-    link_velocity: Array = field(repr=False)
-    link_angular_velocity: Array = field(repr=False)
-    contacts: Numbers = field(repr=False)
+    smarticle_ids: Numbers = field(repr=False)  #: (N,) int64
+    link_velocity: Array = field(repr=False)  #: (N, 3, 3) float64 [m/s], of the centres of barb 1, middle link, barb 2
+    link_angular_velocity: Array = field(repr=False)  #: (N, 3, 3) float64 [rad/s]
+    contacts: Numbers = field(repr=False)  #: (N,) int64, how many other smarticles each one touches, by the engine
+    #: Further data of the file, (N, 3, …) one value per link, by name. Frames of scenes that actuate have `angle_rad`,
+    #: `motor_torque_N_m` and `motor_work_J`, NaN on the middle link and on welded smarticles, and `halted`.
     cell_data: Mapping[str, NDArray[Any]] = field(repr=False)
 
     @property

@@ -25,16 +25,11 @@ _REMEDY = "give the directory of a run that has written a frame"
 
 @dataclass
 class FrameWriter:
-    """Writes frames into a run directory, and rewrites their list, `frames.pvd`, at each.
-
-    Args:
-        noun: name of one file; "sphere" gives `spheres.pvd` and `spheres/sphere_000000.vtu`.
-        times: times of the frames written so far [s].
-    """
+    """Writes frames into a run directory, and rewrites their list, `frames.pvd`, at each."""
 
     folder: Path
-    noun: str = names.FRAME
-    times: list[float] = field(default_factory=list)
+    noun: str = names.FRAME  #: Name of one file; "sphere" gives `spheres.pvd` and `spheres/sphere_000000.vtu`
+    times: list[float] = field(default_factory=list)  #: Times of the frames written so far [s]
 
     def write(self, mesh: meshio.Mesh, time: float) -> None:
         """Write one frame.

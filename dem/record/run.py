@@ -24,26 +24,16 @@ State = Literal["done", "running", "queued", "failed", "interrupted", "stopped",
 
 @dataclass(frozen=True, kw_only=True)
 class Status:
-    """How far a run is; None where its files do not say.
-
-    Attributes:
-        cause: Why it failed or was interrupted.
-        phase: Type of its current phase.
-        time_s: Simulated time [s].
-        steps: Time steps of a done run.
-        wall_s: Wall time so far [s].
-        cpu_s: Processor time of a done run [s].
-        checkpoint_s: Simulated time of the checkpoint from which it can be resumed [s].
-    """
+    """How far a run is; None where its files do not say."""
 
     state: State
-    cause: str | None = None
-    phase: str | None = None
-    time_s: float | None = None
-    steps: int | None = None
-    wall_s: float | None = None
-    cpu_s: float | None = None
-    checkpoint_s: float | None = None
+    cause: str | None = None  #: Why it failed or was interrupted
+    phase: str | None = None  #: Type of its current phase
+    time_s: float | None = None  #: Simulated time [s]
+    steps: int | None = None  #: Time steps of a done run
+    wall_s: float | None = None  #: Wall time so far [s]
+    cpu_s: float | None = None  #: Processor time of a done run [s]
+    checkpoint_s: float | None = None  #: Simulated time of the checkpoint from which it can be resumed [s]
 
 
 @dataclass(frozen=True)

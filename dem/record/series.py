@@ -91,18 +91,13 @@ class SeriesWriter:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Series:
-    """The recorded quantities of a run against time; all arrays are read-only.
+    """The recorded quantities of a run against time; all arrays are read-only."""
 
-    Attributes:
-        path: The file it came from.
-        data: Arrays by name, e.g. "com_height_m": (n,), (n, 2) for barb 1 and barb 2, or (n, 3) for x, y, z. The scene
-            decides which there are: one that never actuates has none of motors.
-        units: Unit of each, e.g. "m"; "1" for a pure number.
-    """
-
-    path: Path
+    path: Path  #: The file it came from
+    #: Arrays by name, e.g. "com_height_m": (n,), (n, 2) for barb 1 and barb 2, or (n, 3) for x, y, z. The scene decides
+    #: which there are: one that never actuates has none of motors.
     data: Mapping[str, NDArray[Any]] = field(repr=False)
-    units: Mapping[str, str] = field(repr=False)
+    units: Mapping[str, str] = field(repr=False)  #: Unit of each, e.g. "m"; "1" for a pure number.
     descriptions: Mapping[str, str] = field(repr=False)
     scene_sha256: str
     seed: int

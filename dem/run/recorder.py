@@ -26,30 +26,20 @@ WATCH_STEPS = 500
 
 @dataclass
 class Recorder:
-    """Records at fixed intervals of time, which are whole numbers of samples of the series.
-
-    Args:
-        watchdog: checks the state at intervals, at every checkpoint and at the end.
-        points: returns (N, P, 3) points of a state that must stay inside the container [m].
-        interval: time between samples [s].
-        frame_every: samples between frames.
-        watch_every: samples between checks of the watchdog; None: about `WATCH_STEPS` steps.
-        forces: writes the forces at contacts, with each frame.
-        sphere_every: samples between these.
-    """
+    """Records at fixed intervals of time, which are whole numbers of samples of the series."""
 
     sampler: Sampler
     series: SeriesWriter
     frames: FrameWriter
-    watchdog: Watchdog
-    points: Callable[[State], Array]
+    watchdog: Watchdog  #: Checks the state at intervals, at every checkpoint and at the end
+    points: Callable[[State], Array]  #: Returns (N, P, 3) points of a state that must stay inside the container [m]
     progress: ProgressWriter
-    interval: float
-    frame_every: int
-    watch_every: int | None = None
-    forces: FrameWriter | None = None
+    interval: float  #: Time between samples [s]
+    frame_every: int  #: Samples between frames
+    watch_every: int | None = None  #: Samples between checks of the watchdog; None: about `WATCH_STEPS` steps
+    forces: FrameWriter | None = None  #: Writes the forces at contacts, with each frame
     spheres: FrameWriter | None = None
-    sphere_every: int = 1
+    sphere_every: int = 1  #: Samples between these
     samples: int = 0
     """Number of samples so far."""
     residual: str | None = None

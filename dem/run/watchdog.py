@@ -20,24 +20,16 @@ BOTH_HOOKS = ("the lower hook", "the upper hook")
 
 @dataclass(kw_only=True)
 class Watchdog:
-    """Limits that no smarticle may exceed.
+    """Limits that no smarticle may exceed."""
 
-    Args:
-        cylinder: the container; a smarticle with a sphere's centre, or a link's axis, beyond its wall or under its
-            floor has escaped, one whose centre of mass is above it has been thrown out.
-        speed: of a link's centre [m/s]; faster than anything that falls or is shaken in the scene.
-        gap: [m]; a hinge whose links are farther apart is broken.
-        depth: [m]; contacts that overlap by more no longer keep bodies apart.
-        energy: [J]; smarticles that gain more from nowhere are blowing up.
-        missed: [1]; the energy ledger may miss this fraction of the dissipation.
-    """
-
+    #: The container; a smarticle with a sphere's centre, or a link's axis, beyond its wall or under its floor has
+    #: escaped, one whose centre of mass is above it has been thrown out
     cylinder: Cylinder
-    speed: float
-    gap: float = math.inf
-    depth: float = math.inf
-    energy: float = math.inf
-    missed: float = math.inf
+    speed: float  #: Of a link's centre [m/s]; faster than anything that falls or is shaken in the scene
+    gap: float = math.inf  #: [m]; a hinge whose links are farther apart is broken
+    depth: float = math.inf  #: [m]; contacts that overlap by more no longer keep bodies apart
+    energy: float = math.inf  #: [J]; smarticles that gain more from nowhere are blowing up
+    missed: float = math.inf  #: [1]; the energy ledger may miss this fraction of the dissipation
     _ceiling: float = math.inf  # limit of kinetic and potential energy less the work done [J]
 
     def content(self, extremes: Extremes, *, floor: float, raised: float | None = 0.0) -> bool:

@@ -20,17 +20,11 @@ WANTED, LIMIT = 0.3, 0.5  # diameters that contacts may give way by, and from wh
 
 
 class Overlap(NamedTuple):
-    """An expected overlap.
+    """An expected overlap."""
 
-    Args:
-        cause: in words.
-        diameters: overlap over the diameter of a link's section [1].
-        stiffness: kn at which it is `WANTED` [N/m].
-    """
-
-    cause: str
-    diameters: float
-    stiffness: float
+    cause: str  #: In words
+    diameters: float  #: Overlap over the diameter of a link's section [1]
+    stiffness: float  #: kn at which it is `WANTED` [N/m]
 
 
 def expected_overlaps(scene: SceneView) -> tuple[Overlap, ...]:

@@ -80,16 +80,12 @@ class Container(Part):
 
 @dataclass(frozen=True, kw_only=True)
 class Cylinder:
-    """The container as the engine builds it. Lengths in m.
+    """The container as the engine builds it. Lengths in m."""
 
-    Args:
-        radius: of the lowest tier.
-        upper: (bottom, radius) of the tiers above the lowest, from below; each one ends where the next begins.
-    """
-
-    radius: float
+    radius: float  #: Of the lowest tier
     height: float
     facets: int
+    #: (bottom, radius) of the tiers above the lowest, from below; each one ends where the next begins
     upper: tuple[tuple[float, float], ...] = ()
 
     @property

@@ -77,19 +77,12 @@ class Bar(NamedTuple):
 
 @dataclass(frozen=True, kw_only=True)
 class Cross:
-    """One hook as the engine builds it. Lengths in m.
+    """One hook as the engine builds it. Lengths in m."""
 
-    Args:
-        height: of the centre above the floor.
-        side: of the bars' square section.
-        length: of the bars, which lie along x and y; of several, diameter of the disc that they end at.
-        count: bars along x, and as many along y, evenly spaced.
-    """
-
-    height: float
-    side: float
-    length: float
-    count: int = 1
+    height: float  #: Of the centre above the floor
+    side: float  #: Of the bars' square section
+    length: float  #: Of the bars, which lie along x and y; of several, diameter of the disc that they end at
+    count: int = 1  #: Bars along x, and as many along y, evenly spaced
 
     @property
     def bars(self) -> tuple[Bar, ...]:

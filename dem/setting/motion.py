@@ -27,20 +27,13 @@ Course = Callable[[Array], Array]  # a motion that has begun: times [s] since th
 
 @dataclass(frozen=True)
 class Leg:
-    """One stretch of a motion that is no sequence.
+    """One stretch of a motion that is no sequence."""
 
-    Args:
-        key: of the motion below the one that it is a leg of, "" or e.g. "steps.1".
-        start: angles [rad] at its beginning.
-        home: angles [rad] at the beginning of the phase.
-        until: its length [s].
-    """
-
-    key: str
+    key: str  #: Of the motion below the one that it is a leg of, "" or e.g. "steps.1".
     motion: SimpleMotion
-    start: Array
-    home: Array
-    until: float
+    start: Array  #: Angles [rad] at its beginning
+    home: Array  #: Angles [rad] at the beginning of the phase
+    until: float  #: Its length [s]
 
     def extent(self) -> tuple[Array, Array, float]:
         """Return the lowest and the highest angle [rad] for each start, and the greatest speed [rad/s] over all."""

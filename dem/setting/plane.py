@@ -23,12 +23,7 @@ class Plane(Part):
 
 @dataclass(frozen=True, kw_only=True)
 class Channel:
-    """Table and walls as the engine builds them. Lengths in m.
+    """Table and walls as the engine builds them. Lengths in m."""
 
-    Args:
-        width: between the walls; None: there are none.
-        table: height of the table below the plane of the centrelines, negative.
-    """
-
-    width: float | None
-    table: float
+    width: float | None  #: Between the walls; None: there are none
+    table: float  #: Height of the table below the plane of the centrelines, negative

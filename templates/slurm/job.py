@@ -31,47 +31,30 @@ CLOSING_S = 30
 
 @dataclass(frozen=True, kw_only=True)
 class Wishes:
-    """Options of the user; None leaves a value to the cluster and the runs.
-
-    Attributes:
-        time: wall time, as Slurm writes it.
-        memory_mib: per run [MiB].
-        ranks: processes of a run, one core each.
-    """
+    """Options of the user; None leaves a value to the cluster and the runs."""
 
     partition: str | None = None
     account: str | None = None
-    time: str | None = None
+    time: str | None = None  #: Wall time, as Slurm writes it
     runs_per_task: int | None = None
-    memory_mib: int | None = None
-    ranks: int | None = None
+    memory_mib: int | None = None  #: Per run [MiB]
+    ranks: int | None = None  #: Processes of a run, one core each
 
 
 @dataclass(frozen=True, kw_only=True)
 class Request:
-    """An array of tasks, each of which computes several runs at once, one core each; or one run on several ranks.
+    """An array of tasks, each of which computes several runs at once, one core each; or one run on several ranks."""
 
-    Attributes:
-        partition: None is Slurm's default.
-        runs_per_task: runs, and cores, of a task; one where it has several ranks.
-        time_s: wall time of a task [s], whole minutes.
-        memory_mib: memory of a task on each node [MiB].
-        lead_s: between the signal and the time limit [s].
-        grace_s: between the signal and the end of runs that have not reached a checkpoint [s].
-        requeues: how often a task may be put back into the queue.
-        ranks: processes of a run, one core each, on `nodes` nodes.
-    """
-
-    partition: str | None
+    partition: str | None  #: None is Slurm's default
     account: str | None
     tasks: int
-    runs_per_task: int
-    time_s: int
-    memory_mib: int
-    lead_s: int
-    grace_s: int
-    requeues: int
-    ranks: int = 1
+    runs_per_task: int  #: Runs, and cores, of a task; one where it has several ranks
+    time_s: int  #: Wall time of a task [s], whole minutes
+    memory_mib: int  #: Memory of a task on each node [MiB]
+    lead_s: int  #: Between the signal and the time limit [s]
+    grace_s: int  #: Between the signal and the end of runs that have not reached a checkpoint [s]
+    requeues: int  #: How often a task may be put back into the queue
+    ranks: int = 1  #: Processes of a run, one core each, on `nodes` nodes
     nodes: int = 1
 
     def to_text(self) -> str:

@@ -40,27 +40,19 @@ JOBS, JOB = "jobs", "job.json"
 
 
 class Submission(Document):
-    """Runs that were given to a queue, or written for it: `job.json`.
-
-    Attributes:
-        job_name: Name of the job; unique, so that the job is found even if its number was lost.
-        job_id: Number of the job; None where the script was only written.
-        cluster: The value of --cluster.
-        runs: Names of the runs, in the order of the tasks.
-        number: Name of its folder in `jobs/`.
-    """
+    """Runs that were given to a queue, or written for it: `job.json`."""
 
     remedy: ClassVar[str] = (
         "it is not known which runs are in the queue; look with `squeue --me`, cancel them, and remove its folder"
     )
     format: Literal[1] = 1
-    job_name: str
-    job_id: int | None = None
-    cluster: str
+    job_name: str  #: Name of the job; unique, so that the job is found even if its number was lost
+    job_id: int | None = None  #: Number of the job; None where the script was only written
+    cluster: str  #: The value of --cluster
     runs_per_task: int
     stored: str = ""
-    runs: tuple[str, ...]
-    number: str = Field("", exclude=True)
+    runs: tuple[str, ...]  #: Names of the runs, in the order of the tasks
+    number: str = Field("", exclude=True)  #: Name of its folder in `jobs/`
 
     @property
     def script(self) -> str:

@@ -23,19 +23,13 @@ _RUN_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._+=-]{0,99}\Z")
 
 @dataclass(frozen=True, kw_only=True)
 class Point:
-    """One run of a sweep.
+    """One run of a sweep."""
 
-    Attributes:
-        name: directory name of the run.
-        values: every variable, the seed included.
-        again: whether it is another point once more, with other constants.
-    """
-
-    name: str
-    values: Mapping[str, Value]
+    name: str  #: Directory name of the run
+    values: Mapping[str, Value]  #: Every variable, the seed included
     scene: Scene
     scene_sha256: str
-    again: bool = False
+    again: bool = False  #: Whether it is another point once more, with other constants
 
 
 def expand(sweep: Sweep, *, max_points: int = MAX_POINTS) -> list[Point]:

@@ -49,20 +49,13 @@ def run_status(directory: Path) -> RunStatus:
 
 
 class Entry(Document):
-    """One run of a sweep.
+    """One run of a sweep."""
 
-    Attributes:
-        name: Name of the run, its scene and its directory.
-        expected_s: Expected wall time; only its proportion to the others' matters.
-        values: The sweep's variables.
-        again: Whether it is another run once more, with other constants.
-    """
-
-    name: str
+    name: str  #: Name of the run, its scene and its directory
     scene_sha256: str
-    expected_s: float
-    values: Mapping[str, Any]
-    again: bool = False
+    expected_s: float  #: Expected wall time; only its proportion to the others' matters
+    values: Mapping[str, Any]  #: The sweep's variables
+    again: bool = False  #: Whether it is another run once more, with other constants
 
 
 class SweepManifest(Document):

@@ -15,20 +15,13 @@ from dem.physics.overlaps import Overlaps
 
 @dataclass(frozen=True)
 class Contacts:
-    """All contacts at one instant.
-
-    Args:
-        pairs: (C, 2) smarticles that touch by two spheres, as often as they do.
-        depths: (C,) overlap of each [m].
-        fixed: (F,) smarticles that touch floor or wall by a sphere, as often as they do.
-        fixed_depths: (F,) overlap of each [m].
-    """
+    """All contacts at one instant."""
 
     count: int
-    pairs: Numbers
-    depths: Array
-    fixed: Numbers
-    fixed_depths: Array
+    pairs: Numbers  #: (C, 2) smarticles that touch by two spheres, as often as they do
+    depths: Array  #: (C,) overlap of each [m]
+    fixed: Numbers  #: (F,) smarticles that touch floor or wall by a sphere, as often as they do
+    fixed_depths: Array  #: (F,) overlap of each [m]
 
     @classmethod
     def of(cls, spheres: Array, radius: float, boundaries: LammpsBoundaries) -> Contacts:

@@ -26,23 +26,14 @@ WRITTEN = (
 
 @dataclass(frozen=True)
 class Moving:
-    """Bodies at one instant, in the laboratory frame.
+    """Bodies at one instant, in the laboratory frame."""
 
-    Args:
-        positions: (N, 3) centres of mass [m].
-        turns: (N, 3, 3) body frame to laboratory frame [1].
-        velocities: (N, 3) of the centres of mass [m/s].
-        spins: (N, 3) angular velocities [rad/s].
-        momenta: (N, 3) angular momenta about the centres of mass [kg m²/s].
-        forces: (N, 3) of contacts and weight [N].
-    """
-
-    positions: Array
-    turns: Array
-    velocities: Array
-    spins: Array
-    momenta: Array
-    forces: Array
+    positions: Array  #: (N, 3) centres of mass [m]
+    turns: Array  #: (N, 3, 3) body frame to laboratory frame [1]
+    velocities: Array  #: (N, 3) of the centres of mass [m/s]
+    spins: Array  #: (N, 3) angular velocities [rad/s]
+    momenta: Array  #: (N, 3) angular momenta about the centres of mass [kg m²/s]
+    forces: Array  #: (N, 3) of contacts and weight [N]
 
     @classmethod
     def none(cls) -> Moving:

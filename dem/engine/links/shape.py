@@ -17,39 +17,22 @@ Array = NDArray[np.float64]
 
 
 class Shape(NamedTuple):
-    """What all smarticles have in common, for the kernels. Lengths in m, masses in kg, inertias in kg m².
+    """What all smarticles have in common, for the kernels. Lengths in m, masses in kg, inertias in kg m²."""
 
-    Args:
-        mass: of a smarticle.
-        middle_mass: of the middle link.
-        barb_mass: of one barb.
-        half: half the length of the middle link: the hinges are this far from its centre.
-        arm: half the length of a barb: its centre of mass is this far from the hinge.
-        middle_inertia: (3,) of the middle link about its centre: along it, in the plane, along the normal.
-        barb_inertia: (3,) the same of a barb.
-        end: how far the middle link's axis reaches from its centre: the hinges, but for a bar without barbs.
-        tip: how far a barb's axis reaches from the hinge: its tip less the radius.
-        radius: of the sphere that sweeps the links.
-        offsets: (strands,) of the strands along the normal.
-        kinds: (links,) which links carry contact: 0 barb 1, 1 the middle link, 2 barb 2.
-        inverses: (3,) inverse squares of the lengths of the links' axes [1/m²].
-        reach: how far the axes of the links reach from the centre of mass, in the shape that it is poured in.
-    """
-
-    mass: float
-    middle_mass: float
-    barb_mass: float
-    half: float
-    arm: float
-    middle_inertia: Array
-    barb_inertia: Array
-    end: float
-    tip: float
-    radius: float
-    offsets: Array
-    kinds: NDArray[np.int64]
-    inverses: Array
-    reach: float
+    mass: float  #: Of a smarticle
+    middle_mass: float  #: Of the middle link
+    barb_mass: float  #: Of one barb
+    half: float  #: Half the length of the middle link: the hinges are this far from its centre
+    arm: float  #: Half the length of a barb: its centre of mass is this far from the hinge
+    middle_inertia: Array  #: (3,) of the middle link about its centre: along it, in the plane, along the normal
+    barb_inertia: Array  #: (3,) the same of a barb
+    end: float  #: How far the middle link's axis reaches from its centre: the hinges, but for a bar without barbs
+    tip: float  #: How far a barb's axis reaches from the hinge: its tip less the radius
+    radius: float  #: Of the sphere that sweeps the links
+    offsets: Array  #: (strands,) of the strands along the normal
+    kinds: NDArray[np.int64]  #: (links,) which links carry contact: 0 barb 1, 1 the middle link, 2 barb 2
+    inverses: Array  #: (3,) inverse squares of the lengths of the links' axes [1/m²]
+    reach: float  #: How far the axes of the links reach from the centre of mass, in the shape that it is poured in
 
 
 def shape_of(particle: Particle) -> Shape:

@@ -20,17 +20,11 @@ from dem.engine.links.vectors import dot, vector
 
 
 class Clock(NamedTuple):
-    """Time of the steps of one length.
+    """Time of the steps of one length."""
 
-    Args:
-        begin: when they began [s].
-        made: how many were made since.
-        dt: their length [s].
-    """
-
-    begin: float
-    made: int
-    dt: float
+    begin: float  #: When they began [s]
+    made: int  #: How many were made since
+    dt: float  #: Their length [s]
 
 
 # Places in `totals`: energy dissipated and work of the boundaries [J], length of the last sub-step [s], sub-steps per

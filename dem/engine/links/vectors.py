@@ -79,35 +79,20 @@ def moving(v: Vector, w: Vector, r: Vector) -> Vector:
 
 
 class Lines(NamedTuple):
-    """Two segments p + s u and q + t v, s and t from 0 to 1, and products of their vectors.
+    """Two segments p + s u and q + t v, s and t from 0 to 1, and products of their vectors."""
 
-    Args:
-        p: start of the first one [m].
-        q: start of the second one [m].
-        u: vector to the end of the first one [m].
-        v: vector to the end of the second one [m].
-        w: p - q [m].
-        a: u · u [m²].
-        b: u · v [m²].
-        c: v · v [m²].
-        d: u · w [m²].
-        e: v · w [m²].
-        inverse_a: 1/a, which links keep all their lives: divisions would take half the time [1/m²].
-        inverse_c: 1/c [1/m²].
-    """
-
-    p: Vector
-    q: Vector
-    u: Vector
-    v: Vector
-    w: Vector
-    a: float
-    b: float
-    c: float
-    d: float
-    e: float
-    inverse_a: float
-    inverse_c: float
+    p: Vector  #: Start of the first one [m]
+    q: Vector  #: Start of the second one [m]
+    u: Vector  #: Vector to the end of the first one [m]
+    v: Vector  #: Vector to the end of the second one [m]
+    w: Vector  #: p - q [m]
+    a: float  #: u · u [m²]
+    b: float  #: u · v [m²]
+    c: float  #: v · v [m²]
+    d: float  #: u · w [m²]
+    e: float  #: v · w [m²]
+    inverse_a: float  #: 1/a, which links keep all their lives: divisions would take half the time [1/m²]
+    inverse_c: float  #: 1/c [1/m²]
 
 
 @inlined

@@ -66,42 +66,26 @@ GROWTH = 1.5  # of a list that is full
 
 @dataclass(frozen=True)
 class Contacts:
-    """All contacts at one instant.
+    """All contacts at one instant."""
 
-    Args:
-        pairs: (M, 2) smarticles that touch, the lower number first; a pair may be there more than once.
-        touches: (N,) points of contact of each smarticle.
-        depths: (N,) deepest contact of each [m].
-        held: (N, 6) whether each touches each part of the boundaries, see `Ground`.
-        elastic_energy: in all springs [J].
-    """
-
+    #: (M, 2) smarticles that touch, the lower number first; a pair may be there more than once
     pairs: NDArray[np.int64]
-    touches: NDArray[np.int64]
-    depths: Array
-    held: NDArray[np.bool_]
-    elastic_energy: float
+    touches: NDArray[np.int64]  #: (N,) points of contact of each smarticle
+    depths: Array  #: (N,) deepest contact of each [m]
+    held: NDArray[np.bool_]  #: (N, 6) whether each touches each part of the boundaries, see `Ground`
+    elastic_energy: float  #: In all springs [J]
 
 
 @dataclass
 class World:
-    """The simulation: what kernels get.
+    """The simulation: what kernels get."""
 
-    Args:
-        particle: one smarticle.
-        contact: the contact law.
-        ground: the boundaries.
-        gravity: g, downwards [m/s²].
-        planar: whether all motion is confined to the plane z = 0.
-        keep_ledger: whether to add up what contacts dissipate.
-    """
-
-    particle: Particle
-    contact: ContactLaw
-    ground: Ground
-    gravity: float
-    planar: bool
-    keep_ledger: bool
+    particle: Particle  #: One smarticle
+    contact: ContactLaw  #: The contact law
+    ground: Ground  #: The boundaries
+    gravity: float  #: g, downwards [m/s²]
+    planar: bool  #: Whether all motion is confined to the plane z = 0
+    keep_ledger: bool  #: Whether to add up what contacts dissipate
     steps: int = 0
     time_step: float = math.nan
     motors: Motoring | None = None

@@ -35,23 +35,14 @@ BARBS = (0, 2)  # links that hinge 1 and hinge 2 join to the middle link
 
 @dataclass(frozen=True, kw_only=True)
 class HingeLaw:
-    """Stiffness of the hinges.
+    """Stiffness of the hinges."""
 
-    Args:
-        pin_stiffness: against the links coming apart [N/m].
-        tilt_stiffness: against their leaving the common plane [N m/rad].
-        shaft_stiffness: twist stiffness of the motor's shaft [N m/rad].
-        torque_cap: at which a shaft slips [N m]; None: never.
-        shaft_damping: of the motors [N m s/rad]; for the stable time step only.
-        damper_time: the dampers' time of relaxation where they are stiff [s]; at least a time step.
-    """
-
-    pin_stiffness: float
-    tilt_stiffness: float
-    shaft_stiffness: float
-    torque_cap: float | None
-    shaft_damping: float = 0.0
-    damper_time: float = DAMPER_TIME
+    pin_stiffness: float  #: Against the links coming apart [N/m]
+    tilt_stiffness: float  #: Against their leaving the common plane [N m/rad]
+    shaft_stiffness: float  #: Twist stiffness of the motor's shaft [N m/rad]
+    torque_cap: float | None  #: At which a shaft slips [N m]; None: never
+    shaft_damping: float = 0.0  #: Of the motors [N m s/rad]; for the stable time step only
+    damper_time: float = DAMPER_TIME  #: The dampers' time of relaxation where they are stiff [s]; at least a time step
 
     @property
     def damper_stiffness(self) -> float:

@@ -27,29 +27,17 @@ _SUMS = ("container_work", "added", "dissipated")
 
 @dataclass(frozen=True)
 class Contacts:
-    """M contacts in one step.
+    """M contacts in one step."""
 
-    Args:
-        normals: (M, 3) from the first body to the second [1].
-        before: (M, 3) velocity of the second body against the first at the contact point, before the step [m/s].
-        after: (M, 3) that velocity after the step, which moves the bodies [m/s].
-        overlaps: (M,) [m].
-        viscous: (M,) normal viscous force of the step, positive where bodies approach [N].
-        shear: (M, 3) elastic shear force [N].
-        stiffness: (M, 2) normal and tangential [N/m].
-        damping: (M, 2) normal and tangential [N s/m].
-        friction: (M,) Coulomb coefficient [1].
-    """
-
-    normals: Array
-    before: Array
-    after: Array
-    overlaps: Array
-    viscous: Array
-    shear: Array
-    stiffness: Array
-    damping: Array
-    friction: Array
+    normals: Array  #: (M, 3) from the first body to the second [1]
+    before: Array  #: (M, 3) velocity of the second body against the first at the contact point, before the step [m/s]
+    after: Array  #: (M, 3) that velocity after the step, which moves the bodies [m/s]
+    overlaps: Array  #: (M,) [m]
+    viscous: Array  #: (M,) normal viscous force of the step, positive where bodies approach [N]
+    shear: Array  #: (M, 3) elastic shear force [N]
+    stiffness: Array  #: (M, 2) normal and tangential [N/m]
+    damping: Array  #: (M, 2) normal and tangential [N s/m]
+    friction: Array  #: (M,) Coulomb coefficient [1]
 
     @property
     def elastic_energy(self) -> float:

@@ -20,19 +20,13 @@ from dem.errors import RunError
 
 @dataclass(frozen=True)
 class Yade:
-    """What this project uses of YADE.
-
-    Args:
-        omega: the simulation; YADE has one per process.
-        vector: constructor of a vector from three numbers.
-        quaternion: constructor of a unit quaternion from (w, x, y, z).
-    """
+    """What this project uses of YADE."""
 
     classes: Any
     utils: Any
-    omega: Any
-    vector: Any
-    quaternion: Any
+    omega: Any  #: The simulation; YADE has one per process
+    vector: Any  #: Constructor of a vector from three numbers
+    quaternion: Any  #: Constructor of a unit quaternion from (w, x, y, z)
 
 
 def rows_of(vectors: Iterable[Any]) -> Array:

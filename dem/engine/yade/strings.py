@@ -22,19 +22,12 @@ from dem.physics.contact import StringLaw
 
 @dataclass(frozen=True, kw_only=True)
 class End:
-    """One string.
+    """One string."""
 
-    Args:
-        body: id of the link that it is tied to.
-        arm: (3,) where, in the body's own frame [m].
-        anchor: (3,) its other end at the start [m].
-        speed: of the anchor along x [m/s].
-    """
-
-    body: int
-    arm: Sequence[float]
-    anchor: Sequence[float]
-    speed: float
+    body: int  #: Id of the link that it is tied to
+    arm: Sequence[float]  #: (3,) where, in the body's own frame [m]
+    anchor: Sequence[float]  #: (3,) its other end at the start [m]
+    speed: float  #: Of the anchor along x [m/s]
 
 
 class YadeStrings:

@@ -34,16 +34,11 @@ class Step(NamedTuple):
     """Lengths of time around one evaluation of forces [s].
 
     The forces themselves decide how long the next sub-step is, and so how long they act.
-
-    Args:
-        past: since the last evaluation, over which tangential springs have stretched.
-        whole: an undivided time step.
-        need: (1,) sub-steps per step that contacts and speeds ask for; written.
     """
 
-    past: float
-    whole: float
-    need: Array
+    past: float  #: Since the last evaluation, over which tangential springs have stretched
+    whole: float  #: An undivided time step
+    need: Array  #: (1,) sub-steps per step that contacts and speeds ask for; written
 
 
 @inlined

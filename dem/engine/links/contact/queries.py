@@ -46,24 +46,16 @@ SLOT, PART, DEPTH, FACTOR, ROOM, AT, PARTLY = (
 
 
 class Found(NamedTuple):
-    """What a query of all contacts writes.
+    """What a query of all contacts writes."""
 
-    Args:
-        met: (P, 2) numbers of the smarticles whose links touch, in order.
-        touches: (N,) points of contact of each smarticle; added to.
-        held: (N, 6) whether each smarticle touches each boundary.
-        depth: (N,) deepest contact of each smarticle [m]; at a boundary the equal share of the room in which axis and
-            surface meet.
-        out: scratch of `meet`.
-        rows: scratch of `contacts_of_link`.
-    """
-
-    met: Indices
-    touches: Any
-    held: Any
+    met: Indices  #: (P, 2) numbers of the smarticles whose links touch, in order
+    touches: Any  #: (N,) points of contact of each smarticle; added to
+    held: Any  #: (N, 6) whether each smarticle touches each boundary
+    #: (N,) deepest contact of each smarticle [m]; at a boundary the equal share of the room in which axis and surface
+    #: meet
     depth: Array
-    out: Array
-    rows: Array
+    out: Array  #: Scratch of `meet`
+    rows: Array  #: Scratch of `contacts_of_link`
 
 
 @part

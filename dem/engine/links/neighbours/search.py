@@ -23,27 +23,16 @@ SKIN, INVERSE = 6, 7  # places in a row of `Cells.lines`
 
 
 class Grid(NamedTuple):
-    """The bins.
+    """The bins."""
 
-    Args:
-        bare: reach of a pair without skins [m].
-        x: where bins begin along x [m].
-        y: the same along y.
-        tallest: extent of the largest box along y [m].
-        size: of a bin along x [m].
-        width: of a strip, along y [m].
-        columns: bins along x.
-        strips: along y.
-    """
-
-    bare: float
-    x: float
-    y: float
-    tallest: float
-    size: float
-    width: float
-    columns: int
-    strips: int
+    bare: float  #: Reach of a pair without skins [m]
+    x: float  #: Where bins begin along x [m]
+    y: float  #: The same along y
+    tallest: float  #: Extent of the largest box along y [m]
+    size: float  #: Of a bin along x [m]
+    width: float  #: Of a strip, along y [m]
+    columns: int  #: Bins along x
+    strips: int  #: Along y
 
 
 @inlined
