@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 from pathlib import Path
 from typing import Any
@@ -12,7 +11,6 @@ import pandas as pd
 import pytest
 from synthetic.strained import WIDTH, write_strained_run
 
-from dem.record.run import open_run
 from postprocess.measures.strain import AT_PEAK, BEND, DROP, FRACTURE, PEAK, QUANTITIES, STIFFNESS, WIDENING, YIELD
 from postprocess.statistics.points import SEED, marked
 from studies.chain import CONFINEMENT, COUNT, SPEED, STUDY, VARIANT
@@ -49,17 +47,6 @@ def test_means_over_trials_and_changes_are_those_put_in(tmp_path: Path) -> None:
     assert changes.to_dict() == pytest.approx({PEAK: 20, FRACTURE: 0, AT_PEAK: 0, STIFFNESS: 20}, abs=0.01)
     assert {f"{figure.name}.png" for figure in STUDY.figures} <= set(report.files)
     assert report.missing[0].directory.endswith("absent")
-
-
-def test_of_bodies_confinement_is_where_walls_are(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    run = write_pull(tmp_path, variant="baseline", ratio=0.52, stiffness=3.0, count=2)
-    content = json.loads((run / "run.json").read_text())
-    # A chain that is wider at the start than the paper's, between the paper's walls.
-    content |= {"middle_thickness_in_plane_m": 0.021, "channel_width_m": 0.8 * content["channel_width_m"]}
-    (run / "run.json").write_text(json.dumps(content))
-    monkeypatch.setattr("studies.chain.PAPER_WIDTH", 0.8 * WIDTH)
-    row: dict[str, Any] = dict(STUDY.measured(open_run(run)).row)
-    assert row[CONFINEMENT] == 0.52
 
 
 def runs(rise: float, *, yielded: float = math.nan) -> pd.DataFrame:

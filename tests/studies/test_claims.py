@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import csv
 import json
-import shutil
 from collections import defaultdict
 from pathlib import Path
 
@@ -99,26 +98,6 @@ def test_a_test_of_ours_decides_where_theirs_cannot_tell(
     claim = one_of(claims(written(tmp_path, theirs | ours)), "shape change has the highest peak force")
     assert claim.verdict == verdict
     assert "; by a test of ours, strength-code: " in text((claim,))
-
-
-@pytest.mark.parametrize(
-    ("links", "yade", "stated"),
-    [
-        ("found", "found", "1 claims: 1 verdicts are equal. Opposite, for the reason given there: none"),
-        ("found", "not found", "0 verdicts are equal. Opposite, for the reason given there: 37 by the text. Res"),
-        ("not found", "not resolved", "with more runs: 37 by the text. By YADE alone: none"),
-        ("not resolved", "not found", "with more runs: none. By YADE alone: 37 by the text."),
-        ("found", "no data", "judge 0 findings of 0 claims"),
-    ],
-)
-def test_where_engines_do_not_agree_is_stated(tmp_path: Path, links: str, yade: str, stated: str) -> None:
-    results = written(tmp_path, {("procedures", HIGHEST): links})
-    shutil.copytree(results / "procedures", results / "procedures-yade")
-    findings = results / "procedures-yade" / "findings.csv"
-    findings.write_text(f"finding in the paper,ours,verdict,criterion\n{HIGHEST},ours,{yade},criterion\n")
-    page = text((one_of(claims(results), MOST),))
-    assert stated in page
-    assert ("(otherwise on YADE)" in page) == ((links, yade) == ("found", "not found"))
 
 
 def test_a_finding_that_is_not_there_is_named(tmp_path: Path) -> None:

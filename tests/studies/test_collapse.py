@@ -160,12 +160,3 @@ def test_times_that_do_not_obey_the_law_refute_it() -> None:
         "not found",
     ]
     assert verdicts(rows_of({(0.4, 2.5): [0.9, 1.0, 1.1], (0.4, 4.0): [1.9, 2.0, 2.1]}))[0] == "not found"
-
-
-def test_a_maximum_at_an_end_is_not_found() -> None:
-    seeds = {
-        (aspect, 2.5): [tau(factor * delta, 2.5) for factor in (0.99, 1, 1.01)]
-        for aspect, delta in {0.13: 6.0, 0.4: 9.0, 1.02: 10.0}.items()
-    }
-    assert verdicts(rows_of(seeds))[2] == "not found"
-    assert verdicts(rows_of({key: value for key, value in seeds.items() if key[0] != 0.13}))[2] == "no data"

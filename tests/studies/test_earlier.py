@@ -121,12 +121,3 @@ def test_a_study_that_draws_from_its_runs_says_so(tmp_path: Path, capsys: pytest
     out = str(tmp_path / "out")
     assert main(["study", "casting", "--quick", "--out", out, "--analyse", "--earlier", str(RESULTS)]) == 2
     assert "--earlier" in capsys.readouterr().err
-
-
-def test_tables_of_other_scenes_are_rejected_before_anything_runs(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    arguments = ["study", "procedures", "--quick", "--out", str(tmp_path / "p"), "--earlier", str(RESULTS)]
-    assert main(arguments) == 2
-    assert "runs is of a scene of this study as it is" in capsys.readouterr().err
-    assert not (tmp_path / "p" / "runs").exists()

@@ -86,23 +86,6 @@ def test_the_bias_of_the_papers_pile_has_its_sign_or_none(slope: float, verdict:
         assert "by -12." in found.ours
 
 
-@pytest.mark.parametrize(
-    ("power", "slope", "verdict"), [(1 / 3, -0.3, "found"), (1.0, -3.0, "not found"), (1 / 3, 0, "not resolved")]
-)
-def test_the_law_is_found_rejected_or_left_open(power: float, slope: float, verdict: str) -> None:
-    found = judged(table(power=power, slope=slope), "phi-f-surface-over-volume")
-    assert found.verdict == verdict, found.ours
-
-
-def test_a_pile_that_is_open_counts() -> None:
-    runs = table()
-    assert judged(runs, "spanned-at-any-size").verdict == "found"
-    runs.loc[(runs[ASPECT] == 0.7).idxmax(), spans(BEFORE)] = 0.0
-    found = judged(runs, "spanned-at-any-size")
-    assert found.verdict == "not found"
-    assert found.ours.startswith("29 of 30 runs")
-
-
 def test_the_place_of_a_threshold_comes_out_again() -> None:
     found = thresholds(table())
     rows = found[(found["stage"] == AFTER) & (found["against"] == "l/w")]

@@ -85,17 +85,6 @@ def test_a_hook_that_stops_on_the_way_was_held_fast(tmp_path: Path) -> None:
     assert (row[HELD_FAST], row[LIMIT], row[PEAK]) == (1, pytest.approx(1.5), pytest.approx(1.5, rel=1e-3))
 
 
-def test_every_figure_is_drawn_and_other_runs_are_listed(tmp_path: Path) -> None:
-    runs = [write(tmp_path / f"{name}{seed}", name, seed=seed) for name in (STATIC, SHAPE) for seed in (1, 2)]
-    runs += [write(tmp_path / f"internal{theta:g}", INTERNAL, theta=theta) for theta in (10.0, 30.0)]
-    runs += [write(tmp_path / "long", INTERNAL, aspect_ratio=1.0)]
-    phases = ("deposit", "pull-hook")
-    other = write_hooked_run(tmp_path / "other", made(STATIC, phases=phases, packing=(0.1,) * 2), np.zeros_like)
-    report = STUDY.analyse([*runs, other], tmp_path / "out", **ORIGIN)
-    assert {f"{figure.name}.png" for figure in STUDY.figures} <= set(report.files)
-    assert "its phases are deposit, pull-hook, not" in report.missing[0].cause
-
-
 def sample(procedure: str, seed: int, peak: float, crossings: float, **others: float) -> dict[str, object]:
     named = {PROCEDURE: procedure, SEED: seed, PEAK: peak, NET: peak, CROSSINGS: crossings}
     return named | {THETA: math.nan, ASPECT: 0.7, RAISED: 0.01, HELD_FAST: 0.0} | others

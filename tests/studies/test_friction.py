@@ -115,16 +115,6 @@ def test_the_papers_friction_and_steel_are_judged(at: float, papers: str, steel:
     assert found["clean-dry-steel"] in (steel[1], "not resolved")
 
 
-def test_growth_is_judged_by_all_points() -> None:
-    runs = runs_of()
-    runs[phi("phi 20 s")] *= 1 + 0.02 * runs[FRICTION]
-    names = ("still-grows", "grows-more-with-friction")
-    assert [verdicts(runs)[name] for name in names] == ["found", "found"]
-    runs[phi("phi 20 s")] = runs[phi("phi 10 s")] * (0.99 - 0.02 * runs[FRICTION])
-    assert [verdicts(runs)[name] for name in names] == ["not found", "not found"]
-    assert verdicts(runs.drop(columns=phi("phi 20 s")))["still-grows"] == "no data"
-
-
 def test_what_was_put_into_runs_is_found(tmp_path: Path) -> None:
     runs = []
     for friction, seed in ((0.2, 1), (0.2, 2), (0.8, 1), (0.8, 2)):

@@ -12,11 +12,9 @@ from dem.scene.scene import Scene
 from dem.setting.fidelity import FIDELITIES, fidelities
 from studies.accuracy import (
     BASE,
-    KNOBS,
     Ladder,
     affordable,
     build_ladder,
-    default_seeds,
     ladder_sweep,
     parse_knobs,
     parse_seeds,
@@ -114,15 +112,6 @@ def test_the_scene_has_its_own_place_among_the_rungs(tmp_path: Path) -> None:
     assert labels(ladder, "fidelity")[0] == ("draft", "draft")
 
 
-def test_knobs_of_motors_belong_to_scenes_that_actuate(tmp_path: Path) -> None:
-    ladder = build_ladder(scene_of(tmp_path, OSCILLATION), source="scene.yaml")
-    assert ladder.knobs == tuple(knob for knob in KNOBS if knob != "engine")
-    assert [name for name, _ in labels(ladder, "control")] == ["0.0004 s", "0.0002 s", "0.0001 s"]
-    assert [name for name, _ in labels(ladder, "hinge")] == ["5000 N/m", "10000 N/m", "20000 N/m"]
-    assert ladder.scenes["control-0.0001"].fidelity.control_interval_s == 1e-4
-    assert ladder.scenes["hinge-x2"].fidelity.hinge_stiffness_N_per_m == 10000
-
-
 def test_on_links_only_what_has_a_meaning_there_is_turned(tmp_path: Path) -> None:
     scene = scene_of(tmp_path, OSCILLATION, "engine=links", "fidelity=standard")
     ladder = build_ladder(scene, source="scene.yaml")
@@ -165,11 +154,6 @@ def test_the_engine_is_a_knob_with_the_finest_of_links_as_its_reference(engine: 
         assert one.fidelity.model_dump().items() >= fidelities(one.engine)[name.split()[1]].items()
     points = {point.name: point.scene for point in expand(ladder_sweep(scene, ladder, (7,)))}
     assert {points[f"{setting}_seed7"].engine for setting in found.values()} == {"yade", "links"}
-
-
-def test_twenty_seeds_where_they_are_cheap(tmp_path: Path) -> None:
-    assert default_seeds(scene_of(tmp_path)) == (1, 2, 3)
-    assert default_seeds(scene_of(tmp_path, SCENE, "engine=links")) == tuple(range(1, 21))
 
 
 def test_what_the_scene_cannot_have_is_left_out_and_said(tmp_path: Path) -> None:

@@ -127,13 +127,6 @@ def test_the_quick_variant_says_how_it_differs() -> None:
     assert not any(line.startswith(("layers:", "engine:", "title:")) for line in lines)
 
 
-def test_studies_that_are_not_there() -> None:
-    with pytest.raises(InputError, match=r"'gravitsh' does not exist; did you mean 'gravish'\?"):
-        study_file("gravitsh")
-    with pytest.raises(InputError, match="study sensitivity has no quick variant; leave --quick out"):
-        study_file("sensitivity", quick=True)
-
-
 @pytest.mark.parametrize("name", STUDIES)
 def test_a_study_is_what_the_registry_calls_it(name: str) -> None:
     shipped = STUDIES[name]

@@ -151,13 +151,3 @@ def test_a_chain_in_a_plane(tmp_path, pvpython):
     assert told["coloured"] == ["CELLS", "smarticle_id"]
     assert told["shown"] == ["smarticles", "time", "wall"]
     assert (np.ptp(pixels(tmp_path / "plane.png"), axis=2) > 40).sum() > 500
-
-
-def test_a_folder_without_an_export_is_one_line(tmp_path, pvpython):
-    run = write_run(tmp_path / "run", SyntheticRun(count=2, frames_per_phase=1))
-    script = export_run(run, to="vtp") / "show_in_paraview.py"
-    alone = shutil.copy(script, tmp_path)
-    (tmp_path / "elsewhere").mkdir()
-    done = pvpython(alone, tmp_path / "elsewhere")
-    assert done.returncode != 0
-    assert "give the folder that `smarticles export --to vtp` wrote" in done.stderr + done.stdout

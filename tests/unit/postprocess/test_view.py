@@ -202,8 +202,3 @@ def test_a_port_that_is_taken_is_one_line(served, capsys):
         f"smarticles: error: --port {port}: cannot listen there (Address already in use); leave it out, or choose "
         "another\n"
     )
-
-
-def test_a_directory_that_is_no_run_is_rejected(tmp_path, capsys):
-    assert main(["view", str(tmp_path)]) == 2
-    assert "cannot read run directory" in capsys.readouterr().err

@@ -10,13 +10,10 @@ from collections.abc import Callable
 from pathlib import Path
 
 import h5py
-import meshio
-import numpy as np
 import pytest
 
 from dem.errors import RunError
 from dem.record.files import write_text, write_whole
-from dem.record.frames import FrameWriter
 
 ROOT = Path(__file__).resolve().parents[3]
 FULL = (
@@ -27,12 +24,6 @@ FULL = (
 
 def full(_: Path) -> None:
     raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
-
-
-def test_text_comes_back(tmp_path: Path) -> None:
-    write_text(tmp_path / "a.txt", "φ = 0.1\n")
-    assert (tmp_path / "a.txt").read_text(encoding="utf-8") == "φ = 0.1\n"
-    assert [path.name for path in tmp_path.iterdir()] == ["a.txt"]
 
 
 def test_writer_sees_a_temporary_name_with_the_suffix_and_never_the_final_one(tmp_path: Path) -> None:
@@ -132,10 +123,3 @@ def test_series_on_a_really_full_disk(tiny_disk: Path) -> None:
     with h5py.File(tiny_disk / "series.h5") as file:
         assert len(file["time_s"]) == 10
     assert [path.name for path in tiny_disk.iterdir()] == ["series.h5"]
-
-
-def test_frames_folder_that_cannot_be_made_is_a_run_error(tmp_path: Path) -> None:
-    (tmp_path / "frames").write_text("a file in the way")
-    mesh = meshio.Mesh(np.zeros((2, 3)), [("line", np.array([[0, 1]]))])
-    with pytest.raises(RunError, match="cannot be written"):
-        FrameWriter(tmp_path).write(mesh, 0.0)

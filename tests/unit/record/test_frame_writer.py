@@ -152,12 +152,6 @@ def test_collection_lists_all_frames_in_time_order(tmp_path: Path) -> None:
     assert len(list((tmp_path / "frames").iterdir())) == len(times)
 
 
-def test_frame_is_binary_and_compressed(tmp_path: Path) -> None:
-    written(tmp_path, make_state())
-    head = (tmp_path / "frames" / "frame_000000.vtu").read_bytes()[:600].decode(errors="replace")
-    assert "vtkZLibDataCompressor" in head
-
-
 @pytest.mark.parametrize("rows", [1, 2])
 def test_spheres_are_points_on_their_links(tmp_path: Path, rows: int) -> None:
     state = make_state()

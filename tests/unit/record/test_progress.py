@@ -108,14 +108,3 @@ def test_deposit_counts_smarticles(tmp_path: Path, wall: Wall, capsys: pytest.Ca
     line = last_line(capsys.readouterr().err)
     assert line == "deposit  ██████████           10/20  t = 0.30 s  about 30 s left in this phase"
     assert "phi" not in json.loads((tmp_path / "progress.json").read_text())
-
-
-def test_quiet_progress_draws_nothing_and_a_missing_folder_does_not_stop_the_run(
-    tmp_path: Path, wall: Wall, capsys: pytest.CaptureFixture[str]
-) -> None:
-    bar = ProgressWriter(tmp_path / "gone", 10, show=False)
-    bar.begin(index=0, phase="deposit", start=0.0, now=0.0, end=None)
-    wall.now += 10
-    bar.update(time=0.1, phi=0.1, count=3)
-    bar.finish()
-    assert capsys.readouterr().err == ""

@@ -23,32 +23,6 @@ def test_measure_prints_one_row_per_phase(tmp_path: Path, write_run: WriteRun, s
     assert lines[3].split()[2:4] == ["12", "0.1050"]
 
 
-def test_measure_names_each_definition_within_100_columns(
-    tmp_path: Path, write_run: WriteRun, smarticles: Smarticles
-) -> None:
-    runs = [write_run(tmp_path / "a"), write_run(tmp_path / "b", frames_per_phase=1)]
-    for words in ([], ["--frames"]):
-        said = smarticles("measure", *runs, *words)
-        lines = said.out.splitlines()
-        assert max(map(len, lines[:1] + [line for line in lines[1:] if not line.startswith("/")])) <= 100
-        assert [line for line in lines if line.startswith("/")] == [f"{run}:" for run in runs]
-        told = " ".join(line.strip() for line in lines)
-        assert "φ by second-highest-com: N V_s / (π r² z), z = " in told
-        assert all(f"{name}: φ = " in told for name in ("top-percentile", "voxel", "voronoi"))
-        assert ("SE: their standard error" in told) == (not words)
-
-
-def test_measure_does_not_overwrite_unless_asked(tmp_path: Path, write_run: WriteRun, smarticles: Smarticles) -> None:
-    run, table = write_run(tmp_path / "a"), tmp_path / "table.csv"
-    table.write_text("precious")
-    said = smarticles("measure", run, "--table", table)
-    assert said.status == 2
-    assert said.err == (f"smarticles: error: --table {table}: exists; choose another name or give --overwrite\n")
-    assert table.read_text() == "precious"
-    assert smarticles("measure", run, "--table", table, "--overwrite").status == 0
-    assert table.read_text(encoding="utf-8").startswith("run,")
-
-
 def test_measure_writes_a_profile_of_each_run_beside_the_table(
     tmp_path: Path, write_run: WriteRun, smarticles: Smarticles
 ) -> None:
@@ -156,25 +130,6 @@ def test_measure_warns_that_a_series_is_gone(tmp_path: Path, write_run: WriteRun
     assert "put it back, or run" in line
 
 
-def test_a_picture_that_is_there_hides_no_bad_option(
-    tmp_path: Path, write_run: WriteRun, smarticles: Smarticles
-) -> None:
-    run = write_run(tmp_path / "a", frames_per_phase=1)
-    (run / "render.png").write_text("mine")
-    for options, told in (
-        (["--view", "nope"], "view 'nope': is not known; known: front"),
-        (["--time", "99"], "time must be between"),
-        (["--color-by", "sped"], "did you mean 'speed'?"),
-        (
-            [],
-            "render.png: exists already and is left as it is; choose another name, or let it be replaced (--overwrite)",
-        ),
-    ):
-        said = smarticles("render", run, *options)
-        assert said.status == 2
-        assert told in said.err
-
-
 @pytest.mark.parametrize("command", ["render", "measure", "status", "resume"])
 def test_places_that_are_neither_run_nor_sweep(command: str, tmp_path: Path, smarticles: Smarticles) -> None:
     (tmp_path / "photos").mkdir()
@@ -189,17 +144,6 @@ def test_places_that_are_neither_run_nor_sweep(command: str, tmp_path: Path, sma
         assert said.status == 2
         assert told in said.err
         assert "; give the directory of a run" in said.err
-
-
-def test_render_draws_a_picture(tmp_path: Path, write_run: WriteRun, smarticles: Smarticles) -> None:
-    run, picture = write_run(tmp_path / "a"), tmp_path / "picture.png"
-    said = smarticles("render", run, "--output", picture, "--time", "1", "--view", "top", "--size", "300")
-    assert (said.status, said.out, said.err) == (0, f"{picture}\n", "")
-    with Image.open(picture) as image:
-        assert (image.format, image.size) == ("PNG", (300, 300))
-    again = smarticles("render", run, "--output", picture)
-    assert again.status == 2
-    assert "--overwrite" in again.err or "exists" in again.err
 
 
 def test_render_draws_a_film_of_a_part_in_fixed_colours(

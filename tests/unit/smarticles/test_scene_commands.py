@@ -14,13 +14,6 @@ from dem.run.run import manifest
 from dem.scene.reading import load_scene
 
 
-def test_plan_prints_phases_and_cost(scene_file: Path, smarticles: Smarticles) -> None:
-    said = smarticles("plan", scene_file)
-    assert said.status == 0
-    assert "0 deposit" in said.out
-    assert "1 shake" in said.out
-
-
 def test_plan_in_json_and_with_other_values(scene_file: Path, smarticles: Smarticles) -> None:
     said = smarticles("plan", scene_file, "--json", "--set", "count=7", "--set", "phases.1.duration_s=3")
     assert said.status == 0

@@ -32,17 +32,6 @@ def queue(monkeypatch: pytest.MonkeyPatch) -> list[str]:
     return lines
 
 
-def test_a_dry_run_shows_list_and_script_and_writes_nothing(sweep_file: Path, smarticles: Smarticles) -> None:
-    before = sorted(sweep_file.parent.iterdir())
-    out = sweep_file.parent / "out"
-    said = smarticles("sweep", sweep_file, "--out", out, "--submit", "slurm", *LARGE, "--dry-run")
-    assert said.status == 0
-    lines = said.out.splitlines()
-    assert "--- jobs/001/runs.txt" in lines
-    assert "#SBATCH --cpus-per-task=2" in lines
-    assert sorted(sweep_file.parent.iterdir()) == before
-
-
 @pytest.mark.parametrize(
     ("words", "message"),
     [

@@ -6,14 +6,14 @@ import json
 from pathlib import Path
 
 import pytest
-from command_cases import SWEEP, Smarticles, WriteRun
+from command_cases import Smarticles, WriteRun
 from synthetic import write_ended
 
 from dem.record.rundir import claimed
 from studies.registry import study_file
 from templates.sweep.expand import expand
-from templates.sweep.folder import create_folder, open_folder
-from templates.sweep.sweep_file import load_sweep, with_constants
+from templates.sweep.folder import open_folder
+from templates.sweep.sweep_file import load_sweep
 
 
 def finish(directory: Path) -> None:
@@ -58,14 +58,6 @@ def test_status_of_one_run_shows_whether_a_process_works_in_it(
     with claimed(run, resume=True):
         assert state() == "running"
     assert state() == "stopped"
-
-
-def test_a_bad_sweep_is_status_2(sweep_file: Path, smarticles: Smarticles) -> None:
-    sweep_file.write_text(SWEEP.replace("grid", "gird"))
-    said = smarticles("sweep", sweep_file, "--out", sweep_file.parent / "out")
-    assert said.status == 2
-    assert said.err == (f"smarticles: error: {sweep_file}: points: unknown key 'gird'; did you mean 'grid'?\n")
-    assert not (sweep_file.parent / "out").exists()
 
 
 def test_status_of_a_sweep(sweep_file: Path, tmp_path: Path, smarticles: Smarticles) -> None:
@@ -148,29 +140,6 @@ def test_another_study_in_the_same_directory_is_rejected(
     said = smarticles("study", "gravish", "--quick", "--out", out)
     assert said.status == 2
     assert said.err.startswith(f"smarticles: error: {out}: holds another sweep ('counts'): ")
-
-
-@pytest.mark.parametrize(
-    ("words", "note"),
-    [
-        ([], "the full study as shipped"),
-        (["--fidelity", "standard"], "the full study as shipped"),
-        (["--fidelity", "reference"], "not the full study: fidelity: reference instead of standard"),
-    ],
-)
-def test_a_study_says_how_it_differs_from_the_full_one(
-    words: list[str], note: str, tmp_path: Path, smarticles: Smarticles
-) -> None:
-    study = ("study", "gravish", "--out", tmp_path / "out", *words)
-    points = expand(with_constants(load_sweep(study_file("gravish")), {"fidelity": (words or ["standard"])[-1]}))
-    # Held by another process: the command ends before it starts a run.
-    folder = create_folder(
-        tmp_path / "out", load_sweep(study_file("gravish")), points, command="", versions={}, expected_s=lambda _: 1.0
-    )
-    with folder.lock():
-        said = smarticles(*study)
-    assert said.status == 2
-    assert said.out.splitlines() == [note]
 
 
 @pytest.fixture
@@ -267,20 +236,3 @@ def test_a_fidelity_at_which_a_study_cannot_be_run_is_rejected_by_its_option(
     assert said.err.startswith("smarticles: error: --fidelity reference: study chain cannot be run at it (")
     assert said.err.endswith("fidelity.rows: 2 rows of spheres out of the plane; use 1); leave --fidelity out\n")
     assert len(said.err.splitlines()) == 1
-
-
-def test_a_study_whose_template_ignores_the_fidelity_rejects_it(
-    sweep_file: Path, smarticles: Smarticles, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    def file_of(name: str, *, quick: bool = False) -> Path:
-        return sweep_file
-
-    monkeypatch.setattr("studies.registry.study_file", file_of)
-    sweep_file.write_text(SWEEP + "constants: {fidelity: standard}\n")
-    out = sweep_file.parent / "out"
-    said = smarticles("study", "gravish", "--fidelity", "draft", "--out", out)
-    assert (said.status, out.exists()) == (2, False)
-    assert said.err == (
-        "smarticles: error: --fidelity draft: study gravish sets the fidelity of its runs itself; leave --fidelity "
-        "out\n"
-    )

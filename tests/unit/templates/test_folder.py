@@ -15,22 +15,6 @@ from dem.scene.reading import load_scene, scene_hash
 from templates.sweep.folder import Folder, open_folder
 
 
-def test_the_manifest_holds_all_that_made_the_sweep(make_folder: MakeFolder) -> None:
-    folder = make_folder()
-    content = json.loads((folder.path / "sweep.json").read_text(encoding="utf-8"))
-    assert content["name"] == "test"
-    assert content["command"] == "smarticles sweep sweep.yaml --out out"
-    assert content["versions"] == {"smarticles": "0"}
-    # By the names they have seen from the sweep file: none of this machine's folders.
-    files = content["files"]
-    assert set(files) == {"sweep.yaml", "scene.yaml.j2"}
-    assert files["sweep.yaml"] == SWEEP
-    assert "{{ count }}" in files["scene.yaml.j2"]
-    assert content["points"][0]["name"] == "n10_seed1"
-    assert content["points"][0]["values"] == {"count": 10, "seed": 1}
-    assert content["points"][0]["expected_s"] == 10.0
-
-
 def test_runs_start_seed_by_seed_where_the_sweep_says_so(make_folder: MakeFolder) -> None:
     folder = make_folder(SWEEP.replace("{seeds: [1, 2]}", "{seeds: [2, 1], seed_by_seed: true}"))
     assert folder.manifest.seed_by_seed

@@ -102,12 +102,6 @@ def test_all_runs_run_once_with_one_thread_the_longest_first(folder: Folder) -> 
     assert last.left_s == 0
 
 
-def test_a_sweep_can_want_its_runs_seed_by_seed(folder: Folder) -> None:
-    watcher, by_seed = Watcher(), Folder(folder.path, folder.manifest.model_copy(update={"seed_by_seed": True}))
-    run_folder(by_seed, watcher, slots=1, command=fake(), **QUICK)
-    assert watcher.starts == ["n20_seed1", "n10_seed1", "n20_seed2", "n10_seed2"]
-
-
 @pytest.mark.parametrize("slots", [1, 3])
 def test_as_many_runs_as_slots_and_never_more(folder: Folder, slots: int) -> None:
     waiting = fake({entry.name: "wait" for entry in folder.entries})
