@@ -30,7 +30,6 @@ from studies.collapse import (
     measure,
     times,
 )
-from studies.framework.findings import Verdict
 
 ORIGIN = {"note": "the full study as shipped", "command": "smarticles study collapse --out 'my study'"}
 DELTAS = {0.13: 6.0, 0.40: 9.0, 1.02: 7.5}
@@ -127,10 +126,6 @@ def rows_of(
     return pd.DataFrame(rows)
 
 
-def verdicts(runs: pd.DataFrame) -> list[Verdict]:
-    return [one.verdict for one in STUDY.judge({"runs": runs, "points": activations(runs)})]
-
-
 def test_a_run_that_did_not_collapse_is_a_bound_and_never_dropped() -> None:
     seeds = {(0.4, gamma): [tau(factor * 9, gamma) for factor in (0.9, 1.0, 1.1)] for gamma in (2.0, 4.0)}
     seeds[0.4, 2.0] = [min(time, tau(9, 2.0)) for time in seeds[0.4, 2.0]]
@@ -143,20 +138,3 @@ def test_a_run_that_did_not_collapse_is_a_bound_and_never_dropped() -> None:
     # The one seed that collapsed at Γ = 2 is not taken for all: Δ is that of Γ = 4, beside the bound.
     assert (row[ACTIVATION], row[AT_LEAST]) == pytest.approx((9, 8.7))
     assert (row[CENSORED], row[USED]) == (2, "4")
-
-
-def test_without_any_collapse_there_is_only_a_bound() -> None:
-    found = rows_of({(0.4, 2.5): [3.0, 3.0, 3.0]}, bounds={(0.4, 2.5, seed) for seed in (1, 2, 3)})
-    row = activations(found).iloc[0]
-    assert math.isnan(row[ACTIVATION])
-    assert row[AT_LEAST] == pytest.approx(2.5 * math.log(90))
-    assert set(verdicts(found)) == {"no data"}
-
-
-def test_times_that_do_not_obey_the_law_refute_it() -> None:
-    # τ hardly depends on Γ: Γ ln(fτ) grows with Γ by 46 %.
-    assert verdicts(rows_of({(0.4, gamma): [0.9, 1.0, 1.1] for gamma in (2.5, 4.0)}))[:2] == [
-        "not resolved",
-        "not found",
-    ]
-    assert verdicts(rows_of({(0.4, 2.5): [0.9, 1.0, 1.1], (0.4, 4.0): [1.9, 2.0, 2.1]}))[0] == "not found"

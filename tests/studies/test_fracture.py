@@ -109,15 +109,6 @@ def verdicts(table: pd.DataFrame) -> list[str]:
     return [str(finding.judge(table).verdict) for finding in STUDY.findings]
 
 
-def test_findings_of_the_paper_are_found_and_the_opposite_is_not() -> None:
-    table = as_in_the_paper()
-    assert verdicts(table) == ["found"] * 6
-    table[PEAK], table[RAISED] = 2 - table[PEAK], 0.02 - table[RAISED]
-    # That procedures have another order by force than by entanglement holds then as well.
-    assert verdicts(table) == ["not found", "not found", "found", "not found", "not found", "not found"]
-    assert verdicts(table[table[PROCEDURE] == STATIC]) == ["no data"] * 6
-
-
 def test_a_lower_bound_is_enough_to_be_above_another_and_not_to_be_below() -> None:
     def holding(procedure: str) -> list[str]:
         held = table.copy()

@@ -112,30 +112,6 @@ def test_the_scene_has_its_own_place_among_the_rungs(tmp_path: Path) -> None:
     assert labels(ladder, "fidelity")[0] == ("draft", "draft")
 
 
-def test_on_links_only_what_has_a_meaning_there_is_turned(tmp_path: Path) -> None:
-    scene = scene_of(tmp_path, OSCILLATION, "engine=links", "fidelity=standard")
-    ladder = build_ladder(scene, source="scene.yaml")
-    assert ladder.knobs == ("time-step", "stiffness", "section", "restitution", "control", "fidelity")
-    own = f"{scene.fidelity.stiffness_N_per_m:g} N/m"
-    values = [f"{k:g} N/m" for k in (125, 250, 500, 1000, 2000, 4000)]
-    assert labels(ladder, "stiffness") == [
-        (value, BASE if value == own else f"stiffness-{value.removesuffix(' N/m')}") for value in values
-    ]
-    assert [name for name, _ in labels(ladder, "section")] == ["1 strand", "2 strands", "3 strands"]
-    idle = ("pitch", "wall_facets", "hinge_stiffness_N_per_m")
-    assert len({tuple(getattr(one.fidelity, key) for key in idle) for one in ladder.scenes.values()}) == 1
-    # Named fidelities are those of the engine, and run once where a knob alone makes them.
-    assert [name for name, _ in labels(ladder, "fidelity")] == ["draft", "standard", "reference", "converged"]
-    for rung in ladder.rungs:
-        if rung.knob == "fidelity" and rung.value != "converged":
-            turned = ladder.scenes[rung.setting].fidelity.model_dump()
-            assert {key: turned[key] for key in turned if key != "base"}.items() >= fidelities("links")[
-                rung.value
-            ].items()
-    with pytest.raises(InputError, match="--knobs: hinge turns nothing: the engine links has no pins"):
-        build_ladder(scene, source="scene.yaml", knobs=["hinge"])
-
-
 @pytest.mark.parametrize("engine", ["yade", "links"])
 def test_the_engine_is_a_knob_with_the_finest_of_links_as_its_reference(engine: str, tmp_path: Path) -> None:
     scene = scene_of(tmp_path, SCENE, f"engine={engine}", "fidelity=standard")

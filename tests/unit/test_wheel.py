@@ -91,20 +91,6 @@ def test_every_file_of_the_packages_is_in_the_wheel(wheel: Path, sources: list[s
     assert table == (ROOT / "results" / "accuracy-links" / "work_precision.csv").read_bytes()
 
 
-def test_plan_works_from_the_wheel(smarticles: Callable[..., str], tmp_path: Path) -> None:
-    (tmp_path / "scene.yaml").write_text(SCENE)
-    assert json.loads(smarticles("plan", tmp_path / "scene.yaml", "--json"))["time_step_s"] > 0
-    # With the table of measured errors that ships.
-    assert json.loads(smarticles("plan", tmp_path / "scene.yaml", "--json", "--max-hours", "9"))["choice"]
-
-
-def test_measure_and_render_work_from_the_wheel(smarticles: Callable[..., str], tmp_path: Path) -> None:
-    run = write_run(tmp_path / "run", SyntheticRun(count=5, frames_per_phase=1, phases=("deposit", "relax")))
-    assert [row["phase type"] for row in json.loads(smarticles("measure", run, "--json"))] == ["deposit", "relax"]
-    smarticles("render", run, "--size", "200")
-    assert (run / "render.png").stat().st_size > 100
-
-
 def test_a_study_is_analysed_from_the_wheel(smarticles: Callable[..., str], tmp_path: Path) -> None:
     out = tmp_path / "study"
     folder = make_folder(study_file("gravish", quick=True), out, "test")

@@ -75,11 +75,6 @@ def test_every_column_belongs_to_one_effect() -> None:
     assert len(set(declared)) == len(declared)
 
 
-def test_a_plain_scene_has_no_warnings() -> None:
-    assert warnings_of(small()) == ()
-    assert plan(small()).warnings == ()
-
-
 @pytest.mark.parametrize(
     ("key", "left_out"), [("frame_interval_s", "no frame is written"), ("sphere_interval_s", "no spheres are written")]
 )

@@ -9,7 +9,7 @@ import subprocess
 import numpy as np
 import pytest
 from PIL import Image
-from synthetic import RADIUS, SyntheticRun, write_manifest, write_run
+from synthetic import RADIUS, SyntheticRun, write_run
 from synthetic.forces import pressed
 
 from dem.record.forces import force_mesh
@@ -141,13 +141,3 @@ def test_forces_are_lines_by_their_size_and_a_wall_that_is_taken_away_is_gone(tm
     ]
     # Some darker pixels are boxes seen through each other.
     assert red[1] - red[0] > 100
-
-
-def test_a_chain_in_a_plane(tmp_path, pvpython):
-    made = SyntheticRun(count=2, frames_per_phase=1)
-    write_manifest(write_run(tmp_path / "run", made), made, planar=True, channel_width_m=0.08)
-    folder = export_run(tmp_path / "run", to="vtp")
-    told = shown(pvpython, folder, tmp_path, "--picture", tmp_path / "plane.png")
-    assert told["coloured"] == ["CELLS", "smarticle_id"]
-    assert told["shown"] == ["smarticles", "time", "wall"]
-    assert (np.ptp(pixels(tmp_path / "plane.png"), axis=2) > 40).sum() > 500

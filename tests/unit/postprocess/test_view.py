@@ -13,11 +13,10 @@ import aiohttp
 import msgpack
 import numpy as np
 import pytest
-from synthetic import T1, SyntheticRun, W, mesh_of, u_shape, write_frame, write_run
+from synthetic import T1, SyntheticRun, W, u_shape, write_frame, write_run
 from synthetic.viewing import serving
 
 from dem.errors import InputError
-from dem.record.frames import FrameWriter, read_frames
 from postprocess.view import PICKED, RunView
 from smarticles.main import main
 
@@ -78,31 +77,6 @@ def test_bodies_stand_on_the_floor_in_millimetres(two):
     bounds = view._meshes["smarticles"].bounds
     assert bounds[4:] == pytest.approx((3.0 - 1e3 * T1 / 2, 23.0 + 1e3 * T1 / 2), abs=1e-3)
     assert view._meshes["floor"].bounds[4] == pytest.approx(0.0, abs=1e-6)
-
-
-def test_colours_follow_the_field(pile):
-    view = RunView(pile)
-    before = colours(view).copy()
-    view.colour_by("height")
-    assert (colours(view) != before).any()
-    legend = view.legend()
-    assert len(legend) == 5
-    shown = [float(row["label"]) for row in legend]
-    assert shown == sorted(shown, reverse=True)
-    view.colour_by("smarticle_id")
-    assert view.legend() == []
-    with pytest.raises(InputError, match="is no field"):
-        view.colour_by("colour")
-
-
-def test_new_frames_are_found(pile):
-    view = RunView(pile)
-    assert not view.grow()
-    writer = FrameWriter(pile, times=read_frames(pile).times.tolist())
-    writer.write(mesh_of(SyntheticRun().vertices(0.1), time=23.0, phase=3), 23.0)
-    assert view.grow()
-    view.go_to(len(view.frames) - 1)
-    assert view.frame.time == 23.0
 
 
 def test_a_damaged_frame_leaves_what_is_shown(pile):

@@ -4,18 +4,13 @@ from __future__ import annotations
 
 import errno
 import os
-import subprocess
-import sys
-from collections.abc import Callable
 from pathlib import Path
 
-import h5py
 import pytest
 
 from dem.errors import RunError
 from dem.record.files import write_text, write_whole
 
-ROOT = Path(__file__).resolve().parents[3]
 FULL = (
     "cannot be written (No space left on device); free space or choose another --out; "
     "everything written before is whole"
@@ -77,49 +72,3 @@ def test_folder_is_made_but_not_a_whole_path(tmp_path: Path) -> None:
     assert (tmp_path / "new" / "a.txt").read_text() == "x"
     with pytest.raises(RunError, match=r"gone/far/a\.txt: cannot be written, its folder is gone"):
         write_text(tmp_path / "gone" / "far" / "a.txt", "x")
-
-
-@pytest.fixture
-def tiny_disk(mount_disk: Callable[[str], Path]) -> Path:
-    """A file system of 64 KiB. Needs root; the tests above do not."""
-    return mount_disk("64k")
-
-
-LONG_SERIES = """
-import sys
-from pathlib import Path
-import numpy as np
-from dem.errors import RunError
-from dem.record.columns import COLUMNS
-from dem.record.series import SeriesWriter
-
-def write(length):
-    writer = SeriesWriter(Path(sys.argv[1]), COLUMNS, {"seed": 1})
-    for _ in range(length):
-        writer.add({name: np.zeros(3) if name == "container_force_N" else 0.0 for name in COLUMNS})
-    writer.write()
-
-write(10)
-try:
-    write(5000)
-except RunError as error:
-    print(error)
-"""
-
-
-def test_series_on_a_really_full_disk(tiny_disk: Path) -> None:
-    # In a process of its own: HDF5 cannot close a file that it could not flush, and crashes at the end.
-    answer = subprocess.run(
-        [sys.executable, "-c", LONG_SERIES, str(tiny_disk)],
-        cwd=ROOT,
-        capture_output=True,
-        text=True,
-        timeout=300,
-        check=False,
-    )
-    assert answer.returncode == 0, answer.stderr
-    assert answer.stdout == f"{tiny_disk}/series.h5: {FULL}\n"
-    assert answer.stderr == ""
-    with h5py.File(tiny_disk / "series.h5") as file:
-        assert len(file["time_s"]) == 10
-    assert [path.name for path in tiny_disk.iterdir()] == ["series.h5"]

@@ -39,23 +39,6 @@ def test_frame_holds_what_was_written(tmp_path, write_frame, scene):
         frame.vertices[0] = 0
 
 
-def test_frame_of_a_scene_that_actuates(tmp_path, write_frame, shape):
-    """Each smarticle has its own shape, and what the middle link does not have is NaN."""
-    vertices = np.array([shape(angles=angles) for angles in [(90, 90), (0, 0), (105, -15)]])
-    angle = np.tile([1.0, np.nan, 2.0], 3)
-    extra = {
-        "angle_rad": angle,
-        "motor_torque_N_m": 1e-5 * angle,
-        "motor_work_J": 1e-6 * angle,
-        "halted": np.tile([1, 0, 0], 3),
-    }
-    frame = read_frame(write_frame(tmp_path, vertices, extra=extra))
-    np.testing.assert_array_equal(frame.vertices, vertices)
-    assert set(frame.cell_data) == set(extra)
-    np.testing.assert_array_equal(frame.cell_data["angle_rad"], angle.reshape(3, 3))
-    assert frame.cell_data["halted"].dtype.kind == "i"
-
-
 def test_frames_are_a_sequence_in_time_order(make_run):
     frames = read_frames(make_run([(0, 0.0), (1, 0.0), (1, 0.0), (2, 0.0)]))
     assert len(frames) == 4
@@ -66,12 +49,6 @@ def test_frames_are_a_sequence_in_time_order(make_run):
     assert len(frames[::2]) == 2
     with pytest.raises(IndexError):
         frames[4]
-
-
-def test_frames_of_a_phase(make_run):
-    frames = read_frames(make_run([(0, 0.0), (2, 0.0), (2, 0.0), (3, 0.0)]))
-    assert [len(frames.in_phase(phase)) for phase in range(5)] == [1, 0, 2, 1, 0]
-    assert frames.in_phase(2)[0].time == pytest.approx(0.1)
 
 
 def test_frames_after_a_time(make_run):

@@ -98,13 +98,3 @@ def test_line_shows_phase_share_time_phi_and_time_left(
     wall.now += 1
     bar.update(time=6.0 + 1e-9, phi=0.1, count=10)
     assert last_line(capsys.readouterr().err).endswith("t = 6.00 s  φ 0.100  0 s left in this phase")
-
-
-def test_deposit_counts_smarticles(tmp_path: Path, wall: Wall, capsys: pytest.CaptureFixture[str]) -> None:
-    bar = ProgressWriter(tmp_path, 20, show=True)
-    bar.begin(index=0, phase="deposit", start=0.0, now=0.0, end=None)
-    wall.now += 10
-    bar.update(time=0.3, phi=float("nan"), count=10)
-    line = last_line(capsys.readouterr().err)
-    assert line == "deposit  ██████████           10/20  t = 0.30 s  about 30 s left in this phase"
-    assert "phi" not in json.loads((tmp_path / "progress.json").read_text())

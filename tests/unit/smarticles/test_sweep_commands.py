@@ -9,7 +9,6 @@ import pytest
 from command_cases import Smarticles, WriteRun
 from synthetic import write_ended
 
-from dem.record.rundir import claimed
 from studies.registry import study_file
 from templates.sweep.expand import expand
 from templates.sweep.folder import open_folder
@@ -44,20 +43,6 @@ def test_a_sweep_is_written_and_started_later(sweep_file: Path, tmp_path: Path, 
     assert manifest["command"] == f"smarticles sweep {sweep_file} --out {out}"
     assert manifest["versions"]["smarticles"]
     assert not (out / "runs").exists()
-
-
-def test_status_of_one_run_shows_whether_a_process_works_in_it(
-    tmp_path: Path, write_run: WriteRun, smarticles: Smarticles
-) -> None:
-    run = write_run(tmp_path / "a", status="unfinished")
-
-    def state() -> str:
-        return str(json.loads(smarticles("status", run, "--json").out)["runs"][0]["state"])
-
-    assert state() == "stopped"
-    with claimed(run, resume=True):
-        assert state() == "running"
-    assert state() == "stopped"
 
 
 def test_status_of_a_sweep(sweep_file: Path, tmp_path: Path, smarticles: Smarticles) -> None:
@@ -130,16 +115,6 @@ def test_a_failing_run_is_status_1_with_its_cause(sweep_file: Path, tmp_path: Pa
     assert lines[3].endswith(f"start them again: smarticles resume {out}")
     assert (out / "runs" / "n5.stopped-1" / "run.json").exists()
     assert (out / "logs" / "n5.txt").read_text(encoding="utf-8").startswith("smarticles: error: ")
-
-
-def test_another_study_in_the_same_directory_is_rejected(
-    sweep_file: Path, tmp_path: Path, smarticles: Smarticles
-) -> None:
-    out = tmp_path / "out"
-    smarticles("sweep", sweep_file, "--out", out)
-    said = smarticles("study", "gravish", "--quick", "--out", out)
-    assert said.status == 2
-    assert said.err.startswith(f"smarticles: error: {out}: holds another sweep ('counts'): ")
 
 
 @pytest.fixture

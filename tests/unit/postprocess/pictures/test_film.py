@@ -100,21 +100,6 @@ def test_film_moves_and_lasts_as_long_as_its_speed_says(run, tmp_path, suffix, u
     assert list(tmp_path.iterdir()) == [path]
 
 
-def test_a_film_shows_the_part_that_is_asked_for(run, tmp_path):
-    whole, _ = shown(render_film(run, tmp_path / "a.webp", size=SIZE, limits=(0.0, 8.0)))
-    told: list[int] = []
-
-    def track(numbers, count):
-        told.append(count)
-        return numbers
-
-    options = {"size": SIZE, "limits": (0.0, 8.0), "start": 1.0, "end": 2.5, "every": 2 / 3, "track": track}
-    part, _ = shown(render_film(run, tmp_path / "b.webp", **options))
-    assert (len(whole), len(part), told) == (9, 3, [3])
-    # The same colours on the bar, of all and of a part.
-    assert np.array_equal(whole[0][200:], part[0][200:])
-
-
 def test_film_needs_two_frames(tmp_path):
     run = write_run(tmp_path / "a", SyntheticRun(frames_per_phase=1, phases=("relax",), packing=(0.1,)))
     with pytest.raises(InputError, match="a film needs at least 2 frames: got 1"):
