@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 import re
 import subprocess
@@ -117,9 +116,3 @@ def test_frames_have_the_documented_fields() -> None:
     assert list(mesh.cell_data) == list(FIELDS)
     source = Path(dem.record.frame.__file__).read_text(encoding="utf-8")
     assert all(f'"{name}":' in source for name in MOTOR_FIELDS)
-
-
-def test_search_index_is_there(site: Path) -> None:
-    text = (site / "searchindex.js").read_text(encoding="utf-8")
-    index = json.loads(text.removeprefix("Search.setIndex(").removesuffix(")"))
-    assert len(index["docnames"]) > 20

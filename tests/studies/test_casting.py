@@ -25,7 +25,6 @@ from studies.casting import (
     WHOLE_KEPT,
 )
 
-ORIGIN = {"note": "the full study as shipped", "command": "smarticles study casting --out casting"}
 MOULD = [
     {"radius_m": 0.012, "height_m": 0.006},
     {"radius_m": 0.0108, "height_m": 0.006},

@@ -11,7 +11,7 @@ import pytest
 import yaml
 
 from dem.errors import InputError
-from studies.claims.__main__ import main, text
+from studies.claims.__main__ import text
 from studies.claims.verdicts import CLAIMS, Claim, claims
 
 RESULTS = Path(__file__).parents[2] / "results"
@@ -119,10 +119,3 @@ def test_what_is_shipped_says_what_the_tables_beside_it_say() -> None:
         tested = [one for one in (claim.tested["text"], claim.tested["code"]) if one is not None]
         assert all(one.ours for one in tested)
         assert tested or claim.why
-
-
-def test_the_command_writes_page_and_table(tmp_path: Path) -> None:
-    results = written(tmp_path, {})
-    main([str(results)])
-    assert (results / "CLAIMS.md").read_text(encoding="utf-8").startswith("# The paper's claims")
-    assert (results / "claims.csv").is_file()

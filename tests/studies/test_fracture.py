@@ -36,7 +36,6 @@ from studies.fracture import (
 )
 from studies.framework.procedures import CROSSINGS, EXTERNAL, INTERNAL, PHI, PROCEDURE, SHAPE, STATIC, THETA
 
-ORIGIN = {"note": "the full study as shipped", "command": "smarticles study fracture --out fracture"}
 ACTIVITY = {EXTERNAL: "shake", SHAPE: "shape-change", INTERNAL: "internal-oscillation"}
 TOP, APEX, BASE = 0.6, 0.5, 0.4  # of a triangular history of force over the weight of all [-, s, s]
 DEPTH = 0.01  # packing fraction at which twelve smarticles bury the hook

@@ -16,7 +16,6 @@ from studies.accuracy import (
     affordable,
     build_ladder,
     ladder_sweep,
-    parse_knobs,
     parse_seeds,
 )
 from templates.sweep.expand import expand
@@ -32,7 +31,6 @@ phases:
   - {type: relax, duration_s: 0.3}
   - {type: shake, duration_s: 1.5}
 """
-OSCILLATION = SCENE.replace("{type: shake, duration_s: 1.5}", "{type: internal-oscillation, theta_deg: 10}")
 
 
 @pytest.fixture
@@ -152,30 +150,6 @@ def test_what_takes_too_long_is_left_out_but_never_the_scene(scene: Scene) -> No
         "fidelity": "standard",
     }
     assert kept.left_out[0] == "section two rows: a run is expected to take 2 h, more than 1 h"
-
-
-@pytest.mark.parametrize(
-    ("text", "settings", "knobs", "message"),
-    [
-        (SCENE.replace("  - {type: shake, duration_s: 1.5}\n", ""), (), None, "phases: deposit, relax: no activity"),
-        (SCENE, ("fidelity.time_step_s=1e-5",), None, "fidelity.time_step_s: a step of 1e-05 s by hand"),
-        (SCENE, (), ["control"], "--knobs: control turns nothing: no phase of scene.yaml actuates"),
-    ],
-)
-def test_a_scene_that_makes_no_ladder_is_rejected(
-    text: str, settings: tuple[str, ...], knobs: list[str] | None, message: str, tmp_path: Path
-) -> None:
-    with pytest.raises(InputError, match=message) as error:
-        build_ladder(scene_of(tmp_path, text, *settings), source="scene.yaml", knobs=knobs)
-    assert "\n" not in str(error.value)
-
-
-def test_knobs_are_known_and_in_order() -> None:
-    assert parse_knobs("fidelity, time-step") == ("time-step", "fidelity")
-    with pytest.raises(InputError, match=r"--knobs: 'timestep' is no knob; did you mean 'time-step'\?"):
-        parse_knobs("timestep,section")
-    with pytest.raises(InputError, match="names none; known: time-step, stiffness"):
-        parse_knobs(",")
 
 
 def test_seeds_are_whole_numbers_each_once() -> None:

@@ -15,7 +15,6 @@ from postprocess.measures.spread import centre_of_mass
 from studies.framework.runs import MeasuredRun
 from studies.melting import BASE, CONTACT, HEIGHT, LIFT, OFFSET, SINCE, SLOUGHED, SPREAD, STUDY, TILT, TOPPLED
 
-ORIGIN = {"note": "the full study as shipped", "command": "smarticles study melting --out melting"}
 Pile = NDArray[np.float64]
 
 

@@ -20,7 +20,6 @@ from studies.registry import study_file
 
 ROOT = Path(__file__).resolve().parents[2]
 PACKAGES = {"dem", "postprocess", "smarticles", "studies", "templates"}
-SCENE = "schema_version: 1\nseed: 1\ncount: 5\nphases: [{type: deposit}, {type: relax, duration_s: 0.1}]\n"
 
 
 def call(*command: str | Path, cwd: Path, **variables: str) -> str:

@@ -14,7 +14,6 @@ from dem.setting.hooks import Cross
 W, T2 = 0.0117, 0.5e-3
 DEPOSIT = {"type": "deposit"}
 PULL = {"type": "pull-hook"}
-REMOVE = {"type": "remove-container"}
 TIERS = [{"radius_m": 0.0234, "height_m": 0.012}, {"radius_m": 0.018, "height_m": 0.012}]
 
 

@@ -17,7 +17,7 @@ from synthetic import T1, SyntheticRun, W, u_shape, write_frame, write_run
 from synthetic.viewing import serving
 
 from dem.errors import InputError
-from postprocess.view import PICKED, RunView
+from postprocess.view import RunView
 from smarticles.main import main
 
 
@@ -54,21 +54,6 @@ def test_a_ray_picks_the_smarticle_that_it_meets_first(two):
     assert (view.pick.smarticle_id, view.pick.link) == (1, 0)
     view.pick_along(np.array([[50.0, 50.0, 100.0], [50.0, 50.0, -100.0]]))
     assert view.pick is None
-
-
-def test_what_is_picked_is_described_and_coloured(two):
-    view = RunView(two)
-    assert view.describe() == []
-    view.draw()
-    y = 1e3 * u_shape(0.7 * W)[1, 1]
-    view.pick_along(np.array([[0.0, y, 100.0], [0.0, y, -100.0]]))
-    told = {row["name"]: row["value"] for row in view.describe()}
-    assert told["smarticle_id"] == "1"
-    assert float(told["height_m"]) == pytest.approx(0.023, rel=1e-3)
-    assert told["crossings"] == "0"
-    assert told["velocity_m_per_s"] == "(0, 0, 0)"
-    picked = (colours(view) == PICKED).all(axis=1)
-    assert picked.tolist() == [False] * 24 + [True] * 24
 
 
 def test_bodies_stand_on_the_floor_in_millimetres(two):

@@ -14,8 +14,6 @@ from dem.record.forces import force_mesh
 from dem.record.frames import FrameWriter
 from dem.record.names import FORCE
 
-UP = np.array([0.0, 0.0, 1.0])
-
 
 def some() -> dict[str, np.ndarray]:
     """Two points of links 0 of 3 and 1 of 1, told once each way; one on the floor; one without a load."""

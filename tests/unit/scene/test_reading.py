@@ -51,13 +51,6 @@ def test_a_value_that_is_nearly_a_known_one(scene_data: SceneData, changes: dict
     assert str(caught.value) == f"bad.yaml: {told}"
 
 
-@pytest.mark.parametrize(("data", "kind"), [([1], "[1]"), ("text", "'text'"), (3, "3")], ids=["list", "text", "3"])
-def test_file_that_is_no_mapping(data: Any, kind: str) -> None:
-    with pytest.raises(InputError) as caught:
-        parse_scene(data, source="bad.yaml")
-    assert str(caught.value) == f"bad.yaml: a scene is a mapping of keys to values, got {kind}"
-
-
 def rejected(folder: Path, content: str | bytes, overrides: Sequence[str] = ()) -> str:
     """The message with which a file is rejected, the folder cut off."""
     path = folder / "bad.yaml"
@@ -89,17 +82,6 @@ def test_file_that_is_no_yaml(tmp_path: Path) -> None:
     assert "could not determine a constructor" in rejected(tmp_path, GOOD + "name: !!python/object:os.system x\n")
 
 
-def test_missing_file_and_folder(tmp_path: Path) -> None:
-    with pytest.raises(InputError) as caught:
-        load_scene(tmp_path / "none.yaml")
-    assert str(caught.value) == (
-        f"{tmp_path}/none.yaml: cannot be read (No such file or directory); give the path of a scene file"
-    )
-    with pytest.raises(InputError) as caught:
-        load_scene(tmp_path)
-    assert str(caught.value) == f"{tmp_path}: is a directory; give the path of a scene file"
-
-
 @pytest.mark.parametrize(
     ("override", "expected"),
     [
@@ -120,10 +102,3 @@ def test_missing_file_and_folder(tmp_path: Path) -> None:
 def test_bad_override(tmp_path: Path, override: str, expected: str) -> None:
     message = rejected(tmp_path, GOOD, [override])
     assert message.startswith(expected) if expected.endswith(": ") else message == expected
-
-
-@pytest.mark.parametrize("overrides", [[], ["seed=1"]])
-def test_empty_file(tmp_path: Path, overrides: list[str]) -> None:
-    assert rejected(tmp_path, "", overrides) == (
-        "bad.yaml: is empty; a scene is a mapping of keys to values, see `smarticles schema`"
-    )

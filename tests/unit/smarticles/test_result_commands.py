@@ -11,18 +11,6 @@ from command_cases import Smarticles, WriteRun
 from PIL import Image
 
 
-def test_measure_prints_one_row_per_phase(tmp_path: Path, write_run: WriteRun, smarticles: Smarticles) -> None:
-    run = write_run(tmp_path / "a")
-    said = smarticles("measure", run)
-    assert said.status == 0
-    lines = said.out.splitlines()
-    assert lines[0].split()[:6] == ["phase", "t", "[s]", "smarticles", "φ", "±"]
-    assert lines[1] == f"{run}:"
-    assert [line.split()[0] for line in lines[2:6]] == ["deposit", "relax", "shake", "relax"]
-    # Known: φ before shaking is 0.105, and 12 smarticles take part.
-    assert lines[3].split()[2:4] == ["12", "0.1050"]
-
-
 def test_measure_writes_a_profile_of_each_run_beside_the_table(
     tmp_path: Path, write_run: WriteRun, smarticles: Smarticles
 ) -> None:
@@ -159,19 +147,6 @@ def test_render_draws_a_film_of_a_part_in_fixed_colours(
         images.seek(1)
         images.load()
         assert images.info["duration"] == 50
-
-
-def test_render_draws_runs_beside_each_other_and_one_smarticle(
-    tmp_path: Path, write_run: WriteRun, smarticles: Smarticles
-) -> None:
-    runs = [write_run(tmp_path / "a"), write_run(tmp_path / "b", seed=2)]
-    both, alone = tmp_path / "both.png", tmp_path / "alone.png"
-    assert smarticles("render", runs[0], "--compare", runs[1], "--output", both, "--size", "300").status == 0
-    with Image.open(both) as image:
-        assert image.size == (600, 300)
-    assert smarticles("render", runs[0], "--smarticle", "3", "--output", alone, "--size", "300").status == 0
-    said = smarticles("render", runs[0], "--smarticle", "99", "--output", tmp_path / "c.png")
-    assert (said.status, "smarticle 99: there are 0 to 11 at 22 s" in said.err) == (2, True)
 
 
 @pytest.mark.parametrize(
