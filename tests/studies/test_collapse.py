@@ -28,8 +28,6 @@ from studies.collapse import (
     times,
 )
 
-ORIGIN = {"note": "the full study as shipped", "command": "smarticles study collapse --out 'my study'"}
-
 
 def tau(delta: float, gamma: float) -> float:
     return math.exp(delta / gamma) / F

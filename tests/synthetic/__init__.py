@@ -46,7 +46,6 @@ class SyntheticRun:
     oscillate_time: float = 5.0
     theta: float = 10.0
     work: float | None = None
-    straight: float = 1.0
     status: str = "done"
     series: bool = True
     floor_z: float = 0.0
@@ -152,10 +151,9 @@ def write_run(directory: Path, run: SyntheticRun | None = None) -> Path:
         for time in np.linspace(start, end, 200)[1:]:
             part = (time - start) / (end - start)
             packing = previous + (target - previous) * (1 - math.exp(-5 * part))
-            rise = 1 + (run.straight - 1) * (1 - abs(2 * part - 1)) if kind == "shape-change" else 1.0
             active = kind not in ("deposit", "relax")
             done = part if active else float(any(row[4] > 0 for row in rows))
-            rows.append((time, index, packing, run.shares().mean() * run.height(packing) * rise, done))
+            rows.append((time, index, packing, run.shares().mean() * run.height(packing), done))
         spans.append((start, end))
         start, previous = end, target
     if run.series:

@@ -36,11 +36,6 @@ def two(tmp_path):
     return directory
 
 
-def colours(view):
-    view.draw()
-    return view._meshes["smarticles"].point_data["colour"]
-
-
 def test_a_ray_picks_the_smarticle_that_it_meets_first(two):
     view = RunView(two)
     view.draw()
