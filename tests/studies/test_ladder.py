@@ -48,29 +48,6 @@ def labels(ladder: Ladder, knob: str) -> list[tuple[str, str]]:
     return [(rung.label, rung.setting) for rung in ladder.rungs if rung.knob == knob]
 
 
-def test_each_knob_goes_from_coarse_to_fine(scene: Scene) -> None:
-    ladder = build_ladder(scene, source="scene.yaml")
-    assert ladder.knobs == ("time-step", "stiffness", "section", "restitution", "fidelity")
-    assert labels(ladder, "time-step") == [("0.9", BASE), ("0.45", "time-step-0.45"), ("0.225", "time-step-0.225")]
-    assert labels(ladder, "stiffness") == [
-        ("250 N/m", BASE),
-        ("500 N/m", "stiffness-x2"),
-        ("1000 N/m", "stiffness-x4"),
-    ]
-    assert [name for name, _ in labels(ladder, "section")] == ["pitch 1.3", "pitch 1", "pitch 0.5", "two rows"]
-    assert [name for name, _ in labels(ladder, "restitution")] == ["0.2", "0.5", "0.7", "0.9"]
-    assert labels(ladder, "fidelity") == [("draft", BASE), ("standard", "standard"), ("reference", "reference")]
-    references = {knob: rung.label for knob, rung in ladder.references().items()}
-    assert references == {
-        "time-step": "0.225",
-        "stiffness": "1000 N/m",
-        "section": "two rows",
-        "restitution": "0.7",
-        "fidelity": "reference",
-    }
-    assert ladder.left_out == ()
-
-
 def test_a_rung_differs_from_the_scene_in_its_knob_alone(scene: Scene) -> None:
     ladder = build_ladder(scene, source="scene.yaml")
     base = scene.model_dump()

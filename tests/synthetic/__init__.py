@@ -30,8 +30,7 @@ ACTUATED = ("shape-change", "internal-oscillation")
 class SyntheticRun:
     """A made-up run; `packing` is φ at the end of each phase.
 
-    `work` [J] is done steadily during the activity, by the motors or, with "shake", by the container. At the middle of
-    a "shape-change" the centre of mass stands `straight` times as high as φ alone would have it. Each phase took
+    `work` [J] is done steadily during the activity, by the motors or, with "shake", by the container. Each phase took
     `wall_s` [s]; `more` are constant series: name, value. The scene has a contact where there is a `friction`, which
     walls share unless they have their own.
     """

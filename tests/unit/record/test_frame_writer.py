@@ -14,6 +14,7 @@ from scipy.spatial.transform import Rotation
 
 from dem.body.particle import Boxes, Particle, SphereChain
 from dem.body.state import State
+from dem.record.columns import FIELDS
 from dem.record.frame import centreline_mesh, motor_fields, sphere_mesh
 from dem.record.frames import FrameWriter
 
@@ -71,16 +72,7 @@ def test_cells_and_data_follow_the_contract(tmp_path: Path) -> None:
     expected = [[4 * k + j, 4 * k + j + 1] for k in range(COUNT) for j in range(3)]
     assert np.array_equal(lines, expected)
     data = {name: values[0] for name, values in mesh.cell_data.items()}
-    assert set(data) == {
-        "smarticle_id",
-        "link",
-        "velocity_m_per_s",
-        "angular_velocity_rad_per_s",
-        "contacts",
-        "time_s",
-        "floor_z_m",
-        "phase",
-    }
+    assert set(data) == set(FIELDS)
     for name in ("smarticle_id", "link", "contacts", "phase"):
         assert data[name].dtype == np.int64
     assert np.array_equal(data["smarticle_id"], np.repeat(np.arange(COUNT), 3))

@@ -7,7 +7,6 @@ import signal
 import subprocess
 import sys
 import threading
-from pathlib import Path
 
 import pytest
 from command_cases import Smarticles
@@ -172,12 +171,6 @@ def test_nothing_heavy_is_imported_to_show_help() -> None:
     )
     answer = subprocess.run([sys.executable, "-c", script], capture_output=True, check=True, text=True)
     assert answer.stderr == "[]\n"
-
-
-def test_python_m_smarticles_is_the_command(tmp_path: Path) -> None:
-    answer = subprocess.run(command("plan", str(tmp_path / "absent.yaml")), capture_output=True, check=False, text=True)
-    assert answer.returncode == 2
-    assert answer.stderr.startswith(f"smarticles: error: {tmp_path}/absent.yaml: ")
 
 
 def test_columns_of_numbers_are_aligned_to_the_right() -> None:

@@ -45,19 +45,6 @@ def test_measure_gives_json_without_nan(tmp_path: Path, write_run: WriteRun, sma
     assert 0.05 < rows[0]["phi second-highest-com [-]"] < 0.2
 
 
-def test_measure_takes_the_runs_of_a_sweep(
-    tmp_path: Path, sweep_file: Path, write_run: WriteRun, smarticles: Smarticles
-) -> None:
-    out = tmp_path / "out"
-    smarticles("sweep", sweep_file, "--out", out)
-    said = smarticles("measure", out)
-    assert said.status == 2
-    assert "no run of this sweep has frames yet; start them with: smarticles resume" in said.err
-    write_run(out / "runs" / "n6")
-    rows = json.loads(smarticles("measure", out, "--json").out)
-    assert {row["run"] for row in rows} == {str(out / "runs" / "n6")}
-
-
 def test_measure_has_the_variables_of_a_sweep_and_means_by_them(
     tmp_path: Path, sweep_file: Path, write_run: WriteRun, smarticles: Smarticles
 ) -> None:

@@ -76,16 +76,6 @@ def test_status_of_a_killed_run_shows_from_where_it_would_go_on(
     assert "checkpoint s" not in smarticles("status", write_run(tmp_path / "done")).out
 
 
-def test_resume_has_nothing_to_do_when_all_is_done(sweep_file: Path, tmp_path: Path, smarticles: Smarticles) -> None:
-    out = tmp_path / "out"
-    smarticles("sweep", sweep_file, "--out", out)
-    finish(out)
-    said = smarticles("resume", out)
-    assert said.status == 0
-    assert said.err.splitlines() == ["n5 finished before", "n6 finished before"]
-    assert said.out.startswith(f"{out}: all 2 runs are done")
-
-
 def test_threads_are_of_one_run_and_not_of_a_sweep(sweep_file: Path, tmp_path: Path, smarticles: Smarticles) -> None:
     out = tmp_path / "out"
     smarticles("sweep", sweep_file, "--out", out)

@@ -96,13 +96,6 @@ def test_a_damaged_manifest_is_an_input_error(tmp_path: Path, text: str) -> None
         open_folder(tmp_path)
 
 
-def test_no_manifest_is_an_input_error(tmp_path: Path) -> None:
-    with pytest.raises(
-        InputError, match=r"holds neither a run \(run.json\) nor a sweep \(sweep.json\); give the directory of"
-    ):
-        open_folder(tmp_path)
-
-
 def test_states_of_its_runs(make_folder: MakeFolder) -> None:
     folder = make_folder()
     for entry, (name, content) in zip(folder.entries, FILES, strict=False):
