@@ -24,10 +24,6 @@ def wall(monkeypatch: pytest.MonkeyPatch) -> Wall:
     return clock
 
 
-def last_line(text: str) -> str:
-    return text.rsplit("\r\x1b[K", 1)[-1]
-
-
 def test_file_states_how_far_the_run_is(tmp_path: Path, wall: Wall) -> None:
     bar = ProgressWriter(tmp_path, 270, show=False)
     bar.begin(index=2, phase="shake", start=3.0, now=3.0, end=8.0)
@@ -83,18 +79,3 @@ def test_at_most_once_per_second_and_at_once_in_a_new_phase(tmp_path: Path, wall
     assert told(0.3)
     bar.begin(index=2, phase="shake", start=1.0, now=1.0, end=2.0)
     assert told(1.0)
-
-
-def test_line_shows_phase_share_time_phi_and_time_left(
-    tmp_path: Path, wall: Wall, capsys: pytest.CaptureFixture[str]
-) -> None:
-    bar = ProgressWriter(tmp_path, 10, show=True)
-    bar.begin(index=2, phase="shake", start=2.0, now=2.0, end=6.0)
-    wall.now += 30
-    bar.update(time=3.0, phi=0.1234, count=10)
-    line = last_line(capsys.readouterr().err)
-    # A quarter done in 30 s: 90 s to go.
-    assert line == "shake    █████                 25 %  t = 3.00 s  φ 0.123  90 s left in this phase"
-    wall.now += 1
-    bar.update(time=6.0 + 1e-9, phi=0.1, count=10)
-    assert last_line(capsys.readouterr().err).endswith("t = 6.00 s  φ 0.100  0 s left in this phase")

@@ -38,14 +38,3 @@ def test_plain_lines_are_whole_and_say_what_happens() -> None:
         "c finished before",
         "stopping 2 runs, which close their files; Ctrl-C again does not wait",
     ]
-
-
-def test_a_terminal_shows_each_run_and_the_total() -> None:
-    terminal = Console(file=io.StringIO(), force_terminal=True, width=100)
-    with Display(terminal) as display:
-        display.update(SNAPSHOT)
-        display.ended(Outcome(name="b", status="failed", wall_s=2.0, cause="left [the] wall"))
-    written = terminal.file.getvalue()  # type: ignore[attr-defined]
-    assert "b failed after 0:02: left [the] wall" in written
-    assert "1.20 of 5.50 s  φ 0.123  0:33" in written
-    assert "3 of 9 runs ended, 1 failed, time left 2:05" in written

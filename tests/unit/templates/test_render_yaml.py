@@ -37,11 +37,6 @@ def test_a_value_within_text_becomes_text() -> None:
     assert data == {"name": "lw0.7-#a: b", "quoted": "0.7"}
 
 
-def test_constants_and_filters_work() -> None:
-    template = "a: {{ 3 }}\nb: {{ '%.2f' | format(x) }}\nc: {{ x | round | int }}\n# {{ x }}\n"
-    assert render_yaml(template, {"x": 0.7}, "t") == {"a": 3, "b": "0.70", "c": 1}
-
-
 @pytest.mark.parametrize(
     ("template", "message"),
     [
