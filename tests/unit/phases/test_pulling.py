@@ -30,7 +30,7 @@ def pull(stiffness: float, *, anew: bool = False, **keys: Any) -> tuple[EngineDo
         if anew:
             memory, pulling = pulling.memory, phase.begin(scene, 1)
             pulling.memory = dict(memory)
-    assert engine.told == [("raise_upper", SPEED), ("stop",)]
+    assert engine.calls == [("raise_upper", SPEED), ("stop",)]
     return engine, engine.boundaries.upper_height - start, pulling
 
 

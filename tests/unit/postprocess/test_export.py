@@ -214,11 +214,11 @@ def test_hostile_names_are_data(tmp_path, name):
 
 @pytest.mark.parametrize("suffix", SUFFIXES)
 def test_all_frames_are_numbered_files(pile, tmp_path, suffix):
-    told, left_out = [], ["local_packing_fraction"]
-    options = {"output": tmp_path / "out", "unwanted": left_out, "progress": lambda *done: told.append(done)}
+    reports, left_out = [], ["local_packing_fraction"]
+    options = {"output": tmp_path / "out", "unwanted": left_out, "progress": lambda *done: reports.append(done)}
     folder = export_run(pile, to=suffix, every_frame=True, **options)
     assert sorted(path.name for path in folder.iterdir()) == [f"frame_{k:06d}.{suffix}" for k in range(8)]
-    assert told == [(k + 1, 8) for k in range(8)]
+    assert reports == [(k + 1, 8) for k in range(8)]
 
 
 @pytest.mark.parametrize(

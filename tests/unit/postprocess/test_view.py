@@ -1,4 +1,4 @@
-"""The page of a run: what it shows, and who gets in, what its server listens on, how it ends."""
+"""The page of a run: what it shows, access by token, what its server listens on, how it ends."""
 
 import asyncio
 import http.cookiejar

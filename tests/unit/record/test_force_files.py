@@ -16,7 +16,7 @@ from dem.record.names import FORCE
 
 
 def some() -> dict[str, np.ndarray]:
-    """Two points of links 0 of 3 and 1 of 1, told once each way; one on the floor; one without a load."""
+    """Two points of links 0 of 3 and 1 of 1, listed once each way; one on the floor; one without a load."""
     high, low, floor = int(at_links(3, 0)), int(at_links(1, 1)), int(at_boundaries(FLOOR))
     return {
         "first": np.array([high, low, low, low]),

@@ -44,7 +44,7 @@ def test_file_states_how_far_the_run_is(tmp_path: Path, wall: Wall) -> None:
 
 
 def test_a_checkpoint_is_reported_at_once(tmp_path: Path, wall: Wall) -> None:
-    def told() -> tuple[float, float | None]:
+    def written() -> tuple[float, float | None]:
         data = json.loads((tmp_path / "progress.json").read_text())
         return data["time_s"], data.get("checkpoint_s")
 
@@ -53,29 +53,29 @@ def test_a_checkpoint_is_reported_at_once(tmp_path: Path, wall: Wall) -> None:
     bar.checkpointed(0.1)  # nothing else is known yet
     assert not (tmp_path / "progress.json").exists()
     bar.update(time=0.2, phi=0.1, count=2)
-    assert told() == (0.2, 0.1)
+    assert written() == (0.2, 0.1)
     wall.now += 0.01
     bar.update(time=0.3, phi=0.1, count=2)
     bar.checkpointed(0.3)
-    assert told() == (0.3, 0.3)
+    assert written() == (0.3, 0.3)
     wall.now += 2
     bar.update(time=0.5, phi=0.1, count=2)
-    assert told() == (0.5, 0.3)
+    assert written() == (0.5, 0.3)
 
 
 def test_at_most_once_per_second_and_at_once_in_a_new_phase(tmp_path: Path, wall: Wall) -> None:
     bar = ProgressWriter(tmp_path, 2, show=False)
     bar.begin(index=1, phase="relax", start=0.0, now=0.0, end=1.0)
 
-    def told(time: float) -> bool:
+    def written(time: float) -> bool:
         (tmp_path / "progress.json").unlink(missing_ok=True)
         bar.update(time=time, phi=0.1, count=2)
         return (tmp_path / "progress.json").exists()
 
-    assert told(0.1)
+    assert written(0.1)
     wall.now += 0.99
-    assert not told(0.2)
+    assert not written(0.2)
     wall.now += 0.02
-    assert told(0.3)
+    assert written(0.3)
     bar.begin(index=2, phase="shake", start=1.0, now=1.0, end=2.0)
-    assert told(1.0)
+    assert written(1.0)

@@ -108,7 +108,7 @@ def test_a_smarticle_held_by_two_boundaries_is_named(between: tuple[str, str], w
     )
 
 
-def looks(dog: Watchdog, *energies: tuple[float, float]) -> None:
+def watch(dog: Watchdog, *energies: tuple[float, float]) -> None:
     """Energy less work [J] and what springs hold [J], look by look."""
     for energy, elastic in energies:
         dog.check_energy(healthy(), energy=energy, elastic=elastic, time=1.25)
@@ -117,16 +117,16 @@ def looks(dog: Watchdog, *energies: tuple[float, float]) -> None:
 def test_energy_may_fall_and_springs_may_give_back_what_they_held() -> None:
     dog = Watchdog(cylinder=WATCHDOG.cylinder, speed=5.0, energy=0.1)
     # Falls on to springs, which throw it back; then less and less.
-    looks(dog, (5.0, 0.0), (2.0, 3.0), (4.9, 0.0), (1.0, 2.0), (2.9, 0.0), (2.0, 0.0), (0.5, 0.0), (0.5, 0.0))
+    watch(dog, (5.0, 0.0), (2.0, 3.0), (4.9, 0.0), (1.0, 2.0), (2.9, 0.0), (2.0, 0.0), (0.5, 0.0), (0.5, 0.0))
     # What is within the limit, again and again, is not summed up.
-    looks(dog, *[(0.59, 0.0), (0.5, 0.0)] * 10)
+    watch(dog, *[(0.59, 0.0), (0.5, 0.0)] * 10)
 
 
 def test_energy_from_nowhere_stops_the_run() -> None:
     dog = Watchdog(cylinder=WATCHDOG.cylinder, speed=5.0, energy=0.1)
-    looks(dog, (5.0, 0.0), (0.5, 0.2))
+    watch(dog, (5.0, 0.0), (0.5, 0.2))
     with pytest.raises(RunError) as caught:
-        looks(dog, (0.81, 0.0))
+        watch(dog, (0.81, 0.0))
     # Of four smarticles, one is three times as fast as the next.
     assert str(caught.value) == (
         "at t = 1.2500 s: 1 smarticle(s) (0): an energy that has risen by 0.11 J more than gravity, motors and springs "

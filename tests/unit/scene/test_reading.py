@@ -36,7 +36,7 @@ def test_several_errors_are_reported_together(scene_data: SceneData) -> None:
 
 
 @pytest.mark.parametrize(
-    ("changes", "told"),
+    ("changes", "stated"),
     [
         ({"engine": "yad"}, "engine: 'yad' is not known; did you mean 'yade'?"),
         ({"fidelity": "standart"}, "fidelity: unknown fidelity 'standart'; did you mean 'standard'?"),
@@ -45,10 +45,10 @@ def test_several_errors_are_reported_together(scene_data: SceneData) -> None:
         ({"motor": {"law": "x"}}, "motor.law: 'x' is not known; use 'halt', 'stall', 'ease', 'slip' or 'servo'"),
     ],
 )
-def test_a_value_that_is_nearly_a_known_one(scene_data: SceneData, changes: dict[str, Any], told: str) -> None:
+def test_a_value_that_is_nearly_a_known_one(scene_data: SceneData, changes: dict[str, Any], stated: str) -> None:
     with pytest.raises(InputError) as caught:
         parse_scene(scene_data(changes), source="bad.yaml")
-    assert str(caught.value) == f"bad.yaml: {told}"
+    assert str(caught.value) == f"bad.yaml: {stated}"
 
 
 def rejected(folder: Path, content: str | bytes, overrides: Sequence[str] = ()) -> str:
@@ -64,8 +64,8 @@ def rejected(folder: Path, content: str | bytes, overrides: Sequence[str] = ()) 
 
 def test_key_given_twice(tmp_path: Path) -> None:
     line = GOOD.count("\n") + 1
-    told = f"bad.yaml, line {line}, column 1: not valid YAML: key 'seed' is given twice; keep one of the two"
-    assert rejected(tmp_path, GOOD + "seed: 2\n") == told
+    stated = f"bad.yaml, line {line}, column 1: not valid YAML: key 'seed' is given twice; keep one of the two"
+    assert rejected(tmp_path, GOOD + "seed: 2\n") == stated
     nested = GOOD + "smarticle: {aspect_ratio: 0.4, aspect_ratio: 0.7}\n"
     assert "key 'aspect_ratio' is given twice" in rejected(tmp_path, nested)
 
@@ -76,9 +76,9 @@ def test_file_that_is_no_yaml(tmp_path: Path) -> None:
     assert message.endswith("; correct this line")
     for tabbed in (GOOD + "\tname: x\n", GOOD + "name:\tx\n", GOOD + "motor:\n\tlaw: slip\n"):
         line = tabbed[: tabbed.index("\t")].count("\n") + 1
-        told = rejected(tmp_path, tabbed)
-        assert told.startswith(f"bad.yaml, line {line}, column ")
-        assert told.endswith(": not valid YAML: a tab; YAML is indented and spaced by blanks")
+        stated = rejected(tmp_path, tabbed)
+        assert stated.startswith(f"bad.yaml, line {line}, column ")
+        assert stated.endswith(": not valid YAML: a tab; YAML is indented and spaced by blanks")
     assert "could not determine a constructor" in rejected(tmp_path, GOOD + "name: !!python/object:os.system x\n")
 
 

@@ -53,7 +53,7 @@ def test_a_resumed_run_has_the_ranks_that_it_began_with_unless_asked(
 
 
 @pytest.mark.parametrize(
-    ("options", "told"),
+    ("options", "stated"),
     [
         (["--engine", "lammps", "--ranks", "4"], "--ranks 4: there are 3 cores for this process, and each rank waits"),
         (
@@ -65,10 +65,10 @@ def test_a_resumed_run_has_the_ranks_that_it_began_with_unless_asked(
     ],
 )
 def test_what_has_no_meaning_is_rejected_before_anything_starts(
-    scene_file: Path, smarticles: Smarticles, seen: list[tuple[str, str]], options: list[str], told: str
+    scene_file: Path, smarticles: Smarticles, seen: list[tuple[str, str]], options: list[str], stated: str
 ) -> None:
     said = smarticles("run", scene_file, "--out", scene_file.parent / "out", *options)
     assert said.status == 2
-    assert told in said.err
+    assert stated in said.err
     assert seen == []
     assert not (scene_file.parent / "out").exists()

@@ -1,4 +1,4 @@
-"""report: what stands on the page of a run, a sweep and a study. How it looks is in `test_report_browser.py`."""
+"""report: what stands on the page of a run, a sweep and a study. Its layout is tested in `test_report_browser.py`."""
 
 from __future__ import annotations
 

@@ -110,14 +110,14 @@ def test_places_that_are_neither_run_nor_sweep(command: str, tmp_path: Path, sma
     (tmp_path / "photos").mkdir()
     (tmp_path / "note.txt").write_text("x")
     both = command in ("status", "resume")
-    for name, told in (
+    for name, stated in (
         ("photos", "holds neither a run (run.json) nor a sweep (sweep.json)" if both else "it holds no run.json"),
         ("note.txt", "is a file"),
         ("absent", "no such directory"),
     ):
         said = smarticles(command, tmp_path / name)
         assert said.status == 2
-        assert told in said.err
+        assert stated in said.err
         assert "; give the directory of a run" in said.err
 
 
@@ -127,7 +127,7 @@ def test_render_draws_a_film_of_a_part_in_fixed_colours(
     run, film = write_run(tmp_path / "a", phases=("deposit",) * 3, frames_per_phase=4), tmp_path / "film.webp"
     words = ("--size", "320x240", "--from", "0.5", "--to", "2", "--every", "0.5", "--fps", "20", "--clim", "0:5")
     said = smarticles("render", run, "--output", film, *words)
-    # Not a word of progress where nobody looks.
+    # No progress where the output is no terminal.
     assert (said.status, said.out, said.err) == (0, f"{film}\n", "")
     with Image.open(film) as images:
         assert (images.n_frames, images.size) == (4, (320, 240))

@@ -68,7 +68,7 @@ def fake(behaviours: dict[str, str] | None = None) -> RunCommand:
 
 @pytest.fixture
 def folder(make_folder: MakeFolder) -> Folder:
-    """Runs n10_seed1, n10_seed2, n20_seed1, n20_seed2; their scenes tell their hashes."""
+    """Runs n10_seed1, n10_seed2, n20_seed1, n20_seed2; their scenes name their hashes."""
     made = make_folder()
     for entry in made.entries:
         scene = made.scene(entry)
@@ -224,16 +224,16 @@ def test_two_runners_do_not_share_a_sweep(folder: Folder) -> None:
 
 
 def test_runs_get_their_places_from_the_sweeps_directory(folder: Folder, monkeypatch: pytest.MonkeyPatch) -> None:
-    told: list[tuple[str, str]] = []
+    places: list[tuple[str, str]] = []
 
     def noting(scene: Path, directory: Path, resume: bool) -> Sequence[str]:
-        told.append((str(scene), str(directory)))
+        places.append((str(scene), str(directory)))
         return fake()(scene, directory, resume)
 
     # What the user gave for imports still means what it meant where it was given.
     monkeypatch.setenv("PYTHONPATH", f"lib{os.pathsep}{folder.path}")
     outcomes = run_folder(folder, Watcher(), command=noting, **QUICK)
-    assert sorted(told) == sorted((f"scenes/{entry.name}.yaml", f"runs/{entry.name}") for entry in folder.entries)
+    assert sorted(places) == sorted((f"scenes/{entry.name}.yaml", f"runs/{entry.name}") for entry in folder.entries)
     assert [outcome.cause for outcome in outcomes] == [None] * 4
     assert all(folder.is_done(entry) for entry in folder.entries)
     searched = (folder.run(folder.entries[0]) / "searched").read_text().split(os.pathsep)

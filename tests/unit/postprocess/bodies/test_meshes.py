@@ -157,8 +157,8 @@ def test_crossings_are_where_links_pass(tmp_path):
     mesh = bodies_at(directory)["crossings"]
     assert np.asarray(mesh.points) == pytest.approx(np.array([[0.001, 0.0, 0.0]]), abs=1e-8)
     assert mesh.point_data["direction"] == pytest.approx(np.array([[0.0, 0.0, 1.0]]))
-    told = [int(mesh.point_data[name][0]) for name in ("smarticle_id", "passing_id", "passing_link")]
-    assert told == [0, 1, 1]
+    ids = [int(mesh.point_data[name][0]) for name in ("smarticle_id", "passing_id", "passing_link")]
+    assert ids == [0, 1, 1]
     arrow = solid("crossings", mesh, open_run(directory))
     assert arrow.bounds[4:] == pytest.approx((-W / 6, W / 6), rel=1e-3)
 

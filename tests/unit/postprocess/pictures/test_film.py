@@ -126,11 +126,11 @@ def test_mp4_is_what_browsers_play(run, tmp_path):
     encoder = pytest.importorskip("imageio_ffmpeg", reason="the encoder of .mp4, imageio-ffmpeg, is not installed")
     path = render_film(run, tmp_path / "a.mp4", size=SIZE, color_by="height", frames_per_second=10.0)
     program = shutil.which(encoder.get_ffmpeg_exe())
-    told = subprocess.run(
+    described = subprocess.run(
         [program, "-hide_banner", "-i", str(path)], capture_output=True, text=True, check=False
     ).stderr
-    assert re.search(r"Video: h264 .*yuv420p.*, 240x240", told)
-    assert re.search(r"Duration: 00:00:00\.90", told)
+    assert re.search(r"Video: h264 .*yuv420p.*, 240x240", described)
+    assert re.search(r"Duration: 00:00:00\.90", described)
     content = path.read_bytes()
     assert content.index(b"moov") < content.index(b"mdat")
     raw = subprocess.run(
