@@ -35,7 +35,7 @@ def test_one_version_everywhere() -> None:
     assert said.split() == ["smarticles", version]
 
 
-def test_day_of_the_release_is_the_same_everywhere() -> None:
+def test_day_of_the_release_is_equal_everywhere() -> None:
     changes = (REPOSITORY / "CHANGELOG.md").read_text(encoding="utf-8")
     day = re.search(r"^## \d+\.\d+\.\d+ \((.+)\)$", changes, re.MULTILINE)
     assert day is not None, "the newest section of CHANGELOG.md: '## VERSION (YYYY-MM-DD)'"

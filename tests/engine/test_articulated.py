@@ -90,7 +90,7 @@ def test_welding_takes_the_energy_of_relative_motion_and_nothing_else(simulate: 
 
 @pytest.fixture(scope="module")
 def piles(worker: Any) -> dict[str, dict[str, Any]]:
-    """The same pile left alone, split; split and left alone, split and welded."""
+    """One pile left alone, split; split and left alone, split and welded."""
     data = {"schema_version": 1, "seed": 1, "count": 6, "fidelity": "draft", "phases": ACTUATED}
     return {
         change: worker.submit(articulated_cases.resting_pile, data, count=6, settle=0.8, change=change).result(300)

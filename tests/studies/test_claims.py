@@ -89,7 +89,7 @@ def test_two_protocols_make_one_verdict(tmp_path: Path, by_text: str, by_code: s
         ("not found", "found", "not"),
     ],
 )
-def test_a_test_of_ours_decides_where_theirs_cannot_tell(
+def test_our_test_decides_where_theirs_is_not_resolved(
     tmp_path: Path, by_theirs: str, by_ours: str, verdict: str
 ) -> None:
     strongest = "shape-change-strongest"

@@ -47,7 +47,7 @@ def test_a_run_is_what_the_table_and_the_provenance_say(wanted: dict[str, Wanted
     assert run.run.manifest.versions["git"] in (RESULTS / "provenance.json").read_text()
 
 
-def test_the_same_tables_come_out_again(wanted: dict[str, Wanted], tmp_path: Path, undrawn: None) -> None:
+def test_the_tables_are_reproduced(wanted: dict[str, Wanted], tmp_path: Path, undrawn: None) -> None:
     report = (
         shipped("procedures")
         .load()

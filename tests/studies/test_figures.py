@@ -87,7 +87,7 @@ def test_what_a_logarithmic_axis_cannot_show_is_stated(
 # -- points that were never digitised ----------------------------------------------------------------------------------
 
 
-def test_references_tell_where_they_have_no_point() -> None:
+def test_references_state_where_they_have_no_point() -> None:
     assert gravish_note([0.4, 0.7]).endswith("at every l/w shown.")
     assert gravish_note([0.4, 0.5, 0.55]).endswith("no φ_0 at l/w = 0.5, 0.55; no φ_f at l/w = 0.55.")
 

@@ -121,7 +121,7 @@ def test_a_study_is_what_the_registry_calls_it(name: str) -> None:
     assert set(shipped.pictured) <= set(variables)
 
 
-def test_what_is_known_of_studies_beforehand_loads_nothing_large() -> None:
+def test_the_registry_of_studies_loads_nothing_large() -> None:
     code = "import sys, studies.registry; print(*{name.split('.')[0] for name in sys.modules})"
     loaded = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.split()
     assert "studies" in loaded

@@ -29,7 +29,7 @@ def begin(*phases: dict[str, Any], **changes: Any) -> tuple[Scene, EngineDouble]
 
 
 def perform(stage: Stage, engine: EngineDouble, fresh: Callable[[], Stage] | None = None) -> dict[str, Any]:
-    """Let a stage run to its end, by `fresh` taken anew from its memory at every look; what it remembers in the end."""
+    """Run a stage to its end, with `fresh` anew from its memory at every check; return what it remembers."""
     while wait := stage.proceed(engine):
         engine.advance(max(1, round(wait / engine.time_step)))
         if fresh is not None:

@@ -131,7 +131,7 @@ def test_gltf_has_no_field_with_holes(opened, tmp_path):
 # STL and OBJ
 
 
-def test_stl_and_obj_have_the_same_shape(single, tmp_path):
+def test_stl_and_obj_have_equal_shapes(single, tmp_path):
     for suffix in ("stl", "obj"):
         path = export_run(single, to=suffix, output=tmp_path / f"one.{suffix}", unwanted=["wall", "floor"])
         shape = pv.read(path).clean()

@@ -21,7 +21,7 @@ def writer_of(folder: Path, rows: int = 0) -> SeriesWriter:
     return writer
 
 
-def test_every_dataset_has_unit_and_description_and_the_same_length(tmp_path: Path) -> None:
+def test_every_dataset_has_unit_description_and_equal_length(tmp_path: Path) -> None:
     writer_of(tmp_path, rows=4).write()
     with h5py.File(tmp_path / "series.h5") as file:
         assert {name: dataset.attrs["unit"] for name, dataset in file.items()} == {

@@ -109,7 +109,7 @@ def test_a_smarticle_held_by_two_boundaries_is_named(between: tuple[str, str], w
 
 
 def watch(dog: Watchdog, *energies: tuple[float, float]) -> None:
-    """Energy less work [J] and what springs hold [J], look by look."""
+    """Energy less work [J] and what springs hold [J], check by check."""
     for energy, elastic in energies:
         dog.check_energy(healthy(), energy=energy, elastic=elastic, time=1.25)
 

@@ -113,7 +113,7 @@ def test_a_finished_ladder_is_analysed_and_feeds_the_planner(
     assert "the hours give way" in rejected.err
 
 
-def test_more_seeds_and_knobs_are_taken_up_in_the_same_directory(
+def test_more_seeds_and_knobs_are_added_in_the_directory(
     base: Path, tmp_path: Path, smarticles: Smarticles, write_run: WriteRun, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("smarticles.commands.study._draw", lambda *_: None)

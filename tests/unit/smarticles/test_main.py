@@ -66,49 +66,40 @@ def test_bad_usage_is_status_2_and_one_line(words: list[str], wrong: str, way_ou
     assert line.endswith("--help`")
 
 
-class TestGuarded:
-    """One place maps errors to status and message."""
+@pytest.mark.parametrize(
+    ("error", "status", "line"),
+    [
+        (InputError("count: -1"), 2, "error: count: -1"),
+        (RunError("left through\n the wall"), 1, "error: left through the wall"),
+        (KeyboardInterrupt(), 130, "stopped; what was written is whole"),
+        (KeyboardInterrupt("go on with: x"), 130, "stopped; go on with: x"),
+        (
+            OSError(28, "No space left on device", "/d/x.csv"),
+            1,
+            "error: /d/x.csv: No space left on device; free space, or check the path and its permissions",
+        ),
+        (
+            ModuleNotFoundError("No module named 'pandas'", name="pandas"),
+            2,
+            "error: the Python package 'pandas' is missing; install it: pip install smarticles, "
+            "or `make setup` in the repository",
+        ),
+        (
+            ZeroDivisionError("division by zero"),
+            1,
+            "error: internal error, ZeroDivisionError: division by zero; "
+            "please report it with the output of the same command with --debug",
+        ),
+    ],
+)
+def test_errors_have_a_status_and_a_message(
+    error: BaseException, status: int, line: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def action() -> int:
+        raise error
 
-    @staticmethod
-    def raising(error: BaseException) -> int:
-        def action() -> int:
-            raise error
-
-        return guarded(action)
-
-    @pytest.mark.parametrize(
-        ("error", "status", "line"),
-        [
-            (InputError("count: -1"), 2, "error: count: -1"),
-            (RunError("left through\n the wall"), 1, "error: left through the wall"),
-            (KeyboardInterrupt(), 130, "stopped; what was written is whole"),
-            (KeyboardInterrupt("go on with: x"), 130, "stopped; go on with: x"),
-            (
-                OSError(28, "No space left on device", "/d/x.csv"),
-                1,
-                "error: /d/x.csv: No space left on device; free space, or check the path and its permissions",
-            ),
-            (
-                ModuleNotFoundError("No module named 'pandas'", name="pandas"),
-                2,
-                "error: the Python package 'pandas' is missing; install it: pip install smarticles, "
-                "or `make setup` in the repository",
-            ),
-            (
-                ZeroDivisionError("division by zero"),
-                1,
-                "error: internal error, ZeroDivisionError: division by zero; "
-                "please report it with the output of the same command with --debug",
-            ),
-        ],
-    )
-    def test_status_and_message(
-        self, error: BaseException, status: int, line: str, capsys: pytest.CaptureFixture[str]
-    ) -> None:
-        assert self.raising(error) == status
-        said = capsys.readouterr()
-        assert said.out == ""
-        assert said.err == f"smarticles: {line}\n"
+    assert guarded(action) == status
+    assert capsys.readouterr() == ("", f"smarticles: {line}\n")
 
 
 @pytest.mark.parametrize("words", [["--debug", "plan", "absent.yaml"], ["plan", "absent.yaml", "--debug"]])

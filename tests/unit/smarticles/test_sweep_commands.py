@@ -45,21 +45,6 @@ def test_a_sweep_is_written_and_started_later(sweep_file: Path, tmp_path: Path, 
     assert not (out / "runs").exists()
 
 
-def test_status_of_a_sweep(sweep_file: Path, tmp_path: Path, smarticles: Smarticles) -> None:
-    out = tmp_path / "out"
-    smarticles("sweep", sweep_file, "--out", out)
-    said = smarticles("status", out)
-    assert said.status == 0
-    assert said.out.splitlines()[-1] == "counts: 2 runs, 2 missing"
-    finish(out)
-    answer = json.loads(smarticles("status", out, "--json").out)
-    assert answer["counts"] == {"done": 2}
-    assert [(run["name"], run["state"], run["wall_s"]) for run in answer["runs"]] == [
-        ("n5", "done", 2.0),
-        ("n6", "done", 2.0),
-    ]
-
-
 def test_status_of_a_killed_run_shows_from_where_it_would_go_on(
     tmp_path: Path, write_run: WriteRun, smarticles: Smarticles
 ) -> None:

@@ -142,15 +142,6 @@ def test_more_seeds_must_be_of_known_points(write_sweep: WriteSweep, old: str, n
         points(MORE.replace(old, new), write_sweep)
 
 
-def test_zip_pairs_first_with_first(write_sweep: WriteSweep) -> None:
-    found = points(
-        sweep_with("{zip: {count: [10, 20], seed_: [3, 4]}}").replace("{{ seed }}", "{{ seed_ }}"),
-        write_sweep,
-        scene=SCENE.replace("seed }}", "seed_ }}"),
-    )
-    assert [(p.values["count"], p.values["seed_"]) for p in found] == [(10, 3), (20, 4)]
-
-
 def test_table_rows_are_points_and_derived_values_follow(write_sweep: WriteSweep) -> None:
     text = sweep_with(
         "{table: {file: counts.csv}}",

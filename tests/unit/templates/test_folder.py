@@ -26,7 +26,7 @@ def test_runs_start_seed_by_seed_where_the_sweep_says_so(make_folder: MakeFolder
     assert folder.in_order_of_start(left)[0].name == "n10_seed2"
 
 
-def test_manifest_of_before_orders_were_known(make_folder: MakeFolder) -> None:
+def test_a_manifest_without_an_order_is_read(make_folder: MakeFolder) -> None:
     folder = make_folder()
     file = folder.path / "sweep.json"
     content = json.loads(file.read_text(encoding="utf-8"))
@@ -42,7 +42,7 @@ def test_scene_files_are_the_scenes_of_the_manifest(make_folder: MakeFolder) -> 
         assert scene_hash(load_scene(folder.scene(entry))) == entry.scene_sha256
 
 
-def test_the_same_sweep_takes_up_its_directory(make_folder: MakeFolder) -> None:
+def test_an_equal_sweep_continues_in_its_directory(make_folder: MakeFolder) -> None:
     first = make_folder()
     before = (first.path / "sweep.json").read_text(encoding="utf-8")
     first.scene(first.entries[0]).unlink()
@@ -72,7 +72,7 @@ def test_another_sweep_is_rejected(make_folder: MakeFolder, old: str, new: str, 
     assert (folder.path / "sweep.json").read_text(encoding="utf-8") == before
 
 
-def test_the_same_names_with_other_scenes_are_rejected(make_folder: MakeFolder) -> None:
+def test_known_names_with_other_scenes_are_rejected(make_folder: MakeFolder) -> None:
     make_folder()
     other = SWEEP.replace("points:", "constants: {k: 1}\npoints:").replace("[10, 20]", "[30, 20]")
     with pytest.raises(InputError, match="runs of another scene: n10_seed1, n10_seed2; give"):

@@ -124,7 +124,7 @@ def test_a_failing_run_does_not_stop_the_others(folder: Folder) -> None:
     ]
 
 
-def test_the_same_again_keeps_finished_runs_and_sets_others_aside(folder: Folder) -> None:
+def test_a_second_start_keeps_finished_runs_and_sets_others_aside(folder: Folder) -> None:
     first = run_folder(folder, Watcher(), command=fake({"n20_seed1": "fail"}), **QUICK)
     assert statuses(first) == ["done", "done", "failed", "done"]
     ids = [(folder.run(entry) / "id").read_text() for entry in folder.entries]

@@ -21,7 +21,7 @@ def plain(interval_s: float = 0.0) -> tuple[Display, io.StringIO]:
     return Display(Console(file=text, width=40), interval_s), text
 
 
-def test_plain_lines_are_whole_and_say_what_happens() -> None:
+def test_plain_lines_are_whole_and_report_events() -> None:
     display, text = plain()
     with display:
         display.started("a")

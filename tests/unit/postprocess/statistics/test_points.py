@@ -1,4 +1,4 @@
-"""Means over seeds as columns and as cells, pairs of runs, and what refuses to be averaged."""
+"""Means over seeds as columns and as cells, pairs of runs, and what must not be averaged."""
 
 from __future__ import annotations
 
