@@ -53,7 +53,6 @@ class SyntheticRun:
     more: tuple[tuple[str, float], ...] = ()
     friction: float | None = None
     friction_wall: float | None = None
-    restitution: float = 0.7
     phases: tuple[str, ...] = field(default=PHASES)
 
     @property
@@ -215,7 +214,7 @@ def _write_scene(directory: Path, run: SyntheticRun) -> None:
     scene: dict[str, Any] = {"schema_version": 1, "phases": phases}
     if run.friction is not None:
         wall = run.friction if run.friction_wall is None else run.friction_wall
-        contact = {"friction_smarticle": run.friction, "friction_wall": wall, "restitution": run.restitution}
+        contact = {"friction_smarticle": run.friction, "friction_wall": wall, "restitution": 0.7}
         scene["contact"] = contact
     (directory / "scene.yaml").write_text(yaml.safe_dump(scene))
 
