@@ -10,9 +10,7 @@ from typing import Any
 
 import pytest
 from hypothesis import settings
-from scenes import SMALL, changed, small
-
-from dem.scene.scene import Scene
+from scenes import SMALL, changed
 
 # The same cases on every machine, and no failure because a shared machine was slow.
 settings.register_profile("suite", derandomize=True, deadline=None, max_examples=25)
@@ -50,12 +48,6 @@ def scene_data() -> Callable[..., dict[str, Any]]:
         return changed(SMALL, changes or {})
 
     return make
-
-
-@pytest.fixture
-def make_scene() -> Callable[..., Scene]:
-    """The same, validated."""
-    return small
 
 
 def pytest_configure() -> None:

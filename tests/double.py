@@ -1,7 +1,7 @@
 """An engine in memory: `dem.engine.interface` with physics that can be computed by hand.
 
 Smarticles fall freely, without turning, through each other, until they stand on the floor; there they stay and go
-with it. Barbs never turn, and a smarticle that a string is tied to goes where the string goes. `told` lists the calls;
+with it. Barbs never turn, and a smarticle that a string is tied to goes where the string goes. `calls` lists the calls;
 answers may be set.
 """
 
@@ -32,7 +32,7 @@ from dem.physics.overlaps import Extremes, Overlaps
 from dem.setting.container import Cylinder
 
 Array = NDArray[np.float64]
-Told = list[tuple[Any, ...]]
+Calls = list[tuple[Any, ...]]
 """Calls in order: a name and numbers."""
 
 STABLE_STEP = 5e-4  # s; nothing here is unstable
@@ -42,7 +42,7 @@ STABLE_STEP = 5e-4  # s; nothing here is unstable
 class BoundariesDouble:
     """Floor, wall and hooks; the upper hook is pulled down by a spring, `hook_stiffness` [N/m], as it is raised."""
 
-    told: Told
+    calls: Calls
     top: float = math.inf
     bottom: float = -0.001
     upper_start: float | None = None
@@ -75,23 +75,23 @@ class BoundariesDouble:
         return self.floor + (self.upper_start or 0.0) + self._moved[1]
 
     def shake(self, *, amplitude: float, frequency: float, walls: bool = True) -> None:
-        self.told.append(("shake", amplitude, frequency) if walls else ("shake the floor", amplitude, frequency))
+        self.calls.append(("shake", amplitude, frequency) if walls else ("shake the floor", amplitude, frequency))
         self._shaken, self._clock = (self.floor, amplitude, 2 * math.pi * frequency), 0.0
 
     def lift_wall(self, speed: float) -> None:
-        self.told.append(("lift_wall", speed))
+        self.calls.append(("lift_wall", speed))
         self._speeds = (speed, self._speeds[1])
 
     def raise_upper(self, speed: float) -> None:
-        self.told.append(("raise_upper", speed))
+        self.calls.append(("raise_upper", speed))
         self._speeds = (self._speeds[0], speed)
 
     def stop(self) -> None:
-        self.told.append(("stop",))
+        self.calls.append(("stop",))
         self._shaken, self._speeds, self.velocity = None, (0.0, 0.0), 0.0
 
     def remove_wall(self) -> None:
-        self.told.append(("remove_wall",))
+        self.calls.append(("remove_wall",))
         self.walled = False
 
     def step(self, dt: float) -> None:
@@ -110,7 +110,7 @@ class BoundariesDouble:
 class MotorsDouble:
     """Motors that hold their commands, and turn nothing."""
 
-    told: Told
+    calls: Calls
     present: bool = False
     articulated: bool = False
     readings: MotorReadings | None = None
@@ -122,19 +122,19 @@ class MotorsDouble:
     def articulate(self) -> None:
         assert self.present
         if not self.articulated:
-            self.told.append(("articulate",))
+            self.calls.append(("articulate",))
             self.articulated = True
             self._hold(self.angles)
 
     def weld(self) -> None:
         if self.articulated:
-            self.told.append(("weld",))
+            self.calls.append(("weld",))
             self.articulated = False
 
     def actuate(self, targets: Array, interval: float) -> None:
         assert self.articulated
         assert len(targets) <= self.updates_at_once
-        self.told.append(("actuate", interval))
+        self.calls.append(("actuate", interval))
         self.targets += list(targets)
         self._hold(targets[-1])
 
@@ -152,7 +152,7 @@ class MotorsDouble:
 class StringsDouble:
     """Two strings of a constant tension, `tension` [N]."""
 
-    told: Told
+    calls: Calls
     tension: float = 0.0
     tied: bool = False
     sums: Array = field(default_factory=lambda: np.zeros((0, 3)))
@@ -164,7 +164,7 @@ class StringsDouble:
     """Speed along x of each smarticle that a string is tied to [m/s]."""
 
     def tie(self, ties: Sequence[Tie], law: StringLaw, speeds: Sequence[float]) -> None:
-        self.told.append(("tie", law.length, *speeds))
+        self.calls.append(("tie", law.length, *speeds))
         self.ties = np.array([self.places[tie.smarticle, tie.link] for tie in ties])
         away = np.sign(self.ties[:, 0]) * np.array(speeds)
         self.velocities = {tie.smarticle: float(speed) for tie, speed in zip(ties, away, strict=True)}
@@ -172,7 +172,7 @@ class StringsDouble:
 
     def untie(self) -> None:
         if self.tied:
-            self.told.append(("untie",))
+            self.calls.append(("untie",))
         self.tied, self.velocities = False, {}
 
     def step(self, dt: float) -> None:
@@ -221,13 +221,13 @@ class EngineDouble:
     time: float = 0.0
     steps: int = 0
     cpu_elsewhere: float = 0.0
-    told: Told = field(default_factory=list)
+    calls: Calls = field(default_factory=list)
     ledger: LedgerDouble = field(default_factory=LedgerDouble)
 
     def __post_init__(self) -> None:
-        self.boundaries = BoundariesDouble(told=self.told, top=self.cylinder.height, planar=self.planar)
-        self.motors = MotorsDouble(told=self.told)
-        self.strings = StringsDouble(told=self.told)
+        self.boundaries = BoundariesDouble(calls=self.calls, top=self.cylinder.height, planar=self.planar)
+        self.motors = MotorsDouble(calls=self.calls)
+        self.strings = StringsDouble(calls=self.calls)
         self.positions = np.zeros((0, 3))
         self.velocities = np.zeros((0, 3))
         self._rotations = np.zeros((0, 3, 3))
@@ -311,7 +311,7 @@ class EngineDouble:
         return len(self.positions)
 
     def add(self, poses: Poses, *, speed: float = 0.0) -> None:
-        self.told.append(("add", len(poses.positions)))
+        self.calls.append(("add", len(poses.positions)))
         n, boxes = len(poses.positions), self.particle.boxes
         self.positions = np.concatenate([self.positions, poses.positions])
         self.velocities = np.concatenate([self.velocities, np.tile([0.0, 0.0, -speed], (n, 1))])
@@ -327,7 +327,7 @@ class EngineDouble:
 
     def still(self) -> None:
         assert not self.motors.articulated
-        self.told.append(("still",))
+        self.calls.append(("still",))
         self.ledger.dissipated += self.state().kinetic_energy
         self.velocities[:] = 0.0
 
@@ -372,9 +372,9 @@ class EngineDouble:
     # -- checkpoints -------------------------------------------------------------------------------------------
 
     def save(self, scratch: Path) -> Saved:
-        kept = {name: value for name, value in vars(self).items() if name not in ("particle", "cylinder", "told")}
+        kept = {name: value for name, value in vars(self).items() if name not in ("particle", "cylinder", "calls")}
         parts = {name: vars(kept.pop(name)) for name in ("boundaries", "motors", "strings", "ledger")}
-        content = {name: {key: value for key, value in part.items() if key != "told"} for name, part in parts.items()}
+        content = {name: {key: value for key, value in part.items() if key != "calls"} for name, part in parts.items()}
         time, steps = kept.pop("time"), kept.pop("steps")
         return Saved(content=pickle.dumps((kept, content)), memory={"time": time, "steps": steps})
 

@@ -22,7 +22,7 @@ from smarticles.main import build_parser
 PAGES = {page.name: page for page in pages()}
 FOLLOWED = [name for name, page in PAGES.items() if any(block.language in RUN for block in page.blocks)]
 COLOURS = 128
-"""Colours of a committed picture: it is half as large as with all of them, and looks alike."""
+"""Colours of a committed picture: half the size of all of them, and no visible difference."""
 
 
 @pytest.fixture(scope="module")

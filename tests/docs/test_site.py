@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 import re
 import subprocess
@@ -10,13 +9,10 @@ import sys
 from html.parser import HTMLParser
 from pathlib import Path
 
-import numpy as np
 import pytest
 from pages import DOCS, REPOSITORY
 
-import dem.record.frame
 from dem.record.columns import EVERY, FIELDS, MOTOR_FIELDS
-from dem.record.frame import centreline_mesh
 from dem.scene.reading import json_schema
 from postprocess.measures.registry import registered
 from smarticles.main import build_parser
@@ -107,19 +103,3 @@ def test_every_folder_of_results_is_listed_with_its_finding(site: Path) -> None:
         assert re.search(rf"results/{re.escape(folder)}(?![\w-])", text), (
             f"results/{folder}/README.md: begin with '# …' and '> the finding, with its numbers'"
         )
-
-
-def test_frames_have_the_documented_fields() -> None:
-    one = np.zeros((1, 4, 3))
-    links = np.zeros((1, 3, 3))
-    count = np.zeros(1, dtype=np.int64)
-    mesh = centreline_mesh(one, velocities=links, spins=links, contacts=count, time=0.0, floor=0.0, phase=0)
-    assert list(mesh.cell_data) == list(FIELDS)
-    source = Path(dem.record.frame.__file__).read_text(encoding="utf-8")
-    assert all(f'"{name}":' in source for name in MOTOR_FIELDS)
-
-
-def test_search_index_is_there(site: Path) -> None:
-    text = (site / "searchindex.js").read_text(encoding="utf-8")
-    index = json.loads(text.removeprefix("Search.setIndex(").removesuffix(")"))
-    assert len(index["docnames"]) > 20

@@ -35,27 +35,8 @@ def test_one_version_everywhere() -> None:
     assert said.split() == ["smarticles", version]
 
 
-def test_day_of_the_release_is_the_same_everywhere() -> None:
+def test_day_of_the_release_is_equal_everywhere() -> None:
     changes = (REPOSITORY / "CHANGELOG.md").read_text(encoding="utf-8")
     day = re.search(r"^## \d+\.\d+\.\d+ \((.+)\)$", changes, re.MULTILINE)
     assert day is not None, "the newest section of CHANGELOG.md: '## VERSION (YYYY-MM-DD)'"
     assert day[1] == _citation()["date-released"] == datetime.date.fromisoformat(day[1]).isoformat()
-
-
-def test_citation_follows_its_format() -> None:
-    """Citation File Format 1.2.0: required keys, an entity as author, an SPDX licence."""
-    citation = _citation()
-    assert citation["cff-version"] == "1.2.0"
-    assert isinstance(citation["message"], str)
-    assert isinstance(citation["title"], str)
-    assert citation["type"] == "software"
-    assert citation["authors"] == [{"name": "The smarticle simulator's authors"}]
-    assert citation["license"] == _project()["license"]["text"]
-    for work in citation["references"]:
-        assert {"type", "title", "authors"} <= set(work)
-        assert all({"family-names", "given-names"} == set(author) for author in work["authors"])
-    known = {
-        *("cff-version", "message", "type", "title", "abstract", "authors", "version", "date-released", "license"),
-        *("keywords", "references"),
-    }
-    assert set(citation) == known

@@ -195,7 +195,7 @@ def own_contacts(engine: YadeEngine) -> int:
 
 
 def reloaded(data: dict[str, Any], *, angle: float, spin: Any, folder: str) -> dict[str, Any]:
-    """A smarticle whose barbs are at an angle [rad] saves itself and loads what it saved, and its motors look again."""
+    """Save and load a smarticle whose barbs are at an angle [rad], and let its motors update."""
     scene, engine = floating(data, spin=spin)
     engine.motors.articulate()
     for _ in drive(engine, scene, 0.25, lambda _: [angle, angle]):
@@ -204,7 +204,12 @@ def reloaded(data: dict[str, Any], *, angle: float, spin: Any, folder: str) -> d
     engine.load(engine.save(Path(folder)), Path(folder))
     loaded = (engine.motors._hinges.angles(), engine.motors._hinges.gaps(), engine.motors._hinges.torques())
     engine.motors.actuate(np.full((1, 1, 2), angle), scene.fidelity.control_interval_s)
-    return {"saved": saved, "loaded": loaded, "looked": engine.motors._hinges.torques(), "state": engine.state().angles}
+    return {
+        "saved": saved,
+        "loaded": loaded,
+        "after": engine.motors._hinges.torques(),
+        "state": engine.state().angles,
+    }
 
 
 # -- hinges and motors -------------------------------------------------------------------------------------------------

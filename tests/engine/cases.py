@@ -197,11 +197,11 @@ def watched(data: dict[str, Any], out: str, each: Callable[[YadeEngine, int], No
     """A whole run; `each` gets engine and phase at every sample."""
     record = Recorder.record
 
-    def look(recorder: Recorder, engine: YadeEngine, phase: int) -> None:
+    def record_and_note(recorder: Recorder, engine: YadeEngine, phase: int) -> None:
         record(recorder, engine, phase)
         each(engine, phase)
 
-    with patch.object(Recorder, "record", look):
+    with patch.object(Recorder, "record", record_and_note):
         answer = run(data, out)
     assert answer["error"] is None, answer
 
@@ -227,7 +227,7 @@ def noted(data: dict[str, Any], out: str) -> list[dict[str, Any]]:
 
 
 def thrown(data: dict[str, Any], *, count: int, speed: float, steps: int, every: int) -> dict[str, Any]:
-    """A layer of random poses thrown at the floor of a container that is shaken: vertices, touches at every look."""
+    """A layer of random poses thrown at the floor of a container that is shaken: vertices, touches at every check."""
     scene = scene_of(data)
     engine = build_engine(scene, time_step(scene))
     rng = np.random.default_rng(scene.seed)

@@ -15,8 +15,6 @@ from dem.run.build import build_engine
 from dem.scene.scene import Scene
 from validation.bench import add, scene_of
 
-TURNED = Rotation.from_rotvec([0.0, 0.0, 0.3])
-
 
 def single(data: dict[str, Any], rotation: Rotation) -> tuple[Scene, YadeEngine]:
     """One smarticle alone in the plane, its motors holding; its barb tips lie on the x-axis unless it is turned."""

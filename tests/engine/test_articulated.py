@@ -90,7 +90,7 @@ def test_welding_takes_the_energy_of_relative_motion_and_nothing_else(simulate: 
 
 @pytest.fixture(scope="module")
 def piles(worker: Any) -> dict[str, dict[str, Any]]:
-    """The same pile left alone, split; split and left alone, split and welded."""
+    """One pile left alone, split; split and left alone, split and welded."""
     data = {"schema_version": 1, "seed": 1, "count": 6, "fidelity": "draft", "phases": ACTUATED}
     return {
         change: worker.submit(articulated_cases.resting_pile, data, count=6, settle=0.8, change=change).result(300)
@@ -179,7 +179,7 @@ def test_motors_know_their_barbs_after_a_reload(simulate: Simulate, data: SceneD
     assert found["loaded"][0] == pytest.approx(np.full((1, 2), angle), abs=0.01)
     assert found["state"] == pytest.approx(found["loaded"][0], abs=1e-3)
     # The next control update twists the shafts for where the barbs are: 3e-3 N m/rad, a hundredth of a radian at most.
-    assert np.abs(found["looked"]).max() < 3e-5
+    assert np.abs(found["after"]).max() < 3e-5
 
 
 # -- motors ------------------------------------------------------------------------------------------------------------

@@ -24,7 +24,7 @@ def test_a_hook_reads_the_weight_that_hangs_on_it(simulate: Simulate, scene_data
     assert hung["speed"] < 1e-6
     assert upper == pytest.approx([0, 0, -hung["weight"]], abs=5e-3 * hung["weight"])
     assert np.abs(lower).max() == 0
-    # Raised at constant speed it reads the same, and what hangs on it comes along.
+    # Raised at constant speed it reads as much, and what hangs on it comes along.
     assert hung["moving"][1] == pytest.approx([0, 0, -hung["weight"]], abs=5e-3 * hung["weight"])
     assert hung["raised"] == pytest.approx(hung["expected"], rel=1e-9)
     assert hung["carried"] == pytest.approx(hung["expected"], rel=5e-3)

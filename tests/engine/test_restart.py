@@ -106,7 +106,7 @@ def test_a_damaged_checkpoint_falls_back_to_the_one_before(halfway: tuple[Path, 
     assert differing(results(whole), results(out)) == []
 
 
-def test_without_a_whole_checkpoint_a_run_says_so_and_touches_nothing(
+def test_without_a_whole_checkpoint_a_run_reports_it_and_changes_nothing(
     halfway: tuple[Path, Path, Path], tmp_path: Path
 ) -> None:
     scene, _, killed = halfway

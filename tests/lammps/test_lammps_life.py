@@ -49,7 +49,7 @@ def poured(engine: LammpsEngine, seed: int, bottom: float) -> None:
     engine.add(poses, speed=0.3)
 
 
-def test_a_saved_simulation_goes_on_to_the_same_bits(build: Build, tmp_path: Path) -> None:
+def test_a_saved_simulation_continues_bit_by_bit(build: Build, tmp_path: Path) -> None:
     scene = small({"engine": "lammps", "container": {"radius_m": 0.0105}})
     engine = build(scene)
     poured(engine, 1, 1e-4)
@@ -122,7 +122,7 @@ def _await(done: Callable[[], bool], what: str) -> None:
         time.sleep(0.1)
 
 
-def test_a_run_whose_rank_is_killed_says_so_loses_nothing_and_goes_on(
+def test_a_run_whose_rank_is_killed_reports_it_loses_nothing_and_continues(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("SMARTICLES_RANKS", "2")

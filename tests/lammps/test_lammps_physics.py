@@ -30,7 +30,7 @@ def put(
     engine.add(Poses(np.array(places), given), speed=speed)
 
 
-def test_one_rank_and_two_move_the_same_smarticles_alike(build: Build) -> None:
+def test_one_rank_and_two_move_smarticles_alike(build: Build) -> None:
     """Sums of forces differ in their last digits alone, which have not grown yet."""
     rng = np.random.default_rng(2)
     turns = tuple(Rotation.random(4, random_state=rng))

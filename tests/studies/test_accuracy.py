@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import pytest
-from synthetic import SyntheticRun, write_run
+from synthetic import SyntheticRun
 from synthetic.hooked import weight, write_hooked_run
 
 from postprocess.statistics.points import ASPECT, SEED, marked
@@ -33,7 +33,6 @@ from studies.accuracy import (
 )
 from studies.framework.findings import Outcome
 from studies.framework.runs import ENGINE, read_runs
-from studies.framework.study import Report
 
 RESULTS = Path(__file__).resolve().parents[2] / "results"
 STEPS = [
@@ -166,52 +165,6 @@ def run(**changes: Any) -> SyntheticRun:
         "frames_per_phase": 2,
     }
     return SyntheticRun(**{**keys, **changes})
-
-
-@pytest.fixture(scope="module")
-def ladder(tmp_path_factory: pytest.TempPathFactory) -> tuple[list[Path], Report]:
-    """Four settings with three seeds each, of which one failed and one was not started."""
-    root = tmp_path_factory.mktemp("ladder")
-    directories = []
-    for setting, level in {"base": 0.130, "half": 0.120, "quarter": 0.120, "bouncy": 0.121}.items():
-        for seed, factor in {1: 0.999, 2: 1.0, 3: 1.001}.items():
-            directories.append(root / f"{setting}_seed{seed}")
-            if (setting, seed) == ("half", 3):
-                continue
-            made = run(
-                seed=seed,
-                packing=(0.1, 0.1 * factor, level * factor, 0.2),
-                wall_s=COSTS[setting] * 2.0,
-                fidelity="standard" if setting == "quarter" else "draft",
-                status="failed" if (setting, seed) == ("bouncy", 1) else "done",
-                more=(("energy_residual_J", -2e-6), ("dissipated_energy_J", 1e-3), ("joint_gap_m", 3e-6)),
-            )
-            write_run(directories[-1], made)
-    expected = {path.name: 4.0 for path in directories}
-    return directories, study(STEPS + RESTITUTIONS, expected).analyse(directories, root / "out", **ORIGIN)
-
-
-def test_runs_are_measured(ladder: tuple[list[Path], Report]) -> None:
-    runs = ladder[1].tables["runs"].set_index("run")
-    row = runs.loc["base_seed2"]
-    assert row[COST] == pytest.approx(1.0)  # 2 s for 2 s of shaking
-    assert row[WALL] == pytest.approx(8.0)  # four phases
-    assert row[EXPECTED] == pytest.approx(2.0)
-    assert row[COMPARED["phi_f"]] == pytest.approx(0.130, rel=1e-4)  # of the shake, not of the relaxation after it
-    assert row[COMPARED["phi_0"]] == pytest.approx(0.1, rel=1e-4)
-    assert (row[RESIDUAL], row[GAP]) == pytest.approx((2e-3, 3e-6))
-    assert len(runs) == 10
-
-
-def test_the_report_advises(ladder: tuple[list[Path], Report]) -> None:
-    _, report = ladder
-    table = report.tables["work_precision"].set_index(["knob", VARIANT])
-    assert table.loc[("time-step", "base"), "phi_f error [%]"] == pytest.approx(100 * (0.13 / 0.12 - 1), rel=1e-3)
-    assert table.loc[("time-step", "half"), "seeds [-]"] == 2
-    assert report.judged[0].ours.startswith("use 0.45, ")
-    assert {"work_precision.csv", "findings.md", "accuracy.png"} <= set(report.files)
-    assert len(report.rows) == 5
-    assert any("10 of 12 runs, 2 missing" in line for line in report.footer)
 
 
 def test_scenes_with_a_hook_are_compared_by_its_peak_force_too(tmp_path: Path) -> None:

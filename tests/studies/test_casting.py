@@ -11,8 +11,7 @@ import pytest
 from numpy.typing import NDArray
 from synthetic.released import stack, write_released
 
-from dem.record.run import Run, open_run
-from postprocess.measures.mould import read_tiers
+from dem.record.run import open_run
 from studies.casting import (
     FILLED,
     FILLED_AFTER,
@@ -26,7 +25,6 @@ from studies.casting import (
     WHOLE_KEPT,
 )
 
-ORIGIN = {"note": "the full study as shipped", "command": "smarticles study casting --out casting"}
 MOULD = [
     {"radius_m": 0.012, "height_m": 0.006},
     {"radius_m": 0.0108, "height_m": 0.006},
@@ -71,15 +69,3 @@ def test_a_tier_that_holds_less_than_the_ball_has_no_share(tmp_path: Path) -> No
     assert 0 < row[FILLED["upper"]] < 0.05
     assert (row[KEPT["lower"]], row[KEPT["middle"]], row[WHOLE_KEPT], row[OVERLAP]) == (1, 1, 1, 1)
     assert math.isnan(row[KEPT["upper"]])
-
-
-def test_piles_without_a_mould_are_listed_and_others_judged(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("postprocess.pictures.strip.draw_strip", lambda rows, output, **_: output)
-    piles = {"before": crossed(14), "after": crossed(14)}
-    runs = [write_released(tmp_path / f"{seed}", "static", **piles, **KEYS, seed=seed) for seed in (1, 2)]
-    plain = write_released(tmp_path / "plain", "static", **piles, aspect_ratio=0.8)
-    report = STUDY.analyse([*runs, plain], tmp_path / "out", **ORIGIN)
-    assert "a mould has 3 tiers and a neck: container.tiers has 0" in report.missing[0].cause
-    assert {one.finding.id: one.verdict for one in report.judged}["internal-fills"] == "no data"
-    assert {"tiers.png", "overlap.png", "pictures.png"} <= set(report.files)
-    assert [(tier.radius, tier.bottom) for tier in read_tiers(Run(runs[0]))][:2] == [(0.012, 0.0), (0.0108, 0.006)]

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import csv
 import json
-import shutil
 from collections import defaultdict
 from pathlib import Path
 
@@ -12,7 +11,7 @@ import pytest
 import yaml
 
 from dem.errors import InputError
-from studies.claims.__main__ import main, text
+from studies.claims.__main__ import text
 from studies.claims.verdicts import CLAIMS, Claim, claims
 
 RESULTS = Path(__file__).parents[2] / "results"
@@ -90,7 +89,7 @@ def test_two_protocols_make_one_verdict(tmp_path: Path, by_text: str, by_code: s
         ("not found", "found", "not"),
     ],
 )
-def test_a_test_of_ours_decides_where_theirs_cannot_tell(
+def test_our_test_decides_where_theirs_is_not_resolved(
     tmp_path: Path, by_theirs: str, by_ours: str, verdict: str
 ) -> None:
     strongest = "shape-change-strongest"
@@ -99,26 +98,6 @@ def test_a_test_of_ours_decides_where_theirs_cannot_tell(
     claim = one_of(claims(written(tmp_path, theirs | ours)), "shape change has the highest peak force")
     assert claim.verdict == verdict
     assert "; by a test of ours, strength-code: " in text((claim,))
-
-
-@pytest.mark.parametrize(
-    ("links", "yade", "stated"),
-    [
-        ("found", "found", "1 claims: 1 verdicts are equal. Opposite, for the reason given there: none"),
-        ("found", "not found", "0 verdicts are equal. Opposite, for the reason given there: 37 by the text. Res"),
-        ("not found", "not resolved", "with more runs: 37 by the text. By YADE alone: none"),
-        ("not resolved", "not found", "with more runs: none. By YADE alone: 37 by the text."),
-        ("found", "no data", "judge 0 findings of 0 claims"),
-    ],
-)
-def test_where_engines_do_not_agree_is_stated(tmp_path: Path, links: str, yade: str, stated: str) -> None:
-    results = written(tmp_path, {("procedures", HIGHEST): links})
-    shutil.copytree(results / "procedures", results / "procedures-yade")
-    findings = results / "procedures-yade" / "findings.csv"
-    findings.write_text(f"finding in the paper,ours,verdict,criterion\n{HIGHEST},ours,{yade},criterion\n")
-    page = text((one_of(claims(results), MOST),))
-    assert stated in page
-    assert ("(otherwise on YADE)" in page) == ((links, yade) == ("found", "not found"))
 
 
 def test_a_finding_that_is_not_there_is_named(tmp_path: Path) -> None:
@@ -140,10 +119,3 @@ def test_what_is_shipped_says_what_the_tables_beside_it_say() -> None:
         tested = [one for one in (claim.tested["text"], claim.tested["code"]) if one is not None]
         assert all(one.ours for one in tested)
         assert tested or claim.why
-
-
-def test_the_command_writes_page_and_table(tmp_path: Path) -> None:
-    results = written(tmp_path, {})
-    main([str(results)])
-    assert (results / "CLAIMS.md").read_text(encoding="utf-8").startswith("# The paper's claims")
-    assert (results / "claims.csv").is_file()

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection, Mapping, Sequence
-from pathlib import Path
 
 import numpy as np
 import pandas as pd
@@ -13,7 +12,7 @@ from synthetic.columns import H0, WITH_WALL, Column, F, write_column
 
 from dem.record.run import Run, open_run
 from postprocess.measures.collapse import COM, CORE, HEIGHTS, REMAINING, column_history, period_means, vibration
-from postprocess.statistics.points import ASPECT, SEED, SEEDS
+from postprocess.statistics.points import ASPECT, SEED
 from studies.collapse import (
     ACTIVATION,
     AT_LEAST,
@@ -22,19 +21,12 @@ from studies.collapse import (
     DELTA,
     GAMMA,
     LOG,
-    REFERENCE,
-    STUDY,
     TIME,
     USED,
     activations,
     measure,
     times,
 )
-from studies.framework.findings import Verdict
-
-ORIGIN = {"note": "the full study as shipped", "command": "smarticles study collapse --out 'my study'"}
-DELTAS = {0.13: 6.0, 0.40: 9.0, 1.02: 7.5}
-FACTORS = {1: 0.98, 2: 1.0, 3: 1.02}
 
 
 def tau(delta: float, gamma: float) -> float:
@@ -78,41 +70,6 @@ def test_a_mean_over_a_period_does_not_see_the_bouncing_within() -> None:
     assert abs(means.mean() - 1) < 0.01
 
 
-def test_a_study_that_obeys_the_law(tmp_path: Path) -> None:
-    runs = [
-        write_column(
-            tmp_path / f"lw{aspect}_gamma{gamma}_seed{seed}",
-            Column(
-                tau=tau(factor * delta, gamma),
-                aspect_ratio=aspect,
-                gamma=gamma,
-                seed=seed,
-                status="failed" if (seed, aspect, gamma) == (3, 0.13, 4.0) else "done",
-            ),
-        )
-        for seed, factor in FACTORS.items()
-        for aspect, delta in DELTAS.items()
-        for gamma in (2.5, 4.0)
-    ]
-    report = STUDY.analyse(runs, tmp_path / "out", **ORIGIN)
-    # 9 is not Gravish's 15.
-    assert {one.finding.id: str(one.verdict) for one in report.judged} == {
-        "gentler-is-later": "found",
-        "law": "found",
-        "greatest-between": "found",
-        "as-gravish": "not found",
-    }
-    table = report.tables["points"].set_index([DEFINITION, ASPECT]).loc[REMAINING]
-    # Whole smarticles leave: τ is known to 2 %, Δ to 0.02 Γ. The seed whose run at Γ = 4 failed does not count.
-    assert table[ACTIVATION].to_dict() == pytest.approx(DELTAS, abs=0.08)
-    assert table[SEEDS].tolist() == [2, 3, 3]
-    assert table[REFERENCE].tolist() == [9, 15, 11]
-    expected = np.std([9 * factor for factor in FACTORS.values()], ddof=1) / math.sqrt(3)
-    assert table.loc[0.4, "Delta SE [-]"] == pytest.approx(expected, abs=0.05)
-    assert {f"{name}.png" for name in ("height_time", "time_acceleration", "delta_aspect")} <= set(report.files)
-    assert [missing.cause for missing in report.missing] == ["a smarticle escaped"]
-
-
 def rows_of(
     seeds_of: Mapping[tuple[float, float], Sequence[float]], *, bounds: Collection[tuple[float, float, int]] = ()
 ) -> pd.DataFrame:
@@ -127,10 +84,6 @@ def rows_of(
     return pd.DataFrame(rows)
 
 
-def verdicts(runs: pd.DataFrame) -> list[Verdict]:
-    return [one.verdict for one in STUDY.judge({"runs": runs, "points": activations(runs)})]
-
-
 def test_a_run_that_did_not_collapse_is_a_bound_and_never_dropped() -> None:
     seeds = {(0.4, gamma): [tau(factor * 9, gamma) for factor in (0.9, 1.0, 1.1)] for gamma in (2.0, 4.0)}
     seeds[0.4, 2.0] = [min(time, tau(9, 2.0)) for time in seeds[0.4, 2.0]]
@@ -143,29 +96,3 @@ def test_a_run_that_did_not_collapse_is_a_bound_and_never_dropped() -> None:
     # The one seed that collapsed at Γ = 2 is not taken for all: Δ is that of Γ = 4, beside the bound.
     assert (row[ACTIVATION], row[AT_LEAST]) == pytest.approx((9, 8.7))
     assert (row[CENSORED], row[USED]) == (2, "4")
-
-
-def test_without_any_collapse_there_is_only_a_bound() -> None:
-    found = rows_of({(0.4, 2.5): [3.0, 3.0, 3.0]}, bounds={(0.4, 2.5, seed) for seed in (1, 2, 3)})
-    row = activations(found).iloc[0]
-    assert math.isnan(row[ACTIVATION])
-    assert row[AT_LEAST] == pytest.approx(2.5 * math.log(90))
-    assert set(verdicts(found)) == {"no data"}
-
-
-def test_times_that_do_not_obey_the_law_refute_it() -> None:
-    # τ hardly depends on Γ: Γ ln(fτ) grows with Γ by 46 %.
-    assert verdicts(rows_of({(0.4, gamma): [0.9, 1.0, 1.1] for gamma in (2.5, 4.0)}))[:2] == [
-        "not resolved",
-        "not found",
-    ]
-    assert verdicts(rows_of({(0.4, 2.5): [0.9, 1.0, 1.1], (0.4, 4.0): [1.9, 2.0, 2.1]}))[0] == "not found"
-
-
-def test_a_maximum_at_an_end_is_not_found() -> None:
-    seeds = {
-        (aspect, 2.5): [tau(factor * delta, 2.5) for factor in (0.99, 1, 1.01)]
-        for aspect, delta in {0.13: 6.0, 0.4: 9.0, 1.02: 10.0}.items()
-    }
-    assert verdicts(rows_of(seeds))[2] == "not found"
-    assert verdicts(rows_of({key: value for key, value in seeds.items() if key[0] != 0.13}))[2] == "no data"

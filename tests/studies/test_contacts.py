@@ -86,16 +86,6 @@ def test_effects_are_those_put_in_and_what_a_seed_shares_is_no_scatter() -> None
     assert by_seed(interaction, PHI_F, WALL)[PHI_F].to_numpy() == pytest.approx(-0.005)
 
 
-def test_each_verdict_is_given_to_data_that_deserve_it() -> None:
-    one = verdicts(runs_of({PHI_F: {FRICTION: -0.02, WALL: 0.01}, RISEN: {WALL: 0.1}}))
-    expected = {"phi-f-friction": "found", "phi-f-container": "not found", "phi-f-restitution": "not resolved"}
-    expected |= {"phi-0-friction": "not resolved", "friction-more-than-container": "found"}
-    assert {name: one[name] for name in expected} == expected
-    assert one["container-raises-lowest"] == "found"
-    other = verdicts(runs_of({PHI_F: {WALL: -0.02}}, together=-0.01))
-    assert (other["friction-more-than-container"], other["frictions-together"]) == ("not found", "found")
-
-
 def test_what_is_missing_takes_its_pairs_with_it_and_is_not_accepted() -> None:
     runs = runs_of(noise=1e-4)
     right = (runs[FRICTION] == 0.8) & (runs[WALL] == 0.4) & (runs[RESTITUTION] == 0.7)

@@ -10,7 +10,6 @@ from synthetic import write_run
 
 from dem.errors import InputError
 from dem.scene.reading import dump_scene
-from smarticles.main import main
 from studies.framework.runs import MeasuredRun, Wanted, collect_runs, earlier_runs
 from studies.registry import shipped, study_file
 from templates.sweep.expand import Point, expand
@@ -48,7 +47,7 @@ def test_a_run_is_what_the_table_and_the_provenance_say(wanted: dict[str, Wanted
     assert run.run.manifest.versions["git"] in (RESULTS / "provenance.json").read_text()
 
 
-def test_the_same_tables_come_out_again(wanted: dict[str, Wanted], tmp_path: Path, undrawn: None) -> None:
+def test_the_tables_are_reproduced(wanted: dict[str, Wanted], tmp_path: Path, undrawn: None) -> None:
     report = (
         shipped("procedures")
         .load()
@@ -115,18 +114,3 @@ def test_a_directory_that_is_there_goes_before_the_tables(wanted: dict[str, Want
     write_run(there)
     found = collect_runs("test", [there, gone], lambda run: MeasuredRun(run=run, rows=[{"new": 1}]), earlier=earlier)
     assert [run.row.get("new") for run in found.runs] == [1, None]
-
-
-def test_a_study_that_draws_from_its_runs_says_so(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    out = str(tmp_path / "out")
-    assert main(["study", "casting", "--quick", "--out", out, "--analyse", "--earlier", str(RESULTS)]) == 2
-    assert "--earlier" in capsys.readouterr().err
-
-
-def test_tables_of_other_scenes_are_rejected_before_anything_runs(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    arguments = ["study", "procedures", "--quick", "--out", str(tmp_path / "p"), "--earlier", str(RESULTS)]
-    assert main(arguments) == 2
-    assert "runs is of a scene of this study as it is" in capsys.readouterr().err
-    assert not (tmp_path / "p" / "runs").exists()

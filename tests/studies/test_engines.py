@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 from synthetic import SyntheticRun, write_manifest, write_run
 
-from studies.engines import COMPARED, STUDY, pitch_of
+from studies.engines import STUDY
 from studies.framework.findings import within
 from studies.framework.study import Report
 
@@ -93,9 +93,3 @@ def test_chains_are_followed_to_links(report: Report) -> None:
 )
 def test_a_number_within_a_margin(percent: float, half_width: float, verdict: str) -> None:
     assert within(percent, half_width, 5.0) == verdict
-
-
-def test_pitches() -> None:
-    assert [pitch_of(name) for name in ("links", "yade", "pitch-0.25")] == [0, 1, 0.25]
-    assert math.isnan(pitch_of("other"))
-    assert all(one.why for one in COMPARED)

@@ -5,7 +5,6 @@ Every figure that any test of a study draws is checked, see `conftest.checked_fi
 
 from __future__ import annotations
 
-import ast
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -14,7 +13,6 @@ import pytest
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-import studies
 from postprocess.report import figures
 from studies.framework.figures import BARS, draw_bounds, draw_means, finish, marker
 from studies.framework.shaken import gravish_note
@@ -46,20 +44,6 @@ def test_error_bars_are_named_once_and_only_where_there_are_any(tmp_path: Path) 
     points(axes, [1.0, 2.0], [np.nan, np.nan])
     draw_bounds(axes, [0.0, 1.0], [1.0, np.nan], 0.2, look=LOOK)
     assert footer(figure, tmp_path) == " ".join(ORIGIN)
-
-
-def test_no_study_draws_error_bars_by_itself() -> None:
-    """So that all are of one kind: `framework.figures` draws those of 95 %, and names them."""
-    own = []
-    for path in Path(studies.__file__).parent.rglob("*.py"):
-        called = {
-            node.func.attr
-            for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
-            if isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute)
-        }
-        if called & {"errorbar", "savefig", "add_footer"}:
-            own.append("/".join(path.parts[-2:]))
-    assert own == ["framework/figures.py"]
 
 
 # -- limits ----------------------------------------------------------------------------------------------------------
@@ -103,7 +87,7 @@ def test_what_a_logarithmic_axis_cannot_show_is_stated(
 # -- points that were never digitised ----------------------------------------------------------------------------------
 
 
-def test_references_tell_where_they_have_no_point() -> None:
+def test_references_state_where_they_have_no_point() -> None:
     assert gravish_note([0.4, 0.7]).endswith("at every l/w shown.")
     assert gravish_note([0.4, 0.5, 0.55]).endswith("no φ_0 at l/w = 0.5, 0.55; no φ_f at l/w = 0.55.")
 

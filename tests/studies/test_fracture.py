@@ -36,7 +36,6 @@ from studies.fracture import (
 )
 from studies.framework.procedures import CROSSINGS, EXTERNAL, INTERNAL, PHI, PROCEDURE, SHAPE, STATIC, THETA
 
-ORIGIN = {"note": "the full study as shipped", "command": "smarticles study fracture --out fracture"}
 ACTIVITY = {EXTERNAL: "shake", SHAPE: "shape-change", INTERNAL: "internal-oscillation"}
 TOP, APEX, BASE = 0.6, 0.5, 0.4  # of a triangular history of force over the weight of all [-, s, s]
 DEPTH = 0.01  # packing fraction at which twelve smarticles bury the hook
@@ -85,17 +84,6 @@ def test_a_hook_that_stops_on_the_way_was_held_fast(tmp_path: Path) -> None:
     assert (row[HELD_FAST], row[LIMIT], row[PEAK]) == (1, pytest.approx(1.5), pytest.approx(1.5, rel=1e-3))
 
 
-def test_every_figure_is_drawn_and_other_runs_are_listed(tmp_path: Path) -> None:
-    runs = [write(tmp_path / f"{name}{seed}", name, seed=seed) for name in (STATIC, SHAPE) for seed in (1, 2)]
-    runs += [write(tmp_path / f"internal{theta:g}", INTERNAL, theta=theta) for theta in (10.0, 30.0)]
-    runs += [write(tmp_path / "long", INTERNAL, aspect_ratio=1.0)]
-    phases = ("deposit", "pull-hook")
-    other = write_hooked_run(tmp_path / "other", made(STATIC, phases=phases, packing=(0.1,) * 2), np.zeros_like)
-    report = STUDY.analyse([*runs, other], tmp_path / "out", **ORIGIN)
-    assert {f"{figure.name}.png" for figure in STUDY.figures} <= set(report.files)
-    assert "its phases are deposit, pull-hook, not" in report.missing[0].cause
-
-
 def sample(procedure: str, seed: int, peak: float, crossings: float, **others: float) -> dict[str, object]:
     named = {PROCEDURE: procedure, SEED: seed, PEAK: peak, NET: peak, CROSSINGS: crossings}
     return named | {THETA: math.nan, ASPECT: 0.7, RAISED: 0.01, HELD_FAST: 0.0} | others
@@ -118,15 +106,6 @@ def as_in_the_paper() -> pd.DataFrame:
 
 def verdicts(table: pd.DataFrame) -> list[str]:
     return [str(finding.judge(table).verdict) for finding in STUDY.findings]
-
-
-def test_findings_of_the_paper_are_found_and_the_opposite_is_not() -> None:
-    table = as_in_the_paper()
-    assert verdicts(table) == ["found"] * 6
-    table[PEAK], table[RAISED] = 2 - table[PEAK], 0.02 - table[RAISED]
-    # That procedures have another order by force than by entanglement holds then as well.
-    assert verdicts(table) == ["not found", "not found", "found", "not found", "not found", "not found"]
-    assert verdicts(table[table[PROCEDURE] == STATIC]) == ["no data"] * 6
 
 
 def test_a_lower_bound_is_enough_to_be_above_another_and_not_to_be_below() -> None:

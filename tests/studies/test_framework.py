@@ -141,9 +141,3 @@ def test_runs_that_must_not_be_averaged_are_rejected(
     with pytest.raises(InputError, match=message):
         TOY.analyse([runs[0], write(tmp_path / "other", **{"seed": 5, **other})], tmp_path / "out", **ORIGIN)
     assert list((tmp_path / "out").iterdir()) == []
-
-
-def test_an_output_that_is_a_file_is_rejected(runs: list[Path], tmp_path: Path) -> None:
-    (tmp_path / "out").write_text("")
-    with pytest.raises(InputError, match="choose another folder as output"):
-        TOY.analyse(runs, tmp_path / "out", **ORIGIN)

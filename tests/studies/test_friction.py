@@ -8,19 +8,15 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pandas as pd
 import pytest
 from synthetic import SyntheticRun, write_run
 
-from postprocess.statistics.points import ASPECT
 from postprocess.statistics.seeds import Scatter
 from studies.framework.shaken import DIGITISING_ERROR, FRICTION, phi
-from studies.friction import GROWTHS, STUDY, Curve
+from studies.friction import STUDY, Curve
 
 ORIGIN = {"note": "the full study as shipped", "command": "smarticles study friction --out friction"}
 FRICTIONS = np.array([0.2, 0.4, 0.6, 0.8])
-# Gravish's φ_0 and φ_f; there is no φ_0 at l/w = 1.
-GRAVISH = {0.4: (0.1425, 0.163), 0.7: (0.105, 0.130), 1.0: (None, 0.105)}
 
 
 def curve(reference: float, half_width: float = 0.004, packing: Any = 0.20 - 0.2 * (FRICTIONS - 0.2)) -> Curve:
@@ -56,73 +52,6 @@ def test_odd_curves_have_crossings() -> None:
     error = float(curve(0.16).error(np.array([0.4]))[0])
     assert curve(0.16 - error).within(10.0, 0.4) == pytest.approx(1)
     assert curve(0.16 - 2 * error).within(error, 0.4) == pytest.approx(0.025, abs=1e-3)
-
-
-def runs_of(
-    *, at: float = 0.5, before: float | None = None, relaxed: float = 1.08, noise: float = 0.002
-) -> pd.DataFrame:
-    """φ is Gravish's at the friction `at`, φ_0 at `before` if elsewhere, and falls by 0.6 of it per 1."""
-    rows = []
-    for aspect, (initial, final) in GRAVISH.items():
-        for friction in (0.2, 0.4, 0.5, 0.65, 0.8):
-            fall_0, fall_f = (1 - 0.6 * (friction - place) for place in (at if before is None else before, at))
-            for seed, factor in ((1, 1 - noise), (2, 1.0), (3, 1 + noise)):
-                first, last = (initial or 0.09) * fall_0 * factor, final * fall_f * factor
-                stages = {"phi_0": first, "phi 5 s": 0.9 * last, "phi 10 s": 0.95 * last, "phi 20 s": last}
-                stages |= {"phi_f": last, "phi_f relaxed": 1.08 * last}
-                place = {ASPECT: aspect, FRICTION: friction, "seed": seed, "smarticles [-]": 9}
-                rows.append(place | {phi(stage): value for stage, value in stages.items()})
-    return pd.DataFrame(rows)
-
-
-def verdicts(runs: pd.DataFrame) -> dict[str, str]:
-    return {one.finding.id: str(one.verdict) for one in STUDY.judge(STUDY.tabulate(runs))}
-
-
-def test_points_have_the_error_of_their_seeds_and_deviations_also_gravishs() -> None:
-    tables = STUDY.tabulate(runs_of())
-    row = tables["points"].set_index(["stage", ASPECT, FRICTION]).loc[("phi_f", 0.7, 0.5)]
-    half_width = 2.042272 * 0.002 * 0.130 / math.sqrt(3)  # t(0.975; 30), pooled over 15 points
-    assert (row["phi [-]"], row["phi 95 % [-]"]) == pytest.approx((0.130, half_width), rel=1e-3)
-    assert row["deviation 95 % [%]"] == pytest.approx(100 * math.hypot(half_width, 0.003) / 0.130, rel=1e-3)
-    found = tables["crossings"].set_index(["stage", ASPECT])[FRICTION]
-    assert found["phi_f"].tolist() == pytest.approx([0.5] * 3)
-    assert len(found["phi_0"]) == 2
-    assert tables["growth"][GROWTHS[1]].tolist() == pytest.approx([100 * (1 / 0.95 - 1)] * 15)
-
-
-def test_one_friction_for_all_is_found_and_different_ones_are_rejected() -> None:
-    found = verdicts(runs_of())
-    assert (found["one-friction-phi-0-and-phi-f"], found["common-friction"]) == ("found", "found")
-    # At rest again piles are 8 % denser: another friction would do, but not together with φ_0.
-    assert found["one-friction-phi-f-relaxed"] == "found"
-    assert found["one-friction-phi-0-and-phi-f-relaxed"] != "found"
-    apart = verdicts(runs_of(before=0.2, at=0.8))
-    assert (apart["one-friction-phi-0"], apart["one-friction-phi-0-and-phi-f"]) == ("found", "not found")
-    assert apart["common-friction"] == "not found"
-    assert verdicts(runs_of(noise=0.2))["one-friction-phi-f"] == "not resolved"
-
-
-@pytest.mark.parametrize(
-    ("at", "papers", "steel"),
-    [(0.4, "found", ("found", "not found")), (0.76, "not found", ("not found", "found"))],
-)
-def test_the_papers_friction_and_steel_are_judged(at: float, papers: str, steel: tuple[str, str]) -> None:
-    found = verdicts(runs_of(at=at, noise=1e-4))
-    assert found["papers-friction"] == papers
-    # Reading Gravish's points to 0.003 makes ± 0.03 to 0.05 of friction, more than clean steel spans.
-    assert found["dry-steel-as-it-comes"] == steel[0]
-    assert found["clean-dry-steel"] in (steel[1], "not resolved")
-
-
-def test_growth_is_judged_by_all_points() -> None:
-    runs = runs_of()
-    runs[phi("phi 20 s")] *= 1 + 0.02 * runs[FRICTION]
-    names = ("still-grows", "grows-more-with-friction")
-    assert [verdicts(runs)[name] for name in names] == ["found", "found"]
-    runs[phi("phi 20 s")] = runs[phi("phi 10 s")] * (0.99 - 0.02 * runs[FRICTION])
-    assert [verdicts(runs)[name] for name in names] == ["not found", "not found"]
-    assert verdicts(runs.drop(columns=phi("phi 20 s")))["still-grows"] == "no data"
 
 
 def test_what_was_put_into_runs_is_found(tmp_path: Path) -> None:

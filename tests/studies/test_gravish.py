@@ -50,14 +50,6 @@ def test_a_fall_is_monotone_unless_a_step_clearly_rises() -> None:
     assert verdict("phi-0-falls", clear, {1: 0.0}) == "not resolved"  # one seed
 
 
-def test_compaction_and_nearness_are_judged() -> None:
-    near = {0.4: (0.1425, 0.163), 0.7: (0.105, 0.130)}
-    assert (verdict("compacts", near), verdict("phi-f-near", near)) == ("found", "found")
-    assert verdict("compacts", {0.4: (0.15, 0.14), 0.7: (0.1, 0.13)}) == "not found"
-    assert verdict("phi-0-near", {0.7: (0.12, 0.13)}) == "not found"
-    assert verdict("phi-0-near", {0.5: (0.12, 0.13)}) == "not resolved"  # Gravish has no φ_0 there
-
-
 def test_runs_have_the_packing_put_in(tmp_path: Path) -> None:
     keys = {"phases": ("deposit", "relax", "shake", "relax"), "shake_time": 1.0, "frames_per_phase": 2}
     runs = [

@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
-import pandas as pd
 import pytest
 from synthetic import SyntheticRun, write_run
 
@@ -65,14 +64,6 @@ def test_hours_are_those_planned_and_those_that_finished_runs_took(studies: Path
     assert (yade[PLANNED], yade[EXPECTED], yade[TAKEN]) == pytest.approx((2.0, 1.0, 2.0))
     assert (links[OVER], yade[OVER]) == pytest.approx((0.5, 2.0))
     assert (every[RUNS], every[DONE], every[TAKEN]) == pytest.approx((4, 2, 2.005))
-
-
-def test_the_table_is_printed_and_written(studies: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    out = tmp_path / "there" / "is none yet"
-    main([str(studies), "two", "--out", str(out)])
-    line = next(line for line in capsys.readouterr().out.splitlines() if "links" in line)
-    assert line.split() == ["two", "links", "2", "0.02", "1", "0.01", "0.01", "0.50"]
-    assert len(pd.read_csv(out / "hours.csv")) == 3
 
 
 def test_what_holds_no_study_is_rejected(studies: Path, tmp_path: Path) -> None:

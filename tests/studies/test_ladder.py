@@ -12,13 +12,10 @@ from dem.scene.scene import Scene
 from dem.setting.fidelity import FIDELITIES, fidelities
 from studies.accuracy import (
     BASE,
-    KNOBS,
     Ladder,
     affordable,
     build_ladder,
-    default_seeds,
     ladder_sweep,
-    parse_knobs,
     parse_seeds,
 )
 from templates.sweep.expand import expand
@@ -34,7 +31,6 @@ phases:
   - {type: relax, duration_s: 0.3}
   - {type: shake, duration_s: 1.5}
 """
-OSCILLATION = SCENE.replace("{type: shake, duration_s: 1.5}", "{type: internal-oscillation, theta_deg: 10}")
 
 
 @pytest.fixture
@@ -50,29 +46,6 @@ def scene_of(folder: Path, text: str = SCENE, *settings: str) -> Scene:
 
 def labels(ladder: Ladder, knob: str) -> list[tuple[str, str]]:
     return [(rung.label, rung.setting) for rung in ladder.rungs if rung.knob == knob]
-
-
-def test_each_knob_goes_from_coarse_to_fine(scene: Scene) -> None:
-    ladder = build_ladder(scene, source="scene.yaml")
-    assert ladder.knobs == ("time-step", "stiffness", "section", "restitution", "fidelity")
-    assert labels(ladder, "time-step") == [("0.9", BASE), ("0.45", "time-step-0.45"), ("0.225", "time-step-0.225")]
-    assert labels(ladder, "stiffness") == [
-        ("250 N/m", BASE),
-        ("500 N/m", "stiffness-x2"),
-        ("1000 N/m", "stiffness-x4"),
-    ]
-    assert [name for name, _ in labels(ladder, "section")] == ["pitch 1.3", "pitch 1", "pitch 0.5", "two rows"]
-    assert [name for name, _ in labels(ladder, "restitution")] == ["0.2", "0.5", "0.7", "0.9"]
-    assert labels(ladder, "fidelity") == [("draft", BASE), ("standard", "standard"), ("reference", "reference")]
-    references = {knob: rung.label for knob, rung in ladder.references().items()}
-    assert references == {
-        "time-step": "0.225",
-        "stiffness": "1000 N/m",
-        "section": "two rows",
-        "restitution": "0.7",
-        "fidelity": "reference",
-    }
-    assert ladder.left_out == ()
 
 
 def test_a_rung_differs_from_the_scene_in_its_knob_alone(scene: Scene) -> None:
@@ -114,39 +87,6 @@ def test_the_scene_has_its_own_place_among_the_rungs(tmp_path: Path) -> None:
     assert labels(ladder, "fidelity")[0] == ("draft", "draft")
 
 
-def test_knobs_of_motors_belong_to_scenes_that_actuate(tmp_path: Path) -> None:
-    ladder = build_ladder(scene_of(tmp_path, OSCILLATION), source="scene.yaml")
-    assert ladder.knobs == tuple(knob for knob in KNOBS if knob != "engine")
-    assert [name for name, _ in labels(ladder, "control")] == ["0.0004 s", "0.0002 s", "0.0001 s"]
-    assert [name for name, _ in labels(ladder, "hinge")] == ["5000 N/m", "10000 N/m", "20000 N/m"]
-    assert ladder.scenes["control-0.0001"].fidelity.control_interval_s == 1e-4
-    assert ladder.scenes["hinge-x2"].fidelity.hinge_stiffness_N_per_m == 10000
-
-
-def test_on_links_only_what_has_a_meaning_there_is_turned(tmp_path: Path) -> None:
-    scene = scene_of(tmp_path, OSCILLATION, "engine=links", "fidelity=standard")
-    ladder = build_ladder(scene, source="scene.yaml")
-    assert ladder.knobs == ("time-step", "stiffness", "section", "restitution", "control", "fidelity")
-    own = f"{scene.fidelity.stiffness_N_per_m:g} N/m"
-    values = [f"{k:g} N/m" for k in (125, 250, 500, 1000, 2000, 4000)]
-    assert labels(ladder, "stiffness") == [
-        (value, BASE if value == own else f"stiffness-{value.removesuffix(' N/m')}") for value in values
-    ]
-    assert [name for name, _ in labels(ladder, "section")] == ["1 strand", "2 strands", "3 strands"]
-    idle = ("pitch", "wall_facets", "hinge_stiffness_N_per_m")
-    assert len({tuple(getattr(one.fidelity, key) for key in idle) for one in ladder.scenes.values()}) == 1
-    # Named fidelities are those of the engine, and run once where a knob alone makes them.
-    assert [name for name, _ in labels(ladder, "fidelity")] == ["draft", "standard", "reference", "converged"]
-    for rung in ladder.rungs:
-        if rung.knob == "fidelity" and rung.value != "converged":
-            turned = ladder.scenes[rung.setting].fidelity.model_dump()
-            assert {key: turned[key] for key in turned if key != "base"}.items() >= fidelities("links")[
-                rung.value
-            ].items()
-    with pytest.raises(InputError, match="--knobs: hinge turns nothing: the engine links has no pins"):
-        build_ladder(scene, source="scene.yaml", knobs=["hinge"])
-
-
 @pytest.mark.parametrize("engine", ["yade", "links"])
 def test_the_engine_is_a_knob_with_the_finest_of_links_as_its_reference(engine: str, tmp_path: Path) -> None:
     scene = scene_of(tmp_path, SCENE, f"engine={engine}", "fidelity=standard")
@@ -165,11 +105,6 @@ def test_the_engine_is_a_knob_with_the_finest_of_links_as_its_reference(engine: 
         assert one.fidelity.model_dump().items() >= fidelities(one.engine)[name.split()[1]].items()
     points = {point.name: point.scene for point in expand(ladder_sweep(scene, ladder, (7,)))}
     assert {points[f"{setting}_seed7"].engine for setting in found.values()} == {"yade", "links"}
-
-
-def test_twenty_seeds_where_they_are_cheap(tmp_path: Path) -> None:
-    assert default_seeds(scene_of(tmp_path)) == (1, 2, 3)
-    assert default_seeds(scene_of(tmp_path, SCENE, "engine=links")) == tuple(range(1, 21))
 
 
 def test_what_the_scene_cannot_have_is_left_out_and_said(tmp_path: Path) -> None:
@@ -192,30 +127,6 @@ def test_what_takes_too_long_is_left_out_but_never_the_scene(scene: Scene) -> No
         "fidelity": "standard",
     }
     assert kept.left_out[0] == "section two rows: a run is expected to take 2 h, more than 1 h"
-
-
-@pytest.mark.parametrize(
-    ("text", "settings", "knobs", "message"),
-    [
-        (SCENE.replace("  - {type: shake, duration_s: 1.5}\n", ""), (), None, "phases: deposit, relax: no activity"),
-        (SCENE, ("fidelity.time_step_s=1e-5",), None, "fidelity.time_step_s: a step of 1e-05 s by hand"),
-        (SCENE, (), ["control"], "--knobs: control turns nothing: no phase of scene.yaml actuates"),
-    ],
-)
-def test_a_scene_that_makes_no_ladder_is_rejected(
-    text: str, settings: tuple[str, ...], knobs: list[str] | None, message: str, tmp_path: Path
-) -> None:
-    with pytest.raises(InputError, match=message) as error:
-        build_ladder(scene_of(tmp_path, text, *settings), source="scene.yaml", knobs=knobs)
-    assert "\n" not in str(error.value)
-
-
-def test_knobs_are_known_and_in_order() -> None:
-    assert parse_knobs("fidelity, time-step") == ("time-step", "fidelity")
-    with pytest.raises(InputError, match=r"--knobs: 'timestep' is no knob; did you mean 'time-step'\?"):
-        parse_knobs("timestep,section")
-    with pytest.raises(InputError, match="names none; known: time-step, stiffness"):
-        parse_knobs(",")
 
 
 def test_seeds_are_whole_numbers_each_once() -> None:

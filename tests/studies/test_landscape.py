@@ -23,19 +23,14 @@ from studies.framework.findings import Judged
 from studies.framework.procedures import ACTIVE, CROSSINGS, EXTERNAL, INTERNAL, PHI, PROCEDURE, SHAPE, STATIC, THETA
 from studies.landscape import (
     ABOVE,
-    ALL,
     BEYOND,
-    COMMON,
     ENERGY,
     EVERY,
     FIRST,
-    FRONTIER,
-    GAIN,
     HELD_FAST,
     HIGH,
     LIFTS,
     LOW,
-    PAIRS,
     PART,
     PEAK,
     PLANNED,
@@ -49,8 +44,6 @@ from studies.landscape import (
     VERDICT,
     WITHIN,
     WORK,
-    YIELD,
-    common_aspects,
     costs,
     measure,
     predicted,
@@ -117,27 +110,6 @@ def test_energy_is_that_of_the_activity_alone(tmp_path: Path) -> None:
     assert (row[PROCEDURE], row[ENERGY], row[LIFTS], row[PLANNED]) == (STATIC, 0.0, 0.0, 0.0)
 
 
-@pytest.mark.usefixtures("undrawn")
-def test_a_whole_study(tmp_path: Path) -> None:
-    levels = {STATIC: 0.3, EXTERNAL: 0.35, INTERNAL: 0.5, SHAPE: 0.9}
-    runs = [
-        write(tmp_path, name, seed=seed, ratio=ratio, top=level * (0.9 + 0.03 * seed + ratio / 5), time=time)
-        for name, level in levels.items()
-        for seed in (1, 2, 3)
-        for ratio in (0.7, 1.0)
-        for time in ((0.5, 2.0) if name == INTERNAL else (2.0,))
-    ]
-    stopped = write(tmp_path, SHAPE, seed=9, limit=0.01, stops=0.6)
-    other = write(tmp_path / "x", SHAPE)
-    renamed = other.rename(other.with_name("shape"))
-    report = STUDY.analyse([*runs, stopped, renamed], tmp_path / "out", note="a test", command="a command")
-    assert {"predictors.csv", "comparisons.csv", "cost.csv", "points.csv", "findings.csv"} <= set(report.files)
-    assert len(report.rows) == 6
-    assert any("held fast: 1 of 31 runs" in line for line in report.footer)
-    assert "not named like a run of this study" in report.missing[0].cause
-    assert {one.finding.id: one.verdict for one in report.judged}["as-strong-as-shape-change"] == "not found"
-
-
 # Which measure goes with strength
 
 
@@ -191,14 +163,6 @@ def test_the_measure_that_strength_follows_from_is_found() -> None:
     assert {verdicts[name].verdict for name in names} == {"found"}
 
 
-def test_where_nothing_predicts_strength_nothing_is_found() -> None:
-    runs = table(lambda t, random: random.normal(size=len(t)))
-    verdicts = judged(runs)
-    assert verdicts["best-strength-over"].verdict == verdicts["best-strength-within"].verdict == "not resolved"
-    ranked, _ = correlations(runs, ALL)
-    assert ((ranked[LOW] > 0) | (ranked[HIGH] < 0)).sum() <= 2
-
-
 def test_runs_of_one_trajectory_are_one_block() -> None:
     def by_trajectory(t: pd.DataFrame, random: np.random.Generator) -> Any:
         numbers = trajectories(t)
@@ -217,50 +181,3 @@ def test_runs_of_one_trajectory_are_one_block() -> None:
 
 
 # What strength costs
-
-
-def bought(scatter: float = 0.01) -> pd.DataFrame:
-    """Oscillation gains 0.1 for each doubling of energy; shape change much, at a price; shaking nothing."""
-    random = np.random.default_rng(3)
-    rows = []
-    for seed in (1, 2, 3, 4):
-        for ratio in RATIOS:
-            level = random.uniform(0.3, 0.5)
-            points = [(STATIC, math.nan, 0.0, 0.0, 0.0)]
-            points += [(INTERNAL, 10.0, time, 0.1 * k + 0.1, 5.0 * time) for k, time in enumerate(TIMES)]
-            points += [(SHAPE, math.nan, 3.0, 0.5, 50.0), (EXTERNAL, math.nan, 3.0, -0.02, 40.0)]
-            for name, theta, time, gain, energy in points:
-                rows.append(
-                    {PROCEDURE: name, THETA: theta, PLANNED: time, ASPECT: ratio, SEED: seed}
-                    | {PEAK: level + gain + scatter * random.normal(), LIFTS: energy, ENERGY: 1e-5 * energy}
-                )
-    return pd.DataFrame(rows)
-
-
-def test_gains_are_those_over_the_pile_poured_alike() -> None:
-    found = costs(bought())
-    found = found[found[SCOPE] == COMMON].set_index([PROCEDURE, PLANNED])
-    shape, half = found.loc[(SHAPE, 3.0)], found.loc[(INTERNAL, 0.5)]
-    assert shape[GAIN] == pytest.approx(0.5, abs=0.01)
-    # The level of the pour, which scatters by 0.06, is in both.
-    assert shape["strength gained over n W_s 95 % [-]"] < 0.02
-    assert half[YIELD] == pytest.approx(0.1 / 2.5, rel=0.1)
-    assert half[LOW] < half[YIELD] < half[HIGH]
-    assert half[HIGH] - half[LOW] < 0.3 * half[YIELD]
-    assert found[PAIRS].tolist() == [12] * 6
-    assert found[FRONTIER].tolist() == [0.0, *[1.0] * 5]
-
-
-def test_the_cheapest_procedure_is_found_where_it_surely_is() -> None:
-    sure = judged(bought(), correlated=False)["cheapest"]
-    assert sure.verdict == "found"
-    assert sure.ours.index("internal θ = 10° for 0.5 s") < sure.ours.index("shape-change for 3 s")
-    assert judged(bought(scatter=0.6), correlated=False)["cheapest"].verdict == "not resolved"
-
-
-def test_only_aspect_ratios_that_have_everything_are_averaged_over() -> None:
-    runs = bought()
-    runs = runs[~((runs[ASPECT] == 0.4) & (runs[PLANNED] == 4.0))]
-    assert common_aspects(runs) == [0.7, 1.0]
-    found = costs(runs)
-    assert set(found[found[SCOPE] == COMMON][PAIRS]) == {8}

@@ -5,7 +5,6 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
-import pandas as pd
 import pytest
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
@@ -16,7 +15,6 @@ from postprocess.measures.spread import centre_of_mass
 from studies.framework.runs import MeasuredRun
 from studies.melting import BASE, CONTACT, HEIGHT, LIFT, OFFSET, SINCE, SLOUGHED, SPREAD, STUDY, TILT, TOPPLED
 
-ORIGIN = {"note": "the full study as shipped", "command": "smarticles study melting --out melting"}
 Pile = NDArray[np.float64]
 
 
@@ -65,24 +63,3 @@ def test_a_pile_that_fell_over_differs_from_one_that_sank(tmp_path: Path) -> Non
     assert over[TILT] == pytest.approx(np.degrees(np.arctan2(0.02 + height, 0.02)))
     assert sank[TILT] == pytest.approx(0, abs=1e-6)
     assert sank[HEIGHT] == pytest.approx(0.99)
-
-
-def test_the_study_judges_and_writes_what_it_measured(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("postprocess.pictures.strip.draw_strip", lambda rows, output, **_: output)
-    runs = []
-    for seed in (1, 2, 3):
-        afters = {"static": sunk(stack(), 0.7 + 0.01 * seed), "internal": shed(stack(), 2 + seed % 2)}
-        for name, after in afters.items():
-            runs.append(write_released(tmp_path / f"{name}{seed}", name, before=stack(), after=after, seed=seed))
-        lifted = sunk(stack(), 0.9)
-        lift = {"before": stack(), "after": lifted, "seed": seed, "lift": 0.1}
-        runs.append(write_released(tmp_path / f"lifted{seed}", "internal", **lift))
-    walled = write_released(tmp_path / "walled", "static", before=stack(), after=stack())
-    for file in (walled / "run.json", walled / "done.json"):
-        file.write_text(file.read_text().replace("remove-container", "relax"))
-    report = STUDY.analyse([*runs, walled, tmp_path / "never"], tmp_path / "out", **ORIGIN)
-    verdicts = {one.finding.id: one.verdict for one in report.judged}
-    assert [verdicts[name] for name in ("sloughs", "lifting-differs", "topples")] == ["found", "found", "no data"]
-    assert "does not end with a rest and remove-container" in report.missing[0].cause
-    assert len(pd.read_csv(report.files["times.csv"], comment="#")) == 9 * 5
-    assert {"time_lw0.70.png", "time_lw0.70_lifted.png", "pictures.png"} <= set(report.files)

@@ -30,8 +30,7 @@ ACTUATED = ("shape-change", "internal-oscillation")
 class SyntheticRun:
     """A made-up run; `packing` is φ at the end of each phase.
 
-    `work` [J] is done steadily during the activity, by the motors or, with "shake", by the container. At the middle of
-    a "shape-change" the centre of mass stands `straight` times as high as φ alone would have it. Each phase took
+    `work` [J] is done steadily during the activity, by the motors or, with "shake", by the container. Each phase took
     `wall_s` [s]; `more` are constant series: name, value. The scene has a contact where there is a `friction`, which
     walls share unless they have their own.
     """
@@ -46,7 +45,6 @@ class SyntheticRun:
     oscillate_time: float = 5.0
     theta: float = 10.0
     work: float | None = None
-    straight: float = 1.0
     status: str = "done"
     series: bool = True
     floor_z: float = 0.0
@@ -55,7 +53,6 @@ class SyntheticRun:
     more: tuple[tuple[str, float], ...] = ()
     friction: float | None = None
     friction_wall: float | None = None
-    restitution: float = 0.7
     phases: tuple[str, ...] = field(default=PHASES)
 
     @property
@@ -152,10 +149,9 @@ def write_run(directory: Path, run: SyntheticRun | None = None) -> Path:
         for time in np.linspace(start, end, 200)[1:]:
             part = (time - start) / (end - start)
             packing = previous + (target - previous) * (1 - math.exp(-5 * part))
-            rise = 1 + (run.straight - 1) * (1 - abs(2 * part - 1)) if kind == "shape-change" else 1.0
             active = kind not in ("deposit", "relax")
             done = part if active else float(any(row[4] > 0 for row in rows))
-            rows.append((time, index, packing, run.shares().mean() * run.height(packing) * rise, done))
+            rows.append((time, index, packing, run.shares().mean() * run.height(packing), done))
         spans.append((start, end))
         start, previous = end, target
     if run.series:
@@ -218,7 +214,7 @@ def _write_scene(directory: Path, run: SyntheticRun) -> None:
     scene: dict[str, Any] = {"schema_version": 1, "phases": phases}
     if run.friction is not None:
         wall = run.friction if run.friction_wall is None else run.friction_wall
-        contact = {"friction_smarticle": run.friction, "friction_wall": wall, "restitution": run.restitution}
+        contact = {"friction_smarticle": run.friction, "friction_wall": wall, "restitution": 0.7}
         scene["contact"] = contact
     (directory / "scene.yaml").write_text(yaml.safe_dump(scene))
 

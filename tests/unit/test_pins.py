@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 import tomllib
-from itertools import combinations
 from pathlib import Path
 
 import pytest
@@ -45,8 +44,3 @@ def test_wanted_packages_are_pinned_once(name: str) -> None:
     assert len(found) > 5
     assert asked_for(name) <= set(found)
     assert len(set(found)) == len(found)
-
-
-def test_no_package_is_pinned_in_two_files() -> None:
-    for one, other in combinations(NAMES, 2):
-        assert not set(pinned(one)) & set(pinned(other)), f"{one}.txt and {other}.txt"

@@ -20,7 +20,6 @@ from studies.registry import study_file
 
 ROOT = Path(__file__).resolve().parents[2]
 PACKAGES = {"dem", "postprocess", "smarticles", "studies", "templates"}
-SCENE = "schema_version: 1\nseed: 1\ncount: 5\nphases: [{type: deposit}, {type: relax, duration_s: 0.1}]\n"
 
 
 def call(*command: str | Path, cwd: Path, **variables: str) -> str:
@@ -89,20 +88,6 @@ def test_every_file_of_the_packages_is_in_the_wheel(wheel: Path, sources: list[s
         table = archive.read("dem/plan/work_precision.csv")
     assert built == {name for name in sources if name.partition("/")[0] in PACKAGES}
     assert table == (ROOT / "results" / "accuracy-links" / "work_precision.csv").read_bytes()
-
-
-def test_plan_works_from_the_wheel(smarticles: Callable[..., str], tmp_path: Path) -> None:
-    (tmp_path / "scene.yaml").write_text(SCENE)
-    assert json.loads(smarticles("plan", tmp_path / "scene.yaml", "--json"))["time_step_s"] > 0
-    # With the table of measured errors that ships.
-    assert json.loads(smarticles("plan", tmp_path / "scene.yaml", "--json", "--max-hours", "9"))["choice"]
-
-
-def test_measure_and_render_work_from_the_wheel(smarticles: Callable[..., str], tmp_path: Path) -> None:
-    run = write_run(tmp_path / "run", SyntheticRun(count=5, frames_per_phase=1, phases=("deposit", "relax")))
-    assert [row["phase type"] for row in json.loads(smarticles("measure", run, "--json"))] == ["deposit", "relax"]
-    smarticles("render", run, "--size", "200")
-    assert (run / "render.png").stat().st_size > 100
 
 
 def test_a_study_is_analysed_from_the_wheel(smarticles: Callable[..., str], tmp_path: Path) -> None:

@@ -1,4 +1,4 @@
-"""A process sends itself a signal at a moment that files tell: no test has to meet that moment from outside.
+"""A process sends itself a signal at a moment that files mark: no test has to meet that moment from outside.
 
 Loaded by every interpreter that has this folder on PYTHONPATH. GATE is JSON: `file`, the end of a path; `count`: the
 signal is sent when a file is about to be put in that place for so many times; `send`, its name; `after`: text of the

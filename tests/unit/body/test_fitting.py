@@ -39,7 +39,7 @@ def test_poses_come_back(ratio: float, angles: tuple[float, float]) -> None:
 
 
 @pytest.mark.parametrize(("ratio", "angles"), [(0.0, (90.0, 90.0)), (0.7, (0.0, 0.0))])
-def test_of_a_straight_shape_some_turn_is_taken_and_always_the_same(ratio: float, angles: tuple[float, float]) -> None:
+def test_a_straight_shape_gets_one_reproducible_turn(ratio: float, angles: tuple[float, float]) -> None:
     boxes = make_boxes(ratio, angles)
     vertices = placed(boxes, random_poses(2))
     found, off = fitted_poses(boxes, vertices)

@@ -199,17 +199,6 @@ def no_yade(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.mark.usefixtures("no_yade")
-def test_missing_yade_says_how_to_get_it() -> None:
-    with pytest.raises(RunError) as caught:
-        import_yade()
-    assert str(caught.value) == (
-        "YADE cannot be imported (import of yade halted; None in sys.modules); install it with `make setup` or "
-        "`apt-get install yade`, see environment.md, or run the scene on the engine that needs none: --engine links; "
-        "`smarticles doctor` reports what is missing"
-    )
-
-
-@pytest.mark.usefixtures("no_yade")
 def test_missing_yade_leaves_no_directory(tmp_path: Path) -> None:
     out = tmp_path / "run"
     with pytest.raises(RunError, match=r"^YADE cannot be imported .* `make setup`"):

@@ -3,20 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 import pytest
 from scenes import small
 
 from dem.phases.pull_hook import PullHook
-from dem.scene.reading import dump_scene, load_scene, scene_hash
 from dem.setting.hooks import Cross
 
 W, T2 = 0.0117, 0.5e-3
 DEPOSIT = {"type": "deposit"}
 PULL = {"type": "pull-hook"}
-REMOVE = {"type": "remove-container"}
 TIERS = [{"radius_m": 0.0234, "height_m": 0.012}, {"radius_m": 0.018, "height_m": 0.012}]
 
 
@@ -33,17 +30,6 @@ def test_hooks_follow_from_the_smarticle_by_default() -> None:
     assert other.hooks is not None
     assert (other.hooks.side_m, other.hooks.length_m, other.hooks.upper_height_m) == (1e-3, 0.02, 20 * T2)
     assert other.phases[1].model_dump()["distance_m"] == 0.04
-
-
-def test_resolved_scene_reads_back_the_same(tmp_path: Any) -> None:
-    phases = [DEPOSIT, PULL, REMOVE]
-    for changes in ({"hooks": {}, "phases": phases}, {"container": {"tiers": TIERS}}):
-        scene = small(changes)
-        path = tmp_path / "scene.yaml"
-        path.write_text(dump_scene(scene))
-        again = load_scene(path)
-        assert again == scene
-        assert scene_hash(again) == scene_hash(scene)
 
 
 def test_tiers_give_the_widest_radius_and_the_whole_height() -> None:

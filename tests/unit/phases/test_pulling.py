@@ -18,7 +18,7 @@ ARRIVAL = DISTANCE / SPEED
 def pull(stiffness: float, *, anew: bool = False, **keys: Any) -> tuple[EngineDouble, float, Stage]:
     """An engine without smarticles, whose hook takes `stiffness` N for each metre; how far it was raised, the stage.
 
-    With `anew` the stage is made again from what it remembers at every look.
+    With `anew` the stage is made again from what it remembers at every check.
     """
     phase = PullHook(type="pull-hook", distance_m=DISTANCE, speed_m_per_s=SPEED, **keys)
     scene = small({"hooks": {}})
@@ -30,7 +30,7 @@ def pull(stiffness: float, *, anew: bool = False, **keys: Any) -> tuple[EngineDo
         if anew:
             memory, pulling = pulling.memory, phase.begin(scene, 1)
             pulling.memory = dict(memory)
-    assert engine.told == [("raise_upper", SPEED), ("stop",)]
+    assert engine.calls == [("raise_upper", SPEED), ("stop",)]
     return engine, engine.boundaries.upper_height - start, pulling
 
 
@@ -45,7 +45,7 @@ def test_a_hook_that_is_not_held_arrives(limit: float | None) -> None:
 
 def test_a_held_hook_stops_at_the_first_check_with_a_mean_above_its_limit() -> None:
     engine, raised, _ = pull(10.0, force_limit_N=0.02)
-    # A look's mean is that of the force half a look before.
+    # A check's mean is that of the force half an interval before.
     reached = 0.02 / 10.0 / SPEED + CHECK_INTERVAL / 2
     assert reached - 2 * DT <= raised / SPEED <= reached + CHECK_INTERVAL + 2 * DT
     assert raised < 0.6 * DISTANCE

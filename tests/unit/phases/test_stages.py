@@ -24,12 +24,12 @@ def begin(*phases: dict[str, Any], **changes: Any) -> tuple[Scene, EngineDouble]
     scene = small({"phases": [DEPOSIT, *phases], "count": 3, **changes})
     engine = EngineDouble.of(scene, DT)
     perform(scene.phases[0].begin(scene, 0), engine)
-    engine.told.clear()
+    engine.calls.clear()
     return scene, engine
 
 
 def perform(stage: Stage, engine: EngineDouble, fresh: Callable[[], Stage] | None = None) -> dict[str, Any]:
-    """Let a stage run to its end, by `fresh` taken anew from its memory at every look; what it remembers in the end."""
+    """Run a stage to its end, with `fresh` anew from its memory at every check; return what it remembers."""
     while wait := stage.proceed(engine):
         engine.advance(max(1, round(wait / engine.time_step)))
         if fresh is not None:
@@ -74,7 +74,7 @@ def test_a_phase_takes_its_known_duration_and_remembers_all_that_it_needs(phase:
         known = scene.phases[1].known_duration
         assert known is not None
         assert engine.time - begun == pytest.approx(known, abs=DT)
-        ends.append((engine.steps, engine.told))
+        ends.append((engine.steps, engine.calls))
     assert ends[0] == ends[1]
 
 
@@ -86,9 +86,9 @@ def test_a_pour_adds_layers_one_after_the_other_and_waits_until_all_stand() -> N
     engine = EngineDouble.of(scene, DT)
     assert scene.phases[0].known_duration is None
     duration = run_phase(scene, engine, 0)
-    assert engine.told == [("add", 5), ("add", 5), ("add", 2)]
+    assert engine.calls == [("add", 5), ("add", 5), ("add", 2)]
     assert engine.touches().all()
-    # Three falls of less than 2w, each looked at every 10 ms, and 50 ms of rest.
+    # Three falls of less than 2w, each checked every 10 ms, and 50 ms of rest.
     assert 3 * 0.01 < duration < 3 * 0.12
     assert engine.positions[:, 2] == pytest.approx(engine.stands)
 
@@ -131,7 +131,7 @@ def test_the_floor_alone_is_shaken_within_its_wall() -> None:
     floor = {"type": "shake", "duration_s": 0.1, "moves": "floor"}
     scene, engine = begin(floor)
     run_phase(scene, engine)
-    assert [told[0] for told in engine.told] == ["shake the floor", "stop"]
+    assert [call[0] for call in engine.calls] == ["shake the floor", "stop"]
     with pytest.raises(InputError, match=r"phases\.1\.moves: the floor alone would go 0\.00276 m down, and the wall"):
         begin(floor | {"peak_acceleration_g": 10})
     begin(floor | {"peak_acceleration_g": 10, "moves": "container"})
@@ -140,7 +140,7 @@ def test_the_floor_alone_is_shaken_within_its_wall() -> None:
 def test_a_wall_is_removed_at_once_or_when_it_is_clear_of_the_pile() -> None:
     scene, engine = begin({"type": "remove-container", "duration_s": 0.5})
     run_phase(scene, engine)
-    assert engine.told == [("remove_wall",)]
+    assert engine.calls == [("remove_wall",)]
     scene, engine = begin({"type": "remove-container", "duration_s": 0.5, "speed_m_per_s": 0.1})
     top = engine.state().vertices[..., 2].max() + scene.particle.radius
     stage, bottoms = scene.phases[1].begin(scene, 1), []
@@ -148,14 +148,14 @@ def test_a_wall_is_removed_at_once_or_when_it_is_clear_of_the_pile() -> None:
         if engine.boundaries.walled:
             bottoms.append(engine.boundaries.wall_bottom)
         engine.advance(round(wait / DT))
-    assert engine.told == [("lift_wall", 0.1), ("remove_wall",)]
+    assert engine.calls == [("lift_wall", 0.1), ("remove_wall",)]
     assert bottoms[-1] < top < bottoms[-1] + 0.1 * CHECK_INTERVAL * 1.01
 
 
 def test_a_wall_that_is_not_clear_stays_and_a_later_shake_fails() -> None:
     scene, engine = begin({"type": "remove-container", "duration_s": 0.1, "speed_m_per_s": 0.01}, {"type": "shake"})
     run_phase(scene, engine)
-    assert engine.told == [("lift_wall", 0.01), ("stop",)]
+    assert engine.calls == [("lift_wall", 0.01), ("stop",)]
     assert engine.boundaries.walled
     with pytest.raises(RunError, match=r"the wall is still around the pile, its edge .* lengthen that phase's"):
         run_phase(scene, engine, 2)
@@ -169,7 +169,7 @@ def test_motors_update_once_in_each_control_period_and_once_more_at_the_end() ->
     scene, engine = begin({"type": "actuate", "barbs": ramp})
     assert run_phase(scene, engine) == pytest.approx(0.01, abs=DT)
     interval = scene.fidelity.control_interval_s
-    assert engine.told == [("articulate",), *[("actuate", interval)] * (round(0.01 / interval) + 1)]
+    assert engine.calls == [("articulate",), *[("actuate", interval)] * (round(0.01 / interval) + 1)]
     assert engine.motors.readings is not None
     assert np.degrees(engine.motors.readings.commands) == pytest.approx(88)
 
@@ -178,15 +178,15 @@ def strained(**changes: Any) -> tuple[EngineDouble, float]:
     scene = chain({"phases.1.distance_m": 0.05, "phases.1.speed_m_per_s": 0.5, **changes})
     engine = EngineDouble.of(scene, scene.fidelity.control_interval_s)
     run_phase(scene, engine, 0)
-    assert engine.told == [("add", 6)]
-    engine.told.clear()
+    assert engine.calls == [("add", 6)]
+    engine.calls.clear()
     return engine, run_phase(scene, engine, 1)
 
 
 def test_a_chain_is_laid_out_at_once_tied_and_let_go_at_the_end_of_the_way() -> None:
     # It would part at 21 mm.
     engine, duration = strained(**{"phases.1.distance_m": 0.01})
-    assert [told for told in engine.told if told[0] != "actuate"] == [
+    assert [call for call in engine.calls if call[0] != "actuate"] == [
         ("articulate",),
         ("tie", 0.1, 0.0, 0.5),
         ("untie",),
@@ -198,9 +198,9 @@ def test_a_chain_is_laid_out_at_once_tied_and_let_go_at_the_end_of_the_way() -> 
 def test_several_control_updates_in_one_call(at_once: int) -> None:
     ramp = {"type": "ramp", "to_deg": 88, "duration_s": 0.01}
     ends = []
-    for looks in (1, at_once):
+    for updates in (1, at_once):
         scene, engine = begin({"type": "actuate", "barbs": ramp})
-        engine.motors.updates_at_once = looks
+        engine.motors.updates_at_once = updates
         run_phase(scene, engine)
         ends.append((np.array(engine.motors.targets), engine.time))
     assert len(ends[0][0]) == round(0.01 / scene.fidelity.control_interval_s) + 1

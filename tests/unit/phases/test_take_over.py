@@ -118,8 +118,8 @@ def test_a_run_begins_with_the_poses_of_the_frame_above_its_floor(
     assert taken.floor_z == 0
     # In the double what stands stays where it is.
     np.testing.assert_allclose(taken.vertices, above_floor(source), atol=1e-12)
-    assert kind.built[-1].told.count(("add", 10)) == 1
-    assert ("still",) not in kind.built[-1].told
+    assert kind.built[-1].calls.count(("add", 10)) == 1
+    assert ("still",) not in kind.built[-1].calls
 
 
 # -- how a scene is resolved -------------------------------------------------------------------------------------------
@@ -198,8 +198,8 @@ def test_runs_and_frames_that_are_not_there(pour: Path, tmp_path: Path) -> None:
     assert rejected(pour, {"frame": 99}) == (
         f"phases.0.frame: 99, but the frames of {pour} are 0 … {len(frames) - 1}; use one of them, or last"
     )
-    for bad, told in (("first", "'first'"), (-1, "-1"), (1.5, "1.5"), (True, "true"), (None, "null")):
-        assert told in (line := rejected(pour, {"frame": bad})), bad
+    for bad, stated in (("first", "'first'"), (-1, "-1"), (1.5, "1.5"), (True, "true"), (None, "null")):
+        assert stated in (line := rejected(pour, {"frame": bad})), bad
         assert line.startswith("phases.0")
     assert rejected(pour, {"sha256": "abc"}).startswith("phases.0.sha256: 'abc' is no SHA-256 of 64 digits; leave it")
     assert rejected(pour, {"run": ""}).startswith("phases.0.run: ")
@@ -221,9 +221,9 @@ def test_runs_and_frames_that_are_not_there(pour: Path, tmp_path: Path) -> None:
     ],
 )
 def test_scenes_that_do_not_fit(pour: Path, changes: dict[str, Any], line: str) -> None:
-    told = rejected(pour, **changes)
-    assert told.startswith(line)
-    assert "; " in told
+    stated = rejected(pour, **changes)
+    assert stated.startswith(line)
+    assert "; " in stated
 
 
 # -- the stage ---------------------------------------------------------------------------------------------------------
@@ -236,7 +236,7 @@ class Pushing(EngineDouble):
 
     def advance(self, steps: int) -> None:
         super().advance(steps)
-        if self.told.count(("still",)) < self.stops:
+        if self.calls.count(("still",)) < self.stops:
             self.velocities[:, 0] = 0.3
 
 
@@ -256,7 +256,7 @@ def test_what_overlaps_is_stopped_until_it_flies_no_more(pour: Path, stops: int)
     assert isinstance(engine, Pushing)
     engine.stops = stops
     memory = perform(scene, engine)
-    assert engine.told == [("add", 10), *[("still",)] * stops]
+    assert engine.calls == [("add", 10), *[("still",)] * stops]
     # A difference of energies, exact to rounding of what was added.
     lost = stops * 0.5 * 10 * engine.particle.boxes.mass * 0.3**2
     assert engine.ledger.dissipated >= lost - 1e-12 * engine.ledger.added

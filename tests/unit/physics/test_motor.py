@@ -20,11 +20,11 @@ PERIOD, STEP = 2e-4, 4e-5  # s
 ADVANCE = 3e-3 * 6.0 * PERIOD  # k ω Δt [N m]
 
 
-def held(law: MotorLaw, angle: float, target: float, looks: int, motors: Motors | None = None) -> Motors:
+def held(law: MotorLaw, angle: float, target: float, updates: int, motors: Motors | None = None) -> Motors:
     """A barb that is held at an angle, and a motor that goes elsewhere."""
     angles = np.full((1, 2), angle)
     motors = motors or Motors(law, angles)
-    for _ in range(looks):
+    for _ in range(updates):
         motors.update(angles, np.full((1, 2), target), PERIOD, STEP)
     return motors
 

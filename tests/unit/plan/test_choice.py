@@ -115,12 +115,9 @@ def test_hours_are_the_planned_ones_times_the_ratio_measured(table_file: Path) -
     assert chosen.planned == plain.corrected(2)
     assert chosen.planned.wall_s / 3600 == pytest.approx(chosen.expected.hours)
     assert sum(phase.wall_s for phase in chosen.planned.phases) == pytest.approx(chosen.planned.wall_s)
-    assert "(one core, corrected by 2 as measured at this fidelity; machines differ" in chosen.planned.to_text()
-    assert "(one core; machines differ by a factor of two)" in plain.to_text()
     text = chosen.to_text()
-    assert text.startswith("engine yade, fidelity standard: the cheapest within --max-error 0.03\nexpected: ")
+    assert text.startswith("engine yade, fidelity standard: the cheapest within --max-error 0.03\n")
     assert "φ_0 +0.010 ± 0.015, φ_f -0.020 ± 0.020 (3 seeds)" in text
-    assert "allows an error up to 0.04, more than --max-error 0.03" in text
     assert text.endswith("use it: --engine yade --set fidelity=standard")
     assert chosen.to_dict()["errors"][1] == {"of": "φ_f", "value": -0.02, "band": 0.02}
 

@@ -39,9 +39,3 @@ def test_examples_of_a_module(name: str, workplace: Path, monkeypatch: pytest.Mo
     outcome = doctest.testmod(importlib.import_module(name), raise_on_error=False, verbose=False)
     assert outcome.failed == 0
     assert outcome.attempted > 0
-
-
-def test_there_are_examples() -> None:
-    assert {"dem.record.frames", "postprocess.measures.packing", "postprocess.pictures.render"} <= {
-        *modules_with_examples()
-    }

@@ -9,7 +9,7 @@ import subprocess
 import numpy as np
 import pytest
 from PIL import Image
-from synthetic import RADIUS, SyntheticRun, write_manifest, write_run
+from synthetic import RADIUS, SyntheticRun, write_run
 from synthetic.forces import pressed
 
 from dem.record.forces import force_mesh
@@ -34,26 +34,26 @@ sys.argv = [script, folder, *sys.argv[4:]]
 runpy.run_path(script, run_name="__main__")
 boxes = simple.FindSource("smarticles")
 shown = simple.GetDisplayProperties(boxes)
-told = {"coloured": list(shown.ColorArrayName), "times": list(boxes.TimestepValues)}
+scene = {"coloured": list(shown.ColorArrayName), "times": list(boxes.TimestepValues)}
 cut = simple.FindSource("wall, cut open")
 if cut is not None:
     cut.UpdatePipeline()
-    told["cut"] = list(cut.GetDataInformation().GetBounds())
+    scene["cut"] = list(cut.GetDataInformation().GetBounds())
 if simple.FindSource("forces") is not None:
-    told["forces"] = list(simple.GetDisplayProperties(simple.FindSource("forces")).ColorArrayName)
-    told["largest force"] = simple.GetColorTransferFunction("normal_force_N").RGBPoints[-4]
-told["points"] = {}
+    scene["forces"] = list(simple.GetDisplayProperties(simple.FindSource("forces")).ColorArrayName)
+    scene["largest force"] = simple.GetColorTransferFunction("normal_force_N").RGBPoints[-4]
+scene["points"] = {}
 for (name, _), proxy in simple.GetSources().items():
     counts = []
     for time in boxes.TimestepValues:
         proxy.UpdatePipeline(time)
         counts.append(proxy.GetDataInformation().GetNumberOfPoints())
-    told["points"][name] = counts
+    scene["points"][name] = counts
 names = {proxy.SMProxy: name for (name, _), proxy in simple.GetSources().items()}
 view = simple.GetActiveView()
 inputs = [part.Input.SMProxy for part in view.Representations if part.Visibility and hasattr(part, "Input")]
-told["shown"] = sorted(names[proxy] for proxy in inputs)
-json.dump(told, open(answer, "w"))
+scene["shown"] = sorted(names[proxy] for proxy in inputs)
+json.dump(scene, open(answer, "w"))
 """
 
 
@@ -69,10 +69,10 @@ def pvpython():
         return
     reading, writing = os.pipe()
     command = ["Xvfb", "-displayfd", str(writing), "-screen", "0", "1280x1024x24", "-nolisten", "tcp", "-noreset"]
-    with subprocess.Popen(command, pass_fds=[writing], stderr=subprocess.DEVNULL) as server, os.fdopen(reading) as told:
+    with subprocess.Popen(command, pass_fds=[writing], stderr=subprocess.DEVNULL) as server, os.fdopen(reading) as line:
         os.close(writing)
-        # The server picks a free number, and tells it once it listens.
-        yield on_display(":" + told.readline().strip())
+        # The server picks a free number, and prints it once it listens.
+        yield on_display(":" + line.readline().strip())
         server.terminate()
 
 
@@ -87,7 +87,7 @@ def on_display(name):
 
 
 def shown(pvpython, folder, tmp_path, *words):
-    """What ParaView tells of an exported folder once the script has run."""
+    """Return what ParaView shows of an exported folder once the script has run."""
     (tmp_path / "ask.py").write_text(ASK)
     answer = tmp_path / "answer.json"
     done = pvpython(tmp_path / "ask.py", folder / "show_in_paraview.py", folder, answer, *words)
@@ -103,12 +103,12 @@ def test_boxes_by_crossings_wall_cut_open_time_running(tmp_path, pvpython):
     run = write_run(tmp_path / "run", SyntheticRun(count=40, frames_per_phase=1, packing=(0.05, 0.06, 0.1, 0.1)))
     folder = export_run(run, to="vtp", every_frame=True, wanted=["crossings"], unwanted=["local_packing_fraction"])
     film = tmp_path / "film"
-    told = shown(pvpython, folder, tmp_path, "--film", film)
-    assert told["coloured"] == ["CELLS", "crossings"]
-    assert told["times"] == pytest.approx(read_frames(run).times.tolist())
+    scene = shown(pvpython, folder, tmp_path, "--film", film)
+    assert scene["coloured"] == ["CELLS", "crossings"]
+    assert scene["times"] == pytest.approx(read_frames(run).times.tolist())
     # The half towards the camera, at negative y, is cut away.
-    assert told["cut"][2:4] == pytest.approx((0.0, RADIUS), abs=1e-3 * RADIUS)
-    assert told["shown"] == ["floor", "passages", "smarticles", "time", "wall, cut open"]
+    assert scene["cut"][2:4] == pytest.approx((0.0, RADIUS), abs=1e-3 * RADIUS)
+    assert scene["shown"] == ["floor", "passages", "smarticles", "time", "wall, cut open"]
     pictures = [pixels(path) for path in sorted(film.glob("*.png"))]
     assert len(pictures) == 4
     coloured = [int((np.ptp(picture, axis=2) > 40).sum()) for picture in pictures]
@@ -128,36 +128,16 @@ def test_forces_are_lines_by_their_size_and_a_wall_that_is_taken_away_is_gone(tm
     folder = export_run(
         run, to="vtp", every_frame=True, wanted=["forces", "crossings"], unwanted=["local_packing_fraction"]
     )
-    told = shown(pvpython, folder, tmp_path, "--film", tmp_path / "film")
-    assert [count > 0 for count in told["points"]["wall, cut open"]] == [True, False]
-    assert [count > 0 for count in told["points"]["forces"]] == [False, True]
+    scene = shown(pvpython, folder, tmp_path, "--film", tmp_path / "film")
+    assert [count > 0 for count in scene["points"]["wall, cut open"]] == [True, False]
+    assert [count > 0 for count in scene["points"]["forces"]] == [False, True]
     # The lines themselves, not a shape about them whose size could be wrong.
-    assert "forces" in told["shown"]
-    assert told["forces"] == ["CELLS", "normal_force_N"]
-    assert told["largest force"] == pytest.approx(2.0)
+    assert "forces" in scene["shown"]
+    assert scene["forces"] == ["CELLS", "normal_force_N"]
+    assert scene["largest force"] == pytest.approx(2.0)
     red = [
         int(((picture[..., 0] > 90) & (picture[..., 1:].max(axis=2) < 70)).sum())
         for picture in map(pixels, sorted((tmp_path / "film").glob("*.png")))
     ]
     # Some darker pixels are boxes seen through each other.
     assert red[1] - red[0] > 100
-
-
-def test_a_chain_in_a_plane(tmp_path, pvpython):
-    made = SyntheticRun(count=2, frames_per_phase=1)
-    write_manifest(write_run(tmp_path / "run", made), made, planar=True, channel_width_m=0.08)
-    folder = export_run(tmp_path / "run", to="vtp")
-    told = shown(pvpython, folder, tmp_path, "--picture", tmp_path / "plane.png")
-    assert told["coloured"] == ["CELLS", "smarticle_id"]
-    assert told["shown"] == ["smarticles", "time", "wall"]
-    assert (np.ptp(pixels(tmp_path / "plane.png"), axis=2) > 40).sum() > 500
-
-
-def test_a_folder_without_an_export_is_one_line(tmp_path, pvpython):
-    run = write_run(tmp_path / "run", SyntheticRun(count=2, frames_per_phase=1))
-    script = export_run(run, to="vtp") / "show_in_paraview.py"
-    alone = shutil.copy(script, tmp_path)
-    (tmp_path / "elsewhere").mkdir()
-    done = pvpython(alone, tmp_path / "elsewhere")
-    assert done.returncode != 0
-    assert "give the folder that `smarticles export --to vtp` wrote" in done.stderr + done.stdout

@@ -1,4 +1,4 @@
-"""The page of a run: what it shows, and who gets in, what its server listens on, how it ends."""
+"""The page of a run: what it shows, access by token, what its server listens on, how it ends."""
 
 import asyncio
 import http.cookiejar
@@ -13,12 +13,11 @@ import aiohttp
 import msgpack
 import numpy as np
 import pytest
-from synthetic import T1, SyntheticRun, W, mesh_of, u_shape, write_frame, write_run
+from synthetic import T1, SyntheticRun, W, u_shape, write_frame, write_run
 from synthetic.viewing import serving
 
 from dem.errors import InputError
-from dem.record.frames import FrameWriter, read_frames
-from postprocess.view import PICKED, RunView
+from postprocess.view import RunView
 from smarticles.main import main
 
 
@@ -37,11 +36,6 @@ def two(tmp_path):
     return directory
 
 
-def colours(view):
-    view.draw()
-    return view._meshes["smarticles"].point_data["colour"]
-
-
 def test_a_ray_picks_the_smarticle_that_it_meets_first(two):
     view = RunView(two)
     view.draw()
@@ -57,52 +51,12 @@ def test_a_ray_picks_the_smarticle_that_it_meets_first(two):
     assert view.pick is None
 
 
-def test_what_is_picked_is_described_and_coloured(two):
-    view = RunView(two)
-    assert view.describe() == []
-    view.draw()
-    y = 1e3 * u_shape(0.7 * W)[1, 1]
-    view.pick_along(np.array([[0.0, y, 100.0], [0.0, y, -100.0]]))
-    told = {row["name"]: row["value"] for row in view.describe()}
-    assert told["smarticle_id"] == "1"
-    assert float(told["height_m"]) == pytest.approx(0.023, rel=1e-3)
-    assert told["crossings"] == "0"
-    assert told["velocity_m_per_s"] == "(0, 0, 0)"
-    picked = (colours(view) == PICKED).all(axis=1)
-    assert picked.tolist() == [False] * 24 + [True] * 24
-
-
 def test_bodies_stand_on_the_floor_in_millimetres(two):
     view = RunView(two)
     view.draw()
     bounds = view._meshes["smarticles"].bounds
     assert bounds[4:] == pytest.approx((3.0 - 1e3 * T1 / 2, 23.0 + 1e3 * T1 / 2), abs=1e-3)
     assert view._meshes["floor"].bounds[4] == pytest.approx(0.0, abs=1e-6)
-
-
-def test_colours_follow_the_field(pile):
-    view = RunView(pile)
-    before = colours(view).copy()
-    view.colour_by("height")
-    assert (colours(view) != before).any()
-    legend = view.legend()
-    assert len(legend) == 5
-    shown = [float(row["label"]) for row in legend]
-    assert shown == sorted(shown, reverse=True)
-    view.colour_by("smarticle_id")
-    assert view.legend() == []
-    with pytest.raises(InputError, match="is no field"):
-        view.colour_by("colour")
-
-
-def test_new_frames_are_found(pile):
-    view = RunView(pile)
-    assert not view.grow()
-    writer = FrameWriter(pile, times=read_frames(pile).times.tolist())
-    writer.write(mesh_of(SyntheticRun().vertices(0.1), time=23.0, phase=3), 23.0)
-    assert view.grow()
-    view.go_to(len(view.frames) - 1)
-    assert view.frame.time == 23.0
 
 
 def test_a_damaged_frame_leaves_what_is_shown(pile):
@@ -202,8 +156,3 @@ def test_a_port_that_is_taken_is_one_line(served, capsys):
         f"smarticles: error: --port {port}: cannot listen there (Address already in use); leave it out, or choose "
         "another\n"
     )
-
-
-def test_a_directory_that_is_no_run_is_rejected(tmp_path, capsys):
-    assert main(["view", str(tmp_path)]) == 2
-    assert "cannot read run directory" in capsys.readouterr().err

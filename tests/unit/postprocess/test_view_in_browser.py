@@ -67,16 +67,16 @@ class Window:
         On a busy machine the answer comes when a place or two farther on have been clicked, whose own answers take it
         away again: so the last places are clicked once more, with time.
         """
-        box, told = self.page.locator("main").bounding_box(), self.page.locator("#pick")
+        box, described = self.page.locator("main").bounding_box(), self.page.locator("#pick")
         tried = []
         for share in shares:
             tried.append(share)
             self._click(box, share, 150)
-            if told.count():
+            if described.count():
                 break
         for share in reversed(tried):
             self._click(box, share, 1500)
-            if told.count():
+            if described.count():
                 return
 
     def _click(self, box, share, wait_ms):

@@ -1,4 +1,4 @@
-"""A checkpoint is plain data and an engine's own bytes; one of before engines had names is read."""
+"""A checkpoint is plain data and an engine's own bytes; one without an engine name is read."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ def test_everything_comes_back_and_the_one_before_is_kept(tmp_path: Path) -> Non
 
 
 @pytest.mark.parametrize(
-    ("wanted", "told"),
+    ("wanted", "stated"),
     [
         ({"scene_sha256": "other"}, "scene abc, here is other"),
         ({"made_by": ("double", "2.0")}, "engine double 1.2, here is double 2.0"),
@@ -51,10 +51,10 @@ def test_everything_comes_back_and_the_one_before_is_kept(tmp_path: Path) -> Non
     ],
 )
 def test_a_checkpoint_of_another_scene_or_engine_is_rejected(
-    tmp_path: Path, wanted: dict[str, object], told: str
+    tmp_path: Path, wanted: dict[str, object], stated: str
 ) -> None:
     write_checkpoint(tmp_path, checkpoint())
-    with pytest.raises(InputError, match=rf"checkpoint\.zip: made with {told}; .*start anew"):
+    with pytest.raises(InputError, match=rf"checkpoint\.zip: made with {stated}; .*start anew"):
         read_checkpoint(tmp_path, **({"scene_sha256": "abc", "made_by": MADE_BY} | wanted))
 
 

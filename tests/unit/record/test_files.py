@@ -4,21 +4,13 @@ from __future__ import annotations
 
 import errno
 import os
-import subprocess
-import sys
-from collections.abc import Callable
 from pathlib import Path
 
-import h5py
-import meshio
-import numpy as np
 import pytest
 
 from dem.errors import RunError
 from dem.record.files import write_text, write_whole
-from dem.record.frames import FrameWriter
 
-ROOT = Path(__file__).resolve().parents[3]
 FULL = (
     "cannot be written (No space left on device); free space or choose another --out; "
     "everything written before is whole"
@@ -27,12 +19,6 @@ FULL = (
 
 def full(_: Path) -> None:
     raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
-
-
-def test_text_comes_back(tmp_path: Path) -> None:
-    write_text(tmp_path / "a.txt", "φ = 0.1\n")
-    assert (tmp_path / "a.txt").read_text(encoding="utf-8") == "φ = 0.1\n"
-    assert [path.name for path in tmp_path.iterdir()] == ["a.txt"]
 
 
 def test_writer_sees_a_temporary_name_with_the_suffix_and_never_the_final_one(tmp_path: Path) -> None:
@@ -86,56 +72,3 @@ def test_folder_is_made_but_not_a_whole_path(tmp_path: Path) -> None:
     assert (tmp_path / "new" / "a.txt").read_text() == "x"
     with pytest.raises(RunError, match=r"gone/far/a\.txt: cannot be written, its folder is gone"):
         write_text(tmp_path / "gone" / "far" / "a.txt", "x")
-
-
-@pytest.fixture
-def tiny_disk(mount_disk: Callable[[str], Path]) -> Path:
-    """A file system of 64 KiB. Needs root; the tests above do not."""
-    return mount_disk("64k")
-
-
-LONG_SERIES = """
-import sys
-from pathlib import Path
-import numpy as np
-from dem.errors import RunError
-from dem.record.columns import COLUMNS
-from dem.record.series import SeriesWriter
-
-def write(length):
-    writer = SeriesWriter(Path(sys.argv[1]), COLUMNS, {"seed": 1})
-    for _ in range(length):
-        writer.add({name: np.zeros(3) if name == "container_force_N" else 0.0 for name in COLUMNS})
-    writer.write()
-
-write(10)
-try:
-    write(5000)
-except RunError as error:
-    print(error)
-"""
-
-
-def test_series_on_a_really_full_disk(tiny_disk: Path) -> None:
-    # In a process of its own: HDF5 cannot close a file that it could not flush, and crashes at the end.
-    answer = subprocess.run(
-        [sys.executable, "-c", LONG_SERIES, str(tiny_disk)],
-        cwd=ROOT,
-        capture_output=True,
-        text=True,
-        timeout=300,
-        check=False,
-    )
-    assert answer.returncode == 0, answer.stderr
-    assert answer.stdout == f"{tiny_disk}/series.h5: {FULL}\n"
-    assert answer.stderr == ""
-    with h5py.File(tiny_disk / "series.h5") as file:
-        assert len(file["time_s"]) == 10
-    assert [path.name for path in tiny_disk.iterdir()] == ["series.h5"]
-
-
-def test_frames_folder_that_cannot_be_made_is_a_run_error(tmp_path: Path) -> None:
-    (tmp_path / "frames").write_text("a file in the way")
-    mesh = meshio.Mesh(np.zeros((2, 3)), [("line", np.array([[0, 1]]))])
-    with pytest.raises(RunError, match="cannot be written"):
-        FrameWriter(tmp_path).write(mesh, 0.0)

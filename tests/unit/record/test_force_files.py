@@ -14,11 +14,9 @@ from dem.record.forces import force_mesh
 from dem.record.frames import FrameWriter
 from dem.record.names import FORCE
 
-UP = np.array([0.0, 0.0, 1.0])
-
 
 def some() -> dict[str, np.ndarray]:
-    """Two points of links 0 of 3 and 1 of 1, told once each way; one on the floor; one without a load."""
+    """Two points of links 0 of 3 and 1 of 1, listed once each way; one on the floor; one without a load."""
     high, low, floor = int(at_links(3, 0)), int(at_links(1, 1)), int(at_boundaries(FLOOR))
     return {
         "first": np.array([high, low, low, low]),

@@ -23,13 +23,6 @@ def edit(directory, **changes):
     path.write_text(json.dumps({key: value for key, value in data.items() if value is not None}))
 
 
-def test_manifest(run):
-    manifest = open_run(run).manifest
-    assert (manifest.name, manifest.seed, manifest.count) == ("pile", 7, 6)
-    assert manifest.thicknesses_in_plane_m == (0.5e-3, 0.5e-3, 0.5e-3)
-    assert manifest.versions["yade"] == "2023.02a"
-
-
 def test_phases_of_a_done_run_have_times_and_time_steps(make_run):
     phase = open_run(make_run(ending=("done.json", DONE))).phases[2]
     assert (phase.type, phase.start_s, phase.end_s, phase.cpu_s, phase.time_step_s) == ("shake", 2.0, 3.0, None, 1e-5)

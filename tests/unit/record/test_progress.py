@@ -24,10 +24,6 @@ def wall(monkeypatch: pytest.MonkeyPatch) -> Wall:
     return clock
 
 
-def last_line(text: str) -> str:
-    return text.rsplit("\r\x1b[K", 1)[-1]
-
-
 def test_file_states_how_far_the_run_is(tmp_path: Path, wall: Wall) -> None:
     bar = ProgressWriter(tmp_path, 270, show=False)
     bar.begin(index=2, phase="shake", start=3.0, now=3.0, end=8.0)
@@ -48,7 +44,7 @@ def test_file_states_how_far_the_run_is(tmp_path: Path, wall: Wall) -> None:
 
 
 def test_a_checkpoint_is_reported_at_once(tmp_path: Path, wall: Wall) -> None:
-    def told() -> tuple[float, float | None]:
+    def written() -> tuple[float, float | None]:
         data = json.loads((tmp_path / "progress.json").read_text())
         return data["time_s"], data.get("checkpoint_s")
 
@@ -57,65 +53,29 @@ def test_a_checkpoint_is_reported_at_once(tmp_path: Path, wall: Wall) -> None:
     bar.checkpointed(0.1)  # nothing else is known yet
     assert not (tmp_path / "progress.json").exists()
     bar.update(time=0.2, phi=0.1, count=2)
-    assert told() == (0.2, 0.1)
+    assert written() == (0.2, 0.1)
     wall.now += 0.01
     bar.update(time=0.3, phi=0.1, count=2)
     bar.checkpointed(0.3)
-    assert told() == (0.3, 0.3)
+    assert written() == (0.3, 0.3)
     wall.now += 2
     bar.update(time=0.5, phi=0.1, count=2)
-    assert told() == (0.5, 0.3)
+    assert written() == (0.5, 0.3)
 
 
 def test_at_most_once_per_second_and_at_once_in_a_new_phase(tmp_path: Path, wall: Wall) -> None:
     bar = ProgressWriter(tmp_path, 2, show=False)
     bar.begin(index=1, phase="relax", start=0.0, now=0.0, end=1.0)
 
-    def told(time: float) -> bool:
+    def written(time: float) -> bool:
         (tmp_path / "progress.json").unlink(missing_ok=True)
         bar.update(time=time, phi=0.1, count=2)
         return (tmp_path / "progress.json").exists()
 
-    assert told(0.1)
+    assert written(0.1)
     wall.now += 0.99
-    assert not told(0.2)
+    assert not written(0.2)
     wall.now += 0.02
-    assert told(0.3)
+    assert written(0.3)
     bar.begin(index=2, phase="shake", start=1.0, now=1.0, end=2.0)
-    assert told(1.0)
-
-
-def test_line_shows_phase_share_time_phi_and_time_left(
-    tmp_path: Path, wall: Wall, capsys: pytest.CaptureFixture[str]
-) -> None:
-    bar = ProgressWriter(tmp_path, 10, show=True)
-    bar.begin(index=2, phase="shake", start=2.0, now=2.0, end=6.0)
-    wall.now += 30
-    bar.update(time=3.0, phi=0.1234, count=10)
-    line = last_line(capsys.readouterr().err)
-    # A quarter done in 30 s: 90 s to go.
-    assert line == "shake    █████                 25 %  t = 3.00 s  φ 0.123  90 s left in this phase"
-    wall.now += 1
-    bar.update(time=6.0 + 1e-9, phi=0.1, count=10)
-    assert last_line(capsys.readouterr().err).endswith("t = 6.00 s  φ 0.100  0 s left in this phase")
-
-
-def test_deposit_counts_smarticles(tmp_path: Path, wall: Wall, capsys: pytest.CaptureFixture[str]) -> None:
-    bar = ProgressWriter(tmp_path, 20, show=True)
-    bar.begin(index=0, phase="deposit", start=0.0, now=0.0, end=None)
-    wall.now += 10
-    bar.update(time=0.3, phi=float("nan"), count=10)
-    line = last_line(capsys.readouterr().err)
-    assert line == "deposit  ██████████           10/20  t = 0.30 s  about 30 s left in this phase"
-    assert "phi" not in json.loads((tmp_path / "progress.json").read_text())
-
-
-def test_quiet_progress_draws_nothing_and_a_missing_folder_does_not_stop_the_run(
-    tmp_path: Path, wall: Wall, capsys: pytest.CaptureFixture[str]
-) -> None:
-    bar = ProgressWriter(tmp_path / "gone", 10, show=False)
-    bar.begin(index=0, phase="deposit", start=0.0, now=0.0, end=None)
-    wall.now += 10
-    bar.update(time=0.1, phi=0.1, count=3)
-    bar.finish()
-    assert capsys.readouterr().err == ""
+    assert written(1.0)

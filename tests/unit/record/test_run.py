@@ -37,7 +37,6 @@ def test_a_scene_that_is_none_is_rejected(text: str, tmp_path: Path) -> None:
 
 
 FAILED = {"status": "failed", "cause": "flew apart", "time_s": 0.5, "checkpoint_s": 0.4}
-DONE = {"status": "done", "time_s": 2, "steps": 9, "wall_s": 3, "phases": []}
 PROGRESS = {"phase": "shake", "time_s": 0.7, "wall_s": 9.0, "checkpoint_s": 0.6}
 
 

@@ -18,15 +18,6 @@ def test_series_holds_values_units_and_descriptions(run):
         series.time[0] = 1
 
 
-def test_series_of_a_scene_that_actuates_holds_a_column_per_barb(run):
-    angles = np.radians([[90.0, 90.0], [80.0, 100.0], [0.0, -5.0]])
-    with h5py.File(run / "series.h5", "a") as file:
-        file.create_dataset("angle_rad", data=angles).attrs.update({"unit": "rad", "description": ""})
-    series = read_series(run)
-    np.testing.assert_array_equal(series["angle_rad"], angles)
-    assert series.units["angle_rad"] == "rad"
-
-
 def test_unknown_name_lists_what_there_is(run):
     with pytest.raises(InputError, match=r"no series 'heat'; choose one of: .*kinetic_energy_J"):
         read_series(run)["heat"]

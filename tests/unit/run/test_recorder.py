@@ -97,8 +97,8 @@ def test_forces_are_asked_for_and_written_with_each_frame_where_the_scene_wants_
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     asked: list[float] = []
-    tell = EngineDouble.contact_forces
-    monkeypatch.setattr(EngineDouble, "contact_forces", lambda self: (asked.append(self.time), tell(self))[1])
+    original = EngineDouble.contact_forces
+    monkeypatch.setattr(EngineDouble, "contact_forces", lambda self: (asked.append(self.time), original(self))[1])
     without, wanting = tmp_path / "without", tmp_path / "wanting"
     for out, more in ((without, {}), (wanting, {"recording.contact_forces": True})):
         out.mkdir()
@@ -125,7 +125,7 @@ def test_the_watchdog_checks_at_intervals_and_after_the_frame_is_written(tmp_pat
     _, engine, recorder = start(tmp_path, heights=[0.02] * 3)
     every = round(WATCH_STEPS * DT / 0.004)
     assert every > 10
-    take(engine, recorder, 2 * every)  # samples 0 to 2 every - 1: looks at 0 and at every
+    take(engine, recorder, 2 * every)  # samples 0 to 2 every - 1: checks at 0 and at every
     assert engine.touches().all()
     engine.deepest = recorder.watchdog.depth * 1.1
     frames = len(files(tmp_path)["frames"])
@@ -139,8 +139,8 @@ def test_where_extremes_are_enough_only_the_energy_is_checked_too(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     _, engine, recorder = start(tmp_path)
-    told = {"fastest": 0.1, "lowest": 1.0, "highest": 1.0, "widest": 0.0, "gap": 0.0, "deepest": 0.0}
-    seen = Extremes(**told, elastic_energy=0.0)
+    extremes = {"fastest": 0.1, "lowest": 1.0, "highest": 1.0, "widest": 0.0, "gap": 0.0, "deepest": 0.0}
+    seen = Extremes(**extremes, elastic_energy=0.0)
     monkeypatch.setattr(engine, "extremes", lambda state: seen)
     engine.deepest = recorder.watchdog.depth * 1.1
     monkeypatch.setattr(engine.boundaries, "floor", 0.99)

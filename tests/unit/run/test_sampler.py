@@ -117,12 +117,11 @@ def test_motors_report_while_articulated_and_not_while_welded() -> None:
     assert math.isnan(row["tracking_error_rad"])
     engine.motors.articulate()
     engine.motors.actuate(np.array([[[1.0, 1.5], [1.2, 1.5]]]), 2e-4)
-    told = engine.motors.readings
-    assert told is not None
+    found = engine.motors.readings
+    assert found is not None
     halted = np.array([[True, False], [False, False]])
-    engine.motors.readings = replace(
-        told, schedule=told.commands - 0.3, torques=np.full((2, 2), 3e-5), work=np.full((2, 2), 1e-6), halted=halted
-    )
+    torques, work = np.full((2, 2), 3e-5), np.full((2, 2), 1e-6)
+    engine.motors.readings = replace(found, schedule=found.commands - 0.3, torques=torques, work=work, halted=halted)
     row = sample(sampler, engine)
     assert row["commanded_angle_rad"] == pytest.approx([1.1, 1.5])
     assert row["schedule_error_rad"] == pytest.approx(0.3)

@@ -218,8 +218,8 @@ def test_a_directory_that_holds_something_is_left_as_it_is(
         # What is not a run's is left alone with --resume as well, and nothing is advised that would be refused.
         with pytest.raises(InputError) as caught:
             run(scene_of("rested"), tmp_path, resume=True)
-        told = "no run to resume but files (notes.txt, …) and is left as it is; choose another directory"
-        assert str(caught.value) == f"--out {tmp_path}: holds {told}"
+        stated = "no run to resume but files (notes.txt, …) and is left as it is; choose another directory"
+        assert str(caught.value) == f"--out {tmp_path}: holds {stated}"
     assert {path.name: path.stat().st_mtime_ns for path in tmp_path.iterdir()} == before
     assert {path.name: path.read_text() for path in tmp_path.iterdir()} == held
     assert not kind.built

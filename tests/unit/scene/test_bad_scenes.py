@@ -229,9 +229,9 @@ def test_one_line_with_key_value_and_way_out(
     line = rejected(good, changes)
     assert len(line.splitlines()) == 1
     assert line.startswith(f"{key}: " if key else value)
-    told = line.removeprefix(f"{key}: ")
-    assert re.search(rf"(?<![\w.]){re.escape(value)}(?![\w.]*\w)", told), line
-    assert WAY_OUT.search(told), line
+    stated = line.removeprefix(f"{key}: ")
+    assert re.search(rf"(?<![\w.]){re.escape(value)}(?![\w.]*\w)", stated), line
+    assert WAY_OUT.search(stated), line
     assert "Value error" not in line  # as pydantic would begin it
 
 

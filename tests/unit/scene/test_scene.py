@@ -16,8 +16,8 @@ from dem.scene.scene import Scene
 
 SceneData = Callable[..., dict[str, Any]]
 
-# Of the small scene, as it was before scenes named an engine. It changes with every default of a scene: whoever changes
-# one makes runs from before that cannot be resumed, and should know.
+# Of the small scene, as it was before scenes named an engine. It changes with every default of a scene: changing
+# one means that earlier runs cannot be resumed.
 PLAIN_HASH = "bd49c1b6ca1f53883664edf95600a298153c39a4d21bf0870066fcafa60feb56"
 MINIMAL = "schema_version: 1\nseed: 3\ncount: 12\nphases:\n  - {type: deposit}\n  - {type: shake}\n"
 

@@ -43,9 +43,3 @@ def test_the_script_for_zsh_is_one(smarticles: Smarticles) -> None:
     if shutil.which("zsh") is None:
         pytest.skip("zsh is not installed here, so its script is not tried")
     assert subprocess.run(["zsh", "-n"], input=said.out, text=True, check=False).returncode == 0
-
-
-def test_another_shell_is_rejected(smarticles: Smarticles) -> None:
-    said = smarticles("--completion", "fish")
-    assert said.status == 2
-    assert "'fish' is not known" in said.err

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 from command_cases import Smarticles
 
-from smarticles.starters import KINDS, about, starter
+from smarticles.starters import KINDS
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -20,13 +20,6 @@ def test_what_is_written_is_planned_without_a_warning(kind: str, tmp_path: Path,
     assert planned.status == 0
     assert "warning" not in planned.out
     assert planned.out.startswith(f"{kind}: ")
-
-
-@pytest.mark.parametrize("kind", KINDS)
-def test_every_scene_begins_with_what_it_does_and_comments_its_keys(kind: str) -> None:
-    lines = starter(kind).splitlines()
-    assert lines[0] == f"# {about(kind)}"
-    assert sum("  # " in line for line in lines) >= 5
 
 
 def test_nothing_is_overwritten_nor_written_through_a_link(tmp_path: Path, smarticles: Smarticles) -> None:

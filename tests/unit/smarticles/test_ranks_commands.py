@@ -53,7 +53,7 @@ def test_a_resumed_run_has_the_ranks_that_it_began_with_unless_asked(
 
 
 @pytest.mark.parametrize(
-    ("options", "told"),
+    ("options", "stated"),
     [
         (["--engine", "lammps", "--ranks", "4"], "--ranks 4: there are 3 cores for this process, and each rank waits"),
         (
@@ -65,29 +65,10 @@ def test_a_resumed_run_has_the_ranks_that_it_began_with_unless_asked(
     ],
 )
 def test_what_has_no_meaning_is_rejected_before_anything_starts(
-    scene_file: Path, smarticles: Smarticles, seen: list[tuple[str, str]], options: list[str], told: str
+    scene_file: Path, smarticles: Smarticles, seen: list[tuple[str, str]], options: list[str], stated: str
 ) -> None:
     said = smarticles("run", scene_file, "--out", scene_file.parent / "out", *options)
     assert said.status == 2
-    assert told in said.err
+    assert stated in said.err
     assert seen == []
     assert not (scene_file.parent / "out").exists()
-
-
-def test_a_sweep_asks_a_cluster_for_ranks(sweep_file: Path, tmp_path: Path, smarticles: Smarticles) -> None:
-    template = sweep_file.with_name("scene.yaml.j2")
-    template.write_text(template.read_text() + "engine: {{ engine }}\n")
-    sweep_file.write_text(sweep_file.read_text() + "constants: {engine: yade}\n")
-    cluster = ("--submit", "none", "--cluster", "example-large", "--dry-run")
-    words = ("sweep", sweep_file, "--out", tmp_path / "out", "--ranks", "96")
-    said = smarticles(*words, "--engine", "lammps", *cluster)
-    assert said.status == 0, said.err
-    assert "2 tasks of 1 run on 96 ranks: 2 nodes" in said.out
-    assert "#SBATCH --nodes=2\n#SBATCH --ntasks=96\n#SBATCH --cpus-per-task=1\n" in said.out
-    assert '--out "runs/$1" --ranks 96 ' in said.out
-    rejected = smarticles(*words, "--engine", "links", *cluster)
-    assert rejected.status == 2
-    assert "--ranks 96: engine: links is one process; leave it out, or give --engine lammps" in rejected.err
-    alone = smarticles(*words, "--engine", "lammps")
-    assert alone.status == 2
-    assert "--ranks: is for a cluster; give --submit slurm" in alone.err

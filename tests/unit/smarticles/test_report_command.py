@@ -1,10 +1,9 @@
-"""report: what stands on the page of a run, a sweep and a study. How it looks is in `test_report_browser.py`."""
+"""report: what stands on the page of a run, a sweep and a study. Its layout is tested in `test_report_browser.py`."""
 
 from __future__ import annotations
 
 import json
 import math
-import re
 from html.parser import HTMLParser
 from pathlib import Path
 
@@ -16,7 +15,6 @@ from scenes import small
 
 from dem.scene.reading import dump_scene
 from smarticles.reporting.charts import thinned
-from smarticles.reporting.page import numbers
 from smarticles.sweeps import make_folder
 from studies.registry import study_file
 
@@ -211,27 +209,3 @@ def test_a_thinned_curve_keeps_its_extremes() -> None:
     assert (few.max(), few.min()) == (9.0, np.nanmin(values))
     assert times[777] in few_times
     assert (np.diff(few_times) > 0).all()
-
-
-@pytest.mark.parametrize(
-    ("cells", "numeric"),
-    [
-        (["1", "-2.5", "1e-05", "0.1 ± 0.02", "-", "+3.1 ± 2 %"], True),
-        (["1", "1.5 s"], False),
-        (["-", "2026-11-22"], False),
-        (["1.2.3-x"], False),
-        ([], False),
-    ],
-)
-def test_columns_of_numbers_are_known(cells: list[str], numeric: bool) -> None:
-    assert numbers(cells) is numeric
-
-
-def test_a_long_table_says_what_is_left_out(tmp_path: Path, smarticles: Smarticles) -> None:
-    (tmp_path / "provenance.json").write_text('{"study": "x", "runs": [], "missing": [], "footer": []}')
-    (tmp_path / "times.csv").write_text("a,b\n" + "".join(f"{k},1\n" for k in range(500)) + "# of nothing\n")
-    smarticles("report", tmp_path)
-    page = Read(tmp_path / "report.html")
-    assert len(page.rows) == 201
-    assert "300 more rows are left out here." in page.text
-    assert not re.search("of nothing", " ".join(cell for row in page.rows for cell in row))

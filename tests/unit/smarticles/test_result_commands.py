@@ -11,44 +11,6 @@ from command_cases import Smarticles, WriteRun
 from PIL import Image
 
 
-def test_measure_prints_one_row_per_phase(tmp_path: Path, write_run: WriteRun, smarticles: Smarticles) -> None:
-    run = write_run(tmp_path / "a")
-    said = smarticles("measure", run)
-    assert said.status == 0
-    lines = said.out.splitlines()
-    assert lines[0].split()[:6] == ["phase", "t", "[s]", "smarticles", "φ", "±"]
-    assert lines[1] == f"{run}:"
-    assert [line.split()[0] for line in lines[2:6]] == ["deposit", "relax", "shake", "relax"]
-    # Known: φ before shaking is 0.105, and 12 smarticles take part.
-    assert lines[3].split()[2:4] == ["12", "0.1050"]
-
-
-def test_measure_names_each_definition_within_100_columns(
-    tmp_path: Path, write_run: WriteRun, smarticles: Smarticles
-) -> None:
-    runs = [write_run(tmp_path / "a"), write_run(tmp_path / "b", frames_per_phase=1)]
-    for words in ([], ["--frames"]):
-        said = smarticles("measure", *runs, *words)
-        lines = said.out.splitlines()
-        assert max(map(len, lines[:1] + [line for line in lines[1:] if not line.startswith("/")])) <= 100
-        assert [line for line in lines if line.startswith("/")] == [f"{run}:" for run in runs]
-        told = " ".join(line.strip() for line in lines)
-        assert "φ by second-highest-com: N V_s / (π r² z), z = " in told
-        assert all(f"{name}: φ = " in told for name in ("top-percentile", "voxel", "voronoi"))
-        assert ("SE: their standard error" in told) == (not words)
-
-
-def test_measure_does_not_overwrite_unless_asked(tmp_path: Path, write_run: WriteRun, smarticles: Smarticles) -> None:
-    run, table = write_run(tmp_path / "a"), tmp_path / "table.csv"
-    table.write_text("precious")
-    said = smarticles("measure", run, "--table", table)
-    assert said.status == 2
-    assert said.err == (f"smarticles: error: --table {table}: exists; choose another name or give --overwrite\n")
-    assert table.read_text() == "precious"
-    assert smarticles("measure", run, "--table", table, "--overwrite").status == 0
-    assert table.read_text(encoding="utf-8").startswith("run,")
-
-
 def test_measure_writes_a_profile_of_each_run_beside_the_table(
     tmp_path: Path, write_run: WriteRun, smarticles: Smarticles
 ) -> None:
@@ -81,19 +43,6 @@ def test_measure_gives_json_without_nan(tmp_path: Path, write_run: WriteRun, sma
     assert [row["frame"] for row in rows] == list(range(16))
     assert rows[0]["phi voxel [-]"] is None
     assert 0.05 < rows[0]["phi second-highest-com [-]"] < 0.2
-
-
-def test_measure_takes_the_runs_of_a_sweep(
-    tmp_path: Path, sweep_file: Path, write_run: WriteRun, smarticles: Smarticles
-) -> None:
-    out = tmp_path / "out"
-    smarticles("sweep", sweep_file, "--out", out)
-    said = smarticles("measure", out)
-    assert said.status == 2
-    assert "no run of this sweep has frames yet; start them with: smarticles resume" in said.err
-    write_run(out / "runs" / "n6")
-    rows = json.loads(smarticles("measure", out, "--json").out)
-    assert {row["run"] for row in rows} == {str(out / "runs" / "n6")}
 
 
 def test_measure_has_the_variables_of_a_sweep_and_means_by_them(
@@ -156,50 +105,20 @@ def test_measure_warns_that_a_series_is_gone(tmp_path: Path, write_run: WriteRun
     assert "put it back, or run" in line
 
 
-def test_a_picture_that_is_there_hides_no_bad_option(
-    tmp_path: Path, write_run: WriteRun, smarticles: Smarticles
-) -> None:
-    run = write_run(tmp_path / "a", frames_per_phase=1)
-    (run / "render.png").write_text("mine")
-    for options, told in (
-        (["--view", "nope"], "view 'nope': is not known; known: front"),
-        (["--time", "99"], "time must be between"),
-        (["--color-by", "sped"], "did you mean 'speed'?"),
-        (
-            [],
-            "render.png: exists already and is left as it is; choose another name, or let it be replaced (--overwrite)",
-        ),
-    ):
-        said = smarticles("render", run, *options)
-        assert said.status == 2
-        assert told in said.err
-
-
 @pytest.mark.parametrize("command", ["render", "measure", "status", "resume"])
 def test_places_that_are_neither_run_nor_sweep(command: str, tmp_path: Path, smarticles: Smarticles) -> None:
     (tmp_path / "photos").mkdir()
     (tmp_path / "note.txt").write_text("x")
     both = command in ("status", "resume")
-    for name, told in (
+    for name, stated in (
         ("photos", "holds neither a run (run.json) nor a sweep (sweep.json)" if both else "it holds no run.json"),
         ("note.txt", "is a file"),
         ("absent", "no such directory"),
     ):
         said = smarticles(command, tmp_path / name)
         assert said.status == 2
-        assert told in said.err
+        assert stated in said.err
         assert "; give the directory of a run" in said.err
-
-
-def test_render_draws_a_picture(tmp_path: Path, write_run: WriteRun, smarticles: Smarticles) -> None:
-    run, picture = write_run(tmp_path / "a"), tmp_path / "picture.png"
-    said = smarticles("render", run, "--output", picture, "--time", "1", "--view", "top", "--size", "300")
-    assert (said.status, said.out, said.err) == (0, f"{picture}\n", "")
-    with Image.open(picture) as image:
-        assert (image.format, image.size) == ("PNG", (300, 300))
-    again = smarticles("render", run, "--output", picture)
-    assert again.status == 2
-    assert "--overwrite" in again.err or "exists" in again.err
 
 
 def test_render_draws_a_film_of_a_part_in_fixed_colours(
@@ -208,26 +127,13 @@ def test_render_draws_a_film_of_a_part_in_fixed_colours(
     run, film = write_run(tmp_path / "a", phases=("deposit",) * 3, frames_per_phase=4), tmp_path / "film.webp"
     words = ("--size", "320x240", "--from", "0.5", "--to", "2", "--every", "0.5", "--fps", "20", "--clim", "0:5")
     said = smarticles("render", run, "--output", film, *words)
-    # Not a word of progress where nobody looks.
+    # No progress where the output is no terminal.
     assert (said.status, said.out, said.err) == (0, f"{film}\n", "")
     with Image.open(film) as images:
         assert (images.n_frames, images.size) == (4, (320, 240))
         images.seek(1)
         images.load()
         assert images.info["duration"] == 50
-
-
-def test_render_draws_runs_beside_each_other_and_one_smarticle(
-    tmp_path: Path, write_run: WriteRun, smarticles: Smarticles
-) -> None:
-    runs = [write_run(tmp_path / "a"), write_run(tmp_path / "b", seed=2)]
-    both, alone = tmp_path / "both.png", tmp_path / "alone.png"
-    assert smarticles("render", runs[0], "--compare", runs[1], "--output", both, "--size", "300").status == 0
-    with Image.open(both) as image:
-        assert image.size == (600, 300)
-    assert smarticles("render", runs[0], "--smarticle", "3", "--output", alone, "--size", "300").status == 0
-    said = smarticles("render", runs[0], "--smarticle", "99", "--output", tmp_path / "c.png")
-    assert (said.status, "smarticle 99: there are 0 to 11 at 22 s" in said.err) == (2, True)
 
 
 @pytest.mark.parametrize(

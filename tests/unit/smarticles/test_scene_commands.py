@@ -14,13 +14,6 @@ from dem.run.run import manifest
 from dem.scene.reading import load_scene
 
 
-def test_plan_prints_phases_and_cost(scene_file: Path, smarticles: Smarticles) -> None:
-    said = smarticles("plan", scene_file)
-    assert said.status == 0
-    assert "0 deposit" in said.out
-    assert "1 shake" in said.out
-
-
 def test_plan_in_json_and_with_other_values(scene_file: Path, smarticles: Smarticles) -> None:
     said = smarticles("plan", scene_file, "--json", "--set", "count=7", "--set", "phases.1.duration_s=3")
     assert said.status == 0
@@ -67,30 +60,30 @@ def test_files_and_folders_that_are_no_scene(
     (tmp_path / "run").mkdir()
     (tmp_path / "run" / "scene.yaml").write_text(scene_file.read_text())
     (tmp_path / "empty").mkdir()
-    for name, told in (
+    for name, stated in (
         (sweep_file.name, "is a sweep file, which makes many scenes; give it to `smarticles sweep`"),
         ("scene.yaml.j2", "is a template of scenes; give the sweep file that names it to `smarticles sweep`"),
         ("run", f"is a directory; give {tmp_path / 'run' / 'scene.yaml'}"),
         ("empty", "is a directory; give the path of a scene file"),
     ):
         said = smarticles(command, tmp_path / name, *out)
-        assert (said.status, said.err) == (2, f"smarticles: error: {tmp_path / name}: {told}\n")
+        assert (said.status, said.err) == (2, f"smarticles: error: {tmp_path / name}: {stated}\n")
     said = smarticles("sweep", scene_file, "--dry-run")
-    told = "is one scene, not a sweep file; give it to `smarticles run` or `smarticles plan`"
-    assert (said.status, said.err) == (2, f"smarticles: error: {scene_file}: {told}\n")
+    stated = "is one scene, not a sweep file; give it to `smarticles run` or `smarticles plan`"
+    assert (said.status, said.err) == (2, f"smarticles: error: {scene_file}: {stated}\n")
 
 
-@pytest.mark.parametrize(("threads", "told"), [("2", False), ("3", True), ("64", True)])
+@pytest.mark.parametrize(("threads", "stated"), [("2", False), ("3", True), ("64", True)])
 def test_more_threads_than_cores_are_warned_of(
-    threads: str, told: bool, scene_file: Path, smarticles: Smarticles, monkeypatch: pytest.MonkeyPatch
+    threads: str, stated: bool, scene_file: Path, smarticles: Smarticles, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("os.sched_getaffinity", lambda _: {0, 5})
     monkeypatch.setattr("dem.run.run.run_scene", lambda *_, **__: None)
     said = smarticles("run", scene_file, "--out", scene_file.parent / "out", "--threads", threads)
     assert said.status == 0
     warning = f"smarticles: warning: --threads {threads}: this process may use 2 cores, and threads that find no free "
-    assert [line.startswith(warning) for line in said.err.splitlines()] == [True] * told
-    assert said.err.endswith("use at most 2\n") == told
+    assert [line.startswith(warning) for line in said.err.splitlines()] == [True] * stated
+    assert said.err.endswith("use at most 2\n") == stated
 
 
 @pytest.mark.parametrize(("options", "threads"), [([], "3"), (["--threads", "1"], "1")])

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import subprocess
 from pathlib import Path
 
 import pytest
@@ -30,17 +29,6 @@ def queue(monkeypatch: pytest.MonkeyPatch) -> list[str]:
     monkeypatch.setattr(slurm, "_call", call)
     monkeypatch.setattr(slurm, "require_sbatch", lambda: None)
     return lines
-
-
-def test_a_dry_run_shows_list_and_script_and_writes_nothing(sweep_file: Path, smarticles: Smarticles) -> None:
-    before = sorted(sweep_file.parent.iterdir())
-    out = sweep_file.parent / "out"
-    said = smarticles("sweep", sweep_file, "--out", out, "--submit", "slurm", *LARGE, "--dry-run")
-    assert said.status == 0
-    lines = said.out.splitlines()
-    assert "--- jobs/001/runs.txt" in lines
-    assert "#SBATCH --cpus-per-task=2" in lines
-    assert sorted(sweep_file.parent.iterdir()) == before
 
 
 @pytest.mark.parametrize(
@@ -112,24 +100,6 @@ def test_a_sweep_is_submitted_followed_and_resumed(
     said = smarticles("resume", out, "--submit", "slurm")  # on the same cluster
     assert ": job 7: 1 of 2 runs, " in said.out
     assert (out / "jobs/002/runs.txt").read_text() == "n5\n"
-
-
-def test_status_says_when_the_queue_does_not_answer(
-    sweep_file: Path, tmp_path: Path, smarticles: Smarticles, queue: list[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    out = tmp_path / "out"
-    smarticles("sweep", sweep_file, "--out", out, "--submit", "slurm", *LARGE)
-
-    def call(command: tuple[str, ...], _: Path | None) -> str:
-        raise subprocess.CalledProcessError(1, command, stderr="Unable to contact slurm controller")
-
-    monkeypatch.setattr(slurm, "_call", call)
-    said = smarticles("status", out)
-    assert said.status == 0
-    assert "the queue cannot be asked: Unable to contact slurm controller; the states are those of" in said.out
-    said = smarticles("resume", out, "--submit", "slurm")
-    assert said.status == 1
-    assert "the queue cannot be asked" in said.err
 
 
 def test_too_many_points_are_rejected_unless_wanted(sweep_file: Path, tmp_path: Path, smarticles: Smarticles) -> None:

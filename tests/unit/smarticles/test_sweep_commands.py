@@ -6,14 +6,13 @@ import json
 from pathlib import Path
 
 import pytest
-from command_cases import SWEEP, Smarticles, WriteRun
+from command_cases import Smarticles, WriteRun
 from synthetic import write_ended
 
-from dem.record.rundir import claimed
 from studies.registry import study_file
 from templates.sweep.expand import expand
-from templates.sweep.folder import create_folder, open_folder
-from templates.sweep.sweep_file import load_sweep, with_constants
+from templates.sweep.folder import open_folder
+from templates.sweep.sweep_file import load_sweep
 
 
 def finish(directory: Path) -> None:
@@ -46,67 +45,19 @@ def test_a_sweep_is_written_and_started_later(sweep_file: Path, tmp_path: Path, 
     assert not (out / "runs").exists()
 
 
-def test_status_of_one_run_shows_whether_a_process_works_in_it(
-    tmp_path: Path, write_run: WriteRun, smarticles: Smarticles
-) -> None:
-    run = write_run(tmp_path / "a", status="unfinished")
-
-    def state() -> str:
-        return str(json.loads(smarticles("status", run, "--json").out)["runs"][0]["state"])
-
-    assert state() == "stopped"
-    with claimed(run, resume=True):
-        assert state() == "running"
-    assert state() == "stopped"
-
-
-def test_a_bad_sweep_is_status_2(sweep_file: Path, smarticles: Smarticles) -> None:
-    sweep_file.write_text(SWEEP.replace("grid", "gird"))
-    said = smarticles("sweep", sweep_file, "--out", sweep_file.parent / "out")
-    assert said.status == 2
-    assert said.err == (f"smarticles: error: {sweep_file}: points: unknown key 'gird'; did you mean 'grid'?\n")
-    assert not (sweep_file.parent / "out").exists()
-
-
-def test_status_of_a_sweep(sweep_file: Path, tmp_path: Path, smarticles: Smarticles) -> None:
-    out = tmp_path / "out"
-    smarticles("sweep", sweep_file, "--out", out)
-    said = smarticles("status", out)
-    assert said.status == 0
-    assert said.out.splitlines()[-1] == "counts: 2 runs, 2 missing"
-    finish(out)
-    answer = json.loads(smarticles("status", out, "--json").out)
-    assert answer["counts"] == {"done": 2}
-    assert [(run["name"], run["state"], run["wall_s"]) for run in answer["runs"]] == [
-        ("n5", "done", 2.0),
-        ("n6", "done", 2.0),
-    ]
-
-
 def test_status_of_a_killed_run_shows_from_where_it_would_go_on(
     tmp_path: Path, write_run: WriteRun, smarticles: Smarticles
 ) -> None:
     run = write_run(tmp_path / "alone", status="unfinished")
-    told = {"phase": "shake", "phase_index": 2, "time_s": 3.51, "wall_s": 20.0, "checkpoint_s": 3.2}
-    (run / "progress.json").write_text(json.dumps(told))
+    progress = {"phase": "shake", "phase_index": 2, "time_s": 3.51, "wall_s": 20.0, "checkpoint_s": 3.2}
+    (run / "progress.json").write_text(json.dumps(progress))
     header, row = smarticles("status", run).out.splitlines()[:2]
     assert [word.strip() for word in header.split("  ") if word] == [
         *("run", "state", "phase", "simulated s", "checkpoint s", "wall s", "cause")
     ]
     assert row.split() == ["alone", "stopped", "shake", "3.51", "3.2", "20"]
     assert json.loads(smarticles("status", run, "--json").out)["runs"][0]["checkpoint_s"] == 3.2
-    # Where all went well, nobody asks.
     assert "checkpoint s" not in smarticles("status", write_run(tmp_path / "done")).out
-
-
-def test_resume_has_nothing_to_do_when_all_is_done(sweep_file: Path, tmp_path: Path, smarticles: Smarticles) -> None:
-    out = tmp_path / "out"
-    smarticles("sweep", sweep_file, "--out", out)
-    finish(out)
-    said = smarticles("resume", out)
-    assert said.status == 0
-    assert said.err.splitlines() == ["n5 finished before", "n6 finished before"]
-    assert said.out.startswith(f"{out}: all 2 runs are done")
 
 
 def test_threads_are_of_one_run_and_not_of_a_sweep(sweep_file: Path, tmp_path: Path, smarticles: Smarticles) -> None:
@@ -138,39 +89,6 @@ def test_a_failing_run_is_status_1_with_its_cause(sweep_file: Path, tmp_path: Pa
     assert lines[3].endswith(f"start them again: smarticles resume {out}")
     assert (out / "runs" / "n5.stopped-1" / "run.json").exists()
     assert (out / "logs" / "n5.txt").read_text(encoding="utf-8").startswith("smarticles: error: ")
-
-
-def test_another_study_in_the_same_directory_is_rejected(
-    sweep_file: Path, tmp_path: Path, smarticles: Smarticles
-) -> None:
-    out = tmp_path / "out"
-    smarticles("sweep", sweep_file, "--out", out)
-    said = smarticles("study", "gravish", "--quick", "--out", out)
-    assert said.status == 2
-    assert said.err.startswith(f"smarticles: error: {out}: holds another sweep ('counts'): ")
-
-
-@pytest.mark.parametrize(
-    ("words", "note"),
-    [
-        ([], "the full study as shipped"),
-        (["--fidelity", "standard"], "the full study as shipped"),
-        (["--fidelity", "reference"], "not the full study: fidelity: reference instead of standard"),
-    ],
-)
-def test_a_study_says_how_it_differs_from_the_full_one(
-    words: list[str], note: str, tmp_path: Path, smarticles: Smarticles
-) -> None:
-    study = ("study", "gravish", "--out", tmp_path / "out", *words)
-    points = expand(with_constants(load_sweep(study_file("gravish")), {"fidelity": (words or ["standard"])[-1]}))
-    # Held by another process: the command ends before it starts a run.
-    folder = create_folder(
-        tmp_path / "out", load_sweep(study_file("gravish")), points, command="", versions={}, expected_s=lambda _: 1.0
-    )
-    with folder.lock():
-        said = smarticles(*study)
-    assert said.status == 2
-    assert said.out.splitlines() == [note]
 
 
 @pytest.fixture
@@ -224,20 +142,23 @@ def test_a_study_without_a_finished_run_has_nothing_to_analyse(tmp_path: Path, s
 @pytest.mark.parametrize(
     ("words", "message"),
     [
-        (["--quick"], "study sensitivity has no quick variant; leave --quick out"),
+        ("sensitivity --quick", "study sensitivity has no quick variant; leave --quick out"),
         (
-            ["--fidelity", "reference"],
+            "sensitivity --fidelity reference",
             "--fidelity reference: study sensitivity sets the fidelity of its runs itself; leave --fidelity out",
         ),
-        (["--fidelity", "fine"], "--fidelity fine: is not known; known: draft, standard, reference"),
+        ("sensitivity --fidelity fine", "--fidelity fine: is not known; known: draft, standard, reference"),
+        ("engines --engine links", "--engine links: study engines cannot be run on it ("),
+        ("chain --quick --fidelity reference", "--fidelity reference: study chain cannot be run at it ("),
     ],
 )
 def test_what_a_study_does_not_have_is_rejected(
-    words: list[str], message: str, tmp_path: Path, smarticles: Smarticles
+    words: str, message: str, tmp_path: Path, smarticles: Smarticles
 ) -> None:
-    said = smarticles("study", "sensitivity", *words, "--out", tmp_path / "out")
+    said = smarticles("study", *words.split(), "--out", tmp_path / "out")
     assert said.status == 2
     assert said.err.startswith(f"smarticles: error: {message}")
+    assert len(said.err.splitlines()) == 1
     assert not (tmp_path / "out").exists()
 
 
@@ -249,38 +170,3 @@ def test_a_sweep_runs_on_the_engine_that_is_asked_for(sweep_file: Path, tmp_path
     assert said.out.splitlines()[-1].startswith("64 runs, ")
     said = smarticles("sweep", study_file("gravish"), "--engine", "yode", "--dry-run")
     assert "--engine: 'yode' is not known; did you mean 'yade'?" in said.err
-
-
-def test_a_study_of_both_engines_rejects_one(tmp_path: Path, smarticles: Smarticles) -> None:
-    said = smarticles("study", "engines", "--engine", "links", "--out", tmp_path / "out")
-    assert said.status == 2
-    assert said.err.startswith("smarticles: error: --engine links: study engines cannot be run on it (")
-    assert len(said.err.splitlines()) == 1
-    assert not (tmp_path / "out").exists()
-
-
-def test_a_fidelity_at_which_a_study_cannot_be_run_is_rejected_by_its_option(
-    tmp_path: Path, smarticles: Smarticles
-) -> None:
-    said = smarticles("study", "chain", "--quick", "--fidelity", "reference", "--out", tmp_path / "out")
-    assert said.status == 2
-    assert said.err.startswith("smarticles: error: --fidelity reference: study chain cannot be run at it (")
-    assert said.err.endswith("fidelity.rows: 2 rows of spheres out of the plane; use 1); leave --fidelity out\n")
-    assert len(said.err.splitlines()) == 1
-
-
-def test_a_study_whose_template_ignores_the_fidelity_rejects_it(
-    sweep_file: Path, smarticles: Smarticles, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    def file_of(name: str, *, quick: bool = False) -> Path:
-        return sweep_file
-
-    monkeypatch.setattr("studies.registry.study_file", file_of)
-    sweep_file.write_text(SWEEP + "constants: {fidelity: standard}\n")
-    out = sweep_file.parent / "out"
-    said = smarticles("study", "gravish", "--fidelity", "draft", "--out", out)
-    assert (said.status, out.exists()) == (2, False)
-    assert said.err == (
-        "smarticles: error: --fidelity draft: study gravish sets the fidelity of its runs itself; leave --fidelity "
-        "out\n"
-    )

@@ -70,15 +70,6 @@ def test_bad_cluster_files_are_input_errors(old: str, new: str, message: str, tm
     assert "\n" not in str(caught.value)
 
 
-def test_unknown_clusters_are_input_errors_with_the_nearest(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match=r"--cluster exmple-large: is not known; did you mean 'example-large'\?"):
-        load_cluster("exmple-large")
-    with pytest.raises(InputError, match="known: example-apptainer, example-large, local-slurm"):
-        load_cluster("zzz")
-    with pytest.raises(InputError, match=r"absent.toml: cannot read the cluster file"):
-        load_cluster(str(tmp_path / "absent.toml"))
-
-
 @pytest.mark.parametrize(
     ("text", "seconds"),
     [("90", 5400), ("1:30", 90), ("01:00:00", 3600), ("2-0", 172800), ("1-02:03", 93780), ("1-02:03:04", 93784)],

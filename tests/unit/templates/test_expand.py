@@ -127,12 +127,6 @@ def test_some_points_have_more_seeds_after_those_of_all(write_sweep: WriteSweep,
     assert not any(point.again for point in found)
 
 
-def test_more_seeds_count(write_sweep: WriteSweep) -> None:
-    assert len(expand(load_sweep(write_sweep(MORE)), max_points=10)) == 10
-    with pytest.raises(InputError, match="10 runs, more than 9"):
-        expand(load_sweep(write_sweep(MORE)), max_points=9)
-
-
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [
@@ -146,20 +140,6 @@ def test_more_seeds_count(write_sweep: WriteSweep) -> None:
 def test_more_seeds_must_be_of_known_points(write_sweep: WriteSweep, old: str, new: str, message: str) -> None:
     with pytest.raises(InputError, match=message):
         points(MORE.replace(old, new), write_sweep)
-
-
-def test_zip_pairs_first_with_first(write_sweep: WriteSweep) -> None:
-    found = points(
-        sweep_with("{zip: {count: [10, 20], seed_: [3, 4]}}").replace("{{ seed }}", "{{ seed_ }}"),
-        write_sweep,
-        scene=SCENE.replace("seed }}", "seed_ }}"),
-    )
-    assert [(p.values["count"], p.values["seed_"]) for p in found] == [(10, 3), (20, 4)]
-
-
-def test_list_gives_the_points_as_written(write_sweep: WriteSweep) -> None:
-    text = sweep_with("{list: [{count: 7}, {count: 5}]}", more="repeats: {seeds: [9]}")
-    assert [point.name for point in points(text, write_sweep)] == ["7-9", "5-9"]
 
 
 def test_table_rows_are_points_and_derived_values_follow(write_sweep: WriteSweep) -> None:

@@ -68,7 +68,7 @@ def fake(behaviours: dict[str, str] | None = None) -> RunCommand:
 
 @pytest.fixture
 def folder(make_folder: MakeFolder) -> Folder:
-    """Runs n10_seed1, n10_seed2, n20_seed1, n20_seed2; their scenes tell their hashes."""
+    """Runs n10_seed1, n10_seed2, n20_seed1, n20_seed2; their scenes name their hashes."""
     made = make_folder()
     for entry in made.entries:
         scene = made.scene(entry)
@@ -102,12 +102,6 @@ def test_all_runs_run_once_with_one_thread_the_longest_first(folder: Folder) -> 
     assert last.left_s == 0
 
 
-def test_a_sweep_can_want_its_runs_seed_by_seed(folder: Folder) -> None:
-    watcher, by_seed = Watcher(), Folder(folder.path, folder.manifest.model_copy(update={"seed_by_seed": True}))
-    run_folder(by_seed, watcher, slots=1, command=fake(), **QUICK)
-    assert watcher.starts == ["n20_seed1", "n10_seed1", "n20_seed2", "n10_seed2"]
-
-
 @pytest.mark.parametrize("slots", [1, 3])
 def test_as_many_runs_as_slots_and_never_more(folder: Folder, slots: int) -> None:
     waiting = fake({entry.name: "wait" for entry in folder.entries})
@@ -130,7 +124,7 @@ def test_a_failing_run_does_not_stop_the_others(folder: Folder) -> None:
     ]
 
 
-def test_the_same_again_keeps_finished_runs_and_sets_others_aside(folder: Folder) -> None:
+def test_a_second_start_keeps_finished_runs_and_sets_others_aside(folder: Folder) -> None:
     first = run_folder(folder, Watcher(), command=fake({"n20_seed1": "fail"}), **QUICK)
     assert statuses(first) == ["done", "done", "failed", "done"]
     ids = [(folder.run(entry) / "id").read_text() for entry in folder.entries]
@@ -230,16 +224,16 @@ def test_two_runners_do_not_share_a_sweep(folder: Folder) -> None:
 
 
 def test_runs_get_their_places_from_the_sweeps_directory(folder: Folder, monkeypatch: pytest.MonkeyPatch) -> None:
-    told: list[tuple[str, str]] = []
+    places: list[tuple[str, str]] = []
 
     def noting(scene: Path, directory: Path, resume: bool) -> Sequence[str]:
-        told.append((str(scene), str(directory)))
+        places.append((str(scene), str(directory)))
         return fake()(scene, directory, resume)
 
     # What the user gave for imports still means what it meant where it was given.
     monkeypatch.setenv("PYTHONPATH", f"lib{os.pathsep}{folder.path}")
     outcomes = run_folder(folder, Watcher(), command=noting, **QUICK)
-    assert sorted(told) == sorted((f"scenes/{entry.name}.yaml", f"runs/{entry.name}") for entry in folder.entries)
+    assert sorted(places) == sorted((f"scenes/{entry.name}.yaml", f"runs/{entry.name}") for entry in folder.entries)
     assert [outcome.cause for outcome in outcomes] == [None] * 4
     assert all(folder.is_done(entry) for entry in folder.entries)
     searched = (folder.run(folder.entries[0]) / "searched").read_text().split(os.pathsep)

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import io
 
-import pytest
 from rich.console import Console
 
 from dem.record.document import Progress
-from templates.local import Display, Outcome, Snapshot, duration
+from templates.local import Display, Outcome, Snapshot
 
 RUNNING = (
     ("lw0.70_seed1", 33.1, Progress(phase="shake", time_s=1.2, end_s=5.5, phi=0.1234)),
@@ -17,17 +16,12 @@ RUNNING = (
 SNAPSHOT = Snapshot(total=9, ended=3, failed=1, running=RUNNING, left_s=125.0)
 
 
-@pytest.mark.parametrize(("seconds", "text"), [(0, "0:00"), (65.4, "1:05"), (3723, "1:02:03"), (59.6, "1:00")])
-def test_duration(seconds: float, text: str) -> None:
-    assert duration(seconds) == text
-
-
 def plain(interval_s: float = 0.0) -> tuple[Display, io.StringIO]:
     text = io.StringIO()
     return Display(Console(file=text, width=40), interval_s), text
 
 
-def test_plain_lines_are_whole_and_say_what_happens() -> None:
+def test_plain_lines_are_whole_and_report_events() -> None:
     display, text = plain()
     with display:
         display.started("a")
@@ -44,21 +38,3 @@ def test_plain_lines_are_whole_and_say_what_happens() -> None:
         "c finished before",
         "stopping 2 runs, which close their files; Ctrl-C again does not wait",
     ]
-
-
-def test_plain_reports_keep_their_distance() -> None:
-    display, text = plain(interval_s=1000.0)
-    display.update(SNAPSHOT)
-    display.update(SNAPSHOT)
-    assert text.getvalue() == ""
-
-
-def test_a_terminal_shows_each_run_and_the_total() -> None:
-    terminal = Console(file=io.StringIO(), force_terminal=True, width=100)
-    with Display(terminal) as display:
-        display.update(SNAPSHOT)
-        display.ended(Outcome(name="b", status="failed", wall_s=2.0, cause="left [the] wall"))
-    written = terminal.file.getvalue()  # type: ignore[attr-defined]
-    assert "b failed after 0:02: left [the] wall" in written
-    assert "1.20 of 5.50 s  φ 0.123  0:33" in written
-    assert "3 of 9 runs ended, 1 failed, time left 2:05" in written

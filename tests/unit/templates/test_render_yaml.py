@@ -37,43 +37,6 @@ def test_a_value_within_text_becomes_text() -> None:
     assert data == {"name": "lw0.7-#a: b", "quoted": "0.7"}
 
 
-def test_a_list_within_text_is_rejected() -> None:
-    with pytest.raises(InputError, match=r"^t, line 1.*list or mapping within text: \[1\]"):
-        render_yaml("name: lw{{ x }}", {"x": [1]}, "t")
-
-
-def test_a_key_can_be_a_value() -> None:
-    assert render_yaml("{{ k }}: 1", {"k": "a: b"}, "t") == {"a: b": 1}
-
-
-def test_loops_and_conditions_shape_the_scene() -> None:
-    template = """\
-phases:
-{% for duration in durations %}
-  - {type: relax, duration_s: {{ duration }}}
-{% endfor %}
-{% if shaken %}
-  - {type: shake}
-{% endif %}
-"""
-    data = render_yaml(template, {"durations": [0.5, 1.0], "shaken": False}, "t")
-    assert data["phases"] == [
-        {"type": "relax", "duration_s": 0.5},
-        {"type": "relax", "duration_s": 1.0},
-    ]
-
-
-def test_constants_and_filters_work() -> None:
-    template = "a: {{ 3 }}\nb: {{ '%.2f' | format(x) }}\nc: {{ x | round | int }}\n# {{ x }}\n"
-    assert render_yaml(template, {"x": 0.7}, "t") == {"a": 3, "b": "0.70", "c": 1}
-
-
-def test_an_undefined_name_is_an_error_with_file_line_and_way_out() -> None:
-    with pytest.raises(InputError) as caught:
-        render_yaml("a: 1\nb: {{ cuont }}\n", {"count": 3, "seed": 1}, "scene.yaml.j2")
-    assert str(caught.value) == ("scene.yaml.j2, line 2: 'cuont' is undefined; did you mean 'count'?")
-
-
 @pytest.mark.parametrize(
     ("template", "message"),
     [

@@ -59,12 +59,6 @@ def test_scripts_are_as_reviewed(cluster: str, case: str) -> None:
     assert rendered(cluster, case) == file.read_text(encoding="utf-8")
 
 
-def test_no_golden_file_is_left_over() -> None:
-    assert {path.relative_to(GOLDEN) for path in GOLDEN.glob("*/*")} == {
-        Path(cluster, f"{case}.sh") for cluster, case in CASES
-    }
-
-
 @pytest.mark.parametrize(("cluster", "case"), CASES, ids=IDS)
 def test_scripts_are_read_by_bash_and_shellcheck(cluster: str, case: str) -> None:
     file = str(GOLDEN / cluster / f"{case}.sh")

@@ -49,14 +49,16 @@ def test_the_queue_is_read() -> None:
     ]
 
 
-def test_an_unknown_state_is_an_error_that_names_it() -> None:
-    with pytest.raises(RunError, match="task 12_0 is DREAMING, a state that is not known here"):
-        parse_queue("six.1|12|0|DREAMING|None")
-
-
-def test_a_line_that_is_not_understood_is_an_error() -> None:
-    with pytest.raises(RunError, match="which is not understood"):
-        parse_queue("slurm_load_jobs: something\n")
+@pytest.mark.parametrize(
+    ("line", "message"),
+    [
+        ("six.1|12|0|DREAMING|None", "task 12_0 is DREAMING, a state that is not known here"),
+        ("slurm_load_jobs: something\n", "which is not understood"),
+    ],
+)
+def test_an_unknown_state_or_line_is_an_error(line: str, message: str) -> None:
+    with pytest.raises(RunError, match=message):
+        parse_queue(line)
 
 
 @pytest.fixture

@@ -9,7 +9,7 @@ from dem.record.frame import Frame
 from dem.record.frames import FrameWriter, read_frames
 from dem.record.run import open_run
 from postprocess.bodies.colours import ColourScale, colour_field, linear
-from postprocess.bodies.fields import BY_NAME, checked_field, fields_of, link_values
+from postprocess.bodies.fields import BY_NAME, fields_of, link_values
 from postprocess.measures.clusters import entanglement_clusters
 from postprocess.measures.entanglement import link_crossings
 
@@ -77,11 +77,6 @@ def test_runs_in_a_plane_have_fewer_fields(pile):
     assert colour_field(None, run).name == "smarticle_id"
     with pytest.raises(InputError, match="this run has no crossings"):
         colour_field("crossings", run)
-
-
-def test_unknown_field_is_rejected():
-    with pytest.raises(InputError, match=r"'crosings' is no field; did you mean 'crossings'\?"):
-        checked_field("crosings")
 
 
 def test_colours_have_grey_for_no_value_and_for_no_crossing():

@@ -12,7 +12,7 @@ from dem.body.particle import Boxes, Particle, SphereChain
 from dem.body.state import State
 from dem.record.frames import FrameWriter, read_frames
 from dem.record.run import open_run
-from postprocess.bodies.meshes import Bodies, read_surroundings
+from postprocess.bodies.meshes import read_surroundings
 
 W, T, GAP, LENGTH, SPEED = 0.0467, 0.0095, 0.00105, 0.1, 0.02
 BOXES = Boxes(middle_length=W, barb_length=W, thickness_normal=0.021, thickness_in_plane=T, density=1250.0)
@@ -66,13 +66,3 @@ def test_strings_are_tied_where_the_simulator_ties_them(tmp_path, count, tied_at
     assert first[:, 1, 1:] == pytest.approx(np.zeros((2, 2)), abs=1e-12)
     assert first[0, 1, 0] < first[0, 0, 0] < first[1, 0, 0] < first[1, 1, 0]
     assert later[:, 1] - first[:, 1] == pytest.approx(np.array([[0.0, 0.0, 0.0], [SPEED, 0.0, 0.0]]))
-
-
-def test_strings_are_bodies_and_tubes(tmp_path):
-    laid_out(tmp_path, 2, "tip")
-    run, frames = open_run(tmp_path), read_frames(tmp_path)
-    bodies = Bodies(run, ["strings"])
-    assert bodies.at(frames[0]) == {}
-    mesh = bodies.at(frames[2])["strings"]
-    assert mesh.cell_data["string"].tolist() == [0, 1]
-    assert mesh.length > 2 * LENGTH

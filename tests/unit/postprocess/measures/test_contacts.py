@@ -50,14 +50,14 @@ def test_a_rattler_touches_neither_others_nor_floor_nor_wall(shape):
     line, d = shape(0.01, 0.7, (0.0, 0.0)), 1e-3
     places = np.array([[0, 0, 0.5 * d], [0, 0, 0.6 * d], [0.0075, 0, 0.01], [0.0077, 0, 0.01], [0, 0, 0.01]])
     pile = line + places[:, None]
-    told = {"diameter": d, "floor_z": 0.0}
+    sizes = {"diameter": d, "floor_z": 0.0}
     # A tip is 12 mm from the middle: it touches a wall of 20 mm where the middle is 8 mm, less what facets take, out.
-    assert without_support(pile, [0] * 5, wall_radius=0.02, **told).tolist() == [False, True, True, True, True]
-    assert without_support(pile, [0] * 5, wall_radius=0.0195, **told).tolist() == [False, True, False, False, True]
-    assert without_support(pile, [0] * 5, wall_radius=None, **told).tolist() == [False, True, True, True, True]
+    assert without_support(pile, [0] * 5, wall_radius=0.02, **sizes).tolist() == [False, True, True, True, True]
+    assert without_support(pile, [0] * 5, wall_radius=0.0195, **sizes).tolist() == [False, True, False, False, True]
+    assert without_support(pile, [0] * 5, wall_radius=None, **sizes).tolist() == [False, True, True, True, True]
     # Lower than the floor it touches it as well; one neighbour is enough.
-    assert not without_support(pile - np.array([0, 0, 0.1]), [0] * 5, wall_radius=None, **told).any()
-    loose = without_support(pile, [0, 1, 0, 2, 0], wall_radius=None, **told)
+    assert not without_support(pile - np.array([0, 0, 0.1]), [0] * 5, wall_radius=None, **sizes).any()
+    loose = without_support(pile, [0, 1, 0, 2, 0], wall_radius=None, **sizes)
     assert loose.tolist() == [False, False, True, False, True]
 
 

@@ -59,23 +59,22 @@ def test_random_scenes_match_brute_force(scene, angles, seed):
     np.testing.assert_array_equal(link_crossings(vertices), counts)
 
 
-def test_hooked_both_ways():
-    # Mouths face each other: each middle link passes through the other's plane.
-    other = np.array([[0.0, -1, -1], [0, 1, -1], [0, 1, 1], [0, -1, 1]])
-    np.testing.assert_array_equal(link_crossings([U, other]), [1, 1])
-
-
-def test_hooked_one_way():
-    # Mouths face the same way: only the closing edge of U passes through the other's plane.
-    other = np.array([[0.0, 3, -1], [0, 1, -1], [0, 1, 1], [0, 3, 1]])
-    np.testing.assert_array_equal(link_crossings([U, other]), [1, 0])
-
-
-def test_both_barbs_through_count_twice():
-    other = np.array([[-0.5, 1, -1], [-0.5, 1, 1], [0.5, 1, 1], [0.5, 1, -1]])
-    np.testing.assert_array_equal(link_crossings([U, other]), [2, 0])
-    pairs = crossing_pairs([U, other])
-    assert (pairs.i.tolist(), pairs.j.tolist(), pairs.links.tolist()) == ([0], [1], [2])
+@pytest.mark.parametrize(
+    ("other", "expected"),
+    [
+        # Mouths face each other: each middle link passes through the other's plane.
+        ([[0, -1, -1], [0, 1, -1], [0, 1, 1], [0, -1, 1]], [1, 1]),
+        # Mouths face the same way: only the closing edge of U passes through the other's plane.
+        ([[0, 3, -1], [0, 1, -1], [0, 1, 1], [0, 3, 1]], [1, 0]),
+        # Both barbs pass, and count twice.
+        ([[-0.5, 1, -1], [-0.5, 1, 1], [0.5, 1, 1], [0.5, 1, -1]], [2, 0]),
+    ],
+)
+def test_hooked(other, expected):
+    pile = [U, np.array(other, dtype=float)]
+    assert link_crossings(pile).tolist() == expected
+    first = crossing_pairs(pile)
+    assert (first.i[0], first.j[0], first.links[0]) == (0, 1, expected[0])
 
 
 def pin(x, y, low=-1.0, high=1.0):

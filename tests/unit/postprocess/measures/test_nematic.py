@@ -32,7 +32,7 @@ def test_random_directions_have_only_what_their_number_gives(count):
     assert np.mean(orders) * count**0.5 == pytest.approx(0.82, abs=0.06)
 
 
-def test_a_turned_pile_has_the_same_order_and_a_turned_director():
+def test_a_turned_pile_keeps_its_order_and_turns_its_director():
     random = np.random.default_rng(5)
     directions = random.normal(size=(50, 3)) * [1, 1, 3]
     before, after = nematic_order(directions), nematic_order(directions[:, [2, 0, 1]])

@@ -6,7 +6,7 @@ from unittest.mock import Mock
 import numpy as np
 import pytest
 from PIL import Image
-from synthetic import RADIUS, T2, SyntheticRun, W, u_shape, write_frame, write_run
+from synthetic import RADIUS, SyntheticRun, W, u_shape, write_frame, write_run
 from synthetic.forces import pressed
 
 from dem.errors import InputError, RunError
@@ -16,7 +16,7 @@ from dem.record.names import FORCE
 from postprocess.bodies.colours import ColourScale
 from postprocess.bodies.fields import BY_NAME
 from postprocess.geometry.links import centres_of_mass
-from postprocess.pictures.render import render_run, turntable
+from postprocess.pictures.render import render_run
 
 SIZE = (240, 240)
 
@@ -114,28 +114,11 @@ def test_bad_input_is_named(run, wrong, message, tmp_path, monkeypatch):
     assert [path.read_text() for path in tmp_path.iterdir()] == ["mine"]
 
 
-def test_run_without_frames_is_rejected(tmp_path):
-    run = write_run(tmp_path / "a", SyntheticRun(frames_per_phase=1))
-    (run / "frames.pvd").unlink()
-    with pytest.raises(InputError, match=r"cannot read list of frames .*frames\.pvd"):
-        render_run(run, size=SIZE)
-
-
 def test_missing_graphics_are_an_error_and_no_crash(run, tmp_path, monkeypatch):
     monkeypatch.delenv("DISPLAY", raising=False)
     monkeypatch.setattr(ctypes, "CDLL", Mock(side_effect=OSError))
     with pytest.raises(RunError, match=r"no display and no libEGL\.so\.1; apt-get install libegl1"):
         render_run(run, output=tmp_path / "a.png", size=SIZE)
-
-
-def test_run_radius_is_drawn_to_scale(tmp_path):
-    """Seen from above, the rim spans the panel and the U its share of it."""
-    run = single_run(tmp_path / "one", u_shape(0.7 * W)[None] + [0, 0, 0.002])
-    image = panel(pixels(render_run(run, output=tmp_path / "a.png", size=(500, 500), view="top", color_by="id")))
-    columns = np.flatnonzero((image < 200).any(axis=(0, 2)))
-    inside = np.flatnonzero((image[..., 0] - image[..., 2] > 60).any(axis=0))  # smarticle 0 is red
-    ratio = np.ptp(inside) / np.ptp(columns)
-    assert ratio == pytest.approx((W + T2) / (2 * RADIUS), rel=0.03)
 
 
 def test_the_scale_bar_has_its_length_and_the_view_has_everything_in_it(run, tmp_path):
@@ -180,16 +163,3 @@ def test_forces_are_drawn_where_they_are_recorded(tmp_path):
     look = {"size": SIZE, "view": "top", "color_by": "contacts"}
     image = panel(pixels(render_run(run, output=tmp_path / "a.png", forces=True, **look)))
     assert ((image[..., 0] > 100) & (image[..., 1] < 60)).sum() > 20
-
-
-def test_a_turntable_shows_the_pile_from_all_around(run):
-    images = turntable(run, views=4, size=240)
-    assert len({image.tobytes() for image in images}) == 4
-    assert all(coloured(np.asarray(image).astype(int)).mean() > 0.02 for image in images)
-
-
-def test_a_full_disk_is_reported_with_the_picture(run, mount_disk):
-    disk = mount_disk("16k")
-    with pytest.raises(RunError, match=rf"^{disk / 'a.png'}: cannot be written \(No space left on device\); free"):
-        render_run(run, output=disk / "a.png")
-    assert list(disk.iterdir()) == []

@@ -1,4 +1,4 @@
-"""Means over seeds as columns and as cells, pairs of runs, and what refuses to be averaged."""
+"""Means over seeds as columns and as cells, pairs of runs, and what must not be averaged."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def test_means_carry_their_errors(group: pd.DataFrame) -> None:
 
 
 @pytest.mark.parametrize(
-    ("value", "form", "error", "told"),
+    ("value", "form", "error", "text"),
     [
         (0.1234, ".3f", 0.0049, "0.123 ± 0.005"),
         (3.0, "+.1f", 2.04, "+3.0 ± 2.0"),
@@ -40,8 +40,8 @@ def test_means_carry_their_errors(group: pd.DataFrame) -> None:
         (math.nan, ".1f", 1.0, "-"),
     ],
 )
-def test_numbers_have_the_error_that_there_is(value: float, form: str, error: float, told: str) -> None:
-    assert told_number(value, form, error) == told
+def test_numbers_have_the_error_that_there_is(value: float, form: str, error: float, text: str) -> None:
+    assert told_number(value, form, error) == text
 
 
 def test_runs_are_compared_pair_by_pair() -> None:

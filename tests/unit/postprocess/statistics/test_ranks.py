@@ -86,11 +86,11 @@ def test_within_blocks_it_is_the_mean_of_spearmans() -> None:
     assert found.standard_error == pytest.approx(np.std(each, ddof=1) / math.sqrt(8))
     # How far above the others one is does not matter, nor what is not known at all.
     y[:, 0] = 10
-    told = correlation_within(x.ravel().tolist(), y.ravel().tolist(), blocks)
+    before = correlation_within(x.ravel().tolist(), y.ravel().tolist(), blocks)
     y[:, 0] = math.inf
-    assert correlation_within(x.ravel().tolist(), y.ravel().tolist(), blocks) == told
+    assert correlation_within(x.ravel().tolist(), y.ravel().tolist(), blocks) == before
     more = correlation_within([*x.ravel(), 5.0], [*y.ravel(), math.nan], [*blocks, 0])
-    assert more == told
+    assert more == before
 
 
 @pytest.mark.parametrize(("count", "size"), [(8, 4), (18, 2), (6, 2)])

@@ -59,7 +59,7 @@ def test_another_law_is_rejected(power: float) -> None:
     assert law.error(1, 0) == pytest.approx(math.sqrt(law.excess) * along.error(1, 0))
 
 
-def test_scatter_knows_nothing_of_the_law() -> None:
+def test_scatter_is_independent_of_the_law() -> None:
     level, steep = scatter_of(COUNTS, piles(0.15, 0.0)), scatter_of(COUNTS, piles(0.15, -5.0))
     assert level.variance == pytest.approx(steep.variance)
     assert level.freedom == 25
