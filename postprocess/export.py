@@ -68,11 +68,9 @@ def export_run(
         RunError: It cannot be written.
     """
     if to not in FORMATS:
-        msg = f"--to {to}: no such format; {nearest(to, FORMATS, cutoff=0.5)}"
-        raise InputError(msg)
+        raise InputError(f"--to {to}: no such format; {nearest(to, FORMATS, cutoff=0.5)}")
     if every_frame and time is not None:
-        msg = f"--time {time:g}: all frames are asked for; leave --time or --all out"
-        raise InputError(msg)
+        raise InputError(f"--time {time:g}: all frames are asked for; leave --time or --all out")
     run = open_run(directory)
     fields = fields_of(run)
     kinds = checked_kinds(wanted, unwanted, also=[field.name for field in fields])
@@ -103,8 +101,7 @@ def export_run(
                     (made / f"frame_{index:06d}.{to}" if folder else made).write_bytes(content)
                     written += 1
         if not written:
-            msg = f"nothing is left to export: of {', '.join(kinds)} there is none here; leave out less"
-            raise InputError(msg)
+            raise InputError(f"nothing is left to export: of {', '.join(kinds)} there is none here; leave out less")
     return path
 
 
@@ -203,8 +200,7 @@ class _Painter:
         self._field = colour_field(color_by, bodies.run)
         values = [scalars(self._field, frame, bodies.run) for frame in frames]
         if not any(np.isfinite(each).any() for each in values):
-            msg = f"--color-by {self._field.name}: no frame to export has it; choose another field"
-            raise InputError(msg)
+            raise InputError(f"--color-by {self._field.name}: no frame to export has it; choose another field")
         self._bounds = span(values)
         self._scale = ColourScale.of(self._field, self._bounds)
 

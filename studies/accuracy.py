@@ -147,19 +147,16 @@ def parse_seeds(text: str) -> tuple[int, ...]:
     """
     words = [word.strip() for word in text.split(",") if word.strip()]
     if not words or not all(re.fullmatch(r"[0-9]{1,9}(-[0-9]{1,9})?", word) for word in words):
-        msg = f"--seeds {text!r}: must be whole numbers from 0, such as 1,2,3 or 1-20"
-        raise InputError(msg)
+        raise InputError(f"--seeds {text!r}: must be whole numbers from 0, such as 1,2,3 or 1-20")
     seeds: list[int] = []
     for word in words:
         first, _, last = word.partition("-")
         if last and not 0 <= int(last) - int(first) < _MOST_SEEDS:
-            msg = f"--seeds {text}: {word} must go up, by fewer than {_MOST_SEEDS}"
-            raise InputError(msg)
+            raise InputError(f"--seeds {text}: {word} must go up, by fewer than {_MOST_SEEDS}")
         seeds += range(int(first), int(last or first) + 1)
     twice = next((seed for seed in seeds if seeds.count(seed) > 1), None)
     if twice is not None:
-        msg = f"--seeds {text}: {twice} is given twice, and would count twice; leave one out"
-        raise InputError(msg)
+        raise InputError(f"--seeds {text}: {twice} is given twice, and would count twice; leave one out")
     return tuple(seeds)
 
 
@@ -172,11 +169,9 @@ def parse_knobs(text: str) -> tuple[str, ...]:
     words = [word.strip() for word in text.split(",") if word.strip()]
     for word in words:
         if word not in KNOBS:
-            msg = f"--knobs: {word!r} is no knob; {nearest(word, KNOBS)}"
-            raise InputError(msg)
+            raise InputError(f"--knobs: {word!r} is no knob; {nearest(word, KNOBS)}")
     if not words:
-        msg = f"--knobs {text!r}: names none; known: {', '.join(KNOBS)}"
-        raise InputError(msg)
+        raise InputError(f"--knobs {text!r}: names none; known: {', '.join(KNOBS)}")
     return tuple(knob for knob in KNOBS if knob in words)
 
 
@@ -375,8 +370,7 @@ def measure(run: Run, expected_s: Mapping[str, float]) -> Row:
     active = [phase for phase in run.phases if phase.type in ACTIVITIES]
     if not active or active[0].index == 0:
         types = ", ".join(phase.type for phase in run.phases)
-        msg = f"{run.path}: no activity after another phase: its phases are {types}"
-        raise InputError(msg)
+        raise InputError(f"{run.path}: no activity after another phase: its phases are {types}")
     named = _NAMED.fullmatch(run.path.name)
     if named is None or int(named["seed"]) != run.manifest.seed:
         msg = f"{run.path}: not named SETTING_seed{run.manifest.seed}, as runs of a ladder are; do not rename runs"
@@ -385,8 +379,7 @@ def measure(run: Run, expected_s: Mapping[str, float]) -> Row:
     wanted = [active[0].index - 1, last.index]
     table = summarise_run(run, definitions=[DEFINITION], phases=set(wanted)).set_index("phase")
     if len(table) != len(wanted):
-        msg = f"{run.path}: no frame of the phase before its activity, or of its last one; run it again"
-        raise InputError(msg)
+        raise InputError(f"{run.path}: no frame of the phase before its activity, or of its last one; run it again")
     before, after = (table.loc[phase] for phase in wanted)
     time, expected = duration(last), expected_s.get(run.path.name, math.nan)
     cpu = math.fsum(_or_nan(phase.cpu_s) for phase in run.phases)

@@ -76,8 +76,7 @@ def measure(run: Run) -> Row:
     """Measure how a mould was filled, and what is left of its shape."""
     tiers = read_tiers(run)
     if len(tiers) != len(TIERS) + 1:
-        msg = f"{run.path}: a mould has {len(TIERS)} tiers and a neck: container.tiers has {len(tiers)}"
-        raise InputError(msg)
+        raise InputError(f"{run.path}: a mould has {len(TIERS)} tiers and a neck: container.tiers has {len(tiers)}")
     tiers = tiers[:-1]  # without the neck that the mould is filled through
     before, frames = around(run)
     start = removal(run).start_s or before.time

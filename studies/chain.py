@@ -68,8 +68,7 @@ def measure(run: Run) -> Row:
     """Measure force, strain and width of the chain."""
     strained = [phase for phase in run.scene["phases"] if phase["type"] == STRAIN]
     if len(strained) != 1:
-        msg = f"{run.path}: {len(strained)} phases that strain a chain; give runs of the study chain"
-        raise InputError(msg)
+        raise InputError(f"{run.path}: {len(strained)} phases that strain a chain; give runs of the study chain")
     pull = read_strain_test(run)
     width = float(pull.widths[0]) if run.manifest.middle_thickness_in_plane_m is None else PAPER_WIDTH
     return {

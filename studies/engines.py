@@ -138,8 +138,7 @@ def _measured(run: Run, case: str) -> dict[str, float]:
     if case == HOOK:
         pulled = run.phases[-1]
         if pulled.type != PULL:
-            msg = f"{run.path}: ends with {pulled.type}, not {PULL}; give runs of the study engines"
-            raise InputError(msg)
+            raise InputError(f"{run.path}: ends with {pulled.type}, not {PULL}; give runs of the study engines")
         force = peak(read_pull(run, run.series, pulled.index)).force
         return {PEAK: force / run.manifest.count / weight_of_one(run)}
     row = procedure_row(run)

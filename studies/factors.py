@@ -46,8 +46,7 @@ def measure(run: Run) -> Row:
     """Measure the shape change, and which rules it went by."""
     row = procedure_row(run)
     if row[PROCEDURE] != SHAPE:
-        msg = f"{run.path}: {row[PROCEDURE]}, where factors are of shape changes; leave it out"
-        raise InputError(msg)
+        raise InputError(f"{run.path}: {row[PROCEDURE]}, where factors are of shape changes; leave it out")
     scene = run.scene
     motor, contact = scene.get("motor"), scene.get("contact")
     return {

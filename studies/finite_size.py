@@ -112,8 +112,7 @@ def measure(run: Run) -> Row:
     """Measure the pile at rest before and after the shake."""
     types = tuple(phase.type for phase in run.phases)
     if types != PHASES:
-        msg = f"{run.path}: its phases are {', '.join(types)}, not {', '.join(PHASES)}"
-        raise InputError(msg)
+        raise InputError(f"{run.path}: its phases are {', '.join(types)}, not {', '.join(PHASES)}")
     frames = run.frames
     row: dict[str, object] = {
         ASPECT: round(run.manifest.aspect_ratio, 6),
@@ -138,8 +137,7 @@ def _at_rest(run: Run, frames: FrameSequence, stage: str, phase: int) -> dict[st
     """Measure the last frame of a rest."""
     part = frames.in_phase(phase)
     if not part:
-        msg = f"{run.path}: no frame of phase {phase} (relax); run it again"
-        raise InputError(msg)
+        raise InputError(f"{run.path}: no frame of phase {phase} (relax); run it again")
     frame = part[-1]
     vertices, diameter = frame.vertices, run.manifest.sphere_diameter_m
     clusters = entanglement_clusters(vertices)

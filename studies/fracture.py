@@ -105,8 +105,7 @@ def measure(run: Run) -> Row:
     rest, asked = pulled.index - 1, run.scene["phases"][pulled.index]
     table = summarise_run(run, definitions=[DEFINITION], phases={rest, pulled.index}).set_index("phase")
     if rest not in table.index:
-        msg = f"{run.path}: no frame of the rest before the pull; run it again"
-        raise InputError(msg)
+        raise InputError(f"{run.path}: no frame of the rest before the pull; run it again")
     before = table.loc[rest]
     frame = run.frames.in_phase(rest)[-1]
     hook = float(series["hook_upper_z_m"][series.nearest(frame.time)])

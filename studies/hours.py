@@ -35,8 +35,7 @@ def hours(folder: Path, studies: Sequence[str] = ()) -> pd.DataFrame:
     cause = "there is no such directory" if not folder.is_dir() else "none of its folders is that of a sweep"
     sweeps = [folder / name for name in studies] or sorted(one.parent for one in folder.glob(f"*/{OF_SWEEP}"))
     if not folder.is_dir() or not sweeps:
-        msg = f"{folder}: {cause}; give the one that `make paper` wrote into"
-        raise InputError(msg)
+        raise InputError(f"{folder}: {cause}; give the one that `make paper` wrote into")
     runs = pd.DataFrame(
         {
             STUDY: path.name,

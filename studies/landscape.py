@@ -125,8 +125,7 @@ def measure(run: Run) -> Row:
     rest = pulled.index - 1
     settings, hooks, frames = run.scene["phases"][pulled.index], run.scene.get("hooks"), run.frames.in_phase(rest)
     if named is None:  # the run's own time is rounded to whole swings
-        msg = f"{run.path}: not named like a run of this study, such as internal10_2s_lw0.70_seed1"
-        raise InputError(msg)
+        raise InputError(f"{run.path}: not named like a run of this study, such as internal10_2s_lw0.70_seed1")
     if hooks is None or not frames or settings["type"] != PULL:
         msg = f"{run.path}: no hooks or pull in scene.yaml, or no frame of the rest before the pull; run it again"
         raise InputError(msg)
@@ -163,8 +162,7 @@ def _spent(run: Run, procedure: str, rest: int) -> float:
     series = run.series
     name = "container_work_J" if procedure == EXTERNAL else "motor_work_J"
     if name not in series.data:
-        msg = f"{series.path}: no {name} of {run.path}; run it with recording.energy"
-        raise InputError(msg)
+        raise InputError(f"{series.path}: no {name} of {run.path}; run it with recording.energy")
     until = series["phase"] <= rest
     return gained(series[name][until], series["phase"][until] <= 1)
 

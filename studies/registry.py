@@ -54,8 +54,7 @@ class Script:
     def sweep_file(self, *, quick: bool = False) -> Path:
         """Name the sweep file with its variants, as `load_sweep` reads it; InputError without a quick variant."""
         if quick and not self.quick:
-            msg = f"study {self.name} has no quick variant; leave --quick out"
-            raise InputError(msg)
+            raise InputError(f"study {self.name} has no quick variant; leave --quick out")
         variants = [*self.variants, *([QUICK] if quick else [])]
         return FOLDER / (f"{self.module}.yaml" + (f"@{','.join(variants)}" if variants else ""))
 
@@ -84,8 +83,7 @@ STUDIES: Mapping[str, Script] = MappingProxyType({study.name: study for study in
 def shipped(name: str) -> Script:
     """Find a shipped study; InputError where there is none of this name."""
     if name not in STUDIES:
-        msg = f"study {name!r} does not exist; {nearest(name, sorted(STUDIES))}"
-        raise InputError(msg)
+        raise InputError(f"study {name!r} does not exist; {nearest(name, sorted(STUDIES))}")
     return STUDIES[name]
 
 

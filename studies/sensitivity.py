@@ -51,10 +51,9 @@ def measure(run: Run) -> Row:
     """Measure φ and crossings before and after shaking; the variant is in the name of the run."""
     found = re.fullmatch(r"(.+)_seed(\d+)", run.path.name)
     if found is None or int(found[2]) != run.manifest.seed:
-        msg = (
+        raise InputError(
             f"{run.path}: runs of this study are named VARIANT_seedN, here N = {run.manifest.seed}; do not rename runs"
         )
-        raise InputError(msg)
     return {VARIANT: found[1], **measured_row(run, [DEFINITION])}
 
 

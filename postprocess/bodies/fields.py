@@ -231,8 +231,7 @@ def checked_field(name: str, aliases: Mapping[str, str] = MappingProxyType({})) 
     """
     field = BY_NAME.get(aliases.get(name, name))
     if field is None:
-        msg = f"{name!r} is no field; {nearest(name, [*aliases, *BY_NAME], cutoff=0.5)}"
-        raise InputError(msg)
+        raise InputError(f"{name!r} is no field; {nearest(name, [*aliases, *BY_NAME], cutoff=0.5)}")
     return field
 
 

@@ -219,12 +219,10 @@ def checked_kinds(wanted: Sequence[str], unwanted: Sequence[str], *, also: Seque
     for name in (*wanted, *(name for name in unwanted if name not in also)):
         if name not in KINDS:
             known = [*KINDS, *(also if name in unwanted else ())]
-            msg = f"{name!r} is nothing to export; {nearest(name, known, cutoff=0.5)}"
-            raise InputError(msg)
+            raise InputError(f"{name!r} is nothing to export; {nearest(name, known, cutoff=0.5)}")
     kept = tuple(kind for kind in KINDS if kind in (*USUAL, *wanted) and kind not in unwanted)
     if not kept:
-        msg = "nothing is left to export; leave out less"
-        raise InputError(msg)
+        raise InputError("nothing is left to export; leave out less")
     return kept
 
 
@@ -239,8 +237,7 @@ class Bodies:
         self, run: Run, kinds: Sequence[str] = USUAL, fields: Sequence[Field] = (), *, cut: bool = False
     ) -> None:
         if "forces" in kinds and run.forces is None:
-            msg = f"{run.path}: records no forces; {NO_FORCES}"
-            raise InputError(msg)
+            raise InputError(f"{run.path}: records no forces; {NO_FORCES}")
         self.run = run
         self.kinds = kinds
         self.around = read_surroundings(run)
@@ -406,8 +403,7 @@ def link_boxes(
     vertices = checked_vertices(vertices)
     in_plane = np.broadcast_to(thickness_in_plane, 3)
     if not (thickness_normal > 0 and (in_plane > 0).all()):
-        msg = f"thicknesses must be above 0 m: got {thickness_normal} m, {thickness_in_plane} m"
-        raise InputError(msg)
+        raise InputError(f"thicknesses must be above 0 m: got {thickness_normal} m, {thickness_in_plane} m")
     lengths = link_lengths(vertices)
     smarticle, link = np.nonzero(lengths > 1e-9 * lengths.sum(axis=1, keepdims=True))
     start, end = vertices[smarticle, link], vertices[smarticle, link + 1]

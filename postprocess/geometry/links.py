@@ -42,16 +42,14 @@ def checked_vertices(vertices: Vertices) -> Floats:
     """
     array = np.asarray(vertices, dtype=np.float64)
     if array.ndim != 3 or array.shape[1:] != (4, 3):
-        msg = f"vertices must be (N, 4, 3) [m]: got {array.shape}; pass frame.vertices"
-        raise InputError(msg)
+        raise InputError(f"vertices must be (N, 4, 3) [m]: got {array.shape}; pass frame.vertices")
     finite = np.isfinite(array).all(axis=(1, 2))
     if not finite.all():
         msg = f"vertices must be finite [m]: smarticle {int(np.argmin(finite))} is not; the run has blown up there"
         raise InputError(msg)
     lengths = link_lengths(array).sum(axis=1)
     if np.any(lengths <= 0):
-        msg = f"vertices of smarticle {int(np.argmin(lengths))} coincide (0 m long); leave it out"
-        raise InputError(msg)
+        raise InputError(f"vertices of smarticle {int(np.argmin(lengths))} coincide (0 m long); leave it out")
     return array
 
 

@@ -78,11 +78,9 @@ def outlines(
     pitch = ball / FINENESS if pitch is None else pitch
     for name, size in (("thickness", thickness), ("ball", ball), ("pitch", pitch)):
         if not (math.isfinite(size) and size > 0):
-            msg = f"{name} must be above 0 m: got {size} m"
-            raise InputError(msg)
+            raise InputError(f"{name} must be above 0 m: got {size} m")
     if not checked or min(map(len, checked)) == 0:
-        msg = "the outline of a pile needs at least 1 smarticle: got 0"
-        raise UndefinedMeasureError(msg)
+        raise UndefinedMeasureError("the outline of a pile needs at least 1 smarticle: got 0")
     corners = [corner for vertices in checked for corner in (vertices.min(axis=(0, 1)), vertices.max(axis=(0, 1)))]
     for region in regions:
         for sign, height in ((-1, region.bottom), (1, region.top)):
@@ -94,8 +92,7 @@ def outlines(
     first[2] = pitch * (math.floor(min(first[2], -margin) / pitch) + 0.5)
     counts = np.ceil((last - first) / pitch).astype(int) + 1
     if math.prod(counts.tolist()) > _MOST_VOXELS:
-        msg = f"a grid of {' x '.join(map(str, counts))} voxels is too large: raise the pitch, {pitch:g} m"
-        raise InputError(msg)
+        raise InputError(f"a grid of {' x '.join(map(str, counts))} voxels is too large: raise the pitch, {pitch:g} m")
     axes = [start + pitch * np.arange(count) for start, count in zip(first, counts, strict=True)]
     bodies = [_closed(vertices, axes, ball=ball, thickness=thickness) for vertices in checked]
     floor = round((pitch / 2 - first[2]) / pitch)

@@ -63,13 +63,11 @@ def local_packing(
     centres = centres_of_mass(vertices)
     interior = region.contains(centres)
     if not np.any(interior):
-        msg = "no smarticle has its centre of mass in the inner region of the pile"
-        raise UndefinedMeasureError(msg)
+        raise UndefinedMeasureError("no smarticle has its centre of mass in the inner region of the pile")
     if spacing is None:
         spacing = float(np.median(link_lengths(vertices)[:, 1])) / 8
     if not spacing > 0:
-        msg = f"spacing of the points along the links must be above 0 m: got {spacing} m"
-        raise InputError(msg)
+        raise InputError(f"spacing of the points along the links must be above 0 m: got {spacing} m")
     below = vertices[centres[:, 2] < container.top]
     # A little higher, lest the highest point coincide with its own image.
     lid = float(below[:, :, 2].max(initial=container.top)) + spacing / 2
@@ -90,8 +88,7 @@ def local_packing(
     np.add.at(volumes, owners, cells)
     total = float(volumes[interior].sum())
     if not np.isfinite(total):
-        msg = "a smarticle in the inner region has no closed Voronoi cell: the pile is too thin"
-        raise UndefinedMeasureError(msg)
+        raise UndefinedMeasureError("a smarticle in the inner region has no closed Voronoi cell: the pile is too thin")
     value = float(interior.sum() * solid_volume / total)
     return LocalPacking(volumes=volumes, interior=interior, value=value)
 

@@ -106,11 +106,10 @@ def solid_points(
     sizes = (thickness_normal, thickness_in_plane)
     pitch = min(sizes) / 2 if pitch is None else pitch
     if not (min(sizes) > 0 and 0 < pitch <= min(sizes)):
-        msg = (
+        raise InputError(
             f"thicknesses must be above 0 m and the pitch between 0 m and the smaller one: "
             f"got t1 {sizes[0]} m, t2 {sizes[1]} m, pitch {pitch} m"
         )
-        raise InputError(msg)
     found = [np.empty((0, 3), dtype=np.int64)]
     for indices in _grid_points(vertices, thickness_normal, thickness_in_plane, pitch, region):
         found.append(indices if region is None else indices[region.contains(pitch * indices @ _TURN)])

@@ -103,8 +103,7 @@ def joined_clusters(count: int, i: Whole, j: Whole) -> Clusters:
         UndefinedMeasureError: There is no smarticle.
     """
     if count == 0:
-        msg = "a cluster needs at least 1 smarticle: got 0"
-        raise UndefinedMeasureError(msg)
+        raise UndefinedMeasureError("a cluster needs at least 1 smarticle: got 0")
     graph = coo_array((np.ones(len(i)), (i, j)), shape=(count, count))
     _, found = connected_components(graph, directed=False)
     sizes = np.bincount(found)

@@ -98,8 +98,7 @@ def vibration(run: Run) -> Vibration:
     after = kinds.index("remove-container") if "remove-container" in kinds else len(kinds)
     found = next((phase for phase in run.phases[after:] if phase.type == "shake"), None)
     if found is None:
-        msg = f"{run.path}: no shake after a remove-container: its phases are {', '.join(kinds)}"
-        raise InputError(msg)
+        raise InputError(f"{run.path}: no shake after a remove-container: its phases are {', '.join(kinds)}")
     settings = run.scene["phases"][found.index]
     return Vibration(
         phase=found,
@@ -120,11 +119,10 @@ def column_history(run: Run, definition: str, shaken: Vibration) -> ColumnHistor
     resting = (times > -REST * (1 + 1e-6)) & (times < 1e-9)
     before = float(heights[resting].mean()) if resting.any() else math.nan
     if not before > 0:
-        msg = (
+        raise InputError(
             f"{run.path}: no height of the column in the last {REST:g} s before its vibration; record more often, "
             "or rest longer before"
         )
-        raise InputError(msg)
     return ColumnHistory(times=times, heights=heights / before, before=before)
 
 
@@ -138,8 +136,7 @@ def height_with_the_wall(run: Run) -> float:
     gone = [phase.type for phase in run.phases].index("remove-container")
     heights = series["com_height_m"][series["phase"] < gone]
     if not len(heights):
-        msg = f"{run.path}: no height of the column before its wall went; record more often"
-        raise InputError(msg)
+        raise InputError(f"{run.path}: no height of the column before its wall went; record more often")
     return float(heights[-1])
 
 

@@ -56,8 +56,7 @@ def contact_pairs(vertices: Vertices, distance: float) -> ContactPairs:
     """
     vertices = checked_vertices(vertices)
     if not (math.isfinite(distance) and distance > 0):
-        msg = f"distance must be above 0 m: got {distance} m; a link's thickness is usual"
-        raise InputError(msg)
+        raise InputError(f"distance must be above 0 m: got {distance} m; a link's thickness is usual")
     count = len(vertices)
     starts, ends = vertices[:, :-1].reshape(-1, 3), vertices[:, 1:].reshape(-1, 3)
     a, b = _close_links(starts, ends, link_lengths(vertices).ravel(), distance)
@@ -80,8 +79,7 @@ def touching_pairs(vertices: Vertices, diameter: float) -> ContactPairs:
     """
     vertices = checked_vertices(vertices)
     if not (math.isfinite(diameter) and diameter > 0):
-        msg = f"diameter must be above 0 m: got {diameter} m; give Run.sphere_diameter"
-        raise InputError(msg)
+        raise InputError(f"diameter must be above 0 m: got {diameter} m; give Run.sphere_diameter")
     # Contacts that only just touch are lost to the rounding of vertices otherwise.
     return contact_pairs(swept_axes(vertices, diameter), diameter * (1 + 1e-9))
 

@@ -43,11 +43,9 @@ def checked_forces(normal: ArrayLike) -> Floats:
     """
     normal = np.asarray(normal, dtype=np.float64)
     if normal.ndim != 1 or not np.all(np.isfinite(normal)) or np.any(normal <= 0):
-        msg = f"normal forces must be (M,) finite numbers above 0 N: got an array of shape {normal.shape}"
-        raise InputError(msg)
+        raise InputError(f"normal forces must be (M,) finite numbers above 0 N: got an array of shape {normal.shape}")
     if len(normal) == 0:
-        msg = "force chains need at least 1 contact that carries a force: got 0"
-        raise UndefinedMeasureError(msg)
+        raise UndefinedMeasureError("force chains need at least 1 contact that carries a force: got 0")
     return normal
 
 
@@ -103,8 +101,7 @@ def force_distribution(normal: ArrayLike, *, edges: ArrayLike | None = None) -> 
     normal = checked_forces(normal)
     edges = np.arange(0.0, 8.01, 0.25) if edges is None else np.asarray(edges, dtype=np.float64)
     if edges.ndim != 1 or len(edges) < 2 or not np.all(np.diff(edges) > 0):
-        msg = f"edges must be numbers that ascend, two or more: got {edges.tolist()}"
-        raise InputError(msg)
+        raise InputError(f"edges must be numbers that ascend, two or more: got {edges.tolist()}")
     counts, _ = np.histogram(normal / normal.mean(), bins=edges)
     return ForceDistribution(edges=edges, density=counts / (len(normal) * np.diff(edges)))
 

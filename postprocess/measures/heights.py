@@ -33,8 +33,7 @@ def heights(vertices: Vertices, *, floor_z: float = 0.0) -> Heights:
     """
     vertices = checked_vertices(vertices)
     if len(vertices) == 0:
-        msg = "a height needs at least 1 smarticle: got 0"
-        raise UndefinedMeasureError(msg)
+        raise UndefinedMeasureError("a height needs at least 1 smarticle: got 0")
     com = np.sort(centres_of_mass(vertices)[:, 2]) - floor_z
     weights = link_lengths(vertices).sum(axis=1)
     return Heights(
@@ -69,11 +68,9 @@ def material_height(vertices: Vertices, *, floor_z: float = 0.0, percentile: flo
     """
     vertices = checked_vertices(vertices)
     if not 0 < percentile <= 100:
-        msg = f"percentile must be above 0 % and up to 100 %: got {percentile} %; 95 is usual"
-        raise InputError(msg)
+        raise InputError(f"percentile must be above 0 % and up to 100 %: got {percentile} %; 95 is usual")
     if len(vertices) == 0:
-        msg = "a height needs at least 1 smarticle: got 0"
-        raise UndefinedMeasureError(msg)
+        raise UndefinedMeasureError("a height needs at least 1 smarticle: got 0")
     z = vertices[:, :, 2] - floor_z
     lower = np.minimum(z[:, :-1], z[:, 1:]).ravel()
     upper = np.maximum(z[:, :-1], z[:, 1:]).ravel()

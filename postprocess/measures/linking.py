@@ -91,8 +91,7 @@ def gauss_integral(first: ArrayLike, second: ArrayLike) -> Floats:
     first, second = np.asarray(first, dtype=np.float64), np.asarray(second, dtype=np.float64)
     for curve in (first, second):
         if curve.ndim < 2 or curve.shape[-1] != 3 or curve.shape[-2] < 2:
-            msg = f"a polygon must be (…, corners, 3) [m] with 2 corners or more: got {curve.shape}"
-            raise InputError(msg)
+            raise InputError(f"a polygon must be (…, corners, 3) [m] with 2 corners or more: got {curve.shape}")
     # Differences of all corners (…, m, n, 3) and their lengths: those of a segment pair are at [s:s+2, t:t+2].
     apart = second[..., None, :, :] - first[..., :, None, :]
     length = np.sqrt(np.einsum("...c,...c->...", apart, apart))

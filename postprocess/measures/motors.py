@@ -48,8 +48,7 @@ def sampled_work(angles: Floats, torques: Floats) -> float:
         0.002
     """
     if angles.shape != torques.shape:
-        msg = f"angles and torques must be of one shape: got {angles.shape} and {torques.shape}"
-        raise InputError(msg)
+        raise InputError(f"angles and torques must be of one shape: got {angles.shape} and {torques.shape}")
     if len(angles) < 2:
         return math.nan
     return float((torques[1:] * np.diff(angles, axis=0)).sum())

@@ -53,15 +53,12 @@ def nematic_order(directions: ArrayLike) -> NematicOrder:
     """
     directions = np.asarray(directions, dtype=np.float64)
     if directions.ndim != 2 or directions.shape[1] != 3 or not np.all(np.isfinite(directions)):
-        msg = f"directions must be (N, 3) finite numbers: got an array of shape {directions.shape}"
-        raise InputError(msg)
+        raise InputError(f"directions must be (N, 3) finite numbers: got an array of shape {directions.shape}")
     if len(directions) == 0:
-        msg = "a nematic order needs at least 1 direction: got 0"
-        raise UndefinedMeasureError(msg)
+        raise UndefinedMeasureError("a nematic order needs at least 1 direction: got 0")
     lengths = np.linalg.norm(directions, axis=1)
     if not np.all(lengths > 0):
-        msg = f"direction {int(np.argmin(lengths))} has no length; leave it out"
-        raise InputError(msg)
+        raise InputError(f"direction {int(np.argmin(lengths))} has no length; leave it out")
     unit = directions / lengths[:, None]
     tensor = 1.5 * unit.T @ unit / len(unit) - 0.5 * np.eye(3)
     values, vectors = np.linalg.eigh(tensor)

@@ -82,27 +82,22 @@ def packing_fraction(
     """
     vertices = checked_vertices(vertices)
     if definition not in DEFINITIONS:
-        msg = f"unknown definition of the packing fraction '{definition}': {list(DEFINITIONS)}"
-        raise InputError(msg)
+        raise InputError(f"unknown definition of the packing fraction '{definition}': {list(DEFINITIONS)}")
     for name, size, unit in (("radius", radius, "m"), ("solid_volume", solid_volume, "m³")):
         if not (math.isfinite(size) and size > 0):
-            msg = f"{name} must be above 0 {unit}: got {size} {unit}"
-            raise InputError(msg)
+            raise InputError(f"{name} must be above 0 {unit}: got {size} {unit}")
     if len(vertices) < 2:
-        msg = f"a packing fraction needs at least 2 smarticles: got {len(vertices)}"
-        raise UndefinedMeasureError(msg)
+        raise UndefinedMeasureError(f"a packing fraction needs at least 2 smarticles: got {len(vertices)}")
     if definition == "second-highest-com":
         height = heights(vertices, floor_z=floor_z).second_highest_com
     else:
         height = material_height(vertices, floor_z=floor_z)
     if not height > 0:
-        msg = f"the pile has no height above its floor: {height:g} m; check floor_z"
-        raise UndefinedMeasureError(msg)
+        raise UndefinedMeasureError(f"the pile has no height above its floor: {height:g} m; check floor_z")
     pile = Region(radius=radius, bottom=floor_z, top=floor_z + height)
     if definition == "voxel":
         if thickness_normal is None or thickness_in_plane is None:
-            msg = "definition 'voxel' needs thickness_normal and thickness_in_plane [m]: got None"
-            raise InputError(msg)
+            raise InputError("definition 'voxel' needs thickness_normal and thickness_in_plane [m]: got None")
         value = solid_fraction(
             vertices, pile.inner, thickness_normal=thickness_normal, thickness_in_plane=thickness_in_plane
         )

@@ -65,12 +65,10 @@ def packing_profile(
         InputError: Bad sizes or numbers of rings and layers.
     """
     if not (math.isfinite(radius) and radius > 0 and rings >= 1):
-        msg = f"a profile needs a radius above 0 m and 1 ring or more: got {radius} m, {rings} rings"
-        raise InputError(msg)
+        raise InputError(f"a profile needs a radius above 0 m and 1 ring or more: got {radius} m, {rings} rings")
     layer = radius / rings if layer is None else layer
     if not (math.isfinite(layer) and layer > 0):
-        msg = f"layer must be above 0 m: got {layer} m; leave it out for the width of a ring"
-        raise InputError(msg)
+        raise InputError(f"layer must be above 0 m: got {layer} m; leave it out for the width of a ring")
     points, pitch = solid_points(
         vertices, thickness_normal=thickness_normal, thickness_in_plane=thickness_in_plane, pitch=pitch
     )
@@ -96,8 +94,7 @@ def profile_table(run: Run, *, rings: int = 6, layer: float | None = None) -> pd
     """
     if run.manifest.planar or run.manifest.container_tiers > 1:
         what = "moves in a plane" if run.manifest.planar else f"has a container of {run.manifest.container_tiers} tiers"
-        msg = f"{run.path}: φ(r, z) is of one upright cylinder: this run {what}; leave out the profile"
-        raise InputError(msg)
+        raise InputError(f"{run.path}: φ(r, z) is of one upright cylinder: this run {what}; leave out the profile")
     frames = run.frames
     rows: list[dict[str, object]] = []
     for phase in run.phases:

@@ -81,8 +81,7 @@ def read_pull(run: Run, series: Series, phase: int) -> HookPull:
     # The hooks move with the container, which does not move now.
     height = series["hook_upper_z_m"]
     if len(inside) < 2 or inside[0] == 0 or not np.isfinite(force[inside]).all():
-        msg = f"{series.path}: no force of a hook throughout phase {phase} of {run.path}; run it again"
-        raise InputError(msg)
+        raise InputError(f"{series.path}: no force of a hook throughout phase {phase} of {run.path}; run it again")
     span = np.concatenate([[inside[0] - 1], inside])
     resting = force[: inside[0]][series["phase"][: inside[0]] == phase - 1]
     resting = resting[np.isfinite(resting)][-max(1, _samples(series.time[span], END)) :]

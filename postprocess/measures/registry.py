@@ -106,8 +106,7 @@ def registered() -> tuple[FrameMeasure | PhaseMeasure, ...]:
     headers = [quantity.header for measure in measures for quantity in measure.quantities]
     for kind, words in (("name", names), ("header", headers)):
         if repeated := {word for word in words if words.count(word) > 1}:
-            msg = f"measures share a {kind}: {', '.join(sorted(repeated))}"
-            raise ValueError(msg)
+            raise ValueError(f"measures share a {kind}: {', '.join(sorted(repeated))}")
     return measures
 
 

@@ -87,8 +87,7 @@ def centre_of_mass(vertices: Vertices) -> Floats:
     """
     vertices = checked_vertices(vertices)
     if len(vertices) == 0:
-        msg = "a centre of mass needs at least 1 smarticle: got 0"
-        raise UndefinedMeasureError(msg)
+        raise UndefinedMeasureError("a centre of mass needs at least 1 smarticle: got 0")
     # Smarticles may differ in length, so their centres are weighted by it.
     weights = link_lengths(vertices).sum(axis=1)
     centre: Floats = np.average(centres_of_mass(vertices), axis=0, weights=weights)
@@ -108,8 +107,7 @@ def spread_radius(vertices: Vertices, *, share: float, axis: tuple[float, float]
     """
     vertices = checked_vertices(vertices)
     if not 0 < share <= 1:
-        msg = f"share must be above 0 and up to 1 of the material: got {share}; 0.95 is usual"
-        raise InputError(msg)
+        raise InputError(f"share must be above 0 and up to 1 of the material: got {share}; 0.95 is usual")
     centre = centre_of_mass(vertices)[:2] if axis is None else np.asarray(axis)
     points = vertices[:, :, :2] - centre
     start, along = points[:, :-1].reshape(-1, 2), np.diff(points, axis=1).reshape(-1, 2)
@@ -127,8 +125,7 @@ def share_outside(vertices: Vertices, radius: float, *, axis: tuple[float, float
     """
     centres = centres_of_mass(vertices)
     if len(centres) == 0:
-        msg = "a share of smarticles needs at least 1 of them: got 0"
-        raise UndefinedMeasureError(msg)
+        raise UndefinedMeasureError("a share of smarticles needs at least 1 of them: got 0")
     return float((np.hypot(*(centres[:, :2] - axis).T) > radius).mean())
 
 
@@ -152,8 +149,7 @@ def tilt(vertices: Vertices, *, foot: tuple[float, float] = (0.0, 0.0), floor_z:
     """
     x, y, z = centre_of_mass(vertices) - [*foot, floor_z]
     if not z > 0:
-        msg = f"the centre of mass is {-z:g} m below the floor; check floor_z"
-        raise UndefinedMeasureError(msg)
+        raise UndefinedMeasureError(f"the centre of mass is {-z:g} m below the floor; check floor_z")
     return math.atan2(math.hypot(x, y), z)
 
 

@@ -108,8 +108,7 @@ def read_strain_test(run: Run) -> StrainTest:
     """
     series = run.series
     if not has_strain(series):
-        msg = f"{run.path}: no chain was pulled in this run; give runs of the study chain"
-        raise InputError(msg)
+        raise InputError(f"{run.path}: no chain was pulled in this run; give runs of the study chain")
     length, force = series["chain_length_m"], series["string_pulled_force_N"][:, 0]
     shown = np.isfinite(length)
     first = length[shown][0]

@@ -148,34 +148,30 @@ def packing_change(
     ]
     if not active or active[0] == 0:
         types = ", ".join(phase.type for phase in run.phases)
-        msg = (
+        raise InputError(
             f"run {run} has no activity with a phase before it: its phases are {types}; "
             f"name its types of activity or choose another run"
         )
-        raise InputError(msg)
     before, after = active[0] - 1, active[-1]
     means = []
     for phase in (before, after):
         part = frames.in_phase(phase)[-last:]
         if not part:
             kind = run.phases[phase].type
-            msg = f"run {run} has no frame of phase {phase} ({kind}) yet; wait or resume it"
-            raise InputError(msg)
+            raise InputError(f"run {run} has no frame of phase {phase} ({kind}) yet; wait or resume it")
         means.append(mean_with_error([packing_of(frame, run, definition=definition) for frame in part]))
     return PackingChange(before=means[0], after=means[1], definition=definition, phase_before=before, phase_after=after)
 
 
 def _check_last(last: int) -> None:
     if last < 1:
-        msg = f"last must be 1 frame or more: got {last}; {LAST_FRAMES} is usual"
-        raise InputError(msg)
+        raise InputError(f"last must be 1 frame or more: got {last}; {LAST_FRAMES} is usual")
 
 
 def _open(run: Run, definitions: Iterable[str]) -> tuple[FrameSequence, Series | None]:
     for definition in definitions:
         if definition not in DEFINITIONS:
-            msg = f"unknown definition of the packing fraction '{definition}': {list(DEFINITIONS)}"
-            raise InputError(msg)
+            raise InputError(f"unknown definition of the packing fraction '{definition}': {list(DEFINITIONS)}")
     _ = run.manifest
     # A run that failed early may have frames and no series.
     return run.frames, run.series if run.has_series else None
@@ -185,11 +181,10 @@ def _phases(run: Run, frames: FrameSequence) -> list[FrameSequence]:
     """Return the frames of each phase that has any."""
     parts = [frames.in_phase(phase.index) for phase in run.phases]
     if sum(map(len, parts)) != len(frames):
-        msg = (
+        raise InputError(
             f"frames of {run.path} name phases that run.json does not have "
             f"(it has {len(parts)}), or not in order; run it again into a new directory"
         )
-        raise InputError(msg)
     return [part for part in parts if part]
 
 

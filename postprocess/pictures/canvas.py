@@ -70,12 +70,10 @@ class Look:
             InputError: Unknown field or view, a bad size, or runs that have no view in common.
         """
         if len({run.manifest.planar for run in runs}) > 1:
-            msg = "a run in a plane and one in space have no view in common; compare runs of one kind"
-            raise InputError(msg)
+            raise InputError("a run in a plane and one in space have no view in common; compare runs of one kind")
         name = view or ("top" if runs[0].manifest.planar else "front")
         if name not in VIEWS:
-            msg = f"view {name!r}: is not known; {nearest(name, VIEWS)}"
-            raise InputError(msg)
+            raise InputError(f"view {name!r}: is not known; {nearest(name, VIEWS)}")
         if not all(_LEAST_SIZE <= side <= _LARGEST_SIZE for side in size):
             msg = f"size must be {_LEAST_SIZE} to {_LARGEST_SIZE} pixels each way: got {size[0]} x {size[1]}"
             raise InputError(msg)
@@ -355,10 +353,9 @@ def check_graphics() -> None:
         except OSError:
             continue
         return
-    msg = (
+    raise RunError(
         "cannot draw: no display and no libEGL.so.1; apt-get install libegl1 libgl1-mesa-dri, or see smarticles doctor"
     )
-    raise RunError(msg)
 
 
 @contextmanager

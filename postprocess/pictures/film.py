@@ -58,33 +58,27 @@ class Moments:
         """
         recorded = np.asarray(recorded, dtype=np.float64)
         if most < 2:
-            msg = f"a film needs most_frames of at least 2: got {most}; leave it out for {MOST}"
-            raise InputError(msg)
+            raise InputError(f"a film needs most_frames of at least 2: got {most}; leave it out for {MOST}")
         if len(recorded) < 2:
-            msg = f"a film needs at least 2 frames: got {len(recorded)}; draw a picture, .png"
-            raise InputError(msg)
+            raise InputError(f"a film needs at least 2 frames: got {len(recorded)}; draw a picture, .png")
         if not (math.isfinite(rate) and 0 < rate <= 100):
-            msg = f"fps must be above 0 and up to 100 pictures per second: got {rate:g}; {RATE:g} is usual"
-            raise InputError(msg)
+            raise InputError(f"fps must be above 0 and up to 100 pictures per second: got {rate:g}; {RATE:g} is usual")
         first, last = float(recorded[0]), float(recorded[-1])
         low, high = first if start is None else start, last if end is None else end
         slack = 1e-9 * max(abs(first), abs(last), 1.0)
         if not first - slack <= low < high <= last + slack:
-            msg = (
+            raise InputError(
                 f"a film must begin before it ends, within {first:g} s to {last:g} s, the run's frames: "
                 f"got {low:g} s to {high:g} s"
             )
-            raise InputError(msg)
         spacing = float(np.median(np.diff(recorded)))
         if every is None:
             every = spacing * max(1, math.ceil((high - low) / spacing / (most - 1) - 1e-6))
         elif not (math.isfinite(every) and every >= spacing * (1 - 1e-6)):
-            msg = f"every must be {spacing:g} s or more, the time between the run's frames: got {every:g} s"
-            raise InputError(msg)
+            raise InputError(f"every must be {spacing:g} s or more, the time between the run's frames: got {every:g} s")
         steps = math.floor((high - low) / every + 1e-6)
         if steps < 1:
-            msg = f"every {every:g} s leaves one picture between {low:g} s and {high:g} s; choose less"
-            raise InputError(msg)
+            raise InputError(f"every {every:g} s leaves one picture between {low:g} s and {high:g} s; choose less")
         return cls(times=low + every * np.arange(steps + 1.0), every=every, rate=rate)
 
     def indices(self, recorded: Floats) -> list[int]:
@@ -112,8 +106,7 @@ def check_film(path: Path, size: tuple[int, int]) -> None:
     if path.suffix != ".mp4":
         return
     if any(side % 2 for side in size):
-        msg = f"size must be even for .mp4: got {size[0]} x {size[1]} pixels"
-        raise InputError(msg)
+        raise InputError(f"size must be even for .mp4: got {size[0]} x {size[1]} pixels")
     try:
         importlib.import_module("imageio_ffmpeg").get_ffmpeg_exe()
     except (ImportError, RuntimeError) as error:

@@ -217,8 +217,7 @@ def _span(shots: Sequence[Shot], values: Sequence[dict[int, Floats]], look: Look
     if isinstance(limits, tuple):
         low, high = limits
         if not (math.isfinite(low) and math.isfinite(high) and low < high):
-            msg = f"limits of the colours must be two finite numbers in order: got {low:g} and {high:g}"
-            raise InputError(msg)
+            raise InputError(f"limits of the colours must be two finite numbers in order: got {low:g} and {high:g}")
         factor = look.field.shown[0] if look.field.shown else 1.0
         return low / factor, high / factor
     if limits == "run":
@@ -236,8 +235,7 @@ def common_times(shots: Sequence[Shot]) -> Floats:
     high = min(float(shot.frames.times[-1]) for shot in shots)
     if low > high:
         spans = ", ".join(f"{shot.run.path} {shot.frames.times[0]:g} to {shot.frames.times[-1]:g} s" for shot in shots)
-        msg = f"the runs have no time in common: {spans}; compare runs that overlap in time"
-        raise InputError(msg)
+        raise InputError(f"the runs have no time in common: {spans}; compare runs that overlap in time")
     inside = [shot.frames.times[(shot.frames.times >= low) & (shot.frames.times <= high)] for shot in shots]
     return min(inside, key=len)
 
@@ -245,8 +243,7 @@ def common_times(shots: Sequence[Shot]) -> Floats:
 def _checked_output(directory: Path | str, output: Path | str | None, default: str, kinds: tuple[str, ...]) -> Path:
     path = Path(directory) / default if output is None else Path(output)
     if path.suffix not in kinds:
-        msg = f"{path}: the output must end in {' or '.join(kinds)}: got '{path.suffix}'"
-        raise InputError(msg)
+        raise InputError(f"{path}: the output must end in {' or '.join(kinds)}: got '{path.suffix}'")
     return path
 
 
@@ -263,8 +260,7 @@ def _focused(shot: Shot, index: int, smarticle: int, look: Look) -> Image.Image:
     found = np.flatnonzero(frame.smarticle_ids == smarticle)
     if not len(found):
         low, high = frame.smarticle_ids.min(), frame.smarticle_ids.max()
-        msg = f"smarticle {smarticle}: there are {low} to {high} at {frame.time:g} s; choose one of these"
-        raise InputError(msg)
+        raise InputError(f"smarticle {smarticle}: there are {low} to {high} at {frame.time:g} s; choose one of these")
     own = int(found[0])
     passages = link_passages(frame.vertices)
     through = passages.i == own

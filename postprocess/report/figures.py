@@ -162,8 +162,7 @@ def whole_file(path: Path, *, overwrite: bool = True) -> Iterator[Path]:
     """
     refuse_to_overwrite(path, overwrite=overwrite)
     if not path.parent.is_dir():
-        msg = f"{path}: the folder {path.parent} does not exist: create it or choose another output"
-        raise InputError(msg)
+        raise InputError(f"{path}: the folder {path.parent} does not exist: create it or choose another output")
     try:
         with whole(path, shared=True) as temporary:
             yield temporary

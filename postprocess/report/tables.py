@@ -20,17 +20,14 @@ def write_table(table: pd.DataFrame, path: Path | str, *, overwrite: bool = Fals
     """
     path = Path(path)
     if path.suffix != ".csv":
-        msg = f"cannot write table {path}: tables are CSV; let its name end in .csv"
-        raise InputError(msg)
+        raise InputError(f"cannot write table {path}: tables are CSV; let its name end in .csv")
     if path.exists() and not overwrite:
-        msg = f"cannot write table {path}: it exists; choose another name or ask to overwrite it"
-        raise InputError(msg)
+        raise InputError(f"cannot write table {path}: it exists; choose another name or ask to overwrite it")
     try:
         with whole(path, shared=True) as temporary, temporary.open("w", encoding="utf-8", newline="") as file:
             table.to_csv(file, index=False)
     except (FileNotFoundError, PermissionError) as error:
-        msg = f"cannot write table {path}: {error.strerror}; choose a folder that can be written"
-        raise InputError(msg) from None
+        raise InputError(f"cannot write table {path}: {error.strerror}; choose a folder that can be written") from None
     except OSError as error:  # which names the temporary file, or none
         msg = f"cannot write table {path}: {error.strerror or error}; free space or choose another folder"
         raise RunError(msg) from error

@@ -126,8 +126,7 @@ def _tested(
     if finding not in findings:
         if optional:
             return None
-        msg = f"{study}: has no finding {finding!r}; correct studies/claims/claims.yaml"
-        raise InputError(msg)
+        raise InputError(f"{study}: has no finding {finding!r}; correct studies/claims/claims.yaml")
     row = findings[finding]
     return Tested(
         study=study,
@@ -151,8 +150,7 @@ def _findings(folder: Path) -> _Findings:
                 header = ["criterion", "verdict", "ours", *header[3:]]
             key = header.index("id") if "id" in header else 0
             return {row[key]: dict(zip(header, row, strict=True)) for row in rows}, _basis(folder)
-    msg = f"{folder}: has neither findings.csv nor verdicts.csv; analyse the study first"
-    raise InputError(msg)
+    raise InputError(f"{folder}: has neither findings.csv nor verdicts.csv; analyse the study first")
 
 
 def _basis(folder: Path) -> str:

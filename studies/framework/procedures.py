@@ -59,11 +59,10 @@ def prepared_by(run: Run, *then: str) -> dict[str, object]:
     types = [phase.type for phase in run.phases]
     active = [kind for kind in types if kind in PROCEDURES]
     if types != ["deposit", "relax", *([active[0], "relax"] if active else []), *then]:
-        msg = (
+        raise InputError(
             f"{run.path}: its phases are {', '.join(types)}, not a pour, a rest, one activity "
             f"({', '.join(PROCEDURES)}) with a rest or none, {' and '.join(then)}"
         )
-        raise InputError(msg)
     procedure = PROCEDURES[active[0]] if active else STATIC
     theta = run.scene["phases"][2]["theta_deg"] if procedure == INTERNAL else math.nan
     pile = run_columns(run)
@@ -108,8 +107,7 @@ def procedure_row(run: Run) -> dict[str, object]:
     wanted = range(active.index - 1, active.index + 2)
     table = summarise_run(run, definitions=[DEFINITION], phases=set(wanted))
     if len(table) != len(wanted):
-        msg = f"{run.path}: no frame of its activity or of the rest before or after it; run it again"
-        raise InputError(msg)
+        raise InputError(f"{run.path}: no frame of its activity or of the rest before or after it; run it again")
     before, during, after = (table.set_index("phase").loc[phase] for phase in wanted)
     theta = settings["theta_deg"] if procedure == INTERNAL else math.nan
     row: dict[str, object] = {PROCEDURE: procedure, THETA: theta, **run_columns(run), ACTIVE: duration(active)}

@@ -167,6 +167,5 @@ def make_folder(path: Path | str) -> Path:
     try:
         path.mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        msg = f"cannot write to {path}: {error.strerror}; choose another folder as output"
-        raise InputError(msg) from None
+        raise InputError(f"cannot write to {path}: {error.strerror}; choose another folder as output") from None
     return path

@@ -27,8 +27,7 @@ def removal(run: Run) -> Phase:
     last = run.phases[-1]
     if last.type != _REMOVAL or len(run.phases) < 3 or run.phases[-2].type != "relax":
         types = ", ".join(phase.type for phase in run.phases)
-        msg = f"{run.path}: does not end with a rest and {_REMOVAL}: its phases are {types}"
-        raise InputError(msg)
+        raise InputError(f"{run.path}: does not end with a rest and {_REMOVAL}: its phases are {types}")
     return last
 
 
@@ -37,8 +36,7 @@ def around(run: Run) -> tuple[Frame, FrameSequence]:
     phase, frames = removal(run), run.frames
     rest, after = frames.in_phase(phase.index - 1), frames.in_phase(phase.index)
     if not rest or not after:
-        msg = f"{run.path}: no frame of the rest before {_REMOVAL} or of that phase; run it again"
-        raise InputError(msg)
+        raise InputError(f"{run.path}: no frame of the rest before {_REMOVAL} or of that phase; run it again")
     return rest[len(rest) - 1], after
 
 
@@ -46,8 +44,7 @@ def named_columns(run: Run) -> dict[str, object]:
     """Give the cells that name a run; InputError where it has several activities, or an unknown one."""
     active = [phase.type for phase in run.phases if phase.type not in {*PASSIVE_PHASES, _REMOVAL}]
     if len(active) > 1 or not set(active) <= set(PROCEDURES):
-        msg = f"{run.path}: not one activity ({', '.join(PROCEDURES)}) or none: it has {', '.join(active)}"
-        raise InputError(msg)
+        raise InputError(f"{run.path}: not one activity ({', '.join(PROCEDURES)}) or none: it has {', '.join(active)}")
     return {PROCEDURE: PROCEDURES[active[0]] if active else STATIC, **run_columns(run)}
 
 

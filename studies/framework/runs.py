@@ -232,11 +232,10 @@ class Collected:
         for run in self.runs:
             first = firsts.setdefault(within(run), run)
             if value(run) != value(first):
-                msg = (
+                raise InputError(
                     f"study {self.study}: runs of different {quantity} must not be averaged: {first.run.path} is "
                     f"{value(first)}, {run.run.path} is {value(run)}; analyse them apart"
                 )
-                raise InputError(msg)
 
     def reject_repeats(self, point: Callable[[MeasuredRun], str]) -> None:
         """Reject two runs with the same seed of the same point, by an InputError."""
@@ -244,11 +243,10 @@ class Collected:
         for run in self.runs:
             key = (point(run), run.run.manifest.seed, run.run.manifest.engine)
             if seen.setdefault(key, run) is not run:
-                msg = (
+                raise InputError(
                     f"study {self.study}: point = {key[0]} with seed {key[1]} is given twice, "
                     f"{seen[key].run.path} and {run.run.path}; leave one out"
                 )
-                raise InputError(msg)
 
 
 def collect_runs(
@@ -284,8 +282,7 @@ def collect_runs(
         missing.append(MissingRun(directory=str(directory), status=status, cause=cause))
     if not runs:
         why = f"; the first: {missing[0].directory}: {missing[0].cause}" if missing else ""
-        msg = f"study {study}: none of {len(run_dirs)} runs is done{why}; finish a run first"
-        raise InputError(msg)
+        raise InputError(f"study {study}: none of {len(run_dirs)} runs is done{why}; finish a run first")
     return Collected(study=study, runs=runs, missing=missing)
 
 
@@ -314,8 +311,7 @@ def earlier_runs(results: Path | str, wanted: Mapping[str, Wanted]) -> dict[str,
         origins = {Path(run["directory"]).name: run for run in runs}
     except (OSError, ValueError, KeyError, TypeError) as error:
         cause = error.strerror if isinstance(error, OSError) else f"it is no provenance of a study ({error!r})"
-        msg = f"cannot read {path}: {cause}; {_REMEDY}"
-        raise InputError(msg) from None
+        raise InputError(f"cannot read {path}: {cause}; {_REMEDY}") from None
     found: dict[str, MeasuredRun] = {}
     for name, rows in table.groupby("run", sort=False):
         run, origin = wanted.get(str(name)), origins.get(str(name))
@@ -337,8 +333,7 @@ def read_runs(results: Path) -> pd.DataFrame:
     except (OSError, ValueError) as error:
         cause = str((isinstance(error, OSError) and error.strerror) or error)
     if cause:
-        msg = f"cannot read {path}: {cause}; {_REMEDY}"
-        raise InputError(msg)
+        raise InputError(f"cannot read {path}: {cause}; {_REMEDY}")
     return table
 
 

@@ -98,8 +98,7 @@ def contact_of(run: Run) -> SceneData:
     """Read what the scene of a run says of its contacts; InputError where it says nothing."""
     contact: SceneData | None = run.scene.get("contact")
     if contact is None:
-        msg = f"{run.path}: scene.yaml has no contact; give runs of a study of friction"
-        raise InputError(msg)
+        raise InputError(f"{run.path}: scene.yaml has no contact; give runs of a study of friction")
     return contact
 
 
@@ -143,8 +142,7 @@ def measured_row(run: Run, definitions: Sequence[str]) -> dict[str, object]:
     shakes = [phase for phase in run.phases if phase.type == _SHAKE]
     if not shakes or shakes[0].index == 0:
         types = ", ".join(phase.type for phase in run.phases)
-        msg = f"{run.path}: no shaking after another phase: its phases are {types}"
-        raise InputError(msg)
+        raise InputError(f"{run.path}: no shaking after another phase: its phases are {types}")
     wanted = {"phi_0": shakes[0].index - 1, "phi_f": shakes[-1].index}
     if shakes[-1].index < run.phases[-1].index:
         wanted["phi_f relaxed"] = run.phases[-1].index
@@ -153,8 +151,7 @@ def measured_row(run: Run, definitions: Sequence[str]) -> dict[str, object]:
     table = summary.set_index("phase") if len(summary) else summary
     gone = next((phase for phase in wanted.values() if phase not in table.index), None)
     if gone is not None:
-        msg = f"{run.path}: no frame of phase {gone} ({run.phases[gone].type}); run it again"
-        raise InputError(msg)
+        raise InputError(f"{run.path}: no frame of phase {gone} ({run.phases[gone].type}); run it again")
     row: dict[str, object] = {**run_columns(run), SHAKEN: sum(map(duration, shakes))}
     for definition in DEFINITIONS:
         if definition in cheap:
@@ -184,8 +181,7 @@ def packing_history(run: Run) -> History:
         shown = (series["phase"] >= shakes[0].index - 1) & np.isfinite(values)
         if shown.any():
             return History(times=series.time[shown] - start, values=values[shown], active=end - start)
-    msg = f"{run.path}: no packing fraction was recorded while shaking"
-    raise InputError(msg)
+    raise InputError(f"{run.path}: no packing fraction was recorded while shaking")
 
 
 PHI_TIME = Histories(

@@ -50,8 +50,7 @@ def finish(process: subprocess.Popen[bytes], what: str) -> float:
     _, status, usage = os.wait4(process.pid, 0)
     process.returncode = os.waitstatus_to_exitcode(status)
     if process.returncode not in {0, -signal.SIGKILL}:
-        msg = f"{what}: ended with status {process.returncode}"
-        raise RunError(msg)
+        raise RunError(f"{what}: ended with status {process.returncode}")
     return usage.ru_utime + usage.ru_stime
 
 
@@ -86,8 +85,7 @@ def row_of(whole: Path, out: Path, *, seconds: float, killed: str) -> dict[str, 
     one, other = results(whole), results(out)
     differing = [name for name in {*one, *other} if one.get(name) != other.get(name)]
     if len(one) < LEAST_FILES:
-        msg = f"{whole}: only {len(one)} files to compare, {LEAST_FILES} at least"
-        raise RunError(msg)
+        raise RunError(f"{whole}: only {len(one)} files to compare, {LEAST_FILES} at least")
     return {
         "killed after [s of processor time]": seconds,
         STATE: killed,
@@ -117,8 +115,7 @@ def kills(engine: str, number: int, folder: Path, *, seed: int) -> list[dict[str
     again = folder / f"again-{seed}"
     took = finish(start(path, again), str(again))
     if results(whole) != results(again):
-        msg = f"{folder}: one scene run twice does not give the same bits; no kill was needed"
-        raise RunError(msg)
+        raise RunError(f"{folder}: one scene run twice does not give the same bits; no kill was needed")
     rows: list[dict[str, Any]] = []
     while len(rows) < number:
         seconds, out = rng.uniform(0.0, LONGER * took), folder / f"killed-{seed}-{len(rows)}"

@@ -104,8 +104,7 @@ class LinksBoundaries:
 
     def shake(self, *, amplitude: float, frequency: float, walls: bool = True) -> None:
         if not self._shaken:
-            msg = "the engine was built without a shaker"
-            raise RunError(msg)
+            raise RunError("the engine was built without a shaker")
         ground, hooked = self._ground, walls and self._world.hooks is not None
         ground.base[:] = ground.place
         ground.speed[:] = 0.0

@@ -246,17 +246,15 @@ class LinksEngine:
             InputError: it was not saved by this engine.
         """
         if saved.memory.get("format") != FORMAT:
-            msg = (
+            raise InputError(
                 f"checkpoint: format {saved.memory.get('format')!r}, here is {FORMAT!r}; it was made by another engine "
                 "or version: resume with that, or start anew"
             )
-            raise InputError(msg)
         try:
             with np.load(io.BytesIO(saved.content)) as file:
                 arrays = {name: file[name] for name in file.files}
         except (zipfile.BadZipFile, ValueError, OSError) as error:
-            msg = f"checkpoint: not readable by the links engine ({error}); start the run anew"
-            raise InputError(msg) from error
+            raise InputError(f"checkpoint: not readable by the links engine ({error}); start the run anew") from error
         self._world.restore(arrays, saved.memory["world"])
         prefix = "motors."
         self.motors.restore({name[len(prefix) :]: array for name, array in arrays.items() if name.startswith(prefix)})
