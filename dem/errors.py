@@ -18,7 +18,6 @@ def reject(concerned: Any, time: float, cause: str, way_out: str) -> None:
 
     Args:
         concerned: (N,) bool array.
-        time: simulated time [s].
     """
     if concerned.any():
         ids = concerned.nonzero()[0]

@@ -27,7 +27,6 @@ def force_mesh(found: ContactForces, positions: Array, *, time: float, phase: in
 
     Args:
         positions: (N, 3) centres of mass of the smarticles at the same instant [m].
-        time: simulated time [s].
     """
     number, between = len(found.forces), found.boundaries == NONE
     ends = np.empty((number, 2, 3))

@@ -52,7 +52,6 @@ def centreline_mesh(
         velocities: (N, 3, 3) of the links' centres [m/s].
         spins: (N, 3, 3) angular velocities of the links [rad/s].
         contacts: (N,) how many others each smarticle touches.
-        time: simulated time [s].
         floor: height of the container's floor [m].
         extra: (3N,) further values, one per link, such as `motor_fields`.
     """

@@ -62,7 +62,6 @@ class Watchdog:
                 mass. Contacts with wall and floor are no measure: YADE takes those deeper than the centre for
                 shallower.
             floor: height of the floor [m].
-            time: simulated time [s].
             raised: distance by which a hook may have raised smarticles [m]; None: nothing holds them, none escapes.
             gaps: (N, 2) distances of the links of each hinge [m]; None while welded.
 
@@ -141,7 +140,6 @@ class Watchdog:
             energy: kinetic and potential energy, less all energy added and all work done since the start [J]; NaN
                 where the work is unknown at present: the ceiling is then forgotten.
             elastic: energy of the springs of contacts and hinges at most [J].
-            time: simulated time [s].
         """
         if math.isnan(energy):
             self._ceiling = math.inf
@@ -164,7 +162,6 @@ class Watchdog:
         Args:
             residual: energy added and work done, less everything stored and dissipated [J].
             dissipated: by contacts, hinges and welding since the start [J].
-            time: simulated time [s].
 
         Raises:
             RunError: the residual is too large, with cause and way out.

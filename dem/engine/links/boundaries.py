@@ -44,7 +44,6 @@ class LinksBoundaries:
     """See `dem.engine.interface.Boundaries`.
 
     Args:
-        world: the simulation.
         cylinder: the container.
         shaken: whether the scene shakes it.
         removed: called with what takes contacts away, to keep the energy ledger.

@@ -50,7 +50,6 @@ class LinksEngine:
         particle: one smarticle.
         cylinder: the container; its floor is at z = 0 at the start.
         law: contact law.
-        gravity: g, downwards [m/s²].
         time_step: dt [s], until another is set.
         shaken: whether the container will move.
         motor_law: what all motors have in common; None where smarticles stay welded.

@@ -9,11 +9,7 @@ from dem.engine.links.world import World
 
 
 class LinksLedger:
-    """See `dem.engine.interface.EnergyLedger`.
-
-    Args:
-        world: the simulation.
-    """
+    """See `dem.engine.interface.EnergyLedger`."""
 
     def __init__(self, world: World) -> None:
         self._world = world

@@ -23,7 +23,6 @@ class LinksMotors:
     """See `dem.engine.interface.Motors`.
 
     Args:
-        world: the simulation.
         law: what all motors have in common; None in scenes without.
         strengths: (N, 2) factors on what each can do [1]; None: all are alike.
 

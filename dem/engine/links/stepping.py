@@ -51,9 +51,7 @@ def settle(shape: Shape, bodies: Bodies, motors: Any, ledger: Array, dt: float) 
     A force takes from the kinetic energy what it does along the mean of the velocities before and after.
 
     Args:
-        shape: what all smarticles have in common.
         bodies: the smarticles; `spin` and `motion` are written.
-        motors: None while welded.
         ledger: see `dem.engine.links.contact.pairs.enter`; emptied.
         dt: time over which they acted [s].
     """
@@ -82,13 +80,9 @@ def act(
 
     Args:
         system: the simulation, posed, with lists up to date.
-        scratch: written.
         totals: (TOTALS,) see `LOST`; brought up to date.
         tick: ticks of the step that have passed.
         dt: an undivided time step [s].
-        motors: None while welded.
-        cords: None where no string is tied.
-        ledger: of forces that dissipate; None where nothing asks.
 
     Returns:
         Its length in ticks.
@@ -150,10 +144,7 @@ def advance(steps: int, clock: Clock, system: System, scratch: Scratch, totals: 
     """Make steps.
 
     Args:
-        steps: how many.
         clock: when these steps are.
-        system: the simulation.
-        scratch: written.
         totals: (TOTALS,) see `LOST`; brought up to date.
 
     Returns:

@@ -18,11 +18,7 @@ Array = NDArray[np.float64]
 
 
 class LinksStrings:
-    """See `dem.engine.interface.Strings`.
-
-    Args:
-        world: the simulation.
-    """
+    """See `dem.engine.interface.Strings`."""
 
     def __init__(self, world: World) -> None:
         self._world = world

@@ -41,7 +41,6 @@ class YadeEngine:
     """`dem.engine.interface.Engine` on YADE.
 
     Args:
-        gravity: g, downwards [m/s²].
         time_step: dt [s], until another is set.
         shaken: whether the container will move; the engine that moves it exists only then.
         hinge_law: with `motor_law`, None where smarticles stay welded: then nothing of a hinge exists.

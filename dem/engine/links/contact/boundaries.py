@@ -76,7 +76,6 @@ def contacts_of_link(
     """Find the contacts of a link with all boundaries.
 
     Args:
-        shape: what all smarticles have in common.
         segments: (N S, 6) axes of the links [m].
         ground: floor and wall, and where all boundaries are.
         channel: (1,) half the distance of the walls that stand in for the container [m]; None for a container.
@@ -85,7 +84,6 @@ def contacts_of_link(
         p: the link.
         kind: 1 for a middle link; the others are barbs, whose starts are ends of the middle link.
         rows: (slots, COLUMNS) written, see `SLOT`.
-        met: scratch of `meet`.
 
     Returns:
         Rows that were written.
@@ -235,10 +233,6 @@ def place_and_motion(
     """Return where a contact is [m], the link's velocity there [m/s], the boundary's [m/s], the link's turn [rad/s].
 
     Args:
-        shape: what all smarticles have in common.
-        bodies: the smarticles.
-        ground: the boundaries.
-        i: the smarticle.
         row: of the link in `Bodies.motion`.
         contact: (COLUMNS,) see `SLOT`.
     """
@@ -256,16 +250,10 @@ def push_boundaries(
     """Add the forces of all boundaries on all links.
 
     Args:
-        shape: what all smarticles have in common.
         law: of contacts with boundaries.
         bodies: the smarticles; `load` or `shares`, and `deepest` are written.
         kept: what contacts remember; brought up to date.
         boundaries: their `force` is written.
-        hinged: None while welded.
-        ledger: of forces that dissipate; None where nothing asks.
-        step: lengths of time around these forces.
-        rows: scratch of `contacts_of_link`.
-        met: scratch of `meet`.
 
     Returns:
         Energy of tangential springs whose contacts have ended [J].

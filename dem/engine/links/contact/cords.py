@@ -40,11 +40,8 @@ def pull(shape: Shape, bodies: Bodies, cords: Cords, hinged: Any, step: Step) ->
     """Add the forces of the strings.
 
     Args:
-        shape: what all smarticles have in common.
         bodies: the smarticles; `load` or `shares` is written.
         cords: the strings; `sums` and `knot` are written.
-        hinged: None while welded.
-        step: lengths of time around these forces.
 
     Returns:
         Power of the strings on the links [W].

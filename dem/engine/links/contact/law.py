@@ -37,7 +37,6 @@ def resist(
     it would exceed friction it is cut to it, and the tangential dashpot is silent: as YADE's `ViscElPhys` does.
 
     Args:
-        law: of the contact.
         load: of the normal spring here [N], not negative.
         share: of a whole contact's springs and dashpots that acts here [1].
         hardening: of the normal dashpot, see `barrier.stretch` [1].

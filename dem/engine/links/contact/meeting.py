@@ -65,7 +65,6 @@ def meet(p: Array, q: Array, diameter: float, stiffness: float, bend_p: bool, be
         p: (6,) start of the first link's axis and vector to its end [m].
         q: (6,) start and vector of the second one [m].
         diameter: of both, or the sum of two radii [m].
-        stiffness: kn [N/m].
         bend_p: whether the first link is a barb, which starts at a hinge.
         bend_q: whether the second one is.
         out: (ROWS, COLUMNS) written.
@@ -91,13 +90,11 @@ def meet_at(
     """Write what `meet` does of links that touch, whose nearest points are known; the number of bare forces.
 
     Args:
-        both: the links.
         s: of the nearest point of the first link.
         t: of the nearest point of the second one.
         gap: from the second nearest point to the first [m].
         distance: of the two [m].
         diameter: of both, or the sum of two radii [m].
-        stiffness: kn [N/m].
         bend_p: whether the first link is a barb.
         bend_q: whether the second one is.
         out: (ROWS, COLUMNS) written.
@@ -125,7 +122,6 @@ def meets_elsewhere(both: Lines, reach: float, bend_p: bool, bend_q: bool) -> in
     takes as long as all of this. The numbers are those of `_lie_along` and `_hinge`, bit for bit.
 
     Args:
-        both: the links.
         reach: square of the diameter [m²].
         bend_p: whether the first link is a barb.
         bend_q: whether the second one is.

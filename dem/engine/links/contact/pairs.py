@@ -54,9 +54,7 @@ def push(bodies: Bodies, i: int, kind: int, hinged: Any, place: Vector, force: V
 
     Args:
         bodies: the smarticles; `load`, or `shares` while articulated, is added to.
-        i: the smarticle.
         kind: the link.
-        hinged: None while welded.
         place: the point [m].
         force: on it [N].
     """
@@ -105,7 +103,6 @@ def motion_at(
     """Return the velocity of one body against another at a point [m/s], and the sum of their turns [rad/s].
 
     Args:
-        bodies: the smarticles.
         owners: the two smarticles.
         rows: of the two bodies in `Bodies.motion`.
         place: the point [m].
@@ -133,13 +130,9 @@ def _rub(
     """Let two links push each other apart at a point; the rate at which they close [m/s].
 
     Args:
-        law: of the contact.
         bodies: the smarticles; `load` or `shares` is written.
         owners: the two smarticles.
         kinds: their links.
-        hinged: None while welded.
-        ledger: of forces that dissipate; None where nothing asks.
-        step: lengths of time around these forces.
         place: the point [m].
         normal: from the second link to the first [1].
         depth: overlap [m].
@@ -173,13 +166,8 @@ def push_apart(
     """Add the forces of all pairs that touch.
 
     Args:
-        shape: what all smarticles have in common.
-        law: of their contacts.
         bodies: the smarticles; `load` or `shares`, and `deepest` are written.
         pairs: pairs that may touch; `slip` and `used` are brought up to date.
-        hinged: None while welded.
-        ledger: of forces that dissipate; None where nothing asks.
-        step: lengths of time around these forces.
         out: (ROWS, COLUMNS) scratch.
 
     Returns:

@@ -108,7 +108,6 @@ def query_all(system: System, found: Found) -> tuple[int, float]:
     """Query all contacts.
 
     Args:
-        system: the simulation, posed.
         found: written.
 
     Returns:
@@ -124,7 +123,6 @@ def find_extremes(system: System, velocities: Array, found: Found, extremes: Arr
     """Find the extremes of all smarticles in one call, which is what a watchdog needs as long as nothing is wrong.
 
     Args:
-        system: the simulation, posed.
         velocities: (N, 3, 3) of the links' centres [m/s].
         found: scratch, with zeros as depths.
         extremes: (7,) written: largest speed of a link [m/s]; height of the lowest and of the highest end of an axis
@@ -215,8 +213,6 @@ def forces_of_pairs(system: System, out: Array, slip: Array, rows: Array) -> int
     """Write the forces of smarticles on each other.
 
     Args:
-        system: the simulation, posed.
-        out: scratch of `meet`.
         slip: (4,) scratch.
         rows: (…, WIDTH) written.
 
@@ -260,8 +256,6 @@ def forces_of_boundaries(system: System, out: Array, contacts: Array, slip: Arra
     """Write the forces of boundaries on smarticles; see `forces_of_pairs`.
 
     Args:
-        system: the simulation, posed.
-        out: scratch of `meet`.
         contacts: scratch of `contacts_of_link`.
         slip: (4,) scratch.
         rows: (…, WIDTH) written.

@@ -129,9 +129,7 @@ def update(shape: Shape, bodies: Bodies, motors: Motoring) -> None:
     Where nobody has told what comes after the last row they go on by it.
 
     Args:
-        shape: what all smarticles have in common.
         bodies: the smarticles; `rate` is written.
-        motors: written.
     """
     now, interval = min(motors.due[0], motors.targets.shape[0] - 1), motors.interval
     motors.due[0], motors.due[1] = now + 1, motors.period
@@ -209,8 +207,6 @@ def free_torques(bodies: Bodies, motors: Motoring, i: int, r1: float, r2: float,
 
     Args:
         bodies: the smarticles; `rate` is that before the step.
-        motors: the motors.
-        i: the smarticle.
         r1: rate of angle 1 after the step without the motors [rad/s].
         r2: the same of angle 2.
         dt: time step [s].
@@ -246,10 +242,8 @@ def middle_of_step(
     """Let a smarticle turn and its angles change for a step, its momentum constant; the implicit midpoint rule.
 
     Args:
-        shape: what all smarticles have in common.
         bodies: the smarticles; `alpha` and `plane` are written, and `rate` of free angles.
         motors: `impulse`, or `momentum` of free angles, is written.
-        i: the smarticle.
         dt: time step [s].
         row: (PLANE,) scratch.
 

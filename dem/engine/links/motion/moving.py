@@ -27,11 +27,8 @@ def kick(shape: Shape, bodies: Bodies, motors: Any, gravity: float, planar: bool
     """Change momenta by the forces in `load` or `shares`, by weight and by motors.
 
     Args:
-        shape: what all smarticles have in common.
         bodies: the smarticles; `velocity`, `momentum` and, while articulated, `load` are written.
         motors: None while welded; `impulse`, and for free angles `momentum` and `work`, are written.
-        gravity: g, downwards [m/s²].
-        planar: whether all motion is confined to a horizontal plane.
         past: length of the last sub-step [s].
         dt: time over which they act [s], half of the last and half of the next sub-step.
     """
@@ -76,10 +73,8 @@ def resolve_speeds(shape: Shape, bodies: Bodies, hinged: bool, gravity: float, s
     """Ask for sub-steps where a link would move far in a step, and enter another one too deep at once.
 
     Args:
-        shape: what all smarticles have in common.
         bodies: the smarticles, with the loads of this instant.
         hinged: whether links have velocities of their own.
-        gravity: g, downwards [m/s²].
         step: `need` is written.
     """
     velocity, spin, load, limit = bodies.velocity, bodies.spin, bodies.load, LONGEST * shape.radius
@@ -119,9 +114,7 @@ def drift(shape: Shape, bodies: Bodies, motors: Any, dt: float, row: Array) -> N
     """Move and turn all smarticles by a step.
 
     Args:
-        shape: what all smarticles have in common.
         bodies: the smarticles; `position`, `turn` and, while articulated, `alpha` are written.
-        motors: None while welded.
         dt: time step [s].
         row: (PLANE,) scratch.
     """

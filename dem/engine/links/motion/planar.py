@@ -39,7 +39,6 @@ def lay_out(shape: Shape, alpha1: float, alpha2: float, row: Array) -> None:
     """Work out the plane geometry of one smarticle.
 
     Args:
-        shape: what all have in common.
         alpha1: angle of barb 1 [rad]; 0: straight, π/2: the U.
         alpha2: angle of barb 2 [rad].
         row: (PLANE,) written: centre of mass from the middle link's centre; then about the centre of mass the
@@ -103,7 +102,6 @@ def lay_out_near(shape: Shape, by1: float, by2: float, from_: Array, row: Array)
     """The same for angles that differ little from those of another row, without sines of the whole angles.
 
     Args:
-        shape: what all have in common.
         by1: by how much angle 1 is greater [rad].
         by2: by how much angle 2 is greater [rad].
         from_: (PLANE,) the other row.
@@ -179,7 +177,6 @@ def lagrange_force(
     """∂T/∂α_k at fixed ω and α̇ [N m]: centrifugal and Coriolis torque on a barb.
 
     Args:
-        shape: what all smarticles have in common.
         row: plane geometry, see `lay_out`.
         k: 0 for barb 1, 1 for barb 2.
         wx: ω in the middle link's axes [rad/s].

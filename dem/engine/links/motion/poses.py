@@ -111,7 +111,6 @@ def pose(shape: Shape, bodies: Bodies, hinged: Any) -> None:
     """Bring everything up to date that follows from the state of the smarticles.
 
     Args:
-        shape: what all smarticles have in common.
         bodies: the smarticles; `axes`, `spin`, `segments` and `motion` are written, and
             `rate` where angles are free.
         hinged: the motors; None while welded: then no barb moves by itself.
@@ -131,7 +130,6 @@ def find_links(bodies: Bodies, hinged: bool, places: Array, frames: Array, veloc
     """Write where all links are and how they move.
 
     Args:
-        bodies: the smarticles, posed.
         hinged: whether links have velocities of their own.
         places: (N, 3, 3) written: centres of the links [m].
         frames: (N, 3, 3, 3) written: along, across and normal to each link, in columns [1].

@@ -21,10 +21,6 @@ def update_lists(shape: Shape, bodies: Bodies, pairs: Pairs, cells: Cells, skins
     """Bring the lists up to date where links have moved too far; GOOD, or FULL where there is no room for all pairs.
 
     Args:
-        shape: what all smarticles have in common.
-        bodies: the smarticles, posed.
-        pairs: written.
-        cells: scratch.
         skins: (7,) of the tight and of the wide list: thinnest and thickest skin [m], time that skins are to be good
             for [s]; then the width of a strip of the search [m].
     """
@@ -66,10 +62,7 @@ def build(shape: Shape, bodies: Bodies, pairs: Pairs, cells: Cells, skins: Array
     """Make the wide list anew, and carry over what contacts remember.
 
     Args:
-        shape: what all smarticles have in common.
-        bodies: the smarticles.
         pairs: the list; all but the tight list is written.
-        cells: scratch.
         skins: see `update_lists`.
 
     Returns:

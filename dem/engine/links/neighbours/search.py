@@ -58,8 +58,6 @@ def search(shape: Shape, bodies: Bodies, pairs: Pairs, cells: Cells, bare: float
     """Write all pairs into the scratch list of `cells`, in rows by the first link.
 
     Args:
-        shape: what all smarticles have in common.
-        bodies: the smarticles.
         pairs: tells owners and kinds.
         cells: `marks` are filled; the rest is written.
         bare: reach of a pair without skins [m].

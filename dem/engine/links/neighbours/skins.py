@@ -20,7 +20,6 @@ def moved(bodies: Bodies, marks: Array, centres: Array) -> bool:
     """Return whether an end of a link has moved by more than the link's skin since `marks` were taken.
 
     Args:
-        bodies: the smarticles.
         marks: (N S, 7) starts and ends of all links then, and their skins [m].
         centres: (N, 3) centres of mass then [m]; their mean move does not count.
     """
@@ -47,8 +46,6 @@ def mark(shape: Shape, bodies: Bodies, marks: Array, centres: Array, least: floa
     """Write down where all links are, and give each a skin.
 
     Args:
-        shape: what all smarticles have in common.
-        bodies: the smarticles.
         marks: (N S, 7) written, see `moved`.
         centres: (N, 3) written.
         least: the thinnest skin [m].
