@@ -25,8 +25,7 @@ from postprocess.bodies.fields import IDENTITY, fields_of
 from postprocess.bodies.meshes import BOX_FACES, BOX_POINTS, Bodies, checked_kinds, owners, solid
 
 SUFFIXES = ("stl", "obj", "gltf", "glb")
-FORMATS = ("vtp", *SUFFIXES)
-"""What a run can be exported to."""
+FORMATS = ("vtp", *SUFFIXES)  #: What a run can be exported to
 
 SCRIPT = "show_in_paraview.py"  #: Name of the script beside the collections
 

@@ -14,8 +14,7 @@ from typing import Any, NoReturn, TypeVar
 from dem.engine import ENGINES
 from dem.errors import InputError, nearest
 
-Handler = Callable[[argparse.Namespace], int]
-"""Does the work of a subcommand; returns the exit status."""
+Handler = Callable[[argparse.Namespace], int]  #: Does the work of a subcommand; returns the exit status
 
 
 class Parser(argparse.ArgumentParser):

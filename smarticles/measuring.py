@@ -19,11 +19,9 @@ if TYPE_CHECKING:
     from postprocess.measures.table import Costly
     from templates.sweep.folder import Folder
 
-_WORTH_PROCESSES = 6
-"""Runs from which on starting processes saves time: each loads its libraries anew."""
+_WORTH_PROCESSES = 6  #: Runs from which on starting processes saves time: each loads its libraries anew
 
-PHASE = ("phase", "phase type")
-"""Columns that identify a phase of a run."""
+PHASE = ("phase", "phase type")  #: Columns that identify a phase of a run
 
 
 def has_frames(directory: Path) -> bool:

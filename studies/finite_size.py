@@ -41,8 +41,7 @@ DEFINITIONS = (DEFINITION, "top-percentile", "voxel")
 """Of φ: the paper's, one whose height no single smarticle decides, and one that leaves walls and top out."""
 
 MOVING = f"phi_f shaken {DEFINITION} [-]"
-WINDOW = 1.0
-"""Over how long φ is averaged at the end of the shake [s]: 30 periods."""
+WINDOW = 1.0  #: Over how long φ is averaged at the end of the shake [s]: 30 periods
 
 PHASES = ("deposit", "relax", "shake", "relax")
 PAPER_ASPECT, PAPER_COUNT = 0.7, 270

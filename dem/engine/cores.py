@@ -6,8 +6,7 @@ import os
 
 from dem.errors import InputError
 
-RANKS = "SMARTICLES_RANKS"
-"""Environment variable: ranks of LAMMPS, set by a command before an engine is built."""
+RANKS = "SMARTICLES_RANKS"  #: Environment variable: ranks of LAMMPS, set by a command before an engine is built
 
 
 def usable_cores() -> int:

@@ -213,12 +213,9 @@ class EnergyLedger(Protocol):
 class Engine(Protocol):
     """A running simulation; one per process, since an engine may be a process-wide singleton."""
 
-    particle: Particle
-    """One smarticle."""
-    cylinder: Cylinder
-    """The container as it was built."""
-    gravity: float
-    """g, downwards [m/s²]."""
+    particle: Particle  #: One smarticle
+    cylinder: Cylinder  #: The container as it was built
+    gravity: float  #: g, downwards [m/s²]
 
     @property
     def boundaries(self) -> Boundaries:

@@ -14,16 +14,12 @@ from dem.errors import InputError
 class EngineKind(Protocol):
     """One engine: what it is, what scenes cost on it, and how a simulation on it begins."""
 
-    name: str
-    """Its name in scenes."""
-    workers: str
-    """What a run on several cores has several of: threads, or ranks, which are processes."""
+    name: str  #: Its name in scenes
+    workers: str  #: What a run on several cores has several of: threads, or ranks, which are processes
     damps_once_per_update: bool
     """Whether a servo's damper acts on the rates of the last control update, so that one is needed every step."""
-    idle_knobs: tuple[str, ...]
-    """Knobs of the fidelity that have no meaning on it."""
-    adds: Mapping[EffectName, Adds]
-    """What an effect adds to its work; effects without an entry add nothing."""
+    idle_knobs: tuple[str, ...]  #: Knobs of the fidelity that have no meaning on it
+    adds: Mapping[EffectName, Adds]  #: What an effect adds to its work; effects without an entry add nothing
 
     @property
     def order(self) -> tuple[str, ...]:

@@ -52,16 +52,13 @@ class Stage:
 class Phase:
     """One entry of a scene's list; kinds of phases override what differs from these defaults."""
 
-    actuates: ClassVar[bool] = False
-    """Whether motors move the barbs in it, or hold them."""
+    actuates: ClassVar[bool] = False  #: Whether motors move the barbs in it, or hold them
     begins: ClassVar[bool] = False
     """Whether it brings the smarticles: a run begins with one such phase and has no other."""
     sources: ClassVar[frozenset[str]] = frozenset()
     """Keys that name the source of content which another key pins; a scene's hash omits them."""
-    pours: ClassVar[bool] = False
-    """Whether the pile grows from nothing in it."""
-    frees: ClassVar[bool] = False
-    """Whether it takes the container away."""
+    pours: ClassVar[bool] = False  #: Whether the pile grows from nothing in it
+    frees: ClassVar[bool] = False  #: Whether it takes the container away
     planar: ClassVar[bool | None] = False
     """Whether it has a meaning in a plane only (True), outside of one only (False), or in either (None)."""
 

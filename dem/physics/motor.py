@@ -76,19 +76,16 @@ class Motors:
         factor = 1.0 if strengths is None else strengths
         self._stiffness = law.stiffness * factor
         self._limit = law.torque_limit * factor
-        self.work: Array = np.zeros_like(angles)
-        """(N, 2) work done on the links since the start, ∫ τ dα [J]."""
+        self.work: Array = np.zeros_like(angles)  #: (N, 2) work done on the links since the start, ∫ τ dα [J]
         self._over = np.zeros(len(angles), dtype=np.int64)
         self.engage(angles)
 
     def engage(self, angles: Array) -> None:
         """Take hold of barbs at (N, 2) angles [rad], without torque."""
-        self.commands: Array = angles.copy()
-        """(N, 2) angles that the motors hold at present [rad]."""
+        self.commands: Array = angles.copy()  #: (N, 2) angles that the motors hold at present [rad]
         self.schedule: Array = angles.copy()
         """(N, 2) angles of the schedule at the last control update [rad]; a motor that halts falls behind."""
-        self.angles: Array = angles.copy()
-        """(N, 2) actual angles at the last control update [rad]."""
+        self.angles: Array = angles.copy()  #: (N, 2) actual angles at the last control update [rad]
         self.torques: Array = np.zeros_like(angles)
         """(N, 2) torques on the barbs since the last control update [N m]; positive ones raise the angle."""
         self.halted: Flags = np.zeros(angles.shape, dtype=bool)

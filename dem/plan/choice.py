@@ -27,8 +27,7 @@ SHIPPED = Path(__file__).with_name("work_precision.csv")
 QUANTITIES = {"phi_0": "φ_0", "phi_f": "φ_f", "crossings": "⟨N⟩"}
 """What a limit of the error can be of: names of columns and of `--of`, and symbols."""
 
-PACKING = ("phi_0", "phi_f")
-"""Default of `--of`."""
+PACKING = ("phi_0", "phi_f")  #: Default of `--of`
 
 _HOW = "make one: smarticles accuracy SCENE.yaml --out DIR, then --table DIR/results/work_precision.csv"
 _FINEST = (list(FIDELITIES)[-1], "converged")

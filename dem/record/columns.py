@@ -16,8 +16,7 @@ class Column(NamedTuple):
     description: str
 
 
-Columns = Mapping[str, Column]
-"""Datasets by name, in the order of the file."""
+Columns = Mapping[str, Column]  #: Datasets by name, in the order of the file
 
 
 def _columns(*, whole_names: bool = False, **described: str | tuple[str, str]) -> Columns:

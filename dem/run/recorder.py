@@ -40,12 +40,9 @@ class Recorder:
     forces: FrameWriter | None = None  #: Writes the forces at contacts, with each frame
     spheres: FrameWriter | None = None
     sphere_every: int = 1  #: Samples between these
-    samples: int = 0
-    """Number of samples so far."""
-    residual: str | None = None
-    """Warning about the energy ledger, if the run ended now."""
-    next_step: int = 0
-    """Step of the next sample."""
+    samples: int = 0  #: Number of samples so far
+    residual: str | None = None  #: Warning about the energy ledger, if the run ended now
+    next_step: int = 0  #: Step of the next sample
 
     def record(self, engine: Engine, phase: int) -> None:
         """Record what is due at this step.

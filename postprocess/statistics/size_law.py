@@ -24,8 +24,7 @@ from scipy.special import chdtrc, chdtri, fdtrc, fdtri, stdtrit
 from postprocess.statistics.seeds import CONFIDENCE, Floats, Slope
 
 POWER = 1 / 3
-POWERS = np.arange(0.02, 1.501, 0.01)
-"""Powers that are tried; an interval that ends there may be longer."""
+POWERS = np.arange(0.02, 1.501, 0.01)  #: Powers that are tried; an interval that ends there may be longer
 
 _FALLS = np.arange(0.0, 2.01, 0.02)
 

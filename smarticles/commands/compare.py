@@ -21,8 +21,7 @@ if TYPE_CHECKING:
     from dem.record.run import Run
     from templates.sweep.folder import Folder
 
-Differences = dict[str, tuple[Any, Any]]
-"""Values of A and B by key; None where one of them has no such key."""
+Differences = dict[str, tuple[Any, Any]]  #: Values of A and B by key; None where one of them has no such key
 
 _NUMBERS = ("A", "B", "B - A", "SE of B - A")
 

@@ -19,8 +19,7 @@ if TYPE_CHECKING:
 _RUNS = "runs [-]"
 _COMPARED = "second-highest-com"
 _WIDTH = 100  # characters of a terminal
-_Column = tuple[str, str, str, float]
-"""Heading, column of the table, format, factor to the unit of the heading."""
+_Column = tuple[str, str, str, float]  #: Heading, column of the table, format, factor to the unit of the heading
 _ALWAYS = (("phase", "phase type", "", 1.0), ("t [s]", "time [s]", ".2f", 1.0))
 # Of single frames only: their means over the last ones have no meaning.
 _PER_FRAME = (

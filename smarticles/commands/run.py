@@ -18,8 +18,7 @@ if TYPE_CHECKING:
 
     from dem.scene.scene import Scene
 
-TO_BE_CONTINUED = 75
-"""Exit status of a run that SIGUSR1 stopped at a checkpoint; EX_TEMPFAIL of sysexits.h."""
+TO_BE_CONTINUED = 75  #: Exit status of a run that SIGUSR1 stopped at a checkpoint; EX_TEMPFAIL of sysexits.h
 
 
 def add(commands: Commands) -> None:

@@ -15,11 +15,9 @@ from markupsafe import Markup
 
 from dem.errors import InputError
 
-MOST_ROWS = 200
-"""Of a table on a page."""
+MOST_ROWS = 200  #: Of a table on a page
 
-Section = tuple[str, Sequence[Markup]]
-"""Title and blocks; a section without blocks is left out."""
+Section = tuple[str, Sequence[Markup]]  #: Title and blocks; a section without blocks is left out
 
 _MIMES = {".png": "image/png", ".svg": "image/svg+xml", ".webp": "image/webp"}
 _NUMBER = re.compile(r"[+−-]?[\d.]+(e[+-]?\d+)?( ± [\d.e+-]+)?( %)?|[-–]?")

@@ -39,8 +39,7 @@ if TYPE_CHECKING:
 
     from dem.scene.scene import Scene
 
-PROVENANCE = "provenance.json"
-"""The file by which results of a study are known."""
+PROVENANCE = "provenance.json"  #: The file by which results of a study are known
 
 # Verdicts, and comparisons with published data; other tables are folded.
 _JUDGED = {"findings": "The paper's findings, one by one", "verdicts": "What was asked, and the answers"}

@@ -21,8 +21,7 @@ from studies.framework.provenance import Reference
 from studies.framework.runs import DEFINITION, duration, last_columns, run_columns
 
 SHAKEN = "time shaken [s]"
-SHAKE_TIME = 20.0
-"""How long Gravish et al. shook [s]."""
+SHAKE_TIME = 20.0  #: How long Gravish et al. shook [s]
 
 DIGITISING_ERROR = 0.003  #: Taken as the error of each of Gravish's points [-]
 

@@ -14,8 +14,7 @@ from dem.scene.scene import Scene
 from templates.sweep.render import Value, evaluate, render_text, render_yaml
 from templates.sweep.sweep_file import SEED, Sweep, matching
 
-MAX_POINTS = 10_000
-"""Runs of one sweep, unless the user asks for more: a slip in a grid makes millions."""
+MAX_POINTS = 10_000  #: Runs of one sweep, unless the user asks for more: a slip in a grid makes millions
 
 # A directory name everywhere, which needs no quoting in a shell and does not look like an option.
 _RUN_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._+=-]{0,99}\Z")

@@ -19,8 +19,7 @@ from jinja2.sandbox import ImmutableSandboxedEnvironment
 from dem.errors import InputError, nearest
 from dem.scene.yaml_text import StrictLoader, parse_yaml
 
-Value = Any
-"""Value of a variable: None, bool, int, float, str, and lists and mappings of these."""
+Value = Any  #: Value of a variable: None, bool, int, float, str, and lists and mappings of these
 
 
 def _environment(finalize: Callable[..., Any] | None = None) -> ImmutableSandboxedEnvironment:

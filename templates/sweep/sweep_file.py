@@ -253,8 +253,7 @@ def with_constants(sweep: Sweep, constants: Mapping[str, Value]) -> Sweep:
     return replace(sweep, content=content)
 
 
-ENGINE = "engine"
-"""The constant of a sweep that names the engine of its scenes."""
+ENGINE = "engine"  #: The constant of a sweep that names the engine of its scenes
 
 
 def on_engine(sweep: Sweep, engine: str) -> Sweep:

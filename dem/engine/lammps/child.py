@@ -74,8 +74,7 @@ class Child:
 
     def __init__(self, ranks: int) -> None:
         self.ranks = ranks
-        self.scratch = Path(tempfile.mkdtemp(prefix="smarticles-lammps-"))
-        """Folder of files that it reads and writes."""
+        self.scratch = Path(tempfile.mkdtemp(prefix="smarticles-lammps-"))  #: Folder of files that it reads and writes
         fifo = self.scratch / ANSWERS
         os.mkfifo(fifo)
         # Opened for writing too, so that there is never an end of it.

@@ -118,8 +118,7 @@ class LammpsEngine:
         self.gravity = gravity
         self.time, self.steps, self.time_step = 0.0, 0, time_step
         self._law = law
-        self.child = Child(ranks)
-        """LAMMPS."""
+        self.child = Child(ranks)  #: LAMMPS
         self._cpu_before = 0.0  # of LAMMPS before it was restarted [s]
         self._moving = Moving.none()
         # Body frame in LAMMPS's own principal frame of each smarticle, known from the first dump on.

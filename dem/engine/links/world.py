@@ -90,10 +90,8 @@ class World:
     time_step: float = math.nan
     motors: Motoring | None = None
     articulated: bool = False
-    begin: float = 0.0
-    """When steps of the present length began [s]."""
-    made: int = 0
-    """Steps of the present length so far."""
+    begin: float = 0.0  #: When steps of the present length began [s]
+    made: int = 0  #: Steps of the present length so far
     totals: Array = field(default_factory=lambda: np.array([0.0, 0.0, math.nan, 1.0, 1.0, 0.0]))
     hooks: Hooks | None = None
     rims: Rims | None = None

@@ -39,14 +39,12 @@ class Assembly:
         self._hinge_law = hinge_law
         self._planar = planar
         self._strengths = strengths
-        self.hinges: Hinges | None = None
-        """The hinges; None while welded."""
+        self.hinges: Hinges | None = None  #: The hinges; None while welded
         self._spheres: list[list[int]] = []
         self._ids: list[int] = []
         self._to_body: list[Any] = []
         self._states: list[Any] = []
-        self.smarticle_of: dict[int, int] = {}
-        """Smarticle by id of sphere."""
+        self.smarticle_of: dict[int, int] = {}  #: Smarticle by id of sphere
         # Link poses in the frames of welded bodies; of no meaning while articulated.
         self._arms: Array = np.empty((0, LINKS, 3))
         self._turns: Array = np.empty((0, LINKS, 3, 3))

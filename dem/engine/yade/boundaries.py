@@ -38,8 +38,7 @@ class YadeBoundaries:
         self._upper_start = hooks[1].height if hooks else 0.0
         self.felt = tuple((wall,) for wall in self.container[:-1]) if self._planar else self.hooks
         """Ids of bodies whose forces are summed step by step, together for each hook or wall of a channel."""
-        self.moving: list[int] = []
-        """Ids of the bodies that move at present, all at one velocity."""
+        self.moving: list[int] = []  #: Ids of the bodies that move at present, all at one velocity
         self._sums = [yade.vector(0, 0, 0) for _ in self.felt]
         self.book_removal: Callable[[Callable[[], None]], None] = lambda remove: remove()
         """Called with a function that takes contacts away; the energy ledger replaces it."""
