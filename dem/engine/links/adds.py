@@ -8,7 +8,7 @@ from dem.engine.effect import Adds, EffectName
 
 ADDS: Mapping[EffectName, Adds] = {
     EffectName.CONTACT: Adds(
-        engines=("pose", "look_for_neighbours", "push_apart", "kick", "drift"), shapes=("swept segments",)
+        engines=("pose", "update_lists", "push_apart", "kick", "drift"), shapes=("swept segments",)
     ),
     EffectName.CONTAINER: Adds(engines=("push_boundaries",), shapes=("floor", "round wall")),
     EffectName.PLANE: Adds(engines=("push_boundaries",), python="two walls instead of the container"),
@@ -24,7 +24,7 @@ ADDS: Mapping[EffectName, Adds] = {
 
 ORDER = (
     "pose",
-    "look_for_neighbours",
+    "update_lists",
     "push_apart",
     "push_boundaries",
     "pull",
