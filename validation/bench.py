@@ -125,12 +125,13 @@ def drive(
     targets: Targets,
     *,
     each: Callable[[], None] | None = None,
+    interval: float | None = None,
 ) -> Iterator[float]:
     """Let the motors follow `targets(t)` [rad] from now on; yield the time since then after each control period.
 
-    `each` is called after each step.
+    `each` is called after each step; `interval` is the control period [s] where it is not the scene's.
     """
-    interval = scene.fidelity.control_interval_s
+    interval = interval or scene.fidelity.control_interval_s
     steps = round(interval / engine.time_step)
     for update in range(1, round(duration / interval) + 1):
         engine.motors.actuate(np.array(targets(update * interval), dtype=float).reshape(1, -1, 2), interval)

@@ -59,7 +59,9 @@ class Plan:
     strands: int = 0  #: Of a link, where the engine takes links as they are; 0 where it fills them with spheres
     correction: float = 1.0  #: Factor that wall times have been corrected by
     protocol: tuple[str, ...] = ()  #: Lines of what the scene has by its protocol
-    overlaps: Mapping[str, float] = field(default_factory=dict)  #: Expected overlaps by cause, in diameters [1]
+    overlaps: Mapping[str, float] = field(
+        default_factory=dict
+    )  #: Expected overlaps by cause, over a link's mean width [1]
 
     def corrected(self, factor: float) -> Self:
         """Return this plan with wall times `factor` times as long [1]."""
@@ -77,7 +79,7 @@ class Plan:
             *self.protocol,
             self._steps_to_text(),
             "contacts give way by about "
-            + ", ".join(f"{overlap:.2g} d in {cause}" for cause, overlap in self.overlaps.items()),
+            + ", ".join(f"{overlap:.2g} of a link's thickness in {cause}" for cause, overlap in self.overlaps.items()),
             "",
             f"{'phase':<24}{'simulated':>12}{'expected wall time':>22}",
         ]
@@ -167,7 +169,7 @@ def plan(scene: Scene) -> Plan:
         stiffness_N_per_m=scene.fidelity.stiffness_N_per_m,
         strands=scene.fidelity.rows if scene.smooth else 0,
         protocol=protocol_lines(scene),
-        overlaps={overlap.cause: overlap.diameters for overlap in expected_overlaps(scene)},
+        overlaps={overlap.cause: overlap.widths for overlap in expected_overlaps(scene)},
     )
 
 

@@ -11,31 +11,33 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
+from dem.body.particle import mean_width
 from dem.phases.phase import SceneView
 from dem.phases.pull_hook import PullHook
 from dem.phases.shake import Shake
 from dem.physics.contact import typical_effective_mass
 
-WANTED, LIMIT = 0.3, 0.5  # diameters that contacts may give way by, and from which on they are too soft
+WANTED, LIMIT = 0.3, 0.5  # mean widths that contacts may give way by, and from which on they are too soft
 
 
 class Overlap(NamedTuple):
     """An expected overlap."""
 
     cause: str  #: In words
-    diameters: float  #: Overlap over the diameter of a link's section [1]
+    widths: float  #: Overlap over the mean width of a link's section, 2 (t1 + t2)/π [1]
     stiffness: float  #: kn at which it is `WANTED` [N/m]
 
 
 def expected_overlaps(scene: SceneView) -> tuple[Overlap, ...]:
     """Return the expected overlaps of a scene: impact, weight, and a hook's pull where there is one."""
     gravity, width, mass = scene.gravity_m_per_s2, scene.smarticle.middle_length_m, scene.smarticle.boxes.mass
-    stiffness, diameter = scene.fidelity.stiffness_N_per_m, scene.sphere_diameter
+    stiffness, smarticle = scene.fidelity.stiffness_N_per_m, scene.smarticle
+    thickness = mean_width(smarticle.thickness_normal_m, smarticle.thickness_in_plane_m)
     speeds = [phase.peak_speed(gravity) for phase in scene.phases]
     if scene.actuates:
         speeds.append(scene.motor.speed_limit_rad_per_s * scene.smarticle.boxes.barb_length)
     speed = math.sqrt(max(speeds) ** 2 + 2 * gravity * width)
-    impact = speed * math.sqrt(typical_effective_mass(scene.particle) / stiffness) / diameter
+    impact = speed * math.sqrt(typical_effective_mass(scene.particle) / stiffness) / thickness
     shaken = max((phase.peak_acceleration_g for phase in scene.phases if isinstance(phase, Shake)), default=0.0)
     pile = scene.count * mass * gravity
     lying = max(1.0, min(scene.count, math.pi * scene.cylinder.radius**2 / width**2))
@@ -43,7 +45,7 @@ def expected_overlaps(scene: SceneView) -> tuple[Overlap, ...]:
     if any(isinstance(phase, PullHook) for phase in scene.phases):
         loads["a hook that lifts the pile"] = pile / 4
     found = [Overlap(f"an impact at {speed:.2g} m/s", impact, (impact / WANTED) ** 2 * stiffness)]
-    found += [Overlap(name, load / stiffness / diameter, load / diameter / WANTED) for name, load in loads.items()]
+    found += [Overlap(name, load / stiffness / thickness, load / thickness / WANTED) for name, load in loads.items()]
     return tuple(found)
 
 
@@ -58,10 +60,10 @@ def stiffness_for(scene: SceneView) -> float:
 
 def too_soft(scene: SceneView) -> str | None:
     """Return why contacts are too soft, in one line: they give way by more than `LIMIT`; None where they do not."""
-    worst = max(expected_overlaps(scene), key=lambda overlap: overlap.diameters)
-    if worst.diameters <= LIMIT:
+    worst = max(expected_overlaps(scene), key=lambda overlap: overlap.widths)
+    if worst.widths <= LIMIT:
         return None
     return (
         f"fidelity.stiffness_N_per_m: at {scene.fidelity.stiffness_N_per_m:g} N/m {worst.cause} presses contacts in "
-        f"by about {worst.diameters:.2g} of their thickness; use about {stiffness_for(scene):.2g} N/m"
+        f"by about {worst.widths:.2g} of their thickness; use about {stiffness_for(scene):.2g} N/m"
     )

@@ -35,6 +35,8 @@ for its fields. A run that goes on is followed. Ends with its window, or by Ctrl
 
 def view_run(arguments: argparse.Namespace) -> int:
     """Serve the page until its window closes."""
+    import trame  # noqa: F401, PLC0415  (first, since its extra brings PyVista along)
+
     from postprocess.view import view_run as serve  # noqa: PLC0415  (imports PyVista and the server)
 
     def opened(address: str) -> None:

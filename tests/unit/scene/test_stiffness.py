@@ -22,7 +22,7 @@ def links(**changes: Any) -> Scene:
 
 
 def deepest(scene: Scene) -> float:
-    return max(overlap.diameters for overlap in expected_overlaps(scene))
+    return max(overlap.widths for overlap in expected_overlaps(scene))
 
 
 def test_ordinary_scenes_keep_the_stiffness_of_their_name() -> None:
@@ -54,8 +54,8 @@ def test_a_given_stiffness_is_kept_or_rejected_with_the_number_that_is_needed() 
 def test_overlaps_fall_with_the_root_of_the_stiffness_in_impacts_and_with_itself_under_weight() -> None:
     soft, stiff = (links(fidelity={"base": "draft", "stiffness_N_per_m": kn}) for kn in (250.0, 1000.0))
     (impact, weight), (less, lighter) = (expected_overlaps(scene) for scene in (soft, stiff))
-    assert impact.diameters == pytest.approx(2 * less.diameters)
-    assert weight.diameters == pytest.approx(4 * lighter.diameters)
+    assert impact.widths == pytest.approx(2 * less.widths)
+    assert weight.widths == pytest.approx(4 * lighter.widths)
     assert less.stiffness == pytest.approx(impact.stiffness)
     assert math.isclose(stiffness_for(soft), stiffness_for(stiff))
 
