@@ -61,7 +61,7 @@ class Plan:
     protocol: tuple[str, ...] = ()  #: Lines of what the scene has by its protocol
     overlaps: Mapping[str, float] = field(
         default_factory=dict
-    )  #: Expected overlaps by cause, over a link's mean width [1]
+    )
 
     def corrected(self, factor: float) -> Self:
         """Return this plan with wall times `factor` times as long [1]."""
