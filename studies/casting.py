@@ -1,7 +1,8 @@
 """Smarticles of l/w = 0.8 are poured into a mould of three tiers, each narrower than the one below, and activated.
 
-The walls go at once: how well each tier is filled before, and what is kept 1 s later, against Savoie, Tuazon, Bhamla
-and Goldman, "Amorphous Entangled Active Matter", Soft Matter 2023, section "Casting". Runs of one seed are compared.
+All walls are removed at once: how well each tier is filled before, and what is kept 1 s later, against Savoie,
+Tuazon, Bhamla and Goldman, "Amorphous Entangled Active Matter", Soft Matter 2023, section "Casting". Procedures are
+compared between runs of one seed.
 """
 
 from __future__ import annotations

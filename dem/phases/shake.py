@@ -53,7 +53,7 @@ class Shake(Part, Phase):
         }
 
     def check(self, scene: SceneView, index: int) -> Iterator[str]:
-        # A floor that moves alone stays within its wall.
+        # The floor must not drop below the wall's lower edge.
         amplitude, below = self.amplitude(scene.gravity_m_per_s2), -scene.cylinder.bottom
         if self.moves == "floor" and amplitude > below:
             yield (

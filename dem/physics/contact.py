@@ -1,4 +1,4 @@
-"""Laws of contact and of strings: spring, dashpot and Coulomb friction, and the dashpot of a restitution."""
+"""Laws of contact and of strings: spring, dashpot and Coulomb friction, and the damping that gives a restitution."""
 
 from __future__ import annotations
 

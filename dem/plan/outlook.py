@@ -59,9 +59,7 @@ class Plan:
     strands: int = 0  #: Of a link, where the engine takes links as they are; 0 where it fills them with spheres
     correction: float = 1.0  #: Factor that wall times have been corrected by
     protocol: tuple[str, ...] = ()  #: Lines of what the scene has by its protocol
-    overlaps: Mapping[str, float] = field(
-        default_factory=dict
-    )
+    overlaps: Mapping[str, float] = field(default_factory=dict)
 
     def corrected(self, factor: float) -> Self:
         """Return this plan with wall times `factor` times as long [1]."""

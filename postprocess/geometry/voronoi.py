@@ -22,7 +22,7 @@ from postprocess.geometry.links import (
 )
 from postprocess.geometry.voxel import Region
 
-TOGETHER = 60_000  #: Most points whose cells are found at once: they take 15 kB each while they are
+TOGETHER = 60_000  #: Most points per call of Qhull; each takes about 15 kB of memory during it
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

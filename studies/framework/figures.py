@@ -152,7 +152,7 @@ class Means:
             draw_means(axes, *self.reference[column], None, look=look, label="experiment")
         positive = True
         for number, engine in enumerate(engines_of(table) or ("",)):
-            label = f"{ENGINE_NAMES.get(engine, engine)}: green"
+            label = f"simulation on {ENGINE_NAMES.get(engine, engine)}"
             for series in self.split(of_engine(table, engine) if engine else table):
                 rows = series.rows[series.rows[column].notna()]
                 x, look = self.transform(series.rows[self.x]) + series.shift * (1 + 2 * number), dict(series.look)
@@ -169,7 +169,8 @@ class Means:
                     least = scale * series.rows[self.bounds[column]].where(series.rows[column].isna())
                     draw_bounds(axes, x, least, 0.05 * least.abs() + 0.2, look={**look, "markerfacecolor": "white"})
         place = axes.get_subplotspec()
-        if not self.share_y or place is None or place.is_first_col():
+        # Panels of one quantity share the label of their row; those of several quantities have their own.
+        if not (self.share_y and self.panels) or place is None or place.is_first_col():
             axes.set_ylabel(quantity.axis or column)
         axes.set_xlabel(self.x_label)
         if self.ticks:

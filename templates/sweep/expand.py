@@ -95,7 +95,7 @@ def _rows(columns: Mapping[str, Sequence[Value]]) -> list[dict[str, Value]]:
 
 
 def _repeated(sweep: Sweep, points: Sequence[dict[str, Value]]) -> Iterator[dict[str, Value]]:
-    """Yield the values of all variables with each seed."""
+    """Yield each point once per seed."""
     repeats = sweep.content.repeats
     if repeats is None:
         yield from points

@@ -305,7 +305,7 @@ class LammpsEngine:
         return self.contacts.overlaps(limit, self._law)
 
     def extremes(self, state: State) -> None:
-        """Return None: LAMMPS has no shorter way."""
+        """Return None: Return None: LAMMPS has no shorter way, so that each smarticle is checked."""
 
     def contact_forces(self) -> NoReturn:
         absent("forces at contacts")

@@ -76,7 +76,7 @@ def settle(shape: Shape, bodies: Bodies, motors: Any, ledger: Array, dt: float) 
 def act(
     system: System, scratch: Scratch, totals: Array, tick: int, dt: float, motors: Any, cords: Any, ledger: Any
 ) -> int:
-    """Make one sub-step, from the forces of this instant, which decide how far they carry.
+    """Make one sub-step, whose length follows from the forces at its beginning.
 
     Args:
         system: the simulation, posed, with lists up to date.

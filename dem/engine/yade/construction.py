@@ -14,7 +14,7 @@ from dem.physics.contact import ContactLaw
 SMARTICLE_MATERIAL, WALL_MATERIAL = "smarticle", "wall"
 
 ORDER = ("ForceResetter", "InsertionSortCollider", "InteractionLoop", "HarmonicMotionEngine", "NewtonIntegrator")
-"""Engines of a step: contacts give forces, the container gets its velocity, then everything moves."""
+"""Order of YADE's engines in a step: contacts give forces, the container gets its velocity, then all moves."""
 
 # Gravity, friction and restitution are numbers of the integrator and of the one contact law that YADE has for springs
 # with dashpots, zero where a scene sets them to zero. The torque cap is a comparison in each control update; the law

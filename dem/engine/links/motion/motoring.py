@@ -78,7 +78,7 @@ def release(shape: Shape, bodies: Bodies, motors: Motoring) -> float:
 
 @kernel
 def note(shape: Shape, bodies: Bodies, motors: Motoring) -> None:
-    """Count torque and work since the last look, which ends here; `motors` is written, and poses are brought up."""
+    """Count torque and work since the last control update; `motors` is written, poses are brought up to date."""
     _note(bodies, motors)
 
 

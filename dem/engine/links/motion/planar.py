@@ -50,7 +50,7 @@ def lay_out(shape: Shape, alpha1: float, alpha2: float, row: Array) -> None:
 
 @inlined
 def lay_out_at(shape: Shape, alpha1: float, alpha2: float, row: Array) -> None:
-    """The same, for other kernels."""
+    """Work out the plane geometry; `lay_out` for other kernels."""
     c1, s1 = direction(alpha1)
     c2, s2 = direction(alpha2)
     lay_out_directions(shape, c1, s1, c2, s2, row)
