@@ -236,7 +236,7 @@ def forces_of_pairs(system: System, out: Array, slip: Array, rows: Array) -> int
                 continue
             place, normal, force = vector(row, PLACE), vector(row, NORMAL), (0.0, 0.0, 0.0)
             if carried > 0.0:
-                moves = (first, second) if bodies.motion.shape[0] > bodies.position.shape[0] else (i, j)
+                moves = (first, second) if system.motors is not None else (i, j)
                 velocity, _ = motion_at(bodies, (i, j), moves, place, normal)
                 _copy(slip, pairs.slip[k, slot])
                 share = share if carried == load else share * carried / load
@@ -264,7 +264,7 @@ def forces_of_boundaries(system: System, out: Array, contacts: Array, slip: Arra
     segments, links, count = bodies.segments, shape.kinds.shape[0], 0
     for p in range(segments.shape[0]):
         i, kind = p // (links * shape.offsets.shape[0]), shape.kinds[p % links]
-        moves = 3 * i + kind if bodies.motion.shape[0] > bodies.position.shape[0] else i
+        moves = 3 * i + kind if system.motors is not None else i
         number = contacts_with_boundaries(
             shape, segments, boundaries.ground, boundaries.channel, boundaries.hooks, boundaries.rims, p, contacts, out
         )
