@@ -84,7 +84,7 @@ def render_run(
     indices = [[len(shot.frames) - 1 if time is None else shot.frames.nearest(time)] for shot in shots]
     look = Look.of([shot.run for shot in shots], color_by=color_by, size=size, view=view)
     # Before an hour of drawing, not after it; and after all that is wrong with what was asked for.
-    figures.refuse_to_overwrite(output, overwrite=overwrite)
+    figures.reject_existing(output, overwrite=overwrite)
     if smarticle is not None:
         if compare or color_by is not None or view is not None or forces:
             msg = f"smarticle {smarticle}: is drawn alone, in colours and from a side of its own; leave out the others"
@@ -147,7 +147,7 @@ def render_film(
         common_times(shots), start=start, end=end, every=every, rate=frames_per_second, most=most_frames
     )
     indices = [moments.indices(shot.frames.times) for shot in shots]
-    figures.refuse_to_overwrite(output, overwrite=overwrite)
+    figures.reject_existing(output, overwrite=overwrite)
     images, count = pictures(shots, indices, look, limits, quick=True, pace=moments.pace), len(moments.times)
     with figures.whole_file(output, overwrite=overwrite) as temporary:
         film.write_film(temporary, track(images, count) if track else images, count=count, rate=moments.rate)

@@ -160,7 +160,7 @@ def whole_file(path: Path, *, overwrite: bool = True) -> Iterator[Path]:
         InputError: The file exists and must not be replaced, or its folder does not exist.
         RunError: The disk is full, or the folder cannot be written.
     """
-    refuse_to_overwrite(path, overwrite=overwrite)
+    reject_existing(path, overwrite=overwrite)
     if not path.parent.is_dir():
         raise InputError(f"{path}: the folder {path.parent} does not exist: create it or choose another output")
     try:
@@ -171,11 +171,11 @@ def whole_file(path: Path, *, overwrite: bool = True) -> Iterator[Path]:
         raise RunError(msg) from error
 
 
-def refuse_to_overwrite(path: Path, *, overwrite: bool) -> None:
-    """Reject early an output that exists.
+def reject_existing(path: Path, *, overwrite: bool) -> None:
+    """Reject an output file that exists already.
 
     Raises:
-        InputError: The file exists and `overwrite` is false.
+        InputError: the file exists and `overwrite` is false.
     """
     if path.exists() and not overwrite:
         msg = f"{path}: exists already and is left as it is; choose another name, or let it be replaced (--overwrite)"

@@ -79,8 +79,11 @@ def seeds_of(group: pd.DataFrame) -> dict[str, object]:
     return {SEEDS: len(group), "seeds": " ".join(map(str, sorted(group[SEED])))}
 
 
-def told_number(value: float, form: str, error: float = math.nan) -> str:
-    """Write `0.123 ± 0.004`: a number with its error, as far as there are any; the error never has a sign."""
+def format_with_error(value: float, form: str, error: float = math.nan) -> str:
+    """Return `0.123 ± 0.004`: a value with its error, both in the format `form`.
+
+    The error has no sign. A value that is NaN gives `-`, an error that is not finite is left out.
+    """
     if math.isnan(value):
         return "-"
     return f"{value:{form}}" + (f" ± {error:{form.removeprefix('+')}}" if math.isfinite(error) else "")

@@ -123,12 +123,19 @@ def _reject_twins(sweep: Sweep, points: list[Point]) -> None:
     names: dict[str, Point] = {}
     scenes: dict[str, Point] = {}
     for point in points:
+        # Some file systems take names that differ in case only for one.
         twin = names.setdefault(point.name.casefold(), point)
         if twin is not point:
-            raise InputError(
-                f"{sweep.path}: run_name: two runs are called {point.name!r}: "
-                f"{difference(twin.values, point.values)}; put what differs into run_name"
-            )
+            differing = difference(twin.values, point.values)
+            if not differing:
+                raise InputError(
+                    f"{sweep.path}: points: {point.name} is given twice with equal values; remove one of the two"
+                )
+            if twin.name == point.name:
+                problem = f"two runs are called {point.name!r}"
+            else:
+                problem = f"the names {twin.name!r} and {point.name!r} differ in upper and lower case only"
+            raise InputError(f"{sweep.path}: run_name: {problem}: {differing}; put what differs into run_name")
         twin = scenes.setdefault(point.scene_sha256, point)
         if twin is not point:
             raise InputError(
@@ -138,6 +145,6 @@ def _reject_twins(sweep: Sweep, points: list[Point]) -> None:
 
 
 def difference(one: Mapping[str, Value], other: Mapping[str, Value]) -> str:
-    """Return the variables in which two points differ, as `friction 0.2 and 0.4, seed 1 and 2`."""
-    parts = [f"{name} {one[name]} and {other[name]}" for name in one if one[name] != other[name]]
-    return ", ".join(parts) or "they differ in nothing"
+    """Return the variables in which two points differ, as `friction 0.2 and 0.4, seed 1 and 2`; "" where equal."""
+    texts = [(name, str(one.get(name, "absent")), str(other.get(name, "absent"))) for name in {**one, **other}]
+    return ", ".join(f"{name} {first} and {second}" for name, first, second in texts if first != second)

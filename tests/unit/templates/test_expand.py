@@ -237,7 +237,13 @@ def test_bad_sweep_files_are_input_errors(text: str, message: str, write_sweep: 
             "n_",
             "two runs are called 'n_seed1': count 10 and 20; put what differs into run_name",
         ),
-        ("n{{ count }}_", "{{ 'N' if count > 10 else 'n' }}_", "two runs are called 'N_seed1'"),
+        (
+            "n{{ count }}_",
+            "{{ 'N' if count > 10 else 'n' }}_",
+            "the names 'n_seed1' and 'N_seed1' differ in upper and lower case only",
+        ),
+        ("[10, 20]", "[10, 20, 10]", "points: n10_seed1 is given twice with equal values; remove one of the two"),
+        ("[10, 20]", "[10, 10.0]", "n10_seed1 and n10.0_seed1 are the same scene although count 10 and 10.0"),
         ("n{{ count }}_", "../{{ count }}", "gives '../10seed1', which cannot be a directory"),
         ("n{{ count }}_", "n {{ count }}", "gives 'n 10seed1', which cannot be a directory"),
         (
