@@ -1,1 +1,1 @@
-"""One smarticle and many: geometry, spheres, poses, states. Knows nothing of scenes or engines."""
+"""Geometry, spheres, poses and states of smarticles, independent of scenes and engines."""

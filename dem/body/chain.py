@@ -21,16 +21,16 @@ from dem.body.state import State
 
 @dataclass(frozen=True)
 class Tie:
-    """Point where a string is tied: smarticle, link, and distance along x from the link's centre [m]."""
+    """Point of a link at which a string is tied."""
 
-    smarticle: int
-    link: int
-    along: float
+    smarticle: int  #: Number of the smarticle
+    link: int  #: 0 barb 1, 2 barb 2
+    along: float  #: Distance from the link's centre towards its tip [m]
 
 
 @dataclass(frozen=True)
 class Chain:
-    """Layout of a chain of U shapes with a free distance of neighbours, `gap`. Lengths in m."""
+    """Layout of a chain of `count` U shapes, whose hooked barbs are `gap` apart. Lengths in m."""
 
     particle: Particle
     count: int
@@ -38,31 +38,34 @@ class Chain:
 
     @property
     def offset(self) -> float:
-        """Distance of the two rows of middle links: the tips of each row are a gap away from the other row's links."""
+        """Distance in y [m] between the centrelines of the two rows of middle links.
+
+        Barb tips of one row end a gap before the middle links of the other row.
+        """
         return self.particle.boxes.barb_length + self.gap + self._half
 
     @property
     def _half(self) -> float:
-        """Distance of a middle link's faces from its axis."""
+        """Distance of a middle link's faces from its axis [m]."""
         return self.particle.boxes.bulge + self.particle.radius
 
     @property
     def width(self) -> float:
-        """h, the whole width [m]."""
+        """Width h of the chain across its axis, including the thickness of the links [m]."""
         return self.offset + 2 * self._half
 
     @property
     def step(self) -> float:
-        """Distance of neighbouring middle links along x: their hooked barbs are a gap apart."""
+        """Distance in x [m] between the centres of neighbouring middle links."""
         return self.particle.boxes.middle_length - 2 * self.particle.radius - self.gap
 
     @property
     def length(self) -> float:
-        """Distance along x of the two points where strings are tied."""
+        """Distance in x [m] between the two points at which strings are tied."""
         return (self.count - 1) * self.step + self.particle.boxes.middle_length
 
     def poses(self) -> Poses:
-        """Return the poses of the centres of mass."""
+        """Return the poses of all smarticles, in their order along x."""
         numbers = np.arange(self.count)
         turned = numbers % 2 == 1
         sign = np.where(turned, 1.0, -1.0)
@@ -74,7 +77,11 @@ class Chain:
         return Poses(positions, tuple(Rotation.from_rotvec([0.0, 0.0, math.pi * half]) for half in turned))
 
     def ties(self, tied_at: Literal["tip", "axis"]) -> tuple[Tie, Tie]:
-        """Return the ties of the strings at the lower and the higher x, on the outer barbs; see `Strain.tied_at`."""
+        """Return where the two strings are tied: the outer barbs of the first and the last smarticle.
+
+        Args:
+            tied_at: "tip": at the barbs' tips; "axis": where the barbs cross the chain's axis.
+        """
         half = self.particle.boxes.barb_length / 2
         along = half - self.particle.radius if tied_at == "tip" else self.offset / 2 - half
         last = self.count - 1
@@ -82,19 +89,24 @@ class Chain:
 
 
 def parted(state: State, diameter: float) -> bool:
-    """Return whether a straight line across the chain separates two neighbours, which can then not hook again."""
+    """Return whether a line across the chain separates two neighbours, which then cannot hook again.
+
+    Args:
+        state: smarticles in their order along x.
+        diameter: thickness of the links [m].
+    """
     places = _corners(state)[..., 0]
     return bool((places[:-1].max(axis=1) + diameter < places[1:].min(axis=1)).any())
 
 
 def extent(state: State, diameter: float) -> float:
-    """Return the width of the chain across its axis, with the links' thickness [m]."""
+    """Return the present width [m] of a chain across its axis, with the links' thickness, `diameter` [m]."""
     places = _corners(state)[..., 1]
     return float(np.ptp(places) + diameter)
 
 
 def _corners(state: State) -> Array:
-    """Return (N, V, 3) tips and hinges, and of thicker middle links the ends of the rows at their faces [m]."""
+    """Return (N, V, 3) tips and hinges [m]; for thicker middle links also the ends of their outer rows of spheres."""
     bulge, vertices = state.boxes.bulge, state.vertices
     if not bulge:
         return vertices

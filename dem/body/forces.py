@@ -1,8 +1,8 @@
 """Forces at contacts, for output.
 
-In engines bodies touch at points: spheres of a chain, or the ends of a stretch over which two links lie on each other.
-A contact is all points of one pair of links, or of a link and a boundary, so that its number does not depend on the
-engine.
+Engines compute forces at points: where two spheres touch, or at both ends of the stretch over which two links lie on
+each other. Here all points of one pair of links, or of one link and one boundary, make one contact, so that the number
+of contacts does not depend on the engine.
 """
 
 from __future__ import annotations
@@ -18,14 +18,14 @@ from dem.body.particle import LINKS
 Number = TypeVar("Number", int, Numbers)
 
 BOUNDARIES = ("floor", "wall", "lower hook", "upper hook", "channel's lower wall", "channel's upper wall")
-"""Rigid boundaries, by their numbers in recorded files."""
+"""Names of the rigid boundaries; recorded files hold places in this tuple."""
 FLOOR, WALL, LOWER_HOOK, UPPER_HOOK, CHANNEL = range(5)  # the channel has two
 NONE = -1
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class ContactForces:
-    """All contacts at one instant that carry a force."""
+    """The M contacts at one instant that carry a force."""
 
     smarticles: Numbers  #: (M, 2) the two smarticles, the lower number first; the second one is -1 for a boundary
     links: Numbers  #: (M, 2) their links: 0 barb 1, 1 middle link, 2 barb 2; -1 for a boundary
@@ -33,31 +33,31 @@ class ContactForces:
     points: Array  #: (M, 3) mean of the points of contact, weighted by their normal forces [m]
     normal: Array  #: (M,) sum of the normal forces at the points, positive [N]
     tangential: Array  #: (M,) size of the sum of the tangential forces at the points [N]
-    forces: Array  #: (M, 3) on the first one, the sum over all points [N]
+    forces: Array  #: (M, 3) total force on the first smarticle, summed over the points [N]
 
 
 def at_links(smarticle: Number, link: Number) -> Number:
-    """Return the numbers of links in `contacts_of_points`."""
+    """Return the codes of links, 0 or above, for `contacts_of_points`."""
     return LINKS * smarticle + link
 
 
 def at_boundaries(part: Number) -> Number:
-    """Return the numbers of boundaries, places in `BOUNDARIES`, in `contacts_of_points`."""
+    """Return the codes of boundaries, below 0, for `contacts_of_points`; `part` are places in `BOUNDARIES`."""
     return -1 - part
 
 
 def contacts_of_points(
     first: Numbers, second: Numbers, *, loads: Array, points: Array, friction: Array, forces: Array
 ) -> ContactForces:
-    """Join the points at which bodies touch into contacts.
+    """Return the contacts that forces at P points make, one for each pair of links or of link and boundary.
 
     Args:
-        first: (P,) bodies that touch: see `at_links`; never a boundary.
-        second: (P,) bodies that are touched: see `at_links` and `at_boundaries`.
-        loads: (P,) normal force of each point, not negative [N]; a contact without any is left out.
-        points: (P, 3) [m].
-        friction: (P, 3) tangential force of each on the first body [N].
-        forces: (P, 3) whole force on the first body [N].
+        first: (P,) codes of links, from `at_links`.
+        second: (P,) codes of the links or boundaries that they touch, from `at_links` or `at_boundaries`.
+        loads: (P,) normal forces, 0 or above [N]; a contact whose points all have 0 is left out.
+        points: (P, 3) positions [m].
+        friction: (P, 3) tangential forces on the links of `first` [N].
+        forces: (P, 3) total forces on the links of `first` [N].
     """
     turned = (second >= 0) & (second < first)
     sign = np.where(turned, -1.0, 1.0)[:, None]
@@ -65,12 +65,12 @@ def contacts_of_points(
     which, number = np.unique(pairs, axis=0, return_inverse=True)
     number = number.reshape(-1)
 
-    def added(values: Array) -> Array:
+    def summed(values: Array) -> Array:
         total = np.zeros((len(which), *values.shape[1:]))
         np.add.at(total, number, values)
         return total
 
-    total = added(loads)
+    total = summed(loads)
     carried = total > 0
     pairs, loose = which[carried].astype(np.int64), which[carried, 1] < 0
     missing = np.column_stack([np.zeros_like(loose), loose])
@@ -78,8 +78,8 @@ def contacts_of_points(
         smarticles=np.where(missing, NONE, pairs // LINKS),
         links=np.where(missing, NONE, pairs % LINKS),
         boundaries=np.where(loose, -1 - pairs[:, 1], NONE),
-        points=added(loads[:, None] * points)[carried] / total[carried, None],
+        points=summed(loads[:, None] * points)[carried] / total[carried, None],
         normal=total[carried],
-        tangential=np.linalg.norm(added(sign * friction)[carried], axis=1),
-        forces=added(sign * forces)[carried],
+        tangential=np.linalg.norm(summed(sign * friction)[carried], axis=1),
+        forces=summed(sign * forces)[carried],
     )

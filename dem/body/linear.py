@@ -1,7 +1,7 @@
-"""Small linear algebra whose bits depend on no processor.
+"""Linear algebra of small matrices, with identical bits on every processor.
 
-BLAS and LAPACK choose their kernels by the processor and differ in the last digit; a pile forgets its start within a
-second. Everything here is made of NumPy's elementwise operations and of sums in a fixed order.
+BLAS and LAPACK choose their kernels by the processor and differ in the last digit, which changes all poses of a pile
+within a second: it is chaotic. Here everything consists of NumPy's elementwise operations and sums in a fixed order.
 """
 
 from __future__ import annotations
@@ -10,11 +10,11 @@ import numpy as np
 
 from dem.arrays import Array, Flags
 
-SWEEPS = 12  # of Jacobi's method, which converges quadratically: five are enough for 4 × 4
+SWEEPS = 12  # of Jacobi's method, which converges quadratically: five are enough for 4 × 4 matrices
 
 
 def matrix_product(a: Array, b: Array) -> Array:
-    """Multiply matrices (…, i, j) and (…, j, k)."""
+    """Return the products (…, i, k) of matrices (…, i, j) and (…, j, k)."""
     total: Array = a[..., :, :1] * b[..., :1, :]
     for j in range(1, b.shape[-2]):
         total = total + a[..., :, j : j + 1] * b[..., j : j + 1, :]
@@ -22,12 +22,14 @@ def matrix_product(a: Array, b: Array) -> Array:
 
 
 def applied(matrix: Array, points: Array) -> Array:
-    """Return matrix (…, i, j) times each of the points (n, j), as (…, n, i)."""
+    """Return the products (…, n, i) of matrices (…, i, j) with points (n, j)."""
     return matrix_product(points, np.swapaxes(matrix, -1, -2))
 
 
 def eigen_symmetric(matrices: Array) -> tuple[Array, Array]:
-    """Return eigenvalues (n, k), in no order, and eigenvectors (n, k, k), in columns, of symmetric (n, k, k).
+    """Return eigenvalues (n, k) and eigenvectors (n, k, k) of symmetric matrices (n, k, k).
+
+    Eigenvalues are in no order; eigenvectors are columns.
 
     Source: Jacobi's cyclic method, Golub and Van Loan, Matrix Computations, section 8.5.
     """
@@ -39,7 +41,7 @@ def eigen_symmetric(matrices: Array) -> tuple[Array, Array]:
             for q in range(p + 1, size):
                 off = a[:, p, q]
                 rest = off == 0.0
-                with np.errstate(over="ignore"):  # an angle of zero then, as it should be
+                with np.errstate(over="ignore"):  # an infinite theta gives a rotation by 0, which is right
                     theta = (a[:, q, q] - a[:, p, p]) / (2 * np.where(rest, 1.0, off))
                     t = np.where(theta < 0, -1.0, 1.0) / (np.abs(theta) + np.sqrt(theta * theta + 1))
                 t = np.where(rest, 0.0, t)
@@ -55,7 +57,7 @@ def eigen_symmetric(matrices: Array) -> tuple[Array, Array]:
 
 
 def positive_definite(matrices: Array) -> Flags:
-    """Return for each of the symmetric matrices (n, k, k) whether it is positive definite, by elimination."""
+    """Return (n,) whether symmetric matrices (n, k, k) are positive definite, by Gaussian elimination."""
     a = np.array(matrices, dtype=np.float64)
     good = np.ones(len(a), np.bool_)
     for p in range(a.shape[-1]):

@@ -1,6 +1,6 @@
-"""One smarticle: three rigid boxes, and the sphere chains that stand for them in contact.
+"""One smarticle: three rigid boxes, and the sphere chains that represent them in contacts.
 
-Mass, centre of mass and inertia are those of the boxes, exactly. Spheres only carry contact; their number, distance and
+Mass, centre of mass and inertia are exactly those of the boxes. Spheres serve contacts only; their number, distance and
 diameter are a choice of accuracy against cost (`Fidelity`).
 
 Body frame: origin at the centre of mass, axes along the principal axes of inertia, z along the normal of the plane.
@@ -24,18 +24,19 @@ from dem.body.linear import eigen_symmetric, matrix_product
 from dem.errors import InputError
 
 LINKS = 3
-# Free distance between a barb's first sphere and the hinge's, in diameters: a loaded hinge may give way by as much
-# before links of one smarticle touch.
+# Free distance between the sphere at a hinge and the first sphere of the barb, in diameters: links of one smarticle
+# touch only when a loaded hinge gives way by more.
 HINGE_CLEARANCE = 0.01
-# Angle by which barbs turn inwards beyond the right angle [rad], outside of a thicker middle link.
+# Angle beyond 90° up to which barbs turn inwards without touching a thicker middle link [rad].
 INWARDS = math.radians(15)
 
 
 def mean_width(thickness_normal: float, thickness_in_plane: float) -> float:
-    """Return the mean caliper width [m] of a rectangular section over all directions, perimeter/π.
+    """Return the caliper width [m] of a rectangular section, averaged over directions: perimeter/π.
 
-    A loose packing of thin bars follows their excluded volume, for two long bars at random orientations proportional
-    to the distance at which their axes touch, whose mean is the mean width of the section.
+    The density of a loose packing of thin bars follows from their excluded volume. For two long bars at random
+    orientations this volume is proportional to the distance between the axes of touching bars. The mean of that
+    distance is the mean width of the section.
 
     Source: Cauchy's formula for convex sections; Onsager's excluded volume of long rods.
     """
@@ -44,23 +45,26 @@ def mean_width(thickness_normal: float, thickness_in_plane: float) -> float:
 
 @lru_cache
 def chain_mean_width(pitch: float) -> float:
-    """Return the mean distance of the axes of two touching sphere chains, over the sphere diameter [1].
+    """Return the mean distance between the axes of two touching sphere chains, in sphere diameters [1].
 
-    The excluded volume of two long chains is that of two smooth bars of this width: less than one diameter, since beads
-    sit partly in the valleys of the other chain. Two chains crossing at the angle γ touch where, seen along their
-    common normal, two spheres lie nearest to each other, r diameters apart: the axes are then √(1 - r²) apart. The mean
-    is over the phases of both chains, uniform over a period, and over isotropic directions, density sin γ, weighted
-    by the area sin γ of the parallelogram in the excluded volume.
+    Two smooth bars of this width have the excluded volume of two long chains. It is below 1, since spheres of one chain
+    sit partly in the gaps of the other. Two chains that cross at an angle γ touch at those two spheres that lie nearest
+    to each other in a view along the common normal. If their distance in this view is r diameters, the axes are
+    √(1 - r²) diameters apart. The mean is taken over the positions of both chains along their axes (uniform over a
+    period) and over isotropic directions (density sin γ), weighted by sin γ, the area of the parallelogram in the
+    excluded volume.
 
-    `pitch` is the distance of neighbouring centres over the diameter, below √2, where chains pass through each other.
+    Args:
+        pitch: distance of neighbouring sphere centres over the diameter [1]; below √2, from which on chains pass
+            through each other.
     """
     nodes, weights = np.polynomial.legendre.leggauss(24)
     angles = math.pi / 4 * (nodes + 1)
     angle_weights = weights * np.sin(angles) ** 2
     phases = pitch * nodes / 2
-    beads = pitch * np.arange(-3, 4)
-    along = (phases[:, None] + beads).reshape(24, 1, 7, 1)
-    across = (phases[:, None] + beads).reshape(1, 24, 1, 7)
+    spheres = pitch * np.arange(-3, 4)
+    along = (phases[:, None] + spheres).reshape(24, 1, 7, 1)
+    across = (phases[:, None] + spheres).reshape(1, 24, 1, 7)
     total = 0.0
     for angle, weight in zip(angles, angle_weights / angle_weights.sum(), strict=True):
         squared = along**2 + across**2 - 2 * along * across * math.cos(angle)
@@ -73,7 +77,8 @@ def chain_mean_width(pitch: float) -> float:
 class Boxes:
     """Exact geometry of a smarticle. Lengths in m, angles in rad, density in kg/m³.
 
-    `angles` are (α1, α2): 0 is straight, π/2 the U. `middle_thickness_in_plane` is that of the barbs where it is None.
+    `angles` are (α1, α2): 0 is straight, π/2 the U. If `middle_thickness_in_plane` is None, the middle link is as thick
+    as the barbs.
     """
 
     middle_length: float
@@ -86,38 +91,44 @@ class Boxes:
 
     @property
     def thicknesses_in_plane(self) -> tuple[float, float, float]:
-        """Thicknesses in the plane of barb 1, middle link, barb 2 [m]."""
+        """Thicknesses t2 of barb 1, middle link and barb 2 in the smarticle's plane [m]."""
         barb, middle = self.thickness_in_plane, self.middle_thickness_in_plane
         return (barb, barb if middle is None else middle, barb)
 
     @property
     def bulge(self) -> float:
-        """Excess thickness of the middle link over the barbs, on either side in the plane [m]."""
+        """Half the difference between the in-plane thicknesses of middle link and barbs [m]."""
         return (self.thicknesses_in_plane[1] - self.thickness_in_plane) / 2
 
     @property
     def _weights(self) -> Array:
-        """(3,) [m]: weights of the links' masses, lengths of links as thick in the plane as the barbs."""
+        """(3,) [m]: lengths that the links would have with their own masses and the barbs' thickness."""
         return self.lengths * (np.array(self.thicknesses_in_plane) / self.thickness_in_plane)
 
     @property
     def lengths(self) -> Array:
-        """(3,) float64 [m]: barb 1, middle link, barb 2."""
+        """(3,) float64 [m]: lengths of barb 1, middle link and barb 2."""
         return np.array([self.barb_length, self.middle_length, self.barb_length])
 
     @property
     def volume(self) -> float:
-        """Solid volume t1 t2 (w + 2l) [m³], each link with its own t2; overlap at hinges counts as in the paper."""
+        """Solid volume t1 t2 (w + 2l) [m³], each link with its own t2.
+
+        Where the boxes of two links overlap at a hinge, the volume counts twice, as in the paper.
+        """
         return float(self.thickness_normal * self.thickness_in_plane * self._weights.sum())
 
     @property
     def mass(self) -> float:
-        """Mass [kg]."""
+        """Mass of the smarticle [kg]."""
         return self.density * self.volume
 
     @cached_property
     def directions(self) -> Array:
-        """(3, 3) float64: unit vectors, hinge to tip for the barbs, hinge 1 to hinge 2 for the middle link."""
+        """(3, 3) float64: unit vectors along the links, in the middle link's frame.
+
+        Barbs point from the hinge to the tip, the middle link from hinge 1 to hinge 2.
+        """
         a1, a2 = self.angles
         barbs = [-math.cos(a1), math.sin(a1), 0.0], [math.cos(a2), math.sin(a2), 0.0]
         return np.array([barbs[0], [1.0, 0.0, 0.0], barbs[1]])
@@ -132,7 +143,7 @@ class Boxes:
 
     @cached_property
     def _plain_centres(self) -> Array:
-        """(3, 3) [m]: link centres in the same frame."""
+        """(3, 3) [m]: link centres in the middle link's frame."""
         v = self._plain_vertices
         return (v[:3] + v[1:]) / 2
 
@@ -168,12 +179,15 @@ class Boxes:
 
     @property
     def link_masses(self) -> Array:
-        """(3,) float64 [kg]."""
+        """(3,) float64 [kg]: masses of barb 1, middle link and barb 2."""
         return self.density * self.thickness_normal * np.array(self.thicknesses_in_plane) * self.lengths
 
     @property
     def link_inertias(self) -> Array:
-        """(3, 3) float64 [kg m²]: principal moments of each link, along its length, in the plane, along the normal."""
+        """(3, 3) float64 [kg m²]: principal moments of each link about its own centre.
+
+        The axes are along the link, across it in the smarticle's plane, and along the plane's normal.
+        """
         t1, length = self.thickness_normal, self.lengths
         t2_squared = np.array([t2**2 for t2 in self.thicknesses_in_plane])
         squares = np.stack([t1**2 + t2_squared, length**2 + t1**2, length**2 + t2_squared], axis=1)
@@ -181,14 +195,15 @@ class Boxes:
 
     @cached_property
     def link_centres(self) -> Array:
-        """(3, 3) float64 [m]: centres of the links in the body frame."""
+        """(3, 3) float64 [m]: centres of barb 1, middle link and barb 2 in the body frame."""
         return self.to_body(self._plain_centres)
 
     @cached_property
     def link_rotations(self) -> Array:
-        """(3, 3, 3) float64: link frames in the body frame; columns: along the link, in the plane, normal.
+        """(3, 3, 3) float64 [1]: rotations from the links' frames to the body frame.
 
-        Barbs point from the hinge to the tip, the middle link from hinge 1 to hinge 2.
+        Columns are the axes of a link: along the link as in `directions`, across it in the smarticle's plane, and along
+        the plane's normal.
         """
         normal = np.array([0.0, 0.0, 1.0])
         frames = [np.stack([u, np.cross(normal, u), normal], axis=1) for u in self.directions]
@@ -200,7 +215,7 @@ class Boxes:
         return self._principal[0]
 
     def to_body(self, points: Array) -> Array:
-        """Turn points (n, 3) [m] from the middle link's frame to the body frame."""
+        """Return points (n, 3) [m] of the middle link's frame in the body frame."""
         return matrix_product(points - self.plain_centre_of_mass, self._principal[1])
 
     @cached_property
@@ -211,19 +226,19 @@ class Boxes:
 
 @dataclass(frozen=True, kw_only=True)
 class SphereChain:
-    """Arrangement of spheres along the links. Lengths in m."""
+    """Arrangement of spheres along the links."""
 
     rows: int  #: Rows of spheres side by side across t1, the thickness along the normal
-    diameter: float
+    diameter: float  #: Of a sphere [m]
     pitch: float  #: Largest distance between neighbouring centres along a link [m]
 
 
 @dataclass(frozen=True)
 class Particle:
-    """A smarticle as the engine sees it.
+    """A smarticle as engines compute it: its boxes, and the spheres that represent them in contacts.
 
     Raises:
-        InputError: the spheres are thicker than the link is wide, or too many for the link.
+        InputError: the spheres are larger than half the middle link's length.
     """
 
     boxes: Boxes
@@ -249,7 +264,7 @@ class Particle:
     def _sides(self) -> Array:
         """(sides,) [m]: offsets of the middle link's rows across it in the plane, at most a diameter apart.
 
-        Outermost spheres lie further out than those of the barbs by the excess thickness.
+        The outermost spheres lie further out than those of the barbs by `Boxes.bulge`.
         """
         bulge = self.boxes.bulge
         if not bulge:
@@ -258,16 +273,16 @@ class Particle:
 
     @property
     def barb_start(self) -> float:
-        """Distance from the hinge to a barb's first sphere [m]: little more than a diameter, at all angles.
+        """Distance from the hinge to the centre of a barb's first sphere [m].
 
-        At a thicker middle link it is the distance from the outer row: up to the right angle by the triangle's
-        inequality, beyond it by the cosine.
+        It keeps the sphere a diameter and `HINGE_CLEARANCE` away from the sphere at the hinge. With a thicker middle
+        link it does so for the row at its face, at angles up to `INWARDS` beyond 90°.
         """
         start = self.chain.diameter * (1 + HINGE_CLEARANCE)
         return (self.boxes.bulge + start) / math.cos(INWARDS) if self.boxes.bulge else start
 
     def _stations(self, link: int) -> Array:
-        """Return distances [m] of the sphere centres along a link from its start (hinge, or hinge 1)."""
+        """Return (n,) distances [m] of a link's sphere centres from its start: the barb's hinge, or hinge 1."""
         d, pitch = self.chain.diameter, self.chain.pitch
         if link == 1:
             # The spheres at the hinges belong to the middle link and are centred on the hinge axes. A bar without
@@ -329,11 +344,11 @@ class Particle:
 
     @cached_property
     def smallest_effective_mass(self) -> float:
-        """Smallest mass [kg] felt by a push on any sphere, over its centre and all directions.
+        """Smallest effective mass [kg] of the smarticle at any sphere's centre, in any direction.
 
-        A force F at r from the centre of mass accelerates the point by (1/m + (r × n)·I⁻¹(r × n)) F along its own
-        direction n; the largest eigenvalue of that mobility over the spheres is the inverse of the result. It rules
-        the stable time step: barb tips are several times lighter than the body.
+        A force F in the direction n at a point r from the centre of mass accelerates that point along n by
+        (1/m + (r × n)·I⁻¹(r × n)) F. The effective mass is the inverse of the largest eigenvalue of this mobility. It
+        limits the stable time step: at barb tips it is several times smaller than the mass.
         """
         inverse, (x, y, z) = 1.0 / self.boxes.inertia, self.centres.T
         # A push on a sphere acts at its surface, but the normal passes through the centre.

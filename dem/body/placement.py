@@ -1,4 +1,4 @@
-"""Poses of smarticles: random ones without overlap in a container, and those fitted to recorded vertices."""
+"""Poses of smarticles: random poses without overlap in a container, and poses fitted to recorded vertices."""
 
 from __future__ import annotations
 
@@ -17,16 +17,16 @@ from dem.errors import RunError
 
 CLEARANCE = 0.02  # free distance kept between surfaces, in sphere diameters
 ATTEMPTS = 200  # poses tried per smarticle before the slab is made higher
-GROWTH = 0.25  # by how much of its height the slab grows then
-MOST_GROWTH = 40  # growths before the layer is given up
+GROWTH = 0.25  # increase of the slab's height, over its height
+MOST_GROWTH = 40  # increases of the slab's height before placement fails
 
 
 @dataclass(frozen=True)
 class Poses:
-    """Poses of k smarticles: centres of mass (k, 3) [m] and rotations, body frame to laboratory frame."""
+    """Poses of k smarticles."""
 
-    positions: Array
-    rotations: tuple[Rotation, ...]
+    positions: Array  #: (k, 3) centres of mass [m]
+    rotations: tuple[Rotation, ...]  #: k rotations from the body frame to the laboratory frame
 
 
 def place_layer(
@@ -40,20 +40,21 @@ def place_layer(
     rng: np.random.Generator,
     narrower: Callable[[Array], Array] | None = None,
 ) -> Poses:
-    """Return random poses without overlap in a slab of a cylinder.
+    """Return random poses of `count` smarticles without overlap, in a slab of a cylinder.
 
-    Orientations are uniform over rotations, centres over the disc and the slab's height, both subject to no overlap. A
-    slab that is too full grows upwards.
+    Orientations are drawn uniformly from all rotations, centres from the disc, and the heights of the lowest points
+    from the slab. Poses that overlap are drawn again. A slab that is too full is made higher.
 
     Args:
         radius: inner radius of the cylinder [m].
-        bottom: height below which no sphere comes [m].
-        height: height of the slab [m], in which the lowest spheres of the smarticles lie.
-        obstacles: (n, 3) centres of present spheres of the same diameter [m].
-        narrower: returns inner radii of the cylinder [m] at heights [m]; it must not be wider higher up.
+        bottom: height of the slab's lower face [m]; no sphere reaches below it.
+        height: height of the slab [m].
+        obstacles: (n, 3) centres of spheres that are already there, with the particle's sphere diameter [m].
+        narrower: function from heights (n,) to inner radii (n,) of the cylinder [m], which must not increase with
+            height; None: `radius` everywhere.
 
     Raises:
-        RunError: no room was found.
+        RunError: some smarticles found no room although the slab was made higher `MOST_GROWTH` times.
     """
     diameter = particle.chain.diameter
     apart = diameter * (1 + CLEARANCE)
@@ -76,7 +77,7 @@ def place_layer(
             off_axis = np.hypot(spheres[:, 0], spheres[:, 1])
             if off_axis.max() > widest:
                 continue
-            # As wide as the cylinder is at the tops of the spheres, they touch neither wall nor ceiling.
+            # The radius at the tops of the spheres counts, so that they touch neither wall nor ceiling of a tier.
             if narrower is not None and (off_axis > narrower(spheres[:, 2] + margin) - margin).any():
                 continue
             if tree is not None and tree.query(spheres, distance_upper_bound=apart)[0].min() < apart:
@@ -97,15 +98,16 @@ def place_layer(
 
 
 def fitted_poses(boxes: Boxes, vertices: Array) -> tuple[Poses, Array]:
-    """Return the poses at which a shape lies nearest to given vertices, by least squares.
+    """Return the poses in which the vertices of a shape lie nearest to given vertices, by least squares.
 
-    The turn of a straight shape about its length is unknown; the choice depends on the vertices alone.
+    Vertices do not tell how a straight shape is rotated about its length; that angle is then arbitrary, but depends on
+    the vertices alone.
 
     Args:
         vertices: (N, 4, 3) barb tip, hinge, hinge, barb tip of each smarticle [m].
 
     Returns:
-        The poses; and (N,) distance of the farthest vertex of each from its place [m].
+        The poses, and (N,) the largest distance between a given and a fitted vertex of each smarticle [m].
 
     Source:
         Horn, J. Opt. Soc. Am. A 4, 629 (1987).

@@ -15,7 +15,7 @@ from dem.body.particle import LINKS, Boxes, Particle
 class State:
     """Poses and velocities of all links, in the laboratory frame.
 
-    Welded or articulated, a smarticle is three links; link 0 is barb 1, 1 the middle link, 2 barb 2.
+    A smarticle has three links, whether it is welded or articulated: 0 barb 1, 1 middle link, 2 barb 2.
     """
 
     boxes: Boxes
@@ -35,15 +35,15 @@ class State:
         *,
         shapes: tuple[Array, Array] | None = None,
     ) -> State:
-        """Return the state of rigid smarticles.
+        """Return the state of N rigid smarticles.
 
         Args:
             positions: (N, 3) centres of mass [m].
             rotations: (N, 3, 3) body frame to laboratory frame [1].
             velocities: (N, 3) of the centres of mass [m/s].
             spins: (N, 3) angular velocities [rad/s].
-            shapes: (N, 3, 3) centres [m] and (N, 3, 3, 3) frames of the links of each smarticle in its body frame;
-                by default those of the boxes.
+            shapes: centres (N, 3, 3) [m] and frames (N, 3, 3, 3) of the links of each smarticle in its body frame;
+                None: those of `boxes` for all smarticles.
         """
         centres, frames = shapes or (boxes.link_centres[None], boxes.link_rotations[None])
         arms = np.einsum("nij,nkj->nki", rotations, centres)
@@ -53,7 +53,7 @@ class State:
 
     @property
     def count(self) -> int:
-        """Smarticles."""
+        """Number of smarticles, N."""
         return len(self.link_positions)
 
     @cached_property
@@ -86,7 +86,7 @@ class State:
         return np.stack([np.arctan2(across1, -along1), np.arctan2(across2, along2)], axis=1)
 
     def spheres(self, particle: Particle, which: Numbers | None = None) -> Array:
-        """Return (N, S, 3) centres of the spheres [m], or of those with the numbers `which`."""
+        """Return (N, S, 3) centres [m] of all spheres of a particle, or (N, len(which), 3) of the spheres `which`."""
         links, local = particle.links, particle.local_centres
         if which is not None:
             links, local = links[which], local[which]
@@ -119,6 +119,6 @@ class State:
         return np.asarray(np.einsum("nkij,nki->nkj", self.link_rotations, self.link_spins))
 
     def potential_energy(self, gravity: float, floor: float) -> float:
-        """Return the gravitational energy [J] of all smarticles above a height [m], at g [m/s²]."""
+        """Return the gravitational energy [J] of all smarticles, 0 at the height `floor` [m]; gravity in m/s²."""
         heights = self.positions[:, 2] - floor
         return float(self.boxes.mass * gravity * heights.sum())

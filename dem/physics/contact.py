@@ -1,4 +1,4 @@
-"""Laws of contact and of strings: spring, dashpot and Coulomb friction, and the damping that gives a restitution."""
+"""Laws of contacts and strings: spring, dashpot, Coulomb friction, and the damping for a restitution coefficient."""
 
 from __future__ import annotations
 
@@ -26,9 +26,10 @@ class ContactLaw:
 
 
 def typical_effective_mass(particle: Particle) -> float:
-    """Return the harmonic mean [kg] of the mass felt by a push on a smarticle, over its spheres and all directions.
+    """Return the effective mass [kg] of a smarticle at a contact, averaged over spheres and directions.
 
-    The mobility of a point r is 1/m + (r × n)·I⁻¹(r × n); averaged over directions n it is a third of its trace.
+    The average is a harmonic mean. A force in the direction n at a point r from the centre of mass moves that point
+    with the mobility, the inverse effective mass, 1/m + (r × n)·I⁻¹(r × n); its mean over n is a third of its trace.
     """
     inverse = 1.0 / particle.boxes.inertia
     x, y, z = particle.centres.T
@@ -37,9 +38,9 @@ def typical_effective_mass(particle: Particle) -> float:
 
 
 def restitution_of(damping_ratio: float) -> float:
-    """Return the restitution [1] of a linear spring and dashpot that never pulls.
+    """Return the coefficient of restitution [1] of a linear spring and dashpot, at a damping ratio ζ [1].
 
-    The contact ends when its force is zero, before the spring is back at zero length.
+    The contact never pulls: it ends when its force is zero, before the overlap is.
 
     Source: Schwager and Pöschel, Granular Matter 9, 465 (2007): with ω = √(1 - ζ²) in units of the undamped frequency,
     e = exp[-(ζ/ω)(π - arg(ω² - ζ² + 2iζω))] for ζ < 1, and its continuation above.
@@ -55,14 +56,18 @@ def restitution_of(damping_ratio: float) -> float:
 
 
 def damping_ratio(restitution: float) -> float:
-    """Return the damping ratio ζ [1] of a contact with a restitution, the inverse of `restitution_of`."""
+    """Return the damping ratio ζ [1] for a coefficient of restitution [1]: the inverse of `restitution_of`."""
     if restitution == 1:
         return 0.0
     return float(brentq(lambda zeta: restitution_of(zeta) - restitution, 0.0, 1e4, xtol=1e-14))
 
 
 def contact_law(particle: Particle, contact: Contact, stiffness: float) -> ContactLaw:
-    """Return the contact law of a stiffness kn [N/m]; restitution holds at the typical effective mass of a pair."""
+    """Return the contact law for a scene's contact parameters and a normal stiffness kn [N/m].
+
+    Dashpots give `contact.restitution` in collisions at the typical effective mass: of two smarticles, or of one with
+    the container.
+    """
     single = typical_effective_mass(particle)
     zeta = damping_ratio(contact.restitution)
     return ContactLaw(
@@ -78,13 +83,13 @@ def contact_law(particle: Particle, contact: Contact, stiffness: float) -> Conta
 
 @dataclass(frozen=True, kw_only=True)
 class StringLaw:
-    """A string: a spring with a dashpot that pulls and never pushes."""
+    """Law of a string: a spring with a dashpot that pulls and never pushes."""
 
-    length: float  #: Unstretched [m]
-    stiffness: float  #: When taut [N/m]
-    damping: float  #: When taut [N s/m]
+    length: float  #: Unstretched length [m]
+    stiffness: float  #: Stiffness while taut [N/m]
+    damping: float  #: Damping coefficient while taut [N s/m]
 
     def tension(self, length: float, rate: float) -> float:
-        """Return the tension [N] at a length [m] that grows at a rate [m/s]; 0 for a string that hangs."""
+        """Return the tension [N] at a length [m] that grows at a rate [m/s]; 0 while the string is slack."""
         stretch = length - self.length
         return max(0.0, self.stiffness * stretch + self.damping * rate) if stretch > 0 else 0.0

@@ -1,4 +1,4 @@
-"""The motors at the hinges: velocity-controlled, of limited torque. Pure arithmetic, once per control period."""
+"""Motors at the hinges, velocity-controlled and with a torque limit: what a control update computes."""
 
 from __future__ import annotations
 
@@ -13,43 +13,45 @@ from dem.arrays import Array, Flags
 Law = Literal["halt", "stall", "ease", "slip", "servo"]
 LAWS: tuple[Law, ...] = get_args(Law)
 HALT, STALL, EASE, SLIP, SERVO = range(len(LAWS))
-EASED = 0.5  # of the speed, for a motor at its torque limit that eases
-PATIENCE = 20  # findings in a row, of both barbs of a smarticle one after the other, after which it stops
+EASED = 0.5  # factor on the speed limit of a motor at its torque limit, law "ease"
+# Law "ease": a motor stops when so many barbs in a row were found at the torque limit, barb 1 and barb 2 in turn.
+PATIENCE = 20
 
 
 @dataclass(frozen=True, kw_only=True)
 class MotorLaw:
-    """What all motors of a scene have in common."""
+    """Parameters that all motors of a scene share."""
 
     torque_limit: float  #: Τ_max [N m]
     speed_limit: float  #: ω, the greatest speed of a command [rad/s]
     stiffness: float  #: Twist stiffness of the shaft between motor and barb [N m/rad]
-    #: "halt": a motor whose torque is at τ_max or above no longer advances against it, and holds with whatever torque
-    #: it takes; "stall": it does not move at all until its torque has fallen, the rule of the paper's text; "ease": it
-    #: goes on at half the speed with whatever torque that takes, and stops only when twenty barbs in a row, those of
-    #: the smarticle in turn, were found there, the rule of the paper's code; "slip": a spring that gives way at τ_max;
-    #: "servo": a spring with a damper beside it, their torque limited as a whole
+    #: What a motor does when its torque reaches τ_max. "halt": it stops advancing against the torque, and holds with
+    #: any torque that this takes. "stall": it moves in neither direction until the torque has fallen, the rule of the
+    #: paper's text. "ease": it goes on at half the speed with any torque that this takes, and stops only when twenty
+    #: barbs in a row, barb 1 and barb 2 in turn, were found at τ_max, the rule of the paper's code. "slip": the shaft
+    #: is a spring whose torque is capped at τ_max. "servo": a spring and a damper, whose total torque is capped there.
     law: Law
     damping: float = 0.0  #: A servo's derivative gain [N m s/rad]
 
 
-# The next two take scalars, or arrays: compiled code calls them for one barb, `Motors` for all barbs of a side.
+# `speed_factor` and `halts` take scalars or arrays: compiled code calls them for one barb, `Motors` for barb 1, then
+# barb 2 of all smarticles.
 
 
 def speed_factor(law: int, over: Any) -> Any:
-    """Return the factor on a motor's greatest speed [1]; arguments as in `halts`."""
+    """Return the factor on a motor's speed limit [1]; arguments as in `halts`."""
     return 1.0 - (1.0 - EASED) * over if law == EASE else 1.0
 
 
 def halts(law: int, over: Any, advance: Any, torque: Any, findings: Any) -> Any:
-    """Return whether a motor halts.
+    """Return whether a motor stops advancing.
 
     Args:
         law: number of the law in `LAWS`.
-        over: whether the torque is at its limit.
-        advance: of the command that is wanted, or its rate; the sign matters.
-        torque: on the barb since the last control update [N m].
-        findings: how many barbs in a row, of this smarticle in turn, were found at the limit, with this one.
+        over: whether the torque has reached its limit.
+        advance: change of the command that the schedule wants [rad], or its rate [rad/s]; only the sign matters.
+        torque: torque on the barb since the last control update [N m].
+        findings: number of the smarticle's barbs in a row, this barb included, that were found at the limit.
     """
     if law == HALT:
         return over & (advance * torque > 0.0)
@@ -61,14 +63,15 @@ def halts(law: int, over: Any, advance: Any, torque: Any, findings: Any) -> Any:
 class Motors:
     """Two motors on each of N smarticles.
 
-    A motor turns one end of its shaft to the command; the barb is at the other end, at the actual angle, and feels the
-    torque k (command - actual). A motor that halts may always give way: only a command that would load the shaft
-    further is rejected. One that stalls, in both directions, comes free only when its neighbours move, since the load
-    of an elastic contact stays when the motor stops.
+    A motor turns one end of its shaft to the command. The barb is at the other end, at the actual angle, and receives
+    the torque k (command - actual). Under the law "halt" a motor at its limit ignores only commands that would load the
+    shaft further. Under "stall" it ignores all commands; since the load of an elastic contact stays, it starts again
+    only after neighbours have moved.
 
     Args:
+        law: parameters of the motors.
         angles: (N, 2) angles at the start [rad].
-        strengths: (N, 2) factors on torque limit and stiffness [1]; None: all are equal.
+        strengths: (N, 2) factors on torque limit and stiffness [1]; None: 1 for all motors.
     """
 
     def __init__(self, law: MotorLaw, angles: Array, strengths: Array | None = None) -> None:
@@ -81,10 +84,10 @@ class Motors:
         self.engage(angles)
 
     def engage(self, angles: Array) -> None:
-        """Take hold of barbs at (N, 2) angles [rad], without torque."""
+        """Start anew with commands at (N, 2) actual angles [rad], so that torques are 0."""
         self.commands: Array = angles.copy()  #: (N, 2) angles that the motors hold at present [rad]
         self.schedule: Array = angles.copy()
-        """(N, 2) angles of the schedule at the last control update [rad]; a motor that halts falls behind."""
+        """(N, 2) angles of the schedule at the last control update [rad]; `commands` of halted motors lag behind."""
         self.angles: Array = angles.copy()  #: (N, 2) actual angles at the last control update [rad]
         self.torques: Array = np.zeros_like(angles)
         """(N, 2) torques on the barbs since the last control update [N m]; positive ones raise the angle."""
@@ -96,18 +99,18 @@ class Motors:
     def update(
         self, angles: Array, targets: Array, interval: float, time_step: float, rates: Array | None = None
     ) -> Array:
-        """Return the torques (N, 2) on the barbs in the control period that begins now [N m].
+        """Make a control update; return the torques (N, 2) on the barbs in the control period that follows [N m].
 
         Args:
             angles: (N, 2) actual angles [rad].
             targets: (N, 2) angles at the end of the period according to the schedule [rad].
             interval: length of the period [s].
             time_step: dt of the integration [s].
-            rates: (N, 2) how fast the angles change [rad/s], which servos damp; None: unknown.
+            rates: (N, 2) rates of the angles [rad/s], for the dampers of servos; None: those given before.
         """
         before = self._torque(angles)
-        # A torque that is set now acts from the middle of the step on: the leapfrog scheme changes velocities there. In
-        # between the torque is linear in the angle, so that the trapezium is exact.
+        # The new torque acts from the middle of the step on, where the leapfrog scheme changes velocities. Between
+        # updates the torque is linear in the angle, so that the trapezoidal rule is exact.
         middle = angles + (angles - self.angles) * (time_step / interval / 2)
         self.work += self._work_since_update(middle)
         self._begun = middle
@@ -143,18 +146,18 @@ class Motors:
     # -- memory ------------------------------------------------------------------------------------------------
 
     def _kept(self) -> dict[str, str]:
-        """Attributes by their keys in `memory`."""
+        """Return the names of the attributes that `memory` holds, by its keys."""
         kept = {name: name for name in ("commands", "schedule", "angles", "torques", "work", "halted")}
         own = {"servo": {"rates": "_rates"}, "ease": {"over": "_over"}}
         return kept | {"begun": "_begun"} | own.get(self.law.law, {})
 
     @property
     def memory(self) -> dict[str, Any]:
-        """Plain data that `restore` needs."""
+        """Plain data of the motors' present state, for `restore`."""
         return {key: getattr(self, name).tolist() for key, name in self._kept().items()}
 
     def restore(self, memory: Mapping[str, Any]) -> None:
-        """Go on from where `memory` was taken."""
+        """Restore the state that `memory` returned."""
         for key, name in self._kept().items():
             present = getattr(self, name)
             setattr(self, name, np.array(memory[key], dtype=present.dtype).reshape(present.shape))

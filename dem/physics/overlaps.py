@@ -8,16 +8,16 @@ from itertools import combinations
 
 from dem.arrays import Flags
 
-APART = 0.1  # of the depth that is too deep; boundaries that have moved against each other by less have not
+APART = 0.1  # of the limit for overlaps: boundaries that have moved apart by less count as unmoved
 
 
 @dataclass(frozen=True)
 class Held:
-    """A smarticle between boundaries that have moved `apart` [m]: only its contacts give way."""
+    """A smarticle that touches two boundaries which have moved apart: only its contacts can give way."""
 
-    smarticle: int
-    between: tuple[str, str]
-    apart: float
+    smarticle: int  #: Number of the smarticle
+    between: tuple[str, str]  #: Names of the boundaries
+    apart: float  #: Change of their distance since the start [m]
 
 
 @dataclass(frozen=True)
@@ -25,31 +25,31 @@ class Overlaps:
     """All contacts and hinges at one instant."""
 
     deepest: float  #: Overlap of the deepest contact [m]
-    deep: Flags  #: (N,) smarticles with a contact deeper than the limit asked for
-    elastic_energy: float  #: Upper bound of what the springs of all contacts and hinges hold [J]
-    held: tuple[Held, ...] = ()  #: Those of the deep ones that two boundaries hold
+    deep: Flags  #: (N,) whether a smarticle has a contact deeper than the limit given to `Engine.overlaps`
+    elastic_energy: float  #: Upper bound of the energy in the springs of all contacts and hinges [J]
+    held: tuple[Held, ...] = ()  #: Smarticles of `deep` that are held between two boundaries
 
 
 @dataclass(frozen=True, kw_only=True)
 class Extremes:
-    """The extremes of all smarticles at one instant; NaN is within no limit."""
+    """Extremes over all smarticles at one instant; a value that is NaN fails every check."""
 
     fastest: float  #: Speed of the fastest link's centre [m/s]
-    lowest: float  #: Height of the lowest point that must stay inside [m]
-    highest: float  #: Height of the highest one [m]
-    widest: float  #: Largest distance of such a point from the vertical axis [m]
+    lowest: float  #: Height of the lowest point of the links' axes [m]
+    highest: float  #: Height of the highest point of the links' axes [m]
+    widest: float  #: Largest distance of a point of the links' axes from the container's axis [m]
     gap: float  #: Largest distance between the links of a hinge [m]
     deepest: float  #: Overlap of the deepest contact [m]
-    elastic_energy: float  #: As in `Overlaps` [J]
+    elastic_energy: float  #: Upper bound of the energy in the springs of all contacts and hinges [J]
 
 
 def held_between(touched: Mapping[int, Collection[str]], raised: Mapping[str, float], least: float) -> tuple[Held, ...]:
-    """Return smarticles that touch two boundaries which have moved apart by more than `least` [m].
+    """Return the smarticles that touch two boundaries which have moved apart by more than `least` [m].
 
     Args:
-        touched: names of the boundaries that a smarticle touches, by its number.
-        raised: how far each boundary was raised since the start [m], by name.
-        least: distance [m].
+        touched: names of the boundaries that a smarticle touches, by the smarticle's number.
+        raised: height by which each boundary was raised since the start [m], by its name.
+        least: smallest change of distance that counts [m].
     """
     return tuple(
         Held(k, (first, second), apart)
