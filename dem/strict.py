@@ -1,4 +1,4 @@
-"""What is read from files that people write: strict models, and what is wrong with a file, in one line."""
+"""Strict models of files that users write, and one-line messages for errors in such files."""
 
 from __future__ import annotations
 
@@ -20,8 +20,8 @@ _UNITS = {
     **{word: word for word in ("m", "s", "g", "w", "N", "J", "kg", "rad", "deg")},
     **{"hz": "Hz", "m3": "m³", "s2": "s²", "per": "/"},
 }
-_OF_A_KEY = "[key]"  # how pydantic ends the place of a key that is wrong itself
-# A message that begins with a key is about that key, below the place that pydantic reports.
+_OF_A_KEY = "[key]"  # pydantic's last step of a place where the key itself is wrong
+# A message that begins with a key is about that key, within the place that pydantic reports.
 _OWN_KEY = re.compile(r"\w[\w.]*(?=: )")
 _LONGEST_KEY = 60  # characters of a key that are shown
 _MOST_ERRORS = 3  # shown at once
@@ -59,18 +59,18 @@ _TEXTS = {
 
 
 class Strict(BaseModel):
-    """A frozen mapping of keys: no unknown ones, no NaN, no infinity, no silent conversion of text to numbers."""
+    """A frozen mapping of keys that rejects unknown keys, NaN, infinity, and text in place of numbers."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
     @classmethod
     def known_keys(cls) -> dict[str, FieldInfo]:
-        """Return the keys as a file has them, in order."""
+        """Return the fields by their keys in a file, in order."""
         return {field.alias or name: field for name, field in cls.model_fields.items()}
 
     @classmethod
     def nearest_key(cls, key: str) -> str:
-        """Return the way out for an unknown key."""
+        """Return what to do about an unknown key."""
         return nearest(key, sorted(cls.known_keys()))
 
     @model_validator(mode="before")
@@ -107,7 +107,7 @@ def _as_a_number(text: str) -> str:
 
 
 def _kind(annotation: Any) -> str:
-    """Return in words what a key takes, by the type of its field."""
+    """Return in words which values a field of a type takes."""
     parts = [annotation] if get_origin(annotation) is None else [*get_args(annotation)]
     parts = [get_args(part)[0] if get_origin(part) is Annotated else part for part in parts]
     if any(part in (int, float) for part in parts) and all(part in (int, float, type(None), ...) for part in parts):
@@ -119,11 +119,17 @@ def _kind(annotation: Any) -> str:
 
 
 def explained(error: ValidationError, data: Any, *, described: str) -> str:
-    """Return pydantic's first errors as `key: value and what is wrong; way out`, in one line."""
+    """Return pydantic's first errors in one line, each as `key: value and what is wrong; what to do`.
+
+    Args:
+        error: errors of the validation of `data`.
+        data: data of the file.
+        described: where users find a description of the keys.
+    """
     texts: dict[str, str] = {}
     filled: set[str] = set()  # places of values that the file does not hold
     for found in error.errors(include_url=False):
-        # A default that follows from a wrong key is no second error, nor is a list too short whose items are wrong.
+        # Missing defaults that follow from a wrong key are no second error, nor are lists that lack only wrong items.
         if found["type"] == "default_factory_not_called" or (found["type"] == "too_short" and found["input"]):
             continue
         place, given = _place(found["loc"], data)
@@ -134,18 +140,18 @@ def explained(error: ValidationError, data: Any, *, described: str) -> str:
             text, given = f"{text}, see {described}", True
         if place:
             place += "." if _OWN_KEY.match(text) else ": "
-        texts.setdefault(place, text)  # of one value, what was found first
+        texts.setdefault(place, text)  # the first error of a value
         if not given:
             filled.add(place)
-    # A value filled in from a wrong one is wrong in the same words, and no second error.
-    said = {text for place, text in texts.items() if place not in filled}
-    lines = [place + text for place, text in texts.items() if place not in filled or text not in said]
+    # A default that follows from a wrong value has an identical message, which is no second error.
+    reported = {text for place, text in texts.items() if place not in filled}
+    lines = [place + text for place, text in texts.items() if place not in filled or text not in reported]
     more = f" (and {len(lines) - _MOST_ERRORS} more)" if len(lines) > _MOST_ERRORS else ""
     return "; also ".join(lines[:_MOST_ERRORS]) + more
 
 
 def unit_of(key: str) -> tuple[str, str]:
-    """Split a key into its name and the unit that its end spells: `speed`, `m/s` of `speed_m_per_s`."""
+    """Return the name and the unit that a key consists of: ("speed", "m/s") for `speed_m_per_s`."""
     words = key.split("_")
     count = len(words)
     while count > 1 and words[count - 1] in _UNITS:
@@ -186,7 +192,7 @@ def _text(kind: str, message: str, value: Any, context: Mapping[str, Any], unit:
 def _place(steps: Sequence[int | str], data: Any) -> tuple[str, bool]:
     """Return pydantic's path to a value as a key of the file, and whether the file holds the value.
 
-    Members of a discriminated union carry their tag, the value of `type`, as an extra step of the path; it is no key.
+    In a discriminated union the path has an extra step, the value of `type`, which is no key.
     """
     here, keys, given = data, [], True
     for step in steps:

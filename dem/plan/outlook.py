@@ -14,7 +14,7 @@ from dem.plan.steps import stable_step, time_steps
 from dem.scene.scene import Scene
 from dem.scene.stiffness import expected_overlaps, too_soft
 from dem.setting.fidelity import Fidelity, fidelities
-from dem.setting.protocol import PARTS, PROTOCOLS, leaves_alone
+from dem.setting.protocol import PARTS, PROTOCOLS, applies
 
 _LEFT_OUT = {
     "series_interval_s": "one sample is taken, at the start",
@@ -235,10 +235,9 @@ def protocol_lines(scene: Scene) -> tuple[str, ...]:
 def _protocol_keys(scene: Scene, says: Mapping[str, Mapping[str, Any]]) -> Iterator[tuple[str, Any, Any]]:
     """Key, the scene's value, and the protocol's, of all keys of the protocol."""
     for part in PARTS:
-        if leaves_alone(part, plane=scene.plane is not None, tiers=scene.container.tiers is not None):
-            continue
-        for key, value in says[part].items():
-            yield f"{part}.{key}", getattr(getattr(scene, part), key), value
+        if applies(part, plane=scene.plane is not None, tiers=scene.container.tiers is not None):
+            for key, value in says[part].items():
+                yield f"{part}.{key}", getattr(getattr(scene, part), key), value
     for index, phase in enumerate(scene.phases):
         for key, value in says.get(phase.kind, {}).items():
             yield f"phases.{index}.{key}", getattr(phase, key), value

@@ -1,4 +1,4 @@
-"""Scenes: read from files and changed by `--set`, written, hashed and compared."""
+"""Reading scenes from files, changing them by `--set`, and writing, hashing and comparing them."""
 
 from __future__ import annotations
 
@@ -23,14 +23,19 @@ from dem.strict import explained
 SCHEMA_VERSION = 1
 MOST_DIFFERENCES = 3  # keys that are shown where two scenes differ
 DEFAULT_ENGINE = "yade"
-YOUNGER: Mapping[str, Mapping[str, Any]] = MappingProxyType(
+ADDED_KEYS: Mapping[str, Mapping[str, Any]] = MappingProxyType(
     {"shake": {"moves": "container"}, "deposit": {"every_s": None, "thrown_at_m_per_s": 0.0}}
 )
-"""Keys of phases that are younger than the format, by type of phase, with their defaults."""
+"""Keys of phases that were added to version 1 of the format, by type of phase, with their defaults."""
 
 
 def parse_scene(data: Any, *, source: str, folder: Path | None = None) -> Scene:
-    """Validate plain data; other runs are relative to `folder`, by default the working directory.
+    """Return the scene that plain data describe.
+
+    Args:
+        data: keys and values of a scene, as read from YAML.
+        source: name of the data in messages.
+        folder: folder that paths of other runs are relative to; None: the working directory.
 
     Raises:
         InputError: one line with file, key, value and the way out.
@@ -51,7 +56,7 @@ def _not_a_scene(data: Any) -> str | None:
     if "template" in data and "points" in data:
         return "is a sweep file, which makes many scenes; give it to `smarticles sweep`"
     if "schema_version" not in data:
-        # A scene made in Python is of this version; a file states its own.
+        # Only scenes made in Python may leave the version out.
         return "schema_version: missing; it has no default"
     version = data["schema_version"]
     if isinstance(version, int) and version != SCHEMA_VERSION:
@@ -60,7 +65,11 @@ def _not_a_scene(data: Any) -> str | None:
 
 
 def load_scene(path: Path | str, overrides: Sequence[str] = ()) -> Scene:
-    """Read a scene file and change keys by `KEY=VALUE`, e.g. `phases.1.duration_s=2`.
+    """Return the scene of a file.
+
+    Args:
+        path: the scene file.
+        overrides: changes of keys as `KEY=VALUE`, e.g. `phases.1.duration_s=2`.
 
     Raises:
         InputError: unreadable file, bad YAML, bad override or invalid scene.
@@ -91,7 +100,7 @@ def apply_override(data: Any, override: str) -> None:
     """Change one key of a scene's data in place, by `KEY=VALUE` with dots for nesting; the value is read as YAML.
 
     Raises:
-        InputError: it has another form, or there is no such place.
+        InputError: the override has another form, or the scene has no such key.
     """
     key, separator, text = override.partition("=")
     if not separator or not key:
@@ -118,9 +127,10 @@ def apply_override(data: Any, override: str) -> None:
 
 
 def _plain(scene: Scene) -> dict[str, Any]:
-    """Return the resolved scene as plain data, without keys younger than the format that have their defaults.
+    """Return the resolved scene as plain data, without keys at their defaults that were added to the format.
 
-    A protocol would fill such keys in again, so that with one they are all kept.
+    Leaving them out keeps the hashes of older scenes. A protocol could fill them in with other values, so that scenes
+    with a protocol keep theirs.
     """
     data = scene.model_dump(mode="json")
     optional: list[tuple[dict[str, Any], Mapping[str, Any]]] = [
@@ -132,7 +142,7 @@ def _plain(scene: Scene) -> dict[str, Any]:
         optional.append((data["hooks"], {"lower_length_m": scene.hooks.length_m, "lower_bars": 1}))
     if scene.protocol is None:
         optional += [(data, {"protocol": None}), (data["container"], {"packing_radius_m": None})]
-        optional += [(phase, YOUNGER.get(phase["type"], {})) for phase in data["phases"]]
+        optional += [(phase, ADDED_KEYS.get(phase["type"], {})) for phase in data["phases"]]
     for part, defaults in optional:
         for key, default in defaults.items():
             if part[key] == default:
@@ -141,7 +151,7 @@ def _plain(scene: Scene) -> dict[str, Any]:
 
 
 def dump_scene(scene: Scene, folder: Path | None = None) -> str:
-    """Return the resolved scene as YAML with every default; other runs are relative to `folder`."""
+    """Return the resolved scene as YAML with every default; paths of other runs are made relative to `folder`."""
     data = _plain(scene)
     if folder is not None:
         for phase in data["phases"]:
@@ -151,7 +161,10 @@ def dump_scene(scene: Scene, folder: Path | None = None) -> str:
 
 
 def scene_hash(scene: Scene) -> str:
-    """Return the SHA-256 of the canonical JSON of the resolved scene, without the source of pinned content."""
+    """Return the SHA-256 hash of a resolved scene, from its canonical JSON.
+
+    Keys that only name the source of content which another key pins (`Phase.sources`) do not count.
+    """
     data = _plain(scene)
     for dumped, phase in zip(data["phases"], scene.phases, strict=True):
         for key in phase.sources:
@@ -161,7 +174,7 @@ def scene_hash(scene: Scene) -> str:
 
 
 def difference(there: Scene, here: Scene) -> str:
-    """Return the first keys in which two scenes differ: `seed 1 there, 2 here; count 100 there, 50 here`."""
+    """Return the first keys in which two scenes differ, as `seed 1 there, 2 here; count 100 there, 50 here`."""
     one, other = (dict(_leaves(scene.model_dump(mode="json"))) for scene in (there, here))
     pairs = [(key, one.get(key, "absent"), other.get(key, "absent")) for key in {**one, **other}]
     texts = [f"{key} {a} there, {b} here" for key, a, b in pairs if a != b]
@@ -184,12 +197,12 @@ def json_schema() -> dict[str, Any]:
     schema = Scene.model_json_schema()
     schema["required"].insert(0, "schema_version")
     del schema["properties"]["schema_version"]["default"]
-    # The file may name a fidelity, or give its base and some knobs; the model that pydantic describes has them all.
+    # A file may name a fidelity, or give its base and some knobs; pydantic describes the model, which has all knobs.
     fidelity = schema["properties"]["fidelity"]
     mapping = {"$ref": fidelity.pop("$ref")}
     fidelity["anyOf"] = [{"type": "string", "enum": list(FIDELITIES)}, mapping]
     schema["$defs"]["Fidelity"].pop("required")
-    # These follow from the smarticle where they are not given.
+    # Their defaults follow from the smarticle.
     schema["$defs"]["Hooks"].pop("required")
     schema["$defs"]["PullHook"]["required"] = ["type"]
     return schema

@@ -1,6 +1,6 @@
-"""What the parts of a scene must be to each other: rules that no part can check alone.
+"""Checks of a scene that involve several of its parts.
 
-Each limit comes from what the engine can do, or from what would make a run without meaning.
+Each limit follows from what engines can compute, or excludes runs without meaning.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from dem.setting.hooks import TOLERANCE, Hooks
 
 
 def problems(scene: SceneView, engine: str) -> Iterator[str]:
-    """Yield what is wrong with a scene on an engine: one line each with key, value and the way out."""
+    """Yield the errors of a scene on an engine: one line each with key, value and what to do."""
     if scene.plane is None:
         yield from _of_order(scene)
         yield from _of_container(scene)
@@ -55,7 +55,7 @@ def _of_plane(scene: SceneView) -> Iterator[str]:
     if scene.hooks is not None:
         yield "hooks: they lie out of the plane; leave hooks or plane out"
     if scene.container != type(scene.container)():
-        yield "container: a plane has none but two walls; leave container out and give plane.width_m"
+        yield "container: a scene in a plane has none; leave container out, and give plane.width_m for two walls"
     if scene.fidelity.rows != 1:
         yield f"fidelity.rows: {scene.fidelity.rows} rows of spheres out of the plane; use 1"
 
@@ -78,12 +78,12 @@ def _of_body(scene: SceneView) -> Iterator[str]:
     if scene.plane is None:
         yield f"{key} in a scene without the key plane; links of their own thickness move in a plane, or leave it out"
     if scene.smooth:
-        yield f"{key} on engine: links, whose links are all as thick; use engine: yade, or leave it out"
+        yield f"{key} on engine: links, where all links have one thickness; use engine: yade, or leave it out"
     particle = scene.particle
     least = particle.barb_start + particle.radius
     if particle.boxes.bulge and 0 < particle.boxes.barb_length < least:
         yield (
-            f"{key} leaves nothing outside of barbs that reach {particle.boxes.barb_length:.4g} m from the hinge; "
+            f"{key} leaves no room for a sphere of barbs that reach {particle.boxes.barb_length:.4g} m from the hinge; "
             f"use barbs of at least {least:.4g} m (aspect_ratio {least / particle.boxes.middle_length:.3g}), or a "
             "thinner middle link"
         )
@@ -103,7 +103,7 @@ def _of_container(scene: SceneView) -> Iterator[str]:
             )
     height = scene.container.height_m
     if height is not None:
-        # No random packing of thin bars comes near one half; a scene beyond it cannot fit, whatever the pour.
+        # No random packing of thin bars reaches a packing fraction near 0.5, however it is poured.
         space = math.fsum(t.radius_m**2 * t.height_m for t in tiers) if tiers else radius**2 * height
         most = int(0.5 * math.pi * space / scene.smarticle.boxes.volume)
         if scene.count > most:
@@ -132,10 +132,10 @@ def _of_recording(scene: SceneView) -> Iterator[str]:
             "that the energy ledger would not close; 2e-4 s is dense enough"
         )
     for number, phase in enumerate(scene.phases):
-        # The length of a pour is unknown, and laying out a chain takes no time.
+        # The duration of a pour is unknown, and laying out a chain takes no time.
         duration = phase.known_duration
         if duration and duration < series:
-            # Some phases add their length up from several keys.
+            # The duration of some phases is the sum of several keys.
             key = ".duration_s" if "duration_s" in getattr(type(phase), "model_fields", {}) else ""
             yield (
                 f"phases.{number}{key}: {duration:g} s is shorter than "
@@ -178,13 +178,13 @@ def _of_room(scene: SceneView, hooks: Hooks) -> Iterator[str]:
             f"hooks.upper_height_m: {hooks.upper_height_m:g} m is outside the container, whose wall ends at "
             f"{cylinder.height:g} m; use at most {cylinder.height - hooks.side_m / 2:g} m"
         )
-    # A tier is narrower than those below it: what fits into the highest one that a hook reaches fits into all.
+    # Tiers are narrower upwards: a hook that fits into the highest tier that it reaches fits into all below.
     raised = sum(phase.raises for phase in scene.phases)
     free = float(cylinder.inner_radii(np.array([top + raised]))[0])
     lowest = float(cylinder.inner_radii(np.array([hooks.lower_height_m + hooks.side_m / 2]))[0])
     lower, upper = hooks.crosses
     for key, cross, room in (("length_m", upper, free), ("lower_length_m", lower, lowest)):
-        # Several bars end at the disc, and their corners half a side beyond it.
+        # The bars of a grid end at a disc, their corners half a side beyond its edge.
         beyond = hooks.side_m / 2 if cross.count > 1 else 0.0
         if cross.reach + beyond >= room:
             most = 2 * math.sqrt(max(0.0, (room - 2 * beyond) ** 2 - (hooks.side_m / 2) ** 2))
@@ -195,7 +195,10 @@ def _of_room(scene: SceneView, hooks: Hooks) -> Iterator[str]:
 
 
 def foreign(scene: SceneView) -> Iterator[str]:
-    """Yield key and name of all that other simulators cannot do: they have passive chains of spheres in a cylinder."""
+    """Yield the parts of a scene that LAMMPS and similar codes cannot compute, each as key and name.
+
+    They compute passive chains of spheres in a cylinder.
+    """
     if scene.plane is not None:
         yield "plane: motion in a plane"
     if scene.hooks is not None:
@@ -216,6 +219,6 @@ def _of_lammps(scene: SceneView) -> Iterator[str]:
     if scene.recording.dissipation_interval_s is not None:
         found.append("recording.dissipation_interval_s: what contacts dissipate is not added up")
     if scene.recording.contact_forces:
-        found.append("recording.contact_forces: forces at contacts are not read from it")
+        found.append("recording.contact_forces: forces at contacts are not read from LAMMPS")
     if found:
         yield f"engine: lammps cannot compute {'; '.join(found)}; leave that out, or use engine: yade or links"

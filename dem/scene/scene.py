@@ -1,6 +1,6 @@
 """The scene: validated, frozen description of one run.
 
-`dem.setting` has what is given, `dem.phases` what happens; `dem.scene.rules` checks them against each other.
+Its parts are in `dem.setting`, its phases in `dem.phases`; `dem.scene.rules` checks that they fit together.
 """
 
 from __future__ import annotations
@@ -34,25 +34,25 @@ from dem.setting.protocol import Protocol, with_protocol
 from dem.setting.recording import Recording
 from dem.setting.smarticle import Smarticle
 
-# Diameters from sphere to sphere of the chains that stand for smooth links where poses are drawn, and in pictures: two
-# of them overlap by a thirtieth of a diameter at most before the links do.
+# Distance of neighbouring spheres, in diameters, of the chains that represent smooth links in pours and pictures. Where
+# such chains do not overlap, the links themselves overlap by a thirtieth of a diameter at most.
 SMOOTH_PITCH = 0.35
-_LEAST_GRAVITY = 1e-6  # m/s²; of a tenth of a micron of rock, and motors that are scaled by it have no strength left
+_LEAST_GRAVITY = 1e-6  # m/s²; below it motors, whose torque limit is proportional to gravity, cannot move anything
 
 
 class Scene(Part):
-    """One run: everything that decides its result."""
+    """Description of one run: everything that its result depends on."""
 
     schema_version: Literal[1] = Field(1, description="version of this format [1]")
     engine: Literal["yade", "links", "lammps"] = Field(
         "yade",
-        description="what computes it: yade, chains of spheres on YADE; links, swept segments; or lammps, those chains "
-        "on LAMMPS, on several processes and nodes, for passive scenes",
+        description="engine: yade, chains of spheres on YADE; links, swept segments; or lammps, chains of spheres on "
+        "LAMMPS, on several processes and nodes, for passive scenes",
     )
     protocol: Protocol | None = Field(
         None,
-        description="rules that fill in what the scene leaves open: text, as the paper says, or code, as its own code "
-        "did: motor.law, friction, container, what a shake moves; default: neither",
+        description="rules for keys that the scene leaves open (motor.law, friction, container, what a shake moves): "
+        "text, those of the paper's text, or code, those of the paper's own code; default: neither",
     )
     name: str = Field("scene", min_length=1, max_length=100, description="name for titles and tables")
     seed: int = Field(..., ge=0, lt=2**63, description="the only source of randomness [1]")
@@ -60,7 +60,7 @@ class Scene(Part):
     count: int = Field(..., ge=1, le=100_000, description="N, number of smarticles [1]")
     container: Container = Field(default_factory=Container, description="the container")
     plane: Plane | None = Field(
-        None, description="confine all motion to a plane, between two walls instead of in the container; default: not"
+        None, description="plane that all motion is confined to, between two walls instead of a container; null: none"
     )
     hooks: Hooks | None = Field(None, description="hooks in the pile, for phases that pull one; default: none")
     contact: Contact = Field(default_factory=Contact, description="friction and restitution")
@@ -70,7 +70,7 @@ class Scene(Part):
         default_factory=lambda given: Fidelity(base="standard", **fidelities(given.get("engine", ""))["standard"]),
         description="a name (draft, standard, reference) or a mapping: base and the knobs that differ from it",
     )
-    phases: tuple[AnyPhase, ...] = Field(..., min_length=1, description="stages of the run, in order")
+    phases: tuple[AnyPhase, ...] = Field(..., min_length=1, description="phases of the run, in order")
     recording: Recording = Field(default_factory=Recording, description="frames and series")
 
     @model_validator(mode="before")
@@ -112,7 +112,7 @@ class Scene(Part):
     @model_validator(mode="wrap")
     @classmethod
     def _stiff_enough(cls, data: Any, handler: ModelWrapValidatorHandler[Self]) -> Self:
-        """Raise the stiffness that a fidelity has by its name, where the scene's loads and speeds need more."""
+        """Raise the stiffness of a named fidelity where the scene's loads and speeds need more."""
         scene = handler(data)
         given = data.get("fidelity") if isinstance(data, Mapping) else scene.fidelity
         chosen = given is not None and not isinstance(given, str | Mapping)
@@ -132,7 +132,7 @@ class Scene(Part):
 
     @cached_property
     def cylinder(self) -> Cylinder:
-        """The container as the engine builds it."""
+        """The container of the simulation, with a height where the scene gives none."""
         container, upper = self.container, []
         tiers, bottom = container.tiers or (), 0.0
         for below, tier in pairwise(tiers):
@@ -148,21 +148,24 @@ class Scene(Part):
         )
 
     def ample_height(self, hooks_top: float = 0.0) -> float:
-        """Return the height [m] of a wall for the loosest pile, hooks with their top at `hooks_top`, and a layer.
+        """Return a height of the wall [m] that is enough for the loosest pile, or for hooks, and a layer above.
 
-        A loose random packing of thin bars has φ ≈ 2.4 d/L with L the length of all links (Gravish's φ_0 at l/w = 0,
-        0.7 and 1.4, with d the mean width of the section); half of that is taken as the loosest.
+        A loose random packing of thin bars has the packing fraction φ ≈ 2.4 d/L, with d the mean width of the section
+        and L the length of all three links (Gravish's φ_0 at l/w = 0, 0.7 and 1.4). Half of it is the loosest pile's.
+
+        Args:
+            hooks_top: height of the upper hook's top above the floor [m]; 0 without hooks.
         """
-        # What is poured may come to lie on a hook.
+        # Smarticles may come to lie on a hook.
         pile = self._height_at(1.2)
         return max(pile, hooks_top) + 4 * self.particle.reach + 6 * self.smarticle.middle_length_m
 
     @property
     def loose_height(self) -> float:
-        """Approximate height [m] of the poured pile, by the packing that `ample_height` states.
+        """Approximate height of the poured pile [m], at the packing fraction 2.4 d/L of `ample_height`.
 
-        Of 9 piles of 100 to 160, l/w 0.4 and 0.7, half of the smarticles end below 0.6 to 0.7 of it, and the highest at
-        1.2 to 1.7 of it.
+        In 9 piles of 100 to 160 smarticles with l/w = 0.4 and 0.7, half of the smarticles were below 0.6 to 0.7 of this
+        height, and the highest one was at 1.2 to 1.7 of it.
         """
         return self._height_at(2.4)
 
@@ -174,12 +177,12 @@ class Scene(Part):
 
     @property
     def smooth(self) -> bool:
-        """Whether the engine takes links as they are, swept segments, and not as chains of spheres."""
+        """Whether the engine computes links as swept segments, not as chains of spheres."""
         return self.engine == "links"
 
     @property
     def sphere_diameter(self) -> float:
-        """Sphere diameter [m]: given, or by the rule that `Fidelity.diameter_m` states."""
+        """Sphere diameter [m]: `fidelity.diameter_m`, or the default that its description states."""
         if self.fidelity.diameter_m is not None:
             return self.fidelity.diameter_m
         smarticle = self.smarticle
@@ -190,16 +193,16 @@ class Scene(Part):
         return smarticle.thickness_in_plane_m
 
     def seed_for(self, purpose: str) -> int:
-        """Derive a 64-bit seed for one purpose, from the scene's seed alone.
+        """Return a 64-bit seed for one purpose, derived from the scene's seed alone.
 
-        Scenes that differ in fidelity only get the same poses, so that fidelities are compared on equal terms.
+        Scenes that differ in fidelity only begin with identical poses, so that fidelities can be compared.
         """
         digest = hashlib.sha256(f"{self.seed}/{purpose}".encode()).digest()
         return int.from_bytes(digest[:8], "big")
 
     @property
     def torque_limit(self) -> float:
-        """τ_max [N m] of the motors: given, or by the rule that `Motor.torque_limit_N_m` states."""
+        """Torque limit τ_max [N m]: `motor.torque_limit_N_m`, or the default that its description states."""
         if self.motor.torque_limit_N_m is not None:
             return self.motor.torque_limit_N_m
         paper = self.smarticle.model_copy(update={"aspect_ratio": REFERENCE_ASPECT_RATIO}).boxes
@@ -207,7 +210,7 @@ class Scene(Part):
 
     @cached_property
     def motor_strengths(self) -> Array | None:
-        """(N, 2) factors on τ_max and stiffness of the motors [1]; None where all are alike."""
+        """(N, 2) factors on τ_max and stiffness of the motors [1]; None where all motors are equal."""
         spread = self.motor.strength_spread
         if not spread:
             return None
@@ -216,28 +219,28 @@ class Scene(Part):
 
     @property
     def channel(self) -> Channel | None:
-        """Table and walls as the engine builds them, in a scene that is confined to a plane."""
+        """Table and walls of a scene in a plane; None in a container."""
         if self.plane is None:
             return None
         return Channel(width=self.plane.width_m, table=-self.smarticle.thickness_normal_m / 2)
 
     @property
     def actuates(self) -> bool:
-        """Whether a phase moves the barbs or holds them, so that there are hinges and motors."""
+        """Whether any phase moves or holds barbs by motors, so that smarticles have hinges."""
         return any(phase.actuates for phase in self.phases)
 
     @property
     def pulled_by(self) -> tuple[tuple[float, float], ...]:
-        """Stiffness [N/m] and damping [N s/m] of the strings of each phase that pulls by some."""
+        """(stiffness [N/m], damping [N s/m]) of the strings, for each phase that has strings."""
         return tuple(phase.pulled_by for phase in self.phases if phase.pulled_by is not None)
 
     def calls_for(self, effect: EffectName) -> bool:
-        """Return whether a phase calls for an effect."""
+        """Return whether any phase needs an effect."""
         return any(effect in phase.calls(self, index) for index, phase in enumerate(self.phases))
 
     @cached_property
     def particle(self) -> Particle:
-        """The smarticle as the engine sees it."""
+        """One smarticle, with the spheres that represent it."""
         diameter = self.sphere_diameter
         pitch = SMOOTH_PITCH if self.smooth else self.fidelity.pitch
         chain = SphereChain(rows=self.fidelity.rows, diameter=diameter, pitch=pitch * diameter)

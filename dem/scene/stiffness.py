@@ -1,9 +1,9 @@
-"""How far contacts give way in a scene, from its loads and speeds, and how stiff they have to be.
+"""Estimates of the largest overlaps in a scene from its loads and speeds, and of the stiffness that contacts need.
 
-Estimates: the hardest impact, of `typical_effective_mass` at the greatest speed that a phase gives and a fall by w; the
-pile's weight times 1 + Γ, on two contacts of as many smarticles as can lie on the floor; a hook that lifts the pile's
-weight, by four contacts. The overlap of an impact falls with the root of the stiffness, that of a load with the
-stiffness itself.
+Three loads count. The hardest impact: the typical effective mass at the greatest speed that a phase causes, plus a fall
+by w. The pile's weight times 1 + Γ, on two contacts of each of the smarticles that can lie on the floor. The pile's
+weight on the four contacts of a hook that lifts it. The overlap of an impact is proportional to the inverse root of the
+stiffness, the overlap of the other loads to the inverse of the stiffness.
 """
 
 from __future__ import annotations
@@ -17,19 +17,19 @@ from dem.phases.pull_hook import PullHook
 from dem.phases.shake import Shake
 from dem.physics.contact import typical_effective_mass
 
-WANTED, LIMIT = 0.3, 0.5  # mean widths that contacts may give way by, and from which on they are too soft
+WANTED, LIMIT = 0.3, 0.5  # overlaps over a link's mean width: aim of `stiffness_for`, and most that is accepted
 
 
 class Overlap(NamedTuple):
     """An expected overlap."""
 
-    cause: str  #: In words
+    cause: str  #: The load in words
     widths: float  #: Overlap over the mean width of a link's section, 2 (t1 + t2)/π [1]
     stiffness: float  #: kn at which it is `WANTED` [N/m]
 
 
 def expected_overlaps(scene: SceneView) -> tuple[Overlap, ...]:
-    """Return the expected overlaps of a scene: impact, weight, and a hook's pull where there is one."""
+    """Return the expected overlaps of a scene: of an impact, of the weight, and of a hook if one is pulled."""
     gravity, stiffness, smarticle = scene.gravity_m_per_s2, scene.fidelity.stiffness_N_per_m, scene.smarticle
     width, boxes = smarticle.middle_length_m, smarticle.boxes
     thickness = mean_width(smarticle.thickness_normal_m, smarticle.thickness_in_plane_m)
@@ -50,7 +50,7 @@ def expected_overlaps(scene: SceneView) -> tuple[Overlap, ...]:
 
 
 def stiffness_for(scene: SceneView) -> float:
-    """Return the stiffness [N/m] at which no expected overlap is more than `WANTED`, rounded up to two digits."""
+    """Return the least stiffness kn [N/m] that keeps expected overlaps within `WANTED`, rounded up to two digits."""
     needed = max(overlap.stiffness for overlap in expected_overlaps(scene))
     if needed <= 0.0:
         return 0.0
@@ -59,7 +59,7 @@ def stiffness_for(scene: SceneView) -> float:
 
 
 def too_soft(scene: SceneView) -> str | None:
-    """Return why contacts are too soft, in one line: they give way by more than `LIMIT`; None where they do not."""
+    """Return a message if an expected overlap exceeds `LIMIT`, so that contacts are too soft; None otherwise."""
     worst = max(expected_overlaps(scene), key=lambda overlap: overlap.widths)
     if worst.widths <= LIMIT:
         return None

@@ -1,4 +1,4 @@
-"""YAML read strictly: the one reader of scenes, sweeps and templates."""
+"""Strict reader of YAML, for scenes, sweeps and templates."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import yaml
 
 from dem.errors import InputError
 
-# YAML 1.1 takes 1e-3 and 5E2 for text; everyone who writes them means numbers, as YAML 1.2 does.
+# YAML 1.1 takes 1e-3 and 5E2 for text; YAML 1.2 takes them for numbers, as their writers do.
 _FLOAT = re.compile(
     r"""[-+]?(?:[0-9][0-9_]*\.[0-9_]*(?:[eE][-+]?[0-9]+)?
         |[0-9][0-9_]*[eE][-+]?[0-9]+
@@ -19,7 +19,7 @@ _FLOAT = re.compile(
         |\.(?:nan|NaN|NAN))\Z""",
     re.VERBOSE,
 )
-# YAML 1.1 reads 1:30 as 90 and 010 as 8; here both are text, which no number's key takes.
+# YAML 1.1 reads 1:30 as 90 and 010 as 8; here both are text, which keys of numbers reject.
 _INT = re.compile(r"[-+]?(?:0|[1-9][0-9_]*)\Z")
 _OWN = ("tag:yaml.org,2002:float", "tag:yaml.org,2002:int")
 
@@ -54,18 +54,18 @@ StrictLoader.add_implicit_resolver("tag:yaml.org,2002:int", _INT, list("-+012345
 
 
 def load_yaml(text: str, loader: type[StrictLoader] = StrictLoader) -> Any:
-    """Return what a YAML text holds.
+    """Return the data of a YAML text.
 
     Raises:
         yaml.YAMLError: the text is not YAML; `parse_yaml` explains it to users.
     """
     try:
-        # A SafeLoader underneath: no Python objects can be made.
+        # The loader is a SafeLoader, which makes no Python objects.
         return yaml.load(text, Loader=loader)
     except ValueError as error:
         digits = sys.get_int_max_str_digits()
         lengthy = f"Exceeds the limit ({digits} digits)" in str(error)
-        # Else a date that does not exist.
+        # Otherwise the text has a date that does not exist.
         problem = f"a whole number of more than {digits} digits" if lengthy else str(error)
         raise yaml.YAMLError(problem) from error
     except RecursionError as error:
@@ -73,7 +73,7 @@ def load_yaml(text: str, loader: type[StrictLoader] = StrictLoader) -> Any:
 
 
 def parse_yaml(text: str, source: str, loader: type[StrictLoader] = StrictLoader) -> Any:
-    """Return what a YAML text holds; `source` is its name in messages.
+    """Return the data of a YAML text; `source` is the text's name in messages.
 
     Raises:
         InputError: the text is not YAML; the message names the line.

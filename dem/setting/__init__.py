@@ -1,1 +1,1 @@
-"""What is given before anything happens: smarticle, container, contact, motors, fidelity, recording; as data."""
+"""Parts of a scene as data: smarticle, container, hooks, contact, motors, motions, fidelity, recording."""

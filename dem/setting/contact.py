@@ -1,4 +1,4 @@
-"""Contact of smarticles with each other and with the container, as a scene states it."""
+"""Contact parameters of a scene."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from dem.setting.part import Part
 
 
 class Contact(Part):
-    """Contact of smarticles with each other and with the container."""
+    """Friction, restitution and damping of contacts between smarticles, and of smarticles with the container."""
 
     friction_smarticle: float = Field(0.4, ge=0, le=10, description="Coulomb coefficient, smarticle-smarticle [1]")
     friction_wall: float = Field(0.4, ge=0, le=10, description="Coulomb coefficient, smarticle-container [1]")
@@ -16,8 +16,8 @@ class Contact(Part):
         0.7,
         ge=0.01,
         le=1,
-        description="normal restitution of a single contact at a typical lever, where the effective mass is the "
-        "harmonic mean over the smarticle's spheres and directions [1]; 0.7: steel on steel below 1 m/s",
+        description="normal coefficient of restitution of a single contact at the typical effective mass, the harmonic "
+        "mean over the smarticle's spheres and directions [1]; 0.7: steel on steel below 1 m/s",
     )
     tangential_stiffness_ratio: float = Field(
         0.82, ge=1e-3, le=1, description="ks/kn [1]; Mindlin's 2(1-ν)/(2-ν) is 0.82 for steel, ν = 0.3"

@@ -1,4 +1,4 @@
-"""The container: an upright cylinder, closed at the bottom; or tiers of them, narrower upwards."""
+"""The container: an upright cylinder, closed at the bottom; or several coaxial cylinders, narrower upwards."""
 
 from __future__ import annotations
 
@@ -28,8 +28,8 @@ class Container(Part):
     height_m: Length | None = Field(None, description="height of the wall [m]; by default high enough for the pour")
     packing_radius_m: Length | None = Field(
         None,
-        description="radius that packing fractions are computed with [m], where it is not the wall's, as in the "
-        "paper's own code; by default radius_m",
+        description="radius for packing fractions [m]; default: radius_m; the paper's own code takes another one than "
+        "its wall's",
     )
 
     tiers: tuple[Tier, ...] | None = Field(
@@ -42,7 +42,7 @@ class Container(Part):
     @model_validator(mode="before")
     @classmethod
     def _size_of_tiers(cls, data: Any) -> Any:
-        # Where one radius and one height are needed, they are the widest and the whole one.
+        # Tiers set radius_m to the widest radius, and height_m to the sum of their heights.
         try:
             radii, heights = ([0.0 + tier[key] for tier in data["tiers"]] for key in ("radius_m", "height_m"))
             size = {"radius_m": radii[0], "height_m": math.fsum(heights)}
@@ -69,38 +69,38 @@ class Container(Part):
             for key, own in (("radius_m", tiers[0].radius_m), ("height_m", whole)):
                 given = getattr(self, key)
                 if given is not None and not math.isclose(given, own, rel_tol=1e-9):
-                    raise ValueError(f"{key}: {given:g} m, but tiers make it {own:g} m; leave {key} out")
+                    raise ValueError(f"{key}: {given:g} m, but tiers give {own:g} m; leave {key} out")
         return self
 
     @property
     def measured_radius(self) -> float:
-        """Radius [m] that packing fractions are computed with."""
+        """Radius for packing fractions [m]."""
         return self.radius_m if self.packing_radius_m is None else self.packing_radius_m
 
 
 @dataclass(frozen=True, kw_only=True)
 class Cylinder:
-    """The container as the engine builds it. Lengths in m."""
+    """The container of a simulation, its wall made of flat facets. Lengths in m."""
 
     radius: float  #: Of the lowest tier
-    height: float
-    facets: int
-    #: (bottom, radius) of the tiers above the lowest, from below; each one ends where the next begins
+    height: float  #: Of the wall's top above the floor
+    facets: int  #: Flat facets around the wall
+    #: (bottom, radius) of the tiers above the lowest, from below; each tier ends where the next begins
     upper: tuple[tuple[float, float], ...] = ()
 
     @property
     def corner_radius(self) -> float:
-        """Distance [m] of the wall's edges from the axis: the polygon has the area of the circle."""
+        """Distance of the wall's vertical edges from the axis [m]; the polygon has the circle's area."""
         return self.corner_radius_of(self.radius)
 
     def corner_radius_of(self, radius: float) -> float:
-        """Return the distance [m] of the wall's edges from the axis, of a tier with a radius [m]."""
+        """Return the distance [m] of the wall's vertical edges from the axis in a tier of a radius [m]."""
         turn = 2 * math.pi / self.facets
         return radius * math.sqrt(turn / math.sin(turn))
 
     @property
     def inner_radius(self) -> float:
-        """Distance [m] of the wall's flats from the axis, a little less than the radius."""
+        """Distance of the wall's flats from the axis [m], slightly less than the radius."""
         return self.corner_radius * math.cos(math.pi / self.facets)
 
     @property
@@ -109,10 +109,13 @@ class Cylinder:
         return -0.1 * self.radius
 
     def radii(self, heights: Array) -> Array:
-        """Return the radii [m] of the tiers at heights above the floor [m]; a tier begins above its bottom."""
+        """Return the container's radii [m] at heights above the floor [m], in the shape of `heights`.
+
+        At the height of a step the radius is that of the tier below the step.
+        """
         steps, radii = [bottom for bottom, _ in self.upper], [self.radius, *(radius for _, radius in self.upper)]
         return np.asarray(np.array(radii)[np.searchsorted(steps, heights, side="left")])
 
     def inner_radii(self, heights: Array) -> Array:
-        """Return the distances [m] of the flats from the axis, at heights above the floor [m]."""
+        """Return the distances [m] of the wall's flats from the axis at heights above the floor [m]."""
         return self.radii(heights) * (self.inner_radius / self.radius)

@@ -1,4 +1,4 @@
-"""Accuracy against cost: knobs, and named sets of their values."""
+"""Knobs, the numerical parameters that trade accuracy for cost, and named sets of their values."""
 
 from __future__ import annotations
 
@@ -11,16 +11,16 @@ from dem.setting.part import Length, Part, Stiffness
 
 
 class Fidelity(Part):
-    """Knobs of accuracy against cost; none of them changes mass or inertia."""
+    """Knobs that trade accuracy for cost; none of them changes mass or inertia."""
 
     base: Literal["draft", "standard", "reference"] = Field(
-        "standard", description="named setting that the other knobs start from"
+        "standard", description="named fidelity that gives the default of all other knobs"
     )
     rows: int = Field(..., ge=1, le=4, description="rows of spheres across t1, the thickness along the normal [1]")
     diameter_m: Length | None = Field(
         None,
-        description="sphere diameter [m]; default: one row such that two crossing chains touch at the same mean "
-        "distance as two bars of the true section, 2(t1+t2)/π; several rows t2, the true section",
+        description="sphere diameter [m]; default with one row: such that two crossing chains touch at the mean "
+        "distance of two bars of the true section, 2(t1+t2)/π; with several rows: t2",
     )
     pitch: float = Field(
         ...,
@@ -40,7 +40,7 @@ class Fidelity(Part):
         None,
         ge=1e-12,
         le=1,
-        description="time step [s] by hand; rejected above the stable one; default: from the fraction",
+        description="time step [s]; rejected above the stable one; default: time_step_fraction of the stable one",
     )
     wall_facets: int = Field(64, ge=16, le=512, description="flat facets around the cylinder's wall [1]")
     control_interval_s: float = Field(
@@ -54,8 +54,8 @@ class Fidelity(Part):
     )
 
 
-# The pin of standard and reference gives way by 1 % of a sphere's diameter under a pull of 100 times the own weight, up
-# to l/w = 1; the softer one of draft allows longer time steps and gives way by as much in a pile that is actuated.
+# The pin of standard and reference gives way by 1 % of a sphere's diameter under a pull of 100 times a smarticle's
+# weight, up to l/w = 1. The softer pin of draft allows longer time steps, and gives way by 1 % in an actuated pile.
 _STANDARD = {
     "rows": 1,
     "pitch": 1.0,
@@ -70,8 +70,8 @@ FIDELITIES: Mapping[str, Mapping[str, Any]] = {
     "reference": {**_STANDARD, "rows": 2},
 }
 
-# On the links engine, chosen by results/accuracy-links; pitch and hinge stiffness have no meaning there. Its stable
-# step may be used to the full (results/stability): at l/w = 0.7 two steps make a control period, where 0.9 needs three.
+# For the engine links, from results/accuracy-links; it ignores pitch and hinge stiffness. All steps up to the stable one
+# are safe (results/stability); at l/w = 0.7 the fraction 0.92 gives two steps per control period, where 0.9 gives three.
 _LINKS = {**_STANDARD, "time_step_fraction": 0.92}
 _BY_ENGINE: Mapping[str, Mapping[str, Mapping[str, Any]]] = {
     "links": {
@@ -83,8 +83,11 @@ _BY_ENGINE: Mapping[str, Mapping[str, Mapping[str, Any]]] = {
 
 
 def fidelities(engine: str) -> Mapping[str, Mapping[str, Any]]:
-    """Return the named fidelities of an engine as in `Scene.engine`, from coarse to fine; of YADE for an unknown one.
+    """Return the named fidelities of an engine, from coarse to fine: keys of `Fidelity` with values, by name.
 
-    A name means about the same errors on all engines.
+    A named fidelity has similar errors on all engines.
+
+    Args:
+        engine: a name as in `Scene.engine`; an unknown name gives the fidelities for YADE.
     """
     return _BY_ENGINE.get(engine, FIDELITIES)

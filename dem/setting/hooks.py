@@ -1,4 +1,4 @@
-"""Hooks in the pile, as data."""
+"""Hooks in the pile, which a phase pulls."""
 
 from __future__ import annotations
 
@@ -19,10 +19,10 @@ TOLERANCE = 1e-9  # relative; lengths and times that meet their limit up to roun
 
 
 class Hooks(Part):
-    """Two horizontal crosses on the axis, each of two square bars at right angles; in place before the pour.
+    """Two horizontal crosses on the container's axis, in place before the pour: each of two square bars.
 
-    The lower one may be a grid of bars, which holds a pile by its whole floor. They rub and damp like the container,
-    and move with it.
+    The lower hook may be a grid of bars, which holds the pile over its whole cross-section. Hooks have the container's
+    friction and damping, and move with the container.
     """
 
     side_m: Length = Field(..., description="side of the bars' square section [m]; default: thickness_in_plane_m, t2")
@@ -34,7 +34,7 @@ class Hooks(Part):
         ..., description="height of the upper cross's centre above the floor at the start [m]; default: 20 t2"
     )
     lower_length_m: Length = Field(
-        ..., description="length of the lower cross's bars, diameter of a grid of several [m]; default: length_m"
+        ..., description="length of the lower cross's bars, or diameter of a grid of bars [m]; default: length_m"
     )
     lower_bars: int = Field(
         1,
@@ -50,18 +50,18 @@ class Hooks(Part):
         return lower, Cross(height=self.upper_height_m, side=self.side_m, length=self.length_m)
 
 
-# Widths w and thicknesses t2 that the keys are by default.
+# (a, b): the default is a w + b t2.
 _HOOK_DEFAULTS = {"side_m": (0, 1), "length_m": (1, 0), "lower_height_m": (0, 10), "upper_height_m": (0, 20)}
 
 
 def with_hook_defaults(hooks: Any, smarticle: Smarticle) -> Any:
-    """Fill in the keys of `Hooks` that follow from the smarticle; leave the rest to validation."""
+    """Return data of `Hooks`, not yet validated, with the missing keys that follow from the smarticle."""
     filled = with_defaults(hooks, _HOOK_DEFAULTS, smarticle)
     return {"lower_length_m": filled["length_m"]} | filled if isinstance(filled, dict) else filled
 
 
 def with_defaults(data: Any, defaults: Mapping[str, tuple[int, int]], smarticle: Smarticle) -> Any:
-    """Fill in keys whose defaults are multiples of width w and thickness t2."""
+    """Return data with missing keys filled in; the default of a key with (a, b) is a w + b t2."""
     if not isinstance(data, Mapping):
         return data
     w, t2 = smarticle.middle_length_m, smarticle.thickness_in_plane_m
@@ -69,24 +69,24 @@ def with_defaults(data: Any, defaults: Mapping[str, tuple[int, int]], smarticle:
 
 
 class Bar(NamedTuple):
-    """One bar of a hook: (x, y) of its middle from the axis, and half edges along x, y, z [m]."""
+    """One bar of a hook."""
 
-    middle: tuple[float, float]
-    half: tuple[float, float, float]
+    middle: tuple[float, float]  #: (x, y) of its centre, from the container's axis [m]
+    half: tuple[float, float, float]  #: Half the lengths of its edges along x, y, z [m]
 
 
 @dataclass(frozen=True, kw_only=True)
 class Cross:
-    """One hook as the engine builds it. Lengths in m."""
+    """One hook of a simulation. Lengths in m."""
 
     height: float  #: Of the centre above the floor
     side: float  #: Of the bars' square section
-    length: float  #: Of the bars, which lie along x and y; of several, diameter of the disc that they end at
-    count: int = 1  #: Bars along x, and as many along y, evenly spaced
+    length: float  #: Length of the two bars; of more bars, diameter of the disc at whose edge they end
+    count: int = 1  #: Number of bars along x, and of bars along y, evenly spaced
 
     @property
     def bars(self) -> tuple[Bar, ...]:
-        """The bars, one along x and one along y in turn."""
+        """The bars: one along x and one along y in turn."""
         found: list[Bar] = []
         for k in range(self.count):
             place = self.length * ((k + 1) / (self.count + 1) - 0.5)
@@ -96,11 +96,14 @@ class Cross:
 
     @property
     def reach(self) -> float:
-        """Largest distance [m] of the bars from the axis: that of the corners at their ends."""
+        """Largest distance of the bars' corners from the axis [m]."""
         return max(math.hypot(abs(x) + a, abs(y) + b) for (x, y), (a, b, _) in self.bars)
 
     def obstacles(self, diameter: float) -> Array:
-        """Return (n, 3) points [m]: a sphere of `diameter` [m] at least a diameter from all of them touches no bar."""
+        """Return (n, 3) points in the bars [m], as obstacles for spheres of a diameter [m].
+
+        A sphere whose centre is at least a diameter away from all points touches no bar.
+        """
         # No point of a bar is farther than √3/2 of the spacing from the grid, less than the radius that is kept away.
         points: list[tuple[float, ...]] = []
         for bar in self.bars:

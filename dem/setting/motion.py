@@ -1,9 +1,9 @@
 """Motions of a barb: its angle as a function of time, as data.
 
-A motion begins at the angle where the barb is, and may depend on it; a sequence begins each of its steps where the step
-before ended. Evaluation is exact at any time, for many smarticles at once: no state is kept between two times.
+A motion begins at the barb's present angle and may depend on it. Each step of a sequence begins at the angle at which
+the previous step ended. Angles are computed for many smarticles at once, at any time, without a state in between.
 
-In a scene file angles are in degrees, in this module's functions in radians.
+Angles are in degrees in a scene file, and in radians in this module's functions.
 """
 
 from __future__ import annotations
@@ -22,62 +22,70 @@ from dem.arrays import Array
 from dem.setting.part import Duration, Frequency, HingeAngle, Part, Turning
 
 Angles = Array | float
-Course = Callable[[Array], Array]  # a motion that has begun: times [s] since then to angles [rad]
+Course = Callable[[Array], Array]  # function from times since the beginning of a motion [s] to angles [rad]
 
 
 @dataclass(frozen=True)
 class Leg:
-    """One stretch of a motion that is no sequence."""
+    """One simple motion within a motion."""
 
-    key: str  #: Of the motion below the one that it is a leg of, "" or e.g. "steps.1".
+    key: str  #: Key of the simple motion within the whole: "" for the whole, or e.g. "steps.1"
     motion: SimpleMotion
-    start: Array  #: Angles [rad] at its beginning
-    home: Array  #: Angles [rad] at the beginning of the phase
-    until: float  #: Its length [s]
+    start: Array  #: Angles at the beginning of the leg [rad]
+    home: Array  #: Angles at the beginning of the phase [rad]
+    until: float  #: Duration of the leg [s]
 
     def extent(self) -> tuple[Array, Array, float]:
-        """Return the lowest and the highest angle [rad] for each start, and the greatest speed [rad/s] over all."""
+        """Return the lowest and the highest angle [rad] for each of `start`, and the greatest speed [rad/s] of all."""
         low, high, speed = self.motion.extent(self.start, self.home, self.until)
         return low + np.zeros_like(self.start), high + np.zeros_like(self.start), float(np.max(speed))
 
 
 class BaseMotion(Part):
-    """What all motions have in common."""
+    """Base of all motions."""
 
     type: str
 
     @property
     def duration(self) -> float:
-        """Length [s]; inf: as long as its phase."""
+        """Duration [s]; inf where the motion lasts as long as its phase."""
         raise NotImplementedError
 
     @property
     def period(self) -> float | None:
-        """Time [s] after which the motion repeats itself; None: it does not."""
+        """Period after which the motion repeats itself [s]; None where it does not."""
         return None
 
     def course(self, start: Array, home: Array) -> Course:
-        """Return the motion from angles `start` [rad] on, in a phase that began at angles `home` [rad]."""
+        """Return the angles over time of a motion that begins at angles `start` [rad].
+
+        Args:
+            start: angles at the beginning of the motion [rad].
+            home: angles at the beginning of the phase, in the shape of `start` [rad].
+        """
         raise NotImplementedError
 
     def legs(self, start: Array, home: Array, until: float) -> Iterator[Leg]:
-        """Yield the stretches of the motion up to the time `until` [s]; of repetitions only those that differ."""
+        """Yield the simple motions within the motion in order, up to the time `until` [s].
+
+        Legs that begin at equal angles in all further repetitions of a sequence are yielded only once.
+        """
         raise NotImplementedError
 
     def end(self, start: Array, home: Array) -> Array:
-        """Return the angles [rad] at the end of a motion of finite length."""
+        """Return the angles [rad] at the end of a motion of finite duration; arguments as in `course`."""
         return self.course(start, home)(np.array(self.duration))
 
 
 class SimpleMotion(BaseMotion):
-    """A motion that is no sequence of others."""
+    """Base of all motions except sequences."""
 
     pace: ClassVar[tuple[str, str]] = ("duration_s", "s")  # the key that sets the speed, and its unit
 
     def extent(self, start: Array, home: Array, until: float) -> tuple[Angles, Angles, Angles]:
         """Return lowest and highest angle [rad] and greatest speed [rad/s] up to the time `until` [s].
 
-        A jump does not count for the speed: the motor follows it at its speed limit.
+        Jumps of the angle do not count as speed, since motors follow them at their speed limit.
         """
         raise NotImplementedError
 
@@ -86,7 +94,7 @@ class SimpleMotion(BaseMotion):
 
 
 class _Endless(SimpleMotion):
-    """A motion that lasts as long as its phase, unless it is given an end."""
+    """A motion that lasts as long as its phase, unless `duration_s` is given."""
 
     duration_s: Duration | None = Field(None, description="length [s]; default: as long as the phase")
 
@@ -117,16 +125,16 @@ class _Straight(SimpleMotion):
         return self.duration_s
 
     def goal(self, home: Array) -> Array:
-        """Angles [rad] at the end."""
+        """Return the angles [rad] at the end of the turn."""
         raise NotImplementedError
 
     def course(self, start: Array, home: Array) -> Course:
         goal, length = self.goal(home), self.duration_s
 
         def at(times: Array) -> Array:
-            share = np.minimum(np.maximum(times / length, 0.0), 1.0)
+            done = np.minimum(np.maximum(times / length, 0.0), 1.0)
             # Weighted so that both ends are exact.
-            return np.asarray((1.0 - share) * start + share * goal)
+            return np.asarray((1.0 - done) * start + done * goal)
 
         return at
 
@@ -155,14 +163,14 @@ class Return(_Straight):
 
 
 class _Wave(_Endless):
-    """Swing about an angle, up first; the first point is jumped to."""
+    """Swing about an angle, upwards first; the barb jumps to the first angle of the swing."""
 
     centre_deg: HingeAngle = Field(..., description="angle that the barb swings about [deg]")
     amplitude_deg: float = Field(
         ..., ge=1e-6, le=120, description="largest distance from the centre, half the full swing [deg]"
     )
     cycles_offset: float = Field(
-        0.0, ge=-1e6, le=1e6, description="cycles that lie behind at the beginning; 0.25: starts on top [1]"
+        0.0, ge=-1e6, le=1e6, description="phase at the beginning in cycles [1]; 0.25: begins at the highest angle"
     )
 
     @property
@@ -176,11 +184,11 @@ class _Wave(_Endless):
 
     @property
     def fastest(self) -> float:
-        """Greatest speed [rad/s], reached in every half cycle."""
+        """Greatest speed of the swing [rad/s], reached in every half cycle."""
         raise NotImplementedError
 
     def swing(self, cycles: Array) -> Array:
-        """Return the distance from the centre over the amplitude [1] after a number of cycles."""
+        """Return the deviation from the centre over the amplitude [1], -1 to 1, after a number of cycles."""
         raise NotImplementedError
 
     def course(self, start: Array, home: Array) -> Course:
@@ -192,7 +200,7 @@ class _Wave(_Endless):
         first = self.cycles_offset
         last = first + self.frequency * until
         ends = self.swing(np.array([first, last] if math.isfinite(last) else [first]))
-        # Tops lie a quarter of a cycle after whole numbers of cycles, bottoms three quarters.
+        # The highest angle is reached a quarter of a cycle after whole numbers of cycles, the lowest three quarters.
         high = 1.0 if np.floor(last - 0.25) >= np.ceil(first - 0.25) else float(ends.max())
         low = -1.0 if np.floor(last - 0.75) >= np.ceil(first - 0.75) else float(ends.min())
         centre, amplitude = math.radians(self.centre_deg), math.radians(self.amplitude_deg)
@@ -206,7 +214,7 @@ _COSINE = (4.16666666666666019037e-02, -1.38888888888741095749e-03, 2.4801587289
 
 
 def sine_of(cycles: Array) -> Array:
-    """Return sin(2π cycles) [1], with the same bits on every processor; NumPy's sine depends on the vector unit.
+    """Return sin(2π cycles) [1] with identical bits on every processor, unlike NumPy's sine.
 
     Source: kernels of fdlibm (Sun Microsystems, 1993), after a reduction to an eighth of a cycle that is exact.
     """
@@ -222,7 +230,7 @@ def sine_of(cycles: Array) -> Array:
 
 
 class Sine(_Wave):
-    """Swing about an angle like a pendulum: centre + amplitude · sin(2π (frequency · t + offset))."""
+    """Swing sinusoidally about an angle: centre + amplitude · sin(2π (frequency · t + offset))."""
 
     type: Literal["sine"]
     frequency_hz: Frequency = Field(..., description="cycles per second [Hz]")
@@ -263,12 +271,12 @@ class Triangle(_Wave):
 
 
 class Sequence(BaseMotion):
-    """Motions one after the other, each from where the one before ended, once or again and again."""
+    """Run motions in order, once or repeatedly; each begins at the angle at which the previous one ended."""
 
     type: Literal["sequence"]
     steps: tuple[Motion, ...] = Field(..., description="motions in order, at least one")
     repeat: int | None = Field(
-        1, ge=1, le=1_000_000, description="how often the steps are run [1]; null: as long as the phase"
+        1, ge=1, le=1_000_000, description="number of times that all steps are run [1]; null: as long as the phase"
     )
 
     @model_validator(mode="after")
@@ -279,7 +287,7 @@ class Sequence(BaseMotion):
         for number, step in enumerate(self.steps[:-1] if once else self.steps):
             if math.isinf(step.duration):
                 where = "each step but the last" if once else "each step of a sequence that is repeated"
-                # What is missing in a sequence stands in the sequence: it repeats for ever, or its last step does.
+                # A nested sequence has no end because of its own `repeat`, or because of its last step.
                 key = "finite repeat" if isinstance(step, Sequence) and step.repeat is None else "duration_s"
                 raise ValueError(f"steps.{number}: {step.type} has no end; give it a {key}, as {where} needs one")
         return self
@@ -294,7 +302,7 @@ class Sequence(BaseMotion):
 
     @property
     def period(self) -> float | None:
-        # The first time through may differ, as it starts elsewhere.
+        # Repetitions are alike from the second one on; the first may begin at another angle.
         return None if self.repeat == 1 else sum(self._lengths)
 
     def _courses(self, start: Array, home: Array) -> list[Course]:
@@ -306,7 +314,7 @@ class Sequence(BaseMotion):
         return courses
 
     def end(self, start: Array, home: Array) -> Array:
-        # However often the steps are repeated: each time ends alike.
+        # All repetitions end at one angle.
         for step in self.steps:
             start = step.end(start, home)
         return start
@@ -316,11 +324,11 @@ class Sequence(BaseMotion):
         begins = [0.0, *accumulate(self._lengths[:-1])]
         courses = self._courses(start, home)
         if repeated:
-            # From the second time on all repetitions are alike: wherever the steps begin, they end at a fixed angle,
-            # or, if all of them hold or return, where they began.
+            # From the second one on all repetitions are alike: the steps end at an angle that does not depend on where
+            # they began, or, if all of them hold or return, at the angle where they began.
             courses += self._courses(self.end(start, home), home)
 
-        # An end belongs to what ends there, so that the last angle of a sequence is that of its last step.
+        # At the time at which a step ends its own angle counts, so that a sequence ends at the angle of its last step.
         def at_one(time: float, times: Array) -> Array:
             cycle = max(math.ceil(time / length) - 1, 0) if repeated else 0
             begun = cycle * length if cycle else 0.0
@@ -328,7 +336,7 @@ class Sequence(BaseMotion):
             return courses[step + count * (cycle > 0)](times - (begun + begins[step]))
 
         def at(times: Array) -> Array:
-            if times.size == 1:  # as for smarticles that move together, at every control update
+            if times.size == 1:  # smarticles that move together, at every control update: the fast case
                 return at_one(times.item(), times)
             cycles = np.maximum(np.ceil(times / length) - 1, 0) if repeated else np.zeros_like(times)
             local = times - cycles * length if repeated else times

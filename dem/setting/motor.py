@@ -1,4 +1,4 @@
-"""The motors of the hinges, as a scene states them."""
+"""Motor parameters of a scene."""
 
 from __future__ import annotations
 
@@ -10,23 +10,23 @@ from dem.setting.part import Part, Turning
 
 
 class Motor(Part):
-    """The motor of each hinge: velocity-controlled, of limited torque."""
+    """The motor of each hinge, velocity-controlled and with a torque limit."""
 
     torque_limit_N_m: float | None = Field(
         None,
         ge=1e-15,
         le=1e6,
-        description="τ_max [N m]; default: the weight of the smarticle with l/w = 0.7 of this material and section "
-        "at the lever w",
+        description="τ_max [N m]; default: w times the weight of a smarticle with this w, section and density, and "
+        "with l/w = 0.7",
     )
     speed_limit_rad_per_s: Turning = Field(6.0, description="ω, greatest speed of a motor [rad/s]")
     law: Literal["halt", "stall", "ease", "slip", "servo"] = Field(
         "halt",
-        description="at τ_max or above: halt: the motor stops advancing towards the load and holds; stall: it does not "
-        "move in either direction, the paper's rule to the letter; ease: it goes on at half the speed, and stops after "
-        "20 findings in a row of both barbs in turn, the rule of the paper's own code; slip: it gives way, a spring "
-        "capped at τ_max; servo: as slip, and damped: proportional and derivative gain, the torque as a whole capped "
-        "at τ_max",
+        description="what a motor does at τ_max or above: halt: it stops advancing against the load and holds; stall: "
+        "it moves in neither direction, the literal rule of the paper's text; ease: it goes on at half the speed, and "
+        "stops when 20 barbs in a row, both barbs of a smarticle in turn, were found there, the rule of the paper's "
+        "own code; slip: it gives way like a spring whose torque is capped at τ_max; servo: proportional and derivative "
+        "gain, with the total torque capped at τ_max",
     )
     stiffness_N_m_per_rad: float = Field(
         3e-3,
@@ -39,8 +39,8 @@ class Motor(Part):
         0.0,
         ge=0,
         lt=1,
-        description="τ_max and stiffness of each motor are multiplied by a factor of its own, drawn from the scene's "
-        "seed, uniform within 1 ± this [1]",
+        description="half-width s of the motors' scatter [1]: τ_max and stiffness of each motor are multiplied by a "
+        "factor from the scene's seed, uniform within 1 ± s",
     )
 
     @model_validator(mode="after")
@@ -48,6 +48,6 @@ class Motor(Part):
         if self.damping_N_m_s_per_rad and self.law != "servo":
             raise ValueError(
                 f"damping_N_m_s_per_rad: {self.damping_N_m_s_per_rad:g} N m s/rad, but law is {self.law}, which has "
-                "none; use law: servo"
+                "no damping; use law: servo"
             )
         return self

@@ -1,4 +1,4 @@
-"""Frozen parts of a scene, and the kinds of numbers that several of them share."""
+"""Base of the parts of a scene, and types of numbers that several parts use."""
 
 from __future__ import annotations
 
@@ -9,17 +9,17 @@ from pydantic import AfterValidator, Field
 
 from dem.strict import Strict
 
-HINGE_RANGE = (-15.0, 105.0)  # deg; the range of the hinges
-LONGEST_LENGTH = 1.0  # m; a longer smarticle or container is taken for a mistaken unit
-REFERENCE_ASPECT_RATIO = 0.7  # l/w of the smarticle that the paper states torques and swings for
+HINGE_RANGE = (-15.0, 105.0)  # deg
+LONGEST_LENGTH = 1.0  # m; longer smarticles or containers are taken for lengths in millimetres
+REFERENCE_ASPECT_RATIO = 0.7  # l/w of the smarticle for which the paper states torques and swings
 
 
 class Part(Strict):
-    """A frozen part of a scene."""
+    """Base of all parts of a scene: a frozen mapping of keys."""
 
     @classmethod
     def nearest_key(cls, key: str) -> str:
-        """Return the way out for an unknown key: a key of this part that is spelt alike, or the part it belongs in."""
+        """Return what to do about an unknown key: use a key of similar spelling, or put it into another part."""
         # Most often the unit, or the second half of a name, was left out.
         here = [field for field in cls.model_fields if field.startswith(f"{key}_")]
         here = here or difflib.get_close_matches(key, cls.model_fields, n=1, cutoff=0.7)
@@ -27,7 +27,7 @@ class Part(Strict):
             return f"did you mean {' or '.join(map(repr, here))}?"
         for part in Part.__subclasses__():
             if "type" in part.model_fields and ("type" in cls.model_fields or part.__subclasses__()):
-                continue  # phases share keys, but one's keys do not belong in another; a base is no part of a file
+                continue  # a key of one phase does not belong in another phase; base classes are no part of a file
             there = difflib.get_close_matches(key, part.model_fields, n=1, cutoff=0.65)
             if there:
                 return f"{there[0]!r} belongs in {part.tag()}"
@@ -41,7 +41,7 @@ class Part(Strict):
 
 
 def in_hinge_range(angle: float) -> float:
-    """Return the angle [deg]; reject one outside the range of the hinges."""
+    """Return an angle [deg]; raise ValueError if it is outside the range of the hinges."""
     low, high = HINGE_RANGE
     if not low <= angle <= high:
         raise ValueError(f"{angle:g}° is outside {low:g}° … {high:g}°, the range of the hinges")
@@ -49,7 +49,7 @@ def in_hinge_range(angle: float) -> float:
 
 
 def reject_wrong_unit(value: float) -> float:
-    """Return the length [m]; reject one that can only be millimetres."""
+    """Return a length [m]; raise ValueError if it must have been meant in millimetres."""
     if value > LONGEST_LENGTH:
         raise ValueError(
             f"{value:g} means {value:g} m, which no smarticle scene needs; "
@@ -58,7 +58,7 @@ def reject_wrong_unit(value: float) -> float:
     return value
 
 
-# Wide physical limits: beyond them are slips of the keyboard, and numbers that no sum survives.
+# Wide physical limits: numbers beyond them are typing errors, or overflow in sums.
 Length = Annotated[
     float, Field(ge=1e-6, json_schema_extra={"maximum": LONGEST_LENGTH}), AfterValidator(reject_wrong_unit)
 ]

@@ -1,7 +1,7 @@
 """Motion confined to a horizontal plane, between two parallel walls instead of in a container.
 
-Robots lie flat on a table: they move along x and y and turn about z, and nothing else. The table carries their weight
-and does not rub.
+Robots lie flat on a table: they move along x and y and turn about z only. The table carries their weight without
+friction.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ class Plane(Part):
 
 @dataclass(frozen=True, kw_only=True)
 class Channel:
-    """Table and walls as the engine builds them. Lengths in m."""
+    """Table and walls of a simulation in a plane. Lengths in m."""
 
-    width: float | None  #: Between the walls; None: there are none
+    width: float | None  #: Distance between the walls; None: no walls
     table: float  #: Height of the table below the plane of the centrelines, negative

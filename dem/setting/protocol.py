@@ -1,11 +1,11 @@
-"""Protocols: in what the paper's text and its own code differ, as keys of a scene.
+"""Protocols: values of a scene's keys in which the paper's text and the paper's own code differ.
 
 Savoie, Tuazon, Bhamla and Goldman, "Amorphous Entangled Active Matter", Soft Matter 2023: the text states one set of
 rules, the sources and run scripts in the public repository `wsavoie/SmarticleSim` (of January 2019) another. A protocol
-fills in what a scene leaves open; keys of the scene itself have priority.
+fills in keys that a scene leaves open; keys that the scene gives have priority.
 
-One difference is left to the scene: the code throws a layer down at 2 m/s every 15 ms (in a deposit, `every_s: 0.015`
-and `thrown_at_m_per_s: 2`). Soft contacts of the named fidelities do not bear that, those of 4000 N/m do.
+One difference is in no protocol: the code throws a layer down at 2 m/s every 15 ms (in a deposit, `every_s: 0.015` and
+`thrown_at_m_per_s: 2`). Contacts of the named fidelities are too soft for such impacts; 4000 N/m are enough.
 """
 
 from __future__ import annotations
@@ -32,31 +32,30 @@ PROTOCOLS: Mapping[str, Mapping[str, Mapping[str, Any]]] = MappingProxyType(
         },
     }
 )
-"""What each protocol says, by part of the scene and by type of phase."""
+"""Values of keys by protocol and by part of the scene or type of phase."""
 
 PARTS = ("motor", "contact", "container")
 
 
-def leaves_alone(part: str, *, plane: bool, tiers: bool) -> bool:
-    """Return whether a protocol leaves a part alone: a plane has no container, a mould of tiers has several radii."""
-    return part == "container" and (plane or tiers)
+def applies(part: str, *, plane: bool, tiers: bool) -> bool:
+    """Return whether a protocol sets keys of a part: not of the container in a plane, or of one with tiers."""
+    return part != "container" or not (plane or tiers)
 
 
 def with_protocol(data: Any) -> Any:
-    """Fill a scene's data, not yet validated, with the keys of its protocol that it leaves open."""
-    says = PROTOCOLS.get(str(data.get("protocol"))) if isinstance(data, Mapping) else None
-    if says is None:
+    """Return a scene's data, not yet validated, with the keys that its protocol fills in."""
+    rules = PROTOCOLS.get(str(data.get("protocol"))) if isinstance(data, Mapping) else None
+    if rules is None:
         return data
     filled = dict(data)
+    plane = data.get("plane") is not None
     for part in PARTS:
         given = data.get(part, {})
-        if isinstance(given, Mapping) and not leaves_alone(
-            part, plane=data.get("plane") is not None, tiers=bool(given.get("tiers"))
-        ):
-            filled[part] = {**says[part], **given}
+        if isinstance(given, Mapping) and applies(part, plane=plane, tiers=bool(given.get("tiers"))):
+            filled[part] = {**rules[part], **given}
     if isinstance(data.get("phases"), list | tuple):
         filled["phases"] = [
-            {**says.get(str(phase.get("type")), {}), **phase} if isinstance(phase, Mapping) else phase
+            {**rules.get(str(phase.get("type")), {}), **phase} if isinstance(phase, Mapping) else phase
             for phase in data["phases"]
         ]
     return filled

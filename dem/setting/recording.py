@@ -1,4 +1,4 @@
-"""What a run writes, and how often, as a scene states it."""
+"""What a run records, and how often."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from dem.setting.part import Duration, Part
 
 
 class Recording(Part):
-    """What is written, and how often."""
+    """Quantities that a run records, and the intervals between two records."""
 
     frame_interval_s: Duration = Field(
         0.04,
@@ -16,24 +16,25 @@ class Recording(Part):
     )
     sphere_interval_s: Duration | None = Field(
         None,
-        description="time between VTK files of the spheres that stand for the smarticles, for ParaView's glyphs [s]; "
-        "null: none",
+        description="time between VTK files of the spheres that represent the smarticles, for ParaView's glyphs [s]; "
+        "null: no such files",
     )
     contact_forces: bool = Field(
         False,
         strict=True,
-        description="whether to record with each frame, in a file of its own, the forces at all contacts: force chains",
+        description="whether to record the forces at all contacts (force chains) with each frame, in a separate file",
     )
     series_interval_s: Duration = Field(0.004, description="time between samples of the HDF5 series [s]")
     energy: bool = Field(
         False,
         strict=True,
-        description="whether to record energies and the work of the container as well as the motors'",
+        description="whether to record energies and the work of the container, in addition to the work of motors",
     )
     dissipation_interval_s: Duration | None = Field(
         None,
-        description="time between samples of what contacts dissipate [s], which closes the energy ledger; null: "
-        "none. A sample costs 10 µs per contact, as much as some twenty steps of a small pile; 2e-4 s is dense enough",
+        description="time between samples of the power that contacts dissipate [s], which closes the energy ledger; "
+        "null: no samples. A sample costs 10 µs per contact, as much as about twenty steps of a small pile; 2e-4 s is "
+        "short enough",
     )
     checkpoint_interval_s: Duration | None = Field(
         0.4,
@@ -42,10 +43,10 @@ class Recording(Part):
     )
 
     def samples_in(self, interval_s: float | None) -> int:
-        """Samples of the series in one of the other intervals [s]; 0 for none."""
+        """Return the number of samples of the series in another interval [s]; 0 for None."""
         return round((interval_s or 0.0) / self.series_interval_s)
 
     @property
     def energies(self) -> bool:
-        """Whether energies are recorded: asked for, or needed by the energy ledger."""
+        """Whether energies are recorded: if `energy` is true, or dissipation is sampled."""
         return self.energy or self.dissipation_interval_s is not None

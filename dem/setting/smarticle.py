@@ -1,4 +1,4 @@
-"""One smarticle: its geometry and material."""
+"""Geometry and material of one smarticle."""
 
 from __future__ import annotations
 
@@ -22,8 +22,9 @@ class Smarticle(Part):
     thickness_in_plane_m: Length = Field(0.5e-3, description="t2, thickness in the smarticle's plane [m]")
     middle_thickness_in_plane_m: Length | None = Field(
         None,
-        description="thickness of the middle link alone in the smarticle's plane [m], as of robots with a body; half "
-        "of it to either side of the line from hinge to hinge; with the key plane, on yade; default: as the barbs",
+        description="thickness of the middle link in the smarticle's plane [m], where it differs from the barbs' as in "
+        "robots with a body; centred on the line from hinge to hinge; only with the key plane and engine: yade; "
+        "default: thickness_in_plane_m",
     )
     density_kg_per_m3: float = Field(
         7850.0,
@@ -78,7 +79,7 @@ class Smarticle(Part):
 
     @property
     def boxes(self) -> Boxes:
-        """Exact geometry, mass and inertia."""
+        """Exact geometry of the smarticle, with its mass and inertia."""
         return Boxes(
             middle_length=self.middle_length_m,
             barb_length=self.aspect_ratio * self.middle_length_m,

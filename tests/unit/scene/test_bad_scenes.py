@@ -191,7 +191,7 @@ CHAINS: Bad = [
     ({"phases.0": {"type": "relax"}}, "phases.0", "relax"),
     ({"phases.0.gap_m": 0.01}, "phases.0.gap_m", "0.0095 m"),
     ({"hooks": {}}, "hooks", "they lie out of the plane"),
-    ({"container": {"radius_m": 0.1}}, "container", "a plane has none but two walls"),
+    ({"container": {"radius_m": 0.1}}, "container", "a scene in a plane has none"),
     ({"smarticle.angles_deg": [80, 90]}, "smarticle.angles_deg", "a chain is laid out of U shapes"),
     ({"motor.law": "halt", "motor.damping_N_m_s_per_rad": 1e-3}, "motor.damping_N_m_s_per_rad", "0.001"),
     ({"fidelity.rows": 2, "fidelity.diameter_m": 0.004}, "fidelity.rows", "2"),
