@@ -1,1 +1,1 @@
-"""What happens, one file for each kind of phase."""
+"""Phases of a run, one file for each kind."""

@@ -14,21 +14,19 @@ from dem.setting.part import REFERENCE_ASPECT_RATIO, Duration, HingeAngle, Part
 from dem.setting.smarticle import Smarticle
 
 ActiveFraction = Annotated[
-    float, Field(ge=1e-6, le=1, description="share of the smarticles that move, drawn from the scene's seed [1]")
+    float, Field(ge=1e-6, le=1, description="fraction of the smarticles that move, drawn from the scene's seed [1]")
 ]
-
-
 Offsets = Annotated[
     Literal["none", "random"],
     Field(
-        description="none: all smarticles move together; random: each begins at another point of the period, drawn "
+        description="none: all smarticles move together; random: each begins at a point of the period that is drawn "
         "from the scene's seed"
     ),
 ]
 
 
 def _length_of_motions(data: dict[str, Any]) -> float:
-    """Return the length [s] of the longest motion given; inf if that has no end."""
+    """Return the duration of the longest motion that is given [s]; inf if it has no end."""
     motions = [data[key] for key in ("barbs", "barb_1", "barb_2") if data.get(key) is not None]
     return max((motion.duration for motion in motions), default=math.inf)
 
@@ -41,7 +39,7 @@ class Actuate(Part, ActuatedPhase):
     barb_1: Motion | None = Field(None, description="motion of barb 1, angle α1")
     barb_2: Motion | None = Field(None, description="motion of barb 2, angle α2")
     duration_s: Duration = Field(
-        default_factory=_length_of_motions, description="length of the phase [s]; default: that of the motion"
+        default_factory=_length_of_motions, description="length of the phase [s]; default: that of the longest motion"
     )
     active_fraction: ActiveFraction = 1.0
     offsets: Offsets = "none"
@@ -84,7 +82,7 @@ class Actuate(Part, ActuatedPhase):
 
     @property
     def keys(self) -> tuple[str, str]:
-        """The keys of the motions of barb 1 and barb 2."""
+        """Keys that hold the motions of barb 1 and barb 2."""
         return ("barbs", "barbs") if self.barbs is not None else ("barb_1", "barb_2")
 
     @property
@@ -102,7 +100,7 @@ class Actuate(Part, ActuatedPhase):
             offsets=self.offsets,
         )
 
-    def own(self, key: str) -> tuple[str, float | None]:
+    def source_of(self, key: str) -> tuple[str, float | None]:
         # A key of one of the motions, such as barbs.steps.1.amplitude_deg.
         here: Any = self
         for part in key.split("."):
@@ -111,13 +109,13 @@ class Actuate(Part, ActuatedPhase):
 
 
 class ShapeChange(Part, ActuatedPhase):
-    """Straighten both barbs, and turn them back to the angles where they began."""
+    """Straighten both barbs, and turn them back to the angles at which the phase began."""
 
     type: Literal["shape-change"]
     straight_deg: HingeAngle = Field(0.0, description="angle that the barbs are turned to [deg]")
-    opening_s: Duration = Field(1.5, description="time to get there [s]")
-    straight_hold_s: float = Field(0.0, ge=0, le=1e6, description="time to stay there [s]")
-    closing_s: Duration = Field(1.5, description="time to get back [s]")
+    opening_s: Duration = Field(1.5, description="time in which the barbs turn to this angle [s]")
+    straight_hold_s: float = Field(0.0, ge=0, le=1e6, description="time for which they hold this angle [s]")
+    closing_s: Duration = Field(1.5, description="time in which they turn back [s]")
 
     @property
     def duration_s(self) -> float:
@@ -132,19 +130,19 @@ class ShapeChange(Part, ActuatedPhase):
         motion = Sequence(type="sequence", steps=tuple(steps))
         return Gait(motions=(motion, motion), duration=motion.duration)
 
-    def own(self, key: str) -> tuple[str, float | None]:
+    def source_of(self, key: str) -> tuple[str, float | None]:
         name = "opening_s" if key == "barbs.steps.0.duration_s" else "closing_s"
         return name, getattr(self, name)
 
 
 class InternalOscillation(Part, ActuatedPhase):
-    """Swing both barbs at the motor's speed limit, θ/2 to either side of the smarticle's own angles."""
+    """Swing both barbs at the motor's speed limit, θ/2 to either side of `smarticle.angles_deg`."""
 
     type: Literal["internal-oscillation"]
     theta_deg: float = Field(..., ge=1e-6, le=240, description="θ, full swing, peak to peak [deg]")
     scaled: bool = Field(
         True,
-        description="swing by θ · 0.7/(l/w) instead, so that the arc of a barb's tip is the same for every l/w",
+        description="whether to swing by θ · 0.7/(l/w) instead of θ, so that barb tips travel equal arcs at all l/w",
     )
     duration_s: Duration = Field(5.0, description="length of the phase [s]")
     active_fraction: ActiveFraction = 1.0
@@ -169,5 +167,5 @@ class InternalOscillation(Part, ActuatedPhase):
             offsets=self.offsets,
         )
 
-    def own(self, key: str) -> tuple[str, float | None]:
+    def source_of(self, key: str) -> tuple[str, float | None]:
         return "theta_deg", self.theta_deg

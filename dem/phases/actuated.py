@@ -1,7 +1,7 @@
-"""Phases in which motors move the barbs or hold them: their gait, its target angles, what is checked, their stage.
+"""Phases in which motors move or hold the barbs: gait, target angles, checks and control updates.
 
-Each is short for a `Gait`. `drive` compiles it into target angles: which smarticles move is drawn from the scene's
-seed, and where they begin follows from the phases before.
+Each of these phases defines a `Gait`, from which `drive` computes target angles over time. The smarticles that move are
+drawn from the scene's seed; starting angles follow from the phases before.
 """
 
 from __future__ import annotations
@@ -26,24 +26,24 @@ from dem.setting.smarticle import Smarticle
 
 BARBS = 2
 BARB_LINKS = (0, 2)
-MOST_PARTS = 100  # parts of the series interval that are tried: one of them has few digits, unless there are very many
-# Share of τ_max that a motor may gain within one control update before it notices and halts. The defaults gain 0.22.
+MOST_PARTS = 100  # numbers of parts tried to divide an interval into parts of few digits
+# Torque over τ_max that a motor may gain between two control updates without a warning; 0.22 at the defaults.
 MOST_OVERSHOOT = 0.5
 
 
 @dataclass(frozen=True, kw_only=True)
 class Gait:
-    """What the barbs of smarticles do in a phase."""
+    """Motions of the barbs in a phase, and the smarticles that make them."""
 
-    motions: tuple[Motion, Motion]
-    keys: tuple[str, str] = ("barbs", "barbs")
+    motions: tuple[Motion, Motion]  #: Of barb 1 and barb 2
+    keys: tuple[str, str] = ("barbs", "barbs")  #: Keys of the motions in messages
     duration: float  #: Length of the phase [s]
-    active_fraction: float = 1.0  #: Share of the smarticles that move [1]
-    offsets: Literal["none", "random"] = "none"  #: "random": each begins at another point of the period
+    active_fraction: float = 1.0  #: Fraction of the smarticles that move [1]
+    offsets: Literal["none", "random"] = "none"  #: "random": each smarticle begins at a random point of the period
 
     @property
     def period(self) -> float | None:
-        """Return the longer period [s] of the motions; None if they have none."""
+        """Longer period of the two motions [s]; None if neither is periodic."""
         return max((motion.period for motion in self.motions if motion.period is not None), default=None)
 
     def active_count(self, count: int) -> int:
@@ -57,11 +57,11 @@ class ActuatedPhase(Phase):
     actuates: ClassVar[bool] = True
 
     def gait(self, smarticle: Smarticle, motor: Motor) -> Gait:
-        """Return the gait that the phase is short for."""
+        """Return the gait of the phase."""
         raise NotImplementedError
 
-    def own(self, key: str) -> tuple[str, float | None]:
-        """Return the key of this phase that sets `key` of the gait, and its value."""
+    def source_of(self, key: str) -> tuple[str, float | None]:
+        """Return the key of this phase that decides the value of `key` in the gait, and that key's value."""
         raise NotImplementedError
 
     def check(self, scene: SceneView, index: int) -> Iterator[str]:
@@ -70,8 +70,7 @@ class ActuatedPhase(Phase):
             yield from _of_control(scene)
         yield from _of_active(scene, index)
         highest = yield from _of_motions(scene, index)
-        # A motor that halts is late, so that barbs may meet although their highest angles are not asked for at one
-        # time.
+        # Halted motors lag behind the schedule, so that both barbs may be at their highest angles at one time.
         if scene.smarticle.tip_clearance(highest) < 0:
             yield (
                 f"phases.{index}: at {highest[0]:.4g}° and {highest[1]:.4g}° the barbs of l/w = "
@@ -91,10 +90,13 @@ class ActuatedPhase(Phase):
     def proceed(self, stage: Stage, engine: Engine) -> float:
         return self.follow(stage, engine)
 
-    def follow(self, stage: Stage, engine: Engine, halt_every: int | None = None) -> float:
-        """Let the motors follow the schedule, one control update per period; smarticles are articulated meanwhile.
+    def follow(self, stage: Stage, engine: Engine, check_every: int | None = None) -> float:
+        """Make the control updates that are due, on articulated smarticles; return the time [s] until the next call.
 
-        After each `halt_every` updates it returns, so that the caller can check the pile.
+        Args:
+            stage: the running phase.
+            engine: the running simulation.
+            check_every: number of updates after which the caller wants to check the pile; None: no checks.
         """
         update: int = stage.memory["look"]
         if update == 0:
@@ -102,8 +104,8 @@ class ActuatedPhase(Phase):
         schedule: Drive = stage.prepared
         interval = stage.scene.fidelity.control_interval_s
         last = math.ceil(schedule.duration / interval - 1e-9)
-        every = halt_every or last
-        # The last update only adds up the work since the one before.
+        every = check_every or last
+        # The last update only adds up the work since the previous one.
         stop = min(update + engine.motors.updates_at_once, (update // every + 1) * every, last)
         updates = range(update, max(update + 1, stop))
         targets = [schedule.targets(min((k + 1) * interval, schedule.duration)) for k in updates]
@@ -121,11 +123,11 @@ class ActuatedPhase(Phase):
 
 @dataclass(frozen=True, eq=False)
 class _Track:
-    """One motion, of all barbs that follow it."""
+    """One motion of all barbs that follow it."""
 
-    span: slice  #: The K entries of `Drive` that it sets
-    course: Course  #: The motion from K starts
-    shifts: Array  #: (1,) or (K,) time that the motion is ahead at the beginning of the phase [s]
+    span: slice  #: The K entries of `Drive` that the motion sets
+    course: Course  #: The motion from K starting angles
+    shifts: Array  #: (1,) or (K,) time by which the motion is ahead at the beginning of the phase [s]
 
 
 @dataclass(frozen=True, eq=False)
@@ -133,16 +135,16 @@ class Drive:
     """Target angles of an actuated phase over time."""
 
     duration: float  #: Length of the phase [s]
-    active: Flags  #: (N,) bool, smarticles that move
-    start: Array  #: (N, 2) target angles at the end of the actuated phase before, or the smarticle's own [rad]
-    # Barbs that always have one target share an entry: `_entries` has those of barbs that do not move, then those of
-    # each track; `_which` (N, 2) is the entry of each barb.
+    active: Flags  #: (N,) bool, which smarticles move
+    start: Array  #: (N, 2) target angles at the end of the previous actuated phase, or `smarticle.angles_deg` [rad]
+    # Barbs whose targets are always equal share an entry of `_entries`: first come those of barbs that do not move,
+    # then those of each track. `_which` (N, 2) is the number of each barb's entry.
     _entries: Array
     _tracks: tuple[_Track, ...]
     _which: Numbers
 
     def targets(self, time: float) -> Array:
-        """Return (N, 2) target angles [rad] at a time [s] after the phase began; beyond its end those of its end."""
+        """Return (N, 2) target angles [rad] at a time [s] since the phase began, constant after its end."""
         time = min(max(time, 0.0), self.duration)
         entries = self._entries.copy()
         for track in self._tracks:
@@ -157,9 +159,9 @@ def _gait(scene: SceneView, index: int) -> Gait:
 
 
 def drive(scene: SceneView, index: int) -> Drive:
-    """Compile the actuated phase `scene.phases[index]`."""
+    """Return the target angles over time of the actuated phase `scene.phases[index]`."""
     gait, start = _gait(scene, index), _starting_angles(scene, index)
-    # The first ones of one random order: at one seed a larger share contains all smarticles of a smaller one.
+    # The first ones in a random order: at one seed a larger fraction contains all smarticles of a smaller one.
     rng = np.random.default_rng(scene.seed_for(f"active/{index}"))
     active = np.zeros(scene.count, dtype=np.bool_)
     active[rng.permutation(scene.count)[: gait.active_count(scene.count)]] = True
@@ -189,7 +191,7 @@ def drive(scene: SceneView, index: int) -> Drive:
 
 
 def _starting_angles(scene: SceneView, index: int) -> Array:
-    """Return (N, 2) final targets of the actuated phase before, or the smarticle's own angles [rad]."""
+    """Return (N, 2) final targets of the previous actuated phase, or else `smarticle.angles_deg` [rad]."""
     for before in range(index - 1, -1, -1):
         if scene.phases[before].actuates:
             last = drive(scene, before)
@@ -197,31 +199,31 @@ def _starting_angles(scene: SceneView, index: int) -> Array:
     return np.tile(np.radians(scene.smarticle.angles_deg), (scene.count, 1))
 
 
-# -- whether smarticles can do it --------------------------------------------------------------------------------------
+# -- checks ------------------------------------------------------------------------------------------------------------
 
 
 def overshoot(scene: SceneView) -> float:
-    """Return the torque over τ_max [1] that a motor can gain in one control update; 0 where it is capped."""
+    """Return the torque over τ_max [1] that a motor can gain between two control updates; 0 for capped torques."""
     motor = scene.motor
     added = motor.stiffness_N_m_per_rad * motor.speed_limit_rad_per_s * scene.fidelity.control_interval_s
     return 0.0 if motor.law in ("slip", "servo") else added / scene.torque_limit
 
 
 def actuation_warnings(scene: SceneView) -> tuple[str, ...]:
-    """Return what a scene that actuates should change, one line each.
+    """Return a warning if motors can exceed their torque limit by more than `MOST_OVERSHOOT`, in one line.
 
-    A motor that is quick and stiff for its torque limit exceeds it. That is no reason to reject a scene: it exceeds it
-    by no more than this, then halts, and motors that can hardly move anything are a case worth running.
+    Such a scene is not rejected: a motor halts at the next control update, and motors too weak to move anything are
+    worth studying.
     """
-    share = overshoot(scene)
-    if share <= MOST_OVERSHOOT:
+    excess = overshoot(scene)
+    if excess <= MOST_OVERSHOOT:
         return ()
-    motor, series, less = scene.motor, scene.recording.series_interval_s, MOST_OVERSHOOT / share
+    motor, series, less = scene.motor, scene.recording.series_interval_s, MOST_OVERSHOOT / excess
     interval = _whole_fraction(series, math.ceil(series / (scene.fidelity.control_interval_s * less)))
     return (
         f"motor.torque_limit_N_m: τ_max = {scene.torque_limit:.3g} N m, but within one control update of "
         f"fidelity.control_interval_s = {scene.fidelity.control_interval_s:g} s at motor.speed_limit_rad_per_s = "
-        f"{motor.speed_limit_rad_per_s:g} rad/s a motor can exceed it by {share:.3g} τ_max; use "
+        f"{motor.speed_limit_rad_per_s:g} rad/s a motor can exceed it by {excess:.3g} τ_max; use "
         f"control_interval_s: {interval} or stiffness_N_m_per_rad: "
         f"{_down(motor.stiffness_N_m_per_rad * less)}, or law: slip",
     )
@@ -236,7 +238,7 @@ def _of_barbs(scene: SceneView, index: int) -> Iterator[str]:
         )
     has_spheres = np.isin(BARB_LINKS, scene.particle.links).all()
     if not has_spheres or _first_station(scene) < diameter * (1 - TOLERANCE):
-        # The first sphere begins where the hinge's ends, and the last one ends at the tip.
+        # The first sphere of a barb begins where the hinge's sphere ends, and the last one ends at the tip.
         least = (1.5 + HINGE_CLEARANCE) * diameter
         yield (
             f"smarticle.aspect_ratio: {ratio:g} means barbs of {ratio * width:.4g} m, too short for a sphere of their "
@@ -246,7 +248,7 @@ def _of_barbs(scene: SceneView, index: int) -> Iterator[str]:
 
 
 def _first_station(scene: SceneView) -> float:
-    """Return the distance [m] of the barbs' first spheres from the hinge, along the barb."""
+    """Return the distance of the barbs' first sphere from the hinge, along the barb [m]."""
     particle = scene.particle
     barb = particle.centres[particle.links == BARB_LINKS[0]] - particle.boxes.vertices[1]
     return float(np.hypot(barb[:, 0], barb[:, 1]).min())
@@ -265,7 +267,7 @@ def _of_control(scene: SceneView) -> Iterator[str]:
 
 
 def _whole_fraction(whole: float, parts: int) -> str:
-    """Return a time [s] over `parts` or a few more, such that it has few digits."""
+    """Return a time [s] divided by `parts` or a slightly higher number, such that it has few digits."""
     for more in range(parts, min(10 * parts, parts + MOST_PARTS) + 1):
         text = f"{whole / more:.3g}"
         if math.isclose(float(text) * more, whole, rel_tol=TOLERANCE):
@@ -296,20 +298,20 @@ def _of_motions(scene: SceneView, index: int) -> Generator[str, None, tuple[floa
             lows, highs, speed = leg.extent()
             low, high = np.degrees(lows), np.degrees(highs)
             if isinstance(leg.motion, Sine | Triangle):
-                # All other angles are checked where they are read: only a swing can leave the range.
-                own, present = phase.own(f"{key}.amplitude_deg")
+                # All other angles were checked when the scene was read: only a swing can leave the range.
+                source, present = phase.source_of(f"{key}.amplitude_deg")
                 assert present is not None  # a swing has an amplitude
                 yield from _of_range(
-                    f"phases.{index}.{own}", present, leg.motion, (float(low.min()), float(high.max()))
+                    f"phases.{index}.{source}", present, leg.motion, (float(low.min()), float(high.max()))
                 )
             highest[barb] = max(highest[barb], high.max())
-            own, _ = phase.own(f"{key}.{leg.motion.pace[0]}")
-            yield from _of_speed(f"phases.{index}.{own}", leg.motion, speed, scene.motor.speed_limit_rad_per_s)
+            source, _ = phase.source_of(f"{key}.{leg.motion.pace[0]}")
+            yield from _of_speed(f"phases.{index}.{source}", leg.motion, speed, scene.motor.speed_limit_rad_per_s)
     return float(highest[0]), float(highest[1])
 
 
 def _of_range(place: str, present: float, swing: Sine | Triangle, reached: tuple[float, float]) -> Iterator[str]:
-    """Reject a swing that leaves the range of the hinges; `present` [deg] is what sets it at `place`."""
+    """Reject a swing that leaves the range of the hinges; `present` [deg] is the value of the key `place`."""
     lowest, highest = HINGE_RANGE
     too_low, too_high = lowest - reached[0], reached[1] - highest
     beyond = max(too_low, too_high)
@@ -351,7 +353,7 @@ def _of_first_spheres(scene: SceneView, index: int, angle: float) -> Iterator[st
     inward = float(((s**2 + m**2 - d**2) / (2 * s * m)).min())
     if -math.cos(math.radians(angle)) <= inward + TOLERANCE:
         return
-    # Spheres are spread evenly, and so may be nearer than the pitch, by up to one more among those of the link.
+    # Spheres are spread evenly over the link, with up to one more than the pitch needs, and may be nearer than it.
     near, inwards = s / d, -math.cos(math.radians(angle))
     apart = near * inwards + math.sqrt(max(0.0, (near * inwards) ** 2 + 1 - near**2))
     wider = apart / (1 - apart * d / scene.smarticle.middle_length_m)
@@ -363,12 +365,12 @@ def _of_first_spheres(scene: SceneView, index: int, angle: float) -> Iterator[st
 
 
 def _up(value: float, digits: int = 3) -> str:
-    """Round a number up to some significant digits."""
+    """Return a positive number rounded up to some significant digits."""
     scale = 10.0 ** (digits - 1 - math.floor(math.log10(value)))
     return f"{math.ceil(value * scale * (1 - TOLERANCE)) / scale:g}"
 
 
 def _down(value: float, digits: int = 3) -> str:
-    """Round a positive number down to some significant digits."""
+    """Return a positive number rounded down to some significant digits."""
     scale = 10.0 ** (digits - 1 - math.floor(math.log10(value)))
     return f"{math.floor(value * scale * (1 + TOLERANCE)) / scale:g}"

@@ -1,4 +1,4 @@
-"""The phase that lays smarticles out as a chain, in a plane."""
+"""The phase that arranges smarticles as a chain in a plane."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ LEAST_COUNT = 2
 
 
 class Arrange(Part, Phase):
-    """Lay the smarticles out as a chain, ⊔-⊓-⊔…, each hooked into the next; takes no time."""
+    """Arrange the smarticles as a chain, ⊔-⊓-⊔…, each hooked into the next; takes no simulated time."""
 
     planar: ClassVar[bool | None] = True
     begins: ClassVar[bool] = True
@@ -44,8 +44,8 @@ class Arrange(Part, Phase):
                 f"plane.width_m: H = {width:g} m leaves no room for a chain that is h = {chain.width:.4g} m wide, h/H "
                 f"= {chain.width / width:.3g}; h/H must be below 1"
             )
-        # Hooked tip to tip, with barbs at right angles: no opening of the servos makes a chain wider, except one that
-        # turns as a whole, whose middle links then add to its width.
+        # The widest chain is hooked tip to tip, with barbs at right angles; if it turns as a whole, the length of a
+        # middle link is added.
         widest = 2 * scene.particle.boxes.barb_length + scene.smarticle.middle_length_m
         if width > widest:
             yield (
@@ -64,7 +64,7 @@ class Arrange(Part, Phase):
 
 
 def chain_of(scene: SceneView) -> Chain:
-    """Return the chain of a scene that begins with one."""
+    """Return the layout of the chain with which a scene begins."""
     first = scene.phases[0]
     assert isinstance(first, Arrange)  # the caller has checked
     return Chain(scene.particle, scene.count, first.gap_m)

@@ -25,13 +25,14 @@ from dem.phases.phase import (
 from dem.setting.part import Part, Speed
 
 LAYER_TIMEOUT = 2.0  # s; the fall of a layer takes less than 0.1 s
-LAYER_SECONDS = 0.125  # from a layer of a pour to the next, about; measured on both engines, N = 100 … 270
+LAYER_SECONDS = 0.125  # s, typical time between two layers of a pour; measured on YADE and links, N = 100 … 270
 
 
 class Deposit(Part, Phase):
     """Pour smarticles in layers of random, non-overlapping poses, then wait until the pile settles.
 
-    A layer is poured just above the pile when the last one has come down; or by the clock, from the top of the wall.
+    A layer is poured just above the pile when the previous layer has landed, or, with `every_s`, at fixed intervals
+    from the top of the wall.
     """
 
     begins: ClassVar[bool] = True
@@ -46,15 +47,14 @@ class Deposit(Part, Phase):
     )
     landed_speed_m_per_s: Speed = Field(
         0.2,
-        description="a layer has come down when each of its smarticles touches something "
-        "and falls slower than this [m/s]",
+        description="a layer has landed when each of its smarticles touches something and falls slower than this [m/s]",
     )
     every_s: float | None = Field(
         None,
         ge=1e-4,
         le=1e6,
-        description="pour a layer each so often [s], from the top of the wall, as the paper's own code does; by "
-        "default each waits until the last one has come down",
+        description="interval between two layers [s], which are poured from the top of the wall, as in the paper's own "
+        "code; default: a layer is poured when the previous one has landed",
     )
     thrown_at_m_per_s: float = Field(
         0.0, ge=0, le=1000, description="speed that smarticles are thrown down with, 0 to let them fall [m/s]"
@@ -86,8 +86,8 @@ class Deposit(Part, Phase):
 
     def first_memory(self, scene: SceneView) -> Memory:
         rng = np.random.default_rng(scene.seed_for("deposit"))
-        # `layer`: smarticles of the layer that is coming down, 0 for none; `waited` [s] for it, or for the pile;
-        # `still` [s] that the pile has been.
+        # `left`: smarticles to pour; `layer`: smarticles of the layer that falls; `waited`: time since the pour of that
+        # layer, or since the last one landed [s]; `still`: time for which the pile has been still [s].
         state = rng.bit_generator.state
         return {"left": scene.count, "layer": 0, "waited": 0.0, "still": 0.0, "random": state}
 
@@ -95,7 +95,7 @@ class Deposit(Part, Phase):
         memory = stage.memory
         if memory["left"] and self.every_s is not None:
             self._pour(stage, engine)
-            memory["layer"] = 0  # the next layer does not wait for it
+            memory["layer"] = 0  # the next layer does not wait for this one
             return self.every_s
         if memory["layer"]:
             self._check_layer(memory, engine)
@@ -128,7 +128,7 @@ class Deposit(Part, Phase):
         if self.every_s is None:
             bottom = tops.max(initial=engine.boundaries.floor) + particle.radius
         else:
-            # Some may still fly: from the top of the wall, so that layers keep the distance that they have in time.
+            # Earlier layers may still fall: a fixed height keeps the distance between layers.
             bottom = cylinder.height - slab - 2 * particle.reach
         near = tops > bottom - 3 * particle.radius
         hooks = [cross.obstacles(2 * particle.radius) for cross in (scene.hooks.crosses if scene.hooks else ())]

@@ -1,4 +1,4 @@
-"""All kinds of phases: the one place where a new one is entered."""
+"""All kinds of phases; a new kind is added here."""
 
 from __future__ import annotations
 

@@ -1,10 +1,10 @@
-"""What every phase of a scene answers, what a phase is while it runs, and when a pile counts as settled.
+"""Interface of phases, the stage that is a phase while it runs, and the criterion for a settled pile.
 
-A kind of phase has one file: its data, a validated part of the scene; its checks; how long it takes; what it calls for;
-and what it does. `dem.phases.kinds` lists the kinds.
+A kind of phase has one file with its data (a validated part of the scene), checks, duration, effects and actions.
+`dem.phases.kinds` lists the kinds.
 
-`proceed` is called again and again, after the time that it returned; in between, time advances and everything due
-is recorded. All that a stage remembers is plain data, so that a run can stop between any two steps and be resumed.
+`proceed` is called again whenever the time that it returned has passed; in between, the simulation advances and the
+recorder writes. The memory of a stage is plain data, so that a run can stop between any two steps and be resumed.
 """
 
 from __future__ import annotations
@@ -26,23 +26,23 @@ from dem.setting.part import Duration, Part, Speed
 from dem.setting.plane import Plane
 
 CHECK_INTERVAL = 0.01  # s between checks whether a layer has come down, a pile has settled, or a force is too large
-SETTLE_SECONDS = 0.35  # that a poured pile takes to settle, about
+SETTLE_SECONDS = 0.35  # s, typical time in which a poured pile settles
 
 Memory = dict[str, Any]
 
 
 @dataclass
 class Stage:
-    """A phase while it runs; its memory is plain data for JSON, `warning` is reported at its end."""
+    """A phase while it runs."""
 
     phase: Phase
     scene: SceneView
-    index: int
-    memory: Memory
+    index: int  #: Of the phase in the scene
+    memory: Memory  #: Plain data for JSON; its key `warning` is reported at the end of the phase
 
     @cached_property
     def prepared(self) -> Any:
-        """What the phase needs besides the memory."""
+        """Result of `Phase.prepare`, computed once per process and not saved."""
         return self.phase.prepare(self.scene, self.index)
 
     def proceed(self, engine: Engine) -> float:
@@ -50,100 +50,99 @@ class Stage:
 
 
 class Phase:
-    """One entry of a scene's list; kinds of phases override what differs from these defaults."""
+    """Base of all kinds of phases, which override what differs from these defaults."""
 
-    actuates: ClassVar[bool] = False  #: Whether motors move the barbs in it, or hold them
-    begins: ClassVar[bool] = False
-    """Whether it brings the smarticles: a run begins with one such phase and has no other."""
+    actuates: ClassVar[bool] = False  #: Whether motors move or hold the barbs
+    begins: ClassVar[bool] = False  #: Whether the phase adds the smarticles; a run begins with one such phase
     sources: ClassVar[frozenset[str]] = frozenset()
-    """Keys that name the source of content which another key pins; a scene's hash omits them."""
-    pours: ClassVar[bool] = False  #: Whether the pile grows from nothing in it
-    frees: ClassVar[bool] = False  #: Whether it takes the container away
+    """Keys that name the source of content whose hash is another key; a scene's hash omits them."""
+    pours: ClassVar[bool] = False  #: Whether the phase pours the smarticles
+    frees: ClassVar[bool] = False  #: Whether the phase takes the container away
     planar: ClassVar[bool | None] = False
-    """Whether it has a meaning in a plane only (True), outside of one only (False), or in either (None)."""
+    """Whether the phase is possible in a plane only (True), in a container only (False), or in both (None)."""
 
     @property
     def kind(self) -> str:
-        """Its `type` in a scene file."""
+        """The phase's `type` in a scene file."""
         return str(getattr(self, "type"))  # noqa: B009 - a field of the part that this is mixed into
 
     def check(self, scene: SceneView, index: int) -> Iterator[str]:
-        """Yield what is wrong with it in its scene, where it is number `index`: one line with key, value and way out.
+        """Yield the errors of the phase, number `index` of a scene: one line each with key, value and what to do.
 
-        Each item relies on the ones before not to be yielded.
+        Only the first error is reported: later checks may assume that earlier ones found none.
         """
         yield from ()
 
     def ready(self, scene: SceneView) -> None:
-        """Check before a run begins that what it needs is still there.
+        """Check before a run begins that the source of the phase's content is present and unchanged.
 
         Raises:
-            InputError: one line with key, value and the way out.
+            InputError: one line with key, value and what to do.
         """
 
     @property
     def origin(self) -> Mapping[str, Any] | None:
-        """The run that its smarticles come from, for the manifest; None: they are its own."""
+        """Keys and values that name the run that smarticles were taken from, for the manifest; None: no run."""
         return None
 
     def warnings(self, scene: SceneView, index: int) -> Sequence[str]:
-        """Return what is suspicious but accepted: one line each with key, value and the way out."""
+        """Return warnings about values that are accepted but suspicious: one line each with key and what to do."""
         return ()
 
     @property
     def known_duration(self) -> float | None:
-        """Its length in simulated time [s]; None where a criterion ends it."""
+        """Simulated time that the phase takes [s]; None where a criterion ends it."""
         return getattr(self, "duration_s", None)
 
     def expected_duration(self, count: int) -> float:
-        """Return its length [s], estimated where a criterion ends it, for a number of smarticles."""
+        """Return the simulated time [s] that the phase takes, an estimate for N = `count` if a criterion ends it."""
         return self.known_duration or 0.0
 
     @property
     def pushing_speed(self) -> float:
-        """Speed at which it moves something through the pile or pulls at it [m/s]."""
+        """Speed of the wall, hook or string that the phase moves [m/s]; 0 if it moves none."""
         return 0.0
 
     def peak_speed(self, gravity: float) -> float:
-        """Return the greatest speed at which it makes smarticles move, except for falls [m/s]; gravity in m/s²."""
+        """Return the greatest speed [m/s] that the phase gives to smarticles, without falls; gravity in m/s²."""
         return self.pushing_speed
 
     @property
     def raises(self) -> float:
-        """Distance by which it raises a hook [m]."""
+        """Distance by which the phase raises a hook [m]."""
         return 0.0
 
     @property
     def pulled_by(self) -> tuple[float, float] | None:
-        """Stiffness [N/m] and damping [N s/m] of its strings; None: it has none."""
+        """Stiffness [N/m] and damping [N s/m] of the phase's strings; None without strings."""
         return None
 
     def calls(self, scene: SceneView, index: int) -> Mapping[EffectName, str]:
-        """Return the effects that it calls for, each with the purpose in words."""
+        """Return the effects that the phase needs, each with the reason in words."""
         return {}
 
     def begin(self, scene: SceneView, index: int) -> Stage:
-        """Return its stage, at the beginning."""
+        """Return the stage of the phase at its beginning."""
         return Stage(self, scene, index, self.first_memory(scene))
 
     def first_memory(self, scene: SceneView) -> Memory:
-        """Return what its stage remembers at the beginning."""
+        """Return the memory of the stage at its beginning."""
         return {}
 
     def prepare(self, scene: SceneView, index: int) -> Any:
-        """Return what its stage computes only once."""
+        """Return data for `Stage.prepared`, which follow from the scene alone."""
 
     def proceed(self, stage: Stage, engine: Engine) -> float:
-        """Do what is due now; return the time [s] until the next call, 0 where the phase is over.
+        """Do what is due; return the simulated time [s] until the next call, or 0 when the phase is over.
 
         Raises:
-            RunError: the phase did not end as it should; the message says by how much.
+            RunError: the phase cannot go on, or its criterion was not met in time; one line with values and limits.
         """
         raise NotImplementedError
 
 
 class SceneView(Demand, Protocol):
-    """What a phase may know of its scene: all that an engine may know, and more."""
+    """The members of a scene that phases use, described in `dem.scene.scene.Scene`."""
 
     @property
     def container(self) -> Container: ...
@@ -155,30 +154,27 @@ class SceneView(Demand, Protocol):
     def phases(self) -> Sequence[Phase]: ...
 
     @property
-    def smooth(self) -> bool:
-        """Whether the engine takes links as they are, and not as chains of spheres."""
+    def smooth(self) -> bool: ...
 
     @property
     def sphere_diameter(self) -> float: ...
 
-    def ample_height(self, hooks_top: float = 0.0) -> float:
-        """Return the height [m] of a wall that is enough for the loosest pile."""
+    def ample_height(self, hooks_top: float = 0.0) -> float: ...
 
     @property
-    def loose_height(self) -> float:
-        """Approximate height [m] of the poured pile."""
+    def loose_height(self) -> float: ...
 
     def seed_for(self, purpose: str) -> int: ...
 
 
 def time_left(engine: Engine, end: float) -> float:
-    """Return the time [s] until `end`; 0 where it is nearer than half a step."""
+    """Return the simulated time [s] that is left until the time `end` [s]; 0 if less than half a step."""
     left = end - engine.time
     return left if left > engine.time_step / 2 else 0.0
 
 
 class Settle(Part):
-    """When a pile counts as settled: both limits hold at every check over a stretch of time."""
+    """Criterion for a settled pile: both limits hold at all checks for the time `hold_s`."""
 
     speed_m_per_s: Speed = Field(0.02, description="largest speed of any smarticle [m/s]")
     unbalanced_force: float = Field(
@@ -189,13 +185,16 @@ class Settle(Part):
 
 
 def has_settled(settle: Settle, memory: Memory, engine: Engine) -> bool:
-    """Check a pile once, every `CHECK_INTERVAL`.
+    """Return whether the pile has settled, from a check that is due every `CHECK_INTERVAL`.
 
     Args:
-        memory: of the stage: `waited` [s] for the pile so far, which the stage adds up; `still` [s] that it has been.
+        settle: the criterion.
+        memory: memory of the stage, with `waited`, the time since the wait began [s], which the stage adds up, and
+            `still`, the time for which both limits have held [s], which this function updates.
+        engine: the running simulation.
 
     Raises:
-        RunError: it takes too long.
+        RunError: the pile has not settled within `settle.timeout_s`.
     """
     speed = float(np.linalg.norm(engine.state().velocities, axis=1).max())
     unbalanced = engine.unbalanced_force()

@@ -14,24 +14,24 @@ from dem.setting.hooks import TOLERANCE, Hooks, with_defaults
 from dem.setting.part import Duration, Force, Length, Part, Speed
 from dem.setting.smarticle import Smarticle
 
-HELD_SECONDS = 0.1  # that a hook stays where its force limit has stopped it, for the force to be measured
+HELD_SECONDS = 0.1  # s, time for which the force is measured on a hook that the force limit has stopped
 
 
 class PullHook(Part, Phase):
-    """Raise a hook at constant speed; its reaction force is the outcome. Motors hold: smarticles are welded."""
+    """Raise the upper hook at constant speed; smarticles are welded, and the force on the hook is measured."""
 
     type: Literal["pull-hook"]
-    which: Literal["upper"] = Field("upper", description="the hook that is raised; the other one stays")
+    which: Literal["upper"] = Field("upper", description="the hook that is raised; the lower one stays")
     distance_m: Length = Field(..., description="how far the hook is raised [m]; default: 2w")
     speed_m_per_s: Speed = Field(..., description="speed of the hook [m/s]; default: w per second")
     duration_s: Duration = Field(
         default_factory=lambda data: data["distance_m"] / data["speed_m_per_s"],
-        description="length of the phase [s]; default: until the hook has arrived; longer: it then stays where it is",
+        description="length of the phase [s]; default: until the hook has arrived; in a longer phase it then rests",
     )
     force_limit_N: Force | None = Field(
         None,
-        description="force on the raised hook, mean over 0.01 s, at which it stops and the phase soon ends [N], as a "
-        "testing machine does before it breaks; null: none. A rigid smarticle that holds both hooks takes any force",
+        description="force on the raised hook, averaged over 0.01 s, at which it stops [N]; the phase ends 0.1 s "
+        "later; null: no limit. The force is unbounded when a rigid smarticle holds both hooks",
     )
 
     @model_validator(mode="after")
@@ -90,21 +90,21 @@ class PullHook(Part, Phase):
         }
 
     def first_memory(self, scene: SceneView) -> Memory:
-        # `force_sum`, `step`: sum of the vertical forces on the hook so far [N], and steps, at the last check.
+        # At the last check, `force_sum`: vertical force on the hook, summed over steps [N]; `step`: number of steps.
         return {"arrival": None, "end": None, "raising": False, "force_sum": 0.0, "step": 0}
 
     def proceed(self, stage: Stage, engine: Engine) -> float:
         memory = stage.memory
         if memory["end"] is None:
             arrival = engine.time + self.distance_m / self.speed_m_per_s
-            memory.update(arrival=arrival, end=engine.time + self.duration_s, raising=True, felt=_felt_above(engine))
+            memory.update(arrival=arrival, end=engine.time + self.duration_s, raising=True, felt=_force_sum(engine))
             engine.motors.weld()
             engine.boundaries.raise_upper(self.speed_m_per_s)
-            _note(memory, engine)
+            memory.update(force_sum=_force_sum(engine)[2], step=engine.steps)
         elif memory["raising"]:
             # Whether the mean force on the hook since the last check exceeds its limit.
             before, step = memory["force_sum"], memory["step"]
-            _note(memory, engine)
+            memory.update(force_sum=_force_sum(engine)[2], step=engine.steps)
             limit = self.force_limit_N
             if limit is not None and before - memory["force_sum"] > limit * (memory["step"] - step):
                 memory.update(arrival=engine.time, end=engine.time + HELD_SECONDS)
@@ -114,7 +114,7 @@ class PullHook(Part, Phase):
             memory["raising"] = False
             engine.boundaries.stop()
         left = time_left(engine, memory["end"])
-        if not left and memory.get("felt") == _felt_above(engine):
+        if not left and memory.get("felt") == _force_sum(engine):
             memory["warning"] = (
                 "no smarticle touched the upper hook while it was raised, and its force is 0 N throughout; lower "
                 "hooks.upper_height_m or raise count"
@@ -122,21 +122,17 @@ class PullHook(Part, Phase):
         return left
 
 
-def _note(memory: Memory, engine: Engine) -> None:
-    memory.update(force_sum=float(engine.boundaries.hook_sums[1, 2]), step=engine.steps)
-
-
-# Widths w and thicknesses t2 that the keys are by default.
+# (a, b): the default is a w + b t2.
 _DEFAULTS = {"distance_m": (2, 0), "speed_m_per_s": (1, 0)}
 
 
 def with_pull_defaults(phase: Any, smarticle: Smarticle) -> Any:
-    """Fill the keys of a pull-hook that follow from the smarticle; return other phases unchanged."""
+    """Return data of a phase; in a pull-hook, missing keys that follow from the smarticle are filled in."""
     pulls = isinstance(phase, Mapping) and phase.get("type") == "pull-hook"
     return with_defaults(phase, _DEFAULTS, smarticle) if pulls else phase
 
 
-def _felt_above(engine: Engine) -> list[float]:
-    """Return the force on the upper hook, summed over steps [N]: unchanged where nothing touches it."""
-    felt: list[float] = engine.boundaries.hook_sums[1].tolist()
-    return felt
+def _force_sum(engine: Engine) -> list[float]:
+    """Return (3,) the force on the upper hook, summed over steps [N]; constant while nothing touches the hook."""
+    total: list[float] = engine.boundaries.hook_sums[1].tolist()
+    return total

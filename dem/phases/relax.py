@@ -12,7 +12,7 @@ from dem.setting.part import Duration, Part
 
 
 class Relax(Part, Phase):
-    """Let the pile rest; nothing acts but gravity."""
+    """Let the pile rest under gravity, with smarticles welded."""
 
     planar: ClassVar[bool | None] = None
     type: Literal["relax"]

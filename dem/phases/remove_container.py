@@ -14,20 +14,20 @@ from dem.setting.part import Duration, Part, Speed
 
 
 class RemoveContainer(Part, Phase):
-    """Take the container's wall away and let the pile rest on its floor, which has no end. Motors hold.
+    """Take the container's wall away, with smarticles welded; the pile rests on an unbounded floor.
 
-    Smarticles are not held back from then on: how far they go is measured. A later phase that shakes the
-    container shakes the floor, and those that have rolled away with it.
+    Smarticles may then roll away without limit; the series count those outside the container's radius. A later shake
+    moves the whole floor, under these smarticles too.
     """
 
     frees: ClassVar[bool] = True
     type: Literal["remove-container"]
     duration_s: Duration = Field(1.0, description="length of the phase [s]")
-    parts: Literal["wall"] = Field("wall", description="what is taken away: the whole wall, every tier of it")
+    parts: Literal["wall"] = Field("wall", description="what is taken away: the wall of all tiers")
     speed_m_per_s: Speed | None = Field(
         None,
-        description="speed at which the wall is lifted, rubbing along the pile, until its lower edge is above the pile "
-        "[m/s]; a wall that is not clear of it at the end of the phase stays where it is; null: gone at once",
+        description="speed at which the wall is lifted, with friction at the pile, until its lower edge is above the "
+        "pile [m/s]; a wall that is still around the pile at the end of the phase stays there; null: gone at once",
     )
 
     def check(self, scene: SceneView, index: int) -> Iterator[str]:

@@ -16,10 +16,9 @@ from dem.setting.part import Duration, Part
 
 
 class Shake(Part, Phase):
-    """Shake the container along the vertical, z = A sin(2πft) with A = Γg/(2πf)², as a whole or its floor alone.
+    """Shake the container, or its floor alone, vertically: z = A sin(2πft) with A = Γg/(2πf)².
 
-    After a phase that takes the container away, its floor alone is shaken, a plane without end: what rolls off the
-    pile goes on being shaken.
+    After a phase that takes the container away the unbounded floor is shaken, with all smarticles on it.
     """
 
     type: Literal["shake"]
@@ -31,15 +30,15 @@ class Shake(Part, Phase):
     )
 
     def amplitude(self, gravity: float) -> float:
-        """Return A = Γ g / (2πf)² [m], gravity in m/s²."""
+        """Return the amplitude A = Γg/(2πf)² [m]; gravity g in m/s²."""
         return self.peak_acceleration_g * gravity / (2 * math.pi * self.frequency_hz) ** 2
 
     def warnings(self, scene: SceneView, index: int) -> Sequence[str]:
         if not 0 < self.peak_acceleration_g < 1:
             return ()
         return (
-            f"phases.{index}.peak_acceleration_g: Γ = {self.peak_acceleration_g:g} is below 1, so that the floor never "
-            "leaves the pile, which moves with it as one; use more than 1 to shake it loose",
+            f"phases.{index}.peak_acceleration_g: Γ = {self.peak_acceleration_g:g} is below 1, so that the pile moves "
+            "with the floor like one body and never leaves it; use more than 1 to loosen the pile",
         )
 
     def peak_speed(self, gravity: float) -> float:
@@ -58,7 +57,8 @@ class Shake(Part, Phase):
         if self.moves == "floor" and amplitude > below:
             yield (
                 f"phases.{index}.moves: the floor alone would go {amplitude:.3g} m down, and the wall ends "
-                f"{below:.3g} m below it; use a lower peak_acceleration_g, a higher frequency_hz, or moves: container"
+                f"{below:.3g} m below the floor; use a lower peak_acceleration_g, a higher frequency_hz, or moves: "
+                "container"
             )
 
     def first_memory(self, scene: SceneView) -> Memory:
@@ -70,10 +70,11 @@ class Shake(Part, Phase):
             return 0.0
         if _freed(stage.scene, stage.index) and engine.boundaries.walled:
             edge = engine.boundaries.wall_bottom - engine.boundaries.floor
+            side = "above" if edge > 0 else "below"
             raise RunError(
-                f"the wall is still around the pile, its edge {edge:.3g} m over the floor that is to be shaken: it was "
-                "not clear of the pile when remove-container ended; lengthen that phase's duration_s or raise its "
-                "speed_m_per_s"
+                f"the wall is still around the pile, its lower edge {abs(edge):.3g} m {side} the floor that is to be "
+                "shaken: remove-container was too short to lift it over the pile; raise duration_s or speed_m_per_s of "
+                "that phase"
             )
         stage.memory["begun"] = True
         engine.motors.weld()

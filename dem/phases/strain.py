@@ -21,25 +21,29 @@ from dem.setting.smarticle import Smarticle
 
 
 class Strain(Part, ActuatedPhase):
-    """Pull the chain by strings at its two end barbs, one held, one moved along x, until it parts.
+    """Pull a chain apart by two strings, one at each end of the chain, while motors hold the barbs' angles.
 
-    The other ends of the strings are on the chain's axis. Strings pull and never push. Motors hold their angles.
+    Each string is tied to an outer barb; its far end is on the chain's axis. One far end is fixed, the other one moves
+    along x. Strings pull and never push.
     """
 
     planar: ClassVar[bool | None] = True
     type: Literal["strain"]
-    speed_m_per_s: Speed = Field(0.005, description="speed of the moved end [m/s]")
-    distance_m: Length = Field(..., description="how far it moves at most [m]; the phase ends when the chain parts")
-    tied_at: Literal["tip", "axis"] = Field(
-        "tip", description="where on the end barbs: at their tips, or where they cross the chain's axis"
+    speed_m_per_s: Speed = Field(0.005, description="speed of the moving end [m/s]")
+    distance_m: Length = Field(
+        ..., description="largest distance by which that end moves [m]; the phase ends earlier when the chain parts"
     )
-    string_length_m: Length = Field(0.1, description="length of either string [m]")
-    string_stiffness_N_per_m: Stiffness = Field(5000.0, description="of either string when taut [N/m]")
-    string_damping_N_s_per_m: float = Field(1.0, ge=0, le=1e6, description="of either string when taut [N s/m]")
+    tied_at: Literal["tip", "axis"] = Field(
+        "tip",
+        description="where strings are tied: at the tips of the outer barbs, or where these cross the chain's axis",
+    )
+    string_length_m: Length = Field(0.1, description="unstretched length of each string [m]")
+    string_stiffness_N_per_m: Stiffness = Field(5000.0, description="stiffness of each string while taut [N/m]")
+    string_damping_N_s_per_m: float = Field(1.0, ge=0, le=1e6, description="damping of each string while taut [N s/m]")
 
     @property
     def duration_s(self) -> float:
-        """Length of the phase [s], unless the chain parts before."""
+        """Longest duration of the phase [s]; it ends earlier when the chain parts."""
         return self.distance_m / self.speed_m_per_s
 
     def check(self, scene: SceneView, index: int) -> Iterator[str]:
@@ -63,7 +67,7 @@ class Strain(Part, ActuatedPhase):
         hold = Hold(type="hold")
         return Gait(motions=(hold, hold), duration=self.duration_s)
 
-    def own(self, key: str) -> tuple[str, float | None]:
+    def source_of(self, key: str) -> tuple[str, float | None]:
         return "distance_m", self.distance_m
 
     def calls(self, scene: SceneView, index: int) -> Mapping[EffectName, str]:
@@ -84,8 +88,8 @@ class Strain(Part, ActuatedPhase):
                 damping=self.string_damping_N_s_per_m,
             )
             engine.strings.tie(chain.ties(self.tied_at), law, (0.0, self.speed_m_per_s))
-        over = update % every == 0 and parted(engine.state(), 2 * chain.particle.radius)
-        wait = 0.0 if over else self.follow(stage, engine, every)
+        broken = update % every == 0 and parted(engine.state(), 2 * chain.particle.radius)
+        wait = 0.0 if broken else self.follow(stage, engine, every)
         if not wait:
             engine.strings.untie()
         return wait

@@ -1,8 +1,8 @@
-"""The phase that takes over the smarticles of another run of any engine.
+"""The phase that takes over the smarticles of another run, made on any engine.
 
 A frame holds poses to the last bit, and no contacts: friction springs are lost, and smarticles begin at rest. On
-another engine, or at another fidelity, the same poses touch elsewhere: chains of spheres reach into each other's
-valleys, smooth links do not. Such overlaps are first relaxed without speed.
+another engine, or at another fidelity, these poses may overlap: spheres of one chain lie partly in the gaps of another
+chain, smooth links do not. Such overlaps are relaxed first, with velocities set to zero every few steps.
 """
 
 from __future__ import annotations
@@ -30,18 +30,18 @@ from dem.setting.hooks import Cross
 from dem.setting.part import Part
 
 LAST = "last"  # the frame at the end of a run that is done
-TAKEN_SECONDS = 0.05  # until a pile that was taken over is still, about
-STRIDE = 10  # steps between checks whether overlapping smarticles fly apart; a contact swings in about as many
-# Sphere diameters that a vertex may be from its place in the scene's shape. A hinge on YADE gives way by 0.01 in a
-# pile, and contacts at rest are about as deep, so that it makes no more overlap than there is.
+TAKEN_SECONDS = 0.05  # s, typical time in which a pile that was taken over comes to rest
+STRIDE = 10  # steps between checks whether overlapping smarticles fly apart, about one oscillation of a contact
+# Largest distance of a recorded vertex from the vertex of the scene's shape that is fitted to it, in sphere diameters.
+# On YADE hinges give way by 0.01 in a pile, and contacts at rest are as deep, so that fits add no larger overlaps.
 MOST_OFF = 0.02
-# Keys of a smarticle that run.json has too.
+# Keys of a smarticle that have equal names in run.json.
 _SHAPE = ("aspect_ratio", "middle_length_m", "thickness_normal_m", "thickness_in_plane_m")
 
 
 @dataclass(frozen=True)
 class Taken:
-    """One frame of another run, by its number."""
+    """A frame of another run, whose smarticles are taken over."""
 
     run: Run
     number: int
@@ -49,17 +49,17 @@ class Taken:
 
     @property
     def vertices(self) -> Array:
-        """(N, 4, 3) above the floor [m]."""
+        """(N, 4, 3) vertices of the smarticles, heights above the floor [m]."""
         return self.frame.vertices - [0.0, 0.0, self.frame.floor_z]
 
     @property
     def sha256(self) -> str:
-        """Hash of these vertices: all of a frame that decides what comes after."""
+        """SHA-256 hash of `vertices`, the only content of the frame that is taken over."""
         return hashlib.sha256(np.ascontiguousarray(self.vertices, dtype="<f8").tobytes()).hexdigest()
 
     @property
     def fastest(self) -> float:
-        """Greatest speed of a link's centre [m/s], which is not taken over."""
+        """Greatest speed of a link's centre in the frame [m/s]; velocities are not taken over."""
         return float(np.linalg.norm(self.frame.link_velocity, axis=-1).max())
 
     def __str__(self) -> str:
@@ -67,10 +67,11 @@ class Taken:
 
 
 def take(path: Path, frame: int | str) -> Taken:
-    """Read a frame of a run, by its number or `LAST`.
+    """Return a frame of the run at a path, by its number or `LAST`.
 
     Raises:
-        InputError: no such run or frame, damaged, or the run is not over; begins with the wrong key, `run` or `frame`.
+        InputError: run or frame are missing or damaged, or the run has not ended; the message begins with the key that
+            is wrong, `run` or `frame`.
     """
     try:
         run = open_run(path)
@@ -97,21 +98,21 @@ def take(path: Path, frame: int | str) -> Taken:
 
 
 class TakeOver(Part, Phase):
-    """Begin with the smarticles of another run, of any engine, at rest where a frame of it has them; they settle."""
+    """Begin with the smarticles of another run, at rest in the poses of one of its frames, until the pile settles."""
 
     begins: ClassVar[bool] = True
     sources: ClassVar[frozenset[str]] = frozenset({"run", "frame"})
     type: Literal["take-over"]
-    run: str = Field(..., min_length=1, description="directory of the run, as seen from the scene file")
+    run: str = Field(..., min_length=1, description="directory of the run, relative to the scene file")
     frame: Annotated[int, Field(ge=0, le=10**9)] | Literal["last"] = Field(
         "last",
-        description="number of the frame, as in the name of its file; last: of a run that is done, resolved when the "
-        "scene is read",
+        description="number of the frame, as in the name of its file; last: the last frame of a run that is done, "
+        "whose number is filled in when the scene is read",
     )
     sha256: str | None = Field(
         None,
-        description="of the frame's vertices above the floor; by default filled in when the scene is read, so that a "
-        "source which has changed since is noticed. It counts for the scene's hash, directory and number do not",
+        description="SHA-256 of the frame's vertices above the floor; default: filled in when the scene is read, so "
+        "that later changes of the frame are noticed. It counts for the scene's hash; run and frame do not",
     )
     settle: Settle = Field(default_factory=Settle, description="when the pile counts as settled")
 
@@ -140,22 +141,26 @@ class TakeOver(Part, Phase):
     @model_validator(mode="wrap")
     @classmethod
     def _pinned(cls, data: Any, handler: ModelWrapValidatorHandler[Self]) -> Self:
-        """Fill in the number of the last frame and the hash of its content, as they are today."""
+        """Fill in the number of the last frame, and the hash of the frame's content."""
         made = handler(data)
         if made.sha256 is not None and made.frame != LAST:
             return made
         taken = take(Path(made.run), made.frame)
         pinned = {"frame": taken.number, "sha256": made.sha256 or taken.sha256}
-        # Filled in here, not given by the user: another run in its place has a hash of its own.
+        # The filled keys do not count as given by the user: if `run` is changed, they are filled in anew.
         return cast("Self", cls.model_construct(_fields_set=made.model_fields_set, **{**dict(made), **pinned}))
 
     @cached_property
     def taken(self) -> Taken:
-        """The frame; an InputError if it is missing, or not the one that the scene was made from."""
+        """The frame that is taken over.
+
+        Raises:
+            InputError: the frame is missing, or its content has changed since the scene was made.
+        """
         taken = take(Path(self.run), self.frame)
         if taken.sha256 != self.sha256:
             raise InputError(
-                f"sha256: {taken} has other poses than those that the scene was made from ({taken.sha256[:12]}… "
+                f"sha256: {taken} has other poses than those from which the scene was made ({taken.sha256[:12]}… "
                 f"instead of {str(self.sha256)[:12]}…); put that run back, or leave sha256 out to take what is there"
             )
         return taken
@@ -166,7 +171,7 @@ class TakeOver(Part, Phase):
         try:
             taken = self.taken
         except InputError:
-            return  # a scene whose source is gone can still be read; `ready` rejects it before a run
+            return  # a scene without its source can still be read; `ready` rejects it before a run
         yield from _mismatches(scene, taken)
 
     def ready(self, scene: SceneView) -> None:
@@ -204,12 +209,12 @@ class TakeOver(Part, Phase):
         )
 
     def expected_duration(self, count: int) -> float:
-        # Nothing falls, so that little more than the hold is needed.
+        # Nothing falls: the pile settles in little more than `hold_s`.
         return self.settle.hold_s + TAKEN_SECONDS
 
     def first_memory(self, scene: SceneView) -> Memory:
-        # `task`: what is due; `stops`: how often smarticles were stopped; `height`: their mean when added [m];
-        # `waited`: since then [s]; `still`: that the pile has been [s].
+        # `task`: the next action; `stops`: how often velocities were set to zero; `height`: mean height of smarticles
+        # when they were added [m]; `waited`: time since then [s]; `still`: time for which the pile has been still [s].
         return {"task": "put", "stops": 0, "height": 0.0, "waited": 0.0, "still": 0.0}
 
     def proceed(self, stage: Stage, engine: Engine) -> float:
@@ -256,10 +261,11 @@ def _mean_height(engine: Engine) -> float:
 
 
 def poses_of(scene: SceneView, taken: Taken) -> Poses:
-    """Return the smarticles of a frame as poses of the scene's own.
+    """Return the poses of a scene's smarticles in a frame of another run.
 
     Raises:
-        InputError: they differ, or do not fit into its container; one line with key, value and the way out.
+        InputError: the frame's smarticles differ from the scene's, or do not fit into its container; one line with
+            key, value and what to do.
     """
     for mismatch in _mismatches(scene, taken):
         raise InputError(mismatch)
@@ -267,7 +273,7 @@ def poses_of(scene: SceneView, taken: Taken) -> Poses:
 
 
 def _mismatches(scene: SceneView, taken: Taken) -> Iterator[str]:
-    """Yield what of a frame does not fit the scene; each item relies on the ones before not to be yielded."""
+    """Yield errors where a frame does not fit the scene; later checks assume that earlier ones found none."""
     manifest, taking = taken.run.manifest, "which phases.0 (take-over) takes over"
     if manifest.planar:
         yield f"phases.0.run: {taken.run} is a run in a plane; take over one in a container"
@@ -334,7 +340,7 @@ def _mismatches(scene: SceneView, taken: Taken) -> Iterator[str]:
 
 
 def _within_tips(vertices: Array, radius: float) -> Array:
-    """Return vertices with both tips a radius [m] further in, at the last contact point of a chain or strand."""
+    """Return vertices (N, 4, 3) with both tips moved inwards by a radius [m], to the centres of the last spheres."""
     moved = vertices.copy()
     for tip, hinge, far in ((0, 1, 2), (3, 2, 1)):
         # Without barbs the middle link ends at the tips.
@@ -348,7 +354,7 @@ def _within_tips(vertices: Array, radius: float) -> Array:
 
 
 def _in_cross(cross: Cross, vertices: Array) -> Flags:
-    """Return (N,) whether the axis of a link passes through a bar, checked in steps of a quarter of its side."""
+    """Return (N,) whether the axis of a link passes through a bar, at points a quarter of the bar's side apart."""
     ends = np.stack([vertices[:, :-1], vertices[:, 1:]], axis=2)  # (N, 3, 2, 3)
     longest = float(np.linalg.norm(ends[:, :, 1] - ends[:, :, 0], axis=-1).max())
     shares = np.linspace(0, 1, 2 + int(4 * longest / cross.side))[:, None]
@@ -359,7 +365,7 @@ def _in_cross(cross: Cross, vertices: Array) -> Flags:
 
 
 def _angles(taken: Taken) -> Array:
-    """Return (N, 2) angles of the barbs [deg], without their sign where frames do not hold them."""
+    """Return (N, 2) angles of the barbs [deg]; where the frame holds no angles, their absolute values."""
     recorded = taken.frame.cell_data.get("angle_rad")
     if recorded is not None:
         return np.asarray(np.degrees(recorded[:, [0, 2]]))

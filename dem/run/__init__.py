@@ -1,1 +1,1 @@
-"""One run: a scene in, a run directory out."""
+"""Simulation of a scene into a run directory."""

@@ -1,4 +1,4 @@
-"""The parts of a run, made from its scene: engine, recorder, watchdog."""
+"""Functions that make the parts of a run from its scene: engine, recorder, watchdog."""
 
 from __future__ import annotations
 
@@ -26,30 +26,32 @@ from dem.run.watchdog import Watchdog
 from dem.scene.reading import scene_hash
 from dem.scene.scene import Scene
 
-GAP_LIMIT = 0.2  # sphere diameters; a hinge holds within 0.01 in a pile and 0.02 at an impact of 3 m/s
-SPEED_MARGIN = 5.0  # times the speed of a fall over the container's height, or of the shaking
-# Sphere diameters: beyond it wall and floor push ever less or outwards, and chains slip through each other; shaking at
-# Γ = 10, draft, reaches 0.4.
+GAP_LIMIT = 0.2  # gap of a hinge in sphere diameters; it is up to 0.01 in a pile and 0.02 at an impact of 3 m/s
+SPEED_MARGIN = 5.0  # limit of speeds, over the speed of a fall over the container's height or of the shaking
+# Overlap in sphere diameters, from which on the forces of wall and floor decrease or point outwards, and chains slip
+# through each other. Shaking at Γ = 10 with the fidelity draft reaches 0.4.
 DEPTH_LIMIT = 0.5
-# Sphere diameters on links, whose contacts stiffen without bound before axes meet: 100 piles on one stay below it.
+# On links, whose contacts stiffen without bound before axes meet; under the weight of 100 piles overlaps are smaller.
 BARRIER_LIMIT = 0.9
-# Fraction of the dissipation that the ledger of links may miss; that of YADE is sampled, as often as a scene asks.
+# Fraction of the dissipation that the energy ledger of links may miss; on YADE it depends on the sampling interval.
 MISSED_LIMIT = 0.05
-# Sphere diameters by which energy from nowhere could lift all smarticles: less than any height in the results resolves.
+# Limit of an unexplained rise of the energy: what lifts all smarticles by so many sphere diameters, a height below the
+# resolution of all results.
 RISE_LIMIT = 0.5
-# Of the kinetic energy at the greatest speed that a phase gives: collisions without loss keep it so well.
+# The limit is at least this fraction of the kinetic energy at the greatest speed that a phase gives to smarticles,
+# since collisions without loss conserve it to that accuracy only.
 KEPT_WITHIN = 0.01
 
 
 def build_engine(scene: Scene, dt: float) -> Engine:
-    """Return the engine of a scene, with the time step `dt` [s] of its phases with motors, which is not checked."""
+    """Return an empty simulation of a scene; dt is the time step of phases with motors [s] and is not checked."""
     return engine_kind(scene.engine).build(scene, dt)
 
 
 def build_recorder(scene: Scene, out: Path, progress: ProgressWriter) -> Recorder:
-    """Return the recorder of a scene, with the watchdog's limits."""
+    """Return the recorder of a scene, which writes into the run directory `out`, and its watchdog."""
     recording = scene.recording
-    # No one radius gives the volume of a mould of tiers.
+    # A mould of tiers has no single radius, and a plane has none.
     radius = math.nan if scene.cylinder.upper or scene.plane else scene.container.measured_radius
     effects = called_for(scene)
     sampler = Sampler(radius, effects)
@@ -69,11 +71,14 @@ def build_recorder(scene: Scene, out: Path, progress: ProgressWriter) -> Recorde
 
 
 def watched_points(scene: Scene) -> Callable[[State], Array]:
-    """Return the (N, P, 3) points [m] that the watchdog checks: all spheres, or ends and middles of smooth links."""
+    """Return a function from states to the points (N, P, 3) [m] that the watchdog checks.
+
+    The points are the centres of all spheres, or the ends and middles of smooth links.
+    """
     particle = scene.particle
     if not scene.smooth:
         return lambda state: state.spheres(particle)
-    # The first, the middle and the last of each straight row of the chain that stands for a link in pictures.
+    # The first, the middle and the last sphere of each straight row of the chain that represents a link in pictures.
     places = np.column_stack([particle.links, np.round(particle.local_centres[:, 1:] / particle.radius, 6)])
     which = []
     for row in np.unique(places, axis=0):
@@ -95,14 +100,14 @@ def build_watchdog(scene: Scene) -> Watchdog:
         gap=GAP_LIMIT * diameter,
         depth=(BARRIER_LIMIT if scene.smooth else DEPTH_LIMIT) * diameter,
         missed=MISSED_LIMIT if scene.smooth else math.inf,
-        # Without gravity there is no such measure.
+        # Without gravity no height corresponds to an energy.
         energy=mass * max(RISE_LIMIT * diameter * gravity, KEPT_WITHIN * fastest**2 / 2) if gravity else math.inf,
     )
 
 
 @dataclass(frozen=True)
 class Builders:
-    """Makers of the parts of a run: time step of each phase [s], engine, recorder; tests replace them."""
+    """Functions that make a run's time steps (one per phase [s]), engine and recorder; tests replace them."""
 
     steps: Callable[[Scene], Sequence[float]] = time_steps
     engine: Callable[[Scene, float], Engine] = build_engine

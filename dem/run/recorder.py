@@ -1,4 +1,4 @@
-"""Everything that a run writes while time advances, and its checks by the watchdog."""
+"""Writing of a run's files while time advances, and checks by the watchdog."""
 
 from __future__ import annotations
 
@@ -20,13 +20,13 @@ from dem.record.series import SeriesWriter
 from dem.run.sampler import Sampler
 from dem.run.watchdog import Watchdog
 
-# Steps between checks of the watchdog, about. A check takes as long as one or two steps; instabilities grow by steps.
+# Approximate steps between checks of the watchdog. A check takes as long as one or two steps.
 WATCH_STEPS = 500
 
 
 @dataclass
 class Recorder:
-    """Records at fixed intervals of time, which are whole numbers of samples of the series."""
+    """Recorder of a run: samples at a fixed interval, other records at whole multiples of it."""
 
     sampler: Sampler
     series: SeriesWriter
@@ -38,14 +38,14 @@ class Recorder:
     frame_every: int  #: Samples between frames
     watch_every: int | None = None  #: Samples between checks of the watchdog; None: about `WATCH_STEPS` steps
     forces: FrameWriter | None = None  #: Writes the forces at contacts, with each frame
-    spheres: FrameWriter | None = None
-    sphere_every: int = 1  #: Samples between these
+    spheres: FrameWriter | None = None  #: Writes the spheres
+    sphere_every: int = 1  #: Samples between files of spheres
     samples: int = 0  #: Number of samples so far
-    residual: str | None = None  #: Warning about the energy ledger, if the run ended now
+    residual: str | None = None  #: Warning about the energy ledger at the last sample, for the end of the run
     next_step: int = 0  #: Step of the next sample
 
     def record(self, engine: Engine, phase: int) -> None:
-        """Record what is due at this step.
+        """Take a sample at the present step, and write frames and check the state if they are due.
 
         Raises:
             RunError: the watchdog stopped the run, or a file cannot be written.
@@ -85,14 +85,18 @@ class Recorder:
         self.schedule(engine)
 
     def schedule(self, engine: Engine) -> None:
-        """Set the step nearest to the time of the next sample; call it again when the time step changes."""
+        """Set `next_step` to the step nearest to the time of the next sample; needed after each change of dt."""
         self.next_step = engine.steps + max(1, round((self.samples * self.interval - engine.time) / engine.time_step))
 
     def watch(self, engine: Engine, state: State | None = None) -> None:
-        """Let the watchdog check everything."""
+        """Let the watchdog check the state, overlaps and energy.
+
+        Raises:
+            RunError: a limit is exceeded.
+        """
         state, time, watchdog = state or engine.state(), engine.time, self.watchdog
         floor, raised, extremes = engine.boundaries.floor, engine.boundaries.raised, engine.extremes(state)
-        if extremes is not None and watchdog.content(extremes, floor=floor, raised=raised):
+        if extremes is not None and watchdog.within_limits(extremes, floor=floor, raised=raised):
             elastic = extremes.elastic_energy
         else:
             gaps = engine.motors.gaps() if engine.motors.articulated else None
@@ -106,7 +110,7 @@ class Recorder:
 
     @property
     def memory(self) -> dict[str, Any]:
-        """Plain data that `restore` needs besides the columns of the series."""
+        """Plain data for `restore`, which also needs the columns of the series."""
         times = {name: writer.times for name, writer in self._writers()}
         return {"samples": self.samples, "next_step": self.next_step, **times, "series": dict(self.sampler.memory)}
 
@@ -115,7 +119,7 @@ class Recorder:
         return [(name, writer) for name, writer in named if writer is not None]
 
     def restore(self, memory: Mapping[str, Any], columns: Mapping[str, NDArray[Any]]) -> None:
-        """Restore what `memory` returned: later frames are removed, the series is cut back."""
+        """Restore the state that `memory` returned: remove later frames, and write the series `columns`."""
         self.samples, self.next_step = memory["samples"], memory["next_step"]
         self.truncate(memory)
         self.sampler.memory = dict(memory["series"])
@@ -123,6 +127,6 @@ class Recorder:
         self.series.write()
 
     def truncate(self, memory: Mapping[str, Any]) -> None:
-        """Keep the frames of `memory` only; none of an empty one."""
+        """Remove all frames that `memory` does not list; an empty mapping lists none."""
         for name, writer in self._writers():
             writer.truncate(memory.get(name, []))

@@ -1,4 +1,4 @@
-"""One run: a scene in, a run directory out."""
+"""Simulation of one scene into a run directory, and the manifest of the run."""
 
 from __future__ import annotations
 
@@ -35,19 +35,21 @@ from dem.scene.scene import Scene
 def run_scene(
     scene: Scene, out: Path, *, command: str, progress: bool, resume: bool = False, builders: Builders | None = None
 ) -> Done | None:
-    """Run a scene into a run directory; return times and cost, None where it was done already.
+    """Simulate a scene into a run directory; return times and cost, or None if the run was done already.
 
     Args:
-        out: the run directory; must not exist, or be empty, or with `resume` hold an unfinished run of this scene.
+        scene: the scene.
+        out: the run directory; it must not exist, or be empty, or with `resume` hold an unfinished run of this scene.
         command: the command line, for the manifest.
-        resume: go on from the newest checkpoint that is whole, or from the start where none was written.
-        builders: makers of its parts, where they differ from the usual ones.
+        progress: whether to show progress on the terminal.
+        resume: whether to continue from the newest undamaged checkpoint, or from the start if none was written.
+        builders: functions that make the parts of the run; None: the default ones.
 
     Raises:
-        InputError: `out` holds something else, or another process runs in it.
-        RunError: the run failed; `failed.json` states the cause and everything recorded before stays.
+        InputError: `out` holds other files, or another process runs in it.
+        RunError: the run failed; `failed.json` states the cause, and all files written before stay.
         StopRequestedError: SIGUSR1 came; the run stopped at its next checkpoint and can be resumed.
-        KeyboardInterrupt: the run was interrupted; what was recorded is whole.
+        KeyboardInterrupt: the run was interrupted; all files are complete.
     """
     builders, kind = builders or Builders(), engine_kind(scene.engine)
     steps, made_by, threads = builders.steps(scene), (kind.name, kind.version()), kind.threads()
@@ -62,13 +64,13 @@ def run_scene(
             if not has_checkpoint(out):
                 _check_ready(scene)
             else:
-                # Before anything is changed: it may be of another version.
+                # Read before anything is changed, since it may be rejected for its version.
                 saved = read_checkpoint(out, scene_sha256=scene_hash(scene), made_by=made_by)
         else:
             made = manifest(scene, out, steps=steps, command=command, made_by=made_by, threads=threads)
             made.write(out / MANIFEST, make_folder=True)
         if not (out / SCENE).exists():
-            # A run killed between the two files can be resumed: a run is known by its manifest.
+            # A directory with a manifest counts as a run, which can be resumed if it was killed before this line.
             write_text(out / SCENE, dump_scene(scene, out))
         (out / FAILED).unlink(missing_ok=True)
         with log_of(out) as log:
@@ -108,7 +110,7 @@ def _check_ready(scene: Scene) -> None:
 
 
 def _check_scene(scene: Scene, out: Path) -> None:
-    """Check that a run directory was made from this scene."""
+    """Reject a run directory that was made from another scene."""
     made = Run(out).manifest.scene_sha256
     if made == scene_hash(scene):
         return
@@ -148,16 +150,16 @@ def _restore(simulation: Simulation, saved: tuple[Checkpoint, str | None] | None
 
 
 def _mark_ended(simulation: Simulation | None, out: Path, log: logging.Logger, error: BaseException) -> str:
-    """Write the series so far and why the run ended; return the cause, for a failed run with its last checkpoint."""
+    """Write the series and `failed.json`; return the cause of the end, for a failed run with its last checkpoint."""
     status: Ended = "interrupted" if isinstance(error, StopRequestedError | KeyboardInterrupt) else "failed"
     cause = "interrupted by the user" if isinstance(error, KeyboardInterrupt) else str(error)
     if not isinstance(error, RunError | StopRequestedError | KeyboardInterrupt):
-        # A defect of ours: the run directory must still say that the run has ended.
+        # A bug in this program: the run directory must still state that the run has ended.
         log.error("unexpected error", exc_info=error)
         cause = f"unexpected {type(error).__name__}: {error}"
     time, checkpoint = 0.0, None
     if simulation is not None:
-        # Without samples the series on the disk is that of a run which could not be resumed.
+        # Without samples this process has resumed nothing, and the series of the earlier one must stay.
         if simulation.recorder.samples:
             with contextlib.suppress(RunError):  # a full disk: what was written before is whole
                 simulation.recorder.series.write()
@@ -173,9 +175,18 @@ def _mark_ended(simulation: Simulation | None, out: Path, log: logging.Logger, e
 def manifest(
     scene: Scene, out: Path, *, steps: Sequence[float], command: str, made_by: tuple[str, str], threads: int
 ) -> Manifest:
-    """Return what made a run, and the numbers that measures need; time steps in s."""
+    """Return the manifest of a run: how it was made, and the numbers of the scene that measures need.
+
+    Args:
+        scene: the scene.
+        out: the run directory.
+        steps: time step of each phase [s].
+        command: the command line.
+        made_by: name and version of the engine.
+        threads: threads, or ranks, of the engine.
+    """
     particle, boxes, origin = scene.particle, scene.smarticle.boxes, scene.phases[0].origin
-    if origin is not None:  # a path that holds where both runs are moved
+    if origin is not None:  # a relative path stays right if both runs are moved together
         origin = {**origin, "run": os.path.relpath(origin["run"], out.resolve())}
     return Manifest(
         name=scene.name,
@@ -213,7 +224,7 @@ def manifest(
 
 
 def versions(made_by: tuple[str, str]) -> dict[str, str]:
-    """Return the versions of everything that results depend on; `made_by`: name and version of the engine."""
+    """Return the versions of all software that results depend on; `made_by` is the engine's name and version."""
     try:
         own = version("smarticles")
     except PackageNotFoundError:
@@ -241,7 +252,7 @@ def _processor() -> str:
 
 
 def _blas() -> str:
-    """Return NumPy's BLAS and the kernels that the environment forces; no run of links depends on it."""
+    """Return NumPy's BLAS and the kernels that the environment selects; results of links do not depend on it."""
     built = np.show_config(mode="dicts")["Build Dependencies"]["blas"]
     forced = os.environ.get("OPENBLAS_CORETYPE", "")
     return f"{built.get('name')} {built.get('version')}, kernels {forced or 'by the processor'}"

@@ -1,4 +1,4 @@
-"""Rows of the series: numbers that the engine reports at each sample."""
+"""Rows of the series, computed from the engine at each sample."""
 
 from __future__ import annotations
 
@@ -21,22 +21,28 @@ from dem.record.packing import packing_fraction
 
 @dataclass
 class Sampler:
-    """Makes rows of the series and keeps the sample before, for means; container's radius in m."""
+    """Computes rows of the series, and keeps values of the previous sample, from which means over time follow."""
 
-    radius: float
-    effects: Set[EffectName] = frozenset()
+    radius: float  #: Radius for packing fractions [m]; NaN: they have no meaning
+    effects: Set[EffectName] = frozenset()  #: Effects of the scene
     memory: dict[str, Any] = field(default_factory=lambda: dict.fromkeys(("before", "hooks", "strain")))
-    """Plain data of the sample before: time [s], impulse of gravity [N s] and momentum [kg m/s]; for hooks and strain
-    steps, and forces summed over them [N]."""
+    """Plain data of the previous sample. `before`: time [s], impulse of gravity [N s], momentum [kg m/s]; `hooks` and
+    `strain`: number of steps, and forces summed over steps [N]."""
 
     @property
     def described(self) -> Columns:
-        """The columns of its rows."""
+        """Descriptions of the columns that rows have, by name."""
         added = {name for effect in self.effects if effect in ADDS for name in ADDS[effect].series}
         return {name: column for name, column in EVERY.items() if name in COLUMNS or name in added}
 
     def sample(self, engine: Engine, state: State, phase: int) -> dict[str, Any]:
-        """Return one row, of an engine with its present state and the index of the phase."""
+        """Return one row: a number, or a (2,) or (3,) array, by name of the column.
+
+        Args:
+            engine: the running simulation.
+            state: present state of the engine.
+            phase: index of the present phase.
+        """
         boxes = engine.particle.boxes
         heights = state.positions[:, 2] - engine.boundaries.floor
         phi = packing_fraction(heights, solid_volume=boxes.volume, radius=self.radius)
@@ -44,7 +50,7 @@ class Sampler:
         more: dict[str, Any] = {}
         if EffectName.HOOKS in self.effects:
             lower, upper = self._mean_since("hooks", engine.steps, engine.boundaries.hook_sums)
-            # The balance includes the hooks.
+            # The momentum balance includes the force on the hooks.
             container_force -= lower + upper
             more |= {
                 "hook_upper_force_N": upper,
@@ -58,7 +64,7 @@ class Sampler:
                 phi = math.nan  # a pile that spreads fills no cylinder
         if EffectName.STRINGS in self.effects:
             more |= self._strain_row(engine, state)
-            # It includes the strings, too.
+            # The momentum balance includes the strings, whose forces act on the chain.
             pulls = more["string_fixed_force_N"] + more["string_pulled_force_N"]
             container_force += np.nan_to_num(pulls)
         row = {
@@ -86,8 +92,8 @@ class Sampler:
         return row | more
 
     def _mean_force(self, engine: Engine, momentum: Array) -> Array:
-        # The container received what the smarticles lost, apart from gravity and from the throw of added smarticles.
-        # This is exact over any interval; sampled contact forces would alias the shaking and miss impacts.
+        # The container receives the momentum that smarticles lose, except for gravity and the throw of added
+        # smarticles. This is exact over any interval; sampled contact forces would alias the shaking and miss impacts.
         time, impulse, before = engine.time, engine.impulse, self.memory["before"]
         self.memory["before"] = [time, impulse, momentum.tolist()]
         if before is None or time <= before[0]:
@@ -96,7 +102,7 @@ class Sampler:
         return np.asarray(lost / (time - before[0]))
 
     def _mean_since(self, name: str, steps: int, sums: Array) -> Array:
-        """Return the mean over the steps since the sample before, from forces summed over all steps."""
+        """Return the mean over the steps since the previous sample, of forces summed over all steps."""
         before = self.memory[name]
         self.memory[name] = [steps, sums.tolist()]
         if before is None or steps <= before[0]:

@@ -26,22 +26,21 @@ SMALLEST_CHECKPOINT = 2**20  # bytes; the container alone makes half of it
 
 
 class StopRequestedError(Exception):
-    """The run was asked to stop at its next checkpoint (SIGUSR1, as from a batch system), and did."""
+    """A run stopped at its next checkpoint after the signal SIGUSR1, e.g. of a batch system."""
 
 
 @dataclass
 class Simulation:
-    """One run while it runs, with name and version of its engine and the time step of each phase [s]."""
+    """A run while it runs."""
 
     scene: Scene
     engine: Engine
     recorder: Recorder
-    folder: Path
+    folder: Path  #: The run directory
     log: logging.Logger
-    made_by: tuple[str, str]
-    time_steps: Sequence[float]
-    checkpointed: float | None = None
-    """Simulated time of the newest checkpoint [s], at which the watchdog found nothing; None: there is none."""
+    made_by: tuple[str, str]  #: Name and version of the engine
+    time_steps: Sequence[float]  #: Of each phase [s]
+    checkpointed: float | None = None  #: Simulated time of the newest checkpoint [s]; None: no checkpoint yet
     _phase: int = 0
     _stage: Stage | None = None
     _target: int = 0
@@ -57,7 +56,7 @@ class Simulation:
 
         Raises:
             RunError: a phase failed.
-            StopRequestedError: SIGUSR1 came; the last checkpoint has everything.
+            StopRequestedError: SIGUSR1 came; the run can be resumed from its last checkpoint.
         """
         before = signal.signal(signal.SIGUSR1, self._request_stop)
         try:
@@ -68,7 +67,7 @@ class Simulation:
         finally:
             signal.signal(signal.SIGUSR1, before)
         if self.checkpointed != self.engine.time:
-            # After a checkpoint contacts are known from the next step on, and the state has been checked.
+            # At a checkpoint the state was checked; after it contacts are unknown until the next step.
             self.recorder.watch(self.engine)
         self.recorder.series.write()
         if self.recorder.residual:
@@ -109,7 +108,7 @@ class Simulation:
         self._phase += 1
 
     def warn(self, message: str) -> None:
-        """Warn in the log and on the terminal."""
+        """Write a warning into the log and to the terminal."""
         self.log.warning("%s", message)
         self.recorder.progress.warn(message)
 
@@ -126,7 +125,7 @@ class Simulation:
                     self._checkpoint()
 
     def _checkpoint(self) -> None:
-        # A checkpoint is good: the watchdog has checked it.
+        # Only a state without errors becomes a checkpoint.
         self.recorder.watch(self.engine)
         self._check_space()
         saved = self.engine.save(self.folder)
@@ -168,7 +167,7 @@ class Simulation:
             )
 
     def restore(self, checkpoint: Checkpoint) -> None:
-        """Restore a checkpoint."""
+        """Restore the state of a checkpoint, from which `run` continues."""
         state: Mapping[str, Any] = checkpoint.state
         self.engine.load(Saved(content=checkpoint.engine, memory=state["engine"]), self.folder)
         self._note_checkpoint()
@@ -183,12 +182,12 @@ class Simulation:
 
     @property
     def wall(self) -> float:
-        """Wall time spent [s], including earlier processes of this run."""
+        """Wall time spent on the run [s], including earlier processes."""
         return self._spent + time.monotonic() - self._began
 
     @property
     def cpu(self) -> float:
-        """Processor time spent [s], including earlier processes and those of the engine on this machine."""
+        """Processor time spent on the run [s], including earlier processes and local processes of the engine."""
         return self._cpu_spent + time.process_time() - self._cpu_began + self.engine.cpu_elsewhere
 
     def _request_stop(self, number: int, frame: FrameType | None) -> None:

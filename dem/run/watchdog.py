@@ -14,7 +14,7 @@ from dem.physics.overlaps import Extremes, Overlaps
 from dem.setting.container import Cylinder
 
 LOWER_STEP = "lower fidelity.time_step_fraction"
-WARNED_SHARE = 0.2  # of the limit of what the energy ledger may miss: from here on a run warns at its end
+WARNED_FRACTION = 0.2  # of the limit `missed`, from which on a run warns at its end
 BOTH_HOOKS = ("the lower hook", "the upper hook")
 
 
@@ -22,20 +22,20 @@ BOTH_HOOKS = ("the lower hook", "the upper hook")
 class Watchdog:
     """Limits that no smarticle may exceed."""
 
-    #: The container; a smarticle with a sphere's centre, or a link's axis, beyond its wall or under its floor has
-    #: escaped, one whose centre of mass is above it has been thrown out
+    #: The container. A smarticle has escaped if a sphere's centre or a link's axis is beyond the wall or under the
+    #: floor, or if its centre of mass is above the wall
     cylinder: Cylinder
-    speed: float  #: Of a link's centre [m/s]; faster than anything that falls or is shaken in the scene
-    gap: float = math.inf  #: [m]; a hinge whose links are farther apart is broken
-    depth: float = math.inf  #: [m]; contacts that overlap by more no longer keep bodies apart
-    energy: float = math.inf  #: [J]; smarticles that gain more from nowhere are blowing up
-    missed: float = math.inf  #: [1]; the energy ledger may miss this fraction of the dissipation
+    speed: float  #: Largest speed of a link's centre [m/s], above that of falls and shaking in the scene
+    gap: float = math.inf  #: Largest gap of a hinge [m]; beyond it the hinge is broken
+    depth: float = math.inf  #: Largest overlap [m]; beyond it contacts no longer keep bodies apart
+    energy: float = math.inf  #: Largest rise of the energy without work [J]; beyond it the simulation is unstable
+    missed: float = math.inf  #: Largest fraction of the dissipation that the energy ledger may miss [1]
     _ceiling: float = math.inf  # limit of kinetic and potential energy less the work done [J]
 
-    def content(self, extremes: Extremes, *, floor: float, raised: float | None = 0.0) -> bool:
-        """Return whether the extremes of all smarticles are certainly within all limits but that of the energy.
+    def within_limits(self, extremes: Extremes, *, floor: float, raised: float | None = 0.0) -> bool:
+        """Return whether extremes of all smarticles prove that all limits hold, except that of the energy.
 
-        `floor` and `raised` are as in `check`.
+        If not, `check` and `check_depths` decide. `floor` and `raised` are as in `check`.
         """
         inside = extremes.lowest >= floor
         if raised is not None:
@@ -55,18 +55,19 @@ class Watchdog:
         raised: float | None = 0.0,
         gaps: Array | None = None,
     ) -> None:
-        """Check speeds, hinges and places of all smarticles.
+        """Check speeds, hinges and positions of all smarticles.
 
         Args:
-            points: (N, P, 3) centres of their spheres, or points of their links' axes [m]; None: their centres of
-                mass. Contacts with wall and floor are no measure: YADE takes those deeper than the centre for
-                shallower.
+            state: poses and velocities of the smarticles.
             floor: height of the floor [m].
-            raised: distance by which a hook may have raised smarticles [m]; None: nothing holds them, none escapes.
-            gaps: (N, 2) distances of the links of each hinge [m]; None while welded.
+            time: simulated time [s].
+            points: (N, P, 3) centres of the spheres, or points of the links' axes [m]; None: centres of mass. Overlaps
+                with wall and floor cannot replace them: YADE reports too small ones where a centre is beyond.
+            raised: distance by which a hook may have raised smarticles [m]; None: nothing encloses them.
+            gaps: (N, 2) distances between the links of each hinge [m]; None while welded.
 
         Raises:
-            RunError: cause, smarticles concerned, time and the way out.
+            RunError: a limit is exceeded; the message names cause, smarticles, time and what to do.
         """
         positions = state.positions
         speeds = _speeds(state)
@@ -81,7 +82,7 @@ class Watchdog:
             LOWER_STEP,
         )
         if gaps is not None:
-            # A gap that is no number is not below the limit either.
+            # A gap that is NaN fails as well.
             reject(
                 (~np.less_equal(gaps, self.gap)).any(axis=1),
                 time,
@@ -106,7 +107,11 @@ class Watchdog:
         )
 
     def check_depths(self, overlaps: Overlaps, *, time: float) -> None:
-        """Check the depths of all contacts at a simulated time [s]."""
+        """Check the overlaps of all contacts at a simulated time [s].
+
+        Raises:
+            RunError: a contact is deeper than `depth`.
+        """
         cause = (
             f"contacts more than {self.depth:.3g} m deep (deepest {overlaps.deepest:.3g} m), so that links pass "
             "through each other or through the container"
@@ -115,7 +120,7 @@ class Watchdog:
         factor = 2 * overlaps.deepest / self.depth
         way_out = f"raise fidelity.stiffness_N_per_m, about {factor:.2g} times, or load the pile less"
         if overlaps.held:
-            # However stiff: between the two, a contact is all that can give way.
+            # A higher stiffness does not help.
             first = overlaps.held[0]
             cause = (
                 f"smarticle {first.smarticle} is held by {' and '.join(first.between)}, which have moved apart by "
@@ -129,17 +134,21 @@ class Watchdog:
         reject(overlaps.deep, time, cause, way_out)
 
     def check_energy(self, state: State, *, energy: float, elastic: float, time: float) -> None:
-        """Check that no energy comes from nowhere.
+        """Check that the energy has not risen by more than work and springs explain.
 
-        Contacts, hinges and welding only take energy away, and their springs give back at most what they hold. So
-        kinetic and potential energy less the work done can never exceed their value at an earlier time by more than
-        the springs held then. The lowest of these ceilings counts: dissipation makes no room for a later rise.
+        Contacts, hinges and welding dissipate energy, and their springs return at most what they store. Kinetic and
+        potential energy less the work done can therefore not exceed their value at any earlier time by more than the
+        elastic energy at that time. The lowest of these ceilings is the limit.
 
         Args:
-            state: the smarticles, to name the fast ones.
-            energy: kinetic and potential energy, less all energy added and all work done since the start [J]; NaN
-                where the work is unknown at present: the ceiling is then forgotten.
-            elastic: energy of the springs of contacts and hinges at most [J].
+            state: poses and velocities of the smarticles, to name the fastest ones.
+            energy: kinetic and potential energy, less all energy added and all work done since the start [J]; NaN if
+                the work is unknown at present, which removes the ceiling.
+            elastic: upper bound of the elastic energy of contacts and hinges [J].
+            time: simulated time [s].
+
+        Raises:
+            RunError: the energy is above the ceiling by more than the limit `energy`.
         """
         if math.isnan(energy):
             self._ceiling = math.inf
@@ -157,16 +166,17 @@ class Watchdog:
         self._ceiling = min(self._ceiling, energy + elastic)
 
     def check_residual(self, residual: float, *, dissipated: float, time: float) -> str | None:
-        """Check the residual of the energy ledger; return a warning for the end of the run, if any.
+        """Check the residual of the energy ledger; return a warning for the end of the run, or None.
 
         Args:
-            residual: energy added and work done, less everything stored and dissipated [J].
-            dissipated: by contacts, hinges and welding since the start [J].
+            residual: energy added and work done, less all energy stored and dissipated [J].
+            dissipated: energy dissipated by contacts, hinges and welding since the start [J].
+            time: simulated time [s].
 
         Raises:
-            RunError: the residual is too large, with cause and way out.
+            RunError: the residual exceeds the limit `missed`.
         """
-        if not abs(residual) > WARNED_SHARE * self.missed * dissipated > 0.0:
+        if not abs(residual) > WARNED_FRACTION * self.missed * dissipated > 0.0:
             return None
         share = 100 * abs(residual) / dissipated
         text = f"the energy ledger misses {residual:.3g} J, {share:.2g} % of the {dissipated:.3g} J dissipated"

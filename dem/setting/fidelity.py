@@ -70,8 +70,8 @@ FIDELITIES: Mapping[str, Mapping[str, Any]] = {
     "reference": {**_STANDARD, "rows": 2},
 }
 
-# For the engine links, from results/accuracy-links; it ignores pitch and hinge stiffness. All steps up to the stable one
-# are safe (results/stability); at l/w = 0.7 the fraction 0.92 gives two steps per control period, where 0.9 gives three.
+# For the engine links, from results/accuracy-links; it ignores pitch and hinge stiffness. Its stable step is safe
+# (results/stability); at l/w = 0.7 the fraction 0.92 gives two steps per control period, where 0.9 gives three.
 _LINKS = {**_STANDARD, "time_step_fraction": 0.92}
 _BY_ENGINE: Mapping[str, Mapping[str, Mapping[str, Any]]] = {
     "links": {

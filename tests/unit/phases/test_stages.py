@@ -157,7 +157,9 @@ def test_a_wall_that_is_not_clear_stays_and_a_later_shake_fails() -> None:
     run_phase(scene, engine)
     assert engine.calls == [("lift_wall", 0.01), ("stop",)]
     assert engine.boundaries.walled
-    with pytest.raises(RunError, match=r"the wall is still around the pile, its edge .* lengthen that phase's"):
+    with pytest.raises(
+        RunError, match=r"the wall is still around the pile, its lower edge .* m below .*; raise duration_s"
+    ):
         run_phase(scene, engine, 2)
 
 

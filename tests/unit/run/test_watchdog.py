@@ -145,7 +145,7 @@ STRICT = Watchdog(cylinder=Cylinder(radius=0.0234, height=0.1, facets=64), speed
 
 def content(raised: float | None = 0.0, dog: Watchdog = STRICT, **changes: float) -> bool:
     extremes = Extremes(**{**GLANCE, "elastic_energy": 0.0, **changes})
-    return dog.content(extremes, floor=1.0, raised=raised)
+    return dog.within_limits(extremes, floor=1.0, raised=raised)
 
 
 def test_extremes_within_all_limits_need_no_full_check() -> None:
