@@ -1,8 +1,8 @@
 """A scene as an input deck of LAMMPS: `in.lammps`, `spheres.data`, `bodies.txt`.
 
-Only passive scenes: given poses that rest, are shaken, and lose their wall. Smarticles are rigid bodies of spheres
-(`fix rigid/small`) that touch by a spring with a dashpot and a sliding friction with memory (`gran/hooke/history`), as
-on YADE. Keywords are those of the version of January 2022, which Debian 12 has.
+Decks are possible for passive scenes that begin with a take-over: the pile rests, is shaken, and loses its wall.
+Smarticles are rigid bodies of spheres (`fix rigid/small`) with spring, dashpot and Coulomb friction with a tangential
+spring (`gran/hooke/history`), as on YADE. Keywords are those of `dem.engine.lammps.text`.
 """
 
 from __future__ import annotations
@@ -34,28 +34,27 @@ from dem.scene.scene import Scene
 
 PassivePhase = TakeOver | Relax | Shake | RemoveContainer
 
-
 DECK, DATA, BODIES, DUMP = "in.lammps", "spheres.data", "bodies.txt", "bodies.dump"
 
-# Sphere diameters. Contacts of piles at rest are 0.02 deep at most; those of links are 0.2 deep and more as spheres,
-# and smarticles would fly apart.
+# Largest overlap that is accepted, in sphere diameters. Overlaps in piles at rest are 0.02 at most; poses of the engine
+# links have overlaps of 0.2 and more as spheres, so that smarticles would fly apart.
 DEEPEST = 0.05
 
 
 @dataclass(frozen=True)
 class PassiveScene:
-    """A scene without motors, its time step [s], and its smarticles at the beginning, at rest."""
+    """A scene without motors, and its smarticles at the beginning."""
 
     scene: Scene
     first: TakeOver
     phases: Sequence[PassivePhase]
-    time_step: float
+    time_step: float  #: dt [s]
     law: ContactLaw
-    state: State
+    state: State  #: The smarticles, at rest
 
     @property
     def turns(self) -> Array:
-        """(N, 3, 3) body frame to laboratory frame."""
+        """(N, 3, 3) rotations from the body frame to the laboratory frame [1]."""
         own = self.scene.particle.boxes.link_rotations[1]
         return np.asarray(self.state.link_rotations[:, 1] @ own.T)
 
@@ -66,10 +65,11 @@ class PassiveScene:
 
 
 def passive(scene: Scene) -> PassiveScene:
-    """Return a scene with its poses.
+    """Return a scene with its poses, for a deck.
 
     Raises:
-        InputError: it has what LAMMPS cannot compute, all of it by name; or its poses are those of another engine.
+        InputError: the scene has parts that LAMMPS cannot compute, all of which the message names; or its poses overlap
+            as spheres, since they are from another engine or fidelity.
     """
     found = list(_foreign(scene))
     if found:
@@ -105,7 +105,7 @@ def passive(scene: Scene) -> PassiveScene:
 
 
 def _foreign(scene: Scene) -> Iterator[str]:
-    """What LAMMPS cannot compute, by key and name."""
+    """Yield the parts of a scene that LAMMPS cannot compute, by key and name."""
     if scene.smooth:
         yield f"engine: {scene.engine} takes links as they are, a deck has chains of spheres (use engine: yade)"
     yield from foreign(scene)
@@ -120,8 +120,8 @@ def write_deck(scene: Scene, folder: Path) -> None:
     """Write the deck of a scene into a folder of its own.
 
     Raises:
-        InputError: the scene has what LAMMPS cannot compute, or the folder exists already.
-        RunError: it cannot be written.
+        InputError: the scene has parts that LAMMPS cannot compute, or the folder exists already.
+        RunError: a file cannot be written.
     """
     given = passive(scene)
     if folder.exists():
@@ -236,5 +236,5 @@ def _steps(time: float, dt: float) -> int:
 
 
 def _one_line(text: str) -> str:
-    """A name that ends no comment."""
+    """Return a name without line breaks, which would end a comment."""
     return " ".join(text.split())

@@ -1,3 +1,3 @@
-"""The running simulation behind one interface."""
+"""Engines, which are running simulations behind one interface."""
 
-ENGINES = ("yade", "links", "lammps")  #: Names of the engines, the default first; `dem.engine.kinds` makes them
+ENGINES = ("yade", "links", "lammps")  #: Names of the engines, the default first

@@ -1,4 +1,4 @@
-"""The cores that this process may use, and what threads and ranks need of them."""
+"""Number of cores that this process may use, and checks of threads and ranks against it."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ RANKS = "SMARTICLES_RANKS"  #: Environment variable: ranks of LAMMPS, set by a c
 
 
 def usable_cores() -> int:
-    """Count the cores that this process may use; a batch system may allow fewer than the machine has."""
+    """Return the number of cores that this process may use, which a batch system may restrict."""
     return len(os.sched_getaffinity(0))
 
 
 def threads_warning(threads: int) -> str | None:
-    """Warn of threads that find no free core, in one line; None if all find one."""
+    """Return a warning in one line if there are more threads than cores; None otherwise."""
     cores = usable_cores()
     if threads <= cores:
         return None
@@ -26,19 +26,23 @@ def threads_warning(threads: int) -> str | None:
 
 
 def ranks() -> int:
-    """Return the number of LAMMPS's processes: 1 unless `RANKS` is set to a number."""
+    """Return the number of ranks of LAMMPS: the value of the environment variable `RANKS`, or 1."""
     given = os.environ.get(RANKS, "")
     return max(1, int(given)) if given.isdecimal() else 1
 
 
 def most_ranks() -> int:
-    """Count the ranks that find a core: of this machine, or of all nodes that a batch system gives."""
+    """Return the largest number of ranks that have a core each, on this machine or all nodes of a batch job."""
     given = os.environ.get("SLURM_NTASKS", "")
     return max(usable_cores(), int(given) if given.isdecimal() else 0)
 
 
 def check_ranks(wanted: int) -> None:
-    """Reject more ranks than there are cores: each waits for the others at every step."""
+    """Reject a number of ranks above the number of cores.
+
+    Raises:
+        InputError: there are fewer cores than ranks, which wait for each other at every step.
+    """
     most = most_ranks()
     if wanted > most:
         raise InputError(

@@ -1,4 +1,4 @@
-"""What a scene asks of an engine."""
+"""The part of a scene that engines use."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from dem.setting.smarticle import Smarticle
 
 
 class Activity(Enum):
-    """What happens to the pile in a phase, as far as costs depend on it."""
+    """Kinds of phases that differ in their cost per step."""
 
     POUR = auto()
     REST = auto()
@@ -31,7 +31,7 @@ class Activity(Enum):
 
 
 class Demand(Protocol):
-    """A scene, as far as an engine has to know it; `dem.scene.scene.Scene` describes the members."""
+    """The members of a scene that engines use, described in `dem.scene.scene.Scene`."""
 
     @property
     def smarticle(self) -> Smarticle: ...
@@ -82,12 +82,12 @@ class Demand(Protocol):
 
 
 def contact_law_of(scene: Demand) -> ContactLaw:
-    """Return the contact law of a scene, on all engines."""
+    """Return the contact law of a scene, which does not depend on the engine."""
     return contact_law(scene.particle, scene.contact, scene.fidelity.stiffness_N_per_m)
 
 
 def motor_law_of(scene: Demand) -> MotorLaw | None:
-    """Return the motor law of a scene, on all engines; None where no phase actuates."""
+    """Return the motor law of a scene, which does not depend on the engine; None if no phase has motors."""
     if not scene.actuates:
         return None
     return MotorLaw(

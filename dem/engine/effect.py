@@ -1,4 +1,4 @@
-"""The effects that a scene may call for, by name, and what one adds to a run."""
+"""Names of the effects that a scene may need, and what an effect adds to a run."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from itertools import chain
 
 
 class EffectName(StrEnum):
-    """Every effect, as `smarticles plan` prints it, in that order."""
+    """Names of all effects, in the order in which `smarticles plan` prints them."""
 
     CONTACT = "contact"
     CONTAINER = "container"
@@ -35,20 +35,20 @@ class EffectName(StrEnum):
 
 @dataclass(frozen=True, kw_only=True)
 class Adds:
-    """What an effect adds to a run; nothing of it exists in a run without the effect."""
+    """Objects, data and work that an effect adds to a run; a run without the effect has none of them."""
 
-    engines: tuple[str, ...] = ()  #: What an engine runs in every step, by its own names
-    functors: tuple[str, ...] = ()  #: What these are given to work with
-    materials: tuple[str, ...] = ()
+    engines: tuple[str, ...] = ()  #: Parts of an engine that run in every step, by the engine's own names
+    functors: tuple[str, ...] = ()  #: YADE's functors
+    materials: tuple[str, ...] = ()  #: YADE's materials
     shapes: tuple[str, ...] = ()  #: Kinds of bodies
     series: tuple[str, ...] = ()  #: Datasets of `series.h5`
     arrays: tuple[str, ...] = ()  #: Cell data of every frame
-    files: tuple[str, ...] = ()
-    python: str = ""  #: What Python does for it, how often, and other costs
+    files: tuple[str, ...] = ()  #: Files of the run directory
+    python: str = ""  #: Work in Python with its frequency, and other costs, in words
 
     @staticmethod
     def together(parts: Iterable[Adds]) -> Adds:
-        """Return the union, in order of mention."""
+        """Return the union of several effects' additions, in the order of `parts`."""
         each = list(parts)
         names = [field.name for field in fields(Adds) if field.name != "python"]
         lists = {
@@ -57,7 +57,7 @@ class Adds:
         return Adds(**lists, python="; ".join(part.python for part in each if part.python))
 
     def to_text(self) -> str:
-        """Return one line, with the number of entries of lists that are long; empty for nothing."""
+        """Return one line with the names in short lists and the lengths of long lists; "" if nothing is added."""
         named = {"engines": self.engines, "materials": self.materials, "bodies": self.shapes, "files": self.files}
         counted = {"functors": self.functors, "datasets": self.series, "arrays per frame": self.arrays}
         parts = [f"{what} {', '.join(names)}" for what, names in named.items() if names]

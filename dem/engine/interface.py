@@ -1,12 +1,11 @@
-"""The interface between the physics and everything around it: what a run needs of an engine.
+"""The interface of engines, which compute the physics of a run.
 
-An engine is a container, or a plane, that smarticles are added to and in which time is advanced. `Engine` is the
-running simulation: time and smarticles on the engine itself, and `boundaries`, `motors`, `strings` and `ledger`.
-`dem.engine.kinds` lists the engines, and says what can be asked of one before there is a simulation; `tests/double.py`
-implements the interface in memory.
+An `Engine` is a running simulation: smarticles are added to a container or a plane, and time is advanced. It has the
+parts `boundaries`, `motors`, `strings` and `ledger`. `dem.engine.kinds` lists the engines, with facts that are known
+without a simulation; `tests/double.py` implements the interface in memory.
 
-Heights, velocities and forces are in the laboratory frame. Sums over steps are counted inside the engine: a difference
-of two of them over the steps in between is a mean that misses no impact.
+Heights, velocities and forces are in the laboratory frame. Engines sum some forces over all steps: the difference of
+two sums, divided by the number of steps in between, is a mean force that misses no impact.
 """
 
 from __future__ import annotations
@@ -29,21 +28,21 @@ from dem.setting.container import Cylinder
 
 @dataclass(frozen=True, kw_only=True)
 class Saved:
-    """A simulation at one instant: the engine's own bytes, and plain data that JSON keeps without loss."""
+    """A saved simulation."""
 
-    content: bytes
-    memory: Mapping[str, Any]
+    content: bytes  #: In the engine's own format
+    memory: Mapping[str, Any]  #: Plain data that JSON stores without loss
 
 
 @dataclass(frozen=True, kw_only=True)
 class MotorReadings:
-    """All motors at one instant, (N, 2) each: barb 1 and barb 2 of every smarticle."""
+    """State of all motors at one instant, as (N, 2) arrays for barb 1 and barb 2 of every smarticle."""
 
-    schedule: Array  #: Angles of the schedule at the last control update [rad]; a motor that halts falls behind
-    commands: Array  #: Angles that they hold [rad]
-    torques: Array  #: On the barbs since the last control update [N m]; positive ones raise the angle
-    work: Array  #: Done on the links since the start, ∫ τ dα up to the last control update [J]
-    halted: Flags  #: Whether a motor wanted to advance at the last control update and did not
+    schedule: Array  #: Angles of the schedule at the last control update [rad]
+    commands: Array  #: Angles that the motors hold [rad]; those of halted motors lag behind the schedule
+    torques: Array  #: Torques on the barbs since the last control update [N m]; positive ones raise the angle
+    work: Array  #: Work on the links since the start, ∫ τ dα up to the last control update [J]
+    halted: Flags  #: Whether a motor did not advance at the last control update although the schedule did
 
 
 class Boundaries(Protocol):
@@ -61,7 +60,7 @@ class Boundaries(Protocol):
 
     @property
     def walled(self) -> bool:
-        """Whether the wall is there, wherever it is."""
+        """Whether the wall exists, lifted or not."""
 
     @property
     def wall_bottom(self) -> float:
@@ -69,20 +68,20 @@ class Boundaries(Protocol):
 
     @property
     def enclosed(self) -> bool:
-        """Whether nothing can leave the container: the wall is there, and begins below the floor."""
+        """Whether nothing can leave the container: the wall exists, and its lower edge is below the floor."""
 
     @property
     def raised(self) -> float | None:
-        """How far a hook may have raised the pile [m]; None where nothing holds the pile back any more."""
+        """Height by which a hook may have raised the pile [m]; None once the container no longer encloses the pile."""
 
     @property
     def upper_height(self) -> float:
-        """Height of the upper hook's centre [m]; of scenes with hooks only."""
+        """Height of the upper hook's centre [m]; undefined in scenes without hooks."""
 
     # -- how they move -----------------------------------------------------------------------------------------
 
     def shake(self, *, amplitude: float, frequency: float, walls: bool = True) -> None:
-        """Move the container as z = A sin(2πf t), t from now; it starts where it is.
+        """Shake the container from now on, by A sin(2πf t) about its present height, with t = 0 now.
 
         Args:
             amplitude: A [m].
@@ -100,92 +99,98 @@ class Boundaries(Protocol):
         """Move the upper hook upwards at a speed [m/s] from now on."""
 
     def stop(self) -> None:
-        """Bring everything to rest where it is."""
+        """Stop all boundaries at their present heights."""
 
     def remove_wall(self) -> None:
-        """Take the wall away, moving or not; what its contacts had stored is dissipated."""
+        """Remove the wall, moving or not; the elastic energy of its contacts counts as dissipated."""
 
     # -- forces on them ----------------------------------------------------------------------------------------
 
     @property
     def hook_sums(self) -> Array:
-        """(2, 3) forces of the smarticles on lower and upper hook, summed over all steps [N]; (0, 3) without hooks."""
+        """(2, 3) forces of smarticles on the lower and the upper hook [N], summed over all steps; (0, 3) without."""
 
     @property
     def channel_sums(self) -> Array:
-        """(2, 3) forces on the lower and the upper wall of a channel, summed likewise [N]; (0, 3) without walls."""
+        """(2, 3) forces on a channel's walls at lower and higher y [N], summed over all steps; (0, 3) without."""
 
 
 class Motors(Protocol):
-    """The barbs' motors. Smarticles are welded, rigid, until they are articulated, and may be welded again."""
+    """Motors of the barbs; smarticles are welded (rigid) at first, and may be articulated and welded again."""
 
     @property
     def present(self) -> bool:
-        """Whether the scene has motors, at work or not."""
+        """Whether the scene has motors, even while smarticles are welded."""
 
     @property
     def articulated(self) -> bool:
         """Whether barbs can turn at present."""
 
     def articulate(self) -> None:
-        """Let barbs turn, held by their motors where they are; nothing while articulated already."""
+        """Let barbs turn, with motors that hold their present angles; no effect on articulated smarticles."""
 
     def weld(self) -> None:
-        """Make each smarticle rigid in its present shape; nothing while welded already."""
+        """Make each smarticle rigid in its present shape; no effect on welded smarticles."""
 
     @property
     def updates_at_once(self) -> int:
-        """Most control updates that `actuate` takes at once."""
+        """Largest number of control updates that one call of `actuate` takes."""
 
     def actuate(self, targets: Array, interval: float) -> None:
-        """Make a control update, which acts for a control period, and others at the ends of the periods that follow.
+        """Make a control update now, and schedule further ones at the ends of the following control periods.
 
         Args:
-            targets: (updates, N, 2) angles at the end of each period according to the schedule [rad]; `updates_at_once`
-                of them at most.
-            interval: length of a period [s].
+            targets: (U, N, 2) angles of the schedule at the ends of U control periods [rad]; U is at most
+                `updates_at_once`.
+            interval: length of a control period [s].
         """
 
     @property
     def readings(self) -> MotorReadings | None:
-        """State of all motors; None before the first articulation."""
+        """State of all motors; None before smarticles are articulated for the first time."""
 
     @property
     def work(self) -> float:
         """Work of all motors on the links since the start, up to now [J]."""
 
     def gaps(self) -> Array:
-        """Return how far the hinges have given way (N, 2) [m]; zero while welded."""
+        """Return (N, 2) the gaps of the hinges, distances between the ends of two links [m]; 0 while welded."""
 
 
 class Strings(Protocol):
-    """The two strings that hold and pull a chain apart."""
+    """The two strings that pull a chain apart."""
 
     @property
     def tied(self) -> bool:
-        """Whether they exist at present."""
+        """Whether strings are tied to smarticles at present."""
 
     def tie(self, ties: Sequence[Tie], law: StringLaw, speeds: Sequence[float]) -> None:
-        """Tie taut strings to smarticles; their other ends move outwards along x at `speeds` [m/s]."""
+        """Tie taut strings to smarticles, with the far ends on the chain's axis.
+
+        Args:
+            ties: points at which strings are tied.
+            law: stiffness and damping of each string.
+            speeds: speeds at which the far ends move outwards along x [m/s].
+        """
 
     def untie(self) -> None:
         """Remove all strings."""
 
     @property
     def sums(self) -> Array:
-        """(strings, 3) forces on the links, summed over all steps since they were tied [N]."""
+        """(2, 3) forces on the tied links [N], summed over all steps since the strings were tied; else (0, 3)."""
 
     @property
     def pulled(self) -> float:
-        """How far the other ends have moved apart since the strings were tied [m]."""
+        """Distance by which the far ends have moved apart since the strings were tied [m]."""
 
     @property
     def ties(self) -> Array:
-        """(strings, 3) where the strings are tied [m]."""
+        """(2, 3) positions of the points at which strings are tied [m]; (0, 3) without strings."""
 
 
 class EnergyLedger(Protocol):
-    """Work and dissipation, added up step by step, each only where a scene asks for it."""
+    """Energy ledger: work and dissipation, summed step by step as far as the scene records them."""
 
     @property
     def container_work(self) -> float:
@@ -193,7 +198,7 @@ class EnergyLedger(Protocol):
 
     @property
     def added(self) -> float:
-        """Energy that smarticles were added with [J]: kinetic, of gravity above z = 0, of contacts taken in."""
+        """Energy of smarticles when they were added [J]: kinetic, gravitational above z = 0, and from `take_in`."""
 
     @property
     def dissipated(self) -> float:
@@ -201,20 +206,20 @@ class EnergyLedger(Protocol):
 
     @property
     def given(self) -> float:
-        """Energy added and work of boundaries since the start [J]; NaN while one moves whose work is not added up."""
+        """Energy added and work of boundaries since the start [J]; NaN while boundaries move unrecorded."""
 
     def elastic(self) -> tuple[float, float]:
         """Return the energies in the springs of contacts and of hinges [J]."""
 
     def take_in(self) -> None:
-        """Count the present energy of contacts as added; for smarticles that were added touching."""
+        """Add the present elastic energy of contacts to `added`, for smarticles that overlap when they are added."""
 
 
 class Engine(Protocol):
     """A running simulation; one per process, since an engine may be a process-wide singleton."""
 
-    particle: Particle  #: One smarticle
-    cylinder: Cylinder  #: The container as it was built
+    particle: Particle  #: Geometry of each smarticle
+    cylinder: Cylinder  #: The container
     gravity: float  #: g, downwards [m/s²]
 
     @property
@@ -237,7 +242,7 @@ class Engine(Protocol):
 
     @property
     def cpu_elsewhere(self) -> float:
-        """Processor time of its other processes on this machine since it was built [s]."""
+        """Processor time of the engine's other processes on this machine, since the engine was built [s]."""
 
     @property
     def time(self) -> float:
@@ -245,17 +250,17 @@ class Engine(Protocol):
 
     @property
     def steps(self) -> int:
-        """Steps made."""
+        """Number of steps made since the start."""
 
     @property
     def time_step(self) -> float:
         """Time step, dt [s]."""
 
     def set_time_step(self, time_step: float) -> None:
-        """Take steps of another length [s] from now on."""
+        """Set the length of all further steps [s]."""
 
     def advance(self, steps: int) -> None:
-        """Advance by whole steps; none for a number that is not positive.
+        """Advance by a number of steps; none if the number is not positive.
 
         Raises:
             RunError: the engine stopped before the last step.
@@ -265,50 +270,54 @@ class Engine(Protocol):
 
     @property
     def count(self) -> int:
-        """Smarticles present, N."""
+        """Number of smarticles present, N."""
 
     def add(self, poses: Poses, *, speed: float = 0.0) -> None:
-        """Add smarticles of the particle's own shape, which fall at a speed [m/s] and do not turn."""
+        """Add welded smarticles in the shape of `particle`, falling at a speed [m/s] without rotation."""
 
     def still(self) -> None:
-        """Set all velocities to zero, while welded; the kinetic energy is dissipated."""
+        """Set all velocities of welded smarticles to zero; the kinetic energy counts as dissipated."""
 
     def state(self) -> State:
         """Return poses and velocities of all smarticles.
 
         Raises:
-            RunError: the simulation has blown up.
+            RunError: a position or velocity is not finite.
         """
 
     @property
     def impulse(self) -> float:
-        """Momentum that gravity and throwing have given to all smarticles, downwards [N s]."""
+        """Downward momentum that gravity and throwing have given to all smarticles since the start [N s]."""
 
     def unbalanced_force(self) -> float:
-        """Return the mean net force on a smarticle over its weight [1]: 0 at rest, 1 in free fall, inf when empty."""
+        """Return the mean net force on a smarticle over its weight [1]: 0 at rest, 1 in free fall, inf if N = 0."""
 
     def neighbours(self) -> Numbers:
-        """Return for each smarticle (N,) how many others it touches."""
+        """Return (N,) the number of other smarticles that each smarticle touches."""
 
     def touches(self) -> Numbers:
-        """Return the number (N,) of contacts of each smarticle, with smarticles and boundaries."""
+        """Return (N,) the number of contacts of each smarticle with other smarticles and boundaries."""
 
     def overlaps(self, limit: float) -> Overlaps:
-        """Return the present overlaps, and which smarticles have one deeper than a limit [m]."""
+        """Return the present overlaps; smarticles with an overlap above `limit` [m] are marked."""
 
     def contact_forces(self) -> ContactForces:
-        """Return forces at all contacts, at present or in the last step; a pair of links has one contact."""
+        """Return the forces at all contacts, at present or in the last step, as one contact per pair of links."""
 
     def extremes(self, state: State) -> Extremes | None:
-        """Return the extremes of all smarticles, cheaper than from each one, in the present state.
+        """Return extremes over all smarticles in the present state; None if a full check is needed.
 
-        None where the engine has no such way, or knows of something that needs a full check.
+        Engines that cannot compute them faster than a full check always return None.
         """
 
     # -- checkpoints -------------------------------------------------------------------------------------------
 
     def save(self, scratch: Path) -> Saved:
-        """Return all that `load` needs; a loaded simulation goes on with the bits of the saved one."""
+        """Return the state for `load`; after loading, the simulation continues with identical bits.
+
+        Args:
+            scratch: folder for temporary files.
+        """
 
     def load(self, saved: Saved, scratch: Path) -> None:
-        """Replace the simulation by a saved one of the same scene."""
+        """Replace the state by one that `save` returned for an engine of this scene; arguments as in `save`."""

@@ -1,4 +1,4 @@
-"""The engines that exist, and what can be asked of one before there is a simulation."""
+"""List of the engines, with facts about them that are known without a simulation."""
 
 from __future__ import annotations
 
@@ -12,46 +12,51 @@ from dem.errors import InputError
 
 
 class EngineKind(Protocol):
-    """One engine: what it is, what scenes cost on it, and how a simulation on it begins."""
+    """Facts about an engine, costs of scenes on it, and the function that builds its simulations."""
 
-    name: str  #: Its name in scenes
-    workers: str  #: What a run on several cores has several of: threads, or ranks, which are processes
+    name: str  #: Name in scenes
+    workers: str  #: Unit of parallel work: "threads", or "ranks", which are processes
     damps_once_per_update: bool
-    """Whether a servo's damper acts on the rates of the last control update, so that one is needed every step."""
-    idle_knobs: tuple[str, ...]  #: Knobs of the fidelity that have no meaning on it
-    adds: Mapping[EffectName, Adds]  #: What an effect adds to its work; effects without an entry add nothing
+    """Whether dampers of servos use rates of the last control update, and so need an update in every step."""
+    idle_knobs: tuple[str, ...]  #: Knobs of the fidelity that have no effect on the engine
+    adds: Mapping[EffectName, Adds]  #: Additions of each effect to the engine; none for effects without an entry
 
     @property
     def order(self) -> tuple[str, ...]:
-        """All names of `Adds.engines`, in the order in which a step runs them."""
+        """All names in `Adds.engines`, in the order in which a step runs them."""
 
     def version(self) -> str:
-        """Return the version of what results depend on.
+        """Return the version of the software on which results depend.
 
         Raises:
-            RunError: it is not installed.
+            RunError: the engine is not installed.
         """
 
     def threads(self) -> int:
-        """Return the number of threads, or ranks, that it runs with here."""
+        """Return the number of threads, or ranks, of runs that this process starts."""
 
     def stable_step(self, scene: Demand, *, articulated: bool) -> float:
-        """Return the largest stable time step [s]; articulated where barbs may turn, or have turned before."""
+        """Return the largest stable time step [s].
+
+        Args:
+            scene: the scene.
+            articulated: whether barbs can turn, or have turned before.
+        """
 
     def seconds_per_second(self, scene: Demand, time_step: float, activity: Activity) -> float:
-        """Estimate the wall seconds that a simulated second costs on one core, with a time step [s]."""
+        """Return an estimate of the wall time per simulated time [1] on one core, with a time step [s]."""
 
     def build(self, scene: Demand, time_step: float) -> Engine:
-        """Build an empty simulation; the time step [s] is that of phases with motors and is not checked."""
+        """Return an empty simulation; the time step of phases with motors [s] is not checked."""
 
 
 def engine_kind(name: str) -> EngineKind:
-    """Return the engine that a scene names.
+    """Return the facts about an engine, by its name in scenes.
 
     Raises:
-        InputError: there is none of that name.
+        InputError: there is no engine of that name.
     """
-    # Imported when asked for: a scene on one engine needs nothing of the others.
+    # Imported only when used, since each engine needs software of its own.
     if name == "yade":
         from dem.engine.yade.kind import YadeKind  # noqa: PLC0415
 

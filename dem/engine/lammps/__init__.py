@@ -1,1 +1,1 @@
-"""LAMMPS as an engine: sphere chains on several processors and nodes, in a child process."""
+"""The engine on LAMMPS: chains of spheres on several processors and nodes, in a child process."""

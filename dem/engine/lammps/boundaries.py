@@ -1,4 +1,4 @@
-"""Floor and wall on LAMMPS: where its variables put them, known here as well."""
+"""Floor and wall on LAMMPS, whose heights are variables of LAMMPS and are computed here as well."""
 
 from __future__ import annotations
 
@@ -8,32 +8,29 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from dem.errors import RunError
 from dem.setting.container import Cylinder
 
-Array = NDArray[np.float64]
-
 
 @dataclass
 class Part:
-    """One part of the container: its height [m] is base + amplitude sin(ω (t - begun))."""
+    """Floor or wall, at a height of base + amplitude sin(ωt)."""
 
-    base: float = 0.0
-    amplitude: float = 0.0
+    base: float = 0.0  #: Height at rest [m]
+    amplitude: float = 0.0  #: Amplitude of the shaking [m]
 
 
 @dataclass
 class LammpsBoundaries:
-    """`dem.engine.interface.Boundaries` on LAMMPS; `clock` returns steps made and the time step [s]."""
+    """`dem.engine.interface.Boundaries` on LAMMPS."""
 
     cylinder: Cylinder
-    send: Callable[[Iterator[str]], None]
-    clock: Callable[[], tuple[int, float]]
+    send: Callable[[Iterator[str]], None]  #: Sends commands to LAMMPS
+    clock: Callable[[], tuple[int, float]]  #: Returns the number of steps made, and the time step [s]
     walled: bool = True
-    _omega: float = 0.0
-    _begun: int = 0
+    _omega: float = 0.0  # ω [rad/s]
+    _begun: int = 0  # step at which the shaking began
     _parts: dict[str, Part] = field(default_factory=lambda: {"floor": Part(), "wall": Part()})
 
     upper_height = math.nan
@@ -59,7 +56,7 @@ class LammpsBoundaries:
 
     @property
     def moving(self) -> bool:
-        """Whether something moves."""
+        """Whether floor or wall move."""
         return self._omega > 0 and any(part.amplitude for part in self._parts.values())
 
     @property
@@ -108,7 +105,7 @@ class LammpsBoundaries:
         self.send(iter(("unfix wall", "region wall delete")))
 
     def variables(self) -> Iterator[str]:
-        """Yield commands that set the variables which heights are made of."""
+        """Yield the commands that set the variables for the heights of floor and wall."""
         yield f"variable omega equal {self._omega:.17g}"
         yield f"variable begun equal {self._begun}"
         for name, part in self._parts.items():

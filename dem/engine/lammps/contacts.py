@@ -1,4 +1,4 @@
-"""Contacts and their overlaps from the positions of the spheres, without LAMMPS."""
+"""Contacts and overlaps, computed here from the positions of the spheres."""
 
 from __future__ import annotations
 
@@ -17,15 +17,21 @@ from dem.physics.overlaps import Overlaps
 class Contacts:
     """All contacts at one instant."""
 
-    count: int
-    pairs: Numbers  #: (C, 2) smarticles that touch by two spheres, as often as they do
-    depths: Array  #: (C,) overlap of each [m]
-    fixed: Numbers  #: (F,) smarticles that touch floor or wall by a sphere, as often as they do
-    fixed_depths: Array  #: (F,) overlap of each [m]
+    count: int  #: Number of smarticles, N
+    pairs: Numbers  #: (C, 2) the two smarticles of each pair of touching spheres
+    depths: Array  #: (C,) overlaps of these pairs [m]
+    fixed: Numbers  #: (F,) smarticle of each sphere that touches floor or wall
+    fixed_depths: Array  #: (F,) overlaps of these spheres [m]
 
     @classmethod
     def of(cls, spheres: Array, radius: float, boundaries: LammpsBoundaries) -> Contacts:
-        """Find the contacts of spheres (N, S, 3) [m] of a radius [m] with each other, floor and wall."""
+        """Return the contacts of spheres with each other, floor and wall.
+
+        Args:
+            spheres: (N, S, 3) centres [m].
+            radius: radius of the spheres [m].
+            boundaries: floor and wall.
+        """
         count, each = spheres.shape[:2]
         centres = spheres.reshape(-1, 3)
         owners = np.repeat(np.arange(count), each)
@@ -63,7 +69,7 @@ class Contacts:
         return Overlaps(float(depths.max(initial=0.0)), deep, self.elastic_energy(law))
 
     def elastic_energy(self, law: ContactLaw) -> float:
-        """Return an upper bound of the energy in all contacts [J]; friction bounds tangential springs."""
+        """Return an upper bound of the elastic energy of all contacts [J], from overlaps and friction."""
         squares = float((self.depths**2).sum() + (self.fixed_depths**2).sum())
         friction = max(law.friction, law.wall_friction)
         return law.normal_stiffness / 2 * squares * (1 + friction**2 * law.normal_stiffness / law.tangential_stiffness)

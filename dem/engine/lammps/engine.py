@@ -36,12 +36,12 @@ HEAD = 9  # lines of a dump before its rows
 
 
 def absent(what: str) -> NoReturn:
-    """Reject a call for what this engine lacks; scenes that need it are rejected before they run."""
+    """Raise RunError for a feature that the engine lacks; scenes that need it are rejected before a run."""
     raise RunError(f"engine: lammps has no {what}")
 
 
 class NoMotors:
-    """`dem.engine.interface.Motors` of smarticles that stay welded."""
+    """`dem.engine.interface.Motors` for smarticles that stay welded."""
 
     present = False
     articulated = False
@@ -63,7 +63,7 @@ class NoMotors:
 
 
 class NoStrings:
-    """`dem.engine.interface.Strings`, of which there are none."""
+    """`dem.engine.interface.Strings` of an engine without strings."""
 
     tied = False
     pulled = math.nan
@@ -77,7 +77,7 @@ class NoStrings:
 
 
 class LammpsLedger:
-    """`dem.engine.interface.EnergyLedger`; what contacts and boundaries do is not added up."""
+    """`dem.engine.interface.EnergyLedger` without the work of boundaries and the dissipation of contacts."""
 
     container_work = 0.0
 
@@ -99,8 +99,8 @@ class LammpsLedger:
 class LammpsEngine:
     """`dem.engine.interface.Engine` on LAMMPS.
 
-    LAMMPS moves smarticles; what is asked of them at one instant follows from their poses, which it writes to a file
-    after each advance.
+    LAMMPS integrates the motion, and writes the bodies' poses and velocities to a file after each advance. All other
+    quantities are computed here from that file.
     """
 
     def __init__(
@@ -119,11 +119,11 @@ class LammpsEngine:
         self.time, self.steps, self.time_step = 0.0, 0, time_step
         self._law = law
         self.child = Child(ranks)  #: LAMMPS
-        self._cpu_before = 0.0  # of LAMMPS before it was restarted [s]
+        self._cpu_before = 0.0  # processor time of earlier LAMMPS processes [s]
         self._moving = Moving.none()
-        # Body frame in LAMMPS's own principal frame of each smarticle, known from the first dump on.
+        # (N, 3, 3) rotations from the body frame to LAMMPS's principal frame, known after the first dump.
         self._frames: Array | None = None
-        self._fresh = True  # the next run must be set up
+        self._fresh = True  # whether the next run must be set up
         self._box = False
         self._seconds = 0.0
         self._thrown = 0.0
@@ -135,17 +135,17 @@ class LammpsEngine:
     # -- commands ----------------------------------------------------------------------------------------------
 
     def _send(self, commands: Iterator[str]) -> None:
-        """Send commands that the next run must be set up for; before there is a box, `_scene` contains them."""
+        """Send commands, after which the next run must be set up; before there is a box `_scene` yields them."""
         self._contacts = None
         if self._box:
             self.child.send(*commands)
             self._fresh = True
 
     def _scene(self, box: str) -> Iterator[str]:
-        """Yield all commands but those of the bodies, for a new LAMMPS; `box` is the command that reads the spheres."""
+        """Yield all commands for a new LAMMPS except those for bodies; `box` is the command that reads the spheres."""
         between, at_wall = text.contact_terms(self._law, self.particle.boxes.mass)
         yield from text.before_box(self.particle)
-        # Ranks share the pile by vertical cuts: a horizontal one would leave the upper part without work.
+        # Vertical cuts divide the pile among ranks: above a horizontal cut there would be little work.
         yield "processors * * 1"
         yield box
         yield from text.neighbours(self.particle)
@@ -160,9 +160,9 @@ class LammpsEngine:
         yield "thermo_modify lost error flush yes"
 
     def _bodies(self, file: str) -> Iterator[str]:
-        # Last of all, since what it does at the set-up of a run needs the forces of the others.
+        # After all other fixes, since its set-up needs their forces.
         yield f"fix bodies all rigid/small molecule infile {file} reinit no"
-        yield from text.writing("bodies.*.dump", when="v_when")
+        yield from text.body_dump("bodies.*.dump", when="v_when")
 
     def _forget_bodies(self) -> Iterator[str]:
         yield "undump bodies"
@@ -170,7 +170,7 @@ class LammpsEngine:
         yield "unfix bodies"
 
     def _balanced(self) -> Iterator[str]:
-        """Yield the command that gives ranks equal shares of the spheres, as two halves of a round pile are."""
+        """Yield the command that balances spheres over ranks; two ranks have equal halves of a round pile anyway."""
         if self.child.ranks > 2:
             yield "balance 1.02 shift xy 20 1.01"
 
@@ -210,7 +210,7 @@ class LammpsEngine:
         except RunError as error:
             raise RunError(f"at t = {self.time:.4f} s to {self.time + steps * self.time_step:.4f} s: {error}") from None
         if self._frames is None:
-            # Written when the run was set up, of poses that are known: where LAMMPS has its axes.
+            # The dump of the set-up, of known poses, gives LAMMPS's principal axes.
             own = _turns(self._read(self.steps))
             self._frames = np.swapaxes(own, 1, 2) @ self._moving.turns
         self._fresh = False
@@ -225,7 +225,7 @@ class LammpsEngine:
         )
 
     def _read(self, step: int) -> Array:
-        """Return (N, 20) numbers of all bodies at a step, as `WRITTEN` names them, and remove their file."""
+        """Return (N, 20) values of all bodies at a step, with the columns `text.WRITTEN`, and remove their file."""
         file = self.child.scratch / f"bodies.{step}.dump"
         lines = file.read_text(encoding="ascii").split("\n", HEAD)
         rows = np.array(lines[HEAD].split(), dtype=np.float64).reshape(-1, len(text.WRITTEN.split()))
@@ -275,8 +275,8 @@ class LammpsEngine:
         self._send(iter(f"velocity all zero {what} rigid bodies" for what in ("linear", "angular")))
 
     def state(self) -> State:
-        now = self._moving
-        return State.rigid(self.particle.boxes, now.positions, now.turns, now.velocities, now.spins)
+        moving = self._moving
+        return State.rigid(self.particle.boxes, moving.positions, moving.turns, moving.velocities, moving.spins)
 
     @property
     def impulse(self) -> float:
@@ -305,7 +305,7 @@ class LammpsEngine:
         return self.contacts.overlaps(limit, self._law)
 
     def extremes(self, state: State) -> None:
-        """Return None: Return None: LAMMPS has no shorter way, so that each smarticle is checked."""
+        """Return None: on LAMMPS extremes are not cheaper than a full check."""
 
     def contact_forces(self) -> NoReturn:
         absent("forces at contacts")
@@ -313,9 +313,9 @@ class LammpsEngine:
     # -- checkpoints -------------------------------------------------------------------------------------------
 
     def save(self, scratch: Path) -> Saved:
-        # LAMMPS's restart file with the springs of friction, the bodies, and their poses here. LAMMPS orders spheres
-        # differently when it reads them: the simulation loads what it has saved, on a LAMMPS that was restarted, since
-        # one that had contacts before does not find those of the file.
+        # Saved are LAMMPS's restart files with friction springs and bodies, and the poses of this process. LAMMPS
+        # orders spheres differently after reading them, so that the running simulation loads what it has saved. It does
+        # so in a new LAMMPS process, since one that has had contacts does not find those of the file.
         files: dict[str, bytes] = {}
         if self._box:
             self.child.send(f"write_restart {RESTART}")
@@ -343,10 +343,10 @@ class LammpsEngine:
         return saved
 
     def load(self, saved: Saved, scratch: Path) -> None:
-        """Replace the simulation by a saved one of the same scene.
+        """Replace the state by one that `save` returned for an engine of this scene.
 
         Raises:
-            InputError: it was not saved by this engine.
+            InputError: the state was saved by another engine or version, or is damaged.
         """
         memory = saved.memory
         if memory.get("format") != FORMAT:
@@ -382,5 +382,5 @@ class LammpsEngine:
 
 
 def _turns(rows: Array) -> Array:
-    """(N, 3, 3) rotations of rows whose quaternions (w, x, y, z) begin at column 7."""
+    """Return (N, 3, 3) rotations of rows whose quaternions (w, x, y, z) begin at column 7."""
     return np.asarray(Rotation.from_quat(rows[:, [8, 9, 10, 7]]).as_matrix())

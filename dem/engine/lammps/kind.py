@@ -1,4 +1,4 @@
-"""LAMMPS as an engine: what can be asked of it before there is a simulation."""
+"""Facts about LAMMPS as an engine, and the function that builds its simulations."""
 
 from __future__ import annotations
 
@@ -22,14 +22,16 @@ ADDS: Mapping[EffectName, Adds] = {
 }
 ORDER = ("neighbour lists", "pair gran/hooke/history", "fix gravity", "fix wall/gran/region", "fix rigid/small")
 
-# Cost on one rank. A step costs by spheres, several times as much while they move, since neighbours are searched again
-# as they do; large piles do not fit into a processor's cache. At each sample of the series LAMMPS writes all bodies to
-# a file, which is read and searched for contacts.
-# Source: results/scaling: steps alone, N = 100 to 5000; results/bench, planned.csv: rest, pours and samples.
-# s per sphere. A pour grows from nothing and would cost half, but for the checks of layers and for adding them.
+# Cost on one rank. The cost of a step grows with the number of spheres. It is several times higher while they move,
+# since neighbours are searched again, and higher per sphere in large piles, which do not fit into a processor's cache.
+# At each sample of the series LAMMPS writes all bodies to a file, which this process reads and searches for contacts.
+# Source: results/scaling: steps alone, N = 100 to 5000; results/bench, planned.csv: rest, pours and samples. STEP is in
+# s per sphere and step. Pours, where the pile grows from nothing, would cost half of shaking, but layers must be
+# checked and added.
 STEP: Mapping[Activity, float] = {Activity.POUR: 1.2e-7, Activity.REST: 0.5e-7, Activity.SHAKE: 1.6e-7}
-SAMPLE = (3e-3, 6e-5)  # s, once and for each smarticle
-# Of so many spheres a step takes so much longer each than of a few.
+SAMPLE = (3e-3, 6e-5)  # s per sample, and s per sample and smarticle
+# From MANY spheres on a step costs (1 + LONGER) times as much per sphere as with few; the factor grows linearly to
+# there.
 MANY, LONGER = 100_000, 1.3
 
 

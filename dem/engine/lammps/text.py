@@ -1,6 +1,6 @@
-"""Commands and files of LAMMPS: spheres, bodies, contact, gravity, container.
+"""Data files of spheres and bodies, and commands of contacts and container, for LAMMPS.
 
-Keywords are those of the version of September 2021, which Debian 12 has.
+Keywords are those of version 29 Sep 2021, update 2, which Debian 12 has.
 """
 
 from __future__ import annotations
@@ -17,38 +17,37 @@ from dem.physics.contact import ContactLaw
 from dem.setting.container import Cylinder
 
 NEVER_PULLS = "limit_damping"
-"""Of a contact law: the normal force is zero where spring and dashpot together would pull, as on our other engines."""
-SKIN = 0.2  # sphere diameters beyond contact up to which neighbours are listed
-WRITTEN = (
-    "mol x y z vx vy vz quatw quati quatj quatk omegax omegay omegaz angmomx angmomy angmomz fx fy fz"  # of a body
-)
+"""Keyword of a contact law: the normal force is zero where spring and dashpot together would pull."""
+SKIN = 0.2  # distance between spheres up to which they are listed as neighbours, in sphere diameters
+WRITTEN = "mol x y z vx vy vz quatw quati quatj quatk omegax omegay omegaz angmomx angmomy angmomz fx fy fz"
+"""Quantities of a body in a dump."""
 
 
 @dataclass(frozen=True)
 class Moving:
-    """Bodies at one instant, in the laboratory frame."""
+    """N bodies at one instant, in the laboratory frame."""
 
     positions: Array  #: (N, 3) centres of mass [m]
     turns: Array  #: (N, 3, 3) body frame to laboratory frame [1]
     velocities: Array  #: (N, 3) of the centres of mass [m/s]
     spins: Array  #: (N, 3) angular velocities [rad/s]
     momenta: Array  #: (N, 3) angular momenta about the centres of mass [kg m²/s]
-    forces: Array  #: (N, 3) of contacts and weight [N]
+    forces: Array  #: (N, 3) forces of contacts and weight [N]
 
     @classmethod
     def none(cls) -> Moving:
-        """No bodies."""
+        """Return arrays for N = 0."""
         empty = np.zeros((0, 3))
         return cls(empty, np.zeros((0, 3, 3)), empty, empty, empty, empty)
 
 
 def sphere_masses(particle: Particle) -> Array:
-    """Return masses (S,) [kg] that sum to a smarticle's, balanced about its centre so that weight does not turn it.
+    """Return masses (S,) of the spheres [kg] that have the smarticle's mass and centre of mass.
 
-    As near to equal as that allows, by least squares.
+    Weights of the spheres then exert no torque. The masses are as equal as possible, by least squares.
     """
     count = len(particle.centres)
-    # Of each sphere: its share of the mass, and of the first moments, which are to vanish.
+    # Conditions: the masses sum to the smarticle's mass, the first moments to zero.
     rows = np.concatenate([np.ones((1, count)), particle.centres.T / particle.boxes.middle_length])
     wanted = np.array([particle.boxes.mass, 0.0, 0.0, 0.0])
     equal = np.full(count, particle.boxes.mass / count)
@@ -58,9 +57,16 @@ def sphere_masses(particle: Particle) -> Array:
 def sphere_lines(
     particle: Particle, cylinder: Cylinder, spheres: Array, *, title: str, first: int = 0
 ) -> Iterator[str]:
-    """Yield all spheres, for `read_data`: number, type, place, diameter, density, smarticle.
+    """Yield the lines of a file of spheres, for the command `read_data`.
 
-    Their centres are (N, S, 3) [m], `first` is the number of the first smarticle; the container gives the box.
+    Each sphere has number, type, position, diameter, density and number of its smarticle.
+
+    Args:
+        particle: geometry of a smarticle.
+        cylinder: the container, from which the simulation box follows.
+        spheres: (N, S, 3) centres [m].
+        title: first line of the file.
+        first: number of smarticles that LAMMPS has already.
     """
     count, each = spheres.shape[:2]
     d = particle.chain.diameter
@@ -78,7 +84,11 @@ def sphere_lines(
 
 
 def body_lines(particle: Particle, moving: Moving) -> Iterator[str]:
-    """Yield all smarticles, for `fix rigid/small infile`: number, mass, centre, inertia (xx yy zz xy xz yz), motion."""
+    """Yield the lines of a file of bodies, for `infile` of `fix rigid/small`.
+
+    Each body has number, mass, centre of mass, inertia tensor (xx yy zz xy xz yz), velocity, angular momentum and three
+    image flags.
+    """
     tensors = moving.turns @ np.diag(particle.boxes.inertia) @ np.swapaxes(moving.turns, 1, 2)
     moments = tensors[:, (0, 1, 2, 0, 0, 1), (0, 1, 2, 1, 2, 2)]
     yield str(len(moving.positions))
@@ -89,10 +99,15 @@ def body_lines(particle: Particle, moving: Moving) -> Iterator[str]:
 
 
 def contact_terms(law: ContactLaw, mass: float) -> tuple[str, str]:
-    """Return the numbers of `pair_style gran/hooke/history` for a mass [kg], and of `fix wall/gran/region`.
+    """Return the arguments of `pair_style gran/hooke/history` and of `fix wall/gran/region`.
 
-    kn and ks [N/m]; damping across and along the surface [1/s], which LAMMPS multiplies with the effective mass of the
-    two bodies that touch, M/2, or M at a wall; friction; 1: damping along the surface is on; a dashpot never pulls.
+    The arguments are kn and ks [N/m]; normal and tangential damping [1/s], which LAMMPS multiplies by the effective
+    mass, M/2 for two smarticles and M at a wall; the friction coefficient; 1, which switches tangential damping on; and
+    the keyword `NEVER_PULLS`.
+
+    Args:
+        law: contact law.
+        mass: mass M of a smarticle [kg].
     """
     between, wall = law.normal_damping / (mass / 2), law.wall_damping / mass
     springs, tangential = f"{law.normal_stiffness:.9g} {law.tangential_stiffness:.9g}", law.tangential_damping
@@ -103,7 +118,7 @@ def contact_terms(law: ContactLaw, mass: float) -> tuple[str, str]:
 
 
 def before_box(particle: Particle) -> Iterator[str]:
-    """Yield the commands before there is a box."""
+    """Yield the commands that must precede the simulation box: units, boundaries, atom style, communication."""
     yield "units            si"
     yield "# Springs of friction need each pair on both of two processors, and velocities of spheres at their borders."
     yield "newton           off"
@@ -119,14 +134,20 @@ def before_box(particle: Particle) -> Iterator[str]:
 
 
 def neighbours(particle: Particle) -> Iterator[str]:
-    """Yield neighbour-list commands."""
+    """Yield the commands of the neighbour list."""
     yield "# Spheres of one smarticle do not touch each other."
     yield f"neighbor         {SKIN * particle.chain.diameter:.9g} bin"
     yield "neigh_modify     delay 0 every 1 check yes exclude molecule/intra all"
 
 
 def container(cylinder: Cylinder, at_wall: str, *, walled: bool = True) -> Iterator[str]:
-    """Yield the commands of floor and wall at the variables `floor_z` and `wall_z`; `at_wall` of `contact_terms`."""
+    """Yield the commands of floor and wall, whose heights are the variables `floor_z` and `wall_z`.
+
+    Args:
+        cylinder: the container.
+        at_wall: contact with floor and wall, the second result of `contact_terms`.
+        walled: whether there is a wall.
+    """
     extent = f"{cylinder.radius:.9g} {cylinder.bottom:.9g} {cylinder.height:.9g}"
     yield "variable         wave equal sin(v_omega*(step-v_begun)*dt)"
     yield "variable         floor_z equal v_floor_base+v_floor_amplitude*v_wave"
@@ -138,8 +159,13 @@ def container(cylinder: Cylinder, at_wall: str, *, walled: bool = True) -> Itera
         yield f"fix              wall all wall/gran/region {at_wall} region wall"
 
 
-def writing(dump: str, *, when: str) -> Iterator[str]:
-    """Yield the commands that write bodies to a file; `when` is that of `dump_modify every`."""
+def body_dump(dump: str, *, when: str) -> Iterator[str]:
+    """Yield the commands that write all bodies to files.
+
+    Args:
+        dump: name of the files.
+        when: argument of `dump_modify every`.
+    """
     count = len(WRITTEN.split())
     yield f"compute          where all rigid/local bodies {WRITTEN}"
     yield f"dump             bodies all local 1 {dump} {' '.join(f'c_where[{k + 1}]' for k in range(count))}"

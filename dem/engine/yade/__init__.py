@@ -1,1 +1,1 @@
-"""The engine on YADE: the only package that knows it."""
+"""The engine on YADE, and the only package that uses YADE."""

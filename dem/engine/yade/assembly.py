@@ -69,7 +69,7 @@ class Assembly:
         }
 
     def bind(self) -> None:
-        """Look up YADE's objects; loading replaces them all."""
+        """Look up YADE's objects, all of which loading replaces."""
         bodies = self._yade.omega.bodies
         self._states = [bodies[body].state for body in self._ids]
 
@@ -124,11 +124,11 @@ class Assembly:
 
     def still(self) -> None:
         assert self.hinges is None  # motors would set links in motion again
-        nought, bodies = self._yade.vector(0, 0, 0), self._yade.omega.bodies
+        zero, bodies = self._yade.vector(0, 0, 0), self._yade.omega.bodies
         # Contact laws read the members' own velocities, before the integrator has moved them.
         for state in (*self._states, *(bodies[sphere].state for spheres in self._spheres for sphere in spheres)):
-            state.vel = state.angVel = nought
-            state.angMom = nought
+            state.vel = state.angVel = zero
+            state.angMom = zero
 
     def _check(self, table: Array) -> None:
         broken = ~np.isfinite(table).all(axis=1) | ~table[:, 9:].any(axis=1)
@@ -142,7 +142,7 @@ class Assembly:
     # -- welding -----------------------------------------------------------------------------------------------
 
     def articulate(self) -> None:
-        """Split every smarticle into its links, hinged to each other; nothing while articulated already."""
+        """Split every smarticle into three links that hinges join; no effect on articulated smarticles."""
         if self.hinges is not None:
             return
         assert self._hinge_law is not None  # the engine was built for scenes that never articulate
@@ -208,7 +208,13 @@ class Assembly:
         return before - self.state().kinetic_energy
 
     def anchor(self, smarticle: int, link: int, point: Array) -> tuple[int, Array]:
-        """Return the id of a link's body, and a point (3,) of the link's frame in the body's own [m]; articulated."""
+        """Return the id of an articulated link's body, and a point (3,) of the link in YADE's frame of the body [m].
+
+        Args:
+            smarticle: number of the smarticle.
+            link: number of the link.
+            point: (3,) in the link's frame [m].
+        """
         number = LINKS * smarticle + link
         arm = self._to_body[number] * self._yade.vector(*point)
         return self._ids[number], np.array([arm[0], arm[1], arm[2]])
@@ -225,9 +231,9 @@ class Assembly:
         self._ids, self._to_body, self._states = [], [], []
 
     def _angular_momenta(self) -> Array:
-        """(bodies, 3) about their own centres of mass, laboratory frame [kg m²/s]."""
+        """Return (bodies, 3) angular momenta about the bodies' centres of mass, in the laboratory frame [kg m²/s]."""
         if self._planar:
-            # YADE keeps no angular momentum of what it turns like a sphere.
+            # YADE stores no angular momentum of bodies that it rotates like spheres.
             return np.array([[0.0, 0.0, s.inertia[2] * s.angVel[2]] for s in self._states]).reshape(-1, 3)
         return rows_of(state.angMom for state in self._states)
 
@@ -283,25 +289,27 @@ def clump(
     angular_momentum: Array,
     planar: bool,
 ) -> tuple[int, Any]:
-    """Make a rigid body of existing spheres, with a mass and an inertia of its own.
+    """Join existing spheres into a rigid body of given mass and inertia.
 
     Args:
-        local: (k, 3) centres of `members` in the body's principal frame [m].
+        yade: YADE.
+        members: ids of the spheres.
+        local: (k, 3) centres of the spheres in the body's principal frame [m].
         mass: [kg].
         inertia: (3,) principal moments [kg m²].
         position: (3,) centre of mass [m].
-        rotation: (3, 3) principal frame to laboratory frame.
+        rotation: (3, 3) from the principal frame to the laboratory frame.
         velocity: (3,) of the centre of mass [m/s].
         angular_momentum: (3,) about the centre of mass [kg m²/s].
-        planar: whether it only moves along x and y and turns about z, which is then its third principal axis.
+        planar: whether the body moves along x and y and turns about z only; z is then its third principal axis.
 
     Returns:
-        Its id, and the quaternion that takes YADE's own principal frame of the clump to the body's: q_body =
-        q_clump · this.
+        The id of the body, and the quaternion q from YADE's principal frame of the clump to the body's principal frame:
+        q_body = q_clump q.
     """
-    # Clumped at the origin in the body frame, then moved: YADE's own mass properties of overlapping spheres depend on
-    # the pose and count overlaps twice. The spheres weigh nothing; one ballast member carries the exact mass and
-    # inertia and is erased again, which leaves the clump's state alone.
+    # Clumped at the origin in the body frame, then moved: the mass properties that YADE computes for overlapping
+    # spheres depend on the pose and count overlaps twice. The spheres have no mass; one ballast member has the exact
+    # mass and inertia, and is then erased, which does not change the clump's state.
     omega, classes, vector = yade.omega, yade.classes, yade.vector
     upright = yade.quaternion(1, 0, 0, 0)
     for member, centre in zip(members, local, strict=True):
@@ -311,8 +319,8 @@ def clump(
     ballast.shape = classes.Box()
     ballast.material = omega.bodies[members[0]].material
     ballast.state.mass = mass
-    # Where it turns about the third axis alone, the other moments do not matter. All equal, the axes keep their order,
-    # and YADE's integration of spheres, which it uses where a rotation is blocked, is right.
+    # For rotation about the third axis alone the other moments do not matter. If all are equal, the axes keep their
+    # order, and YADE's integration for spheres, which it uses where a rotation is blocked, is right.
     inertia = np.full(3, inertia[2]) if planar else inertia
     ballast.state.inertia = vector(*inertia)
     ballast_id = omega.bodies.append(ballast)

@@ -22,7 +22,7 @@ from dem.setting.plane import Channel
 class YadeBoundaries:
     """`dem.engine.interface.Boundaries` on YADE.
 
-    Hooks are the lower and the upper one; a channel takes the place of the container. The floor is at z = 0 at first.
+    `hooks` are the lower and the upper hook; a channel replaces the container. The floor begins at z = 0.
     """
 
     def __init__(
@@ -36,17 +36,17 @@ class YadeBoundaries:
         self.hooks: tuple[tuple[int, ...], ...] = tuple(add_cross(yade, cross) for cross in hooks or ())
         """Ids of the bars of the lower and the upper hook."""
         self._upper_start = hooks[1].height if hooks else 0.0
-        self.felt = tuple((wall,) for wall in self.container[:-1]) if self._planar else self.hooks
-        """Ids of bodies whose forces are summed step by step, together for each hook or wall of a channel."""
+        self.measured = tuple((wall,) for wall in self.container[:-1]) if self._planar else self.hooks
+        """Ids of the bodies of each hook, or of each wall of a channel, whose force is summed over steps."""
         self.moving: list[int] = []  #: Ids of the bodies that move at present, all at one velocity
-        self._sums = [yade.vector(0, 0, 0) for _ in self.felt]
+        self._sums = [yade.vector(0, 0, 0) for _ in self.measured]
         self.book_removal: Callable[[Callable[[], None]], None] = lambda remove: remove()
-        """Called with a function that takes contacts away; the energy ledger replaces it."""
+        """Calls a function that removes contacts; replaced by the energy ledger's method."""
 
     def bind(self) -> None:
-        """Look up YADE's objects; loading replaces them all."""
+        """Look up YADE's objects, all of which loading replaces."""
         bodies = self._yade.omega.bodies
-        # The wall may be gone from what was loaded.
+        # The loaded simulation may have no wall.
         self.container = [body for body in self.container if bodies[body] is not None]
         self._floor = bodies[self.container[-1]].state
         engines, moved = self._yade.omega.engines, self._yade.classes.HarmonicMotionEngine
@@ -88,14 +88,14 @@ class YadeBoundaries:
 
     @property
     def raised(self) -> float | None:
-        # Nothing holds a pile back once the wall is gone or lifted, or a hook was pulled out over it; in a plane walls
-        # hold, but the container's limits do not apply.
+        # A pile is no longer enclosed once the wall is gone or lifted, or a hook was pulled out above it; in a plane
+        # there are walls, but the container's limits do not apply.
         if not self.enclosed:
             return None
         if self._upper is None:
             return 0.0
         height = self.upper_height - self.floor
-        # Moved by the floor's velocity, step by step: apart from it by rounding, when it was never raised.
+        # Hook and floor move by equal steps: without a pull their distance changes by rounding only.
         return None if height > self._top else max(0.0, height - self._upper_start)
 
     @property
@@ -104,9 +104,10 @@ class YadeBoundaries:
         return float(self._upper.pos[2])
 
     def parts(self) -> Mapping[str, tuple[Sequence[int], float]]:
-        """Return what can hold smarticles in scenes with hooks: ids of its bodies, and by how much it was raised [m].
+        """Return the boundaries that can hold smarticles, by name; none without hooks.
 
-        Raised against the floor, since the start.
+        The values are the ids of the boundary's bodies, and the height by which it was raised relative to the floor
+        since the start [m].
         """
         if not self.hooks:
             return {}
@@ -119,7 +120,7 @@ class YadeBoundaries:
 
     @property
     def part_of(self) -> Mapping[int, int]:
-        """Place in `dem.body.forces.BOUNDARIES` by id of body."""
+        """Places in `dem.body.forces.BOUNDARIES` by ids of bodies."""
         *walls, floor = self.container
         numbers = [CHANNEL + k for k in range(len(walls))] if self._planar else [WALL] * len(walls)
         found = {floor: FLOOR, **dict(zip(walls, numbers, strict=True))}
@@ -173,15 +174,15 @@ class YadeBoundaries:
     # -- forces ------------------------------------------------------------------------------------------------
 
     def power(self) -> float:
-        """Return the power of what moves on the smarticles, in the step that was just made [W]."""
-        # What smarticles exert on it is the opposite of what it exerts on them.
+        """Return the power that moving boundaries exerted on smarticles in the last step [W]."""
+        # YADE sums the forces on the boundaries, opposite to those on smarticles.
         lift = self._yade.utils.sumForces(self.moving, self._yade.vector(0, 0, 1))
         return -float(lift * self._yade.omega.bodies[self.moving[0]].state.vel[2])
 
-    def feel(self) -> None:
-        """Add up the forces on hooks or walls of a channel in the step that was just made."""
+    def sum_forces(self) -> None:
+        """Add the forces on hooks, or on walls of a channel, in the last step to their sums."""
         force = self._yade.omega.forces.f
-        for k, (first, *others) in enumerate(self.felt):
+        for k, (first, *others) in enumerate(self.measured):
             total = force(first)
             for body in others:
                 total = total + force(body)
@@ -201,30 +202,30 @@ class YadeBoundaries:
 
 
 def add_container(yade: Yade, cylinder: Cylinder) -> list[int]:
-    """Add the container, its floor at z = 0; return ids of bodies, wall from below, floor last."""
-    # A polygon of the same area as the circle; it starts below the floor so that no gap opens at the edge.
+    """Add a container with its floor at z = 0; return the ids of the bodies: wall from below, then floor."""
+    # The polygon has the circle's area; the wall starts below the floor, so that no gap opens at the edge.
     bottoms = [cylinder.bottom, *(bottom for bottom, _ in cylinder.upper), cylinder.height]
     rings = [_ring(cylinder, radius) for radius in (cylinder.radius, *(radius for _, radius in cylinder.upper))]
     bodies = []
     for k, ring in enumerate(rings):
         bodies += list(_band(yade, (ring, bottoms[k]), (ring, bottoms[k + 1])))
         if k + 1 < len(rings):
-            # The ceiling of the part of a tier that the next one does not cover.
+            # The ceiling of a tier where the next tier is narrower.
             bodies += list(_band(yade, (ring, bottoms[k + 1]), (rings[k + 1], bottoms[k + 1])))
-    # sense=1: the floor pushes upwards whatever happens, so nothing that is pressed through comes out below.
+    # sense=1: the floor always pushes upwards, so that spheres pressed through it do not come out below.
     bodies.append(yade.utils.wall(0, axis=2, sense=1, material=WALL_MATERIAL))
     return [yade.omega.bodies.append(body) for body in bodies]
 
 
 def _ring(cylinder: Cylinder, radius: float) -> Array:
-    """(n + 1, 2) corners of the wall's polygon [m], the first one again at the end."""
+    """Return (n + 1, 2) corners of the wall's polygon [m]; the first corner is repeated at the end."""
     corner = cylinder.corner_radius_of(radius)
     angles = 2 * math.pi * np.arange(cylinder.facets + 1) / cylinder.facets
     return np.stack([corner * np.cos(angles), corner * np.sin(angles)], axis=1)
 
 
 def _band(yade: Yade, one: tuple[Array, float], other: tuple[Array, float]) -> Iterator[Any]:
-    """Facets between two rings, each with its height [m]."""
+    """Yield facets between two rings of corners, each given with its height [m]."""
     for (start, end), (above_start, above_end) in zip(pairwise(one[0]), pairwise(other[0]), strict=True):
         a, b = yade.vector(*start, one[1]), yade.vector(*end, one[1])
         c, d = yade.vector(*above_end, other[1]), yade.vector(*above_start, other[1])
@@ -233,10 +234,10 @@ def _band(yade: Yade, one: tuple[Array, float], other: tuple[Array, float]) -> I
 
 
 def add_channel(yade: Yade, channel: Channel) -> list[int]:
-    """Add walls and table, centrelines at z = 0; return ids: lower, upper wall if any, table last."""
+    """Add walls, if any, and table for centrelines at z = 0; return ids: lower wall, upper wall, table."""
     bodies = []
     if channel.width is not None:
-        # As the container's floor, each pushes to its own side whatever happens.
+        # Each wall always pushes to its inner side, like the container's floor.
         for side in (-1, 1):
             place = side * channel.width / 2
             bodies.append(yade.utils.wall(place, axis=1, sense=-side, material=WALL_MATERIAL))
@@ -245,7 +246,7 @@ def add_channel(yade: Yade, channel: Channel) -> list[int]:
 
 
 def add_cross(yade: Yade, cross: Cross) -> tuple[int, ...]:
-    """Add the bars of a hook, as boxes: flat faces, square edges, and one contact with each sphere."""
+    """Add the bars of a hook as boxes, which have one contact with each sphere; return their ids."""
     boxes = [(yade.vector(*bar.middle, cross.height), yade.vector(*bar.half)) for bar in cross.bars]
     return tuple(
         int(yade.omega.bodies.append(yade.utils.box(middle, half, material=WALL_MATERIAL, fixed=True)))

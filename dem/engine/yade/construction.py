@@ -1,4 +1,4 @@
-"""What each effect adds on YADE, by name, and the materials and engines made of it; nothing else exists."""
+"""Materials, engines and functors that each effect needs on YADE, and their construction."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ from dem.physics.contact import ContactLaw
 SMARTICLE_MATERIAL, WALL_MATERIAL = "smarticle", "wall"
 
 ORDER = ("ForceResetter", "InsertionSortCollider", "InteractionLoop", "HarmonicMotionEngine", "NewtonIntegrator")
-"""Order of YADE's engines in a step: contacts give forces, the container gets its velocity, then all moves."""
+"""Order of YADE's engines in a step: forces of contacts, velocity of the container, motion of all bodies."""
 
-# Gravity, friction and restitution are numbers of the integrator and of the one contact law that YADE has for springs
-# with dashpots, zero where a scene sets them to zero. The torque cap is a comparison in each control update; the law
-# slip gives each bond of a shaft a cap.
+# Gravity, friction and restitution add nothing: they are parameters of the integrator and of YADE's contact law for
+# springs with dashpots, and may be zero. The torque cap is a comparison in each control update; under the laws slip and
+# servo it is a parameter of a shaft's bond.
 ADDS: Mapping[EffectName, Adds] = {
     EffectName.CONTACT: Adds(
         engines=("ForceResetter", "InsertionSortCollider", "InteractionLoop", "NewtonIntegrator"),
@@ -60,22 +60,29 @@ ADDS: Mapping[EffectName, Adds] = {
     EffectName.CHECKPOINTS: Adds(python="saves and reloads the simulation once per checkpoint"),
 }
 
-# How far a sphere may move before neighbours are searched again, in radii: a larger distance means more pairs in every
-# step, a smaller one more searches. Measured on a shaken pile (N = 494, l/w = 0.4, draft): 0.2 costs 17 % less than
-# 0.4, 0.1 as much as 0.2.
+# Distance in radii that a sphere may move before neighbours are searched again. A larger distance means more pairs in
+# every step, a smaller one more searches. Measured on a shaken pile (N = 494, l/w = 0.4, draft): 0.1 and 0.2 cost 17 %
+# less than 0.4.
 VERLET_DISTANCE = 0.15
 
 
 def add_materials(yade: Yade, adds: Adds, law: ContactLaw) -> None:
-    """Add the materials of smarticles, container and, where there are any, hinges."""
-    # YADE joins two materials in series, so each carries twice the contact's value. The wall's dashpot is chosen such
-    # that the series with a smarticle's gives the wall's. Density zero: see `dem.engine.yade.assembly.clump`.
+    """Add the materials `adds.materials` to YADE's simulation, in that order.
+
+    Args:
+        yade: YADE.
+        adds: union of the additions of all effects of a scene.
+        law: contact law from which the materials' stiffness and damping follow.
+    """
+    # YADE puts two materials in series, so that each has twice the contact's value. The wall's dashpot is chosen such
+    # that in series with a smarticle's dashpot it gives `law.wall_damping`. `dem.engine.yade.assembly.clump` sets
+    # masses, so that densities are zero.
     between = 2 * law.normal_damping
     wall = 1 / (1 / law.wall_damping - 1 / between) if law.wall_damping else 0.0
     dampings = {SMARTICLE_MATERIAL: between, WALL_MATERIAL: wall}
     for label in adds.materials:
         if label == HINGE_MATERIAL:
-            # Bonds get their stiffness one by one; the material only selects YADE's law for them.
+            # Each bond gets a stiffness of its own; the material only selects YADE's law for bonds.
             material = yade.classes.CohFrictMat(density=0, young=1, poisson=0, isCohesive=False, label=label)
         else:
             material = yade.classes.ViscElMat(
@@ -92,13 +99,22 @@ def add_materials(yade: Yade, adds: Adds, law: ContactLaw) -> None:
 def add_engines(
     yade: Yade, adds: Adds, law: ContactLaw, *, hinges: HingeLaw | None, gravity: float, radius: float
 ) -> None:
-    """Make the engines and give them to the simulation; g is downwards [m/s²], the spheres have a radius [m]."""
+    """Make the engines and functors of `adds`, and add them to YADE's simulation.
+
+    Args:
+        yade: YADE, with the materials already added.
+        adds: union of the additions of all effects of a scene.
+        law: contact law, for the friction coefficients.
+        hinges: law of the hinges; None where smarticles stay welded.
+        gravity: g, downwards [m/s²].
+        radius: radius of the spheres [m].
+    """
     classes = yade.classes
-    # The materials of smarticles and wall are the first two.
+    # 0 and 1 are the numbers of the materials of smarticles and wall.
     friction = classes.MatchMaker(matches=((0, 0, math.atan(law.friction)), (0, 1, math.atan(law.wall_friction))))
     settings: Mapping[str, Mapping[str, Any]] = {
         "Ip2_ViscElMat_ViscElMat_ViscElPhys": {"frictAngle": friction},
-        # The correction for sliding spheres would falsify the motion of nodes that do not touch.
+        # YADE's correction for sliding spheres would be wrong for nodes, which do not touch.
         "Ig2_GridNode_GridNode_GridNodeGeom6D": {"avoidGranularRatcheting": False},
         "Law2_ScGeom6D_CohFrictPhys_CohesionMoment": {
             "useIncrementalForm": True,
@@ -111,7 +127,7 @@ def add_engines(
     }
 
     def functors(prefix: str) -> list[Any]:
-        # The beginning of a functor's name is that of its dispatcher.
+        # A functor's prefix tells its dispatcher.
         return [getattr(classes, name)(**settings.get(name, {})) for name in adds.functors if name.startswith(prefix)]
 
     dispatched = {

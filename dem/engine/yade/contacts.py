@@ -1,4 +1,4 @@
-"""Contacts read from YADE's interactions: which exist, how deep they are, and their forces."""
+"""Contacts among YADE's interactions, with their overlaps and forces."""
 
 from __future__ import annotations
 
@@ -26,10 +26,10 @@ def contacts_of(yade: Yade, assembly: Assembly) -> Iterator[Any]:
 
 
 def contact_forces(yade: Yade, assembly: Assembly, boundaries: YadeBoundaries) -> ContactForces:
-    """Return the forces at all contacts in the last step; spheres of one pair of links make one contact.
+    """Return the forces at all contacts in the last step; all spheres of a pair of links make one contact.
 
-    They lack what a tangential dashpot adds while its contact does not slide: YADE keeps it nowhere, and it is zero in
-    a pile at rest.
+    Tangential forces lack the part of the dashpot at contacts that stick, which YADE does not store. It is zero in a
+    pile at rest.
     """
     codes_of = {sphere: at_links(*link) for sphere, link in assembly.link_of.items()}
     codes_of |= {body: at_boundaries(part) for body, part in boundaries.part_of.items()}
@@ -65,7 +65,7 @@ def measure_overlaps(
 ) -> Overlaps:
     """Return the overlaps of all contacts, with the smarticles that have one deeper than a limit [m]."""
     hinges = assembly.hinges
-    # Measured in every run: without hinges every interaction is a contact, and none is asked for its bodies.
+    # Called often: without hinges all interactions are contacts, so that their bodies need not be looked up.
     contacts = contacts_of(yade, assembly) if hinges is not None else (c for c in yade.omega.interactions if c.isReal)
     depths = np.array([contact.geom.penetrationDepth for contact in contacts])
     deepest = float(depths.max(initial=0.0))
@@ -78,14 +78,14 @@ def measure_overlaps(
                 deep[[k for k in number if k is not None]] = True
         held = _held(yade, assembly, boundaries, deep, APART * limit)
     normal = law.normal_stiffness / 2 * float((np.fmax(depths, 0.0) ** 2).sum())
-    # Friction bounds what tangential springs hold by what normal ones do.
+    # Friction bounds the energy of tangential springs by that of normal springs.
     friction = max(law.friction, law.wall_friction)
     tangential = friction**2 * law.normal_stiffness / law.tangential_stiffness * normal
     return Overlaps(deepest, deep, normal + tangential + (0.0 if hinges is None else hinges.elastic_energy()), held)
 
 
 def _held(yade: Yade, assembly: Assembly, boundaries: YadeBoundaries, deep: Flags, least: float) -> tuple[Held, ...]:
-    """Smarticles among the `deep` ones (N,) that touch two boundaries which have moved apart by `least` [m] or more."""
+    """Return the smarticles of `deep` (N,) that touch two boundaries which have moved apart by over `least` [m]."""
     parts = boundaries.parts()
     part_of = {body: name for name, (bodies, _) in parts.items() for body in bodies}
     touched: dict[int, set[str]] = defaultdict(set)

@@ -41,13 +41,19 @@ class YadeEngine:
     """`dem.engine.interface.Engine` on YADE.
 
     Args:
-        time_step: dt [s], until another is set.
-        shaken: whether the container will move; the engine that moves it exists only then.
-        hinge_law: with `motor_law`, None where smarticles stay welded: then nothing of a hinge exists.
-        dissipation_interval: time between samples of what is dissipated [s]; None: never.
-        hooks: the lower and the upper hook; None: nothing of a hook exists.
+        particle: geometry of a smarticle.
+        cylinder: the container.
+        law: contact law.
+        gravity: g, downwards [m/s²].
+        time_step: dt of the first steps [s].
+        shaken: whether the container will be shaken, for which YADE needs an engine of its own.
+        hinge_law: law of the hinges; None if smarticles stay welded.
+        motor_law: law of the motors; None if smarticles stay welded.
+        track_work: whether to sum the work of moving boundaries.
+        dissipation_interval: time between samples of the dissipation [s]; None: no samples.
+        hooks: the lower and the upper hook; None: no hooks.
         channel: table and walls instead of the container; all motion is then confined to a plane.
-        strengths: (N, 2) factors on torque limit and stiffness of the motors [1]; None: all are equal.
+        strengths: (N, 2) factors on torque limit and stiffness of the motors [1]; None: 1 for all motors.
 
     Raises:
         RunError: YADE is not installed.
@@ -80,7 +86,7 @@ class YadeEngine:
         self._assembly = Assembly(self._yade, particle, hinge_law, planar=channel is not None, strengths=strengths)
         self._smarticle_seconds = 0.0
         self._thrown = 0.0
-        # (step, value) of the unbalanced force when the simulation was loaded: forces are not saved.
+        # (step, value) of the unbalanced force at loading, since YADE does not save forces.
         self._loaded: tuple[int, float] | None = None
         called_for = {
             EffectName.CONTACT: True,
@@ -95,7 +101,7 @@ class YadeEngine:
         self.ledger = YadeLedger(
             self._yade, self._assembly, self.boundaries, works=track_work, dissipation_interval=dissipation_interval
         )
-        self.boundaries.book_removal = self.ledger.removed
+        self.boundaries.book_removal = self.ledger.book_removal
         self.motors = YadeMotors(self._yade, self._assembly, self.ledger, motor_law, strengths)
         self.strings = YadeStrings(self._yade, self._assembly)
         add_engines(self._yade, adds, law, hinges=hinge_law, gravity=gravity, radius=particle.radius)
@@ -106,8 +112,8 @@ class YadeEngine:
     # -- checkpoints -------------------------------------------------------------------------------------------
 
     def save(self, scratch: Path) -> Saved:
-        # YADE orders bodies and contacts differently when it loads, and sums of forces depend on their order: the
-        # simulation loads what it has saved, so that one that goes on from there gives the same bits.
+        # YADE orders bodies and contacts differently after loading, and sums of forces depend on the order. The running
+        # simulation loads what it has saved, so that a resumed run gives identical bits.
         file = scratch / SCRATCH
         try:
             self._store(file)
@@ -161,13 +167,13 @@ class YadeEngine:
     # -- time --------------------------------------------------------------------------------------------------
 
     def set_time_step(self, time_step: float) -> None:
-        """Take steps of another length [s] from now on.
+        """Set the length of all further steps [s].
 
-        Velocities belong to the middles of steps: a change of the length by Δ puts them in error by Δ/2 times the
-        acceleration at this moment, next to nothing in a pile at rest.
+        Velocities are those at the middles of steps. A change of the length by Δ causes an error of Δ/2 times the
+        present acceleration, which is negligible in a pile at rest.
         """
         self.time_step = self._omega.dt = time_step
-        self.ledger.count_in(time_step)
+        self.ledger.set_time_step(time_step)
 
     @property
     def time(self) -> float:
@@ -180,16 +186,16 @@ class YadeEngine:
     def advance(self, steps: int) -> None:
         if steps <= 0:
             return
-        step, target, felt = self._omega.step, self.steps + steps, bool(self.boundaries.felt)
+        step, target, measured = self._omega.step, self.steps + steps, bool(self.boundaries.measured)
         tied = self.strings.tied
-        # One call per step: 1 µs, where YADE's own loop in the background would be waited for by polling. Ctrl-C
+        # One call per step costs 1 µs; YADE's own loop runs in the background and would have to be polled. Ctrl-C
         # arrives between two steps.
         for number in range(self.steps + 1, target + 1):
             if tied:
                 self.ledger.container_work += self.strings.pull(self.time_step)
             self.ledger.step(number, step)
-            if felt:
-                self.boundaries.feel()
+            if measured:
+                self.boundaries.sum_forces()
         if self._assembly.hinges is not None:
             self._assembly.hinges.moved()
         if self.steps != target:
@@ -247,7 +253,7 @@ class YadeEngine:
         return contact_forces(self._yade, self._assembly, self.boundaries)
 
     def extremes(self, state: State) -> None:
-        """Return None: YADE has no shorter way."""
+        """Return None: on YADE extremes are not cheaper than a full check."""
 
     def container_force(self) -> Array:
         """Return the force (3,) of the smarticles on the container in the last step [N]."""
@@ -257,8 +263,8 @@ class YadeEngine:
         return force
 
     def unbalanced_force(self) -> float:
-        # YADE's own measure leaves gravity out for a body whose contact forces are exactly zero or balance exactly, and
-        # so calls a still pile unbalanced.
+        # YADE's own measure omits gravity for bodies whose contact forces are exactly zero or balance exactly, which is
+        # wrong for a pile at rest.
         if self._loaded is not None and self._loaded[0] == self.steps:
             return self._loaded[1]
         if not self.count or not self.gravity:

@@ -1,8 +1,8 @@
 """Hinges between the links of articulated smarticles, made of YADE's bonds.
 
-A hinge is two bonds: a pin, a spring of no length that holds the two links together at the hinge's centre; and a shaft
-along the hinge's axis, which carries the motor's twist, keeps the two links in one plane, and damps the pin's
-vibrations. Both act between nodes that touch nothing else, so that contact knows nothing of hinges.
+A hinge consists of two bonds: a pin, a spring of length zero that holds the two links together at the hinge's centre;
+and a shaft along the hinge's axis, which transmits the motor's torque, keeps the two links in one plane, and damps the
+pin's vibrations. Both act between nodes, which have no contacts.
 """
 
 from __future__ import annotations
@@ -18,15 +18,16 @@ from dem.body.particle import Boxes
 from dem.engine.yade.library import Yade
 
 HINGE_MATERIAL = "hinge"
-NODE_RADIUS = 1e-4  # m; cancels in every force, but YADE wants one
-OFFSET = 1e-9  # m; a spring of exactly no length has no direction
-SHAFT_STIFFNESS = 1e-3  # N/m along the axis; the pin holds, this bond is for what the pin does not
-SHAFT_FORCE = 1e-4  # N along the axis, that the cap on a slipping shaft's torque is stated in
-# YADE's rotations are first order and feed energy into the pin's fast vibrations, which undamped grow within a second
-# after a hard impact. A damper of a spring and a dashpot in a row takes it away and leaves slow motion alone.
-DAMPER_SHARE = 0.25  # of the pin's stiffness
-DAMPER_VISCOSITY = 0.15  # N s/m; at the stiffness of the named fidelities it relaxes over a few time steps
-DAMPER_TIME = 4e-5  # s; no shorter with stiffer pins, since a step must not relax it twice over
+NODE_RADIUS = 1e-4  # m; has no effect on forces, but YADE needs a radius
+OFFSET = 1e-9  # m; a spring of exactly zero length has no direction
+SHAFT_STIFFNESS = 1e-3  # N/m along the axis, small since the pin takes this force
+SHAFT_FORCE = 1e-4  # N along the axis; YADE takes the torque cap of a slipping shaft as a multiple of this force
+# YADE integrates rotations to first order, which adds energy to the pin's fast vibrations: without damping they grow
+# within a second after a hard impact. A damper, a spring and a dashpot in series, removes this energy and does not
+# affect slow motion.
+DAMPER_SHARE = 0.25  # stiffness of the damper's spring over that of the pin
+DAMPER_VISCOSITY = 0.15  # N s/m; at the stiffness of the named fidelities the damper relaxes within a few time steps
+DAMPER_TIME = 4e-5  # s; least relaxation time with stiffer pins, since a step must not relax more than the whole force
 UPDATES_PER_TILT = 10  # control updates between corrections of the tilt's drift
 # Turning a barb inwards (α up) turns barb 1 and barb 2 in opposite directions about the smarticle's normal.
 SENSE = np.array([1.0, -1.0])
@@ -35,14 +36,14 @@ BARBS = (0, 2)  # links that hinge 1 and hinge 2 join to the middle link
 
 @dataclass(frozen=True, kw_only=True)
 class HingeLaw:
-    """Stiffness of the hinges."""
+    """Stiffness and damping of the hinges."""
 
-    pin_stiffness: float  #: Against the links coming apart [N/m]
-    tilt_stiffness: float  #: Against their leaving the common plane [N m/rad]
+    pin_stiffness: float  #: Against a gap between the links [N/m]
+    tilt_stiffness: float  #: Against rotation of a link out of the common plane [N m/rad]
     shaft_stiffness: float  #: Twist stiffness of the motor's shaft [N m/rad]
-    torque_cap: float | None  #: At which a shaft slips [N m]; None: never
-    shaft_damping: float = 0.0  #: Of the motors [N m s/rad]; for the stable time step only
-    damper_time: float = DAMPER_TIME  #: The dampers' time of relaxation where they are stiff [s]; at least a time step
+    torque_cap: float | None  #: Torque at which a shaft slips [N m]; None: it does not slip
+    shaft_damping: float = 0.0  #: Derivative gain of the motors [N m s/rad], which the stable time step depends on
+    damper_time: float = DAMPER_TIME  #: Least relaxation time of the dampers [s], at least a time step
 
     @property
     def damper_stiffness(self) -> float:
@@ -68,7 +69,7 @@ def hinge_nodes(boxes: Boxes, link: int) -> Array:
 
 
 def add_nodes(yade: Yade, count: int) -> list[int]:
-    """Add bodies for hinge nodes: no mass, no bound, no contact."""
+    """Add bodies for hinge nodes, without mass and contacts; return their ids."""
     ids = []
     for _ in range(count):
         body = yade.classes.Body()
@@ -83,8 +84,10 @@ class Hinges:
     """All hinges of N articulated smarticles.
 
     Args:
-        nodes: per smarticle the node ids of its links, as `hinge_nodes` orders them.
-        angles: (N, 2) angles of the barbs where the bonds were made [rad].
+        yade: YADE.
+        law: stiffness and damping.
+        nodes: ids of the nodes of each link of each smarticle, in the order of `hinge_nodes`.
+        angles: (N, 2) angles of the barbs when the bonds were made [rad].
     """
 
     def __init__(self, yade: Yade, law: HingeLaw, nodes: Sequence[Sequence[Sequence[int]]], angles: Array) -> None:
@@ -95,12 +98,13 @@ class Hinges:
         self._pins: list[Any] = []
         self._shafts: list[tuple[Any, Any]] = []
         self._ends: list[tuple[Any, Any]] = []
-        # What YADE computes of the bonds in each step, and does not save: twists (2N,) [rad], gaps (2N,) [m].
+        # Twists (2N,) [rad] and gaps (2N,) [m] at loading, since YADE computes them in each step but does not save
+        # them.
         self._loaded: tuple[Array, Array] | None = None
         self._updates = 0
 
     def make(self, strengths: Array | None = None) -> None:
-        """Make the bonds; `strengths` are factors (N, 2) on stiffness and cap of the shafts [1], None: all equal."""
+        """Make the bonds; `strengths` are factors (N, 2) on stiffness and torque cap of the shafts [1], None: 1."""
         factors = np.ones_like(self._angles) if strengths is None else strengths
         for (barb_centre, barb_end, middle_centre), factor in zip(self._hinges(), factors.flat, strict=True):
             self._bond(barb_centre, middle_centre, self._law.pin_stiffness)
@@ -108,7 +112,7 @@ class Hinges:
         self.bind()
 
     def bind(self) -> None:
-        """Look up YADE's bonds; loading replaces them all."""
+        """Look up YADE's bonds, all of which loading replaces."""
         interactions = self._yade.omega.interactions
         self._pins = [interactions[centre, middle].geom for centre, _, middle in self._hinges()]
         shafts = [interactions[end, middle] for _, end, middle in self._hinges()]
@@ -124,7 +128,7 @@ class Hinges:
         self._pins, self._shafts, self._ends = [], [], []
 
     def _hinges(self) -> Iterator[tuple[int, int, int]]:
-        """Nodes of each hinge: the barb's at the centre and at the end of the axis, the middle link's at the centre."""
+        """Yield the ids of each hinge's nodes: the barb's at centre and axis end, the middle link's at the centre."""
         for links in self._nodes:
             for hinge, barb in enumerate(BARBS):
                 centre, end = links[barb]
@@ -148,12 +152,12 @@ class Hinges:
         phys.momentRotationLaw, phys.ktw, phys.kr = True, strength * law.shaft_stiffness, law.tilt_stiffness
         phys.ks, phys.shearAdhesion = law.damper_stiffness, 1e9
         if law.torque_cap is not None:
-            # YADE states the cap as a multiple of the normal force; a small one is kept constant for it.
+            # YADE takes the cap as a multiple of the normal force, which is therefore kept constant and small.
             phys.unp -= SHAFT_FORCE / SHAFT_STIFFNESS
             phys.maxTwistPl = strength * law.torque_cap / SHAFT_FORCE
 
     def moved(self) -> None:
-        """Read the bonds' shape from YADE again, after a step."""
+        """Discard the loaded twists and gaps, since a step has made YADE compute them."""
         self._loaded = None
 
     def _twists(self) -> Array:
@@ -175,9 +179,10 @@ class Hinges:
         return np.asarray(-SENSE * np.array(turning).reshape(-1, 2))
 
     def set_torques(self, torques: Array, time_step: float) -> None:
-        """Twist the shafts so that they exert (N, 2) torques on the barbs [N m], positive ones raising the angle.
+        """Set the torques (N, 2) of the shafts on the barbs [N m]; positive torques raise the angle.
 
-        YADE sums twist and tilt step by step, of a length dt [s]; set from the angles now and then, neither drifts.
+        YADE sums changes of twist and tilt over steps, which drift. This method sets the twist, and every
+        `UPDATES_PER_TILT` calls also the tilt, from the present angles; `time_step` is dt [s].
         """
         moments = (-SENSE * torques).ravel().tolist()
         for (geom, phys), moment in zip(self._shafts, moments, strict=True):
@@ -187,9 +192,9 @@ class Hinges:
         self._updates += 1
 
     def _set_tilts(self, time_step: float) -> None:
-        # From the axes themselves: YADE splits a turn into twist and tilt by its rotation vector, which is right only
-        # while the twist is small. The next step adds the turn of the step that was just made, which the axes already
-        # have, so it is taken off here; without that the pins' vibrations gain energy at every correction.
+        # The tilt is computed from the axes: YADE splits a rotation into twist and tilt by its rotation vector, which
+        # is right only for small twists. The next step will add the rotation of the last step, which the axes already
+        # include, so that it is subtracted here; otherwise each correction would add energy to the pins' vibrations.
         up, tilt = self._yade.vector(0, 0, 1), self._law.tilt_stiffness
         for (_, phys), (barb, middle) in zip(self._shafts, self._ends, strict=True):
             axis = barb.ori * up
@@ -202,24 +207,24 @@ class Hinges:
         return np.asarray(-SENSE * np.array(moments).reshape(-1, 2))
 
     def gaps(self) -> Array:
-        """Return the distances (N, 2) of the two links of each hinge [m]."""
+        """Return (N, 2) distances between the two links of each hinge [m]."""
         return self._gaps().reshape(-1, 2)
 
     def elastic_energy(self) -> float:
-        """Return the energy in pins, dampers and tilted shafts [J]; the motors have that of their twist."""
+        """Return the elastic energy of pins, dampers and tilted shafts [J], without the twist of the shafts."""
         dampers = self._damper_forces() / self._law.damper_stiffness
         pins = self._law.pin_stiffness * (self.gaps() ** 2).sum()
         tilts = sum(phys.moment_bending.squaredNorm() for _, phys in self._shafts) / self._law.tilt_stiffness
         return float(0.5 * (pins + dampers + tilts))
 
     def damped(self, time_step: float) -> float:
-        """Return the energy that the dampers dissipate in a step of a length dt [s], [J]."""
-        # YADE relaxes a damper's force by this share in each step.
-        share = time_step * self._law.damper_stiffness / self._law.damper_viscosity
-        return self._damper_forces() * (2 * share - share**2) / (2 * self._law.damper_stiffness)
+        """Return the energy [J] that the dampers dissipate in a step dt [s]."""
+        # YADE reduces a damper's force by this fraction in each step.
+        loss = time_step * self._law.damper_stiffness / self._law.damper_viscosity
+        return self._damper_forces() * (2 * loss - loss**2) / (2 * self._law.damper_stiffness)
 
     def _damper_forces(self) -> float:
-        """Sum of the squares of all dampers' forces [N²]."""
+        """Return the sum of the squares of all dampers' forces [N²]."""
         return float(sum(phys.shearForce.squaredNorm() for _, phys in self._shafts))
 
     @property
@@ -235,7 +240,7 @@ class Hinges:
 
     @classmethod
     def restored(cls, yade: Yade, law: HingeLaw, memory: Mapping[str, Any]) -> Hinges:
-        """Return the hinges of a simulation that was loaded."""
+        """Return the hinges of a loaded simulation, from the `memory` that was saved with it."""
         hinges = cls(yade, law, memory["nodes"], np.array(memory["angles"]).reshape(-1, 2))
         hinges.bind()
         hinges._loaded = np.array(memory["twists"]), np.array(memory["gaps"])

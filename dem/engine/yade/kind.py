@@ -1,4 +1,4 @@
-"""YADE as an engine: what can be asked of it before there is a simulation."""
+"""Facts about YADE as an engine, and the function that builds its simulations."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ from dem.engine.yade.stable_step import hinged_stable_time_step, planar_stable_t
 # Wall seconds per sphere and step in a dense pile, one core, measured with `make bench` (see README); machines
 # differ by a factor of two.
 COST_PER_SPHERE_STEP = 3.3e-7
-# Factors on that: a pour costs about half as much as the full pile, since the pile grows from nothing; motors mean
-# three bodies and four bonds for each smarticle, and control updates.
+# Factors on this cost. A pour costs about half as much as the full pile, since the pile grows from nothing; with motors
+# each smarticle has three bodies and four bonds, and there are control updates.
 FACTORS = {Activity.POUR: 0.5, Activity.ACTUATE: 1.7}
 
 
@@ -62,11 +62,11 @@ class YadeKind:
 
 
 def hinge_law(scene: Demand, time_step: float = 0.0) -> HingeLaw:
-    """Return the hinges' law of a scene that actuates; no damper relaxes more than its force in a time step [s]."""
+    """Return the hinges' law of a scene with motors; dampers relax over at least a time step [s]."""
     motor, pin = scene.motor, scene.fidelity.hinge_stiffness_N_per_m
     return HingeLaw(
         pin_stiffness=pin,
-        # As if the pin were held at both faces of the links.
+        # That of two pins of half the stiffness, at both faces of the links.
         tilt_stiffness=pin * (scene.smarticle.thickness_normal_m / 2) ** 2,
         shaft_stiffness=motor.stiffness_N_m_per_rad,
         torque_cap=scene.torque_limit if motor.law in ("slip", "servo") else None,

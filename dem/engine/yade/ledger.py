@@ -1,10 +1,9 @@
-"""The energy ledger on YADE: what was brought in, and what was dissipated.
+"""The energy ledger on YADE: energy added, work and dissipation.
 
-YADE's viscoelastic law does not sum what it dissipates, so that is sampled. A sample gives, for every contact, how much
-of the work done on it in one step is neither stored in its springs at the end of the step nor given back, from the
-force that acts in the step and the velocity that moves the bodies in it. Summed over the steps of a run, work and
-stored energy then differ by this and by what the scheme itself gains or loses, mostly where contacts begin in the
-middle of a step. Only every so many steps are sampled, and stand for those between.
+YADE's viscoelastic law does not sum its dissipation, which is therefore sampled. A sample takes, for every contact, the
+work that the bodies do against the contact's force in one step, less the increase of the energy in its springs. A
+sampled step stands for all steps up to the next sample. The ledger's residual is then the error of the sampling and of
+the integration scheme, mostly where contacts begin in the middle of a step.
 """
 
 from __future__ import annotations
@@ -30,8 +29,8 @@ class Contacts:
     """M contacts in one step."""
 
     normals: Array  #: (M, 3) from the first body to the second [1]
-    before: Array  #: (M, 3) velocity of the second body against the first at the contact point, before the step [m/s]
-    after: Array  #: (M, 3) that velocity after the step, which moves the bodies [m/s]
+    before: Array  #: (M, 3) velocity of the second body relative to the first at the contact, before the step [m/s]
+    after: Array  #: (M, 3) that relative velocity after the step, with which the bodies move [m/s]
     overlaps: Array  #: (M,) [m]
     viscous: Array  #: (M,) normal viscous force of the step, positive where bodies approach [N]
     shear: Array  #: (M, 3) elastic shear force [N]
@@ -46,7 +45,7 @@ class Contacts:
         return float(0.5 * (kn * self.overlaps**2).sum() + 0.5 * ((self.shear**2).sum(axis=1) / ks).sum())
 
     def dissipated(self, time_step: float) -> float:
-        """Return the energy that all contacts dissipate in one step of a length dt [s], [J]."""
+        """Return the energy [J] that all contacts dissipate in a step dt [s]."""
         kn, ks = self.stiffness.T
         cn, cs = self.damping.T
         closing, sliding = self._split(self.after)
@@ -54,7 +53,7 @@ class Contacts:
         # The contact never pulls.
         pressed = np.maximum(kn * self.overlaps + self.viscous, 0.0)
         later = np.maximum(self.overlaps + closing * time_step, 0.0)
-        # A force takes from the kinetic energy what it does along the mean of the velocities before and after.
+        # The work of a force in a step is that along the mean of the velocities before and after.
         normal = pressed * (closed + closing) / 2 * time_step - 0.5 * kn * (later**2 - self.overlaps**2)
 
         strength = np.linalg.norm(self.shear, axis=1)
@@ -69,13 +68,21 @@ class Contacts:
         return float(normal.sum() + shear.sum())
 
     def _split(self, velocities: Array) -> tuple[Array, Array]:
-        """Speed of approach (M,) and velocity of the first body along the second (M, 3) [m/s]."""
+        """Return speeds of approach (M,) and tangential velocities of the first body relative to the second (M, 3)."""
         closing = -np.einsum("mi,mi->m", velocities, self.normals)
         return closing, -(velocities + closing[:, None] * self.normals)
 
 
 class YadeLedger:
-    """`dem.engine.interface.EnergyLedger` on YADE; None as `dissipation_interval` [s]: nothing is sampled."""
+    """`dem.engine.interface.EnergyLedger` on YADE.
+
+    Args:
+        yade: YADE.
+        assembly: the smarticles.
+        boundaries: the boundaries.
+        works: whether to sum the work of moving boundaries.
+        dissipation_interval: time between samples of the dissipation [s]; None: no samples.
+    """
 
     def __init__(
         self,
@@ -94,13 +101,13 @@ class YadeLedger:
         self._interval = dissipation_interval
         self._time_step, self._every = 0.0, 0
 
-    def count_in(self, time_step: float) -> None:
-        """Take steps of a length [s] from now on."""
+    def set_time_step(self, time_step: float) -> None:
+        """Set the length of all further steps [s]."""
         self._time_step = time_step
         self._every = max(1, round(self._interval / time_step)) if self._interval else 0
 
     def step(self, number: int, advance: Callable[[], None]) -> None:
-        """Make a step by calling `advance`, and add up what is due in the step of this number."""
+        """Make the step of a number by calling `advance`, and add its work and dissipation to the sums."""
         if not self._every or number % self._every:
             advance()
         else:
@@ -124,15 +131,15 @@ class YadeLedger:
     def given(self) -> float:
         return math.nan if self._boundaries.moving and not self._works else self.added + self.container_work
 
-    def removed(self, remove: Callable[[], None]) -> None:
-        """Do something that takes contacts away; what their springs held is dissipated."""
+    def book_removal(self, remove: Callable[[], None]) -> None:
+        """Call a function that removes contacts; their elastic energy counts as dissipated."""
         stored = self.elastic()[0] if self._every else 0.0
         remove()
         if self._every:
             self.dissipated += stored - self.elastic()[0]
 
     def _velocities(self) -> Velocities:
-        """Relative velocities at all contacts, for the step that is sampled [m/s]."""
+        """Return the relative velocities at all contacts [m/s], by the ids of the two bodies."""
         found = {}
         for contact in contacts_of(self._yade, self._assembly):
             v = contact.geom.incidentVel(contact, False)
@@ -140,7 +147,7 @@ class YadeLedger:
         return found
 
     def _contacts(self, before: Velocities) -> Contacts:
-        """All contacts; one that is new has no velocity in `before`, and counts with its present one."""
+        """Return all contacts; a new contact, absent in `before`, counts with its present velocity."""
         rows = []
         for contact in contacts_of(self._yade, self._assembly):
             geom, phys = contact.geom, contact.phys
@@ -150,12 +157,12 @@ class YadeLedger:
             law = (phys.Fv, phys.kn, phys.ks, phys.cn, phys.cs, phys.tangensOfFrictionAngle)
             depth = geom.penetrationDepth
             if math.isnan(depth):
-                # YADE does not save it; until the next step it follows from the spring's force.
+                # After loading, since YADE does not save depths; until the next step the spring's force gives it.
                 depth = phys.Fn / phys.kn
             rows.append((n[0], n[1], n[2], *earlier, *after, s[0], s[1], s[2], depth, *law))
         table = np.array(rows).reshape(-1, 19)
         normals, first, last, shear, rest = np.split(table, (3, 6, 9, 12), axis=1)
-        # An overlap that is negative belongs to a contact that has just ended.
+        # A contact that has just ended has a negative overlap.
         overlaps = np.maximum(rest[:, 0], 0.0)
         return Contacts(normals, first, last, overlaps, rest[:, 1], shear, rest[:, 2:4], rest[:, 4:6], rest[:, 6])
 

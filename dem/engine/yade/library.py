@@ -1,4 +1,4 @@
-"""The distribution's YADE. The only module that imports `yade`."""
+"""Import of the YADE that the Linux distribution ships; no other module imports `yade`."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from dem.errors import RunError
 
 @dataclass(frozen=True)
 class Yade:
-    """What this project uses of YADE."""
+    """The parts of YADE that this project uses."""
 
     classes: Any
     utils: Any
@@ -30,7 +30,7 @@ class Yade:
 
 
 def rows_of(vectors: Iterable[Any]) -> Array:
-    """(n, 3) components of YADE's vectors, five times faster than NumPy's own conversion."""
+    """Return (n, 3) components of YADE's vectors, five times faster than NumPy's own conversion."""
     return np.array([(v[0], v[1], v[2]) for v in vectors], dtype=np.float64).reshape(-1, 3)
 
 
@@ -46,13 +46,13 @@ def load_yade() -> Yade:
 
 
 def yade_version() -> str:
-    """Return the version of the YADE that runs."""
+    """Return the version of the installed YADE."""
     import_yade()
     return str(importlib.import_module("yade.config").version)
 
 
 def yade_threads() -> int:
-    """Return the number of threads that YADE runs with here: OMP_NUM_THREADS, by default 1."""
+    """Return the number of threads of YADE in this process: OMP_NUM_THREADS, by default 1."""
     import_yade()
     from yade import wrapper  # noqa: PLC0415
 
@@ -71,7 +71,7 @@ def import_yade() -> Any:
         if folder.parent.name in ("yade", "yade-double") and str(folder) not in sys.path:
             sys.path.append(str(folder))
     try:
-        # YADE greets on standard output, which belongs to the command's own answer.
+        # YADE prints a greeting to standard output, where only the output of the command belongs.
         with contextlib.redirect_stdout(io.StringIO()):
             return importlib.import_module("yade")
     except ImportError as error:

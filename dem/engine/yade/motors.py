@@ -1,4 +1,4 @@
-"""The motors of a simulation on YADE: their control, and the hinges that it acts on."""
+"""Motors on YADE: control updates that set the torques of hinges."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from dem.physics.motor import MotorLaw, Motors
 class YadeMotors:
     """`dem.engine.interface.Motors` on YADE; `strengths` are factors (N, 2) on torque limit and stiffness [1]."""
 
-    updates_at_once = 1  # between two control updates YADE comes back to Python anyhow
+    updates_at_once = 1  # YADE returns to Python after every step anyway
 
     def __init__(
         self, yade: Yade, assembly: Assembly, ledger: YadeLedger, law: MotorLaw | None, strengths: Array | None
@@ -54,7 +54,7 @@ class YadeMotors:
             self.control.engage(angles)
 
     def weld(self) -> None:
-        # Motors that hold would do, at three times the cost.
+        # Articulated smarticles whose motors hold would cost three times as much as welded ones.
         self._ledger.dissipated += self._assembly.weld()
 
     def actuate(self, targets: Array, interval: float) -> None:
@@ -66,11 +66,15 @@ class YadeMotors:
 
     @property
     def readings(self) -> MotorReadings | None:
-        now = self.control
-        if now is None:
+        motors = self.control
+        if motors is None:
             return None
         return MotorReadings(
-            schedule=now.schedule, commands=now.commands, torques=now.torques, work=now.work, halted=now.halted
+            schedule=motors.schedule,
+            commands=motors.commands,
+            torques=motors.torques,
+            work=motors.work,
+            halted=motors.halted,
         )
 
     @property

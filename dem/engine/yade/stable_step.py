@@ -1,4 +1,4 @@
-"""The stable time step on YADE, from masses and inertias rather than from sphere size."""
+"""The stable time step on YADE, from masses and inertias of smarticles instead of sphere sizes."""
 
 from __future__ import annotations
 
@@ -14,24 +14,29 @@ from dem.body.particle import LINKS, Boxes, Particle
 from dem.engine.yade.hinges import HingeLaw
 from dem.physics.contact import ContactLaw
 
-# Contacts that push one barb tip along the same line at the same time. A tip sphere between the beads of another
-# smarticle's chain touches two of them; more act along different directions and do not add up in one mode.
+# Contacts that push a barb's tip along one line at one time. A sphere at a tip that lies between two spheres of another
+# chain touches both; further contacts act in other directions and do not add up in one mode.
 CONTACTS_AT_A_TIP = 2
-# Contacts of a sphere in a row with another row along it, as far as it is pressed in by less than a twentieth of the
-# square of the pitch, in diameters: the spheres beside the nearest one are touched, those beyond are not.
+# Contacts of a sphere with a parallel row of spheres: the nearest sphere and its two neighbours, while the overlap in
+# diameters is below a twentieth of the pitch squared.
 CONTACTS_IN_A_ROW = 3
 
 
 def stable_time_step(particle: Particle, law: ContactLaw) -> float:
-    """Return the largest stable time step [s] of the leapfrog scheme over the stiffest modes of contact.
+    """Return the largest stable time step [s] of the leapfrog scheme for rigid smarticles in contact.
 
-    Modes are masses on parallel springs and dashpots: the lightest points of two smarticles against each other and
-    against the container, `CONTACTS_AT_A_TIP` contacts each; a pile of smarticles lying flat, every sphere in contact
-    with the neighbours above and below that move against it, which is the stiffest of any such pile and stiffer than
-    one lying on the container; and the same pile in which all roll alike, surfaces rubbing against those above and
-    below, stiffer still for bars with barbs below l/w = 0.2, which have little inertia about themselves. A step that is
-    too long for the flat or the rolling mode makes smarticles chatter without end, and the pile compacts. YADE takes
-    the dashpot's velocity half a step late, so a mode is stable while ω²dt² + 2c dt ≤ 4 with ω² = K/m, c = C/m.
+    The step is the least over the stiffest modes, each a mass on parallel springs and dashpots:
+
+    - the lightest points of two smarticles against each other, or of one against the container, with
+      `CONTACTS_AT_A_TIP` contacts;
+    - a pile of smarticles that lie flat, where every sphere touches neighbours above and below that move in the
+      opposite direction, the stiffest mode of such a pile;
+    - a flat pile where all smarticles roll in one sense and rub against those above and below. This mode is the
+      stiffest below l/w = 0.2, where smarticles have little inertia about their length.
+
+    A step that is too long for the second or third mode makes smarticles vibrate for ever, which compacts the pile.
+    YADE takes the dashpot's velocity half a step late, so that a mode is stable while ω²dt² + 2c dt ≤ 4, with ω² = K/m
+    and c = C/m.
 
     Source: characteristic polynomial λ² - (2 - c dt - ω²dt²) λ + (1 - c dt) at λ = -1; chain of equal masses at the
     edge of its band, K = 4k.
@@ -57,12 +62,11 @@ def stable_time_step(particle: Particle, law: ContactLaw) -> float:
 
 
 def hinged_stable_time_step(particle: Particle, law: ContactLaw, hinges: HingeLaw) -> float:
-    """Return the largest stable time step [s] of an articulated smarticle, over modes of hinges and contact together.
+    """Return the largest stable time step [s] of an articulated smarticle with its hinges and contacts.
 
-    Three free links, 18 degrees of freedom, joined by the springs of the pins, in the surroundings of
-    `stable_time_step`: the tip of a barb against another such tip, against the container, and all of it in a flat pile.
-    With M, K and C the matrices of mass, stiffness and damping, stable while K dt² + 2 C dt - 4 M has no positive
-    eigenvalue.
+    The smarticle is three links with 18 degrees of freedom, joined by the hinges' springs, with the contacts of
+    `stable_time_step`: a barb's tip at another tip or at the container, a flat pile, and a rolling one. With matrices M
+    of mass, K of stiffness and C of damping, a step is stable while K dt² + 2 C dt - 4 M has no positive eigenvalue.
     """
     boxes = particle.boxes
     mass = _mass_matrix(boxes)
@@ -80,8 +84,8 @@ def hinged_stable_time_step(particle: Particle, law: ContactLaw, hinges: HingeLa
         if hinges.shaft_damping:
             damped = damped + hinges.shaft_damping * _twist_shape()
         steps.append(_stable_step(mass, stiffness, damped))
-    # Links that roll about themselves all alike in a flat pile: surfaces rub against those above and below, and a link
-    # has little inertia about itself. In series, the wall's dashpot is at most twice the other.
+    # Links that all roll in one sense in a flat pile rub against those above and below, and have little inertia about
+    # their length. In series, the wall's dashpot is at most twice the other.
     roll = _roll_shape(particle)
     damping = max(law.normal_damping, law.wall_damping / 2) * law.tangential_damping
     steps.append(_stable_step(mass, pins + 4 * law.tangential_stiffness * roll, 4 * damping * roll))
@@ -91,13 +95,17 @@ def hinged_stable_time_step(particle: Particle, law: ContactLaw, hinges: HingeLa
 def planar_stable_time_step(
     particle: Particle, law: ContactLaw, hinges: HingeLaw, strings: Sequence[tuple[float, float]] = ()
 ) -> float:
-    """Return the largest stable time step [s] of articulated smarticles that lie flat in a plane, none on another.
+    """Return the largest stable time step [s] of articulated smarticles that lie side by side in a plane.
 
-    The stiffest surroundings are then a barb that lies along another one that moves against it, each of its spheres
-    among `CONTACTS_IN_A_ROW` of the other's, and a middle link that lies along a wall, each sphere in contact with it,
-    of a thicker one those of its outer row; and a barb with a string at its tip.
+    The stiffest modes are a barb along another barb that moves against it, where each sphere touches
+    `CONTACTS_IN_A_ROW` spheres; a middle link along a wall, which all spheres of its outer row touch; and a barb with a
+    string at its tip.
 
-    Strings have a stiffness [N/m] and a damping [N s/m] each.
+    Args:
+        particle: geometry of a smarticle.
+        law: contact law.
+        hinges: law of the hinges.
+        strings: stiffness [N/m] and damping [N s/m] of each string.
     """
     boxes = particle.boxes
     mass, pins = _mass_matrix(boxes), _hinge_stiffness(boxes, hinges)
@@ -116,7 +124,7 @@ def planar_stable_time_step(
 
 
 def _roll_shape(particle: Particle) -> Array:
-    """(18, 18): the stiffness matrix of springs of 1 N/m across the highest point of every sphere, against rolling."""
+    """Return (18, 18) the stiffness matrix of tangential springs of 1 N/m at the highest points of all spheres."""
     shape = np.zeros((6 * LINKS, 6 * LINKS))
     for link, height in zip(particle.links, particle.centres[:, 2] + particle.radius, strict=True):
         about = slice(6 * int(link) + 3, 6 * int(link) + 5)
@@ -133,7 +141,7 @@ def _stable_step(mass: Array, stiffness: Array, damping: Array) -> float:
 
 
 def _mass_matrix(boxes: Boxes) -> Array:
-    """(18, 18) of three links: velocity and angular velocity of each, in the body frame."""
+    """Return (18, 18) the mass matrix for velocity and angular velocity of each link, in the body frame."""
     blocks = []
     for moved, moments, rotation in zip(boxes.link_masses, boxes.link_inertias, boxes.link_rotations, strict=True):
         blocks += [moved * np.eye(3), rotation @ np.diag(moments) @ rotation.T]
@@ -141,7 +149,7 @@ def _mass_matrix(boxes: Boxes) -> Array:
 
 
 def _velocity_of(boxes: Boxes, link: int, point: Array) -> Array:
-    """(3, 18): velocity of a point of a link (3,) [m], body frame, from those of all links."""
+    """Return the matrix (3, 18) from the velocities of all links to that of a point (3,) [m], in the body frame."""
     x, y, z = point - boxes.link_centres[link]
     rows = np.zeros((3, 6 * LINKS))
     rows[:, 6 * link : 6 * link + 3] = np.eye(3)
@@ -150,7 +158,7 @@ def _velocity_of(boxes: Boxes, link: int, point: Array) -> Array:
 
 
 def _hinge_stiffness(boxes: Boxes, law: HingeLaw) -> Array:
-    """(18, 18): the stiffness matrix of both hinges."""
+    """Return (18, 18) the stiffness matrix of both hinges."""
     stiffness = np.zeros((6 * LINKS, 6 * LINKS))
     plane = np.eye(3)[:2]
     # The damper acts half way between the centre and the end of the axis (see `dem.engine.yade.hinges`).
@@ -169,19 +177,19 @@ def _hinge_stiffness(boxes: Boxes, law: HingeLaw) -> Array:
 
 
 def _twist(barb: int) -> Array:
-    """(1, 18): how much a barb turns against the middle link, about the normal."""
+    """Return the matrix (1, 18) from the velocities of all links to the rate of a barb's angle."""
     row = np.zeros((1, 6 * LINKS))
     row[0, 6 * barb + 5], row[0, 11] = 1, -1
     return row
 
 
 def _twist_shape() -> Array:
-    """(18, 18): the matrix of twist springs of 1 N m/rad at both hinges."""
+    """Return (18, 18) the stiffness matrix of twist springs of 1 N m/rad at both hinges."""
     return np.asarray(sum(_twist(barb).T @ _twist(barb) for barb in (0, 2)))
 
 
 def _push_shape(particle: Particle, spheres: Iterable[int], directions: Array) -> Array:
-    """(18, 18): the stiffness matrix of springs of 1 N/m on spheres, along directions (k, 3)."""
+    """Return (18, 18) the stiffness matrix of springs of 1 N/m at some spheres, along directions (k, 3)."""
     shape = np.zeros((6 * LINKS, 6 * LINKS))
     for sphere in spheres:
         rows = directions @ _velocity_of(particle.boxes, int(particle.links[sphere]), particle.centres[sphere])

@@ -1,7 +1,7 @@
-"""The two strings that hold and pull a chain, in YADE: forces set before every step.
+"""The two strings that pull a chain on YADE, as forces set before every step.
 
-Each is anchored at a point in space; one of the two moves. Their forces follow from positions and velocities of the
-tied links as YADE's contact laws have them, and so have the stability of such a contact.
+The far end of each string, its anchor, is a point in space that may move. Forces use the positions and velocities that
+YADE's contact laws use, and so have the stability of such a contact.
 """
 
 from __future__ import annotations
@@ -24,10 +24,10 @@ from dem.physics.contact import StringLaw
 class End:
     """One string."""
 
-    body: int  #: Id of the link that it is tied to
-    arm: Sequence[float]  #: (3,) where, in the body's own frame [m]
-    anchor: Sequence[float]  #: (3,) its other end at the start [m]
-    speed: float  #: Of the anchor along x [m/s]
+    body: int  #: Id of the link's body
+    arm: Sequence[float]  #: (3,) tied point in YADE's frame of the body [m]
+    anchor: Sequence[float]  #: (3,) position of the anchor at the start [m]
+    speed: float  #: Velocity of the anchor along x [m/s]
 
 
 class YadeStrings:
@@ -65,7 +65,7 @@ class YadeStrings:
         self._bind(ends, [end.anchor for end in ends], [(0, 0, 0) for _ in ends])
 
     def pull(self, time_step: float) -> float:
-        """Set the forces of a step dt [s] and move the anchors on; return the work on the links [J]."""
+        """Set the forces for a step dt [s] and move the anchors; return the work on the links [J]."""
         assert self._law is not None  # called while strings are tied only
         work = 0.0
         forces, vector = self._yade.omega.forces, self._yade.vector

@@ -209,11 +209,11 @@ UNKNOWN = "ERROR: Unknown fix style nonsense (../modify.cpp:899)\nLast command: 
     [
         ("", KILLED, "rank 1 was ended by signal 9 (Killed)", "if memory ran out.*fewer --ranks; go on .*resume"),
         ("", KILLED.replace("9 (Killed)", "11 (Segmentation fault)"), "signal 11 (Segm", "^go on from the last check"),
-        (UNKNOWN, "", "Unknown fix style nonsense (command: fix bogus all nonsense)", "does not know .*setup-mpi"),
+        (UNKNOWN, "", "Unknown fix style nonsense (command: fix bogus all nonsense)", "lacks commands .*setup-mpi"),
         ("ERROR: Lost atoms: original 180 (../thermo.cpp:438)", "", "Lost atoms: original", "fly apart.*low"),
         ("", "ERROR on proc 1: Failed to allocate 8 bytes for array x (../memory.cpp:66)", "Failed", "memory is short"),
         ("", "There are not enough slots available in the system", "fewer cores than ranks", "fewer --ranks"),
-        ("units si", "", "exit status 3 (it says nothing)", "see its log"),
+        ("units si", "", "exit status 3 (no output)", "see its log"),
     ],
 )
 def test_why_it_ended_is_read_from_its_own_log(log: str, printed: str, cause: str, way_out: str) -> None:
