@@ -167,7 +167,7 @@ read_data        {DATA}
 
 # Contact: kn and ks [N/m]; damping across and along the surface, to be multiplied with the effective mass of the two
 # bodies, M/2 [1/s]; friction; 1: damping along the surface is on; where the dashpot would pull there is no force.
-# cn = {law.normal_damping:.6g} N s/m: restitution {scene.contact.restitution:g} at a typical lever.
+# cn = {law.normal_damping:.6g} N s/m: restitution {scene.contact.restitution:g} at the typical effective mass.
 pair_style       gran/hooke/history {between}
 pair_coeff       * *
 

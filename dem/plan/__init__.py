@@ -1,1 +1,1 @@
-"""What a run will do and cost, and why."""
+"""Effects, time steps and cost of a run, known before it begins."""

@@ -1,8 +1,8 @@
-"""The engine and fidelity that a scene needs, from a table of measured errors and costs.
+"""Choice of engine and fidelity for a scene, from a table of measured errors and costs.
 
-`smarticles accuracy` writes the table: the error of each named fidelity on some scene, and how its processor times
-compare with the planned wall times. The hours are those planned for this scene, times that ratio. The table's knob
-`engine` compares engines with one reference, its knob `fidelity` the fidelities of one engine.
+`smarticles accuracy` measures the table on one scene. It has the error of each named fidelity, and the ratio of
+measured processor times to planned wall times, by which the hours planned for another scene are corrected. Rows of the
+knob `engine` compare engines with one reference, rows of the knob `fidelity` the fidelities of one engine.
 """
 
 from __future__ import annotations
@@ -22,10 +22,10 @@ from dem.scene.scene import Scene
 from dem.setting.fidelity import FIDELITIES, fidelities
 
 SHIPPED = Path(__file__).with_name("work_precision.csv")
-"""The table that is used unless another one is given; there only if it was measured."""
+"""Default table."""
 
 QUANTITIES = {"phi_0": "φ_0", "phi_f": "φ_f", "crossings": "⟨N⟩"}
-"""What a limit of the error can be of: names of columns and of `--of`, and symbols."""
+"""Quantities with measured errors: symbols by the names in columns and in `--of`."""
 
 PACKING = ("phi_0", "phi_f")  #: Default of `--of`
 
@@ -41,11 +41,11 @@ _COLUMNS = (
 
 @dataclass(frozen=True, kw_only=True)
 class Error:
-    """A relative error."""
+    """The relative error of a quantity."""
 
-    of: str
-    value: float  #: Against the reference fidelity [1]; NaN if unknown
-    band: float  #: Half-width of its 95 % interval over seeds [1]; NaN if unknown
+    of: str  #: Symbol of the quantity
+    value: float  #: Relative deviation from the reference fidelity [1]; NaN if unknown
+    band: float  #: Half-width of the 95 % interval over seeds [1]; NaN if unknown
 
     def __str__(self) -> str:
         band = f" ± {self.band:.3f}" if math.isfinite(self.band) else ", scatter unknown"
@@ -53,43 +53,43 @@ class Error:
 
     @property
     def size(self) -> float:
-        """Absolute value [1]; inf if unknown."""
+        """Absolute value of the error [1]; inf if unknown."""
         return math.inf if math.isnan(self.value) else abs(self.value)
 
 
 @dataclass(frozen=True, kw_only=True)
 class Measured:
-    """One named fidelity of an engine as the table has it."""
+    """Errors and cost of one named fidelity of an engine, from the table."""
 
     fidelity: str
-    errors: tuple[Error, ...]  #: Of the quantities asked for; `others` are those of the others
+    errors: tuple[Error, ...]  #: Of the quantities that were asked for
     engine: str = "yade"
-    others: tuple[Error, ...] = ()
-    seeds: int
+    others: tuple[Error, ...] = ()  #: Of all other quantities
+    seeds: int  #: Number of seeds
     ratio: float  #: Measured processor time over the planned wall time [1]
-    is_reference: bool  #: Whether the errors of the others are against it
+    is_reference: bool  #: Whether errors are relative to this fidelity
     hours: float = math.nan  #: Expected wall time on the scene at hand, on one core of the table's machine [h]
 
     @property
     def name(self) -> str:
-        """Engine and fidelity."""
+        """Fidelity and engine, as `standard on links`."""
         return f"{self.fidelity} on {self.engine}"
 
     @property
     def worst(self) -> Error:
-        """The largest error, or one that is unknown."""
+        """The largest error; an unknown one counts as larger than all others."""
         return max(self.errors, key=lambda error: error.size)
 
 
 @dataclass(frozen=True, kw_only=True)
 class AccuracyTable:
-    """What was measured, and of which scene."""
+    """Measured fidelities, and the scene on which they were measured."""
 
     path: Path
-    fidelities: tuple[Measured, ...]  #: Those with finished runs, engine by engine, coarse to fine
-    reference: str  #: Name of what errors are against
-    aspect_ratio: float
-    count: int
+    fidelities: tuple[Measured, ...]  #: Fidelities with finished runs, engine by engine, coarse to fine
+    reference: str  #: Name of the reference of all errors
+    aspect_ratio: float  #: L/w of the scene [1]
+    count: int  #: N of the scene
     activity: str  #: Types of phase, separated by spaces
 
 
@@ -97,12 +97,12 @@ def read_table(path: Path | None, *, of: Sequence[str] = PACKING, engine: str | 
     """Read a table of `smarticles accuracy`.
 
     Args:
-        path: None: the one that ships.
-        of: keys of `QUANTITIES`, of which errors are asked for.
-        engine: the only one that may be chosen; None: any.
+        path: the table; None: `SHIPPED`.
+        of: keys of `QUANTITIES` whose errors decide.
+        engine: the only engine that may be chosen; None: any.
 
     Raises:
-        InputError: there is none, it is another table, or it has no named fidelities.
+        InputError: the file is missing, is no table of work and precision, or has no named fidelities.
     """
     file = SHIPPED if path is None else path
     if path is None and not file.is_file():
@@ -147,9 +147,9 @@ def read_table(path: Path | None, *, of: Sequence[str] = PACKING, engine: str | 
 
 
 def _named_fidelities(rows: Sequence[dict[str, str]]) -> dict[tuple[str, str], dict[str, str]]:
-    """Rows of named fidelities by engine and name, coarse to fine.
+    """Return the rows of named fidelities by engine and name, coarse to fine.
 
-    All errors are against one reference: of the knob `engine` where the table has it, otherwise of the knob `fidelity`.
+    All rows are of one knob, since their errors must have one reference: `engine` if the table has it, else `fidelity`.
     """
     named = {row[_VALUE]: row for row in rows if row[_KNOB] == "engine"} or {
         # Older tables lack the column.
@@ -183,15 +183,15 @@ def _measured(engine: str, name: str, row: dict[str, str], of: Sequence[str]) ->
 
 @dataclass(frozen=True, kw_only=True)
 class Choice:
-    """The engine and fidelity chosen: the scene's plan with corrected wall times, errors, reason, caveats."""
+    """The engine and fidelity that were chosen for a scene."""
 
-    planned: Plan
-    expected: Measured
-    why: str
-    notes: tuple[str, ...]
+    planned: Plan  #: Plan of the scene with corrected wall times
+    expected: Measured  #: Errors and cost
+    why: str  #: The limit that decided
+    notes: tuple[str, ...]  #: Caveats
 
     def to_dict(self) -> dict[str, Any]:
-        """Return plain data for `--json`; an unknown number is null."""
+        """Return plain data for `--json`, with null for unknown numbers."""
 
         def known(number: float) -> float | None:
             return None if math.isnan(number) else number
@@ -227,12 +227,13 @@ def choose(
     """Choose engine and fidelity for a scene: the cheapest within the error, else the most exact within the hours.
 
     Args:
-        scene: the scene; its own engine and fidelity do not matter.
-        max_error: largest relative error of what `table` was read for, against the reference fidelity [1].
+        scene: the scene; its own engine and fidelity are ignored.
+        table: measured errors and costs.
+        max_error: largest relative error of the quantities for which `table` was read [1].
         max_hours: longest wall time on one core [h].
 
     Raises:
-        InputError: no fidelity keeps the limit, or the two contradict each other; the message says which gives way.
+        InputError: no fidelity keeps the limits; the message gives limits that can be kept.
     """
     plans: dict[str, Plan] = {}
     expected: list[Measured] = []
@@ -254,10 +255,19 @@ def choose(
 
 
 def pick(expected: Sequence[Measured], *, max_error: float | None, max_hours: float | None) -> tuple[Measured, str]:
-    """Return one of some fidelities, coarse to fine, that keeps the limits of `choose`, and in words which limit.
+    """Return the fidelity that `choose` takes, and the limit that decided in words.
 
-    Of those that the hours allow the most exact is taken: the reference, else the finest of an engine, and of several
-    engines' finest the one whose error is known and least.
+    With a limit of the error it is the cheapest fidelity within the limit. With a limit of the hours alone it is the
+    most exact fidelity within the limit: the reference, or else, among the finest ones of all engines, the one with the
+    least known error.
+
+    Args:
+        expected: fidelities with their hours, for each engine from coarse to fine.
+        max_error: as in `choose`.
+        max_hours: as in `choose`.
+
+    Raises:
+        InputError: as in `choose`.
     """
     quick = [one for one in expected if max_hours is None or one.hours <= max_hours]
     if max_error is None:
@@ -294,7 +304,7 @@ def pick(expected: Sequence[Measured], *, max_error: float | None, max_hours: fl
 
 
 def _above(number: float) -> str:
-    """A number rounded up to two digits."""
+    """Return a number rounded up to two digits, as text."""
     if number <= 0 or math.isinf(number):
         return f"{max(0.0, number):g}"
     unit = 10.0 ** (math.floor(math.log10(number)) - 1)

@@ -1,7 +1,7 @@
-"""Which effects a scene calls for, why, and what each adds to a run.
+"""Effects of a scene: which ones it needs, why, and what each adds to a run.
 
-`dem.plan.outlook` prints this, `dem.run` makes a run from it, and tests compare it with an engine's own lists and the
-files of runs.
+`dem.plan.outlook` prints the effects, `dem.run` builds a run from them, and tests compare them with an engine's own
+lists and the files of runs.
 """
 
 from __future__ import annotations
@@ -56,17 +56,17 @@ ADDS: Mapping[EffectName, Adds] = {
     ),
     EffectName.CHECKPOINTS: Adds(files=("checkpoint.zip", "checkpoint.previous.zip")),
 }
-"""What effects add on every engine; `EngineKind.adds` has what they add on one."""
+"""Additions of effects on every engine; `EngineKind.adds` has those on one engine."""
 
 
 @dataclass(frozen=True)
 class Decision:
-    """One effect in one scene: whether it is on, why, and what it adds: nothing where it is off."""
+    """One effect in one scene."""
 
     name: EffectName
-    on: bool
-    why: str
-    adds: Adds
+    on: bool  #: Whether the scene needs the effect
+    why: str  #: Reason in words
+    adds: Adds  #: Additions to the run; none for an effect that is off
 
 
 def decide(scene: Scene) -> tuple[Decision, ...]:
@@ -79,12 +79,12 @@ def decide(scene: Scene) -> tuple[Decision, ...]:
 
 
 def called_for(scene: Scene) -> frozenset[EffectName]:
-    """Return the effects that a scene calls for."""
+    """Return the effects that a scene needs."""
     return frozenset(name for name, (on, _) in _reasons(scene).items() if on)
 
 
 def _reasons(scene: Scene) -> Mapping[EffectName, tuple[bool, str]]:
-    """Whether a scene calls for each effect, and why."""
+    """Return whether a scene needs each effect, and why."""
     contact, plane, gravity = scene.contact, scene.plane, scene.gravity_m_per_s2
     recording = scene.recording
     by_phases: dict[EffectName, list[str]] = {}
@@ -118,7 +118,10 @@ def _reasons(scene: Scene) -> Mapping[EffectName, tuple[bool, str]]:
             contact.friction_smarticle > 0 or contact.friction_wall > 0,
             f"μ = {contact.friction_smarticle:g} between smarticles, {contact.friction_wall:g} at the container",
         ),
-        EffectName.RESTITUTION: (contact.restitution < 1, f"restitution {contact.restitution:g} at a typical lever"),
+        EffectName.RESTITUTION: (
+            contact.restitution < 1,
+            f"coefficient {contact.restitution:g} at the typical effective mass",
+        ),
         EffectName.CONTAINER_MOTION: phases(EffectName.CONTAINER_MOTION, "no phase of type shake"),
         **_motors(scene, by_phases.get(EffectName.ARTICULATION, [])),
         EffectName.HOOKS: _hooks(scene, ", ".join(by_phases.get(EffectName.HOOKS, []))),

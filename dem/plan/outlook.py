@@ -1,4 +1,4 @@
-"""What a run would do: phases, effects and why each is on or off, engines, time step, cost, warnings."""
+"""Plan of a run: phases, effects with reasons, engines, time steps, cost, warnings."""
 
 from __future__ import annotations
 
@@ -25,13 +25,13 @@ _LEFT_OUT = {
 
 @dataclass(frozen=True)
 class PlannedPhase:
-    """One phase: its duration (None where a criterion ends it, then `estimate_s` is a guess), cost and time step."""
+    """One phase of a plan."""
 
     index: int
     type: str
-    duration_s: float | None
-    estimate_s: float
-    wall_s: float
+    duration_s: float | None  #: Simulated time; None where a criterion ends the phase
+    estimate_s: float  #: Simulated time, estimated where `duration_s` is None
+    wall_s: float  #: Expected wall time
     time_step_s: float
 
 
@@ -56,13 +56,13 @@ class Plan:
     engine: str = "yade"
     fidelity: str = "standard"
     stiffness_N_per_m: float = 0.0
-    strands: int = 0  #: Of a link, where the engine takes links as they are; 0 where it fills them with spheres
-    correction: float = 1.0  #: Factor that wall times have been corrected by
-    protocol: tuple[str, ...] = ()  #: Lines of what the scene has by its protocol
-    overlaps: Mapping[str, float] = field(default_factory=dict)
+    strands: int = 0  #: Strands of a link on the engine links; 0 on engines with spheres
+    correction: float = 1.0  #: Factor by which wall times were corrected
+    protocol: tuple[str, ...] = ()  #: Lines about the keys of the scene's protocol
+    overlaps: Mapping[str, float] = field(default_factory=dict)  #: Expected overlaps over a link's width, by cause
 
     def corrected(self, factor: float) -> Self:
-        """Return this plan with wall times `factor` times as long [1]."""
+        """Return this plan with all wall times multiplied by a factor [1]."""
         phases = tuple(replace(phase, wall_s=factor * phase.wall_s) for phase in self.phases)
         return replace(self, phases=phases, wall_s=factor * self.wall_s, correction=factor * self.correction)
 
@@ -103,7 +103,7 @@ class Plan:
         return f"{self.strands} strand{'' if self.strands == 1 else 's'}"
 
     def _engine_to_text(self) -> list[str]:
-        """What differs on an engine other than YADE: knobs without meaning, and the fidelity of links."""
+        """Return the lines for engines other than YADE: knobs without meaning, and the fidelity of links."""
         idle = ", ".join(engine_kind(self.engine).idle_knobs)
         if not self.strands:
             return [f"engine {self.engine}: {idle} have no meaning here"] if idle else []
@@ -124,7 +124,7 @@ class Plan:
 
 
 def _wall_time(wall: float) -> str:
-    """A wall time in the unit in which it has two or three digits."""
+    """Return a wall time [s] as text, in the unit in which it has two or three digits."""
     for most, unit, name, form in ((10, 1, "s", ".1f"), (600, 1, "s", ".0f"), (7200, 60, "min", ".0f")):
         if wall < most:
             return f"{wall / unit:{form}} {name}"
@@ -132,7 +132,7 @@ def _wall_time(wall: float) -> str:
 
 
 def plan(scene: Scene) -> Plan:
-    """Plan a scene.
+    """Return the plan of a scene.
 
     Raises:
         InputError: the scene's time step is above the stable one.
@@ -181,9 +181,9 @@ def _activity(scene: Scene, index: int) -> Activity:
 
 
 def warnings_of(scene: Scene) -> tuple[str, ...]:
-    """Return all warnings of a scene, for `plan` and the beginning of a run: what, where, value with unit, way out."""
+    """Return all warnings of a scene, one line each with key, value with unit, and what to do."""
     of_phases = (warning for index, phase in enumerate(scene.phases) for warning in phase.warnings(scene, index))
-    # Several phases may give the warning about one thing.
+    # Several phases may give equal warnings.
     return (
         *dict.fromkeys(of_phases),
         *recording_warnings(scene),
@@ -193,7 +193,7 @@ def warnings_of(scene: Scene) -> tuple[str, ...]:
 
 
 def engine_warnings(scene: Scene) -> tuple[str, ...]:
-    """Warn of knobs of the fidelity that are set and have no meaning on the scene's engine, in one line."""
+    """Return a warning, in one line, about knobs of the fidelity that the scene sets and its engine ignores."""
     fidelity = scene.fidelity
     named = fidelities(scene.engine)[fidelity.base]
     usual = {key: named.get(key, Fidelity.model_fields[key].default) for key in engine_kind(scene.engine).idle_knobs}
@@ -205,7 +205,7 @@ def engine_warnings(scene: Scene) -> tuple[str, ...]:
 
 
 def recording_warnings(scene: Scene) -> tuple[str, ...]:
-    """Warn of intervals of recording that are longer than the run."""
+    """Return warnings about intervals of recording that are longer than the run, one line each."""
     known = all(phase.known_duration is not None for phase in scene.phases)
     length = sum(phase.expected_duration(scene.count) for phase in scene.phases)
     run = f"the whole run, {'' if known else 'about '}{length:.3g} s"
@@ -219,27 +219,27 @@ def recording_warnings(scene: Scene) -> tuple[str, ...]:
 
 
 def protocol_lines(scene: Scene) -> tuple[str, ...]:
-    """Return a line of what a scene has by its protocol, and one of its deviations; none without a protocol."""
+    """Return a line of the keys with their protocol's values, and one of deviating keys; none without a protocol."""
     if scene.protocol is None:
         return ()
     kept, other = [], []
-    for key, value, says in _protocol_keys(scene, PROTOCOLS[scene.protocol]):
-        if value == says:
+    for key, value, rule in _protocol_keys(scene, PROTOCOLS[scene.protocol]):
+        if value == rule:
             kept.append(f"{key} {_word(value)}")
         else:
-            other.append(f"{key} is {_word(value)} here, not {_word(says)}")
+            other.append(f"{key} is {_word(value)} here, not {_word(rule)}")
     lines = [f"protocol {scene.protocol}: {', '.join(kept) or 'nothing of it is left'}"]
     return (*lines, f"  the scene says otherwise: {', '.join(other)}") if other else tuple(lines)
 
 
-def _protocol_keys(scene: Scene, says: Mapping[str, Mapping[str, Any]]) -> Iterator[tuple[str, Any, Any]]:
-    """Key, the scene's value, and the protocol's, of all keys of the protocol."""
+def _protocol_keys(scene: Scene, rules: Mapping[str, Mapping[str, Any]]) -> Iterator[tuple[str, Any, Any]]:
+    """Yield all keys of a protocol that apply to a scene, each with the scene's value and the protocol's value."""
     for part in PARTS:
         if applies(part, plane=scene.plane is not None, tiers=scene.container.tiers is not None):
-            for key, value in says[part].items():
+            for key, value in rules[part].items():
                 yield f"{part}.{key}", getattr(getattr(scene, part), key), value
     for index, phase in enumerate(scene.phases):
-        for key, value in says.get(phase.kind, {}).items():
+        for key, value in rules.get(phase.kind, {}).items():
             yield f"phases.{index}.{key}", getattr(phase, key), value
 
 

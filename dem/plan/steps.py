@@ -1,4 +1,4 @@
-"""The time step of each phase: from the engine's stable step, and from intervals that it has to divide."""
+"""Time steps of the phases, from the engine's stable step and the intervals that are whole multiples of a step."""
 
 from __future__ import annotations
 
@@ -10,14 +10,15 @@ from dem.errors import InputError
 from dem.scene.scene import Scene
 from dem.scene.stiffness import too_soft
 
-# Sphere diameters by which a phase may move walls, hooks or strings in a step. Measured with a hook drawn out of piles
-# of 30, draft and standard, 3 to 4 seeds: the deepest contact is 0.29 to 0.55 diameters deep at 0.03, 0.42 to 0.70 at
-# 0.05 and 0.61 to 0.66 at 0.1, where the watchdog's limit is 0.5; at 0.3 the hook leaves the pile behind.
+# Largest distance, in sphere diameters, by which walls, hooks or strings may move in a step. Measured with a hook
+# pulled out of piles of 30, draft and standard, 3 to 4 seeds: the deepest contact is 0.29 to 0.55 diameters deep at
+# 0.03, 0.42 to 0.70 at 0.05 and 0.61 to 0.66 at 0.1, where the watchdog's limit is 0.5; at 0.3 the hook leaves the pile
+# behind.
 MOST_PER_STEP = 0.05
 
 
 def stable_step(scene: Scene) -> float:
-    """Return the largest stable time step [s] of a scene on its engine, articulated where a phase actuates."""
+    """Return the largest stable time step [s] of a scene on its engine, with hinges if any phase has motors."""
     return engine_kind(scene.engine).stable_step(scene, articulated=scene.actuates)
 
 
@@ -28,7 +29,7 @@ def time_step(scene: Scene) -> float:
         InputError: the given `time_step_s` is above the stable one, the recording intervals do not fit, or a phase
             moves something so fast that contacts cannot follow.
     """
-    # On links the barrier bears any load, but not where it should: sub-steps then take the time.
+    # On links the barrier bears any load, but large overlaps need many sub-steps.
     if scene.smooth and (soft := too_soft(scene)):
         msg = f"{soft}, or leave it out"
         raise InputError(msg)
@@ -55,12 +56,13 @@ def time_step(scene: Scene) -> float:
 def time_steps(scene: Scene) -> tuple[float, ...]:
     """Return the time step [s] of each phase.
 
-    Until motors act for the first time, smarticles are the rigid bodies that were poured, and phases have the step, and
-    so the bits, of a scene without motors. After that a welded smarticle has the shape in which its motors left it, for
-    which no longer step than that of the hinges is known to be stable. A given step is that of all phases.
+    Until motors act for the first time, smarticles are rigid in their initial shape, and phases have the step of a
+    scene without motors, and therefore bitwise equal results. Later a welded smarticle has the shape in which its
+    motors left it, for which only the step of hinges is known to be stable. `fidelity.time_step_s` is the step of all
+    phases.
 
     Raises:
-        InputError: as in `time_step`, or something moves too fast for the step of its phase.
+        InputError: as in `time_step`, or a wall, hook or string moves too fast for the step of its phase.
     """
     count, shortest = len(scene.phases), time_step(scene)
     first = next((k for k, phase in enumerate(scene.phases) if phase.actuates), count)
@@ -75,12 +77,12 @@ def time_steps(scene: Scene) -> tuple[float, ...]:
 
 
 def _steps_in(interval: float, wanted: float) -> int:
-    """Number of equal time steps of an interval, of at most the wanted length [s]."""
+    """Return the number of equal time steps in an interval [s], none longer than `wanted` [s]."""
     return max(1, math.ceil(interval / wanted * (1 - 1e-12)))
 
 
 def _check_speeds(scene: Scene, steps: Sequence[float]) -> None:
-    """Reject speeds of walls, hooks and strings that pass through smarticles before a contact can push them away."""
+    """Reject speeds at which walls, hooks or strings pass through smarticles before contacts push these away."""
     diameter = scene.sphere_diameter
     for index, (phase, step) in enumerate(zip(scene.phases, steps, strict=True)):
         most = MOST_PER_STEP * diameter / step

@@ -1,1 +1,1 @@
-"""What a run writes: names, formats, writers and readers."""
+"""Files of a run: names, formats, writers and readers."""

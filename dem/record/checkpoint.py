@@ -1,11 +1,11 @@
 """Checkpoints: everything that a run needs to be resumed, in one checksummed file; the previous one is kept.
 
-What the engine saved is opaque here: bytes, with the name and version of the engine that can read them. The rest is
-plain data.
+The engine's state is stored as bytes in the engine's own format, with the engine's name and version. The rest is plain
+data.
 
-On one thread a resumed run gives the same bits as one that was never stopped, because the running simulation reloads
-each checkpoint that it writes: an engine may order bodies and contacts anew when it loads, and sums of forces depend on
-their order.
+On one thread a resumed run gives bitwise the results of a run that was never stopped, because the running simulation
+reloads each checkpoint that it writes: an engine may order bodies and contacts anew when it loads, and sums of forces
+depend on the order.
 """
 
 from __future__ import annotations
@@ -33,20 +33,20 @@ _YADE, _YADE_MEMBER = "yade", "engine.yade"
 
 @dataclass(frozen=True, kw_only=True)
 class Checkpoint:
-    """What a run needs to be resumed; `made_by` is name and version of the engine, `state` plain data."""
+    """Content of a checkpoint."""
 
     scene_sha256: str
-    made_by: tuple[str, str]
-    state: Mapping[str, Any]
-    series: Mapping[str, NDArray[Any]]
-    engine: bytes
+    made_by: tuple[str, str]  #: Name and version of the engine
+    state: Mapping[str, Any]  #: Plain data of the run
+    series: Mapping[str, NDArray[Any]]  #: Columns of the series so far
+    engine: bytes  #: State of the engine
 
 
 def write_checkpoint(folder: Path, checkpoint: Checkpoint) -> None:
-    """Write a checkpoint whole, flushed to the disk; the previous one is kept.
+    """Write a checkpoint into a run directory and flush it to the disk; the previous one is kept.
 
     Raises:
-        RunError: it cannot be written; older checkpoints stay.
+        RunError: the file cannot be written; older checkpoints stay.
     """
     newest = folder / CHECKPOINT
     name, version = checkpoint.made_by
@@ -73,13 +73,18 @@ def write_checkpoint(folder: Path, checkpoint: Checkpoint) -> None:
 
 
 def read_checkpoint(folder: Path, *, scene_sha256: str, made_by: tuple[str, str]) -> tuple[Checkpoint, str | None]:
-    """Read the newest checkpoint that is whole, of a scene, and of an engine by name and version.
+    """Read the newest undamaged checkpoint of a run directory.
+
+    Args:
+        folder: the run directory.
+        scene_sha256: hash of the scene that the checkpoint must have.
+        made_by: name and version of the engine that the checkpoint must have.
 
     Returns:
-        The checkpoint, and a warning where the newest one is damaged and the previous one is used.
+        The checkpoint, and a warning if the newest one is damaged and the previous one was read.
 
     Raises:
-        InputError: no whole checkpoint, or one of another format, engine or scene.
+        InputError: there is no undamaged checkpoint, or it is of another format, engine or scene.
     """
     damaged: list[str] = []
     for name in (CHECKPOINT, CHECKPOINT_BEFORE):
@@ -106,7 +111,7 @@ def read_checkpoint(folder: Path, *, scene_sha256: str, made_by: tuple[str, str]
 
 
 def has_checkpoint(folder: Path) -> bool:
-    """Return whether a run directory holds a checkpoint, whole or not."""
+    """Return whether a run directory holds a checkpoint, damaged or not."""
     return (folder / CHECKPOINT).exists() or (folder / CHECKPOINT_BEFORE).exists()
 
 

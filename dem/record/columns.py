@@ -1,4 +1,4 @@
-"""What is recorded: datasets of `series.h5` and cell data of frames, with unit and description, as effects add them."""
+"""Recorded quantities with units and descriptions: datasets of `series.h5`, and cell data of frames and forces."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from dem.strict import unit_of
 
 
 class Column(NamedTuple):
-    """One dataset, or one field of the frames."""
+    """One dataset of the series, or one field of the frames."""
 
     unit: str  #: SI; "1" for a pure number
     label: str  #: Name in tables, without the unit
@@ -20,9 +20,10 @@ Columns = Mapping[str, Column]  #: Datasets by name, in the order of the file
 
 
 def _columns(*, whole_names: bool = False, **described: str | tuple[str, str]) -> Columns:
-    """Return columns from descriptions, or labels and descriptions; names spell the unit, and the label by default.
+    """Return columns by name, from descriptions or pairs of label and description.
 
-    With `whole_names` the labels are the names with their units.
+    Units follow from the ends of the names. Default labels are the names without units, or, with `whole_names`, the
+    names.
     """
     found = {}
     for name, text in described.items():
@@ -53,27 +54,27 @@ COLUMNS = _columns(
 MOTOR_COLUMNS = _columns(
     commanded_angle_rad="mean angle that the motors hold, barb 1 and barb 2",
     angle_rad="mean actual angle, barb 1 and barb 2",
-    schedule_error_rad="largest difference of the angle of the schedule and the commanded one; NaN while welded",
-    tracking_error_rad="largest difference of commanded and actual angle; NaN while welded",
+    schedule_error_rad="largest difference between the schedule's and the commanded angle; NaN while welded",
+    tracking_error_rad="largest difference between commanded and actual angle; NaN while welded",
     motor_torque_N_m="root mean square torque of the motors; NaN while welded",
-    halted_fraction="share of motors that are halted by their torque; NaN while welded",
+    halted_fraction="fraction of motors that are halted by their torque; NaN while welded",
     motor_work_J="work of all motors on the links since the start, sum of ∫ τ dα",
-    joint_gap_m="how far the hinge that gives way most has done so",
+    joint_gap_m="largest gap between the two links of a hinge",
 )
 # In scenes that ask for energy.
 ENERGY_COLUMNS = _columns(
-    gravitational_energy_J="of all smarticles above the floor's height at the start",
+    gravitational_energy_J="gravitational energy of all smarticles, zero at the floor's height at the start",
     container_work_J="work of the moving container, hook or strings on the smarticles since the start, without "
-    "their own weight",
+    "the weight of hook and container",
 )
 # In scenes that sample dissipation.
 LEDGER_COLUMNS = _columns(
     whole_names=True,
-    added_energy_J="gravitational energy that smarticles had when they were poured, above the same height",
-    contact_elastic_energy_J="in the springs of all contacts",
-    hinge_elastic_energy_J="in the pins and dampers of all hinges",
-    dissipated_energy_J="by contacts, hinges and welding since the start, sampled",
-    energy_residual_J="added energy and work less everything stored and dissipated: the ledger's error",
+    added_energy_J="energy of smarticles when they were added, zero at the floor's height at the start",
+    contact_elastic_energy_J="energy in the springs of all contacts",
+    hinge_elastic_energy_J="energy in the pins and dampers of all hinges",
+    dissipated_energy_J="energy dissipated by contacts, hinges and welding since the start, sampled",
+    energy_residual_J="added energy and work less all energy stored and dissipated: the ledger's error",
 )
 # In scenes with hooks.
 HOOK_COLUMNS = _columns(
@@ -98,45 +99,45 @@ STRAIN_COLUMNS = _columns(
     string_pulled_force_N=("pulled string force", "force of the string that is pulled on the chain (x, y, z)"),
     channel_lower_force_N=("lower wall force", "force of the chain on the wall at lower y (x, y, z); 0 without walls"),
     channel_upper_force_N=("upper wall force", "force of the chain on the wall at higher y (x, y, z); 0 without walls"),
-    pulled_m="how far the moved end of the string has gone",
-    chain_length_m="distance along x of the two points where strings are tied",
+    pulled_m="distance by which the moving end of a string has moved",
+    chain_length_m="distance along x between the two points where strings are tied",
     chain_width_m="extent of all links along y, with their thickness",
 )
 EVERY: Columns = {
     **{**COLUMNS, **MOTOR_COLUMNS, **ENERGY_COLUMNS, **LEDGER_COLUMNS},
     **{**HOOK_COLUMNS, **RELEASE_COLUMNS, **STRAIN_COLUMNS},
 }
-"""All that any scene may have."""
+"""Columns of all scenes together."""
 
 # Cell data of the frames: one value per link, in the order barb 1, middle link, barb 2 of each smarticle.
 FIELDS = _columns(
-    smarticle_id=("smarticle", "number of the smarticle, the same in all frames"),
+    smarticle_id=("smarticle", "number of the smarticle in all frames"),
     link="0 barb 1, 1 middle link, 2 barb 2",
-    velocity_m_per_s="of the link's centre (x, y, z)",
-    angular_velocity_rad_per_s="of the link (x, y, z)",
-    contacts="how many other smarticles this smarticle touches, by the engine",
-    time_s="simulated time, the same for all links, so that each file stands alone",
-    floor_z_m="height of the container's floor, likewise; heights are measured from it",
-    phase="index of the phase in the scene, likewise",
+    velocity_m_per_s="velocity of the link's centre (x, y, z)",
+    angular_velocity_rad_per_s="angular velocity of the link (x, y, z)",
+    contacts="number of other smarticles that this smarticle touches, by the engine",
+    time_s="simulated time, equal for all links, so that each file stands alone",
+    floor_z_m="height of the container's floor, equal for all links; heights are measured from it",
+    phase="index of the phase in the scene, equal for all links",
 )
 # Cell data of the files of forces: one value per contact; with `recording.contact_forces`.
 FORCE_FIELDS = _columns(
-    first_smarticle=("first", "number of the one that the force acts on"),
+    first_smarticle=("first", "number of the smarticle on which the force acts"),
     first_link="0 barb 1, 1 middle link, 2 barb 2",
-    second_smarticle=("second", "number of the one that exerts it, the higher one; -1 for a boundary"),
-    second_link="likewise; -1 for a boundary",
+    second_smarticle=("second", "number of the smarticle that exerts the force, the higher one; -1 for a boundary"),
+    second_link="0 barb 1, 1 middle link, 2 barb 2; -1 for a boundary",
     fixture="-1 none, 0 floor, 1 wall, 2 lower hook, 3 upper hook, 4 and 5 the channel's walls",
-    normal_force_N="sum of those at the points of contact; above 0",
-    tangential_force_N="size of the sum of those at the points of contact",
-    force_N="on the first one (x, y, z), all points of contact together",
-    point_m="where it acts (x, y, z), mean of the points, weighted by their normal forces",
-    time_s="simulated time, the same for all contacts",
-    phase="index of the phase in the scene, likewise",
+    normal_force_N="sum of the normal forces at the points of contact, above 0",
+    tangential_force_N="magnitude of the sum of the tangential forces at the points of contact",
+    force_N="total force on the first smarticle (x, y, z), summed over the points of contact",
+    point_m="mean of the points of contact (x, y, z), weighted by their normal forces",
+    time_s="simulated time, equal for all contacts",
+    phase="index of the phase in the scene, equal for all contacts",
 )
 # Cell data of frames in scenes that actuate.
 MOTOR_FIELDS = _columns(
-    angle_rad="of a barb, 0 straight, pi/2 the U; NaN on middle links",
-    motor_torque_N_m="of the motor at the barb's hinge; NaN on middle links and while welded",
-    motor_work_J="of that motor since the start; NaN on middle links and while welded",
-    halted="1 where that motor is halted by its torque, else 0",
+    angle_rad="angle of a barb, 0 straight, pi/2 the U; NaN on middle links",
+    motor_torque_N_m="torque of the motor at the barb's hinge; NaN on middle links and while welded",
+    motor_work_J="work of the motor at the barb's hinge since the start; NaN on middle links and while welded",
+    halted="1 where the motor at the barb's hinge is halted by its torque, else 0",
 )

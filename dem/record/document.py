@@ -1,4 +1,4 @@
-"""JSON files of a run directory: `run.json` with `done.json` or `failed.json`, and `progress.json`."""
+"""JSON files of a run directory: `run.json`, `done.json`, `failed.json` and `progress.json`."""
 
 from __future__ import annotations
 
@@ -26,17 +26,17 @@ REMEDY = "give the directory of a run made by `smarticles run`"
 
 
 class Document(BaseModel):
-    """A JSON object with typed keys; keys of other versions are ignored."""
+    """A JSON object with typed keys; unknown keys are ignored."""
 
     model_config = ConfigDict(frozen=True, extra="ignore", allow_inf_nan=False, strict=True)
     remedy: ClassVar[str] = REMEDY
 
     @classmethod
     def read(cls, path: Path) -> Self:
-        """Read a file.
+        """Return the content of a file.
 
         Raises:
-            InputError: It is missing, damaged, or lacks a key; one line with file, key and value.
+            InputError: the file is missing, damaged, or lacks a key; one line with file, key and value.
         """
         try:
             return cls.model_validate_json(path.read_bytes())
@@ -51,16 +51,16 @@ class Document(BaseModel):
             cannot_read("manifest", path, ": ".join([".".join(place), text] if place else [text]), cls.remedy)
 
     def write(self, path: Path, *, make_folder: bool = False) -> None:
-        """Write it whole, without keys that are None.
+        """Write a file, without keys that are None, and make its folder if `make_folder`.
 
         Raises:
-            RunError: It cannot be written.
+            RunError: the file cannot be written.
         """
         write_text(path, self.model_dump_json(indent=2, exclude_none=True) + "\n", make_folder=make_folder)
 
 
 class Phase(Document):
-    """One phase of a run: `run.json` has its time step, `done.json` when it began and ended, and what it cost."""
+    """One phase of a run: its time step in `run.json`, its simulated times and cost in `done.json`."""
 
     index: NonNegativeInt
     type: str
@@ -72,7 +72,7 @@ class Phase(Document):
 
 
 class Manifest(Document):
-    """What made a run, `run.json`."""
+    """Manifest of a run, `run.json`: how it was made, and numbers of its scene."""
 
     format: Literal[1] = 1
     name: str
@@ -95,16 +95,16 @@ class Manifest(Document):
     smarticle_mass_kg: PositiveFloat
     solid_volume_m3: PositiveFloat  #: Volume of one smarticle, t1 t2 (w + 2l), each link with its own t2
     container_radius_m: PositiveFloat  #: Of the widest tier
-    #: Radius that packing fractions are computed with, where it is not the container's
+    #: Radius for packing fractions, where it is not the container's
     packing_radius_m: PositiveFloat | None = None
     container_tiers: PositiveInt = 1  #: Cylinders of different radii that stand on each other
     planar: bool = False  #: Whether all motion is confined to a plane, without a container
-    channel_width_m: PositiveFloat | None = None  #: Distance of the two walls in the plane; None without
+    channel_width_m: PositiveFloat | None = None  #: Distance of the two walls in a plane; None without walls
     sphere_diameter_m: PositiveFloat
     spheres_per_smarticle: PositiveInt
-    time_step_s: PositiveFloat  #: The shortest of its phases
+    time_step_s: PositiveFloat  #: Shortest time step of all phases
     phases: tuple[Phase, ...]
-    taken_over: Mapping[str, Any] | None = None  #: The source of its smarticles, if from another run
+    taken_over: Mapping[str, Any] | None = None  #: `Phase.origin`: the run from which smarticles were taken
 
     @model_validator(mode="after")
     def _numbered(self) -> Self:
@@ -120,25 +120,25 @@ class Manifest(Document):
 
     @property
     def bulge_m(self) -> float:
-        """Excess thickness of the middle link over the barbs, on either side in the plane [m]."""
+        """Half the difference between the in-plane thicknesses of middle link and barbs [m]."""
         return (self.thicknesses_in_plane_m[1] - self.thickness_in_plane_m) / 2
 
     @property
     def measured_radius_m(self) -> float:
-        """Radius that packing fractions are computed with [m]."""
+        """Radius for packing fractions [m]."""
         return self.container_radius_m if self.packing_radius_m is None else self.packing_radius_m
 
     def walled(self, phase: int) -> bool:
-        """Return whether the container has its wall in a phase, by its index."""
+        """Return whether the container has its wall in the phase of an index."""
         return not self.planar and all(record.type != "remove-container" for record in self.phases[: phase + 1])
 
     def fills_cylinder(self, phase: int) -> bool:
-        """Return whether the pile fills one cylinder in a phase, so that packing fractions have a meaning."""
+        """Return whether the pile fills a cylinder in the phase of an index, so that it has a packing fraction."""
         return self.container_tiers == 1 and self.walled(phase)
 
 
 class Done(Document):
-    """Times and cost of a run that is done, `done.json`, the last of its files."""
+    """Times and cost of a run that is done, `done.json`, which is written last."""
 
     status: Literal["done"] = "done"
     time_s: NonNegativeFloat
@@ -148,7 +148,7 @@ class Done(Document):
     phases: tuple[Phase, ...]
 
     def mark(self, out: Path) -> None:
-        """Write it into a run directory."""
+        """Write `done.json` into a run directory, and remove `failed.json`."""
         (out / FAILED).unlink(missing_ok=True)
         self.write(out / DONE)
 
@@ -157,15 +157,15 @@ Ended = Literal["failed", "interrupted"]
 
 
 class Failed(Document):
-    """Why a run ended too early, `failed.json`; `checkpoint_s` is the simulated time of its last good checkpoint."""
+    """Cause of the early end of a run, `failed.json`."""
 
     status: Ended
     cause: str
-    time_s: NonNegativeFloat
-    checkpoint_s: NonNegativeFloat | None = None
+    time_s: NonNegativeFloat  #: Simulated time
+    checkpoint_s: NonNegativeFloat | None = None  #: Simulated time of the newest checkpoint; None: no checkpoint
 
     def mark(self, out: Path) -> None:
-        """Write it into a run directory; silent where the disk is full, since the cause is on the terminal too."""
+        """Write `failed.json` into a run directory; errors are ignored, since the terminal has the cause too."""
         try:
             self.write(out / FAILED)
         except RunError:

@@ -1,4 +1,4 @@
-"""Files that appear whole or not at all, and the error about a file that cannot be read."""
+"""Writing of files that appear complete or not at all, and the error about a file that cannot be read."""
 
 from __future__ import annotations
 
@@ -14,10 +14,11 @@ from dem.record.names import partial
 
 @contextlib.contextmanager
 def whole(path: Path, *, before: Path | None = None, shared: bool = False) -> Iterator[Path]:
-    """Yield a temporary path beside `path`, renamed to it when the block ends well, removed otherwise.
+    """Yield a temporary path, which is renamed to `path` if the block ends without an error, or else removed.
 
     Args:
-        before: where the replaced file is kept; None: nowhere.
+        path: the file.
+        before: new path of the file that is replaced; None: it is removed.
         shared: whether several processes may write the file at once.
     """
     name = f"{path.stem}.{os.getpid()}{path.suffix}" if shared else path.name
@@ -28,17 +29,22 @@ def whole(path: Path, *, before: Path | None = None, shared: bool = False) -> It
             os.replace(path, before)  # noqa: PTH105 - the atomic call by its name
         os.replace(temporary, path)  # noqa: PTH105
     except BaseException:
-        # Where even this fails, the first error is the one to report.
+        # If this fails as well, the first error is reported.
         with contextlib.suppress(OSError):
             temporary.unlink(missing_ok=True)
         raise
 
 
 def write_whole(path: Path, write: Callable[[Path], object], *, make_folder: bool = True) -> None:
-    """Make or replace a file: `write` fills a temporary path; its folder is made, if wanted.
+    """Write or replace a file, complete or not at all.
+
+    Args:
+        path: the file.
+        write: function that writes the content to a temporary path.
+        make_folder: whether to make the folder of the file.
 
     Raises:
-        RunError: the disk is full or the folder cannot be written; the file that was there is untouched.
+        RunError: the disk is full or the folder cannot be written; an existing file is unchanged.
     """
     try:
         if make_folder:
@@ -58,15 +64,22 @@ def write_whole(path: Path, write: Callable[[Path], object], *, make_folder: boo
 
 
 def write_text(path: Path, text: str, *, make_folder: bool = True) -> None:
-    """Write text whole; errors as in `write_whole`."""
+    """Write a text file in UTF-8; arguments and errors as in `write_whole`."""
     write_whole(path, lambda temporary: temporary.write_bytes(text.encode()), make_folder=make_folder)
 
 
 def cannot_read(what: str, path: Path, cause: BaseException | str, remedy: str) -> NoReturn:
-    """Raise InputError: a file, e.g. a "frame", is missing, truncated or not what it should be."""
+    """Raise InputError about a file that is missing, truncated or wrong.
+
+    Args:
+        what: kind of the file, e.g. "frame".
+        path: the file.
+        cause: an error, or the cause in words.
+        remedy: what to do.
+    """
     if isinstance(cause, BaseException):
         lines = str(cause).strip().splitlines()
         named = ": ".join([type(cause).__name__, *lines[:1]])
-        # The system's own words say enough, and str() would repeat the path.
+        # The text of an OSError would repeat the path.
         cause = getattr(cause, "strerror", None) or named
     raise InputError(f"cannot read {what} {path}: {cause}; {remedy}") from None

@@ -1,4 +1,4 @@
-"""Forces at contacts at one time: a small VTK file of lines, one per contact; see docs/reference/files.md."""
+"""Forces at contacts at one time: a VTK file of lines, one per contact; see docs/reference/files.md."""
 
 from __future__ import annotations
 
@@ -18,15 +18,21 @@ from dem.record.names import FORCE, collection, member
 
 _HEAD, _EMPTY = 512, b'NumberOfCells="0"'
 NO_FORCES = "a run does where its scene says recording.contact_forces: true"
-"""What to do about a run that records no forces."""
+"""Text about what to do, for messages about a run without recorded forces."""
 _REMEDY = "run the scene anew; forces are recorded by recording.contact_forces: true"
 
 
 def force_mesh(found: ContactForces, positions: Array, *, time: float, phase: int) -> meshio.Mesh:
-    """Return contacts as lines from the first smarticle's centre of mass to the second's, or the point at a boundary.
+    """Return a mesh of lines, one for each contact.
+
+    A line goes from the first smarticle's centre of mass to that of the second, or to the point of contact at a
+    boundary.
 
     Args:
-        positions: (N, 3) centres of mass of the smarticles at the same instant [m].
+        found: the contacts.
+        positions: (N, 3) centres of mass of the smarticles [m].
+        time: simulated time [s].
+        phase: index of the phase.
     """
     number, between = len(found.forces), found.boundaries == NONE
     ends = np.empty((number, 2, 3))
@@ -54,27 +60,27 @@ def force_mesh(found: ContactForces, positions: Array, *, time: float, phase: in
 class RecordedForces:
     """The forces at contacts at one recorded time."""
 
-    path: Path  #: The file that they came from
+    path: Path  #: The file
     contacts: ContactForces = field(repr=False)  #: The contacts
-    #: (M, 2, 3) centre of mass of the first smarticle, and of the second or the point at a boundary [m]
+    #: (M, 2, 3) ends of the lines: the first smarticle's centre of mass, and the second's or a boundary's point [m]
     ends: Array = field(repr=False)
 
     @property
     def between(self) -> Flags:
-        """(M,) which contacts are between two smarticles."""
+        """(M,) whether a contact is between two smarticles."""
         return np.asarray(self.contacts.boundaries == NONE)
 
 
 def has_forces(directory: Path) -> bool:
-    """Return whether a run directory holds forces at contacts."""
+    """Return whether a run directory holds recorded forces at contacts."""
     return (directory / collection(FORCE)).is_file()
 
 
 def read_forces(frame: Frame) -> RecordedForces:
-    """Read the forces at contacts that were recorded with one of a run's frames.
+    """Return the forces at contacts that were recorded together with a frame of a run.
 
     Raises:
-        InputError: The run recorded none, or the file is damaged.
+        InputError: the run recorded no forces, or the file is damaged.
     """
     path = frame.path.parent.parent / member(FORCE, int(frame.path.stem.rpartition("_")[2]))
     points, data = _content(path)

@@ -1,4 +1,4 @@
-"""Frames: VTK files of the centrelines of all smarticles at one time, and of their spheres.
+"""Frames: VTK files of the centrelines, or of the spheres, of all smarticles at one time.
 
 docs/reference/files.md describes the format.
 """
@@ -45,15 +45,17 @@ def centreline_mesh(
     phase: int,
     extra: Mapping[str, NDArray[Any]] | None = None,
 ) -> meshio.Mesh:
-    """Return one frame as a mesh of lines; each smarticle may have its own shape.
+    """Return one frame of N smarticles as a mesh of 3N lines, one for each link.
 
     Args:
         vertices: (N, 4, 3) barb tip, hinge, hinge, barb tip of each smarticle [m].
-        velocities: (N, 3, 3) of the links' centres [m/s].
+        velocities: (N, 3, 3) velocities of the links' centres [m/s].
         spins: (N, 3, 3) angular velocities of the links [rad/s].
-        contacts: (N,) how many others each smarticle touches.
+        contacts: (N,) number of other smarticles that each smarticle touches.
+        time: simulated time [s].
         floor: height of the container's floor [m].
-        extra: (3N,) further values, one per link, such as `motor_fields`.
+        phase: index of the phase.
+        extra: further cell data by name, (3N,) or (3N, 3), such as `motor_fields`.
     """
     n, number = len(vertices), LINKS * len(vertices)
     data = {
@@ -77,12 +79,13 @@ def motor_fields(
     work: Array | None = None,
     halted: Flags | None = None,
 ) -> dict[str, NDArray[Any]]:
-    """Return cell data of scenes with motors, from (N, 2) values of the barbs; None while welded.
+    """Return cell data (3N,) of scenes with motors, by name; NaN on middle links.
 
     Args:
-        angles: of the barbs [rad].
-        torques: of the motors on the barbs [N m].
-        work: of the motors since the start [J].
+        angles: (N, 2) angles of the barbs [rad].
+        torques: (N, 2) torques of the motors on the barbs [N m]; None while welded.
+        work: (N, 2) work of the motors since the start [J]; None while welded.
+        halted: (N, 2) whether motors are halted; None while welded.
     """
     none = np.full(angles.shape, np.nan)
     fields = {
@@ -113,7 +116,7 @@ def sphere_mesh(state: State, particle: Particle) -> meshio.Mesh:
 
 
 def _lines(count: int) -> Numbers:
-    """Return (3N, 2) the ends of the links of N smarticles, as numbers of vertices."""
+    """Return (3N, 2) numbers of the two vertices of each link of N smarticles."""
     first = VERTICES * np.arange(count)[:, None] + np.arange(LINKS)
     return np.stack([first, first + 1], axis=-1).reshape(-1, 2)
 
@@ -122,16 +125,16 @@ def _lines(count: int) -> Numbers:
 class Frame:
     """The smarticles at one recorded time; all arrays are read-only."""
 
-    path: Path  #: The file it came from
+    path: Path  #: The file
     time: float  #: Simulated time [s]
     floor_z: float  #: Height of the container's floor [m]; heights are measured from it
     phase: int  #: Index into `Run.phases`
-    #: (N, 4, 3) float64 [m], barb tip, hinge, hinge, barb tip of each smarticle, in the shape that it has at that time
+    #: (N, 4, 3) float64 [m], barb tip, hinge, hinge, barb tip of each smarticle, in its shape at that time
     vertices: Array = field(repr=False)
     smarticle_ids: Numbers = field(repr=False)  #: (N,) int64
     link_velocity: Array = field(repr=False)  #: (N, 3, 3) float64 [m/s], of the centres of barb 1, middle link, barb 2
     link_angular_velocity: Array = field(repr=False)  #: (N, 3, 3) float64 [rad/s]
-    contacts: Numbers = field(repr=False)  #: (N,) int64, how many other smarticles each one touches, by the engine
+    contacts: Numbers = field(repr=False)  #: (N,) int64, number of other smarticles that each smarticle touches
     #: Further data of the file, (N, 3, …) one value per link, by name. Frames of scenes that actuate have `angle_rad`,
     #: `motor_torque_N_m` and `motor_work_J`, NaN on the middle link and on welded smarticles, and `halted`.
     cell_data: Mapping[str, NDArray[Any]] = field(repr=False)
@@ -143,10 +146,10 @@ class Frame:
 
 
 def read_frame(path: Path | str) -> Frame:
-    """Read one frame file, a `.vtu` as described in docs/reference/files.md.
+    """Return the content of a frame file, a `.vtu` as described in docs/reference/files.md.
 
     Raises:
-        InputError: The file is missing, damaged, or lacks what a frame must have.
+        InputError: the file is missing or damaged, or lacks cell data of frames.
     """
     path = Path(path)
     mesh = read_mesh(path)
@@ -199,7 +202,7 @@ def read_frame(path: Path | str) -> Frame:
         link_velocity=per_link("velocity_m_per_s", np.float64, 3),
         link_angular_velocity=per_link("angular_velocity_rad_per_s", np.float64, 3),
         contacts=frozen(per_link("contacts", np.int64)[:, 0]),
-        # What is left once the data above are taken out.
+        # `data` now holds only what `per_link` has not removed.
         cell_data=MappingProxyType(
             {name: frozen(values.reshape(count, LINKS, *values.shape[1:])) for name, values in data.items()}
         ),
@@ -207,13 +210,18 @@ def read_frame(path: Path | str) -> Frame:
 
 
 def read_mesh(path: Path, what: str = "frame", remedy: str | None = None) -> Any:
-    """Read a VTK file by meshio.
+    """Return the mesh of a VTK file.
+
+    Args:
+        path: the file.
+        what: kind of the file in messages.
+        remedy: what to do about a damaged file; None: advice for frames.
 
     Raises:
-        InputError: it cannot be read.
+        InputError: the file is missing, truncated or not VTK.
     """
-    # meshio's own dispatch prints and exits on damaged files, hence the reader of the format. That one fails with any
-    # exception, or prints a warning and goes on, which the checks of shapes catch.
+    # `meshio.read` prints and exits on damaged files. The reader of the format raises any exception, or prints a
+    # warning and continues, which the callers' checks of shapes find.
     noise = io.StringIO()
     try:
         with (
@@ -229,7 +237,7 @@ def read_mesh(path: Path, what: str = "frame", remedy: str | None = None) -> Any
 
 
 def frozen(values: NDArray[Any]) -> NDArray[Any]:
-    """Return contiguous, read-only values."""
+    """Return the values as a contiguous, read-only array."""
     values = np.ascontiguousarray(values)
     values.flags.writeable = False
     return values

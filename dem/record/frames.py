@@ -1,4 +1,4 @@
-"""The frames of a run in time: files numbered in order, and the ParaView collection that lists them."""
+"""The sequence of a run's frames: numbered files, and the ParaView collection that lists them with their times."""
 
 from __future__ import annotations
 
@@ -25,17 +25,17 @@ _REMEDY = "give the directory of a run that has written a frame"
 
 @dataclass
 class FrameWriter:
-    """Writes frames into a run directory, and rewrites their list, `frames.pvd`, at each."""
+    """Writer of frames into a run directory, which rewrites their list, `frames.pvd`, with each frame."""
 
-    folder: Path
-    noun: str = names.FRAME  #: Name of one file; "sphere" gives `spheres.pvd` and `spheres/sphere_000000.vtu`
+    folder: Path  #: The run directory
+    noun: str = names.FRAME  #: Kind of files; "sphere" gives `spheres.pvd` and `spheres/sphere_000000.vtu`
     times: list[float] = field(default_factory=list)  #: Times of the frames written so far [s]
 
     def write(self, mesh: meshio.Mesh, time: float) -> None:
-        """Write one frame.
+        """Write one frame at a simulated time [s].
 
         Raises:
-            RunError: it cannot be written.
+            RunError: the file cannot be written.
         """
         name = names.member(self.noun, len(self.times))
         write_whole(self.folder / name, lambda path: mesh.write(path, file_format="vtu"))
@@ -43,7 +43,7 @@ class FrameWriter:
         write_text(self.folder / names.collection(self.noun), self._collection(), make_folder=False)
 
     def truncate(self, times: Sequence[float]) -> None:
-        """Keep the first frames, of the given times [s]; remove later files."""
+        """Keep the first frames, whose times [s] are given, and remove all later ones."""
         self.times = list(times)
         kept = {self.folder / names.member(self.noun, k) for k in range(len(self.times))}
         for path in set((self.folder / names.folder(self.noun)).glob("*.vtu")) - kept:
@@ -60,11 +60,11 @@ class FrameWriter:
 
 
 class FrameSequence(Sequence[Frame]):
-    """The frames of a run in time order; each access reads the file anew, and a slice is again a lazy sequence.
+    """The frames of a run in time order; each access reads a file, and a slice is a sequence that reads none.
 
     Attributes:
-        times: (n,) float64 [s], as listed in `frames.pvd`; needs no frame to be read.
-        paths: The files, in time order.
+        times: (n,) float64 [s], as listed in `frames.pvd`.
+        paths: the files, in time order.
     """
 
     def __init__(self, times: Array, paths: tuple[Path, ...]) -> None:
@@ -95,7 +95,7 @@ class FrameSequence(Sequence[Frame]):
         """Return the index of the frame nearest to a time [s].
 
         Raises:
-            InputError: The time is before the first or after the last frame.
+            InputError: the time is before the first or after the last frame.
         """
         first, last = float(self.times[0]), float(self.times[-1])
         slack = 1e-9 * max(abs(first), abs(last), 1.0)
@@ -104,18 +104,19 @@ class FrameSequence(Sequence[Frame]):
         return int(np.argmin(np.abs(self.times - time)))
 
     def after(self, time: float) -> FrameSequence:
-        """Return the frames later than a time [s], by their list alone; its times are rounded to nine digits."""
+        """Return the frames later than a time [s], without reading any."""
+        # Times in the list are rounded to nine digits.
         return self[bisect_right(self.times, time + 1e-8 * max(abs(time), 1.0)) :]
 
     def in_phase(self, phase: int) -> FrameSequence:
-        """Return the frames of one phase, by its index; found by bisection, since phases follow each other in time."""
+        """Return the frames of the phase of an index; a bisection reads only a few frames."""
         first = bisect_left(self, phase, key=attrgetter("phase"))
         last = bisect_right(self, phase, lo=first, key=attrgetter("phase"))
         return self[first:last]
 
 
 def read_frames(directory: Path | str) -> FrameSequence:
-    """Open the frames of a run directory, which may be done, failed or still running.
+    """Return the frames of a run directory, whose run may be done, failed or still running.
 
     Raises:
         InputError: `frames.pvd` is missing, damaged or not in time order.

@@ -1,4 +1,4 @@
-"""The files of a run directory and the formats of those that have one; docs/reference/files.md says what is in them."""
+"""Names of the files of a run directory, and numbers of their formats; docs/reference/files.md describes them."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ SERIES = "series.h5"
 CHECKPOINT = "checkpoint.zip"
 CHECKPOINT_BEFORE = "checkpoint.previous.zip"
 
-# Nouns of the VTK files of centrelines, of spheres and of forces at contacts; see `collection` and `member`.
+# Nouns that name the VTK files of centrelines, spheres and forces at contacts; see `collection` and `member`.
 FRAME, SPHERE, FORCE = "frame", "sphere", "force"
 
 SERIES_FORMAT = 1
@@ -22,26 +22,26 @@ CHECKPOINT_FORMAT = 4
 
 
 def folder(noun: str) -> str:
-    """Return the folder of the files of a noun, `frames` of "frame"."""
+    """Return the name of the folder for a noun: `frames` for "frame"."""
     return f"{noun}s"
 
 
 def collection(noun: str) -> str:
-    """Return the name of the list of all files of a noun with their times."""
+    """Return the name of the file that lists all files of a noun with times: `frames.pvd` for "frame"."""
     return f"{noun}s.pvd"
 
 
 def member(noun: str, number: int) -> str:
-    """Return the name of one file of a noun, by its number from 0."""
+    """Return the path of a numbered file of a noun: `frames/frame_000000.vtu` for "frame" and 0."""
     return f"{noun}s/{noun}_{number:06d}.vtu"
 
 
 def partial(name: str) -> str:
-    """Return the name of a file while it is written."""
+    """Return the temporary name of a file while it is written."""
     stem, dot, suffix = name.rpartition(".")
     return f".{stem}.partial{dot}{suffix}" if stem else f".{name}.partial"
 
 
 def is_partial(name: str) -> bool:
-    """Return whether a file is one that a killed process had not finished writing."""
+    """Return whether a name is temporary, as of a file that a killed process has left incomplete."""
     return name.startswith(".") and ".partial." in name

@@ -1,4 +1,4 @@
-"""Packing fraction by the second-highest centre of mass, the paper's definition: its one formula."""
+"""Packing fraction of a pile whose height is that of the second-highest centre of mass, the paper's definition."""
 
 from __future__ import annotations
 
@@ -15,17 +15,24 @@ def second_highest(heights: Array) -> float:
 
 
 def filled(count: int, *, solid_volume: float, radius: float, height: float) -> float:
-    """Return N V_s / (pi r² z) [1].
+    """Return the packing fraction N V_s / (π r² z) [1] of N = `count` smarticles in a cylinder.
 
     Args:
-        solid_volume: of one smarticle [m³].
-        radius: of the container [m].
-        height: of the pile [m].
+        count: N.
+        solid_volume: volume V_s of one smarticle [m³].
+        radius: radius r of the container [m].
+        height: height z of the pile [m].
     """
     return float(count * solid_volume / (math.pi * radius**2 * height))
 
 
 def packing_fraction(heights: Array, *, solid_volume: float, radius: float) -> float:
-    """Return φ of (N,) centres of mass above the floor [m]; NaN for fewer than two, and for none above the floor."""
+    """Return the packing fraction φ [1]; NaN for fewer than two smarticles, or a pile without height.
+
+    Args:
+        heights: (N,) heights of the centres of mass above the floor [m].
+        solid_volume: volume of one smarticle [m³].
+        radius: radius of the container [m].
+    """
     height = second_highest(heights)
     return filled(len(heights), solid_volume=solid_volume, radius=radius, height=height) if height > 0 else math.nan

@@ -1,4 +1,4 @@
-"""Progress of a running simulation: `progress.json` for other processes, one line on the terminal."""
+"""Progress of a running simulation, in `progress.json` and in one line on the terminal."""
 
 from __future__ import annotations
 
@@ -21,11 +21,11 @@ def _now() -> float:
 
 @dataclass
 class ProgressWriter:
-    """Reports progress at most once per second."""
+    """Writer of a run's progress, at most once per second."""
 
-    folder: Path
-    total: int
-    show: bool
+    folder: Path  #: The run directory
+    total: int  #: Smarticles of the scene
+    show: bool  #: Whether to write to the terminal
     _said: Progress = field(default_factory=Progress)
     _begun: float = field(default_factory=_now)
     _start: float = 0.0
@@ -36,9 +36,11 @@ class ProgressWriter:
         """Begin or resume a phase.
 
         Args:
-            start: simulated time at which it began [s].
-            now: simulated time [s].
-            end: simulated time at which it will end [s], if known.
+            index: index of the phase.
+            phase: type of the phase.
+            start: simulated time at which the phase began [s].
+            now: present simulated time [s].
+            end: simulated time at which the phase will end [s]; None: unknown.
         """
         self._said = self._said.model_copy(update={"phase": phase, "phase_index": index, "end_s": end})
         self._start = start
@@ -46,19 +48,19 @@ class ProgressWriter:
         self._last = -math.inf
 
     def warn(self, message: str) -> None:
-        """Print a warning at once."""
+        """Print a warning to standard error."""
         start = "\r\x1b[K" if self.show else ""
         sys.stderr.write(f"{start}smarticles: warning: {message}\n")
 
     def checkpointed(self, time: float) -> None:
-        """Report at once the simulated time [s] of a new checkpoint."""
+        """Write the simulated time [s] of a new checkpoint at once."""
         said = self._said = self._said.model_copy(update={"checkpoint_s": time})
         if said.count is not None:
             self._last = -math.inf
             self.update(time=time, phi=math.nan if said.phi is None else said.phi, count=said.count)
 
     def update(self, *, time: float, phi: float, count: int) -> None:
-        """Report simulated time [s], packing fraction [1] and smarticles present."""
+        """Write simulated time [s], packing fraction [1] and number of smarticles, if a second has passed."""
         now = _now()
         said = {"time_s": time, "phi": phi if math.isfinite(phi) else None, "count": count, "wall_s": now - self._begun}
         self._said = self._said.model_copy(update=said)
@@ -75,7 +77,7 @@ class ProgressWriter:
             self._draw(time, count, now)
 
     def finish(self) -> None:
-        """End the report."""
+        """Remove `progress.json`, and clear the line on the terminal."""
         (self.folder / PROGRESS).unlink(missing_ok=True)
         if self.show:
             sys.stderr.write("\r\x1b[K")

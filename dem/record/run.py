@@ -1,4 +1,4 @@
-"""A run directory as an object, which measures, studies, exports, reports and commands take."""
+"""A run directory as an object, the argument of measures, studies, exports, reports and commands."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ State = Literal["done", "running", "queued", "failed", "interrupted", "stopped",
 
 @dataclass(frozen=True, kw_only=True)
 class Status:
-    """How far a run is; None where its files do not say."""
+    """State and progress of a run; None for what its files do not hold."""
 
     state: State
     cause: str | None = None  #: Why it failed or was interrupted
@@ -38,7 +38,7 @@ class Status:
 
 @dataclass(frozen=True)
 class Run:
-    """A run directory, finished or not; each part is read when it is first asked for, once."""
+    """A run directory, finished or not; each part is read once, at the first access."""
 
     path: Path
 
@@ -50,10 +50,10 @@ class Run:
 
     @cached_property
     def manifest(self) -> Manifest:
-        """What made the run.
+        """The manifest, `run.json`: how the run was made, and numbers of its scene.
 
         Raises:
-            InputError: The directory or its `run.json` is missing, damaged or of another format.
+            InputError: the directory or its `run.json` is missing, damaged or of another format.
         """
         if not (self.path / MANIFEST).is_file():
             _reject_place(self.path)
@@ -61,7 +61,7 @@ class Run:
 
     @cached_property
     def scene(self) -> SceneData:
-        """The resolved scene, every default written out, as the version that ran it wrote it.
+        """The resolved scene, `scene.yaml`, as a mapping in which all defaults are filled in.
 
         Raises:
             InputError: `scene.yaml` is missing or damaged.
@@ -77,7 +77,7 @@ class Run:
 
     @cached_property
     def phases(self) -> tuple[Phase, ...]:
-        """The phases in order; with times where the run is done.
+        """The phases in order; if the run is done, with their times and cost.
 
         Raises:
             InputError: `run.json` and `done.json` are not of one run.
@@ -97,13 +97,13 @@ class Run:
         """The recorded frames in time order, each read when it is asked for.
 
         Raises:
-            InputError: The run has written none yet, or their list is damaged.
+            InputError: the run has written no frame yet, or their list is damaged.
         """
         return read_frames(self.path)
 
     @property
     def has_series(self) -> bool:
-        """Whether it has recorded time series; a run that failed early has none."""
+        """Whether the run has recorded time series; a run that failed early has none."""
         return (self.path / SERIES).exists()
 
     @cached_property
@@ -111,7 +111,7 @@ class Run:
         """The recorded time series as arrays.
 
         Raises:
-            InputError: There are none yet, or the file is damaged.
+            InputError: the run has written no series yet, or the file is damaged.
         """
         return read_series(self.path)
 
@@ -122,10 +122,10 @@ class Run:
 
     @property
     def status(self) -> Status:
-        """How far it is at this moment.
+        """The present state and progress of the run.
 
         Raises:
-            InputError: A file that says so is damaged.
+            InputError: `done.json` or `failed.json` is damaged.
         """
         if not self.path.is_dir() or not any(self.path.iterdir()):
             return Status(state="missing")
@@ -158,12 +158,12 @@ class Run:
 
     @property
     def can_resume(self) -> bool:
-        """Whether it was stopped, did not fail, and left a checkpoint to go on from."""
+        """Whether the run was interrupted or killed, and left a checkpoint."""
         return self.status.state in ("interrupted", "stopped") and (self.path / CHECKPOINT).is_file()
 
     @property
     def lost_series(self) -> str | None:
-        """Warning about a run that is done and whose series is gone; None otherwise."""
+        """Warning about a missing series of a run that is done; None otherwise."""
         if self.has_series or not (self.path / DONE).exists():
             return None
         return (
@@ -173,7 +173,7 @@ class Run:
 
 
 class SceneData(dict[str, Any]):
-    """A mapping of `scene.yaml`; a missing key is an `InputError` that names the file."""
+    """A mapping in `scene.yaml`, in which access to a missing key raises an `InputError` that names the file."""
 
     def __init__(self, path: Path, place: str, values: dict[str, Any]) -> None:
         super().__init__({key: _within(path, f"{place}{key}.", value) for key, value in values.items()})
@@ -193,7 +193,7 @@ def _within(path: Path, place: str, value: Any) -> Any:
 
 @dataclass(frozen=True)
 class ForceSequence:
-    """The forces at contacts of a run's frames, read at each access."""
+    """The forces at contacts of a run, one item for each frame, read at each access."""
 
     frames: FrameSequence
 
@@ -205,7 +205,7 @@ class ForceSequence:
 
 
 def _reject_place(path: Path) -> NoReturn:
-    """Report what is there instead of a run."""
+    """Raise InputError about a path that is no run directory, with what it is instead."""
     remedy = REMEDY
     if not path.exists():
         cause = "no such directory"
@@ -219,10 +219,10 @@ def _reject_place(path: Path) -> NoReturn:
 
 
 def open_run(path: Path | str) -> Run:
-    """Open a run directory and read its manifest.
+    """Return a run directory as a `Run`, after reading its manifest.
 
     Raises:
-        InputError: It is no run directory.
+        InputError: the path is no run directory.
     """
     run = Run(Path(path))
     _ = run.manifest

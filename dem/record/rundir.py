@@ -15,12 +15,16 @@ from dem.record.names import LOCK, LOG, MANIFEST, is_partial
 
 @contextmanager
 def claimed(out: Path, *, resume: bool) -> Iterator[None]:
-    """Hold a run directory, new or empty unless a run is resumed, while a run writes into it.
+    """Lock a run directory while a run writes into it, and make it if needed.
 
-    The lock is the kernel's: it ends with the process that holds it, so that it is never stale.
+    The lock is held by the kernel and ends with the process, so that it is never stale.
+
+    Args:
+        out: the run directory.
+        resume: whether the directory must hold a run; otherwise it must be new or empty.
 
     Raises:
-        InputError: it is not empty, or has nothing to resume, or another process writes into it.
+        InputError: the directory has other content, cannot be written, or another process writes into it.
     """
     _check_content(out, resume=resume)
     try:
@@ -35,7 +39,7 @@ def claimed(out: Path, *, resume: bool) -> Iterator[None]:
             lock.seek(0)
             msg = f"--out {out}: process {lock.read().strip() or 'unknown'} is running it; wait for it or stop it"
             raise InputError(msg) from None
-        # Once more: another process may have finished a run in it since the first check.
+        # Checked again, since another process may have finished a run in the directory before the lock was free.
         _check_content(out, resume=resume)
         lock.truncate(0)
         lock.write(f"{os.getpid()}\n")
@@ -44,7 +48,7 @@ def claimed(out: Path, *, resume: bool) -> Iterator[None]:
 
 
 def _check_content(out: Path, *, resume: bool) -> None:
-    """Make the directory if needed, and reject it where it is not for this run."""
+    """Make the directory if needed, and reject wrong content."""
     try:
         out.mkdir(parents=True, exist_ok=True)
         held = sorted(path.name for path in out.iterdir() if path.name != LOCK and not is_partial(path.name))
@@ -64,7 +68,7 @@ def _check_content(out: Path, *, resume: bool) -> None:
 
 
 def in_use(out: Path) -> bool:
-    """Return whether a process runs in a run directory at present."""
+    """Return whether a process holds the lock of a run directory."""
     try:
         with (out / LOCK).open() as lock:
             fcntl.flock(lock, fcntl.LOCK_SH | fcntl.LOCK_NB)
@@ -77,7 +81,7 @@ def in_use(out: Path) -> bool:
 
 @contextmanager
 def log_of(out: Path) -> Iterator[logging.Logger]:
-    """Open the log of a run, `log.txt`; a resumed run appends to it."""
+    """Yield a logger that appends to `log.txt` of a run directory, and close it at the end."""
     log = logging.getLogger(f"smarticles.{out.resolve()}")
     log.setLevel(logging.INFO)
     log.propagate = False

@@ -1,4 +1,4 @@
-"""Time series of a run: sampled often, small, one HDF5 file with units."""
+"""Time series of a run: samples of its quantities in one HDF5 file with units."""
 
 from __future__ import annotations
 
@@ -25,19 +25,19 @@ from dem.record.frame import frozen
 if TYPE_CHECKING:
     import pandas as pd
 
-PERIOD = 1.0  # s of wall time between two writings of a series that grows
-# Names of the components of a series of vectors, by their number.
+PERIOD = 1.0  # s of wall time between two rewrites of the file by `keep_up`
+# Suffixes of a vector's components in column names, by the number of components.
 _COMPONENTS = {2: (" barb 1", " barb 2"), 3: (" x", " y", " z")}
 _REMEDY = "give the directory of a run that has recorded its series, or run it again"
 
 
 @dataclass
 class SeriesWriter:
-    """Keeps rows, with values of all `described` columns; rewrites `series.h5` whole when asked."""
+    """Writer of the series, which keeps all rows and rewrites the whole of `series.h5`."""
 
-    folder: Path
-    described: Columns
-    attributes: Mapping[str, Any]
+    folder: Path  #: The run directory
+    described: Columns  #: Columns that each row has
+    attributes: Mapping[str, Any]  #: Attributes of the file
     _rows: dict[str, list[Any]] = field(default_factory=dict)
     _written: float = -math.inf
 
@@ -45,7 +45,7 @@ class SeriesWriter:
         self._rows = {name: [] for name in self.described}
 
     def add(self, row: Mapping[str, Any]) -> None:
-        """Add one row: a number, (2,) or (3,) values for each column."""
+        """Add one row: a number, or a (2,) or (3,) array, by name of the column."""
         if row.keys() != self._rows.keys():
             raise ValueError(f"a row has other columns than the series: {sorted(row.keys() ^ self._rows.keys())}")
         for name, value in row.items():
@@ -57,11 +57,11 @@ class SeriesWriter:
         return {name: np.array(values) for name, values in self._rows.items()}
 
     def restore(self, columns: Mapping[str, NDArray[Any]]) -> None:
-        """Go on from where `columns` were taken."""
+        """Replace all rows by those of `columns`, as the property returned them."""
         self._rows = {name: list(columns[name]) for name in self.described}
 
     def keep_up(self) -> None:
-        """Rewrite the file, unless it was written less than `PERIOD` ago: it is always written whole."""
+        """Rewrite the file, unless it was written less than `PERIOD` ago."""
         if time.monotonic() - self._written >= PERIOD:
             self.write()
 
@@ -69,13 +69,13 @@ class SeriesWriter:
         """Rewrite the file with all rows.
 
         Raises:
-            RunError: it cannot be written.
+            RunError: the file cannot be written.
         """
         write_whole(self.folder / names.SERIES, self._write, make_folder=False)
         self._written = time.monotonic()
 
     def _write(self, path: Path) -> None:
-        # Made in memory: on a full disk HDF5's own library does not fail cleanly but takes the process with it.
+        # Made in memory, since the HDF5 library may abort the process on a full disk.
         content = io.BytesIO()
         with h5py.File(content, "w") as file:
             file.attrs["format"] = names.SERIES_FORMAT
@@ -93,12 +93,12 @@ class SeriesWriter:
 class Series:
     """The recorded quantities of a run against time; all arrays are read-only."""
 
-    path: Path  #: The file it came from
-    #: Arrays by name, e.g. "com_height_m": (n,), (n, 2) for barb 1 and barb 2, or (n, 3) for x, y, z. The scene decides
-    #: which there are: one that never actuates has none of motors.
+    path: Path  #: The file
+    #: Arrays by name, e.g. "com_height_m": (n,), (n, 2) for barb 1 and barb 2, or (n, 3) for x, y, z. Their names
+    #: depend on the scene: only scenes with motors have quantities of motors.
     data: Mapping[str, NDArray[Any]] = field(repr=False)
-    units: Mapping[str, str] = field(repr=False)  #: Unit of each, e.g. "m"; "1" for a pure number.
-    descriptions: Mapping[str, str] = field(repr=False)
+    units: Mapping[str, str] = field(repr=False)  #: Units by name, e.g. "m"; "1" for a pure number
+    descriptions: Mapping[str, str] = field(repr=False)  #: Descriptions by name
     scene_sha256: str
     seed: int
 
@@ -106,7 +106,7 @@ class Series:
         """Return the array of one quantity.
 
         Raises:
-            InputError: The series does not hold it.
+            InputError: the series has no quantity of that name.
         """
         try:
             return self.data[name]
@@ -122,7 +122,7 @@ class Series:
         return np.asarray(self.data["time_s"])
 
     def table(self) -> pd.DataFrame:
-        """Return the series as a table: one row per sample, units in its column names."""
+        """Return the series as a table with one row per sample, and units in the column names."""
         import pandas as pd  # noqa: PLC0415  (slow to import, and no run needs it)
 
         columns = {name: self[name] for name in ("time_s", "phase")}
@@ -138,10 +138,10 @@ class Series:
 
 
 def read_series(directory: Path | str) -> Series:
-    """Read the time series of a run directory, which may be done, failed or still running.
+    """Return the time series of a run directory, whose run may be done, failed or still running.
 
     Raises:
-        InputError: The file is missing, damaged, or lacks what it must have.
+        InputError: the file is missing or damaged, or lacks an attribute or dataset.
 
     Example:
         >>> series = read_series("runs/pile")
@@ -172,7 +172,7 @@ def read_series(directory: Path | str) -> Series:
 
 
 def _wrong(attributes: dict[str, Any], data: dict[str, NDArray[Any]]) -> str | None:
-    """Return what is wrong with the content of a file."""
+    """Return what is wrong with the content of a file, or None."""
     for key in ("format", "scene_sha256", "seed"):
         if key not in attributes:
             return f"attribute '{key}' is missing"
