@@ -108,11 +108,11 @@ class Boundaries(Protocol):
 
     @property
     def hook_sums(self) -> Array:
-        """(2, 3) forces of smarticles on the lower and the upper hook [N], summed over all steps; (0, 3) without."""
+        """(2, 3) forces on the lower and the upper hook [N], summed over all steps; (0, 3) without hooks."""
 
     @property
     def channel_sums(self) -> Array:
-        """(2, 3) forces on a channel's walls at lower and higher y [N], summed over all steps; (0, 3) without."""
+        """(2, 3) forces on the channel's lower and upper wall [N], summed over all steps; (0, 3) without walls."""
 
 
 class Motors(Protocol):
@@ -178,7 +178,7 @@ class Strings(Protocol):
 
     @property
     def sums(self) -> Array:
-        """(2, 3) forces on the tied links [N], summed over all steps since the strings were tied; else (0, 3)."""
+        """(2, 3) forces on the tied links [N], summed over all steps since tying; (0, 3) without strings."""
 
     @property
     def pulled(self) -> float:
@@ -206,7 +206,7 @@ class EnergyLedger(Protocol):
 
     @property
     def given(self) -> float:
-        """Energy added and work of boundaries since the start [J]; NaN while boundaries move unrecorded."""
+        """Energy added and work of boundaries since the start [J]; NaN while that work is not recorded."""
 
     def elastic(self) -> tuple[float, float]:
         """Return the energies in the springs of contacts and of hinges [J]."""

@@ -82,7 +82,7 @@ class Phase:
 
     @property
     def origin(self) -> Mapping[str, Any] | None:
-        """Keys and values that name the run that smarticles were taken from, for the manifest; None: no run."""
+        """Data about the run from which smarticles are taken, for the manifest; None without such a run."""
         return None
 
     def warnings(self, scene: SceneView, index: int) -> Sequence[str]:

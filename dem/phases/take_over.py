@@ -98,7 +98,7 @@ def take(path: Path, frame: int | str) -> Taken:
 
 
 class TakeOver(Part, Phase):
-    """Begin with the smarticles of another run, at rest in the poses of one of its frames, until the pile settles."""
+    """Take the smarticles' poses from a frame of another run, at rest, then wait until the pile settles."""
 
     begins: ClassVar[bool] = True
     sources: ClassVar[frozenset[str]] = frozenset({"run", "frame"})

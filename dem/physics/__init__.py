@@ -1,1 +1,1 @@
-"""Laws and numbers that follow from them: contact, hinges, motors, strings, stable steps. No engine in it."""
+"""Laws of contacts, motors and strings, and limits of overlaps, independent of engines."""

@@ -40,7 +40,7 @@ def typical_effective_mass(particle: Particle) -> float:
 def restitution_of(damping_ratio: float) -> float:
     """Return the coefficient of restitution [1] of a linear spring and dashpot, at a damping ratio ζ [1].
 
-    The contact never pulls: it ends when its force is zero, before the overlap is.
+    The contact never pulls: it ends when its force is zero, before its overlap is zero.
 
     Source: Schwager and Pöschel, Granular Matter 9, 465 (2007): with ω = √(1 - ζ²) in units of the undamped frequency,
     e = exp[-(ζ/ω)(π - arg(ω² - ζ² + 2iζω))] for ζ < 1, and its continuation above.

@@ -22,7 +22,7 @@ class Held:
 
 @dataclass(frozen=True)
 class Overlaps:
-    """All contacts and hinges at one instant."""
+    """Overlaps and elastic energy of all contacts and hinges at one instant."""
 
     deepest: float  #: Overlap of the deepest contact [m]
     deep: Flags  #: (N,) whether a smarticle has a contact deeper than the limit given to `Engine.overlaps`

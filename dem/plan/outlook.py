@@ -135,7 +135,7 @@ def plan(scene: Scene) -> Plan:
     """Return the plan of a scene.
 
     Raises:
-        InputError: the scene's time step is above the stable one.
+        InputError: as in `time_steps`.
     """
     kind = engine_kind(scene.engine)
     steps = time_steps(scene)

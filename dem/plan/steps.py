@@ -26,8 +26,8 @@ def time_step(scene: Scene) -> float:
     """Return the time step [s] of a scene, a whole fraction of its recording intervals and of its control period.
 
     Raises:
-        InputError: the given `time_step_s` is above the stable one, the recording intervals do not fit, or a phase
-            moves something so fast that contacts cannot follow.
+        InputError: `fidelity.time_step_s` is above the stable step, contacts on the engine links are too soft, or a
+            servo's control interval has more than one step.
     """
     # On links the barrier bears any load, but large overlaps need many sub-steps.
     if scene.smooth and (soft := too_soft(scene)):

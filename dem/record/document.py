@@ -114,7 +114,7 @@ class Manifest(Document):
 
     @property
     def thicknesses_in_plane_m(self) -> tuple[float, float, float]:
-        """Thicknesses in the plane of barb 1, middle link, barb 2 [m]."""
+        """Thicknesses t2 of barb 1, middle link and barb 2 in the smarticle's plane [m]."""
         middle = self.middle_thickness_in_plane_m
         return (self.thickness_in_plane_m, middle or self.thickness_in_plane_m, self.thickness_in_plane_m)
 
@@ -129,11 +129,11 @@ class Manifest(Document):
         return self.container_radius_m if self.packing_radius_m is None else self.packing_radius_m
 
     def walled(self, phase: int) -> bool:
-        """Return whether the container has its wall in the phase of an index."""
+        """Return whether the container has its wall in a phase, which is given by its index."""
         return not self.planar and all(record.type != "remove-container" for record in self.phases[: phase + 1])
 
     def fills_cylinder(self, phase: int) -> bool:
-        """Return whether the pile fills a cylinder in the phase of an index, so that it has a packing fraction."""
+        """Return whether the pile fills a cylinder in a phase, given by its index, and so has a packing fraction."""
         return self.container_tiers == 1 and self.walled(phase)
 
 

@@ -109,7 +109,7 @@ class FrameSequence(Sequence[Frame]):
         return self[bisect_right(self.times, time + 1e-8 * max(abs(time), 1.0)) :]
 
     def in_phase(self, phase: int) -> FrameSequence:
-        """Return the frames of the phase of an index; a bisection reads only a few frames."""
+        """Return the frames of a phase, given by its index; a bisection reads only a few frames."""
         first = bisect_left(self, phase, key=attrgetter("phase"))
         last = bisect_right(self, phase, lo=first, key=attrgetter("phase"))
         return self[first:last]

@@ -57,7 +57,7 @@ class SeriesWriter:
         return {name: np.array(values) for name, values in self._rows.items()}
 
     def restore(self, columns: Mapping[str, NDArray[Any]]) -> None:
-        """Replace all rows by those of `columns`, as the property returned them."""
+        """Replace all rows by those of `columns`, arrays of the form that the property `columns` has."""
         self._rows = {name: list(columns[name]) for name in self.described}
 
     def keep_up(self) -> None:

@@ -31,7 +31,7 @@ class StopRequestedError(Exception):
 
 @dataclass
 class Simulation:
-    """A run while it runs."""
+    """A run that is being simulated."""
 
     scene: Scene
     engine: Engine

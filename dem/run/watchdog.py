@@ -61,8 +61,8 @@ class Watchdog:
             state: poses and velocities of the smarticles.
             floor: height of the floor [m].
             time: simulated time [s].
-            points: (N, P, 3) centres of the spheres, or points of the links' axes [m]; None: centres of mass. Overlaps
-                with wall and floor cannot replace them: YADE reports too small ones where a centre is beyond.
+            points: (N, P, 3) centres of the spheres, or points of the links' axes [m]; None: centres of mass. They are
+                needed beside overlaps, which YADE underestimates where a centre is beyond wall or floor.
             raised: distance by which a hook may have raised smarticles [m]; None: nothing encloses them.
             gaps: (N, 2) distances between the links of each hinge [m]; None while welded.
 

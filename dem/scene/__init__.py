@@ -1,1 +1,1 @@
-"""A scene: what is given and what happens, joined, checked and read."""
+"""Scenes: their model, checks, reading and hashing."""

@@ -72,7 +72,7 @@ def load_scene(path: Path | str, overrides: Sequence[str] = ()) -> Scene:
         overrides: changes of keys as `KEY=VALUE`, e.g. `phases.1.duration_s=2`.
 
     Raises:
-        InputError: unreadable file, bad YAML, bad override or invalid scene.
+        InputError: the file cannot be read or is not YAML, an override is wrong, or the scene is not valid.
     """
     path = Path(path)
     problem, way_out = "", "give the path of a scene file"

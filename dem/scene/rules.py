@@ -197,7 +197,7 @@ def _of_room(scene: SceneView, hooks: Hooks) -> Iterator[str]:
 def foreign(scene: SceneView) -> Iterator[str]:
     """Yield the parts of a scene that LAMMPS and similar codes cannot compute, each as key and name.
 
-    They compute passive chains of spheres in a cylinder.
+    Such codes compute only passive chains of spheres in a cylinder.
     """
     if scene.plane is not None:
         yield "plane: motion in a plane"

@@ -132,7 +132,7 @@ class Scene(Part):
 
     @cached_property
     def cylinder(self) -> Cylinder:
-        """The container of the simulation, with a height where the scene gives none."""
+        """The container of the simulation, with `ample_height` if the scene gives no height."""
         container, upper = self.container, []
         tiers, bottom = container.tiers or (), 0.0
         for below, tier in pairwise(tiers):
@@ -151,7 +151,8 @@ class Scene(Part):
         """Return a height of the wall [m] that is enough for the loosest pile, or for hooks, and a layer above.
 
         A loose random packing of thin bars has the packing fraction φ ≈ 2.4 d/L, with d the mean width of the section
-        and L the length of all three links (Gravish's φ_0 at l/w = 0, 0.7 and 1.4). Half of it is the loosest pile's.
+        and L the length of all three links (Gravish's φ_0 at l/w = 0, 0.7 and 1.4). The loosest pile is assumed to have
+        half this packing fraction.
 
         Args:
             hooks_top: height of the upper hook's top above the floor [m]; 0 without hooks.
@@ -195,7 +196,7 @@ class Scene(Part):
     def seed_for(self, purpose: str) -> int:
         """Return a 64-bit seed for one purpose, derived from the scene's seed alone.
 
-        Scenes that differ in fidelity only begin with identical poses, so that fidelities can be compared.
+        Scenes that differ in nothing but the fidelity begin with identical poses, so that fidelities can be compared.
         """
         digest = hashlib.sha256(f"{self.seed}/{purpose}".encode()).digest()
         return int.from_bytes(digest[:8], "big")

@@ -1,9 +1,12 @@
 """Estimates of the largest overlaps in a scene from its loads and speeds, and of the stiffness that contacts need.
 
-Three loads count. The hardest impact: the typical effective mass at the greatest speed that a phase causes, plus a fall
-by w. The pile's weight times 1 + Γ, on two contacts of each of the smarticles that can lie on the floor. The pile's
-weight on the four contacts of a hook that lifts it. The overlap of an impact is proportional to the inverse root of the
-stiffness, the overlap of the other loads to the inverse of the stiffness.
+Three loads are estimated:
+
+- the hardest impact, of the typical effective mass at the greatest speed that a phase causes, increased by a fall by w;
+- the pile's weight times 1 + Γ, shared by two contacts of each smarticle that can lie on the floor;
+- the pile's weight on the four contacts of a hook that lifts it.
+
+The overlap of an impact is inversely proportional to the root of the stiffness, other overlaps to the stiffness itself.
 """
 
 from __future__ import annotations

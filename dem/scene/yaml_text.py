@@ -28,7 +28,11 @@ class StrictLoader(yaml.SafeLoader):  # type: ignore[misc]  # PyYAML ships no ty
     """SafeLoader that rejects a key given twice and reads `1e-3` as a number."""
 
     def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Any, Any]:
-        """Build a mapping; a repeated key is an error."""
+        """Return the mapping of a node.
+
+        Raises:
+            yaml.constructor.ConstructorError: a key is given twice, or is neither text nor a number.
+        """
         if isinstance(node, yaml.MappingNode):
             self.flatten_mapping(node)
             seen: set[Any] = set()

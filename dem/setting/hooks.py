@@ -19,10 +19,10 @@ TOLERANCE = 1e-9  # relative; lengths and times that meet their limit up to roun
 
 
 class Hooks(Part):
-    """Two horizontal crosses on the container's axis, in place before the pour: each of two square bars.
+    """Two horizontal crosses of two square bars each, on the container's axis.
 
-    The lower hook may be a grid of bars, which holds the pile over its whole cross-section. Hooks have the container's
-    friction and damping, and move with the container.
+    The lower hook may be a grid of bars, which holds the pile over its whole cross-section. Hooks are in place before
+    the pour, have the container's friction and damping, and move with the container.
     """
 
     side_m: Length = Field(..., description="side of the bars' square section [m]; default: thickness_in_plane_m, t2")
@@ -61,7 +61,13 @@ def with_hook_defaults(hooks: Any, smarticle: Smarticle) -> Any:
 
 
 def with_defaults(data: Any, defaults: Mapping[str, tuple[int, int]], smarticle: Smarticle) -> Any:
-    """Return data with missing keys filled in; the default of a key with (a, b) is a w + b t2."""
+    """Return data with missing keys filled in.
+
+    Args:
+        data: a mapping; other data are returned unchanged.
+        defaults: (a, b) by key, for a default of a w + b t2.
+        smarticle: the smarticle with w and t2.
+    """
     if not isinstance(data, Mapping):
         return data
     w, t2 = smarticle.middle_length_m, smarticle.thickness_in_plane_m

@@ -68,7 +68,7 @@ class BaseMotion(Part):
     def legs(self, start: Array, home: Array, until: float) -> Iterator[Leg]:
         """Yield the simple motions within the motion in order, up to the time `until` [s].
 
-        Legs that begin at equal angles in all further repetitions of a sequence are yielded only once.
+        Of a sequence that is repeated only two repetitions are yielded, since further ones are equal to the second.
         """
         raise NotImplementedError
 
@@ -216,7 +216,7 @@ _COSINE = (4.16666666666666019037e-02, -1.38888888888741095749e-03, 2.4801587289
 def sine_of(cycles: Array) -> Array:
     """Return sin(2π cycles) [1] with identical bits on every processor, unlike NumPy's sine.
 
-    Source: kernels of fdlibm (Sun Microsystems, 1993), after a reduction to an eighth of a cycle that is exact.
+    Source: kernels of fdlibm (Sun Microsystems, 1993), after an exact reduction to an eighth of a cycle.
     """
     quarters = np.round(4 * cycles)
     x = (cycles - quarters / 4) * (2 * math.pi)

@@ -1,4 +1,4 @@
-"""Protocols: values of a scene's keys in which the paper's text and the paper's own code differ.
+"""Protocols: the values of scene keys on which the paper's text and the paper's own code disagree.
 
 Savoie, Tuazon, Bhamla and Goldman, "Amorphous Entangled Active Matter", Soft Matter 2023: the text states one set of
 rules, the sources and run scripts in the public repository `wsavoie/SmarticleSim` (of January 2019) another. A protocol
@@ -38,7 +38,7 @@ PARTS = ("motor", "contact", "container")
 
 
 def applies(part: str, *, plane: bool, tiers: bool) -> bool:
-    """Return whether a protocol sets keys of a part: not of the container in a plane, or of one with tiers."""
+    """Return whether a protocol sets keys of a part; it leaves out the container in a plane or with tiers."""
     return part != "container" or not (plane or tiers)
 
 

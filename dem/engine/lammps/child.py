@@ -110,7 +110,7 @@ class Child:
         return ticks / os.sysconf("SC_CLK_TCK")
 
     def local_ranks(self) -> list[int]:
-        """Return the process ids of the ranks on this machine, in order."""
+        """Return the process ids of those ranks that run on this machine."""
         number = self._process.pid
         children = map(int, _text(Path(f"/proc/{number}/task/{number}/children")).split())
         return [child for child in children if _text(Path(f"/proc/{child}/comm")).strip() == LMP]

@@ -1,7 +1,7 @@
 """Smarticles as rigid bodies of spheres: welded, one body each, or articulated, three links and two hinges each.
 
-Welding and articulating keep positions, momentum and angular momentum to rounding. Articulating keeps the kinetic
-energy as well; welding dissipates that of the links' motion against each other.
+Welding and articulating conserve positions, momentum and angular momentum up to rounding. Articulating also conserves
+the kinetic energy; welding dissipates the energy of the links' relative motion.
 """
 
 from __future__ import annotations
@@ -55,12 +55,12 @@ class Assembly:
 
     @property
     def bodies(self) -> Sequence[int]:
-        """Ids of the rigid bodies: one per smarticle, or three, in order."""
+        """Ids of the rigid bodies in the order of smarticles: one per welded, three per articulated smarticle."""
         return self._ids
 
     @property
     def link_of(self) -> Mapping[int, tuple[int, int]]:
-        """Smarticle and link by id of sphere."""
+        """(smarticle, link) of each sphere, by the sphere's id."""
         links = self._particle.links.tolist()
         return {
             sphere: (k, link)

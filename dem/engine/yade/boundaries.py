@@ -180,7 +180,7 @@ class YadeBoundaries:
         return -float(lift * self._yade.omega.bodies[self.moving[0]].state.vel[2])
 
     def sum_forces(self) -> None:
-        """Add the forces on hooks, or on walls of a channel, in the last step to their sums."""
+        """Add the last step's forces on hooks, or on walls of a channel, to their sums over steps."""
         force = self._yade.omega.forces.f
         for k, (first, *others) in enumerate(self.measured):
             total = force(first)
