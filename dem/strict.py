@@ -122,8 +122,6 @@ def explained(error: ValidationError, data: Any, *, described: str) -> str:
     """Return pydantic's first errors in one line, each as `key: value and what is wrong; what to do`.
 
     Args:
-        error: errors of the validation of `data`.
-        data: data of the file.
         described: where users find a description of the keys.
     """
     texts: dict[str, str] = {}

@@ -39,7 +39,6 @@ class EngineKind(Protocol):
         """Return the largest stable time step [s].
 
         Args:
-            scene: the scene.
             articulated: whether barbs can turn, or have turned before.
         """
 

@@ -94,8 +94,6 @@ class ActuatedPhase(Phase):
         """Make the control updates that are due, on articulated smarticles; return the time [s] until the next call.
 
         Args:
-            stage: the running phase.
-            engine: the running simulation.
             check_every: number of updates after which the caller wants to check the pile; None: no checks.
         """
         update: int = stage.memory["look"]

@@ -188,10 +188,8 @@ def has_settled(settle: Settle, memory: Memory, engine: Engine) -> bool:
     """Return whether the pile has settled, from a check that is due every `CHECK_INTERVAL`.
 
     Args:
-        settle: the criterion.
         memory: memory of the stage, with `waited`, the time since the wait began [s], which the stage adds up, and
             `still`, the time for which both limits have held [s], which this function updates.
-        engine: the running simulation.
 
     Raises:
         RunError: the pile has not settled within `settle.timeout_s`.

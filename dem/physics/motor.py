@@ -69,7 +69,6 @@ class Motors:
     only after neighbours have moved.
 
     Args:
-        law: parameters of the motors.
         angles: (N, 2) angles at the start [rad].
         strengths: (N, 2) factors on torque limit and stiffness [1]; None: 1 for all motors.
     """

@@ -228,7 +228,6 @@ def choose(
 
     Args:
         scene: the scene; its own engine and fidelity are ignored.
-        table: measured errors and costs.
         max_error: largest relative error of the quantities for which `table` was read [1].
         max_hours: longest wall time on one core [h].
 
@@ -263,8 +262,6 @@ def pick(expected: Sequence[Measured], *, max_error: float | None, max_hours: fl
 
     Args:
         expected: fidelities with their hours, for each engine from coarse to fine.
-        max_error: as in `choose`.
-        max_hours: as in `choose`.
 
     Raises:
         InputError: as in `choose`.

@@ -76,7 +76,6 @@ def read_checkpoint(folder: Path, *, scene_sha256: str, made_by: tuple[str, str]
     """Read the newest undamaged checkpoint of a run directory.
 
     Args:
-        folder: the run directory.
         scene_sha256: hash of the scene that the checkpoint must have.
         made_by: name and version of the engine that the checkpoint must have.
 

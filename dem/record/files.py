@@ -17,7 +17,6 @@ def whole(path: Path, *, before: Path | None = None, shared: bool = False) -> It
     """Yield a temporary path, which is renamed to `path` if the block ends without an error, or else removed.
 
     Args:
-        path: the file.
         before: new path of the file that is replaced; None: it is removed.
         shared: whether several processes may write the file at once.
     """
@@ -39,7 +38,6 @@ def write_whole(path: Path, write: Callable[[Path], object], *, make_folder: boo
     """Write or replace a file, complete or not at all.
 
     Args:
-        path: the file.
         write: function that writes the content to a temporary path.
         make_folder: whether to make the folder of the file.
 
@@ -73,7 +71,6 @@ def cannot_read(what: str, path: Path, cause: BaseException | str, remedy: str) 
 
     Args:
         what: kind of the file, e.g. "frame".
-        path: the file.
         cause: an error, or the cause in words.
         remedy: what to do.
     """

@@ -29,10 +29,8 @@ def force_mesh(found: ContactForces, positions: Array, *, time: float, phase: in
     boundary.
 
     Args:
-        found: the contacts.
         positions: (N, 3) centres of mass of the smarticles [m].
         time: simulated time [s].
-        phase: index of the phase.
     """
     number, between = len(found.forces), found.boundaries == NONE
     ends = np.empty((number, 2, 3))

@@ -54,7 +54,6 @@ def centreline_mesh(
         contacts: (N,) number of other smarticles that each smarticle touches.
         time: simulated time [s].
         floor: height of the container's floor [m].
-        phase: index of the phase.
         extra: further cell data by name, (3N,) or (3N, 3), such as `motor_fields`.
     """
     n, number = len(vertices), LINKS * len(vertices)
@@ -213,7 +212,6 @@ def read_mesh(path: Path, what: str = "frame", remedy: str | None = None) -> Any
     """Return the mesh of a VTK file.
 
     Args:
-        path: the file.
         what: kind of the file in messages.
         remedy: what to do about a damaged file; None: advice for frames.
 

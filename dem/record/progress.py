@@ -36,8 +36,6 @@ class ProgressWriter:
         """Begin or resume a phase.
 
         Args:
-            index: index of the phase.
-            phase: type of the phase.
             start: simulated time at which the phase began [s].
             now: present simulated time [s].
             end: simulated time at which the phase will end [s]; None: unknown.

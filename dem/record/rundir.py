@@ -20,7 +20,6 @@ def claimed(out: Path, *, resume: bool) -> Iterator[None]:
     The lock is held by the kernel and ends with the process, so that it is never stale.
 
     Args:
-        out: the run directory.
         resume: whether the directory must hold a run; otherwise it must be new or empty.
 
     Raises:

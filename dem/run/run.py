@@ -38,7 +38,6 @@ def run_scene(
     """Simulate a scene into a run directory; return times and cost, or None if the run was done already.
 
     Args:
-        scene: the scene.
         out: the run directory; it must not exist, or be empty, or with `resume` hold an unfinished run of this scene.
         command: the command line, for the manifest.
         progress: whether to show progress on the terminal.
@@ -178,10 +177,7 @@ def manifest(
     """Return the manifest of a run: how it was made, and the numbers of the scene that measures need.
 
     Args:
-        scene: the scene.
-        out: the run directory.
         steps: time step of each phase [s].
-        command: the command line.
         made_by: name and version of the engine.
         threads: threads, or ranks, of the engine.
     """

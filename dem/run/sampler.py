@@ -36,13 +36,7 @@ class Sampler:
         return {name: column for name, column in EVERY.items() if name in COLUMNS or name in added}
 
     def sample(self, engine: Engine, state: State, phase: int) -> dict[str, Any]:
-        """Return one row: a number, or a (2,) or (3,) array, by name of the column.
-
-        Args:
-            engine: the running simulation.
-            state: present state of the engine.
-            phase: index of the present phase.
-        """
+        """Return one row: a number, or a (2,) or (3,) array, by name of the column."""
         boxes = engine.particle.boxes
         heights = state.positions[:, 2] - engine.boundaries.floor
         phi = packing_fraction(heights, solid_volume=boxes.volume, radius=self.radius)

@@ -68,7 +68,6 @@ def load_scene(path: Path | str, overrides: Sequence[str] = ()) -> Scene:
     """Return the scene of a file.
 
     Args:
-        path: the scene file.
         overrides: changes of keys as `KEY=VALUE`, e.g. `phases.1.duration_s=2`.
 
     Raises:

@@ -30,7 +30,6 @@ class Contacts:
         Args:
             spheres: (N, S, 3) centres [m].
             radius: radius of the spheres [m].
-            boundaries: floor and wall.
         """
         count, each = spheres.shape[:2]
         centres = spheres.reshape(-1, 3)

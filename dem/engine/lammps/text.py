@@ -62,7 +62,6 @@ def sphere_lines(
     Each sphere has number, type, position, diameter, density and number of its smarticle.
 
     Args:
-        particle: geometry of a smarticle.
         cylinder: the container, from which the simulation box follows.
         spheres: (N, S, 3) centres [m].
         title: first line of the file.
@@ -106,7 +105,6 @@ def contact_terms(law: ContactLaw, mass: float) -> tuple[str, str]:
     the keyword `NEVER_PULLS`.
 
     Args:
-        law: contact law.
         mass: mass M of a smarticle [kg].
     """
     between, wall = law.normal_damping / (mass / 2), law.wall_damping / mass
@@ -144,7 +142,6 @@ def container(cylinder: Cylinder, at_wall: str, *, walled: bool = True) -> Itera
     """Yield the commands of floor and wall, whose heights are the variables `floor_z` and `wall_z`.
 
     Args:
-        cylinder: the container.
         at_wall: contact with floor and wall, the second result of `contact_terms`.
         walled: whether there is a wall.
     """

@@ -211,8 +211,6 @@ class Assembly:
         """Return the id of an articulated link's body, and a point (3,) of the link in YADE's frame of the body [m].
 
         Args:
-            smarticle: number of the smarticle.
-            link: number of the link.
             point: (3,) in the link's frame [m].
         """
         number = LINKS * smarticle + link
@@ -292,7 +290,6 @@ def clump(
     """Join existing spheres into a rigid body of given mass and inertia.
 
     Args:
-        yade: YADE.
         members: ids of the spheres.
         local: (k, 3) centres of the spheres in the body's principal frame [m].
         mass: [kg].

@@ -70,7 +70,6 @@ def add_materials(yade: Yade, adds: Adds, law: ContactLaw) -> None:
     """Add the materials `adds.materials` to YADE's simulation, in that order.
 
     Args:
-        yade: YADE.
         adds: union of the additions of all effects of a scene.
         law: contact law from which the materials' stiffness and damping follow.
     """

@@ -41,9 +41,6 @@ class YadeEngine:
     """`dem.engine.interface.Engine` on YADE.
 
     Args:
-        particle: geometry of a smarticle.
-        cylinder: the container.
-        law: contact law.
         gravity: g, downwards [m/s²].
         time_step: dt of the first steps [s].
         shaken: whether the container will be shaken, for which YADE needs an engine of its own.

@@ -84,8 +84,6 @@ class Hinges:
     """All hinges of N articulated smarticles.
 
     Args:
-        yade: YADE.
-        law: stiffness and damping.
         nodes: ids of the nodes of each link of each smarticle, in the order of `hinge_nodes`.
         angles: (N, 2) angles of the barbs when the bonds were made [rad].
     """

@@ -77,9 +77,6 @@ class YadeLedger:
     """`dem.engine.interface.EnergyLedger` on YADE.
 
     Args:
-        yade: YADE.
-        assembly: the smarticles.
-        boundaries: the boundaries.
         works: whether to sum the work of moving boundaries.
         dissipation_interval: time between samples of the dissipation [s]; None: no samples.
     """

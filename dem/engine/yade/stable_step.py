@@ -102,9 +102,6 @@ def planar_stable_time_step(
     string at its tip.
 
     Args:
-        particle: geometry of a smarticle.
-        law: contact law.
-        hinges: law of the hinges.
         strings: stiffness [N/m] and damping [N s/m] of each string.
     """
     boxes = particle.boxes
