@@ -26,6 +26,7 @@ from dem.engine.links.shape import shape_of
 from dem.engine.yade.construction import SMARTICLE_MATERIAL, WALL_MATERIAL
 from dem.engine.yade.engine import YadeEngine
 from dem.engine.yade.kind import hinge_law
+from dem.engine.yade.library import rows_of
 from dem.physics.contact import ContactLaw
 from dem.physics.motor import LAWS
 from dem.plan.steps import time_step
@@ -369,7 +370,8 @@ class YadeAccess(_Access):
         heavy.mass, heavy.inertia = ratio * heavy.mass, ratio * heavy.inertia
 
     def floor_force(self, engine: Engine) -> Array:
-        return _yade(engine).container_force()
+        own = _yade(engine)
+        return rows_of(own._omega.forces.f(body) for body in own.boundaries.container).sum(axis=0)
 
     def torques(self, engine: Engine) -> Array:
         return np.asarray(_yade(engine).motors._hinges.torques()[0])

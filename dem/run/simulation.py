@@ -90,7 +90,7 @@ class Simulation:
             index=self._phase,
             phase=phase.type,
             start=entry["start_s"],
-            now=self.engine.time,
+            time=self.engine.time,
             end=entry["start_s"] + duration if duration else None,
         )
         self._advance()

@@ -121,7 +121,7 @@ def pile(data: dict[str, Any], *, count: int, settle: float, watch: int) -> dict
     sampler = Sampler(scene.container.radius_m)
     sampler.sample(engine, engine.state(), 0)
     forces: list[np.ndarray] = []
-    advance_watched(engine, watch, lambda: forces.append(engine.container_force()))
+    advance_watched(engine, watch, lambda: forces.append(YadeAccess().floor_force(engine)))
     state = engine.state()
     balance = sampler.sample(engine, state, 0)["container_force_N"]
     return {
@@ -174,7 +174,7 @@ def shaken_force(data: dict[str, Any], *, count: int, samples: int, every: int) 
     means, balance = [], []
     for _ in range(samples):
         forces: list[np.ndarray] = []
-        advance_watched(engine, every, lambda forces=forces: forces.append(engine.container_force()))
+        advance_watched(engine, every, lambda forces=forces: forces.append(YadeAccess().floor_force(engine)))
         means.append(np.mean(forces, axis=0))
         balance.append(sampler.sample(engine, engine.state(), 0)["container_force_N"])
     return {

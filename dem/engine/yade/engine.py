@@ -252,13 +252,6 @@ class YadeEngine:
     def extremes(self, state: State) -> None:
         """Return None: on YADE extremes are not cheaper than a full check."""
 
-    def container_force(self) -> Array:
-        """Return the force (3,) of the smarticles on the container in the last step [N]."""
-        force = np.zeros(3)
-        for body in self.boundaries.container:
-            force += self._omega.forces.f(body)
-        return force
-
     def unbalanced_force(self) -> float:
         # YADE's own measure omits gravity for bodies whose contact forces are exactly zero or balance exactly, which is
         # wrong for a pile at rest.
