@@ -23,10 +23,13 @@ class ProgressWriter:
     total: int  #: Smarticles of the scene
     show: bool  #: Whether to write to the terminal
     _progress: Progress = field(default_factory=Progress)
-    _begun: float = field(default_factory=lambda: monotonic())  # looked up at each call, for tests
+    _begun: float = field(init=False)
     _start: float = 0.0
     _resumed: tuple[float, float] = (0.0, 0.0)  # wall time and simulated time at the beginning or the resumption [s]
     _last: float = -math.inf
+
+    def __post_init__(self) -> None:
+        self._begun = monotonic()
 
     def begin(self, *, index: int, phase: str, start: float, time: float, end: float | None) -> None:
         """Begin or resume a phase.
