@@ -81,14 +81,14 @@ def passive(scene: Scene) -> PassiveScene:
     assert isinstance(first, TakeOver)  # all others were named
     first.ready(scene)
     poses = poses_of(scene, first.taken)
-    turns, still = np.array([turn.as_matrix() for turn in poses.rotations]), np.zeros_like(poses.positions)
+    turns, zero = np.array([turn.as_matrix() for turn in poses.rotations]), np.zeros_like(poses.positions)
     given = PassiveScene(
         scene=scene,
         first=first,
         phases=[first, *(phase for phase in others if isinstance(phase, Relax | Shake | RemoveContainer))],
         time_step=min(time_steps(scene)),
         law=contact_law_of(scene),
-        state=State.rigid(scene.particle.boxes, poses.positions, turns, still, still),
+        state=State.rigid(scene.particle.boxes, poses.positions, turns, zero, zero),
     )
     spheres = given.spheres
     owners = np.repeat(np.arange(len(spheres)), spheres.shape[1])
@@ -131,11 +131,11 @@ def write_deck(scene: Scene, folder: Path) -> None:
     except OSError as error:
         raise InputError(f"--output {folder}: cannot be made ({error.strerror}); choose another place") from None
     spheres, state = given.spheres, given.state
-    still = np.zeros((state.count, 3))
+    zero = np.zeros((state.count, 3))
     title = f"Spheres of {len(spheres)} smarticles, {spheres.shape[1]} each: {_one_line(scene.name)}"
     contents = {
         DATA: text.sphere_lines(scene.particle, scene.cylinder, spheres, title=title),
-        BODIES: text.body_lines(scene.particle, Moving(state.positions, given.turns, still, still, still, still)),
+        BODIES: text.body_lines(scene.particle, Moving(state.positions, given.turns, zero, zero, zero, zero)),
         DECK: _deck(given),
     }
     for name, lines in contents.items():

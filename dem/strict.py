@@ -192,17 +192,17 @@ def _place(steps: Sequence[int | str], data: Any) -> tuple[str, bool]:
 
     In a discriminated union the path has an extra step, the value of `type`, which is no key.
     """
-    here, keys, given = data, [], True
+    node, keys, given = data, [], True
     for step in steps:
-        if isinstance(here, Mapping) and step not in here and here.get("type") == step:
+        if isinstance(node, Mapping) and step not in node and node.get("type") == step:
             continue
         if step == _OF_A_KEY:
             given = False
             continue
         keys.append(str(step) if len(str(step)) <= _LONGEST_KEY else f"{str(step)[:_LONGEST_KEY]}…")
-        if isinstance(here, Mapping):
-            given &= step in here
-            here = here.get(step)
-        elif isinstance(here, list) and isinstance(step, int):
-            here = here[step] if step < len(here) else None
+        if isinstance(node, Mapping):
+            given &= step in node
+            node = node.get(step)
+        elif isinstance(node, list) and isinstance(step, int):
+            node = node[step] if step < len(node) else None
     return ".".join(keys), given

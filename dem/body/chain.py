@@ -95,14 +95,14 @@ def parted(state: State, diameter: float) -> bool:
         state: smarticles in their order along x.
         diameter: thickness of the links [m].
     """
-    places = _corners(state)[..., 0]
-    return bool((places[:-1].max(axis=1) + diameter < places[1:].min(axis=1)).any())
+    along = _corners(state)[..., 0]
+    return bool((along[:-1].max(axis=1) + diameter < along[1:].min(axis=1)).any())
 
 
 def extent(state: State, diameter: float) -> float:
     """Return the present width [m] of a chain across its axis, with the links' thickness, `diameter` [m]."""
-    places = _corners(state)[..., 1]
-    return float(np.ptp(places) + diameter)
+    across = _corners(state)[..., 1]
+    return float(np.ptp(across) + diameter)
 
 
 def _corners(state: State) -> Array:

@@ -57,15 +57,15 @@ def place_layer(
         RunError: some smarticles found no room although the slab was made higher `MOST_GROWTH` times.
     """
     diameter = particle.chain.diameter
-    apart = diameter * (1 + CLEARANCE)
+    spacing = diameter * (1 + CLEARANCE)
     margin = particle.radius * (1 + 2 * CLEARANCE)
     widest = radius - margin
-    taken = obstacles
+    occupied = obstacles
     positions: list[Array] = []
     rotations: list[Rotation] = []
-    grown = 0
+    increases = 0
     while len(positions) < count:
-        tree = cKDTree(taken) if len(taken) else None
+        tree = cKDTree(occupied) if len(occupied) else None
         for _ in range(ATTEMPTS):
             rotation = Rotation.random(random_state=rng)
             spheres = rotation.apply(particle.centres)
@@ -80,16 +80,16 @@ def place_layer(
             # The radius at the tops of the spheres counts, so that they touch neither wall nor ceiling of a tier.
             if narrower is not None and (off_axis > narrower(spheres[:, 2] + margin) - margin).any():
                 continue
-            if tree is not None and tree.query(spheres, distance_upper_bound=apart)[0].min() < apart:
+            if tree is not None and tree.query(spheres, distance_upper_bound=spacing)[0].min() < spacing:
                 continue
             positions.append(centre)
             rotations.append(rotation)
-            taken = np.concatenate([taken, spheres])
+            occupied = np.concatenate([occupied, spheres])
             break
         else:
             height *= 1 + GROWTH
-            grown += 1
-            if grown > MOST_GROWTH:
+            increases += 1
+            if increases > MOST_GROWTH:
                 raise RunError(
                     f"only {len(positions)} of {count} smarticles of a layer found room in a container of radius "
                     f"{radius:g} m; lower phases.0.per_layer or widen container.radius_m"
@@ -112,12 +112,12 @@ def fitted_poses(boxes: Boxes, vertices: Array) -> tuple[Poses, Array]:
     Source:
         Horn, J. Opt. Soc. Am. A 4, 629 (1987).
     """
-    centre, own = vertices.mean(axis=1), boxes.vertices.mean(axis=0)
-    turns = _turns(np.einsum("nvi,vj->nij", vertices - centre[:, None], boxes.vertices - own))
-    positions = centre - applied(turns, own[None])[:, 0]
-    places = np.einsum("nij,vj->nvi", turns, boxes.vertices) + positions[:, None]
-    off: Array = np.linalg.norm(places - vertices, axis=-1).max(axis=1)
-    return Poses(positions, tuple(Rotation.from_matrix(turn) for turn in turns)), off
+    centre, shape_centre = vertices.mean(axis=1), boxes.vertices.mean(axis=0)
+    turns = _turns(np.einsum("nvi,vj->nij", vertices - centre[:, None], boxes.vertices - shape_centre))
+    positions = centre - applied(turns, shape_centre[None])[:, 0]
+    fitted = np.einsum("nij,vj->nvi", turns, boxes.vertices) + positions[:, None]
+    deviations: Array = np.linalg.norm(fitted - vertices, axis=-1).max(axis=1)
+    return Poses(positions, tuple(Rotation.from_matrix(turn) for turn in turns)), deviations
 
 
 def _turns(moments: Array) -> Array:

@@ -172,17 +172,17 @@ def drive(scene: SceneView, index: int) -> Drive:
     which = np.empty((scene.count, BARBS), dtype=np.int64)
     which[~active] = which_resting.reshape(-1, BARBS)
     tracks, size = [], resting.size
-    one, other = gait.motions
-    for columns, motion in [([0, 1], one)] if one == other else [([0], one), ([1], other)]:
-        begun = start[active][:, columns]
+    motion_1, motion_2 = gait.motions
+    for columns, motion in [([0, 1], motion_1)] if motion_1 == motion_2 else [([0], motion_1), ([1], motion_2)]:
+        starts = start[active][:, columns]
         if shifts.size > 1:
-            each, inverse = np.ravel(begun), np.arange(begun.size)
+            each, inverse = np.ravel(starts), np.arange(starts.size)
             ahead = np.repeat(shifts, len(columns))
         else:
-            each, inverse = np.unique(begun, return_inverse=True)
+            each, inverse = np.unique(starts, return_inverse=True)
             ahead = shifts
         tracks.append(_Track(slice(size, size + each.size), motion.course(each, each), ahead))
-        which[np.flatnonzero(active)[:, None], columns] = size + inverse.reshape(begun.shape)
+        which[np.flatnonzero(active)[:, None], columns] = size + inverse.reshape(starts.shape)
         size += each.size
     entries = np.concatenate([resting, np.zeros(size - resting.size)])
     return Drive(gait.duration, active, start, entries, tuple(tracks), which)

@@ -103,10 +103,10 @@ class PullHook(Part, Phase):
             memory.update(force_sum=_force_sum(engine)[2], step=engine.steps)
         elif memory["raising"]:
             # Whether the mean force on the hook since the last check exceeds its limit.
-            before, step = memory["force_sum"], memory["step"]
+            force_sum, step = memory["force_sum"], memory["step"]
             memory.update(force_sum=_force_sum(engine)[2], step=engine.steps)
             limit = self.force_limit_N
-            if limit is not None and before - memory["force_sum"] > limit * (memory["step"] - step):
+            if limit is not None and force_sum - memory["force_sum"] > limit * (memory["step"] - step):
                 memory.update(arrival=engine.time, end=engine.time + HELD_SECONDS)
         if memory["raising"] and (left := time_left(engine, memory["arrival"])):
             return left if self.force_limit_N is None else min(CHECK_INTERVAL, left)

@@ -53,11 +53,11 @@ class Shake(Part, Phase):
 
     def check(self, scene: SceneView, index: int) -> Iterator[str]:
         # The floor must not drop below the wall's lower edge.
-        amplitude, below = self.amplitude(scene.gravity_m_per_s2), -scene.cylinder.bottom
-        if self.moves == "floor" and amplitude > below:
+        amplitude, depth = self.amplitude(scene.gravity_m_per_s2), -scene.cylinder.bottom
+        if self.moves == "floor" and amplitude > depth:
             yield (
                 f"phases.{index}.moves: the floor alone would go {amplitude:.3g} m down, and the wall ends "
-                f"{below:.3g} m below the floor; use a lower peak_acceleration_g, a higher frequency_hz, or moves: "
+                f"{depth:.3g} m below the floor; use a lower peak_acceleration_g, a higher frequency_hz, or moves: "
                 "container"
             )
 

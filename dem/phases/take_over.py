@@ -282,19 +282,19 @@ def _mismatches(scene: SceneView, taken: Taken) -> Iterator[str]:
         if not math.isclose(here, there, rel_tol=1e-9):
             unit = "" if key == "aspect_ratio" else " m"
             yield (
-                f"smarticle.{key}: {here:g}{unit} here, but {there:g}{unit} in {taken.run}, {taking}; use the same, or "
-                "another run"
+                f"smarticle.{key}: {here:g}{unit} here, but {there:g}{unit} in {taken.run}, {taking}; use "
+                f"{there:g}{unit}, or another run"
             )
     if taken.frame.count != scene.count:
         whole = "" if taken.frame.count == manifest.count else f" of {manifest.count}, poured so far"
         yield (
-            f"count: {scene.count} here, but {taken}, {taking}, holds {taken.frame.count}{whole}; use the same, or "
-            "another frame"
+            f"count: {scene.count} here, but {taken}, {taking}, holds {taken.frame.count}{whole}; use "
+            f"{taken.frame.count}, or another frame"
         )
     straight = scene.smarticle.aspect_ratio == 0 or scene.smarticle.angles_deg == (0.0, 0.0)
     if straight and scene.fidelity.rows > 1:
         yield (
-            f"fidelity.rows: {scene.fidelity.rows}, but frames do not know how a straight smarticle is turned about "
+            f"fidelity.rows: {scene.fidelity.rows}, but frames do not record how a straight smarticle is turned about "
             "its length, which phases.0 (take-over) needs for more than 1; use 1, or angles_deg that are not 0"
         )
     # No link's axis may lie outside the wall, under the floor or in a hook: no contact would push it back.
@@ -319,19 +319,19 @@ def _mismatches(scene: SceneView, taken: Taken) -> Iterator[str]:
                 f"hooks.{name}_height_m: {cross.height:g} m; {inside.sum()} smarticles of {taken}, {taking}, lie in "
                 "this hook; take over a run that was poured with these hooks"
             )
-    _, off = fitted_poses(scene.particle.boxes, vertices)
-    if off.max() <= MOST_OFF * scene.sphere_diameter:
+    _, deviations = fitted_poses(scene.particle.boxes, vertices)
+    if deviations.max() <= MOST_OFF * scene.sphere_diameter:
         return
     angles = _angles(taken)
     low, high = angles.min(axis=0), angles.max(axis=0)
     reached = " and ".join(f"{a:.4g}° … {b:.4g}°" for a, b in zip(low, high, strict=True))
     (first, second), middle = scene.smarticle.angles_deg, (low + high) / 2
-    # A scene can be made with barbs that all stand alike.
-    alike = math.radians(float((high - low).max()) / 2) * scene.particle.boxes.barb_length
+    # A scene can describe barbs whose angles are equal on all smarticles.
+    spread = math.radians(float((high - low).max()) / 2) * scene.particle.boxes.barb_length
     way_out = (
         f"use smarticle.angles_deg: [{middle[0]:.4g}, {middle[1]:.4g}]"
-        if alike < MOST_OFF * scene.sphere_diameter
-        else "smarticles of a scene begin in one shape: take a frame in which all barbs stand alike"
+        if spread < MOST_OFF * scene.sphere_diameter
+        else "all smarticles of a scene begin with equal angles: take a frame in which their angles are equal"
     )
     yield (
         f"smarticle.angles_deg: ({first:g}, {second:g}) here, but the barbs of {taken}, {taking}, stand at {reached}; "
@@ -344,11 +344,11 @@ def _within_tips(vertices: Array, radius: float) -> Array:
     moved = vertices.copy()
     for tip, hinge, far in ((0, 1, 2), (3, 2, 1)):
         # Without barbs the middle link ends at the tips.
-        ways = [vertices[:, end] - vertices[:, tip] for end in (hinge, far)]
-        lengths = [np.linalg.norm(way, axis=-1, keepdims=True) for way in ways]
+        vectors = [vertices[:, end] - vertices[:, tip] for end in (hinge, far)]
+        lengths = [np.linalg.norm(vector, axis=-1, keepdims=True) for vector in vectors]
         shares = [np.minimum(1.0, radius / np.maximum(length, 1e-300)) for length in lengths]
         barbed = lengths[0] > 0
-        moved[:, tip] += np.where(barbed, shares[0] * ways[0], shares[1] * ways[1])
+        moved[:, tip] += np.where(barbed, shares[0] * vectors[0], shares[1] * vectors[1])
         moved[:, hinge] = np.where(barbed, moved[:, hinge], moved[:, tip])
     return moved
 
@@ -359,8 +359,8 @@ def _in_cross(cross: Cross, vertices: Array) -> Flags:
     longest = float(np.linalg.norm(ends[:, :, 1] - ends[:, :, 0], axis=-1).max())
     shares = np.linspace(0, 1, 2 + int(4 * longest / cross.side))[:, None]
     points = (ends[:, :, :1] * (1 - shares) + ends[:, :, 1:] * shares).reshape(len(vertices), -1, 3)
-    above = points - [0.0, 0.0, cross.height]
-    inside = [(np.abs(above - [*bar.middle, 0.0]) < bar.half).all(axis=-1).any(axis=-1) for bar in cross.bars]
+    relative = points - [0.0, 0.0, cross.height]
+    inside = [(np.abs(relative - [*bar.middle, 0.0]) < bar.half).all(axis=-1).any(axis=-1) for bar in cross.bars]
     return np.asarray(np.logical_or.reduce(inside))
 
 
@@ -372,7 +372,7 @@ def _angles(taken: Taken) -> Array:
     tip_1, hinge_1, hinge_2, tip_2 = np.moveaxis(taken.vertices, 1, 0)
     along = hinge_2 - hinge_1
     cosines = [
-        np.einsum("ni,ni->n", way, barb) / np.linalg.norm(way, axis=1) / np.linalg.norm(barb, axis=1)
-        for way, barb in ((-along, tip_1 - hinge_1), (along, tip_2 - hinge_2))
+        np.einsum("ni,ni->n", axis, barb) / np.linalg.norm(axis, axis=1) / np.linalg.norm(barb, axis=1)
+        for axis, barb in ((-along, tip_1 - hinge_1), (along, tip_2 - hinge_2))
     ]
     return np.asarray(np.degrees(np.arccos(np.clip(cosines, -1, 1))).T)

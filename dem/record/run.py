@@ -133,13 +133,13 @@ class Run:
         if (self.path / DONE).exists():
             done = Done.read(self.path / DONE)
             return Status(state="done", time_s=done.time_s, steps=done.steps, wall_s=done.wall_s, cpu_s=done.cpu_s)
-        said = self.progress
+        progress = self.progress
         status = Status(
             state="running",
-            phase=said.phase,
-            time_s=said.time_s,
-            wall_s=said.wall_s,
-            checkpoint_s=said.checkpoint_s,
+            phase=progress.phase,
+            time_s=progress.time_s,
+            wall_s=progress.wall_s,
+            checkpoint_s=progress.checkpoint_s,
         )
         if not (self.path / FAILED).exists():
             return status if in_use(self.path) else replace(status, state="stopped")

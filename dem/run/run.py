@@ -110,20 +110,20 @@ def _check_ready(scene: Scene) -> None:
 
 def _check_scene(scene: Scene, out: Path) -> None:
     """Reject a run directory that was made from another scene."""
-    made = Run(out).manifest.scene_sha256
-    if made == scene_hash(scene):
+    recorded_hash = Run(out).manifest.scene_sha256
+    if recorded_hash == scene_hash(scene):
         return
     try:
-        there = load_scene(out / SCENE)
+        recorded = load_scene(out / SCENE)
     except InputError:
-        there = None
-    if there is None or scene_hash(there) != made:
+        recorded = None
+    if recorded is None or scene_hash(recorded) != recorded_hash:
         raise InputError(
             f"--out {out}: {out / SCENE} is not the scene that this run was made from (its hash is not the "
-            f"{made[:12]} of {MANIFEST}); put it back as it was, or run it in another directory"
+            f"{recorded_hash[:12]} of {MANIFEST}); put it back as it was, or run it in another directory"
         )
     raise InputError(
-        f"--out {out}: was made from another scene: {difference(there, scene)}; resume with {out / SCENE} and no "
+        f"--out {out}: was made from another scene: {difference(recorded, scene)}; resume with {out / SCENE} and no "
         "--set, or run the changed scene in another directory"
     )
 
@@ -138,12 +138,12 @@ def _restore(simulation: Simulation, saved: tuple[Checkpoint, str | None] | None
     if warning:
         simulation.warn(warning)
     simulation.restore(checkpoint)
-    begun = Run(out).manifest.threads
-    if begun != threads:
+    earlier = Run(out).manifest.threads
+    if earlier != threads:
         workers = engine_kind(simulation.scene.engine).workers
         simulation.warn(
-            f"--{workers} {threads}: the run began with {begun}; it goes on, with other last bits than a run that was "
-            "never stopped"
+            f"--{workers} {threads}: the run began with {earlier}; it continues, but results may differ in their last "
+            "bits from those of a run that was never stopped"
         )
     log.info("resumed from the checkpoint of t = %.4f s", simulation.engine.time)
 

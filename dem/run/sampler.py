@@ -41,25 +41,25 @@ class Sampler:
         heights = state.positions[:, 2] - engine.boundaries.floor
         phi = packing_fraction(heights, solid_volume=boxes.volume, radius=self.radius)
         container_force = self._mean_force(engine, state.momentum)
-        more: dict[str, Any] = {}
+        extra: dict[str, Any] = {}
         if EffectName.HOOKS in self.effects:
             lower, upper = self._mean_since("hooks", engine.steps, engine.boundaries.hook_sums)
             # The momentum balance includes the force on the hooks.
             container_force -= lower + upper
-            more |= {
+            extra |= {
                 "hook_upper_force_N": upper,
                 "hook_lower_force_N": lower,
                 "hook_upper_z_m": engine.boundaries.upper_height,
             }
         if EffectName.WALL_REMOVAL in self.effects:
             outside = np.hypot(state.positions[:, 0], state.positions[:, 1]) > engine.cylinder.radius
-            more["outside_count"] = np.count_nonzero(outside)
+            extra["outside_count"] = np.count_nonzero(outside)
             if not engine.boundaries.enclosed:
                 phi = math.nan  # a pile that spreads fills no cylinder
         if EffectName.STRINGS in self.effects:
-            more |= self._strain_row(engine, state)
+            extra |= self._strain_row(engine, state)
             # The momentum balance includes the strings, whose forces act on the chain.
-            pulls = more["string_fixed_force_N"] + more["string_pulled_force_N"]
+            pulls = extra["string_fixed_force_N"] + extra["string_pulled_force_N"]
             container_force += np.nan_to_num(pulls)
         row = {
             "time_s": engine.time,
@@ -83,25 +83,25 @@ class Sampler:
             }
         if EffectName.ENERGY_ACCOUNT in self.effects:
             row |= _ledger_row(engine, row)
-        return row | more
+        return row | extra
 
     def _mean_force(self, engine: Engine, momentum: Array) -> Array:
         # The container receives the momentum that smarticles lose, except for gravity and the throw of added
         # smarticles. This is exact over any interval; sampled contact forces would alias the shaking and miss impacts.
-        time, impulse, before = engine.time, engine.impulse, self.memory["before"]
+        time, impulse, previous = engine.time, engine.impulse, self.memory["before"]
         self.memory["before"] = [time, impulse, momentum.tolist()]
-        if before is None or time <= before[0]:
+        if previous is None or time <= previous[0]:
             return np.full(3, math.nan)
-        lost = np.array(before[2]) - momentum - np.array([0.0, 0.0, impulse - before[1]])
-        return np.asarray(lost / (time - before[0]))
+        lost = np.array(previous[2]) - momentum - np.array([0.0, 0.0, impulse - previous[1]])
+        return np.asarray(lost / (time - previous[0]))
 
     def _mean_since(self, name: str, steps: int, sums: Array) -> Array:
         """Return the mean over the steps since the previous sample, of forces summed over all steps."""
-        before = self.memory[name]
+        previous = self.memory[name]
         self.memory[name] = [steps, sums.tolist()]
-        if before is None or steps <= before[0]:
+        if previous is None or steps <= previous[0]:
             return np.full_like(sums, math.nan)
-        return np.asarray((sums - np.array(before[1])) / (steps - before[0]))
+        return np.asarray((sums - np.array(previous[1])) / (steps - previous[0]))
 
     def _strain_row(self, engine: Engine, state: State) -> dict[str, Any]:
         strings, none = engine.strings, np.full(3, math.nan)

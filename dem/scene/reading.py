@@ -108,21 +108,21 @@ def apply_override(data: Any, override: str) -> None:
         value = load_yaml(text)
     except yaml.YAMLError:
         raise InputError(f"--set {override}: the value is not valid YAML") from None
-    here: Any = data
+    node: Any = data
     parts = key.split(".")
     for number, part in enumerate(parts, 1):
         last = number == len(parts)
-        place: Any = int(part) if isinstance(here, list) and part.isdigit() else part
-        if not isinstance(here, dict) and not (isinstance(here, list) and isinstance(place, int) and place < len(here)):
+        step: Any = int(part) if isinstance(node, list) and part.isdigit() else part
+        if not isinstance(node, dict) and not (isinstance(node, list) and isinstance(step, int) and step < len(node)):
             raise InputError(f"--set {override}: there is no {part!r} in the scene; lists are numbered from 0")
         if last:
-            here[place] = value
-        elif isinstance(here, dict):
-            if part == "fidelity" and isinstance(here.get(part), str):
-                here[part] = {"base": here[part]}
-            here = here.setdefault(part, {})
+            node[step] = value
+        elif isinstance(node, dict):
+            if part == "fidelity" and isinstance(node.get(part), str):
+                node[part] = {"base": node[part]}
+            node = node.setdefault(part, {})
         else:
-            here = here[place]
+            node = node[step]
 
 
 def _plain(scene: Scene) -> dict[str, Any]:

@@ -306,11 +306,11 @@ class Sequence(BaseMotion):
         return None if self.repeat == 1 else sum(self._lengths)
 
     def _courses(self, start: Array, home: Array) -> list[Course]:
-        courses, begun = [], start
+        courses, angles = [], start
         for step in self.steps:
-            courses.append(step.course(begun, home))
+            courses.append(step.course(angles, home))
             if math.isfinite(step.duration):
-                begun = step.end(begun, home)
+                angles = step.end(angles, home)
         return courses
 
     def end(self, start: Array, home: Array) -> Array:

@@ -21,16 +21,16 @@ class Part(Strict):
     def nearest_key(cls, key: str) -> str:
         """Return what to do about an unknown key: use a key of similar spelling, or put it into another part."""
         # Most often the unit, or the second half of a name, was left out.
-        here = [field for field in cls.model_fields if field.startswith(f"{key}_")]
-        here = here or difflib.get_close_matches(key, cls.model_fields, n=1, cutoff=0.7)
-        if here:
-            return f"did you mean {' or '.join(map(repr, here))}?"
+        similar = [field for field in cls.model_fields if field.startswith(f"{key}_")]
+        similar = similar or difflib.get_close_matches(key, cls.model_fields, n=1, cutoff=0.7)
+        if similar:
+            return f"did you mean {' or '.join(map(repr, similar))}?"
         for part in Part.__subclasses__():
             if "type" in part.model_fields and ("type" in cls.model_fields or part.__subclasses__()):
                 continue  # a key of one phase does not belong in another phase; base classes are no part of a file
-            there = difflib.get_close_matches(key, part.model_fields, n=1, cutoff=0.65)
-            if there:
-                return f"{there[0]!r} belongs in {part.tag()}"
+            elsewhere = difflib.get_close_matches(key, part.model_fields, n=1, cutoff=0.65)
+            if elsewhere:
+                return f"{elsewhere[0]!r} belongs in {part.tag()}"
         return "known keys: " + ", ".join(cls.model_fields)
 
     @classmethod

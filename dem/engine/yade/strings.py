@@ -56,10 +56,10 @@ class YadeStrings:
         for tie, speed in zip(ties, speeds, strict=True):
             point = np.array([tie.along, 0.0, 0.0])
             body, arm = self._assembly.anchor(tie.smarticle, tie.link, point)
-            place = state.link_positions[tie.smarticle, tie.link]
-            place = place + state.link_rotations[tie.smarticle, tie.link] @ point
-            away = math.copysign(1.0, place[0])
-            anchor = [float(place[0] + away * math.sqrt(law.length**2 - place[1] ** 2)), 0.0, 0.0]
+            position = state.link_positions[tie.smarticle, tie.link]
+            position = position + state.link_rotations[tie.smarticle, tie.link] @ point
+            away = math.copysign(1.0, position[0])
+            anchor = [float(position[0] + away * math.sqrt(law.length**2 - position[1] ** 2)), 0.0, 0.0]
             ends.append(End(body=body, arm=arm.tolist(), anchor=anchor, speed=away * speed))
         self._law = law
         self._bind(ends, [end.anchor for end in ends], [(0, 0, 0) for _ in ends])
@@ -96,8 +96,8 @@ class YadeStrings:
 
     @property
     def pulled(self) -> float:
-        begun = np.array([end.anchor for end in self._ends])
-        return float(np.ptp(rows_of(self._anchors)[:, 0]) - np.ptp(begun[:, 0]))
+        starts = np.array([end.anchor for end in self._ends])
+        return float(np.ptp(rows_of(self._anchors)[:, 0]) - np.ptp(starts[:, 0]))
 
     @property
     def ties(self) -> Array:
