@@ -185,7 +185,7 @@ class Settle(Part):
 
 
 def has_settled(settle: Settle, memory: Memory, engine: Engine) -> bool:
-    """Return whether the pile has settled, from a check that is due every `CHECK_INTERVAL`.
+    """Return whether the pile has settled; to be called every `CHECK_INTERVAL`.
 
     Args:
         memory: memory of the stage, with `waited`, the time since the wait began [s], which the stage adds up, and

@@ -27,7 +27,7 @@ def filled(count: int, *, solid_volume: float, radius: float, height: float) -> 
 
 
 def packing_fraction(heights: Array, *, solid_volume: float, radius: float) -> float:
-    """Return the packing fraction φ [1]; NaN for fewer than two smarticles, or a pile without height.
+    """Return the packing fraction φ [1]; NaN where the second-highest smarticle is missing or below the floor.
 
     Args:
         heights: (N,) heights of the centres of mass above the floor [m].
