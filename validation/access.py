@@ -371,7 +371,7 @@ class YadeAccess(_Access):
 
     def floor_force(self, engine: Engine) -> Array:
         own = _yade(engine)
-        return rows_of(own._omega.forces.f(body) for body in own.boundaries.container).sum(axis=0)
+        return np.asarray(rows_of(own._omega.forces.f(body) for body in own.boundaries.container).sum(axis=0))
 
     def torques(self, engine: Engine) -> Array:
         return np.asarray(_yade(engine).motors._hinges.torques()[0])
