@@ -42,7 +42,7 @@ _MOST = 60  # characters of a value that are shown
 
 
 def nearest(word: str, known: Iterable[str], *, cutoff: float = 0.6) -> str:
-    """Return `did you mean …` with the known word nearest to `word`, or the list of known words if none is near.
+    """Return `did you mean …` with the nearest known word, or the list of known words if none is near.
 
     Args:
         cutoff: least similarity of a near word, from 0 to 1, as in `difflib.get_close_matches`.

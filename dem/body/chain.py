@@ -106,7 +106,7 @@ def extent(state: State, diameter: float) -> float:
 
 
 def _corners(state: State) -> Array:
-    """Return (N, V, 3) tips and hinges [m]; for thicker middle links also the ends of their outer rows of spheres."""
+    """Return (N, V, 3) tips and hinges [m]; for thicker middle links also the ends of their outer rows."""
     bulge, vertices = state.boxes.bulge, state.vertices
     if not bulge:
         return vertices

@@ -42,14 +42,14 @@ def at_links(smarticle: Number, link: Number) -> Number:
 
 
 def at_boundaries(part: Number) -> Number:
-    """Return the codes of boundaries, below 0, for `contacts_of_points`; `part` are places in `BOUNDARIES`."""
+    """Return the codes of boundaries, below 0, for `contacts_of_points`, from places in `BOUNDARIES`."""
     return -1 - part
 
 
 def contacts_of_points(
     first: Numbers, second: Numbers, *, loads: Array, points: Array, friction: Array, forces: Array
 ) -> ContactForces:
-    """Return the contacts that forces at P points make, one for each pair of links or of link and boundary.
+    """Return the contacts that P points make: one per pair of links, or of a link and a boundary.
 
     Args:
         first: (P,) codes of links, from `at_links`.

@@ -1,4 +1,4 @@
-"""Poses of smarticles: random poses without overlap in a container, and poses fitted to recorded vertices."""
+"""Poses of smarticles: random poses without overlap, and poses fitted to recorded vertices."""
 
 from __future__ import annotations
 

@@ -71,7 +71,7 @@ class State:
 
     @cached_property
     def vertices(self) -> Array:
-        """(N, 4, 3) barb tip, hinge, hinge, barb tip of each smarticle [m]; the hinges are the middle link's ends."""
+        """(N, 4, 3) barb tip, hinge, hinge, barb tip of each smarticle [m]; hinges end the middle link."""
         half = self.link_rotations[..., 0] * (self.boxes.lengths / 2)[None, :, None]
         starts, ends = self.link_positions - half, self.link_positions + half
         return np.stack([ends[:, 0], starts[:, 1], ends[:, 1], ends[:, 2]], axis=1)
@@ -86,7 +86,7 @@ class State:
         return np.stack([np.arctan2(across1, -along1), np.arctan2(across2, along2)], axis=1)
 
     def spheres(self, particle: Particle, which: Numbers | None = None) -> Array:
-        """Return (N, S, 3) centres [m] of all spheres of a particle, or (N, len(which), 3) of the spheres `which`."""
+        """Return (N, S, 3) centres of all spheres [m], or (N, len(which), 3) of the spheres `which`."""
         links, local = particle.links, particle.local_centres
         if which is not None:
             links, local = links[which], local[which]

@@ -32,7 +32,7 @@ def ranks() -> int:
 
 
 def most_ranks() -> int:
-    """Return the largest number of ranks that have a core each, on this machine or all nodes of a batch job."""
+    """Return the largest number of ranks with a core each, on this machine or the nodes of a batch job."""
     given = os.environ.get("SLURM_NTASKS", "")
     return max(usable_cores(), int(given) if given.isdecimal() else 0)
 

@@ -72,7 +72,7 @@ class Boundaries(Protocol):
 
     @property
     def raised(self) -> float | None:
-        """Height by which a hook may have raised the pile [m]; None once the container no longer encloses the pile."""
+        """Height by which a hook may have raised the pile [m]; None once the pile is no longer enclosed."""
 
     @property
     def upper_height(self) -> float:
@@ -112,11 +112,11 @@ class Boundaries(Protocol):
 
     @property
     def channel_sums(self) -> Array:
-        """(2, 3) forces on the channel's lower and upper wall [N], summed over all steps; (0, 3) without walls."""
+        """(2, 3) forces on the channel's lower and upper wall [N], summed over steps; (0, 3) without walls."""
 
 
 class Motors(Protocol):
-    """Motors of the barbs; smarticles are welded (rigid) at first, and may be articulated and welded again."""
+    """Motors of the barbs; smarticles are welded (rigid) at first, and can be articulated and welded."""
 
     @property
     def present(self) -> bool:
@@ -198,7 +198,7 @@ class EnergyLedger(Protocol):
 
     @property
     def added(self) -> float:
-        """Energy of smarticles when they were added [J]: kinetic, gravitational above z = 0, and from `take_in`."""
+        """Energy of smarticles when added [J]: kinetic, gravitational above z = 0, and from `take_in`."""
 
     @property
     def dissipated(self) -> float:
@@ -212,7 +212,7 @@ class EnergyLedger(Protocol):
         """Return the energies in the springs of contacts and of hinges [J]."""
 
     def take_in(self) -> None:
-        """Add the present elastic energy of contacts to `added`, for smarticles that overlap when they are added."""
+        """Add the present elastic energy of contacts to `added`, for smarticles that overlap when added."""
 
 
 class Engine(Protocol):
@@ -290,7 +290,7 @@ class Engine(Protocol):
         """Downward momentum that gravity and throwing have given to all smarticles since the start [N s]."""
 
     def unbalanced_force(self) -> float:
-        """Return the mean net force on a smarticle over its weight [1]: 0 at rest, 1 in free fall, inf if N = 0."""
+        """Return the mean net force on a smarticle over its weight [1]: 0 at rest, 1 in free fall, inf for N = 0."""
 
     def neighbours(self) -> Numbers:
         """Return (N,) the number of other smarticles that each smarticle touches."""

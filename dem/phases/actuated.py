@@ -91,7 +91,7 @@ class ActuatedPhase(Phase):
         return self.follow(stage, engine)
 
     def follow(self, stage: Stage, engine: Engine, check_every: int | None = None) -> float:
-        """Make the control updates that are due, on articulated smarticles; return the time [s] until the next call.
+        """Articulate smarticles, and make the control updates that are due; return the time to the next call [s].
 
         Args:
             check_every: number of updates after which the caller wants to check the pile; None: no checks.
@@ -201,7 +201,7 @@ def _starting_angles(scene: SceneView, index: int) -> Array:
 
 
 def overshoot(scene: SceneView) -> float:
-    """Return the torque over τ_max [1] that a motor can gain between two control updates; 0 for capped torques."""
+    """Return the torque over τ_max [1] that a motor can gain between control updates; 0 if it is capped."""
     motor = scene.motor
     added = motor.stiffness_N_m_per_rad * motor.speed_limit_rad_per_s * scene.fidelity.control_interval_s
     return 0.0 if motor.law in ("slip", "servo") else added / scene.torque_limit

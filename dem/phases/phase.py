@@ -67,7 +67,7 @@ class Phase:
         return str(getattr(self, "type"))  # noqa: B009 - a field of the part that this is mixed into
 
     def check(self, scene: SceneView, index: int) -> Iterator[str]:
-        """Yield the errors of the phase, number `index` of a scene: one line each with key, value and what to do.
+        """Yield the errors of the phase, number `index` of a scene: a line each with key, value, what to do.
 
         Only the first error is reported: later checks may assume that earlier ones found none.
         """
@@ -86,7 +86,7 @@ class Phase:
         return None
 
     def warnings(self, scene: SceneView, index: int) -> Sequence[str]:
-        """Return warnings about values that are accepted but suspicious: one line each with key and what to do."""
+        """Return warnings about accepted but suspicious values: one line each with key and what to do."""
         return ()
 
     @property
@@ -95,7 +95,7 @@ class Phase:
         return getattr(self, "duration_s", None)
 
     def expected_duration(self, count: int) -> float:
-        """Return the simulated time [s] that the phase takes, an estimate for N = `count` if a criterion ends it."""
+        """Return the simulated time that the phase takes [s], estimated from N if a criterion ends it."""
         return self.known_duration or 0.0
 
     @property

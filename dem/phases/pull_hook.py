@@ -18,7 +18,7 @@ HELD_SECONDS = 0.1  # s, time for which the force is measured on a hook that the
 
 
 class PullHook(Part, Phase):
-    """Raise the upper hook at constant speed; smarticles are welded, and the force on the hook is measured."""
+    """Raise the upper hook at constant speed, with smarticles welded, and measure the force on the hook."""
 
     type: Literal["pull-hook"]
     which: Literal["upper"] = Field("upper", description="the hook that is raised; the lower one stays")
@@ -133,6 +133,6 @@ def with_pull_defaults(phase: Any, smarticle: Smarticle) -> Any:
 
 
 def _force_sum(engine: Engine) -> list[float]:
-    """Return (3,) the force on the upper hook, summed over steps [N]; constant while nothing touches the hook."""
+    """Return (3,) the force on the upper hook, summed over steps [N]; constant while nothing touches it."""
     total: list[float] = engine.boundaries.hook_sums[1].tolist()
     return total

@@ -21,7 +21,7 @@ from dem.setting.smarticle import Smarticle
 
 
 class Strain(Part, ActuatedPhase):
-    """Pull a chain apart by two strings, one at each end of the chain, while motors hold the barbs' angles.
+    """Pull a chain apart by two strings at its ends, while motors hold the barbs' angles.
 
     Each string is tied to an outer barb; its far end is on the chain's axis. One far end is fixed, the other one moves
     along x. Strings pull and never push.

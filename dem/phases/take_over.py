@@ -340,7 +340,7 @@ def _mismatches(scene: SceneView, taken: Taken) -> Iterator[str]:
 
 
 def _within_tips(vertices: Array, radius: float) -> Array:
-    """Return vertices (N, 4, 3) with both tips moved inwards by a radius [m], to the centres of the last spheres."""
+    """Return vertices (N, 4, 3) with both tips a radius [m] further in, at the last spheres' centres."""
     moved = vertices.copy()
     for tip, hinge, far in ((0, 1, 2), (3, 2, 1)):
         # Without barbs the middle link ends at the tips.
@@ -354,7 +354,7 @@ def _within_tips(vertices: Array, radius: float) -> Array:
 
 
 def _in_cross(cross: Cross, vertices: Array) -> Flags:
-    """Return (N,) whether the axis of a link passes through a bar, at points a quarter of the bar's side apart."""
+    """Return (N,) whether a link's axis passes through a bar, at points a quarter of the side apart."""
     ends = np.stack([vertices[:, :-1], vertices[:, 1:]], axis=2)  # (N, 3, 2, 3)
     longest = float(np.linalg.norm(ends[:, :, 1] - ends[:, :, 0], axis=-1).max())
     shares = np.linspace(0, 1, 2 + int(4 * longest / cross.side))[:, None]

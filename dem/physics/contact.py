@@ -1,4 +1,4 @@
-"""Laws of contacts and strings: spring, dashpot, Coulomb friction, and the damping for a restitution coefficient."""
+"""Laws of contacts and strings, and the damping that gives a coefficient of restitution."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ def restitution_of(damping_ratio: float) -> float:
 
 
 def damping_ratio(restitution: float) -> float:
-    """Return the damping ratio ζ [1] for a coefficient of restitution [1]: the inverse of `restitution_of`."""
+    """Return the damping ratio ζ [1] of a coefficient of restitution [1], inverse to `restitution_of`."""
     if restitution == 1:
         return 0.0
     return float(brentq(lambda zeta: restitution_of(zeta) - restitution, 0.0, 1e4, xtol=1e-14))

@@ -98,7 +98,7 @@ class Motors:
     def update(
         self, angles: Array, targets: Array, interval: float, time_step: float, rates: Array | None = None
     ) -> Array:
-        """Make a control update; return the torques (N, 2) on the barbs in the control period that follows [N m].
+        """Make a control update; return the torques (N, 2) on the barbs in the next control period [N m].
 
         Args:
             angles: (N, 2) actual angles [rad].

@@ -224,7 +224,7 @@ class Choice:
 def choose(
     scene: Scene, table: AccuracyTable, *, max_error: float | None = None, max_hours: float | None = None
 ) -> Choice:
-    """Choose engine and fidelity for a scene: the cheapest within the error, else the most exact within the hours.
+    """Return the cheapest engine and fidelity within the error, or else the most exact within the hours.
 
     Args:
         scene: the scene; its own engine and fidelity are ignored.

@@ -193,7 +193,7 @@ def warnings_of(scene: Scene) -> tuple[str, ...]:
 
 
 def engine_warnings(scene: Scene) -> tuple[str, ...]:
-    """Return a warning, in one line, about knobs of the fidelity that the scene sets and its engine ignores."""
+    """Return a warning in one line about knobs that the scene sets and its engine ignores."""
     fidelity = scene.fidelity
     named = fidelities(scene.engine)[fidelity.base]
     usual = {key: named.get(key, Fidelity.model_fields[key].default) for key in engine_kind(scene.engine).idle_knobs}
@@ -219,7 +219,7 @@ def recording_warnings(scene: Scene) -> tuple[str, ...]:
 
 
 def protocol_lines(scene: Scene) -> tuple[str, ...]:
-    """Return a line of the keys with their protocol's values, and one of deviating keys; none without a protocol."""
+    """Return a line of keys with the protocol's values, and one of deviating keys; none without protocol."""
     if scene.protocol is None:
         return ()
     kept, other = [], []
@@ -233,7 +233,7 @@ def protocol_lines(scene: Scene) -> tuple[str, ...]:
 
 
 def _protocol_keys(scene: Scene, rules: Mapping[str, Mapping[str, Any]]) -> Iterator[tuple[str, Any, Any]]:
-    """Yield all keys of a protocol that apply to a scene, each with the scene's value and the protocol's value."""
+    """Yield the protocol's keys that apply to a scene, each with the scene's and the protocol's value."""
     for part in PARTS:
         if applies(part, plane=scene.plane is not None, tiers=scene.container.tiers is not None):
             for key, value in rules[part].items():

@@ -1,4 +1,4 @@
-"""Time steps of the phases, from the engine's stable step and the intervals that are whole multiples of a step."""
+"""Time steps of phases, from the engine's stable step and the intervals that steps must divide."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ MOST_PER_STEP = 0.05
 
 
 def stable_step(scene: Scene) -> float:
-    """Return the largest stable time step [s] of a scene on its engine, with hinges if any phase has motors."""
+    """Return the largest stable time step [s] of a scene, with hinges if any phase has motors."""
     return engine_kind(scene.engine).stable_step(scene, articulated=scene.actuates)
 
 
 def time_step(scene: Scene) -> float:
-    """Return the time step [s] of a scene, a whole fraction of its recording intervals and of its control period.
+    """Return the time step [s] of a scene, a whole fraction of its recording and control intervals.
 
     Raises:
         InputError: `fidelity.time_step_s` is above the stable step, contacts on the engine links are too soft, or a
@@ -82,7 +82,7 @@ def _steps_in(interval: float, wanted: float) -> int:
 
 
 def _check_speeds(scene: Scene, steps: Sequence[float]) -> None:
-    """Reject speeds at which walls, hooks or strings pass through smarticles before contacts push these away."""
+    """Reject speeds of walls, hooks or strings that are too high for contacts to push smarticles away."""
     diameter = scene.sphere_diameter
     for index, (phase, step) in enumerate(zip(scene.phases, steps, strict=True)):
         most = MOST_PER_STEP * diameter / step

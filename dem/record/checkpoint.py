@@ -1,4 +1,4 @@
-"""Checkpoints: everything that a run needs to be resumed, in one checksummed file; the previous one is kept.
+"""Checkpoints: all that a run needs to be resumed, in one checksummed file; the previous one is kept.
 
 The engine's state is stored as bytes in the engine's own format, with the engine's name and version. The rest is plain
 data.

@@ -1,4 +1,4 @@
-"""Recorded quantities with units and descriptions: datasets of `series.h5`, and cell data of frames and forces."""
+"""Recorded quantities with units and descriptions, in `series.h5` and the cell data of VTK files."""
 
 from __future__ import annotations
 

@@ -14,7 +14,7 @@ from dem.record.names import partial
 
 @contextlib.contextmanager
 def whole(path: Path, *, before: Path | None = None, shared: bool = False) -> Iterator[Path]:
-    """Yield a temporary path, which is renamed to `path` if the block ends without an error, or else removed.
+    """Yield a temporary path, which is renamed to `path` if the block succeeds, and removed otherwise.
 
     Args:
         before: new path of the file that is replaced; None: it is removed.

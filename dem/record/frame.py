@@ -29,7 +29,7 @@ VERTICES = 4
 
 
 def _remedy(path: Path) -> str:
-    """Return what to do about a frame that cannot be read; a resumed run does not write earlier frames again."""
+    """Return what to do about an unreadable frame; a resumed run does not write earlier frames again."""
     scene = path.parent.parent / SCENE
     return f"remove its line from {scene.with_name(collection(FRAME))} to do without it, or run {scene} anew elsewhere"
 

@@ -1,4 +1,4 @@
-"""The sequence of a run's frames: numbered files, and the ParaView collection that lists them with their times."""
+"""The sequence of a run's frames: numbered files, and the ParaView collection with their times."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ class FrameWriter:
 
 
 class FrameSequence(Sequence[Frame]):
-    """The frames of a run in time order; each access reads a file, and a slice is a sequence that reads none.
+    """The frames of a run in time order; each access reads a file, and a slice reads none.
 
     Attributes:
         times: (n,) float64 [s], as listed in `frames.pvd`.

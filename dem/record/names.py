@@ -1,4 +1,4 @@
-"""Names of the files of a run directory, and numbers of their formats; docs/reference/files.md describes them."""
+"""File names of a run directory and numbers of formats, as docs/reference/files.md describes them."""
 
 from __future__ import annotations
 

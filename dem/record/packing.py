@@ -1,4 +1,4 @@
-"""Packing fraction of a pile whose height is that of the second-highest centre of mass, the paper's definition."""
+"""Packing fraction by the paper's definition, up to the second-highest centre of mass."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def filled(count: int, *, solid_volume: float, radius: float, height: float) -> 
 
 
 def packing_fraction(heights: Array, *, solid_volume: float, radius: float) -> float:
-    """Return the packing fraction φ [1]; NaN where the second-highest smarticle is missing or below the floor.
+    """Return the packing fraction φ [1]; NaN if no second-highest smarticle is above the floor.
 
     Args:
         heights: (N,) heights of the centres of mass above the floor [m].

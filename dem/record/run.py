@@ -173,7 +173,7 @@ class Run:
 
 
 class SceneData(dict[str, Any]):
-    """A mapping in `scene.yaml`, in which access to a missing key raises an `InputError` that names the file."""
+    """A mapping in `scene.yaml`; access to a missing key raises an `InputError` that names the file."""
 
     def __init__(self, path: Path, place: str, values: dict[str, Any]) -> None:
         super().__init__({key: _within(path, f"{place}{key}.", value) for key, value in values.items()})

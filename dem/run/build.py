@@ -44,7 +44,7 @@ KEPT_WITHIN = 0.01
 
 
 def build_engine(scene: Scene, dt: float) -> Engine:
-    """Return an empty simulation of a scene; dt is the time step of phases with motors [s] and is not checked."""
+    """Return an empty simulation of a scene; the time step dt [s] of phases with motors is not checked."""
     return engine_kind(scene.engine).build(scene, dt)
 
 

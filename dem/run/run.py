@@ -149,7 +149,7 @@ def _restore(simulation: Simulation, saved: tuple[Checkpoint, str | None] | None
 
 
 def _mark_ended(simulation: Simulation | None, out: Path, log: logging.Logger, error: BaseException) -> str:
-    """Write the series and `failed.json`; return the cause of the end, for a failed run with its last checkpoint."""
+    """Write the series and `failed.json`; return the cause, for a failed run with its last checkpoint."""
     status: Ended = "interrupted" if isinstance(error, StopRequestedError | KeyboardInterrupt) else "failed"
     cause = "interrupted by the user" if isinstance(error, KeyboardInterrupt) else str(error)
     if not isinstance(error, RunError | StopRequestedError | KeyboardInterrupt):
@@ -220,7 +220,7 @@ def manifest(
 
 
 def versions(made_by: tuple[str, str]) -> dict[str, str]:
-    """Return the versions of all software that results depend on; `made_by` is the engine's name and version."""
+    """Return the versions of all software on which results depend; `made_by` is the engine's."""
     try:
         own = version("smarticles")
     except PackageNotFoundError:
@@ -248,14 +248,14 @@ def _processor() -> str:
 
 
 def _blas() -> str:
-    """Return NumPy's BLAS and the kernels that the environment selects; results of links do not depend on it."""
+    """Return NumPy's BLAS and the kernels that the environment selects; links does not depend on them."""
     built = np.show_config(mode="dicts")["Build Dependencies"]["blas"]
     forced = os.environ.get("OPENBLAS_CORETYPE", "")
     return f"{built.get('name')} {built.get('version')}, kernels {forced or 'by the processor'}"
 
 
 def _git_revision() -> str:
-    """Return the commit of the code, with `-dirty` where files differ from it; `unknown` outside a checkout."""
+    """Return the commit of the code, with `-dirty` for changed files; `unknown` outside a checkout."""
     command = ["git", "describe", "--always", "--dirty", "--abbrev=12", "--exclude=*"]
     try:
         answer = subprocess.run(

@@ -21,7 +21,7 @@ from dem.record.packing import packing_fraction
 
 @dataclass
 class Sampler:
-    """Computes rows of the series, and keeps values of the previous sample, from which means over time follow."""
+    """Computes rows of the series, and keeps values of the previous sample for means over time."""
 
     radius: float  #: Radius for packing fractions [m]; NaN: they have no meaning
     effects: Set[EffectName] = frozenset()  #: Effects of the scene

@@ -1,4 +1,4 @@
-"""The loop of a run: phases in order, time advanced from one recording to the next, checkpoints in between."""
+"""The loop of a run: phases in order, steps from one recording to the next, and checkpoints."""
 
 from __future__ import annotations
 

@@ -96,7 +96,7 @@ def load_scene(path: Path | str, overrides: Sequence[str] = ()) -> Scene:
 
 
 def apply_override(data: Any, override: str) -> None:
-    """Change one key of a scene's data in place, by `KEY=VALUE` with dots for nesting; the value is read as YAML.
+    """Change one key of a scene's data in place, by `KEY=VALUE` with dots for nesting and a YAML value.
 
     Raises:
         InputError: the override has another form, or the scene has no such key.
@@ -126,7 +126,7 @@ def apply_override(data: Any, override: str) -> None:
 
 
 def _plain(scene: Scene) -> dict[str, Any]:
-    """Return the resolved scene as plain data, without keys at their defaults that were added to the format.
+    """Return the resolved scene as plain data, without later added keys that have their defaults.
 
     Leaving them out keeps the hashes of older scenes. A protocol could fill them in with other values, so that scenes
     with a protocol keep theirs.
@@ -150,7 +150,7 @@ def _plain(scene: Scene) -> dict[str, Any]:
 
 
 def dump_scene(scene: Scene, folder: Path | None = None) -> str:
-    """Return the resolved scene as YAML with every default; paths of other runs are made relative to `folder`."""
+    """Return the resolved scene as YAML with all defaults, and paths of other runs relative to `folder`."""
     data = _plain(scene)
     if folder is not None:
         for phase in data["phases"]:
@@ -173,7 +173,7 @@ def scene_hash(scene: Scene) -> str:
 
 
 def difference(there: Scene, here: Scene) -> str:
-    """Return the first keys in which two scenes differ, as `seed 1 there, 2 here; count 100 there, 50 here`."""
+    """Return the first keys in which two scenes differ, as `seed 1 there, 2 here; count 9 there, 8 here`."""
     one, other = (dict(_leaves(scene.model_dump(mode="json"))) for scene in (there, here))
     pairs = [(key, one.get(key, "absent"), other.get(key, "absent")) for key in {**one, **other}]
     texts = [f"{key} {a} there, {b} here" for key, a, b in pairs if a != b]

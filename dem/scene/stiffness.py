@@ -1,4 +1,4 @@
-"""Estimates of the largest overlaps in a scene from its loads and speeds, and of the stiffness that contacts need.
+"""Estimates of overlaps in a scene from its loads and speeds, and of the stiffness that it needs.
 
 Three loads are estimated:
 
@@ -32,7 +32,7 @@ class Overlap(NamedTuple):
 
 
 def expected_overlaps(scene: SceneView) -> tuple[Overlap, ...]:
-    """Return the expected overlaps of a scene: of an impact, of the weight, and of a hook if one is pulled."""
+    """Return the expected overlaps of a scene: for impact, weight, and a hook if one is pulled."""
     gravity, stiffness, smarticle = scene.gravity_m_per_s2, scene.fidelity.stiffness_N_per_m, scene.smarticle
     width, boxes = smarticle.middle_length_m, smarticle.boxes
     thickness = mean_width(smarticle.thickness_normal_m, smarticle.thickness_in_plane_m)
@@ -53,7 +53,7 @@ def expected_overlaps(scene: SceneView) -> tuple[Overlap, ...]:
 
 
 def stiffness_for(scene: SceneView) -> float:
-    """Return the least stiffness kn [N/m] that keeps expected overlaps within `WANTED`, rounded up to two digits."""
+    """Return the least kn [N/m] that keeps expected overlaps within `WANTED`, rounded up to two digits."""
     needed = max(overlap.stiffness for overlap in expected_overlaps(scene))
     if needed <= 0.0:
         return 0.0
@@ -62,7 +62,7 @@ def stiffness_for(scene: SceneView) -> float:
 
 
 def too_soft(scene: SceneView) -> str | None:
-    """Return a message if an expected overlap exceeds `LIMIT`, so that contacts are too soft; None otherwise."""
+    """Return a message about too soft contacts if an expected overlap exceeds `LIMIT`; None otherwise."""
     worst = max(expected_overlaps(scene), key=lambda overlap: overlap.widths)
     if worst.widths <= LIMIT:
         return None

@@ -1,1 +1,1 @@
-"""Parts of a scene as data: smarticle, container, hooks, contact, motors, motions, fidelity, recording."""
+"""Parts of a scene as data, such as smarticle, container, contact, motors and recording."""

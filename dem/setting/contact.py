@@ -8,7 +8,7 @@ from dem.setting.part import Part
 
 
 class Contact(Part):
-    """Friction, restitution and damping of contacts between smarticles, and of smarticles with the container."""
+    """Friction, restitution and damping at contacts of smarticles with each other and the container."""
 
     friction_smarticle: float = Field(0.4, ge=0, le=10, description="Coulomb coefficient, smarticle-smarticle [1]")
     friction_wall: float = Field(0.4, ge=0, le=10, description="Coulomb coefficient, smarticle-container [1]")

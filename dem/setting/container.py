@@ -1,4 +1,4 @@
-"""The container: an upright cylinder, closed at the bottom; or several coaxial cylinders, narrower upwards."""
+"""The container: an upright cylinder with a floor, or several coaxial cylinders, narrower upwards."""
 
 from __future__ import annotations
 

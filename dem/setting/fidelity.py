@@ -83,7 +83,7 @@ _BY_ENGINE: Mapping[str, Mapping[str, Mapping[str, Any]]] = {
 
 
 def fidelities(engine: str) -> Mapping[str, Mapping[str, Any]]:
-    """Return the named fidelities of an engine, from coarse to fine: keys of `Fidelity` with values, by name.
+    """Return an engine's named fidelities, from coarse to fine: values of `Fidelity`'s keys by name.
 
     A named fidelity has similar errors on all engines.
 

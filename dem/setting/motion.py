@@ -36,7 +36,7 @@ class Leg:
     until: float  #: Duration of the leg [s]
 
     def extent(self) -> tuple[Array, Array, float]:
-        """Return the lowest and the highest angle [rad] for each of `start`, and the greatest speed [rad/s] of all."""
+        """Return lowest and highest angle [rad] for each of `start`, and the greatest speed of all [rad/s]."""
         low, high, speed = self.motion.extent(self.start, self.home, self.until)
         return low + np.zeros_like(self.start), high + np.zeros_like(self.start), float(np.max(speed))
 

@@ -14,7 +14,7 @@ from dem.setting.part import Length, Part
 
 
 class Plane(Part):
-    """Smarticles lie flat on a table that carries them without friction, and stay in the plane; no container."""
+    """Smarticles lie flat on a table without friction and stay in its plane; there is no container."""
 
     width_m: Length | None = Field(
         None, description="H, distance between two walls along x that confine them [m]; null: no walls"

@@ -73,7 +73,7 @@ class Smarticle(Part):
         return self
 
     def tip_clearance(self, angles_deg: tuple[float, float]) -> float:
-        """Return the free distance [m] between the barb tips at angles [deg] beyond 90°; negative: the barbs cross."""
+        """Return the free distance of the barb tips [m] at angles [deg] beyond 90°; negative: they cross."""
         inward = -sum(math.cos(math.radians(angle)) for angle in angles_deg if angle > 90)
         return self.middle_length_m * (1 - self.aspect_ratio * inward) - self.thickness_in_plane_m
 

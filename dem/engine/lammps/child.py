@@ -145,7 +145,7 @@ class Child:
 
 
 def explain(log: str, output: str, status: int | None) -> tuple[str, str]:
-    """Return the cause of LAMMPS's end, and what to do, from its log, mpirun's output and mpirun's exit status."""
+    """Return the cause of LAMMPS's end, and what to do, from its log, mpirun's output and exit status."""
     errors = re.findall(r"^ERROR(?: on proc \d+)?: (.+)", f"{log}\n{output}", re.MULTILINE)
     if errors:
         cause = re.sub(r"\s*\([^()]*\.(?:cpp|h):\d+\)\s*$", "", errors[0]).strip()

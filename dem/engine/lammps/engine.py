@@ -1,4 +1,4 @@
-"""A running simulation on LAMMPS, in a child process on one or several ranks; see `dem.engine.lammps.child`."""
+"""A running simulation on LAMMPS, in a child process on one or several ranks."""
 
 from __future__ import annotations
 
@@ -142,7 +142,7 @@ class LammpsEngine:
             self._fresh = True
 
     def _scene(self, box: str) -> Iterator[str]:
-        """Yield all commands for a new LAMMPS except those for bodies; `box` is the command that reads the spheres."""
+        """Yield all commands for a new LAMMPS except those for bodies; the command `box` reads the spheres."""
         between, at_wall = text.contact_terms(self._law, self.particle.boxes.mass)
         yield from text.before_box(self.particle)
         # Vertical cuts divide the pile among ranks: above a horizontal cut there would be little work.
@@ -170,7 +170,7 @@ class LammpsEngine:
         yield "unfix bodies"
 
     def _balanced(self) -> Iterator[str]:
-        """Yield the command that balances spheres over ranks; two ranks have equal halves of a round pile anyway."""
+        """Yield the command that balances spheres over ranks; two have equal halves of a round pile anyway."""
         if self.child.ranks > 2:
             yield "balance 1.02 shift xy 20 1.01"
 
@@ -225,7 +225,7 @@ class LammpsEngine:
         )
 
     def _read(self, step: int) -> Array:
-        """Return (N, 20) values of all bodies at a step, with the columns `text.WRITTEN`, and remove their file."""
+        """Return (N, 20) values of all bodies at a step, in columns `text.WRITTEN`, and remove their file."""
         file = self.child.scratch / f"bodies.{step}.dump"
         lines = file.read_text(encoding="ascii").split("\n", HEAD)
         rows = np.array(lines[HEAD].split(), dtype=np.float64).reshape(-1, len(text.WRITTEN.split()))

@@ -116,7 +116,7 @@ def contact_terms(law: ContactLaw, mass: float) -> tuple[str, str]:
 
 
 def before_box(particle: Particle) -> Iterator[str]:
-    """Yield the commands that must precede the simulation box: units, boundaries, atom style, communication."""
+    """Yield the commands that must precede the simulation box, such as units and atom style."""
     yield "units            si"
     yield "# Springs of friction need each pair on both of two processors, and velocities of spheres at their borders."
     yield "newton           off"

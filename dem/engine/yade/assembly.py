@@ -1,4 +1,4 @@
-"""Smarticles as rigid bodies of spheres: welded, one body each, or articulated, three links and two hinges each.
+"""Smarticles as rigid bodies of spheres: one body if welded, three links and two hinges if articulated.
 
 Welding and articulating conserve positions, momentum and angular momentum up to rounding. Articulating also conserves
 the kinetic energy; welding dissipates the energy of the links' relative motion.
@@ -208,7 +208,7 @@ class Assembly:
         return before - self.state().kinetic_energy
 
     def anchor(self, smarticle: int, link: int, point: Array) -> tuple[int, Array]:
-        """Return the id of an articulated link's body, and a point (3,) of the link in YADE's frame of the body [m].
+        """Return the id of an articulated link's body, and a point (3,) in YADE's frame of this body [m].
 
         Args:
             point: (3,) in the link's frame [m].
@@ -229,7 +229,7 @@ class Assembly:
         self._ids, self._to_body, self._states = [], [], []
 
     def _angular_momenta(self) -> Array:
-        """Return (bodies, 3) angular momenta about the bodies' centres of mass, in the laboratory frame [kg m²/s]."""
+        """Return (bodies, 3) angular momenta about the centres of mass, in the laboratory frame [kg m²/s]."""
         if self._planar:
             # YADE stores no angular momentum of bodies that it rotates like spheres.
             return np.array([[0.0, 0.0, s.inertia[2] * s.angVel[2]] for s in self._states]).reshape(-1, 3)
@@ -264,7 +264,7 @@ class Assembly:
 
 
 def _tensors(state: State) -> tuple[Array, Array]:
-    """Inertia tensors of the smarticles (N, 3, 3) [kg m²] and arms of their links (N, 3, 3) [m], laboratory axes."""
+    """Return smarticles' inertia tensors (N, 3, 3) [kg m²] and links' arms (N, 3, 3) [m], laboratory axes."""
     boxes = state.boxes
     arms = state.link_positions - state.positions[:, None]
     own = np.einsum("nkij,kj,nklj->nil", state.link_rotations, boxes.link_inertias, state.link_rotations)

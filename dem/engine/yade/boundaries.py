@@ -1,4 +1,4 @@
-"""Rigid boundaries in YADE: a container of flat facets on a floor, hooks, or table and walls of motion in a plane."""
+"""Rigid boundaries in YADE: floor and wall of flat facets, hooks, or table and walls of a channel."""
 
 from __future__ import annotations
 

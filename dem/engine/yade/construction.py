@@ -70,7 +70,7 @@ def add_materials(yade: Yade, adds: Adds, law: ContactLaw) -> None:
     """Add the materials `adds.materials` to YADE's simulation, in that order.
 
     Args:
-        adds: union of the additions of all effects of a scene.
+        adds: what all effects of the scene add.
         law: contact law from which the materials' stiffness and damping follow.
     """
     # YADE puts two materials in series, so that each has twice the contact's value. The wall's dashpot is chosen such
@@ -102,7 +102,7 @@ def add_engines(
 
     Args:
         yade: YADE, with the materials already added.
-        adds: union of the additions of all effects of a scene.
+        adds: what all effects of the scene add.
         law: contact law, for the friction coefficients.
         hinges: law of the hinges; None where smarticles stay welded.
         gravity: g, downwards [m/s²].

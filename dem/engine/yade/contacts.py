@@ -85,7 +85,7 @@ def measure_overlaps(
 
 
 def _held(yade: Yade, assembly: Assembly, boundaries: YadeBoundaries, deep: Flags, least: float) -> tuple[Held, ...]:
-    """Return the smarticles of `deep` (N,) that touch two boundaries which have moved apart by over `least` [m]."""
+    """Return the smarticles of `deep` (N,) between two boundaries which moved apart by over `least` [m]."""
     parts = boundaries.parts()
     part_of = {body: name for name, (bodies, _) in parts.items() for body in bodies}
     touched: dict[int, set[str]] = defaultdict(set)

@@ -102,7 +102,7 @@ class Hinges:
         self._updates = 0
 
     def make(self, strengths: Array | None = None) -> None:
-        """Make the bonds; `strengths` are factors (N, 2) on stiffness and torque cap of the shafts [1], None: 1."""
+        """Make the bonds, with factors (N, 2) on the shafts' stiffness and torque cap [1]; None: 1."""
         factors = np.ones_like(self._angles) if strengths is None else strengths
         for (barb_centre, barb_end, middle_centre), factor in zip(self._hinges(), factors.flat, strict=True):
             self._bond(barb_centre, middle_centre, self._law.pin_stiffness)
@@ -126,7 +126,7 @@ class Hinges:
         self._pins, self._shafts, self._ends = [], [], []
 
     def _hinges(self) -> Iterator[tuple[int, int, int]]:
-        """Yield the ids of each hinge's nodes: the barb's at centre and axis end, the middle link's at the centre."""
+        """Yield the ids of each hinge's nodes: the barb's at centre and axis end, the middle link's."""
         for links in self._nodes:
             for hinge, barb in enumerate(BARBS):
                 centre, end = links[barb]

@@ -68,7 +68,7 @@ class Contacts:
         return float(normal.sum() + shear.sum())
 
     def _split(self, velocities: Array) -> tuple[Array, Array]:
-        """Return speeds of approach (M,) and tangential velocities of the first body relative to the second (M, 3)."""
+        """Return speeds of approach (M,) and tangential velocities of the first body to the second (M, 3)."""
         closing = -np.einsum("mi,mi->m", velocities, self.normals)
         return closing, -(velocities + closing[:, None] * self.normals)
 

@@ -17,7 +17,7 @@ from dem.physics.motor import MotorLaw, Motors
 
 
 class YadeMotors:
-    """`dem.engine.interface.Motors` on YADE; `strengths` are factors (N, 2) on torque limit and stiffness [1]."""
+    """`dem.engine.interface.Motors` on YADE, with factors (N, 2) on torque limit and stiffness [1]."""
 
     updates_at_once = 1  # YADE returns to Python after every step anyway
 

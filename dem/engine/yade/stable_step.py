@@ -121,7 +121,7 @@ def planar_stable_time_step(
 
 
 def _roll_shape(particle: Particle) -> Array:
-    """Return (18, 18) the stiffness matrix of tangential springs of 1 N/m at the highest points of all spheres."""
+    """Return (18, 18) the stiffness matrix of tangential springs of 1 N/m at all spheres' highest points."""
     shape = np.zeros((6 * LINKS, 6 * LINKS))
     for link, height in zip(particle.links, particle.centres[:, 2] + particle.radius, strict=True):
         about = slice(6 * int(link) + 3, 6 * int(link) + 5)
@@ -146,7 +146,7 @@ def _mass_matrix(boxes: Boxes) -> Array:
 
 
 def _velocity_of(boxes: Boxes, link: int, point: Array) -> Array:
-    """Return the matrix (3, 18) from the velocities of all links to that of a point (3,) [m], in the body frame."""
+    """Return the matrix (3, 18) from all links' velocities to that of a point (3,) [m], in the body frame."""
     x, y, z = point - boxes.link_centres[link]
     rows = np.zeros((3, 6 * LINKS))
     rows[:, 6 * link : 6 * link + 3] = np.eye(3)
