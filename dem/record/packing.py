@@ -27,7 +27,7 @@ def filled(count: int, *, solid_volume: float, radius: float, height: float) -> 
 
 
 def packing_fraction(heights: Array, *, solid_volume: float, radius: float) -> float:
-    """Return the packing fraction φ [1]; NaN if no second-highest smarticle is above the floor.
+    """Return the packing fraction φ [1]; NaN if fewer than two centres of mass are above the floor.
 
     Args:
         heights: (N,) heights of the centres of mass above the floor [m].
