@@ -12,12 +12,13 @@ from __future__ import annotations
 
 import hashlib
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from importlib.resources import files
 
 import numpy as np
 import pandas as pd
+from numpy.typing import ArrayLike, NDArray
 
 from dem.record.run import Run
 from postprocess.measures.collapse import (
@@ -37,7 +38,7 @@ from postprocess.statistics.seeds import SeedMean, Slope, difference, mean_over_
 from studies.framework.figures import ASPECT_LABEL, Histories, History, Means, one_by_one
 from studies.framework.findings import Effect, Finding, Outcome, Verdict, all_of, decide, within
 from studies.framework.provenance import Reference
-from studies.framework.runs import ASPECT_KEY, Key, Quantity, Row, duration, last_columns, sort_rows
+from studies.framework.runs import ASPECT_KEY, Key, Quantity, Row, duration, judging, last_columns, sort_rows
 from studies.framework.study import Study
 
 GAMMA, FREQUENCY, WATCHED = "peak acceleration [g]", "frequency [Hz]", "time vibrated [s]"
@@ -263,6 +264,15 @@ def _with_bounds(table: pd.DataFrame) -> pd.DataFrame:
     return own.assign(**{LOG: own[LOG].where(own[CENSORED] == 0), AT_LEAST: own[LOG]})
 
 
+def _law_curves(
+    tables: Mapping[str, pd.DataFrame], rows: pd.DataFrame, _: str, places: NDArray[np.float64]
+) -> dict[str, tuple[ArrayLike, ArrayLike]]:
+    """Compute ln(fτ) = Δ/Γ with the Δ of one l/w at places 1/Γ (n,), with the half-widths of its 95 % interval (n,)."""
+    points = judging(tables["points"])
+    own = points[(points[DEFINITION] == REMAINING) & (points[ASPECT] == rows[ASPECT].iloc[0])].iloc[0]
+    return {"_Δ": (own[ACTIVATION] * places, own[marked(ACTIVATION, "95 %")] * places)}
+
+
 STUDY = Study(
     name="collapse",
     title="Collapse of columns against the findings of Gravish et al.",
@@ -282,7 +292,11 @@ STUDY = Study(
             rows=_with_bounds,
             bounds={LOG: AT_LEAST},
             split=one_by_one(ASPECT, lambda aspect: rf"$l/w$ = {aspect:g}"),
-            notes=["By the height `remaining`. Open, with an arrow: a run did not collapse, a bound."],
+            fit=_law_curves,
+            notes=[
+                "By the height `remaining`. Open, with an arrow: a run did not collapse, a bound. Lines: "
+                "τ = (1/f) exp(Δ/Γ) with the Δ of each l/w and its 95 % interval."
+            ],
         ),
         Means(
             name="delta_aspect",

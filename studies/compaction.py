@@ -8,13 +8,14 @@ what they leave can be compared.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from dataclasses import replace
 from itertools import product
 from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import least_squares
 
 from dem.record.run import Run
@@ -148,6 +149,15 @@ def positive(name: str, says: str, values: Callable[[pd.DataFrame], pd.Series], 
     return Finding(id=name, says=says, outcome=outcome)
 
 
+def _law_curves(
+    _: Mapping[str, pd.DataFrame], rows: pd.DataFrame, __: str, times: Array
+) -> dict[str, tuple[ArrayLike, ArrayLike]]:
+    """Average both laws over the runs of one coefficient of friction: φ at times (n,), without an interval."""
+    fits = {law: rows[[of(law, name) for name in _MEANINGS][:5]].itertuples(index=False) for law in LAWS}
+    means = {law: np.mean([Fit(law, *run).at(times) for run in runs], axis=0) for law, runs in fits.items()}
+    return {law: (mean, np.full(len(times), np.nan)) for law, mean in means.items()}
+
+
 FINDINGS = (
     positive(
         "still-grows",
@@ -189,7 +199,14 @@ STUDY = Study(
         *(Quantity(column=of(law, name), meaning=f"{law}: {_MEANINGS[name]}") for law in LAWS for name in _MEANINGS),
     ),
     findings=FINDINGS,
-    figures=(PHI_TIME,),
+    figures=(
+        replace(
+            PHI_TIME,
+            fit=_law_curves,
+            marks=[SHAKE_TIME],
+            notes=[f"Laws: means over the runs; broken line: Gravish's {SHAKE_TIME:g} s."],
+        ),
+    ),
     order=(ASPECT, FRICTION, SEED),
     one_engine=True,
     remarks=(

@@ -10,10 +10,12 @@ pile counts as spanned where a cluster joins floor and top, and one wall and wal
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from functools import partial
 
 import numpy as np
 import pandas as pd
+from numpy.typing import ArrayLike, NDArray
 
 from dem.errors import InputError
 from dem.record.frames import FrameSequence
@@ -348,6 +350,18 @@ FINDINGS = (
     ),
 )
 
+
+def _law_curves(
+    tables: Mapping[str, pd.DataFrame], rows: pd.DataFrame, column: str, places: NDArray[np.float64]
+) -> dict[str, tuple[ArrayLike, ArrayLike]]:
+    """Compute the law of a quantity at places N^(-1/3) (n,), with the half-widths of its 95 % interval (n,)."""
+    law = fitted(tables["runs"], float(rows[ASPECT].iloc[0]), column)
+    if law is None:
+        return {}
+    half_widths = [law.error(1, float(place)) for place in places]
+    return {r"fit of $q_\infty + a N^{-1/3}$": (law.bulk + law.slope * places, half_widths)}
+
+
 _SCALING = [column(stage) for column in (phi, partial(phi, definition="voxel"), crossings) for stage in STAGES]
 FIGURES = (
     Means(
@@ -359,7 +373,10 @@ FIGURES = (
         rows=lambda points: points[points[ASPECT] == PAPER_ASPECT],
         split=one_by_one(ASPECT, "l/w = {:g}".format),
         marks=[PAPER_COUNT**-POWER],
-        notes=[f"0 is a pile without end; broken line: the paper's {PAPER_COUNT} smarticles. Fits: laws.csv."],
+        fit=_law_curves,
+        notes=[
+            f"Bands: 95 % of the fit; 0: a pile of infinite size; broken line: the paper's {PAPER_COUNT} smarticles."
+        ],
     ),
     Means(
         name="percolation",

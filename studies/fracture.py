@@ -178,8 +178,8 @@ _BY_ASPECT = one_by_one(ASPECT, lambda aspect: rf"$l/w$ = {aspect:g}")
 
 def _line(rows: Rows) -> Split:
     """Make one series of the internal oscillation."""
-    look = {**procedure_marker(INTERNAL), "linestyle": (0, (2, 1.5))}
-    return lambda points: [Series(rows=rows(points), label="internal oscillation", look=look)]
+    properties = {**procedure_marker(INTERNAL), "linestyle": (0, (2, 1.5))}
+    return lambda points: [Series(rows=rows(points), label="internal oscillation", properties=properties)]
 
 
 def _all_points(table: pd.DataFrame) -> list[Series]:

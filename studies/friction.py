@@ -428,15 +428,22 @@ def _shown(points: pd.DataFrame) -> pd.DataFrame:
 
 
 def _gravish(points: pd.DataFrame) -> dict[str, float]:
-    values = {stage: gravish_at(points[ASPECT].iloc[0], stage) for stage in ("phi_0", "phi_f")}
-    return {f"Gravish, {stage}": value for stage, value in values.items() if math.isfinite(value)}
+    return {f"Gravish, {stage}": gravish_at(points[ASPECT].iloc[0], stage) for stage in ("phi_0", "phi_f")}
+
+
+def _crosses(tables: Mapping[str, pd.DataFrame], aspect: float) -> pd.DataFrame:
+    """Select the friction at which φ_0 and φ_f are Gravish's at one l/w: `x`, `low`, `high` and φ, `y` [-]."""
+    found = tables["crossings"]
+    found = found[(found[ASPECT] == aspect) & found[STAGE].isin(["phi_0", "phi_f"]) & np.isfinite(found[FRICTION])]
+    low, high = (found[name].clip(found[FIRST], found[LAST]) for name in (LOW, HIGH))
+    return pd.DataFrame({"x": found[FRICTION], "low": low, "high": high, "y": found[REFERENCE]})
 
 
 STUDY = Study(
     name="friction",
     title="Friction that packs smarticles as Gravish et al. 2012 found",
     measure=measure,
-    keys=(ASPECT_KEY, Key(column=FRICTION, label="friction", form="g")),
+    keys=(Key(column=STAGE, label="stage"), ASPECT_KEY, Key(column=FRICTION, label="friction", form="g")),
     quantities=(
         PHI_QUANTITY,
         Quantity(column=DEVIATION, label="from Gravish [%]", form="+.1f", meaning="less Gravish's, over it"),
@@ -453,8 +460,12 @@ STUDY = Study(
             panels=ASPECT,
             levels=_gravish,
             share_y=True,
+            crosses=_crosses,
             bars=POOLED,
-            notes=[gravish_note((0.4, 0.7, 1.0))],
+            notes=[
+                "Crosses: friction at which φ is Gravish's, with its 95 % interval as far as it was measured.",
+                gravish_note((0.4, 0.7, 1.0)),
+            ],
         ),
         replace(PHI_TIME, panels=ASPECT),
     ),

@@ -182,7 +182,7 @@ def _compacts(runs: pd.DataFrame) -> Outcome:
 
 
 def _line(points: pd.DataFrame) -> list[Series]:
-    return [Series(rows=points, label="simulation", look=procedure_marker(EXTERNAL))]
+    return [Series(rows=points, label="simulation", properties=procedure_marker(EXTERNAL))]
 
 
 _PUBLISHED = read_gravish()

@@ -42,7 +42,7 @@ from postprocess.statistics.ranks import (
     resampled,
 )
 from postprocess.statistics.seeds import mean_over_seeds
-from studies.framework.figures import Means, Rows, Scatter, Series, marker, one_by_one, procedure_marker
+from studies.framework.figures import Heatmap, Means, Rows, Scatter, Series, marker, one_by_one, procedure_marker
 from studies.framework.findings import Finding, Outcome, Verdict, decide
 from studies.framework.procedures import (
     ACTIVE,
@@ -103,7 +103,12 @@ QUANTITIES = declare(
         WORK: ("", "", "∫ F dz over the whole pull, over n W_s w"),
         HELD_FAST: ("", "", "1 where the hook was stopped by its force limit on the way, 0 elsewhere"),
     },
-    axes={PEAK: r"strength $F/(n W_\mathrm{s})$ [-]"},
+    axes={
+        PHI: r"$\phi$ [-]",
+        CROSSINGS: r"$\langle N\rangle$ [-]",
+        LINKING: "linking number [-]",
+        PEAK: r"strength $F/(n W_\mathrm{s})$ [-]",
+    },
 )
 
 _MEASURED = {
@@ -486,7 +491,6 @@ FINDINGS = (
 
 # Figures
 
-_MAPPED = (PHI, CROSSINGS, LINKING, PEAK)
 _by_aspect = one_by_one(ASPECT, "l/w = {:g}".format)
 
 
@@ -498,7 +502,9 @@ def _swung(table: pd.DataFrame) -> pd.DataFrame:
 def _bought(table: pd.DataFrame) -> list[Series]:
     """Make a line of each θ of the internal oscillation, and markers of the other procedures."""
     others = [
-        Series(rows=table[table[PROCEDURE] == name], label=name, look={**procedure_marker(name), "linestyle": "none"})
+        Series(
+            rows=table[table[PROCEDURE] == name], label=name, properties={**procedure_marker(name), "linestyle": "none"}
+        )
         for name in (EXTERNAL, SHAPE)
     ]
     return [*one_by_one(THETA, "internal, θ = {:g}°".format)(_swung(table)), *others]
@@ -515,21 +521,34 @@ def _correlations(table: pd.DataFrame) -> pd.DataFrame:
 
 def _scopes(table: pd.DataFrame) -> list[Series]:
     styles = {WITHIN: marker("o", style.ORANGE, style.ORANGE), ALL: marker("D", style.BLUE, style.BLUE)}
-    return [Series(rows=table[table[SCOPE] == scope], label=scope, look=look) for scope, look in styles.items()]
+    return [
+        Series(rows=table[table[SCOPE] == scope], label=scope, properties=properties)
+        for scope, properties in styles.items()
+    ]
 
 
-_over_energy = partial(Means, x=ENERGY, x_label="energy per\nsmarticle [J]", log_x=True, share_y=True)
 FIGURES = (
-    _over_energy(
+    Heatmap(
         name="maps",
-        quantities=[QUANTITIES[name] for name in _MAPPED],
-        rows=_swung,
-        split=_by_aspect,
+        quantities=[QUANTITIES[name] for name in (PHI, CROSSINGS, LINKING, PEAK)],
+        rows=lambda points: points[points[PROCEDURE].isin([STATIC, INTERNAL])],
+        x=ENERGY,
+        x_label="energy per smarticle [J]",
+        y=ASPECT,
+        y_label=r"$l/w$ [-]",
         panels=THETA,
         panel="θ = {:g}°",
+        notes=[
+            "Left of the broken line: poured, no energy spent. A cell is a mean over seeds; l/w and θ beyond what the "
+            "hinge reaches are empty."
+        ],
     ),
-    _over_energy(
+    Means(
         name="strength_energy",
+        x=ENERGY,
+        x_label="energy per\nsmarticle [J]",
+        log_x=True,
+        share_y=True,
         quantities=[QUANTITIES[PEAK]],
         split=_bought,
         panels=ASPECT,

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pandas as pd
 
+from dem.errors import InputError
 from dem.record.run import Run
 from postprocess.report import figures as style
 from postprocess.report.tables import meaning_lines, table_lines
@@ -88,6 +89,19 @@ class Study:
     remarks: Sequence[str] = ()
     reference: Reference = SAVOIE  #: What the runs are compared with
     pictured: Mapping[str, object] = field(default_factory=dict)  #: Values of the run that a picture is drawn of
+
+    def __post_init__(self) -> None:
+        """Reject figures of points or runs that are split by a column that is no key, by an InputError."""
+        keys = [key.column for key in self.keys]
+        for figure in self.figures:
+            if getattr(figure, "table", "points") == "points":
+                split = getattr(getattr(figure, "split", None), "column", "")
+                for column in filter(None, (split, getattr(figure, "panels", ""))):
+                    if column not in keys:
+                        raise InputError(
+                            f"study {self.name}: figure {figure.name} is split by the column {column!r}, which is no "
+                            f"key; keys: {', '.join(keys)}; split by one of these, or add Key(column={column!r}, …)"
+                        )
 
     def analyse(
         self,

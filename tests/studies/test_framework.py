@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -141,3 +142,16 @@ def test_runs_that_must_not_be_averaged_are_rejected(
     with pytest.raises(InputError, match=message):
         TOY.analyse([runs[0], write(tmp_path / "other", **{"seed": 5, **other})], tmp_path / "out", **ORIGIN)
     assert list((tmp_path / "out").iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    "figure",
+    [
+        Means(name="odd", quantities=[LEVEL], x=ASPECT, x_label="l/w", split=one_by_one("colour", str)),
+        Means(name="odd", quantities=[LEVEL], x=ASPECT, x_label="l/w", split=lambda _: [], panels="colour"),
+    ],
+)
+def test_a_figure_split_by_a_column_that_is_no_key_is_rejected_when_the_study_is_made(figure: Means) -> None:
+    message = r"study toy: figure odd is split by the column 'colour', which is no key; keys: aspect ratio \[-\]; split"
+    with pytest.raises(InputError, match=message):
+        replace(TOY, figures=[figure])
