@@ -1,4 +1,4 @@
-"""Piles whose container is taken away: a pour, one activity or none, a rest, and `remove-container`, which is last."""
+"""Runs that end with `remove-container`: a pour, one activity or none, a rest, and the removal of the wall."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ _REMOVAL = "remove-container"
 
 
 def removal(run: Run) -> Phase:
-    """Find the phase that takes the wall away; InputError unless it is the last one, after a rest."""
+    """Return the phase that removes the wall; InputError unless it is the last one and follows a rest."""
     last = run.phases[-1]
     if last.type != _REMOVAL or len(run.phases) < 3 or run.phases[-2].type != "relax":
         types = ", ".join(phase.type for phase in run.phases)
@@ -32,7 +32,7 @@ def removal(run: Run) -> Phase:
 
 
 def around(run: Run) -> tuple[Frame, FrameSequence]:
-    """Read the last frame with the wall, and all those since it began to go; InputError where there are none."""
+    """Return the last frame with the wall and all frames of the removal; InputError if either is missing."""
     phase, frames = removal(run), run.frames
     rest, after = frames.in_phase(phase.index - 1), frames.in_phase(phase.index)
     if not rest or not after:
@@ -41,7 +41,11 @@ def around(run: Run) -> tuple[Frame, FrameSequence]:
 
 
 def named_columns(run: Run) -> dict[str, object]:
-    """Give the cells that name a run; InputError where it has several activities, or an unknown one."""
+    """Return the cells procedure, aspect ratio, seed, count and fidelity of a run's row.
+
+    Raises:
+        InputError: The run has several activities, or one of an unknown type.
+    """
     active = [phase.type for phase in run.phases if phase.type not in {*PASSIVE_PHASES, _REMOVAL}]
     if len(active) > 1 or not set(active) <= set(PROCEDURES):
         raise InputError(f"{run.path}: not one activity ({', '.join(PROCEDURES)}) or none: it has {', '.join(active)}")
@@ -50,15 +54,15 @@ def named_columns(run: Run) -> dict[str, object]:
 
 @dataclass(frozen=True, kw_only=True)
 class Pictures:
-    """A row of pictures for the first seed of each procedure: with the wall, 0.1 s after, and later."""
+    """Three pictures of the first seed of each procedure: with the wall, 0.1 s after it is removed, and later."""
 
-    labels: Mapping[str, str]  #: Labels by procedure
-    after: float | None = None  #: When the last picture is, after the wall began to go [s]; None: at the end
-    select: Sequence[str] = ()  #: Selects the runs; the first one of each procedure is drawn
+    labels: Mapping[str, str]  #: Label of each procedure
+    after: float | None = None  #: Time of the last picture since the removal began [s]; None: the end of the run
+    select: Sequence[str] = ()  #: Columns that must be 0 in the runs that are drawn
     name: str = "pictures"  #: Of the file
 
     def draw(self, path: Path, analysis: Analysis) -> list[Path]:
-        """Draw the runs whose directories are there."""
+        """Draw the pictures and return the path of the file; none if no run directory exists."""
         from postprocess.pictures import strip  # noqa: PLC0415  (imports PyVista)
 
         runs, rows = analysis.table("runs"), []
