@@ -259,7 +259,7 @@ class Collected:
                 )
 
     def reject_repeats(self, point: Callable[[MeasuredRun], str]) -> None:
-        """Raise InputError if two runs have equal point, seed and engine; `point` computes the name of a run's point."""
+        """Raise InputError if two runs have equal point, seed and engine; `point` returns the name of a run's point."""
         seen: dict[tuple[str, int, str], MeasuredRun] = {}
         for run in self.runs:
             key = (point(run), run.run.manifest.seed, run.run.manifest.engine)
