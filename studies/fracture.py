@@ -1,8 +1,9 @@
-"""A hook is pulled out of piles that were prepared by each procedure, of several amplitudes θ and several l/w.
+"""A hook is pulled out of piles that were prepared by each procedure, at several amplitudes θ and several l/w.
 
-Force against time, peak force, work, and how they go with entanglement, against Savoie, Tuazon, Bhamla and Goldman,
-"Amorphous Entangled Active Matter", Soft Matter 2023, section "Tensile loading and fracture". Runs of one l/w and seed
-were poured alike and are compared seed by seed; a pile that held fast has a peak of at least the limit of the hook.
+Measured are force against time, peak force and work, and their correlation with entanglement. They are compared with
+Savoie, Tuazon, Bhamla and Goldman, "Amorphous Entangled Active Matter", Soft Matter 2023, section "Tensile loading and
+fracture". Runs of one l/w and seed are poured from equal poses and compared pair by pair. If the hook stops at its
+force limit ("held fast"), the peak force is a lower bound.
 """
 
 from __future__ import annotations
@@ -63,7 +64,7 @@ from studies.strength import (
     with_crossings,
 )
 
-SHOWN_ASPECT = 0.7  # at which procedures and amplitudes are compared, as in the paper
+SHOWN_ASPECT = 0.7  # l/w at which procedures and amplitudes are compared, as in the paper
 
 PEAK_TIME = "time of the peak [s]"
 WINDOWS = {
@@ -100,7 +101,7 @@ QUANTITIES = declare(
 
 
 def measure(run: Run) -> Row:
-    """Measure the pile before the pull, and the forces on the hooks."""
+    """Measure the pile before the pull, and the forces on the hooks; return the run's row."""
     pile, pulled, series = prepared_by(run, PULL), run.phases[-1], run.series
     rest, asked = pulled.index - 1, run.scene["phases"][pulled.index]
     table = summarise_run(run, definitions=[DEFINITION], phases={rest, pulled.index}).set_index("phase")
@@ -138,30 +139,30 @@ def measure(run: Run) -> Row:
 
 
 def force_history(run: Run, *, net: bool = False) -> History:
-    """Read the force over n W_s against the time since the pull began; net of that on the lower hook."""
+    """Read the force on the upper hook over n W_s [-] against time; `net`: less the force on the lower hook."""
     pull = read_pull(run, run.series, run.phases[-1].index)
     force = (pull.net if net else pull).force / run.manifest.count / weight_of_one(run)
-    return History(times=pull.times, values=force, active=0.0)
+    return History(times=pull.times, values=force)
 
 
 def at_shown_aspect(table: pd.DataFrame) -> pd.DataFrame:
-    """Select what is at the aspect ratio at which procedures are compared."""
+    """Return the rows at the aspect ratio `SHOWN_ASPECT`."""
     return table[np.isclose(table[ASPECT], SHOWN_ASPECT)]
 
 
 def at_one_theta(table: pd.DataFrame) -> pd.DataFrame:
-    """Select what is compared: one l/w, of the internal oscillation one θ."""
+    """Return the rows at the aspect ratio `SHOWN_ASPECT`, of the internal oscillation only those at one θ."""
     return compared(at_shown_aspect(table))
 
 
 def amplitudes(table: pd.DataFrame) -> pd.DataFrame:
-    """Select the internal oscillation at the shown l/w, where there are several θ."""
+    """Return the rows of the internal oscillation at the aspect ratio `SHOWN_ASPECT`; none if they have one θ."""
     part = at_shown_aspect(table[table[PROCEDURE] == INTERNAL])
     return part if part[THETA].nunique() > 1 else part.iloc[:0]
 
 
 def aspects(table: pd.DataFrame) -> pd.DataFrame:
-    """Select the internal oscillation at the θ that is compared, where there are several l/w."""
+    """Return the rows of the internal oscillation at θ = `AMPLITUDE`; none if they have one l/w."""
     part = of_procedure(table, INTERNAL)
     return part if part[ASPECT].nunique() > 1 else part.iloc[:0]
 
@@ -177,13 +178,13 @@ _BY_ASPECT = one_by_one(ASPECT, lambda aspect: rf"$l/w$ = {aspect:g}")
 
 
 def _line(rows: Rows) -> Split:
-    """Make one series of the internal oscillation."""
+    """Return a split into one series, the internal oscillation."""
     properties = {**procedure_marker(INTERNAL), "linestyle": (0, (2, 1.5))}
     return lambda points: [Series(rows=rows(points), label="internal oscillation", properties=properties)]
 
 
 def _all_points(table: pd.DataFrame) -> list[Series]:
-    """Make series of the procedures, and of the internal oscillation at each other θ and l/w."""
+    """Return a series of each procedure at `SHOWN_ASPECT`, and of the internal oscillation at each other θ and l/w."""
     others = amplitudes(table), aspects(table)
     return [
         *by_procedure(line=False)(at_shown_aspect(table)),
