@@ -1,8 +1,8 @@
-"""Smarticles of l/w = 0.8 are poured into a mould of three tiers, which are narrower from the floor up, and activated.
+"""Smarticles of l/w = 0.8 are poured into a mould of three tiers, narrower from tier to tier.
 
-Then all walls are removed at once. Measured are how much of each tier is filled before, and how much of that is filled
-1 s after. Compared with Savoie, Tuazon, Bhamla and Goldman, "Amorphous Entangled Active Matter", Soft Matter 2023,
-section "Casting". Procedures are compared seed by seed.
+After an activity, or none, all walls are removed at once. Measured are how much of each tier is filled before, and how
+much of that is filled 1 s after. Compared with Savoie, Tuazon, Bhamla and Goldman, "Amorphous Entangled Active Matter",
+Soft Matter 2023, section "Casting". Procedures are compared seed by seed.
 """
 
 from __future__ import annotations
@@ -73,7 +73,7 @@ QUANTITIES = declare(
 
 
 def measure(run: Run) -> Row:
-    """Measure the shares of the mould inside the pile before the walls are removed and 1 s after; return the row."""
+    """Measure how the pile fills the mould before the walls are removed and 1 s after; return the row."""
     tiers = read_tiers(run)
     if len(tiers) != len(TIERS) + 1:
         raise InputError(

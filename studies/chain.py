@@ -1,8 +1,9 @@
-"""Strain test of a chain of two or six robots between two walls: force, yield, width and fracture against confinement.
+"""Strain test of a chain of two or six robots between two walls, at several distances of the walls.
 
-Compared with Savoie, Tuazon, Bhamla and Goldman, "Amorphous Entangled Active Matter", Soft Matter 2023, section
-"Robophysical experiment". The paper omits friction, servos and strings; variants of the sweep show their influence. In
-`chain-bodies` robots have bodies 2.1 cm thick. Runs of one seed have equal servos. --quick takes minutes.
+Measured are force, yield, width and fracture against confinement h/H. Compared with Savoie, Tuazon, Bhamla and Goldman,
+"Amorphous Entangled Active Matter", Soft Matter 2023, section "Robophysical experiment". The paper omits friction,
+servos and strings; variants of the sweep show their influence. In `chain-bodies` robots have bodies 2.1 cm thick. Runs
+of one seed have equal servos. --quick takes minutes.
 """
 
 from __future__ import annotations
@@ -147,7 +148,7 @@ def _straight(base: pd.DataFrame) -> list[Effect]:
 
 
 def yields(count: int) -> Finding:
-    """Make the finding that a chain of so many robots yields, with a drop of the force, near the paper's strain."""
+    """Make the finding that a chain of so many robots has a yield drop near the paper's strain."""
     expected = YIELDS[count]
 
     def outcome(base: pd.DataFrame) -> Outcome:
@@ -228,7 +229,7 @@ FINDINGS = (
 
 
 def history(run: Run, *, width: bool = False) -> History:
-    """Read the force of the pulled string [N], or the width over that at the start [-], against strain to fracture."""
+    """Read the string's force [N], or the width over that at the start [-], against strain to fracture."""
     pull = read_strain_test(run)
     end = pull.fracture + 1
     values = pull.widths / pull.widths[0] if width else pull.forces

@@ -1,4 +1,4 @@
-"""Free-standing columns on a vibrating floor: collapse time τ, and Δ in τ = (1/f) exp(Δ/Γ), against l/w.
+"""Collapse of free-standing columns on a vibrating floor: time τ and Δ in τ = (1/f) exp(Δ/Γ).
 
 Gravish, Franklin, Hu and Goldman, "Entangled granular media", Phys. Rev. Lett. 108, 208001 (2012), found that Δ is
 greatest at an intermediate l/w. A run pours the pile, shakes it inside the wall, lets it rest, removes the wall, and
@@ -113,7 +113,7 @@ def measure(run: Run) -> Sequence[Row]:
 
 
 def times(runs: pd.DataFrame) -> pd.DataFrame:
-    """Average ln(fτ) over seeds: one row per definition, l/w and Γ; a mean that includes a bound has no error."""
+    """Average ln(fτ) over seeds by definition, l/w and Γ; a mean that includes a bound has no error."""
     found = []
     for point, group in runs.groupby([DEFINITION, ASPECT, GAMMA], sort=False):
         bounds, mean = int(group[TIME].isna().sum()), mean_over_seeds(group[LOG])
@@ -167,7 +167,7 @@ def rise(used: pd.DataFrame) -> Slope:
 
 
 def change(used: pd.DataFrame) -> Slope:
-    """Fit the change of Γ ln(fτ) from the least to the greatest Γ, over its mean at each l/w [-]; 0 by the law."""
+    """Fit the change of Γ ln(fτ) from the least to the greatest Γ, over its mean at each l/w [-]."""
     span = float(np.ptp(used[GAMMA])) if len(used) else 0.0
     if not span:
         return slope_within([], [], [])
@@ -267,7 +267,7 @@ def _with_bounds(table: pd.DataFrame) -> pd.DataFrame:
 def _law_curves(
     tables: Mapping[str, pd.DataFrame], rows: pd.DataFrame, _: str, places: NDArray[np.float64]
 ) -> dict[str, tuple[ArrayLike, ArrayLike]]:
-    """Compute ln(fτ) = Δ/Γ with the Δ of one l/w at places 1/Γ (n,), with the half-widths of its 95 % interval (n,)."""
+    """Compute ln(fτ) = Δ/Γ of one l/w at places 1/Γ (n,), with 95 % half-widths (n,)."""
     points = judging(tables["points"])
     own = points[(points[DEFINITION] == REMAINING) & (points[ASPECT] == rows[ASPECT].iloc[0])].iloc[0]
     return {"_Δ": (own[ACTIVATION] * places, own[marked(ACTIVATION, "95 %")] * places)}

@@ -1,9 +1,9 @@
-"""U-shapes of l/w = 0.7 are shaken for 200 s, ten times as long as by Gravish et al., at two coefficients of friction.
+"""U-shapes of l/w = 0.7 are shaken for 200 s at two coefficients of friction.
 
-Does φ still grow, and by which law? Gravish et al. (PRL 108, 208001, 2012) describe the relaxation of staples by the
-stretched exponential of Kohlrausch, Williams and Watts. Tapped columns of beads follow the inverse logarithm of Knight,
-Fandrich, Lau, Jaeger and Nagel, Phys. Rev. E 51, 3957 (1995). Both laws have four parameters, so that their residuals
-can be compared.
+This is ten times as long as Gravish et al. shook. Does φ still grow, and by which law? Gravish et al. (PRL 108, 208001,
+2012) describe the relaxation of staples by the stretched exponential of Kohlrausch, Williams and Watts. Tapped columns
+of beads follow the inverse logarithm of Knight, Fandrich, Lau, Jaeger and Nagel, Phys. Rev. E 51, 3957 (1995). Both
+laws have four parameters, so that their residuals can be compared.
 """
 
 from __future__ import annotations
@@ -101,7 +101,7 @@ def fit(law: str, times: Array, packing: Array) -> Fit:
 
 
 def spread_out(times: Array, packing: Array) -> tuple[Array, Array]:
-    """Average φ (n,) [-] at times (n,) [s] over logarithmic intervals from `FIRST` on; empty intervals are left out.
+    """Average φ (n,) [-] at times (n,) [s] over logarithmic intervals; empty ones are left out.
 
     Returns:
         Geometric centres of the intervals (m,) [s], and means of φ (m,) [-].
@@ -164,7 +164,7 @@ def positive(name: str, says: str, values: Callable[[pd.DataFrame], pd.Series], 
 def _law_curves(
     _: Mapping[str, pd.DataFrame], rows: pd.DataFrame, __: str, times: Array
 ) -> dict[str, tuple[ArrayLike, ArrayLike]]:
-    """Average both laws over the runs of one coefficient of friction: φ at times (n,), without an interval."""
+    """Compute φ at times (n,) by both laws, averaged over the runs of one coefficient of friction."""
     fits = {law: rows[[law_column(law, name) for name in _MEANINGS][:5]].itertuples(index=False) for law in LAWS}
     means = {law: np.mean([Fit(law, *run).at(times) for run in runs], axis=0) for law, runs in fits.items()}
     return {law: (mean, np.full(len(times), np.nan)) for law, mean in means.items()}

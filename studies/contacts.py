@@ -1,4 +1,4 @@
-"""Friction between smarticles, friction at the container and restitution: how much does each change packing?
+"""Effect of friction between smarticles, friction at the container and restitution on packing.
 
 All combinations of two values of these three factors at three l/w, shaken as by Gravish et al. The effect of a factor
 is the mean of paired differences, second value less first, between runs that are equal in everything else. Differences
@@ -57,7 +57,7 @@ DEVIATION = "deviation of phi_f from Gravish [%]"
 
 
 def measure(run: Run) -> Row:
-    """Measure φ before, during and after shaking, and the rise of the lowest smarticles; return the run's row."""
+    """Measure φ before, during and after shaking, and the rise of the lowest smarticles; return the row."""
     contact = contact_of(run)
     known = {
         FRICTION: contact["friction_smarticle"],
@@ -99,7 +99,7 @@ def points(runs: pd.DataFrame) -> pd.DataFrame:
 
 
 def by_seed(runs: pd.DataFrame, quantity: str, *changed: str) -> pd.DataFrame:
-    """Return the change of a quantity with one factor, or the interaction of two factors: a row per l/w and seed."""
+    """Return the change of a quantity with one factor, or the interaction of two, by l/w and seed."""
     table, left = runs, [*FACTORS, ASPECT, SEED]
     for factor in changed:
         left = [name for name in left if name != factor]
@@ -150,7 +150,7 @@ def lowers(name: str, says: str, quantity: str, *changed: str, sign: int = -1, l
 
 
 def _near_gravish(means: pd.DataFrame) -> Outcome:
-    """Judge whether a combination is within the margin of Gravish's points at every l/w, beyond its errors."""
+    """Judge whether a combination is surely within the margin of Gravish's points at every l/w."""
     known = means[means[DEVIATION].notna()]
     if known.empty:
         return Outcome(note="no points of Gravish's at these l/w", verdict=Verdict.NOT_RESOLVED)

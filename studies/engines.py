@@ -1,4 +1,4 @@
-"""Equal seeds on links and YADE: the difference of each quantity against a margin that was chosen before the runs.
+"""Equal seeds on links and YADE: differences against margins that were chosen before the runs.
 
 Both engines pour equal seeds from equal poses. The engines are equivalent in a quantity if the 95 % confidence interval
 of the relative difference lies within the margin, different if it lies outside, and not resolved otherwise: that a
@@ -185,7 +185,7 @@ def equivalence(runs: pd.DataFrame) -> pd.DataFrame:
 
 
 def pitch_of(variant: str) -> float:
-    """Return the pitch of a variant [-]: 0 for links, the limit, 1 for YADE's default; NaN for an unknown variant."""
+    """Return the pitch of a variant [-]: 0 for links, the limit, 1 for `yade`; NaN if it is unknown."""
     if variant in (LINKS, YADE):
         return 0.0 if variant == LINKS else 1.0
     return float(variant.removeprefix("pitch-")) if variant.startswith("pitch-") else math.nan

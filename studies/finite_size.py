@@ -1,4 +1,4 @@
-"""Finite size: packing, entanglement and percolation in piles of one shape with 100 to 10 000 smarticles.
+"""Finite size: packing, entanglement and percolation in piles of 100 to 10 000 smarticles.
 
 Measured are φ and ⟨N⟩ against N^(-1/3), where N is the number of smarticles, and the l/w from which entangled clusters
 span piles of each size. A run is a pour, a rest, a shake and a rest.
@@ -75,7 +75,7 @@ def share(stage: str) -> str:
 
 
 def spans(stage: str, what: str = "pile") -> str:
-    """Return the name of the column that is 1 if clusters span `what`: the height, the width, or both (pile)."""
+    """Return the name of the column that is 1 if clusters span the height, the width, or both ("pile")."""
     return f"spans {what} {stage} [-]"
 
 
@@ -110,7 +110,7 @@ ASKED = {
 
 
 def measure(run: Run) -> Row:
-    """Measure the pile at rest before and after the shake, and φ at the end of the shake; return the run's row."""
+    """Measure the pile at rest before and after the shake, and φ at its end; return the run's row."""
     types = tuple(phase.type for phase in run.phases)
     if types != PHASES:
         raise InputError(f"{run.path}: its phases are {', '.join(types)}, not {', '.join(PHASES)}")
@@ -191,7 +191,7 @@ def _column(stage: str, axis: str) -> str:
 
 
 def _profiles(runs: pd.DataFrame, stage: str, axis: str) -> dict[int, Profile]:
-    """Fit the threshold from which piles are spanned, along an axis ("l/w" or "⟨N⟩"), by number of smarticles."""
+    """Fit the threshold from which piles are spanned along an axis ("l/w" or "⟨N⟩"), by size."""
     column = _column(stage, axis)
     part = runs[(runs[ASPECT] <= LARGEST) & np.isfinite(runs[column])]
     if part.empty:
@@ -354,7 +354,7 @@ FINDINGS = (
 def _law_curves(
     tables: Mapping[str, pd.DataFrame], rows: pd.DataFrame, column: str, places: NDArray[np.float64]
 ) -> dict[str, tuple[ArrayLike, ArrayLike]]:
-    """Compute the law of a quantity at places N^(-1/3) (n,), with the half-widths of its 95 % interval (n,)."""
+    """Compute the law of a quantity at places N^(-1/3) (n,), with 95 % half-widths (n,)."""
     law = fitted(tables["runs"], float(rows[ASPECT].iloc[0]), column)
     if law is None:
         return {}

@@ -1,4 +1,4 @@
-"""A hook is pulled out of piles that were prepared by each procedure, at several amplitudes θ and several l/w.
+"""A hook is pulled out of piles that were prepared by each procedure, at several θ and l/w.
 
 Measured are force against time, peak force and work, and their correlation with entanglement. They are compared with
 Savoie, Tuazon, Bhamla and Goldman, "Amorphous Entangled Active Matter", Soft Matter 2023, section "Tensile loading and
@@ -139,7 +139,7 @@ def measure(run: Run) -> Row:
 
 
 def force_history(run: Run, *, net: bool = False) -> History:
-    """Read the force on the upper hook over n W_s [-] against time; `net`: less the force on the lower hook."""
+    """Read the force on the upper hook, `net` of that on the lower one, over n W_s [-] against time."""
     pull = read_pull(run, run.series, run.phases[-1].index)
     force = (pull.net if net else pull).force / run.manifest.count / weight_of_one(run)
     return History(times=pull.times, values=force)
@@ -156,7 +156,7 @@ def at_one_theta(table: pd.DataFrame) -> pd.DataFrame:
 
 
 def amplitudes(table: pd.DataFrame) -> pd.DataFrame:
-    """Return the rows of the internal oscillation at the aspect ratio `SHOWN_ASPECT`; none if they have one θ."""
+    """Return the rows of the internal oscillation at `SHOWN_ASPECT`; none if they have one θ."""
     part = at_shown_aspect(table[table[PROCEDURE] == INTERNAL])
     return part if part[THETA].nunique() > 1 else part.iloc[:0]
 
@@ -184,7 +184,7 @@ def _line(rows: Rows) -> Split:
 
 
 def _all_points(table: pd.DataFrame) -> list[Series]:
-    """Return a series of each procedure at `SHOWN_ASPECT`, and of the internal oscillation at each other θ and l/w."""
+    """Return a series of each procedure, and of the internal oscillation at each other θ and l/w."""
     others = amplitudes(table), aspects(table)
     return [
         *by_procedure(line=False)(at_shown_aspect(table)),

@@ -1,4 +1,4 @@
-"""Which coefficient of friction μ, from 0.2 to 0.8, gives Gravish's packing fractions, and is it that of steel?
+"""Which coefficient of friction, 0.2 to 0.8, gives Gravish's packing fractions, and is it steel's?
 
 U-shapes of three l/w are poured and shaken for 20 s as by Gravish, Franklin, Hu and Goldman, "Entangled granular
 media", Phys. Rev. Lett. 108, 208001 (2012). Smarticles and walls have equal friction. φ is interpolated linearly in
@@ -104,7 +104,7 @@ class Curve:
         return np.asarray(np.interp(friction, self.friction, self.packing) - self.reference, dtype=np.float64)
 
     def error(self, friction: Array) -> Array:
-        """Return the 95 % half-width (m,) [-] of the deviation: errors of both neighbouring means and of reading."""
+        """Return the 95 % half-width (m,) [-] of the deviation, by the errors of both means and of reading."""
         if len(self.friction) == 1:
             return np.asarray(np.hypot(np.full(friction.shape, self.half_widths[0]), DIGITISING_ERROR))
         right = np.clip(np.searchsorted(self.friction, friction), 1, len(self.friction) - 1)
@@ -147,7 +147,7 @@ class Curve:
         return value, low, high, place
 
     def within(self, margin: float, friction: float) -> float:
-        """Return the confidence that φ is within a margin [-] of Gravish's φ at a friction; NaN without errors."""
+        """Return the confidence that φ is within a margin [-] of Gravish's φ; NaN without errors."""
         at = np.array([friction])
         deviation, error = float(self.deviation(at)[0]), float(self.error(at)[0]) / _per_error(self.scatter)
         if not math.isfinite(error):
@@ -170,7 +170,7 @@ def _per_error(scatter: Scatter) -> float:
 
 
 def tabulate(runs: pd.DataFrame) -> dict[str, pd.DataFrame]:
-    """Make the tables `points`, `crossings`, `verdicts`, `nearest`, `growth` and `scatter` from the table of runs."""
+    """Make the tables `points`, `crossings`, `verdicts`, `nearest`, `growth` and `scatter`."""
     scatters = {}
     for name in (stage for stage in COMPARED if phi(stage) in runs):
         groups = [group[phi(name)].dropna() for _, group in runs.groupby([ASPECT, FRICTION])]
@@ -234,7 +234,7 @@ def crossings(found: Curves) -> pd.DataFrame:
 
 
 def nearness(found: Curves, friction: float) -> dict[str, float | int | str]:
-    """Compute deviations of all curves from Gravish's φ at a friction [%], and the confidence of being near [%].
+    """Compute deviations of all curves from Gravish's φ at a friction, and the confidence of being near.
 
     Returns:
         Cells by column: mean and largest deviation, the confidence that all points are within `MARGIN`, and that of
@@ -272,7 +272,7 @@ def verdict(near: Mapping[str, float | int | str], *, whole: bool) -> str:
 
 
 def verdicts(found: Curves) -> pd.DataFrame:
-    """Tabulate `nearness` and `verdict` for each set of stages in `JUDGED` and each friction that was measured."""
+    """Tabulate `nearness` and `verdict` for each set of stages in `JUDGED` and each measured friction."""
     rows = []
     for what, stages in JUDGED.items():
         wanted = {key: curve for key, curve in found.items() if key[0] in stages}
@@ -285,7 +285,7 @@ def verdicts(found: Curves) -> pd.DataFrame:
 
 
 def nearest(found: Curves) -> pd.DataFrame:
-    """Tabulate for each set of stages in `JUDGED` the friction with the least largest deviation, interpolated."""
+    """Tabulate for each set of stages in `JUDGED` the friction with the smallest maximum deviation."""
     rows = []
     for what, stages in JUDGED.items():
         wanted = {key: curve for key, curve in found.items() if key[0] in stages}
@@ -304,7 +304,7 @@ def nearest(found: Curves) -> pd.DataFrame:
 
 
 def growth(runs: pd.DataFrame) -> pd.DataFrame:
-    """Tabulate the mean growth of φ between `TIMES` [%] by l/w and friction; the scatter is pooled over all points."""
+    """Tabulate the mean growth of φ between `TIMES` [%] by l/w and friction, with pooled scatter."""
     names = [phi(at_time(time)) for time in TIMES]
     grown = runs.reindex(columns=[*runs.columns, *(set(names) - set(runs.columns))])
     for name, (one, other) in zip(GROWTHS, itertools.pairwise(names), strict=True):
@@ -374,7 +374,7 @@ def _common(found: pd.DataFrame) -> Outcome:
 
 
 def of_steel(surface: str) -> Finding:
-    """Make the finding that the friction at which φ_f is Gravish's is that of steel with a surface, key of `STEEL`."""
+    """Make the finding that φ_f is Gravish's at the friction of steel, of a surface in `STEEL`."""
     least, most = STEEL[surface]
 
     def outcome(found: pd.DataFrame) -> Outcome:
@@ -444,7 +444,7 @@ def _gravish(points: pd.DataFrame) -> dict[str, float]:
 
 
 def _crosses(tables: Mapping[str, pd.DataFrame], aspect: float) -> pd.DataFrame:
-    """Select the friction at which φ_0 and φ_f are Gravish's at one l/w: `x`, `low`, `high` and φ, `y` [-]."""
+    """Return friction (`x`, `low`, `high`) and φ (`y`) [-] at which φ_0 and φ_f of one l/w are Gravish's."""
     found = tables["crossings"]
     found = found[(found[ASPECT] == aspect) & found[STAGE].isin(["phi_0", "phi_f"]) & np.isfinite(found[FRICTION])]
     low, high = (found[name].clip(found[FIRST], found[LAST]) for name in (LOW, HIGH))

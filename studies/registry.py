@@ -28,7 +28,7 @@ QUICK = "quick"
 
 @dataclass(frozen=True)
 class Script:
-    """A shipped study before it is loaded: its script, its sweep file and the variants of the sweep that it uses."""
+    """A shipped study before it is loaded: its script, sweep file and variants of the sweep."""
 
     name: str  #: Such as `strength-code`
     module: str  #: Such as `strength`
@@ -47,7 +47,7 @@ class Script:
         return replace(study, name=self.name)
 
     def sweep_file(self, *, quick: bool = False) -> Path:
-        """Return the sweep file with its variants as `FILE@VARIANT`; InputError if `quick` asks for one not there."""
+        """Return the sweep file with its variants, `FILE@VARIANT`; InputError if there is no quick variant."""
         if quick and not self.quick:
             raise InputError(f"study {self.name} has no quick variant; leave --quick out")
         variants = [*self.variants, *([QUICK] if quick else [])]

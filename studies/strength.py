@@ -1,4 +1,4 @@
-"""Piles prepared by each procedure are torn apart between a grid on the floor and a hook, without a wall.
+"""Piles of each procedure are torn apart between a grid on the floor and a hook, without a wall.
 
 In the paper's own test (study `fracture`) a single smarticle may hold both hooks, or the hook lifts the whole pile,
 which rubs on the wall. Here a grid of bars 2.5 mm above the floor holds the pile, the wall is removed before the pull,
@@ -83,7 +83,7 @@ QUANTITIES = declare(
 
 
 def measure(run: Run) -> Row:
-    """Measure the pile before the pull, the force on the hook, and the share torn off; return the run's row."""
+    """Measure the pile before the pull, the force on the hook, and the share torn off; return the row."""
     pile, pulled = prepared_by(run, "remove-container", PULL), run.phases[-1]
     rest, free = pulled.index - 2, pulled.index - 1
     settings, hooks = run.scene["phases"][pulled.index], run.scene.get("hooks")
@@ -132,7 +132,7 @@ def force_history(run: Run) -> History:
 
 
 def over_heights(runs: pd.DataFrame) -> pd.DataFrame:
-    """Average runs over the heights of the hook: one row per procedure, l/w and seed that has runs at all heights."""
+    """Average runs over the heights of the hook, by procedure, l/w and seed with runs at all heights."""
     columns = [PEAK, RAISED, WORK, THROUGH, CARRIED, ABOVE, CROSSINGS, HELD_FAST]
     grouped = compared(runs).groupby([PROCEDURE, ASPECT, SEED])
     return grouped[columns].mean()[grouped[UPPER].nunique() == runs[UPPER].nunique()].reset_index()
@@ -181,7 +181,7 @@ def other_order(table: pd.DataFrame) -> Outcome:
 
 
 def strongest(rows: Rows, suffix: str = "") -> tuple[Finding, Finding]:
-    """Make the findings that peak force is highest after shape change and lowest after internal oscillation."""
+    """Make the findings that peak force is greatest after shape change, least after internal oscillation."""
     keys: dict[str, Any] = {"beside": (STATIC,), "bounds": HELD_FAST, "rows": rows}
     most, least = (f"has the {one} peak force of the three procedures{suffix}" for one in ("highest", "least"))
     return (
@@ -230,7 +230,7 @@ def with_crossings(
 
 
 def several_amplitudes(runs: pd.DataFrame) -> pd.DataFrame:
-    """Return the runs of the internal oscillation at those l/w and heights of the hook that have several θ."""
+    """Return the internal oscillation at those l/w and heights of the hook that have several θ."""
     internal = runs[runs[PROCEDURE] == INTERNAL]
     return internal[internal.groupby([ASPECT, UPPER])[THETA].transform("nunique") > 1]
 

@@ -59,7 +59,7 @@ def _numbers(tested: Tested | None) -> str:
 
 
 def engines(found: Sequence[Claim]) -> str:
-    """Return a statement on the findings that were judged on both engines: equal, opposite, resolved by one alone."""
+    """Return a statement on the findings that were judged on both engines."""
     asked = [(f"{claim.number} by the {protocol}", how) for claim in found for protocol, how in claim.engines.items()]
     which = {one: ", ".join(name for name, how in asked if how == one) or "none" for one in _HOW}
     claimed = len({name.split()[0] for name, _ in asked})
@@ -74,7 +74,7 @@ _HOW = ("opposite", "links alone", "YADE alone")
 
 
 def table(found: Sequence[Claim]) -> pd.DataFrame:
-    """Make the table `claims.csv`: one row per claim, with verdict and, for each protocol and engine, our numbers."""
+    """Make the table `claims.csv`: a row per claim, with verdict and numbers by protocol and engine."""
     rows = []
     for claim in found:
         row = {"number": claim.number, "part": claim.part, "claim": claim.says, "verdict": claim.verdict}

@@ -71,9 +71,9 @@ class Claim:
 
     @property
     def engines(self) -> dict[str, str]:
-        """Comparison of the engines by protocol: `alike`, `opposite`, `links alone` or `YADE alone` resolves it.
+        """Agreement of both engines by protocol: `alike`, `opposite`, `links alone`, or `YADE alone`.
 
-        Protocols that were not tested on both engines are left out.
+        `alone` is the engine that resolves the claim. Protocols not tested on both engines are left out.
         """
         found = {}
         for name in ("text", "code"):
@@ -128,7 +128,7 @@ def _tested(
     *,
     optional: bool = False,
 ) -> Tested | None:
-    """Read the verdict of a finding, named [STUDY, ID], and of the finding that may stand `instead`; None of None."""
+    """Read the verdict of the finding [STUDY, ID] and of its substitute `instead`; None if there is none."""
     if named is None:
         return None
     study, finding = named

@@ -58,7 +58,7 @@ class Analysis:
     footer: Sequence[str]  #: Statements about the origin of the results
 
     def table(self, name: str) -> pd.DataFrame:
-        """Select the rows of the engine that judges from a table; empty if the study has no table of this name."""
+        """Return a table's rows of the judging engine; empty if the study has no table of this name."""
         return judging(self.tables.get(name, pd.DataFrame()))
 
 
@@ -116,7 +116,7 @@ class Figure(Protocol):
 
 @dataclass(frozen=True, kw_only=True)
 class Means:
-    """Means with their error bars against a variable: a panel for each quantity and each value of a column."""
+    """Means with error bars against a variable: a panel for each quantity and each value of a column."""
 
     name: str  #: Of the files
     quantities: Sequence[Quantity]  #: Drawn along y, in a panel each
@@ -286,7 +286,7 @@ class Rows:
 
 @dataclass(frozen=True, kw_only=True)
 class Heatmap:
-    """Means as colours over two variables: a line of panels for each quantity, a panel for each value of a column.
+    """Means as colours over two variables: a panel for each quantity and each value of a column.
 
     Points at x = 0, which a logarithmic axis cannot show, are drawn left of a broken line in all panels.
     """
@@ -338,7 +338,7 @@ class Heatmap:
 
 @dataclass(frozen=True, kw_only=True)
 class Histories:
-    """Quantities of runs against time or another variable: means over seeds, lowest to highest seed as a band."""
+    """Quantities against time or another variable: means over seeds, with a band of all seeds."""
 
     name: str  #: Of the files
     #: Label of the y axis, by column of the table `times`; by "" if `history` reads the values
@@ -414,7 +414,7 @@ class Histories:
 
 @dataclass(frozen=True, kw_only=True)
 class Scatter:
-    """A quantity against others in a panel each: every run as a small marker, means over seeds as large ones."""
+    """A quantity against others in a panel each: small markers for runs, large ones for means over seeds."""
 
     name: str  #: Of the files
     xs: Sequence[Quantity]  #: Drawn along x, in a panel each
@@ -457,7 +457,7 @@ class Scatter:
 
 
 def one_by_one(column: str, label: Callable[[Any], str], *, last: float = 0.85) -> SplitBy:
-    """Make a series for each value of a column, in colours from dark to light; `last` is that of `sequence`."""
+    """Make a series for each value of a column, in colours from dark to light up to `last` of viridis."""
 
     def split(table: pd.DataFrame) -> list[Series]:
         values = sorted(table[column].dropna().unique())
@@ -483,7 +483,7 @@ PROCEDURE_LABELS: Mapping[str, str] = MappingProxyType(
 
 
 def by_procedure(labels: Mapping[str, str] = PROCEDURE_LABELS, *, apart: float = 0.0, line: bool = True) -> SplitBy:
-    """Make a series for each procedure; of the internal oscillation only the amplitude `AMPLITUDE` is drawn.
+    """Make a series for each procedure, of the internal oscillation only at θ = `AMPLITUDE`.
 
     Args:
         labels: label of each procedure, in the order of the legend.
@@ -513,7 +513,7 @@ def marker(shape: str, colour: str, face: str) -> dict[str, Any]:
 
 
 def procedure_marker(procedure: str) -> dict[str, Any]:
-    """Return the properties of a procedure's marker; the static state, which is no activity, has an open one."""
+    """Return the properties of a procedure's marker, which is open for the static state."""
     colour = _COLOURS[procedure]
     return marker(_SHAPES[procedure], colour, "white" if procedure == STATIC else colour)
 
@@ -521,7 +521,7 @@ def procedure_marker(procedure: str) -> dict[str, Any]:
 def panels(
     count: int, *, columns: int, width: float | None = None, height: float | None = None, **shared: Any
 ) -> tuple[Canvas, list[Axes]]:
-    """Make a figure and its panels, line by line; width of the figure and height of a line of panels in inch."""
+    """Make a figure and its panels, line by line; its width, and the height of a line, are in inch."""
     columns = min(count, columns)
     lines = -(-count // columns)
     size = width or min(columns * style.COLUMN_WIDTH, _PAGE), height or 2.8
@@ -565,7 +565,7 @@ def binned(
 def draw_history(
     axes: Axes, histories: Sequence[History], width: float, *, log: bool = False, **properties: Any
 ) -> NDArray[np.float64]:
-    """Draw the mean over seeds as a line, and a band from the lowest to the highest seed; return the times (n,) [s]."""
+    """Draw mean (line) and range (band) of histories, and return the times (n,) [s] that are drawn."""
     centres, means = binned(histories, width, log=log)
     axes.plot(centres, means.mean(axis=0), **properties)
     if len(means) > 1:
@@ -582,7 +582,7 @@ def draw_fits(
     *,
     lines: Sequence[Any] = ("solid",),
 ) -> None:
-    """Draw fitted curves at places x (n,), each with its own kind of line, and their 95 % bands as far as known."""
+    """Draw fitted curves at places x (n,), each with its own kind of line, and their 95 % bands."""
     for (label, (values, half_widths)), line in zip(fits.items(), lines, strict=False):
         axes.plot(x, values, color=colour, linewidth=0.9, linestyle=line, label=label)
         low, high = np.asarray(values) - half_widths, np.asarray(values) + half_widths
@@ -621,7 +621,7 @@ def draw_means(
 def draw_bounds(
     axes: Axes, x: ArrayLike, least: ArrayLike, lengths: ArrayLike, *, properties: Mapping[str, Any]
 ) -> None:
-    """Draw lower bounds (n,) as markers with an arrow upwards; lengths of the arrows mean nothing, NaN are left out."""
+    """Draw lower bounds (n,) as markers with an arrow upwards of any length (n,); NaN are left out."""
     at, from_, long = np.broadcast_arrays(*(np.asarray(part, dtype=np.float64) for part in (x, least, lengths)))
     known = np.isfinite(from_)
     if known.any():
@@ -630,7 +630,7 @@ def draw_bounds(
 
 
 def finish(figure: Canvas, path: Path, notes: Sequence[str], footer: Sequence[str], *, bars: str = BARS) -> list[Path]:
-    """Add legend and footer to a figure and write it to a path without suffix; returns the paths of the files.
+    """Add legend and footer to a figure, write it to a path without suffix, and return its files.
 
     Axes are widened until they show everything. The footer explains error bars by `bars` if the figure has any.
     """

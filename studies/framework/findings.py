@@ -52,7 +52,7 @@ class Effect:
 
     @property
     def verdict(self) -> Verdict:
-        """Verdict on whether the estimate lies beyond its threshold; a bound can only support one of both sides."""
+        """Verdict on whether the estimate lies beyond its threshold; a bound excludes one side only."""
         verdict = Verdict(str(self._judged))
         high, low = (self.may_be_higher, self.may_be_lower)[:: self.sign or 1]
         if (verdict == Verdict.FOUND and low) or (verdict == Verdict.NOT_FOUND and high):
@@ -61,7 +61,7 @@ class Effect:
 
     @property
     def more(self) -> float:
-        """Factor by which the number of runs would have to grow to resolve the effect; NaN if resolved or unknown."""
+        """Factor in the number of runs that would resolve the effect; NaN if it is resolved or unknown."""
         judged = self._judged
         return judged.more if isinstance(judged, Unresolved) else math.nan
 
@@ -144,20 +144,20 @@ def all_of(verdicts: Iterable[Verdict]) -> Verdict:
 
 
 def decide(found: bool, wrong: bool = False, *, data: bool = True) -> Verdict:
-    """Return the verdict on a statement: whether it was found, whether its opposite was (`wrong`), or neither."""
+    """Return the verdict on a statement that was found, whose opposite was found (`wrong`), or neither."""
     if not data:
         return Verdict.NO_DATA
     return Verdict.FOUND if found else Verdict.NOT_FOUND if wrong else Verdict.NOT_RESOLVED
 
 
 def within(value: float, half_width: float, margin: float) -> Verdict:
-    """Judge whether the 95 % interval value ± half_width lies within ±margin; not found if it lies outside."""
+    """Judge whether the interval value ± half_width lies within ±margin; not found if it lies outside."""
     size = abs(value)
     return decide(size + half_width <= margin, size - half_width > margin, data=not math.isnan(value))
 
 
 def findings_table(judged: Sequence[Judged]) -> pd.DataFrame:
-    """Make the table `findings.csv`: one row per finding, with statement, numbers, verdict, criterion and id."""
+    """Make the table `findings.csv`: statement, numbers, verdict and criterion, a row per finding."""
     rows = [
         {
             "finding in the paper": one.finding.says,
@@ -248,7 +248,7 @@ def slope(
     rows: Rows = lambda table: table,
     label: str = "",
 ) -> Finding:
-    """Make the finding that a quantity rises (sign +1) or falls (−1) with a variable, by the slope of straight lines.
+    """Make the finding that a quantity rises (sign +1) or falls (−1) with a variable, on straight lines.
 
     Args:
         name: id of the finding.
@@ -361,7 +361,7 @@ def unit_of(column: str) -> str:
 
 
 def blocks(table: pd.DataFrame, columns: Sequence[str]) -> Sequence[Hashable]:
-    """Return the block of each row, which is the values of some columns; one block for all rows without columns."""
+    """Return the block of each row, the values of some columns; without columns, one block for all rows."""
     return list(map(tuple, table[list(columns)].to_numpy().tolist())) if columns else ["all"] * len(table)
 
 

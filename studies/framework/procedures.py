@@ -1,4 +1,4 @@
-"""Procedures (static, external oscillation, shape change, internal oscillation) and measures of one activity.
+"""Procedures (static, external and internal oscillation, shape change) and measures of one activity.
 
 A run of one activity has four phases: pour, rest, activity, rest. Measures are averaged over the frames of both rests:
 the first rest is the static state of an aspect ratio and a seed, the second rest is the state after the activity. φ_f
@@ -51,7 +51,7 @@ _WINDOW = 0.1  # s, of moving means of heights: longer than a swing at θ = 10°
 
 
 def prepared_by(run: Run, *then: str) -> dict[str, object]:
-    """Return the cells procedure, θ [deg], pile (see `run_columns`) and time of the activity [s] of a run's row.
+    """Return the cells procedure, θ [deg], those of `run_columns`, and time of the activity [s].
 
     The run must consist of a pour, a rest, one activity with a rest or none, and phases of the types `then`.
 
@@ -83,12 +83,12 @@ def compared(table: pd.DataFrame) -> pd.DataFrame:
 
 
 def paired(table: pd.DataFrame, quantity: str, one: str, other: str) -> SeedMean:
-    """Return the mean difference of a quantity, `one` less `other`, over pairs of equal aspect ratio and seed."""
+    """Return the mean difference, `one` less `other`, over pairs of equal aspect ratio and seed."""
     return mean_difference(of_procedure(table, one), of_procedure(table, other), quantity)
 
 
 def activity(run: Run) -> Phase:
-    """Return the only activity of a run; InputError unless there is exactly one, of a known type, between rests."""
+    """Return the only activity of a run; InputError unless there is exactly one, between two rests."""
     active = [phase for phase in run.phases if phase.type not in PASSIVE_PHASES]
     around = run.phases[active[0].index - 1 : active[0].index + 2] if active else ()
     if len(active) != 1 or active[0].type not in PROCEDURES or len(around) != 3 or around[2].type != "relax":
@@ -99,7 +99,7 @@ def activity(run: Run) -> Phase:
 
 
 def procedure_row(run: Run) -> dict[str, object]:
-    """Measure a run of one activity between two rests and return its row; InputError if the run is another one."""
+    """Measure a run of one activity between two rests and return its row; InputError for other runs."""
     active = activity(run)
     settings = run.scene["phases"][active.index]
     if settings["type"] != active.type:
@@ -128,7 +128,7 @@ def procedure_row(run: Run) -> dict[str, object]:
 
 
 def height_history(run: Run) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Read the height of the centre of mass against time, from the rest before the activity to the end of the run.
+    """Read the height of the centre of mass against time, from the rest before the activity on.
 
     Returns:
         Heights over h0 (n,) [-], where h0 is the mean over that rest, and times since the activity began (n,) [s].
@@ -174,7 +174,7 @@ def _of_series(run: Run, active: Phase, straight_until: float | None) -> dict[st
 
 
 def _smooth(values: NDArray[np.float64], time: NDArray[np.float64], chosen: NDArray[np.bool_]) -> NDArray[np.float64]:
-    """Return the moving mean over `_WINDOW` of the chosen values; empty if they cover less than one window."""
+    """Return the moving mean of the chosen values over `_WINDOW`; empty if they cover less than that."""
     if chosen.sum() < 2:
         return np.empty(0)
     samples = max(round(_WINDOW / float(np.median(np.diff(time[chosen])))), 1)
@@ -183,7 +183,7 @@ def _smooth(values: NDArray[np.float64], time: NDArray[np.float64], chosen: NDAr
 
 
 def gained(work: NDArray[np.float64], before: NDArray[np.bool_]) -> float:
-    """Return the increase of a cumulative work (n,) [J] from the last known sample in `before` (n,) to the end [J].
+    """Return the increase [J] of a cumulative work (n,) [J] from the last sample in `before` (n,) on.
 
     NaN if the work was not recorded.
     """
@@ -227,7 +227,7 @@ def half_compaction(time: NDArray[np.float64], height: NDArray[np.float64], dura
 
 
 def samples(runs: pd.DataFrame) -> pd.DataFrame:
-    """Make the samples: one row per procedure, aspect ratio, θ and seed, with the static state as a procedure.
+    """Make the samples, a row per procedure, aspect ratio, θ and seed; static is a procedure too.
 
     Runs of equal aspect ratio and seed are poured from equal poses. So the static state is one sample: the mean over
     these runs.

@@ -133,7 +133,7 @@ class Origin:
         return {file: output / file for file in texts}
 
     def _missing_lines(self) -> list[str]:
-        """Return the lines of the Markdown table of missing runs, one row for each cause; none without such runs."""
+        """Return the lines of the Markdown table of missing runs, one row for each cause."""
         rows: dict[tuple[str, str], list[str]] = {}
         for run in self.found.missing:
             rows.setdefault((run.status, run.common_cause), []).append(run.directory)

@@ -1,4 +1,4 @@
-"""Runs that end with `remove-container`: a pour, one activity or none, a rest, and the removal of the wall."""
+"""Runs that end with `remove-container`, after a pour, one activity or none, and a rest."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ def named_columns(run: Run) -> dict[str, object]:
 
 @dataclass(frozen=True, kw_only=True)
 class Pictures:
-    """Three pictures of the first seed of each procedure: with the wall, 0.1 s after it is removed, and later."""
+    """Pictures of the first seed of each procedure: with the wall, 0.1 s after its removal, and later."""
 
     labels: Mapping[str, str]  #: Label of each procedure
     after: float | None = None  #: Time of the last picture since the removal began [s]; None: the end of the run

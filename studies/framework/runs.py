@@ -1,4 +1,4 @@
-"""Runs of a study and their tables: measuring finished runs, listing missing ones, columns, and several engines."""
+"""Runs of a study and their tables: finished and missing runs, columns, and several engines."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ class Quantity:
     bar: str = "SE"  #: Error that is shown in the short table: `SE` (standard error) or `95 %` (half-width)
 
     def cell(self, point: Mapping[str, float]) -> str:
-        """Format the mean over seeds of a point with its error, for the short table; without an error if it is NaN."""
+        """Format the mean over seeds of a point for the short table, with its error unless that is NaN."""
         error = point.get(marked(self.column, self.bar), math.nan)
         return told_number(self.scale * point[self.column], self.form, self.scale * error)
 
@@ -108,7 +108,7 @@ THETA_KEY = Key(column="theta [deg]", label="θ", form="g", unit="°")
 
 
 def sort_rows(table: pd.DataFrame, columns: Sequence[str], keys: Sequence[Key]) -> pd.DataFrame:
-    """Return a table with its rows sorted by columns; words are sorted by `Key.order` if their key has one."""
+    """Return a table sorted by columns; words are sorted by the `Key.order` of their column, if any."""
     ranks = {key.column: {name: rank for rank, name in enumerate(key.order)} for key in keys if key.order}
     return table.sort_values(
         list(columns),
@@ -131,7 +131,7 @@ def of_engine(table: pd.DataFrame, engine: str) -> pd.DataFrame:
 
 
 def judging(table: pd.DataFrame) -> pd.DataFrame:
-    """Return the rows of the judging engine, without the column `engine`; all rows if there is no such column."""
+    """Return the rows of the judging engine without the column `engine`; all rows if that is missing."""
     several = engines_of(table)
     return of_engine(table, several[0]) if several else table
 
@@ -259,7 +259,7 @@ class Collected:
                 )
 
     def reject_repeats(self, point: Callable[[MeasuredRun], str]) -> None:
-        """Raise InputError if two runs have equal point, seed and engine; `point` returns the name of a run's point."""
+        """Raise InputError if two runs have equal point (named by a function), seed and engine."""
         seen: dict[tuple[str, int, str], MeasuredRun] = {}
         for run in self.runs:
             key = (point(run), run.run.manifest.seed, run.run.manifest.engine)

@@ -1,4 +1,4 @@
-"""Shaken piles: measures of packing fraction and crossings before and after shaking, and Gravish's data points."""
+"""Shaken piles: packing fraction and crossings before and after shaking, and Gravish's points."""
 
 from __future__ import annotations
 
@@ -72,7 +72,7 @@ def read_gravish() -> pd.DataFrame:
 
 
 def gravish_at(aspect: float, stage: str) -> float:
-    """Return Gravish's φ [-] at exactly this aspect ratio, or NaN; the stage is a key of `GRAVISH_COLUMNS`."""
+    """Return Gravish's φ [-] at exactly this aspect ratio, or NaN, at a stage of `GRAVISH_COLUMNS`."""
     points = read_gravish()
     same = np.isclose(points["l_over_w"], aspect, rtol=0, atol=1e-6)
     return float(points.loc[same, GRAVISH_COLUMNS[stage]].iloc[0]) if same.any() else math.nan
@@ -106,7 +106,7 @@ def contact_of(run: Run) -> SceneData:
 
 
 def common_friction(run: Run) -> float:
-    """Return the coefficient of friction of a run [-]; InputError if smarticles and walls have different ones."""
+    """Return the coefficient of friction of a run [-]; InputError if that of its walls differs."""
     contact = contact_of(run)
     between, wall = contact["friction_smarticle"], contact["friction_wall"]
     if between != wall:
@@ -116,7 +116,7 @@ def common_friction(run: Run) -> float:
 
 
 def timed_row(run: Run, known: Mapping[str, object]) -> dict[str, object]:
-    """Measure φ at each stage and at `TIMES` during shaking; return the run's row, with the `known` cells in it."""
+    """Measure φ at each stage and at `TIMES` during shaking; return the row, with the `known` cells."""
     history = packing_history(run)
     row = {**known, **measured_row(run, [DEFINITION])}
     for time in TIMES:

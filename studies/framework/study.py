@@ -1,4 +1,4 @@
-"""Studies: a study declares measure, columns, findings and figures; `analyse` makes its results from finished runs."""
+"""Studies: measure, columns, findings and figures, from which `analyse` makes results."""
 
 from __future__ import annotations
 
@@ -259,7 +259,7 @@ class Study:
         ]
 
     def statements(self, tables: Mapping[str, pd.DataFrame]) -> list[str]:
-        """Return statements for footers: points and seeds of the runs, engines, remarks, error bars and criterion."""
+        """Return statements for footers: points, seeds, engines, remarks, error bars and criterion."""
         every = tables["runs"]
         runs = judging(every)
         parts = []
