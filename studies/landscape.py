@@ -533,11 +533,8 @@ FIGURES = (
     Heatmap(
         name="maps",
         quantities=[QUANTITIES[name] for name in (PHI, CROSSINGS, LINKING, PEAK)],
-        rows=lambda points: points[points[PROCEDURE].isin([STATIC, INTERNAL])],
-        x=ENERGY,
-        x_label="energy per smarticle [J]",
-        y=ASPECT,
-        y_label=r"$l/w$ [-]",
+        x=Quantity(column=ENERGY, axis="energy per smarticle [J]"),
+        y=Quantity(column=ASPECT, axis=r"$l/w$ [-]"),
         panels=THETA,
         panel="θ = {:g}°",
         notes=[

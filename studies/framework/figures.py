@@ -293,46 +293,41 @@ class Heatmap:
 
     name: str  #: Of the files
     quantities: Sequence[Quantity]
-    x: str  #: Column of the points that is drawn along x, logarithmically
-    x_label: str
-    y: str  #: Column of the points that is drawn along y
-    y_label: str
+    x: Quantity  #: Drawn along x, on a logarithmic axis
+    y: Quantity
     panels: str  #: Column whose values have a panel each
     panel: str  #: Title of a panel, with `{}` for its value
-    rows: Select = lambda table: table
     notes: Sequence[str] = ()  #: Sentences for the footer
 
     def draw(self, path: Path, analysis: Analysis) -> list[Path]:
         """Draw a cell for each point; neighbouring cells meet midway, along x at the geometric mean."""
-        table = self.rows(analysis.table("points"))
-        table, zero = table[table[self.x] > 0], table[table[self.x] == 0]
+        points, x, y = analysis.table("points"), self.x.column, self.y.column
+        table, zero = points[(points[x] > 0) & points[self.panels].notna()], points[points[x] == 0]
         if table.empty:
             return []
-        values, half = sorted(table[self.panels].unique()), np.diff(np.unique(table[self.y])).min(initial=0.1) / 2
-        least = table[self.x].min() / _CELL
-        size = {"height": 1.45, "width": _PAGE}
-        figure, grid = panels(len(self.quantities) * len(values), columns=len(values), sharex=True, sharey=True, **size)
+        values, half = sorted(table[self.panels].unique()), np.diff(np.unique(table[y])).min(initial=0.1) / 2
+        left = table[x].min() / _CELL
+        size = {"columns": len(values), "height": 1.45, "width": _PAGE, "sharex": True, "sharey": True}
+        figure, grid = panels(len(self.quantities) * len(values), **size)
         for number, (axes, (quantity, value)) in enumerate(zip(grid, product(self.quantities, values), strict=True)):
-            drawn = pd.concat([table, zero])[quantity.column]
-            colours = {"cmap": "viridis", "norm": Normalize(drawn.min(), drawn.max())}
-            part = table[table[self.panels] == value].sort_values(self.x)
-            for y, row in part.groupby(self.y):
-                x = row[self.x].to_numpy()
-                edges = [x[0] / _CELL, *np.sqrt(x[:-1] * x[1:]), x[-1] * _CELL]
-                axes.pcolormesh(edges, [y - half, y + half], [row[quantity.column]], **colours)
-                for mean in zero.loc[zero[self.y] == y, quantity.column]:
-                    axes.pcolormesh([least / 4, least / 2], [y - half, y + half], [[mean]], **colours)
-            axes.axvline(least / 1.4, color=style.GREY, linewidth=0.6, linestyle=(0, (4, 3)))
+            means = pd.concat([table, zero])[quantity.column]
+            colours = {"cmap": "viridis", "norm": Normalize(means.min(), means.max())}
+            for place, row in table[table[self.panels] == value].sort_values(x).groupby(y):
+                xs = row[x].to_numpy()
+                edges = [xs[0] / _CELL, *np.sqrt(xs[:-1] * xs[1:]), xs[-1] * _CELL]
+                axes.pcolormesh(edges, [place - half, place + half], [row[quantity.column]], **colours)
+                for mean in zero.loc[zero[y] == place, quantity.column]:
+                    axes.pcolormesh([left / 4, left / 2], [place - half, place + half], [[mean]], **colours)
+            axes.axvline(left / 1.4, color=style.GREY, linewidth=0.6, linestyle=(0, (4, 3)))
             axes.set_xscale("log")
             axes.grid(visible=False)
             if number < len(values):
                 axes.set_title(self.panel.format(value), fontsize=8)
             if number % len(values) == 0:
-                axes.set_ylabel(self.y_label)
+                axes.set_ylabel(self.y.axis)
                 line = grid[number : number + len(values)]
                 figure.colorbar(ScalarMappable(**colours), ax=line, pad=0.01, aspect=12, label=quantity.axis)
-            if number == len(grid) - len(values) // 2 - 1:
-                axes.set_xlabel(self.x_label)
+        figure.supxlabel(self.x.axis, fontsize=8)
         return finish(figure, path, self.notes, analysis.footer)
 
 

@@ -19,7 +19,6 @@ from numpy.typing import NDArray
 from dem.errors import InputError
 from dem.record.document import Phase
 from dem.record.run import Run
-from dem.record.series import Series
 from postprocess.measures.motors import APART, SAMPLED_WORK
 from postprocess.measures.table import PASSIVE_PHASES, summarise_run
 from postprocess.statistics.points import ASPECT, SEED, mean_difference
@@ -136,10 +135,7 @@ def height_history(run: Run) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     Raises:
         InputError: The height was not recorded.
     """
-    return _heights(run.series, activity(run))
-
-
-def _heights(series: Series, active: Phase) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    series, active = run.series, activity(run)
     height = np.asarray(series["com_height_m"], dtype=np.float64)
     shown = (series["phase"] >= active.index - 1) & np.isfinite(height)
     before = shown & (series["phase"] == active.index - 1)
@@ -162,7 +158,7 @@ def _of_series(run: Run, active: Phase, straight_until: float | None) -> dict[st
     if work in series.data:
         found[ENERGY] = gained(series[work], series["phase"] < active.index) / run.manifest.count
     if "com_height_m" in series.data:
-        height, time = _heights(series, active)
+        height, time = height_history(run)
         if straight_until is not None:
             last = (time > straight_until - _WINDOW) & (time <= straight_until)
             found[STRAIGHT] = float(height[last].mean()) if last.any() else math.nan
