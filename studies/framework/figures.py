@@ -307,11 +307,11 @@ class Heatmap:
             return []
         values, half = sorted(table[self.panels].unique()), np.diff(np.unique(table[y])).min(initial=0.1) / 2
         left = table[x].min() / _CELL
-        size = {"columns": len(values), "height": 1.45, "width": _PAGE, "sharex": True, "sharey": True}
+        size: dict[str, Any] = {"columns": len(values), "height": 1.45, "width": _PAGE, "sharex": True, "sharey": True}
         figure, grid = panels(len(self.quantities) * len(values), **size)
         for number, (axes, (quantity, value)) in enumerate(zip(grid, product(self.quantities, values), strict=True)):
             means = pd.concat([table, zero])[quantity.column]
-            colours = {"cmap": "viridis", "norm": Normalize(means.min(), means.max())}
+            colours: dict[str, Any] = {"cmap": "viridis", "norm": Normalize(means.min(), means.max())}
             for place, row in table[table[self.panels] == value].sort_values(x).groupby(y):
                 xs = row[x].to_numpy()
                 edges = [xs[0] / _CELL, *np.sqrt(xs[:-1] * xs[1:]), xs[-1] * _CELL]
@@ -327,7 +327,7 @@ class Heatmap:
                 axes.set_ylabel(self.y.axis)
                 line = grid[number : number + len(values)]
                 figure.colorbar(ScalarMappable(**colours), ax=line, pad=0.01, aspect=12, label=quantity.axis)
-        figure.supxlabel(self.x.axis, fontsize=8)
+        grid[-len(values) // 2].set_xlabel(self.x.axis)
         return finish(figure, path, self.notes, analysis.footer)
 
 
