@@ -57,8 +57,8 @@ _MEANINGS = {
     END: "φ in the end",
     TAU: "τ",
     POWER: "β or B",
-    RESIDUAL: "root mean square of what the law leaves",
-    MISSED: f"the law fitted to the first {100 * EARLY:g} % of the time less what φ is in the last tenth of it",
+    RESIDUAL: "root mean square of the residuals",
+    MISSED: f"mean φ over the last tenth of the time, by the law fitted to its first {100 * EARLY:g} %, less measured",
 }
 
 

@@ -47,7 +47,11 @@ QUANTITIES = declare(
         PHI_F: ("phi_f", ".4f", "packing fraction at the end of shaking"),
         PHI_RELAXED: ("phi_f at rest again", ".4f", "packing fraction after the rest that follows"),
         CROSSED: ("N after shaking", ".2f", "links through a smarticle's plane at the end of shaking"),
-        RISEN: ("the rise of the lowest tenth [w]", ".3f", "mean height of the lowest tenth of all, after less before"),
+        RISEN: (
+            "the rise of the lowest tenth [w]",
+            ".3f",
+            "mean height of the lowest tenth of smarticles, after less before",
+        ),
     },
     axes={RISEN: "rise of the lowest tenth [w]"},
 )

@@ -89,8 +89,8 @@ QUANTITIES = declare(
     | {crossings(stage): (f"⟨N⟩ {stage}", "", f"⟨N⟩ {stage} the shake, at rest") for stage in STAGES}
     | {share(stage): (f"cluster {stage}", "", f"share of the largest entangled cluster {stage}") for stage in STAGES}
     | {spans(stage, "height"): ("", "", f"1 where a cluster joins floor and top {stage}") for stage in STAGES}
-    | {spans(stage, "width"): ("", "", f"1 where one joins wall and wall {stage}") for stage in STAGES}
-    | {spans(stage): (f"spanned {stage}", "", f"1 where both is so {stage}") for stage in STAGES}
+    | {spans(stage, "width"): ("", "", f"1 where a cluster joins wall and wall {stage}") for stage in STAGES}
+    | {spans(stage): (f"spanned {stage}", "", f"1 where clusters span height and width {stage}") for stage in STAGES}
 )
 SCALED = (
     *(phi(stage, one) for stage in STAGES for one in DEFINITIONS),

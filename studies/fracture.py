@@ -76,22 +76,22 @@ LEFT = "load at the end over n W_s [-]"
 CAME_FREE, FREE_TIME = "came free [-]", "time of coming free [s]"
 ACCOUNT = "work less that of the engine's account [-]"
 
-_FORCE = f"largest mean over {WINDOW:g} s of the force that raises the hook, over n W_s; at least, where it held"
+_FORCE = f"largest mean over {WINDOW:g} s of the force that raises the hook; a lower bound where it held fast"
 QUANTITIES = declare(
     {
         PEAK: ("peak", ".3f", _FORCE),
         HELD_FAST: ("held fast", ".2f", "1 where the hook was stopped by its force limit, 0 where it arrived"),
         **{column: ("", ".3f", f"largest mean over {window:g} s") for window, column in WINDOWS.items()},
-        HELD: ("lower hook at it", ".3f", "upwards on the lower hook at the peak: what goes from hook to hook"),
+        HELD: ("lower hook at it", ".3f", "upward force on the lower hook at the peak, transmitted from hook to hook"),
         NET: ("peak less lower hook", ".3f", "largest mean of the force on the upper hook less that on the lower"),
         PEAK_TIME: ("", ".3g", "time since the pull began at which the peak is"),
-        RAISED: ("raised at it [mm]", ".1f", "how far the hook had been raised then"),
+        RAISED: ("raised at it [mm]", ".1f", "displacement of the hook at the peak"),
         WORK: ("work / n W_s w", ".3f", "∫ F dz over the whole pull"),
         CAME_FREE: ("came free", ".2f", f"1 where the force came below {FREE:g} of its peak for good, 0 elsewhere"),
-        FREE_TIME: ("", ".3g", "when it did so, since the pull began; empty where it did not"),
+        FREE_TIME: ("", ".3g", "time since the pull began at which it came free; empty where it did not"),
         LEFT: ("load at the end", ".3f", f"mean force over the last {END:g} s of the pull"),
         BEFORE: ("", ".3g", f"mean force on the hook over the last {END:g} s before the pull"),
-        ABOVE: ("above the hook", ".2f", "share with the centre of mass above the hook before the pull"),
+        ABOVE: ("above the hook", ".2f", "share of smarticles with the centre of mass above the hook before the pull"),
         CROSSINGS: ("⟨N⟩", ".2f", "⟨N⟩ at rest before the pull: links of others through a smarticle's plane"),
         PHI: ("", ".3g", "packing fraction at rest before the pull"),
     },

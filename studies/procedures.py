@@ -77,7 +77,7 @@ QUANTITIES = declare(
         PHI: ("φ at rest again", ".4f", "packing fraction at rest: after the activity, or of the static state"),
         CROSSINGS: ("⟨N⟩", ".2f", "⟨N⟩ at rest: links of others through a smarticle's plane"),
         ENERGY: ("energy [J]", ".2e", "work of the motors, or of the shaken container, on the smarticles"),
-        SAMPLED: ("", "", "of the motors, torque times angle over moments so far apart, as the paper's code could"),
+        SAMPLED: ("", "", "work of the motors, summed as torque times change of angle, as the paper's code could"),
         HEIGHT: ("h/h0", ".3f", "height of the centre of mass at rest after the activity, over that before it"),
         STRAIGHT: ("", "", "height of the centre of mass over h0 at the end of the straight state of the shape change"),
         LOWEST: ("", "", "least height over h0, means over 0.1 s, while barbs close in the shape change"),

@@ -58,15 +58,19 @@ TOP, KEPT = "height of 95 % [m]", "com height without over with the wall [-]"
 
 QUANTITIES = declare(
     {
-        PEAK: ("peak", ".3f", f"largest mean over {WINDOW:g} s of the force on the hook; at least, where it held"),
-        RAISED: ("raised at it [mm]", ".1f", "how far the hook had been raised then"),
-        WORK: ("work / n W_s w", ".3f", "∫ F dz over the whole pull: to fracture, and to carry off what comes along"),
-        THROUGH: ("through to the grid", ".3f", "upwards on the grid at the peak less that before the pull"),
-        BEFORE: ("before", ".3f", "force on the hook before the pull: what rests on it, and a pile that is braced"),
+        PEAK: ("peak", ".3f", f"largest mean over {WINDOW:g} s of the force on the hook; a bound where it held fast"),
+        RAISED: ("raised at it [mm]", ".1f", "displacement of the hook at the peak"),
+        WORK: ("work / n W_s w", ".3f", "∫ F dz over the whole pull, which tears the pile and lifts the part torn off"),
+        THROUGH: ("through to the grid", ".3f", "upward force on the grid at the peak, less that before the pull"),
+        BEFORE: ("before", ".3f", "force on the hook before the pull, by weight and by bracing of the pile"),
         HELD_FAST: ("held fast", ".2f", "1 where the hook was stopped by its force limit, 0 where it arrived"),
-        CARRIED: ("carried off", ".3f", "share that rose by more than half of the hook's way; empty where held"),
-        BREAK: ("broke at [mm]", ".1f", "mean height of the lowest points of those before the pull"),
-        ABOVE: ("above the hook", ".2f", "share with the centre of mass above the hook before the pull"),
+        CARRIED: (
+            "carried off",
+            ".3f",
+            "share that rose by more than half of the hook's displacement; empty where held",
+        ),
+        BREAK: ("broke at [mm]", ".1f", "mean height, before the pull, of the lowest points of the part carried off"),
+        ABOVE: ("above the hook", ".2f", "share of smarticles with the centre of mass above the hook before the pull"),
         TOP: ("height [mm]", ".1f", "height below which 95 % of the material lies before the pull"),
         KEPT: ("kept without wall", ".3f", "height of the centre of mass before the pull over that with the wall"),
         CROSSINGS: ("⟨N⟩", ".2f", "links of others through a smarticle's plane at rest before the wall went"),
