@@ -233,7 +233,10 @@ def build_ladder(scene: Scene, *, source: str, knobs: Sequence[str] | None = Non
 
 
 def affordable(ladder: Ladder, expected_s: Mapping[str, float], most_s: float) -> Ladder:
-    """Return a ladder without variants whose expected wall time [s] is above `most_s`, but for the scene."""
+    """Return a ladder without the variants that are expected to run longer than `most_s` [s].
+
+    The scene itself is always kept.
+    """
     dear = {setting for setting, wall in expected_s.items() if wall > most_s and setting != BASE}
     lines = [
         f"{rung.knob} {rung.label}: a run is expected to take {expected_s[rung.setting] / 3600:.2g} h, "
@@ -442,11 +445,11 @@ def work_precision(runs: pd.DataFrame, rungs: Sequence[Rung]) -> pd.DataFrame:
     """Compare each rung with the reference of its knob.
 
     Returns:
-        One row per rung, from coarse to fine within a knob: cost and means over seeds with their standard errors
-        (`… SE`); `… error [%]`, relative to the reference's mean; `… error 95 % [%]`, the band of that error, half of
-        its 95 % interval by Student's t with the scatter pooled over all variants; `… resolved`, whether the error is
-        beyond its band; `verdict`, whether any error is. The error of the reference is 0, and its band is that of its
-        mean. A rung without runs has NaN.
+        One row per rung, from coarse to fine within a knob; NaN for a rung without runs. Columns: cost and means over
+        seeds with their standard errors `… SE`; `… error [%]`, relative to the mean of the reference; `… error 95 %
+        [%]`, the band of the error, which is half of its 95 % interval by Student's t, with the scatter pooled over all
+        variants; `… resolved`, whether the error is beyond its band; `verdict`, whether any error of the rung is. The
+        reference has the error 0 and the band of its own mean.
     """
     groups = {rung.setting: runs[runs[VARIANT] == rung.setting] for rung in rungs}
     scatters = {name: pooled_scatter(group[column] for group in groups.values()) for name, column in COMPARED.items()}

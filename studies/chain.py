@@ -119,7 +119,7 @@ def in_range(runs: pd.DataFrame) -> pd.DataFrame:
 def by_trial(part: pd.DataFrame, quantity: str) -> SeedMean:
     """Average a quantity over h/H, then over seeds.
 
-    Runs with equal servos are identical until the chain touches a wall, so that values of h/H are no samples.
+    Runs with equal servos are identical until the chain touches a wall: values at several h/H are not independent.
     """
     return mean_over_seeds(part.groupby(SEED)[quantity].mean().tolist())
 
@@ -148,7 +148,7 @@ def _straight(base: pd.DataFrame) -> list[Effect]:
 
 
 def yields(count: int) -> Finding:
-    """Make the finding that a chain of so many robots has a yield drop near the paper's strain."""
+    """Make the finding that a chain of `count` robots has a yield drop near the paper's strain."""
     expected = YIELDS[count]
 
     def outcome(base: pd.DataFrame) -> Outcome:

@@ -126,9 +126,9 @@ def times(runs: pd.DataFrame) -> pd.DataFrame:
 def activations(runs: pd.DataFrame) -> pd.DataFrame:
     """Fit Δ, the slope of ln(fτ) against 1/Γ through the origin: one row per definition and l/w.
 
-    Δ is fitted for each seed over those accelerations at which all runs collapsed, then averaged over seeds. Seeds
-    without a run at one of these accelerations are left out: if the law does not hold, their slope is another one.
-    Without such an acceleration Δ is NaN, and the row has a lower bound only.
+    Δ is fitted for each seed over those accelerations at which all runs collapsed, then averaged over seeds. A seed
+    that lacks a run at one of these accelerations is left out, since its slope would belong to other accelerations.
+    If there is no such acceleration, Δ is NaN, and the row has a lower bound only.
     """
     found = []
     every, gravish = times(runs), _GRAVISH.set_index("l_over_w")["delta"]

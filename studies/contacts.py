@@ -94,7 +94,10 @@ def _lowest_tenth(heights: NDArray[np.float64]) -> float:
 
 
 def points(runs: pd.DataFrame) -> pd.DataFrame:
-    """Average over seeds, and compute the deviation of φ_f from Gravish's [%], with the errors of both."""
+    """Average over seeds, and compute the deviation of φ_f from Gravish's φ_f [%].
+
+    The error of the deviation combines that of our mean and that of reading Gravish's point.
+    """
     means = STUDY.points(runs)
     values = means[ASPECT].map(lambda aspect: gravish_at(aspect, "phi_f"))
     error = np.hypot(means[marked(PHI_F, "95 %")], DIGITISING_ERROR)

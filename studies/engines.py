@@ -112,7 +112,7 @@ _WORDS = {Verdict.FOUND: "equivalent", Verdict.NOT_FOUND: "different"}
 
 
 def measure(run: Run) -> Row:
-    """Measure the quantities of the run's case, by the measures of the study that the case is taken from."""
+    """Measure the quantities of the run's case; return the run's row, with NaN for all other quantities."""
     case, slash, variant = run.manifest.name.partition("/")
     if not slash or case not in (*ACTIVE, HOOK, COLLAPSE, CHAIN):
         msg = f"{run.path}: the scene's name is {run.manifest.name!r}, not CASE/VARIANT; give runs of the study engines"
@@ -154,7 +154,7 @@ def by_seed(runs: pd.DataFrame, one: Compared, variant: str) -> pd.Series:
 
 
 def equivalence(runs: pd.DataFrame) -> pd.DataFrame:
-    """Compare the engines in each quantity that was measured on one of them: a row each, paired by seed."""
+    """Compare the engines, paired by seed: a row for each quantity that was measured on one of them."""
     rows = []
     for one in COMPARED:
         links, yade = (by_seed(runs, one, variant) for variant in (LINKS, YADE))

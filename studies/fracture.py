@@ -139,7 +139,7 @@ def measure(run: Run) -> Row:
 
 
 def force_history(run: Run, *, net: bool = False) -> History:
-    """Read the force on the upper hook, `net` of that on the lower one, over n W_s [-] against time."""
+    """Read the force on the upper hook over n W_s [-] against time; `net` subtracts the lower hook's."""
     pull = read_pull(run, run.series, run.phases[-1].index)
     force = (pull.net if net else pull).force / run.manifest.count / weight_of_one(run)
     return History(times=pull.times, values=force)
@@ -151,7 +151,7 @@ def at_shown_aspect(table: pd.DataFrame) -> pd.DataFrame:
 
 
 def at_one_theta(table: pd.DataFrame) -> pd.DataFrame:
-    """Return the rows at the aspect ratio `SHOWN_ASPECT`, of the internal oscillation only those at one θ."""
+    """Return the rows at `SHOWN_ASPECT`, of the internal oscillation only those with θ = `AMPLITUDE`."""
     return compared(at_shown_aspect(table))
 
 

@@ -114,7 +114,7 @@ class Curve:
         return np.asarray(np.hypot(of_mean, DIGITISING_ERROR), dtype=np.float64)
 
     def grid(self) -> Array:
-        """Return measured coefficients of friction and steps of `STEP` between them (m,) [-]."""
+        """Return all measured coefficients of friction, with steps of `STEP` between them (m,) [-]."""
         steps = np.arange(self.friction[0], self.friction[-1] + STEP / 2, STEP)
         return np.unique(np.concatenate([np.clip(steps, None, self.friction[-1]), self.friction]))
 
@@ -374,7 +374,10 @@ def _common(found: pd.DataFrame) -> Outcome:
 
 
 def of_steel(surface: str) -> Finding:
-    """Make the finding that φ_f is Gravish's at the friction of steel, of a surface in `STEEL`."""
+    """Make the finding that the friction at which φ_f is Gravish's is that of steel.
+
+    `surface`, a key of `STEEL`, is the condition of the steel that the coefficients were published for.
+    """
     least, most = STEEL[surface]
 
     def outcome(found: pd.DataFrame) -> Outcome:

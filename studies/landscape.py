@@ -195,7 +195,8 @@ def predicted(runs: pd.DataFrame) -> tuple[pd.DataFrame, pd.DataFrame]:
 
     Returns:
         The table `predictors`: rank correlation and slope with 95 % intervals, a row per strength, part of the runs,
-        scope and measure, best measure first. The table `comparisons`: the best measure against each other one.
+        scope (over all l/w, within l/w, or one l/w) and measure, best measure first. The table `comparisons`: the
+        difference of the best measure's rank correlation to that of each other measure.
     """
     each: list[dict[str, object]] = []
     against: list[dict[str, object]] = []
@@ -340,7 +341,10 @@ def _drawn_ratio(values: Floats) -> Interval:
 
 
 def best_points(table: pd.DataFrame) -> pd.DataFrame:
-    """Return each procedure's row of the greatest gain per energy, among intervals above 0."""
+    """Return for each procedure the row of `costs` with the greatest gain per energy, at the common l/w.
+
+    Rows whose 95 % interval of the gain per energy reaches 0 are left out.
+    """
     known = table[(table[SCOPE] == COMMON) & (table[LOW] > 0)] if len(table) else table
     if known.empty:
         return known

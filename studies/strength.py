@@ -136,14 +136,17 @@ def force_history(run: Run) -> History:
 
 
 def over_heights(runs: pd.DataFrame) -> pd.DataFrame:
-    """Average runs over the heights of the hook, by procedure, l/w and seed with runs at all heights."""
+    """Average runs over the heights of the hook: a row per procedure, l/w and seed.
+
+    A procedure, l/w and seed without a run at every height is left out.
+    """
     columns = [PEAK, RAISED, WORK, THROUGH, CARRIED, ABOVE, CROSSINGS, HELD_FAST]
     grouped = compared(runs).groupby([PROCEDURE, ASPECT, SEED])
     return grouped[columns].mean()[grouped[UPPER].nunique() == runs[UPPER].nunique()].reset_index()
 
 
 def order_findings(rows: Rows) -> tuple[Finding, Finding]:
-    """Make the findings on the order of procedures by peak force against those by ⟨N⟩ and by displacement."""
+    """Make the findings that peak force and ⟨N⟩ differ in order, and that shape change is brittle."""
     return (
         Finding(
             id="other-order-than-crossings",

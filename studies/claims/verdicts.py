@@ -62,7 +62,10 @@ class Claim:
 
     @property
     def verdict(self) -> str:
-        """Common verdict of both protocols; else `partly` if one reproduces the claim, `not` if none does."""
+        """Verdict under both protocols together.
+
+        It is their common verdict if they agree; otherwise `partly` if one reproduces the claim, `not` if none does.
+        """
         settled = [one.settled for one in (self.tested["text"], self.tested["code"]) if one is not None]
         known = set(settled) - {"no data"}
         if not known:

@@ -452,7 +452,7 @@ class Scatter:
 
 
 def one_by_one(column: str, label: Callable[[Any], str], *, last: float = 0.85) -> SplitBy:
-    """Make a series for each value of a column, in colours from dark to light up to `last` of viridis."""
+    """Make a series for each value of a column, in colours from dark to light; `last` is the lightest."""
 
     def split(table: pd.DataFrame) -> list[Series]:
         values = sorted(table[column].dropna().unique())
@@ -616,7 +616,10 @@ def draw_means(
 def draw_bounds(
     axes: Axes, x: ArrayLike, least: ArrayLike, lengths: ArrayLike, *, properties: Mapping[str, Any]
 ) -> None:
-    """Draw lower bounds (n,) as markers with an arrow upwards of any length (n,); NaN are left out."""
+    """Draw lower bounds (n,) as markers with arrows upwards; NaN are left out.
+
+    The lengths of the arrows (n,), in the unit of y, have no meaning.
+    """
     at, from_, long = np.broadcast_arrays(*(np.asarray(part, dtype=np.float64) for part in (x, least, lengths)))
     known = np.isfinite(from_)
     if known.any():

@@ -52,7 +52,10 @@ class Effect:
 
     @property
     def verdict(self) -> Verdict:
-        """Verdict on whether the estimate lies beyond its threshold; a bound excludes one side only."""
+        """Verdict on whether the estimate lies beyond its threshold on the side of its sign.
+
+        It is not resolved if the estimate is a bound and the true value may lie on the other side.
+        """
         verdict = Verdict(str(self._judged))
         high, low = (self.may_be_higher, self.may_be_lower)[:: self.sign or 1]
         if (verdict == Verdict.FOUND and low) or (verdict == Verdict.NOT_FOUND and high):
@@ -144,14 +147,14 @@ def all_of(verdicts: Iterable[Verdict]) -> Verdict:
 
 
 def decide(found: bool, wrong: bool = False, *, data: bool = True) -> Verdict:
-    """Return the verdict on a statement that was found, whose opposite was found (`wrong`), or neither."""
+    """Return the verdict: found, not found (the opposite was found, `wrong`), not resolved, or no data."""
     if not data:
         return Verdict.NO_DATA
     return Verdict.FOUND if found else Verdict.NOT_FOUND if wrong else Verdict.NOT_RESOLVED
 
 
 def within(value: float, half_width: float, margin: float) -> Verdict:
-    """Judge whether the interval value ± half_width lies within ±margin; not found if it lies outside."""
+    """Return found if the interval value ± half_width lies within ±margin, not found if outside of it."""
     size = abs(value)
     return decide(size + half_width <= margin, size - half_width > margin, data=not math.isnan(value))
 

@@ -82,7 +82,10 @@ def compared(table: pd.DataFrame) -> pd.DataFrame:
 
 
 def paired(table: pd.DataFrame, quantity: str, one: str, other: str) -> SeedMean:
-    """Return the mean difference, `one` less `other`, over pairs of equal aspect ratio and seed."""
+    """Return the mean difference of a quantity between procedures, `one` less `other`.
+
+    Runs are paired by aspect ratio and seed.
+    """
     return mean_difference(of_procedure(table, one), of_procedure(table, other), quantity)
 
 

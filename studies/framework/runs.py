@@ -1,4 +1,7 @@
-"""Runs of a study and their tables: finished and missing runs, columns, and several engines."""
+"""Runs of a study and their tables: finished and missing runs, columns, and several engines.
+
+If a study has runs on several engines, findings are judged by the runs on links, which is then the judging engine.
+"""
 
 from __future__ import annotations
 
@@ -259,7 +262,7 @@ class Collected:
                 )
 
     def reject_repeats(self, point: Callable[[MeasuredRun], str]) -> None:
-        """Raise InputError if two runs have equal point (named by a function), seed and engine."""
+        """Raise InputError if two runs have equal point, seed and engine; `point` names a run's point."""
         seen: dict[tuple[str, int, str], MeasuredRun] = {}
         for run in self.runs:
             key = (point(run), run.run.manifest.seed, run.run.manifest.engine)

@@ -72,7 +72,7 @@ def read_gravish() -> pd.DataFrame:
 
 
 def gravish_at(aspect: float, stage: str) -> float:
-    """Return Gravish's φ [-] at exactly this aspect ratio, or NaN, at a stage of `GRAVISH_COLUMNS`."""
+    """Return Gravish's φ [-] at an aspect ratio and a stage (key of `GRAVISH_COLUMNS`); NaN if unknown."""
     points = read_gravish()
     same = np.isclose(points["l_over_w"], aspect, rtol=0, atol=1e-6)
     return float(points.loc[same, GRAVISH_COLUMNS[stage]].iloc[0]) if same.any() else math.nan
@@ -116,7 +116,7 @@ def common_friction(run: Run) -> float:
 
 
 def timed_row(run: Run, known: Mapping[str, object]) -> dict[str, object]:
-    """Measure φ at each stage and at `TIMES` during shaking; return the row, with the `known` cells."""
+    """Measure φ at each stage and at `TIMES` during shaking; return the row, which includes `known`."""
     history = packing_history(run)
     row = {**known, **measured_row(run, [DEFINITION])}
     for time in TIMES:
