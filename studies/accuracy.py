@@ -150,7 +150,7 @@ def parse_seeds(text: str) -> tuple[int, ...]:
     for word in words:
         first, _, last = word.partition("-")
         if last and not 0 <= int(last) - int(first) < _MOST_SEEDS:
-            raise InputError(f"--seeds {text}: {word} must go up, by fewer than {_MOST_SEEDS}")
+            raise InputError(f"--seeds {text}: {word} must be an ascending range of at most {_MOST_SEEDS} seeds")
         seeds += range(int(first), int(last or first) + 1)
     twice = next((seed for seed in seeds if seeds.count(seed) > 1), None)
     if twice is not None:
@@ -192,18 +192,18 @@ def build_ladder(scene: Scene, *, source: str, knobs: Sequence[str] | None = Non
     msg = ""
     if not ACTIVITIES & set(types):
         msg = (
-            f"{source}: phases: {', '.join(types)}: no activity whose result could be compared; "
+            f"{source}: phases: {', '.join(types)}: no activity, so there is nothing to compare; "
             f"add a phase of type {', '.join(sorted(ACTIVITIES))}"
         )
     elif scene.fidelity.time_step_s is not None:
         msg = (
-            f"{source}: fidelity.time_step_s: a step of {scene.fidelity.time_step_s:g} s by hand does not follow the "
-            "knobs; leave it out and give time_step_fraction"
+            f"{source}: fidelity.time_step_s: a fixed step of {scene.fidelity.time_step_s:g} s does not follow the "
+            "knobs; give fidelity.time_step_fraction instead"
         )
     elif idle is not None:
-        msg = f"--knobs: {idle} turns nothing: no phase of {source} actuates ({', '.join(types)}); leave it out"
+        msg = f"--knobs: {idle} changes nothing: no phase of {source} moves barbs ({', '.join(types)}); leave it out"
     elif scene.smooth and "hinge" in (knobs or ()):
-        msg = f"--knobs: hinge turns nothing: the engine {scene.engine} has no pins; leave it out"
+        msg = f"--knobs: hinge changes nothing: the engine {scene.engine} has no pins; leave it out"
     if msg:
         raise InputError(msg)
     useless = {"engine", *(() if driven else _OF_MOTORS), *(["hinge"] if scene.smooth else [])}
@@ -376,7 +376,7 @@ def measure(run: Run, expected_s: Mapping[str, float]) -> Row:
     active = [phase for phase in run.phases if phase.type in ACTIVITIES]
     if not active or active[0].index == 0:
         types = ", ".join(phase.type for phase in run.phases)
-        raise InputError(f"{run.path}: no activity after another phase: its phases are {types}")
+        raise InputError(f"{run.path}: no activity after another phase: its phases are {types}; leave it out")
     named = _NAMED.fullmatch(run.path.name)
     if named is None or int(named["seed"]) != run.manifest.seed:
         msg = f"{run.path}: not named SETTING_seed{run.manifest.seed}, as runs of a ladder are; do not rename runs"

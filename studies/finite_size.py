@@ -113,7 +113,7 @@ def measure(run: Run) -> Row:
     """Measure the pile at rest before and after the shake, and φ at its end; return the run's row."""
     types = tuple(phase.type for phase in run.phases)
     if types != PHASES:
-        raise InputError(f"{run.path}: its phases are {', '.join(types)}, not {', '.join(PHASES)}")
+        raise InputError(f"{run.path}: its phases are {', '.join(types)}, not {', '.join(PHASES)}; leave it out")
     frames = run.frames
     row: dict[str, object] = {
         ASPECT: round(run.manifest.aspect_ratio, 6),

@@ -131,7 +131,9 @@ def measure(run: Run) -> Row:
     rest = pulled.index - 1
     settings, hooks, frames = run.scene["phases"][pulled.index], run.scene.get("hooks"), run.frames.in_phase(rest)
     if named is None:  # the planned time is only in the name: that of the run is rounded to whole swings
-        raise InputError(f"{run.path}: not named like a run of this study, such as internal10_2s_lw0.70_seed1")
+        raise InputError(
+            f"{run.path}: not named like a run of this study, such as internal10_2s_lw0.70_seed1; restore its name"
+        )
     if hooks is None or not frames or settings["type"] != PULL:
         msg = f"{run.path}: no hooks or pull in scene.yaml, or no frame of the rest before the pull; run it again"
         raise InputError(msg)

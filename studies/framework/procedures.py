@@ -62,7 +62,7 @@ def prepared_by(run: Run, *then: str) -> dict[str, object]:
     if types != ["deposit", "relax", *([active[0], "relax"] if active else []), *then]:
         raise InputError(
             f"{run.path}: its phases are {', '.join(types)}, not a pour, a rest, one activity "
-            f"({', '.join(PROCEDURES)}) with a rest or none, {' and '.join(then)}"
+            f"({', '.join(PROCEDURES)}) with a rest or none, {' and '.join(then)}; leave it out"
         )
     procedure = PROCEDURES[active[0]] if active else STATIC
     theta = run.scene["phases"][2]["theta_deg"] if procedure == INTERNAL else math.nan
@@ -95,7 +95,8 @@ def activity(run: Run) -> Phase:
     around = run.phases[active[0].index - 1 : active[0].index + 2] if active else ()
     if len(active) != 1 or active[0].type not in PROCEDURES or len(around) != 3 or around[2].type != "relax":
         types = ", ".join(phase.type for phase in run.phases)
-        msg = f"{run.path}: not one activity ({', '.join(PROCEDURES)}) between two rests: its phases are {types}"
+        wanted = f"one activity ({', '.join(PROCEDURES)}) between two rests"
+        msg = f"{run.path}: its phases are {types}, not {wanted}; leave it out"
         raise InputError(msg)
     return active[0]
 
@@ -105,7 +106,8 @@ def procedure_row(run: Run) -> dict[str, object]:
     active = activity(run)
     settings = run.scene["phases"][active.index]
     if settings["type"] != active.type:
-        msg = f"{run.path}: phase {active.index} is {active.type} in run.json, {settings['type']} in scene.yaml"
+        scene = f"{settings['type']} in scene.yaml"
+        msg = f"{run.path}: phase {active.index} is {active.type} in run.json, {scene}; run it again"
         raise InputError(msg)
     procedure = PROCEDURES[active.type]
     wanted = range(active.index - 1, active.index + 2)

@@ -27,7 +27,7 @@ def removal(run: Run) -> Phase:
     last = run.phases[-1]
     if last.type != _REMOVAL or len(run.phases) < 3 or run.phases[-2].type != "relax":
         types = ", ".join(phase.type for phase in run.phases)
-        raise InputError(f"{run.path}: does not end with a rest and {_REMOVAL}: its phases are {types}")
+        raise InputError(f"{run.path}: does not end with a rest and {_REMOVAL}: its phases are {types}; leave it out")
     return last
 
 
@@ -48,7 +48,9 @@ def named_columns(run: Run) -> dict[str, object]:
     """
     active = [phase.type for phase in run.phases if phase.type not in {*PASSIVE_PHASES, _REMOVAL}]
     if len(active) > 1 or not set(active) <= set(PROCEDURES):
-        raise InputError(f"{run.path}: not one activity ({', '.join(PROCEDURES)}) or none: it has {', '.join(active)}")
+        raise InputError(
+            f"{run.path}: not one activity ({', '.join(PROCEDURES)}) or none: it has {', '.join(active)}; leave it out"
+        )
     return {PROCEDURE: PROCEDURES[active[0]] if active else STATIC, **run_columns(run)}
 
 

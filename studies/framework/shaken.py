@@ -110,7 +110,9 @@ def common_friction(run: Run) -> float:
     contact = contact_of(run)
     between, wall = contact["friction_smarticle"], contact["friction_wall"]
     if between != wall:
-        msg = f"{run.path}: friction is {between:g} between smarticles, {wall:g} at walls; this study has one"
+        msg = (
+            f"{run.path}: friction is {between:g} between smarticles, {wall:g} at walls; this study asks for equal ones"
+        )
         raise InputError(msg)
     return float(between)
 
@@ -146,7 +148,9 @@ def measured_row(run: Run, definitions: Sequence[str]) -> dict[str, object]:
     shakes = [phase for phase in run.phases if phase.type == _SHAKE]
     if not shakes or shakes[0].index == 0:
         types = ", ".join(phase.type for phase in run.phases)
-        raise InputError(f"{run.path}: no phase of type shake after another phase: its phases are {types}")
+        raise InputError(
+            f"{run.path}: no phase of type shake after another phase: its phases are {types}; leave it out"
+        )
     wanted = {"phi_0": shakes[0].index - 1, "phi_f": shakes[-1].index}
     if shakes[-1].index < run.phases[-1].index:
         wanted["phi_f relaxed"] = run.phases[-1].index
@@ -185,7 +189,7 @@ def packing_history(run: Run) -> History:
         shown = (series["phase"] >= shakes[0].index - 1) & np.isfinite(values)
         if shown.any():
             return History(times=series.time[shown] - start, values=values[shown], active=end - start)
-    raise InputError(f"{run.path}: no packing fraction was recorded while shaking")
+    raise InputError(f"{run.path}: no packing fraction was recorded while shaking; run it again")
 
 
 PHI_TIME = Histories(
