@@ -90,7 +90,12 @@ QUANTITIES = declare(
     | {share(stage): (f"cluster {stage}", "", f"share of the largest entangled cluster {stage}") for stage in STAGES}
     | {spans(stage, "height"): ("", "", f"1 where a cluster joins floor and top {stage}") for stage in STAGES}
     | {spans(stage, "width"): ("", "", f"1 where a cluster joins wall and wall {stage}") for stage in STAGES}
-    | {spans(stage): (f"spanned {stage}", "", f"1 where clusters span height and width {stage}") for stage in STAGES}
+    | {spans(stage): (f"spanned {stage}", "", f"1 where clusters span height and width {stage}") for stage in STAGES},
+    axes={phi(stage): rf"$\phi_{end}$ {stage} the shake [-]" for stage, end in zip(STAGES, "0f", strict=True)}
+    | {phi(stage, "voxel"): rf"$\phi$ of the inside {stage} [-]" for stage in STAGES}
+    | {crossings(stage): rf"$\langle N\rangle$ {stage} the shake [-]" for stage in STAGES}
+    | {share(stage): f"largest cluster {stage} [-]" for stage in STAGES}
+    | {spans(stage): f"share of piles spanned {stage} [-]" for stage in STAGES},
 )
 SCALED = (
     *(phi(stage, one) for stage in STAGES for one in DEFINITIONS),

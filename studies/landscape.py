@@ -177,7 +177,7 @@ def _spent(run: Run, procedure: str, rest: int) -> float:
 
 # Which measure goes with strength
 
-RESAMPLES, DRAW = 1000, 17
+RESAMPLES, DRAW = 1000, 17  # number of resamples, and seed of their random numbers
 STRENGTH, SCOPE, PART, PREDICTOR = "strength", "scope", "runs", "measure"
 RHO, LOW, HIGH = "rank correlation [-]", "from [-]", "to [-]"
 FIRST, OTHER, VERDICT = "first in resamples [-]", "other", "verdict"

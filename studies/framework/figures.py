@@ -54,7 +54,7 @@ class Analysis:
     """Tables and runs that the figures of a study are drawn from."""
 
     tables: Mapping[str, pd.DataFrame] = field(repr=False)  #: By name
-    manifests: Mapping[str, Run] = field(repr=False)  #: Runs by the name of their directory
+    runs: Mapping[str, Run] = field(repr=False)  #: Measured runs by the name of their directory
     footer: Sequence[str]  #: Statements about the origin of the results
 
     def table(self, name: str) -> pd.DataFrame:
@@ -402,7 +402,7 @@ class Histories:
             own = times[times["run"] == run]
             return History(times=own[self.x].to_numpy(), values=own[quantity].to_numpy()) if len(own) else None
         try:
-            return self.history(analysis.manifests[run])
+            return self.history(analysis.runs[run])
         except (InputError, KeyError):
             return None
 

@@ -72,10 +72,10 @@ class Pictures:
             runs = runs[(runs[list(self.select)] == 0).all(axis=1)]
         runs = runs.assign(apart=(runs[ASPECT] - 0.7).abs()).sort_values(["apart", SEED])
         for procedure, label in self.labels.items():
-            names = [name for name in runs.loc[runs[PROCEDURE] == procedure, "run"] if name in analysis.manifests]
+            names = [name for name in runs.loc[runs[PROCEDURE] == procedure, "run"] if name in analysis.runs]
             if not names:
                 continue
-            run = analysis.manifests[names[0]]
+            run = analysis.runs[names[0]]
             start, end = removal(run).start_s, run.status.time_s
             if start is not None and end is not None:
                 last = end if self.after is None else start + self.after

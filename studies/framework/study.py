@@ -138,9 +138,9 @@ class Study:
         header, rows = self.table(tables)
         lines = self.text(tables, judged, table_lines(header, rows))
         files = origin.write(output, footer, tables=tables, text=(TEXT, lines))
-        manifests = {run.run.path.name: run.run for run in found.runs}
+        measured = {run.run.path.name: run.run for run in found.runs}
         short = origin.figure_footer(f"{self._seeds(tables)}.", TEXT)
-        analysis = Analysis(tables=tables, manifests=manifests, footer=short)
+        analysis = Analysis(tables=tables, runs=measured, footer=short)
         files |= {path.name: path for path in self.draw(output, analysis)}
         verdicts = [f"{one.verdict.upper()}: {one.finding.says}\n    {one.ours}" for one in judged]
         return Report(

@@ -19,8 +19,8 @@ from studies.compaction import (
     STUDY,
     TIMES,
     Fit,
-    law_column,
     fit,
+    law_column,
     phi_column,
 )
 from studies.framework.figures import History

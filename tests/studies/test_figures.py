@@ -32,9 +32,6 @@ def points(axes: Axes, middle: Sequence[float], half_widths: Sequence[float]) ->
     draw_means(axes, range(len(middle)), middle, half_widths, properties=PROPERTIES, label="points")
 
 
-# -- error bars ------------------------------------------------------------------------------------------------------
-
-
 def test_error_bars_are_named_once_and_only_where_there_are_any(tmp_path: Path) -> None:
     figure, axes = figures.new_figure()
     points(axes, [1.0, 2.0], [0.1, np.nan])
@@ -44,9 +41,6 @@ def test_error_bars_are_named_once_and_only_where_there_are_any(tmp_path: Path) 
     points(axes, [1.0, 2.0], [np.nan, np.nan])
     draw_bounds(axes, [0.0, 1.0], [1.0, np.nan], 0.2, properties=PROPERTIES)
     assert footer(figure, tmp_path) == " ".join(ORIGIN)
-
-
-# -- limits ----------------------------------------------------------------------------------------------------------
 
 
 def test_limits_are_widened_to_what_is_drawn(tmp_path: Path) -> None:
@@ -79,12 +73,6 @@ def test_what_a_logarithmic_axis_cannot_show_is_stated(
     said = footer(figure, tmp_path)
     assert (stated in said) if stated else "cut" not in said
     assert axes.get_ylim()[1] > 2 + half_widths[2]
-
-
-# -- footers ---------------------------------------------------------------------------------------------------------
-
-
-# -- points that were never digitised ----------------------------------------------------------------------------------
 
 
 def test_references_state_where_they_have_no_point() -> None:
