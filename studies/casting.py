@@ -23,7 +23,7 @@ from postprocess.statistics.seeds import mean_over_seeds
 from studies.framework.figures import PROCEDURE_LABELS, Rows, by_procedure
 from studies.framework.findings import Effect, Finding, Outcome, above, mean, means_by
 from studies.framework.procedures import INTERNAL, PROCEDURE, SHAPE, STATIC, of_procedure
-from studies.framework.release import ORDER, Pictures, around, named_columns, removal
+from studies.framework.release import ORDER, Pictures, named_columns, removal, removal_frames
 from studies.framework.runs import Key, Row, declare, duration, last_columns
 from studies.framework.study import Study
 
@@ -81,7 +81,7 @@ def measure(run: Run) -> Row:
             "of the study casting"
         )
     tiers = tiers[:-1]  # without the neck
-    before, frames = around(run)
+    before, frames = removal_frames(run)
     start = removal(run).start_s or before.time
     after = frames[int(np.argmin(np.abs(frames.times - start - AFTER)))]
     one, other = (frame.vertices - np.array([0.0, 0.0, frame.floor_z]) for frame in (before, after))

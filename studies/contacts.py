@@ -67,12 +67,12 @@ def measure(run: Run) -> Row:
         FRICTION: contact["friction_smarticle"],
         WALL: contact["friction_wall"],
         RESTITUTION: contact["restitution"],
-        RISEN: risen(run),
+        RISEN: lowest_rise(run),
     }
     return timed_row(run, known)
 
 
-def risen(run: Run) -> float:
+def lowest_rise(run: Run) -> float:
     """Return the rise of the lowest tenth of all smarticles by shaking, over their middle length w [-].
 
     It is negative in a pile that compacts, and positive if the whole pile climbs in its container and leaves a gap at
@@ -174,10 +174,10 @@ def _near_gravish(means: pd.DataFrame) -> Outcome:
         for _, row in rows.iterrows()
     )
     verdict = decide(whole["inside"].any(), each["outside"].all())
-    return Outcome(note=f"nearest: {named(best)}; by l/w {places}", verdict=verdict)
+    return Outcome(note=f"nearest: {combination_name(best)}; by l/w {places}", verdict=verdict)
 
 
-def named(row: pd.Series) -> str:
+def combination_name(row: pd.Series) -> str:
     """Return the name of a combination of the three factors."""
     return f"μ = {row[FRICTION]:g}, container {row[WALL]:g}, e = {row[RESTITUTION]:g}"
 
@@ -234,7 +234,7 @@ STUDY: Study = Study(
         Rows(
             name="contacts",
             quantities=[Quantity(column=DEVIATION, axis=r"$\phi_\mathrm{f}$ less Gravish's [%]"), QUANTITIES[RISEN]],
-            row=named,
+            row=combination_name,
             split=one_by_one(ASPECT, "l/w = {:g}".format),
         ),
     ),

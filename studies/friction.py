@@ -334,7 +334,10 @@ def _of_stages(table: pd.DataFrame, what: str) -> pd.DataFrame:
 
 
 def one_friction(what: str) -> Finding:
-    """Make the finding that one friction brings φ at a set of stages near Gravish's at every l/w."""
+    """Make the finding that φ is near Gravish's φ at every l/w with one coefficient of friction.
+
+    `what`, a key of `JUDGED`, is the set of stages at which φ is compared.
+    """
 
     def outcome(tried: pd.DataFrame, best: pd.DataFrame) -> Outcome:
         tried, best = _of_stages(tried, what), _of_stages(best, what)

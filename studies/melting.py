@@ -20,7 +20,7 @@ from postprocess.statistics.seeds import mean_over_seeds
 from studies.framework.figures import PROCEDURE_LABELS, Histories, by_procedure
 from studies.framework.findings import Effect, Finding, Outcome, Verdict, above, decide, mean, means_by
 from studies.framework.procedures import INTERNAL, PROCEDURE, SHAPE, STATIC, of_procedure, paired
-from studies.framework.release import ORDER, Pictures, around, named_columns, removal
+from studies.framework.release import ORDER, Pictures, named_columns, removal, removal_frames
 from studies.framework.runs import ASPECT_KEY, Key, MeasuredRun, declare, duration, last_columns
 from studies.framework.study import Study
 
@@ -54,7 +54,7 @@ QUANTITIES = declare(
 
 def measure(run: Run) -> MeasuredRun:
     """Measure the pile with the wall and in every frame after; return the run's row and history."""
-    before, after = around(run)
+    before, after = removal_frames(run)
     phase = removal(run)
     settings = run.scene["phases"][phase.index]
     lift = 0.0 if settings.get("speed_m_per_s") is None else settings["speed_m_per_s"]

@@ -83,7 +83,7 @@ def summarise(runs: pd.DataFrame) -> dict[str, pd.DataFrame]:
     return {"summary": pd.DataFrame(rows)}
 
 
-def owes(name: str) -> Finding:
+def depends(name: str) -> Finding:
     """Make the finding that a quantity, key of `COMPARED`, depends on a parameter of the contact model."""
     column = COMPARED[name]
 
@@ -111,7 +111,7 @@ STUDY = Study(
     measure=measure,
     keys=(Key(column=VARIANT, label="variant", order=VARIANTS),),
     quantities=tuple(QUANTITIES.values()),
-    findings=tuple(map(owes, COMPARED)),
+    findings=tuple(map(depends, COMPARED)),
     figures=(
         Rows(
             name="sensitivity",

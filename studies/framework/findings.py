@@ -90,7 +90,7 @@ class Outcome:
 
 @dataclass(frozen=True, kw_only=True)
 class Finding:
-    """A statement with the function that computes what it is judged by."""
+    """A statement, with the function that computes the effects for its verdict."""
 
     id: str  #: Short name, unique in its study; `claims.yaml` refers to findings by it
     says: str  #: The statement, of the paper or our own

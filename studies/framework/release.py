@@ -31,7 +31,7 @@ def removal(run: Run) -> Phase:
     return last
 
 
-def around(run: Run) -> tuple[Frame, FrameSequence]:
+def removal_frames(run: Run) -> tuple[Frame, FrameSequence]:
     """Return the last frame with the wall and all frames of the removal; InputError if either is missing."""
     phase, frames = removal(run), run.frames
     rest, after = frames.in_phase(phase.index - 1), frames.in_phase(phase.index)
@@ -79,7 +79,9 @@ class Pictures:
             start, end = removal(run).start_s, run.status.time_s
             if start is not None and end is not None:
                 last = end if self.after is None else start + self.after
-                rows.append(strip.Row(directory=run.path, label=label, times=(around(run)[0].time, start + 0.1, last)))
+                rows.append(
+                    strip.Row(directory=run.path, label=label, times=(removal_frames(run)[0].time, start + 0.1, last))
+                )
         if not rows:
             return []
         columns = ("with the wall", "0.1 s after", "at the end" if self.after is None else f"{self.after:g} s after")
