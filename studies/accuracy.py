@@ -1,8 +1,9 @@
-"""What accuracy costs in time: variants of one scene, each with one knob turned, against the knob's finest rung.
+"""Accuracy and cost of one scene, by variants that each change one numerical parameter (a "knob").
 
-A knob has rungs from coarse to fine; the scene itself, the setting `base`, is a rung of every knob, and is run once.
-Errors are relative to the knob's reference: its finest rung with finished runs, or the scene itself for what is no
-accuracy but a sensitivity. An error within the scatter between seeds is not resolved, which is not the same as none.
+A knob has several values, its "rungs", from coarse to fine. The scene itself is the variant `base`; it is a rung of
+every knob, and is run once. Errors are relative to the reference of a knob: its finest rung with finished runs. Knobs
+of the model, such as restitution, have no accuracy but a sensitivity; their reference is the scene itself. An error
+within the scatter between seeds is not resolved, which does not prove that it is 0.
 """
 
 from __future__ import annotations
@@ -37,24 +38,24 @@ from studies.framework.study import Study
 from templates.sweep.render import Value, render_yaml
 from templates.sweep.sweep_file import Sweep, SweepFile
 
-BASE = "base"  #: Setting of the scene as it stands, which the others are variants of
+BASE = "base"  #: Name of the variant that is the scene itself
 
 KNOBS = ("time-step", "stiffness", "section", "restitution", "control", "hinge", "fidelity", "engine")
-"""Knobs in order; `smarticles accuracy --help` says what they are."""
+"""Knobs in the order of tables; `smarticles accuracy --help` explains them."""
 
-ACTUATED = frozenset({"actuate", "shape-change", "internal-oscillation"})  #: Types of phase in which barbs move
+ACTUATED = frozenset({"actuate", "shape-change", "internal-oscillation"})  #: Types of phases in which barbs move
 
 ACTIVITIES = ACTUATED | {"shake"}
-"""Types of phase that do something to the pile in its container; packing is compared before and after them."""
+"""Types of phases that are activities; packing is compared before the first and after the last of them."""
 
 _OF_MOTORS = frozenset({"control", "hinge"})
 _ENGINES = ("yade", "links")
-"""From coarse to fine: links have neither beads nor facets, so that all are compared with their converged answer."""
-# Left as the scene has them: facets, since no knob turns them; a step by hand is rejected.
+"""From coarse to fine: links have smooth bodies and walls, so that their converged results are the reference."""
+# Fields of the fidelity that no knob changes; a scene with its own time step is rejected.
 _FIXED = frozenset({"wall_facets", "time_step_s"})
 _STIFFNESSES = (125.0, 250.0, 500.0, 1000.0, 2000.0, 4000.0)
 _CONVERGED = {"rows": 3, "stiffness_N_per_m": 2000.0}
-"""Finer than the finest name on links, in what was found to matter: what the names are compared with."""
+"""Changes to the finest named fidelity on links that make the reference of the knobs `fidelity` and `engine`."""
 _ROWS = {2: "two", 3: "three", 4: "four"}
 _MOST_SEEDS = 1000
 _TEMPLATE = Path("accuracy.yaml.j2")
@@ -62,50 +63,47 @@ _TEMPLATE = Path("accuracy.yaml.j2")
 
 @dataclass(frozen=True, kw_only=True)
 class Rung:
-    """One value of one knob; `setting` names the variant of the scene that has it, whose runs are SETTING_seedN."""
+    """One value of a knob."""
 
     knob: str
-    value: str
-    unit: str
-    setting: str
+    value: str  #: As text
+    unit: str  #: Empty for a pure number or a name
+    setting: str  #: Name of the variant of the scene; its runs are named SETTING_seedN
 
     @property
     def label(self) -> str:
-        """Value and unit."""
+        """Value with unit, as text."""
         return f"{self.value} {self.unit}".rstrip()
 
     @property
     def sensitivity(self) -> bool:
-        """Whether the knob belongs to what is modelled: its rungs differ from the scene itself, and do not err."""
+        """Whether the knob belongs to the model, so that other values are no errors."""
         return self.knob == "restitution"
 
 
 @dataclass(frozen=True, kw_only=True)
 class Ladder:
-    """Rungs of all knobs, each knob's from coarse to fine, and variables and scene of each setting, `BASE` first.
+    """Rungs of all knobs, and the variants of the scene that they need."""
 
-    What could not be made is in `left_out`, one line each.
-    """
-
-    rungs: tuple[Rung, ...]
-    settings: Mapping[str, Mapping[str, Value]] = field(repr=False)
-    left_out: tuple[str, ...] = ()
-    scenes: Mapping[str, Scene] = field(repr=False)
+    rungs: tuple[Rung, ...]  #: By knob, from coarse to fine
+    settings: Mapping[str, Mapping[str, Value]] = field(repr=False)  #: Variables of the template by variant
+    left_out: tuple[str, ...] = ()  #: Rungs that the scene cannot have, with the reason, as text
+    scenes: Mapping[str, Scene] = field(repr=False)  #: Scenes by variant
 
     @property
     def knobs(self) -> tuple[str, ...]:
-        """The knobs that have rungs, in order."""
+        """Knobs that have rungs, in the order of tables."""
         return tuple(dict.fromkeys(rung.knob for rung in self.rungs))
 
     def references(self) -> dict[str, Rung]:
-        """What each knob's rungs are compared with: its finest rung, or the scene itself for a sensitivity."""
+        """Return the reference of each knob: its finest rung, or the scene itself for a sensitivity."""
         return {rung.knob: rung for rung in self.rungs if not rung.sensitivity or rung.setting == BASE}
 
 
 VARIANT, KNOB, VALUE, UNIT, REFERENCE, VERDICT = "variant", "knob", "value", "unit", "reference", "verdict"
 ACTIVITY, COUNT = "activity", "smarticles [-]"
 COST, WALL = "processor time per simulated time of the last activity [s/s]", "wall time [s]"
-"""A run is one thread, and waits for nothing; unlike its wall time, its processor time is not what others leave."""
+"""Cost is given as processor time, which other processes change less than wall time; a run has one thread."""
 
 EXPECTED = "processor time over expected wall time [-]"
 RESIDUAL, GAP = "energy residual over dissipated [-]", "largest joint gap [m]"
@@ -118,16 +116,16 @@ COMPARED = {
     "crossings": "crossings [-]",
     "hook_force": "peak hook force over n W_s [-]",
 }
-"""What is compared where runs have it: its name, and its column in the table of runs.
+"""Compared quantities: column of the table of runs by short name.
 
-A packing fraction hangs on one smarticle near the top; the height of the centre of mass, before the first activity, is
-a mean over all of them and scatters half as much.
+The height is that of the centre of mass before the first activity. It is a mean over all smarticles and scatters half
+as much as φ_0, which depends on a single smarticle near the top.
 """
 
 SYMBOLS = {"phi_0": "φ_0", "phi_f": "φ_f", "height": "h_0", "crossings": "⟨N⟩", "hook_force": "F_peak"}
 
 RESOLVED, NOT_RESOLVED, IS_REFERENCE, UNKNOWN = "resolved", "not resolved", "reference", "unknown"
-"""Verdicts: an error beyond its seed-to-seed band; none that is; the reference itself; no band, or no runs."""
+"""Verdicts on a rung: an error beyond its 95 % band; no such error; the reference itself; no band or no runs."""
 
 _AVERAGED = (COST, WALL, EXPECTED, *COMPARED.values(), RESIDUAL, GAP)
 _OF_SETTING = (ENGINE, TIME_STEP, SPHERES, ASPECT, COUNT, ACTIVITY)
@@ -135,15 +133,15 @@ _NAMED = re.compile(r"(?P<variant>.+)_seed(?P<seed>\d+)")
 
 
 def default_seeds(scene: Scene) -> tuple[int, ...]:
-    """Give the seeds of a ladder: twenty where they are cheap, three on YADE."""
+    """Return the default seeds: 1 to 20 on links, where runs are cheap, 1 to 3 on YADE."""
     return tuple(range(1, 21 if scene.smooth else 4))
 
 
 def parse_seeds(text: str) -> tuple[int, ...]:
-    """Parse seeds from `1,2,3` or `1-20`.
+    """Parse seeds from a text such as `1,2,3` or `1-20`.
 
     Raises:
-        InputError: there is none, one is no whole number from 0, or one is given twice.
+        InputError: There is no seed, one is not a whole number from 0, or one is given twice.
     """
     words = [word.strip() for word in text.split(",") if word.strip()]
     if not words or not all(re.fullmatch(r"[0-9]{1,9}(-[0-9]{1,9})?", word) for word in words):
@@ -152,7 +150,7 @@ def parse_seeds(text: str) -> tuple[int, ...]:
     for word in words:
         first, _, last = word.partition("-")
         if last and not 0 <= int(last) - int(first) < _MOST_SEEDS:
-            raise InputError(f"--seeds {text}: {word} must go up, by fewer than {_MOST_SEEDS}")
+            raise InputError(f"--seeds {text}: {word} must be an ascending range of at most {_MOST_SEEDS} seeds")
         seeds += range(int(first), int(last or first) + 1)
     twice = next((seed for seed in seeds if seeds.count(seed) > 1), None)
     if twice is not None:
@@ -161,10 +159,10 @@ def parse_seeds(text: str) -> tuple[int, ...]:
 
 
 def parse_knobs(text: str) -> tuple[str, ...]:
-    """Parse knobs from `time-step,section`, in the order of `KNOBS`.
+    """Parse knobs from a text such as `time-step,section`, and return them in the order of `KNOBS`.
 
     Raises:
-        InputError: there is none, or one is unknown.
+        InputError: There is no knob, or one is unknown.
     """
     words = [word.strip() for word in text.split(",") if word.strip()]
     for word in words:
@@ -176,12 +174,17 @@ def parse_knobs(text: str) -> tuple[str, ...]:
 
 
 def build_ladder(scene: Scene, *, source: str, knobs: Sequence[str] | None = None) -> Ladder:
-    """Make the ladder of a scene; a rung that it cannot have, such as two rows in a square section, is left out.
+    """Make the ladder of a scene.
 
-    `source` is the scene's file, for messages; without `knobs` there are all that the scene calls for.
+    Rungs that the scene cannot have, such as two rows of spheres in a square section, are left out.
+
+    Args:
+        scene: the scene.
+        source: name of its file, for messages.
+        knobs: knobs that are wanted; None: all that change anything in this scene.
 
     Raises:
-        InputError: the scene has no activity, a time step by hand, or nothing that a knob asked for could turn.
+        InputError: The scene has no activity, a time step of its own, or nothing that a given knob changes.
     """
     types = [phase.type for phase in scene.phases]
     driven = bool(ACTUATED & set(types))
@@ -189,18 +192,18 @@ def build_ladder(scene: Scene, *, source: str, knobs: Sequence[str] | None = Non
     msg = ""
     if not ACTIVITIES & set(types):
         msg = (
-            f"{source}: phases: {', '.join(types)}: no activity whose result could be compared; "
+            f"{source}: phases: {', '.join(types)}: no activity, so there is nothing to compare; "
             f"add a phase of type {', '.join(sorted(ACTIVITIES))}"
         )
     elif scene.fidelity.time_step_s is not None:
         msg = (
-            f"{source}: fidelity.time_step_s: a step of {scene.fidelity.time_step_s:g} s by hand does not follow the "
-            "knobs; leave it out and give time_step_fraction"
+            f"{source}: fidelity.time_step_s: a fixed step of {scene.fidelity.time_step_s:g} s does not follow the "
+            "knobs; give fidelity.time_step_fraction instead"
         )
     elif idle is not None:
-        msg = f"--knobs: {idle} turns nothing: no phase of {source} actuates ({', '.join(types)}); leave it out"
+        msg = f"--knobs: {idle} changes nothing: no phase of {source} moves barbs ({', '.join(types)}); leave it out"
     elif scene.smooth and "hinge" in (knobs or ()):
-        msg = f"--knobs: hinge turns nothing: the engine {scene.engine} has no pins; leave it out"
+        msg = f"--knobs: hinge changes nothing: the engine {scene.engine} has no pins; leave it out"
     if msg:
         raise InputError(msg)
     useless = {"engine", *(() if driven else _OF_MOTORS), *(["hinge"] if scene.smooth else [])}
@@ -214,7 +217,7 @@ def build_ladder(scene: Scene, *, source: str, knobs: Sequence[str] | None = Non
     for knob in knobs or [knob for knob in KNOBS if knob not in useless]:
         for value, unit, name, changes in _rungs(knob, base, smooth=scene.smooth):
             values = {**base, **changes}
-            # The name of a fidelity decides nothing by itself.
+            # Variants that differ only in the name of their fidelity are equal.
             decisive = {key: one for key, one in values.items() if key != "base"}
             setting = next((known for known, there in settings.items() if _same(decisive, there)), name)
             if setting not in settings:
@@ -230,7 +233,10 @@ def build_ladder(scene: Scene, *, source: str, knobs: Sequence[str] | None = Non
 
 
 def affordable(ladder: Ladder, expected_s: Mapping[str, float], most_s: float) -> Ladder:
-    """Leave out settings whose run is expected to take longer than so many seconds; the scene itself always stays."""
+    """Return a ladder without the variants that are expected to run longer than `most_s` [s].
+
+    The scene itself is always kept.
+    """
     dear = {setting for setting, wall in expected_s.items() if wall > most_s and setting != BASE}
     lines = [
         f"{rung.knob} {rung.label}: a run is expected to take {expected_s[rung.setting] / 3600:.2g} h, "
@@ -248,7 +254,7 @@ def affordable(ladder: Ladder, expected_s: Mapping[str, float], most_s: float) -
 
 
 def ladder_sweep(scene: Scene, ladder: Ladder, seeds: Sequence[int]) -> Sweep:
-    """Make the sweep of a ladder: every setting once per seed, all settings with the first seed first."""
+    """Make the sweep of a ladder: every variant at every seed, seed by seed."""
     data = {
         "schema_version": 1,
         "name": "accuracy",
@@ -268,13 +274,13 @@ def ladder_sweep(scene: Scene, ladder: Ladder, seeds: Sequence[int]) -> Sweep:
 
 
 def _template(scene: Scene) -> str:
-    """The scene as a template: all that the knobs turn is a variable."""
+    """Return the text of the scene as a template, with a variable for each value that a knob changes."""
     data = scene.model_dump(mode="json")
     data |= {"name": "{{ title }}", SEED: "{{ seed }}", "engine": "{{ engine }}"}
     data["contact"]["restitution"] = "{{ restitution }}"
     data["fidelity"] |= {key: f"{{{{ {key} }}}}" for key in data["fidelity"] if key not in _FIXED}
     text = str(yaml.safe_dump(data, sort_keys=False, allow_unicode=True))
-    # A variable that stands alone keeps its type.
+    # Without quotes the value of a variable keeps its type in YAML.
     return re.sub(r"'(\{\{ \w+ \}\})'", r"\1", text)
 
 
@@ -289,11 +295,11 @@ def _equal(one: Value, other: Value) -> bool:
 
 
 _Point = tuple[str, str, str, dict[str, Value]]
-"""Value and unit as text, name of the setting, and the variables that differ from the base."""
+"""Value and unit of a rung as text, name of its variant, and the variables that differ from the scene."""
 
 
 def _rungs(knob: str, base: Mapping[str, Value], *, smooth: bool) -> list[_Point]:
-    """All rungs of a knob, coarse to fine; `smooth`: of links that are no chains of spheres."""
+    """Return all rungs of a knob, from coarse to fine; `smooth`: links are smooth, not chains of spheres."""
     if knob == "section":
         return _strands(base) if smooth else _sections(base)
     if knob == "fidelity":
@@ -316,7 +322,7 @@ def _rungs(knob: str, base: Mapping[str, Value], *, smooth: bool) -> list[_Point
 
 
 def _names(engine: str) -> dict[str, dict[str, Value]]:
-    """What each named fidelity of an engine sets, coarse to fine; on links what is finer yet comes last."""
+    """Return the variables of each named fidelity of an engine, from coarse to fine."""
     shared: dict[str, Value] = {"engine": engine, "diameter_m": None}
     found = {name: {**shared, "base": name, **knobs} for name, knobs in fidelities(engine).items()}
     if engine == _ENGINES[-1]:
@@ -325,9 +331,9 @@ def _names(engine: str) -> dict[str, dict[str, Value]]:
 
 
 def _sections(base: Mapping[str, Value]) -> list[_Point]:
-    """Rows of spheres by the scene's own rule of their diameter, the true section last.
+    """Return the rungs of the section of chains of spheres, with diameters by the scene's rule.
 
-    A scene of several rows is compared with what is finer yet: its pitch halved, its rows doubled.
+    If the scene has several rows, there are two finer rungs: half of its pitch, and twice its rows.
     """
     shapes: list[dict[str, Value]] = [{"rows": 1, "pitch": pitch, "diameter_m": None} for pitch in (1.3, 1.0, 0.5)]
     shapes.append({"rows": 2, "pitch": 1.0, "diameter_m": None})
@@ -347,7 +353,7 @@ def _sections(base: Mapping[str, Value]) -> list[_Point]:
 
 
 def _strands(base: Mapping[str, Value]) -> list[_Point]:
-    """Strands of a smooth link, by the scene's own rule of their diameter."""
+    """Return the rungs of the section of smooth links: 1 to 3 strands, with diameters by the scene's rule."""
     shapes: list[dict[str, Value]] = [{"rows": rows, "diameter_m": None} for rows in (1, 2, 3)]
     own = {key: base[key] for key in shapes[0]}
     if not any(_same(own, shape) for shape in shapes):
@@ -357,20 +363,20 @@ def _strands(base: Mapping[str, Value]) -> list[_Point]:
 
 
 def _shaped(name: str, shape: dict[str, Value]) -> _Point:
-    """A rung of the section, with its diameter where that is set by hand."""
+    """Return a rung of the section; its name has the diameter if the scene sets it."""
     name += "" if shape["diameter_m"] is None else f" d {1e3 * shape['diameter_m']:g} mm"
     return name, "", re.sub(r"[^A-Za-z0-9.]+", "-", name), shape
 
 
 def measure(run: Run, expected_s: Mapping[str, float]) -> Row:
-    """Measure what a run, named SETTING_seedN, cost, and what is compared.
+    """Measure cost and compared quantities of a run, named SETTING_seedN; return its row.
 
-    The expected wall time is given by name of the run directory, where it is known [s].
+    `expected_s` has expected wall times [s] by name of the run directory, as far as known.
     """
     active = [phase for phase in run.phases if phase.type in ACTIVITIES]
     if not active or active[0].index == 0:
         types = ", ".join(phase.type for phase in run.phases)
-        raise InputError(f"{run.path}: no activity after another phase: its phases are {types}")
+        raise InputError(f"{run.path}: no activity after another phase: its phases are {types}; leave it out")
     named = _NAMED.fullmatch(run.path.name)
     if named is None or int(named["seed"]) != run.manifest.seed:
         msg = f"{run.path}: not named SETTING_seed{run.manifest.seed}, as runs of a ladder are; do not rename runs"
@@ -393,7 +399,7 @@ def measure(run: Run, expected_s: Mapping[str, float]) -> Row:
         ENGINE: run.manifest.engine,
         "fidelity": run.manifest.fidelity,
         TIME_STEP: run.manifest.time_step_s,
-        # Links that are no chains have spheres in pictures alone.
+        # Smooth links have spheres only in pictures.
         SPHERES: run.manifest.spheres_per_smarticle if run.manifest.engine == "yade" else math.nan,
         COST: _or_nan(last.cpu_s) / time if time > 0 else math.nan,
         WALL: _or_nan(run.status.wall_s),
@@ -415,7 +421,7 @@ def _or_nan(number: float | None) -> float:
 
 
 def _of_series(run: Run) -> dict[str, float]:
-    """Read the peak force of the first hook, energy residual and joint gap; NaN where the scene has none."""
+    """Return the cells peak hook force, energy residual and joint gap of a run; NaN if not recorded."""
     found = {COMPARED["hook_force"]: math.nan, RESIDUAL: math.nan, GAP: math.nan}
     if not (run.path / "series.h5").exists():
         return found
@@ -436,12 +442,14 @@ def _of_series(run: Run) -> dict[str, float]:
 
 
 def work_precision(runs: pd.DataFrame, rungs: Sequence[Rung]) -> pd.DataFrame:
-    """Compare each rung with its knob's reference: cost, means over seeds, errors; rungs go from coarse to fine.
+    """Compare each rung with the reference of its knob.
 
-    `… SE` is a standard error over seeds. `… error [%]` is relative to the reference's mean, `… error 95 % [%]` its
-    seed-to-seed band: the half-width of the interval of confidence by Student's t, with the scatter pooled over all
-    settings. The error of the reference itself is 0 by definition, its band that of its own mean. `… resolved` says
-    whether the error is beyond the band, `verdict` whether any is. A rung without runs has NaN.
+    Returns:
+        One row per rung, from coarse to fine within a knob; NaN for a rung without runs. Columns: cost and means over
+        seeds with their standard errors `… SE`; `… error [%]`, relative to the mean of the reference; `… error 95 %
+        [%]`, the band of the error, which is half of its 95 % interval by Student's t, with the scatter pooled over all
+        variants; `… resolved`, whether the error is beyond its band; `verdict`, whether any error of the rung is. The
+        reference has the error 0 and the band of its own mean.
     """
     groups = {rung.setting: runs[runs[VARIANT] == rung.setting] for rung in rungs}
     scatters = {name: pooled_scatter(group[column] for group in groups.values()) for name, column in COMPARED.items()}
@@ -449,7 +457,7 @@ def work_precision(runs: pd.DataFrame, rungs: Sequence[Rung]) -> pd.DataFrame:
     for knob in dict.fromkeys(rung.knob for rung in rungs):
         own = [rung for rung in rungs if rung.knob == knob]
         able = [rung for rung in reversed(own) if not rung.sensitivity or rung.setting == BASE]
-        # The finest rung with two finished runs, else with one.
+        # The finest rung with two finished runs; if there is none, the finest with one.
         reference = next((one.setting for n in (2, 1) for one in able if len(groups[one.setting]) >= n), "")
         rows += [_rung_row(rung, groups, reference, scatters) for rung in own]
     return pd.DataFrame(rows)
@@ -478,7 +486,7 @@ def _rung_row(
     for name, column in COMPARED.items():
         base = mean_over_seeds(groups[reference][column] if reference else [])
         error = relative_difference(mean_over_seeds(group[column]), base, scatter=scatters[name])
-        # The reference's own band is that of its mean alone: a difference of two such means has √2 of it.
+        # The difference of the reference's mean to itself would have √2 times the band of that mean.
         value, band = (0.0, error.half_width / math.sqrt(2)) if own else (error.value, error.half_width)
         clear.append(not own and abs(value) > band)
         known.append(math.isfinite(band))
@@ -492,7 +500,7 @@ def _label(row: pd.Series) -> str:
 
 
 def _errors(row: pd.Series) -> str:
-    """All errors of a rung with their bands."""
+    """Format all errors of a rung with their bands."""
     errors = {
         name: format_with_error(row[f"{name} error [%]"], "+.1f", row[f"{name} error 95 % [%]"]) for name in SYMBOLS
     }
@@ -500,9 +508,10 @@ def _errors(row: pd.Series) -> str:
 
 
 def advise(table: pd.DataFrame, knob: str) -> Outcome:
-    """Name the cheapest rung of a knob whose errors are not resolved, or of a sensitivity what is resolved.
+    """Judge which rung of a knob to use: the cheapest one whose errors are not resolved.
 
-    Its largest error that the seeds do not exclude says how far to trust that.
+    The text gives the largest error in φ that the seeds do not exclude. For a sensitivity it lists the rungs that
+    differ from the scene.
     """
     rows = table[table[KNOB] == knob]
     own, judged = rows[rows[VERDICT] == IS_REFERENCE], rows[rows[VERDICT].isin([RESOLVED, NOT_RESOLVED])]
@@ -544,7 +553,12 @@ def _finding(knob: str, *, sensitivity: bool) -> Finding:
 
 
 def study(rungs: Sequence[Rung], expected_s: Mapping[str, float] = MappingProxyType({})) -> Study:
-    """Make the study of a ladder: each knob's rungs, coarse to fine; expected wall times of runs by name [s]."""
+    """Make the study of a ladder.
+
+    Args:
+        rungs: rungs by knob, from coarse to fine.
+        expected_s: expected wall times of runs [s] by name of the run directory.
+    """
     knobs = {rung.knob: rung.sensitivity for rung in rungs}
 
     def tables(runs: pd.DataFrame) -> dict[str, pd.DataFrame]:

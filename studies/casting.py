@@ -1,8 +1,8 @@
-"""Smarticles of l/w = 0.8 are poured into a mould of three tiers, each narrower than the one below, and activated.
+"""Smarticles of l/w = 0.8 are poured into a mould of three tiers, narrower from tier to tier.
 
-All walls are removed at once: how well each tier is filled before, and what is kept 1 s later, against Savoie,
-Tuazon, Bhamla and Goldman, "Amorphous Entangled Active Matter", Soft Matter 2023, section "Casting". Procedures are
-compared between runs of one seed.
+After an activity, or none, all walls are removed at once. Measured are how much of each tier is filled before, and how
+much of that is filled 1 s after. Compared with Savoie, Tuazon, Bhamla and Goldman, "Amorphous Entangled Active Matter",
+Soft Matter 2023, section "Casting". Procedures are compared seed by seed.
 """
 
 from __future__ import annotations
@@ -23,15 +23,15 @@ from postprocess.statistics.seeds import mean_over_seeds
 from studies.framework.figures import PROCEDURE_LABELS, Rows, by_procedure
 from studies.framework.findings import Effect, Finding, Outcome, above, mean, means_by
 from studies.framework.procedures import INTERNAL, PROCEDURE, SHAPE, STATIC, of_procedure
-from studies.framework.release import ORDER, Pictures, around, named_columns, removal
+from studies.framework.release import ORDER, Pictures, named_columns, removal, removal_frames
 from studies.framework.runs import Key, Row, declare, duration, last_columns
 from studies.framework.study import Study
 
-AFTER = 1.0  # s after the walls went, as in the paper
-# Of a tier's volume inside the pile. A plain cylinder of r = 1.2 w has 0.74 ± 0.02 by this measure as poured (three
-# seeds, up to 3/4 of its height): the ball dips in between smarticles at the wall.
+AFTER = 1.0  # s, time between the removal of the walls and the second measurement, as in the paper
+# Share of a tier's volume inside the pile from which the tier counts as filled. The share is below 1 since the ball
+# reaches between smarticles at the wall: poured piles in a plain cylinder of r = 1.2 w have 0.74 ± 0.02 (three seeds).
 FULL = 0.7
-LOST = 0.05  # of the filled volume
+LOST = 0.05  # share of the filled volume whose loss counts as falling apart
 
 TIERS = ("lower", "middle", "upper")
 FILLED, FILLED_AFTER, KEPT, MATERIAL, MATERIAL_AFTER = (
@@ -43,7 +43,6 @@ WHOLE_AFTER, WHOLE_KEPT = "filled whole after [-]", "kept whole [-]"
 IN_MOULD, OVERLAP = "material in the mould after [-]", "overlap before and after [-]"
 LIKENESS_BEFORE, LIKENESS = "likeness to the mould [-]", "likeness to the mould after [-]"
 HEIGHT, CENTRE = "height of 95 % [m]", "com height over that before [-]"
-
 
 _BY_TIER = (
     (FILLED, "filled {}", "share of the volume of the {} tier inside the pile before"),
@@ -74,12 +73,15 @@ QUANTITIES = declare(
 
 
 def measure(run: Run) -> Row:
-    """Measure how a mould was filled, and what is left of its shape."""
+    """Measure how the pile fills the mould before the walls are removed and 1 s after; return the row."""
     tiers = read_tiers(run)
     if len(tiers) != len(TIERS) + 1:
-        raise InputError(f"{run.path}: a mould has {len(TIERS)} tiers and a neck: container.tiers has {len(tiers)}")
-    tiers = tiers[:-1]  # without the neck that the mould is filled through
-    before, frames = around(run)
+        raise InputError(
+            f"{run.path}: container.tiers must have {len(TIERS)} tiers and a neck, not {len(tiers)} entries; give runs "
+            "of the study casting"
+        )
+    tiers = tiers[:-1]  # without the neck
+    before, frames = removal_frames(run)
     start = removal(run).start_s or before.time
     after = frames[int(np.argmin(np.abs(frames.times - start - AFTER)))]
     one, other = (frame.vertices - np.array([0.0, 0.0, frame.floor_z]) for frame in (before, after))
@@ -87,7 +89,7 @@ def measure(run: Run) -> Row:
     found = cast(one, other, tiers, thickness=run.manifest.sphere_diameter_m, ball=ball)
     volumes = np.array([tier.volume for tier in tiers])
     filled = found.filled_before * volumes
-    # A share of less than the ball that separates inside from outside means nothing.
+    # A filled volume smaller than the ball that separates inside from outside is not meaningful.
     kept = np.where(filled > 4 / 3 * math.pi * ball**3, found.kept, math.nan)
     row = named_columns(run)
     for k, tier in enumerate(TIERS):
@@ -127,7 +129,7 @@ def _pour_fills(runs: pd.DataFrame) -> Outcome:
 
 FINDINGS = (
     Finding(id="pour-fills", says="The mould is filled by pouring (shown in a picture)", outcome=_pour_fills),
-    # A pile that packs denser sinks, and leaves the upper tier; the lower one is where it has enough to fill with.
+    # A denser pile sinks and leaves the upper tier empty, so only the lower tier shows how well the mould is filled.
     above(
         "internal-fills",
         "Internal oscillation fills the mould more completely, like a fluid",

@@ -1,8 +1,9 @@
-"""Strain test of a chain of two or six robots between two walls: force, yield, width and fracture against confinement.
+"""Strain test of a chain of two or six robots between two walls, at several distances of the walls.
 
-Against Savoie, Tuazon, Bhamla and Goldman, "Amorphous Entangled Active Matter", Soft Matter 2023, "Robophysical
-experiment", and what friction, servos and strings matter, which the paper omits. In `chain-bodies` robots have
-bodies 2.1 cm thick. Runs of one seed have the same servos. --quick takes minutes.
+Measured are force, yield, width and fracture against confinement h/H. Compared with Savoie, Tuazon, Bhamla and Goldman,
+"Amorphous Entangled Active Matter", Soft Matter 2023, section "Robophysical experiment". The paper omits friction,
+servos and strings; variants of the sweep show their influence. In `chain-bodies` robots have bodies 2.1 cm thick. Runs
+of one seed have equal servos. --quick takes minutes.
 """
 
 from __future__ import annotations
@@ -40,16 +41,16 @@ from studies.framework.findings import Effect, Finding, Outcome, Rows, Verdict
 from studies.framework.runs import Key, Quantity, Row, declare, last_columns
 from studies.framework.study import Study
 
-RANGE = (0.52, 0.65)  # h/H of the paper
+RANGE = (0.52, 0.65)  # least and greatest h/H in the paper
 YIELDS = {2: 0.2, 6: 0.4}  # strains at which the paper's single trials yield, by number of robots
-NEAR = 0.1  # of strain: how near a yield strain must be to the paper's, which is read off a sentence
-STRAIGHT = 0.25  # how far the second slope may be from the first, relative, to count as a straight line
+NEAR = 0.1  # accepted deviation from these strains, which a sentence of the paper gives
+STRAIGHT = 0.25  # accepted deviation of the second slope from the first, over the first, for a straight line
 BASELINE = "baseline"
 VARIANT, COUNT, CONFINEMENT, SPEED = "variant", "smarticles [-]", "h/H [-]", "speed [m/s]"
 START = "width at the start [m]"
 
-# h of the paper [m]. Links of one thickness are chosen such that a chain is as wide. With bodies of their own it is no
-# chain's outer width, and h/H only says where walls are: where the paper's are.
+# h of the paper [m]. A chain of robots with links of one thickness has this width by choice of the thickness. A chain
+# of robots with thicker bodies is wider: h/H then only gives the distance of the walls, which is that of the paper.
 PAPER_WIDTH = 0.062
 
 _SHOWN = {
@@ -65,10 +66,12 @@ QUANTITIES = declare({column: (*_SHOWN.get(column, ("", "")), meaning) for colum
 
 
 def measure(run: Run) -> Row:
-    """Measure force, strain and width of the chain."""
+    """Measure force, strain and width of the chain; return the run's row."""
     strained = [phase for phase in run.scene["phases"] if phase["type"] == STRAIN]
     if len(strained) != 1:
-        raise InputError(f"{run.path}: {len(strained)} phases that strain a chain; give runs of the study chain")
+        raise InputError(
+            f"{run.path}: has {len(strained)} phases of type {STRAIN}, not 1; give runs of the study chain"
+        )
     pull = read_strain_test(run)
     width = float(pull.widths[0]) if run.manifest.middle_thickness_in_plane_m is None else PAPER_WIDTH
     return {
@@ -84,7 +87,7 @@ def measure(run: Run) -> Row:
 
 
 def tabulate(runs: pd.DataFrame) -> dict[str, pd.DataFrame]:
-    """Make `points`, means over trials, and `sensitivity`, changes against the baseline's trials."""
+    """Make the tables `points`, means over seeds, and `sensitivity`, changes against the baseline [%]."""
     keys = [VARIANT, COUNT, CONFINEMENT, SPEED]
     points = [
         dict(zip(keys, place, strict=True))
@@ -104,17 +107,20 @@ def tabulate(runs: pd.DataFrame) -> dict[str, pd.DataFrame]:
 
 
 def baseline(runs: pd.DataFrame) -> pd.DataFrame:
-    """Select the runs of the baseline."""
+    """Return the rows of the variant `baseline`."""
     return runs[runs[VARIANT] == BASELINE]
 
 
 def in_range(runs: pd.DataFrame) -> pd.DataFrame:
-    """Select the runs of the baseline at the paper's h/H."""
+    """Return the rows of the variant `baseline` with an h/H within the range of the paper."""
     return baseline(runs)[baseline(runs)[CONFINEMENT].between(*RANGE)]
 
 
 def by_trial(part: pd.DataFrame, quantity: str) -> SeedMean:
-    """Average over seeds means over h/H: before they touch a wall, runs with the same servos are the same run."""
+    """Average a quantity over h/H, then over seeds.
+
+    Runs with equal servos are identical until the chain touches a wall: values at several h/H are not independent.
+    """
     return mean_over_seeds(part.groupby(SEED)[quantity].mean().tolist())
 
 
@@ -142,7 +148,7 @@ def _straight(base: pd.DataFrame) -> list[Effect]:
 
 
 def yields(count: int) -> Finding:
-    """Make the finding that a chain has a yield drop near the paper's strain."""
+    """Make the finding that a chain of `count` robots has a yield drop near the paper's strain."""
     expected = YIELDS[count]
 
     def outcome(base: pd.DataFrame) -> Outcome:
@@ -184,7 +190,7 @@ def rises(name: str, says: str, quantity: str, rows: Rows) -> Finding:
             slope = slope_within(own[CONFINEMENT].tolist(), own[quantity].tolist(), own[SEED].tolist())
             walls = f" per unit of h/H, force on the walls up to {own[WALL].max():.2g} N"
             effects.append(Effect(label=f"n = {count}: slope", value=slope, note=walls))
-            # A slope of nothing at all has no scatter: walls that are never touched change no bit.
+            # If the chain never touches a wall, runs at all h/H are identical: the slope is 0 without scatter.
             untouched |= slope.count > 1 and slope.value <= 0 and not slope.half_width > 0
         return Outcome(effects=effects, verdict=Verdict.NOT_FOUND if untouched else None)
 
@@ -223,7 +229,7 @@ FINDINGS = (
 
 
 def history(run: Run, *, width: bool = False) -> History:
-    """Read the force of the pulled string, or the width over that at the start, against strain up to the fracture."""
+    """Read the string's force [N], or the width over that at the start [-], against strain to fracture."""
     pull = read_strain_test(run)
     end = pull.fracture + 1
     values = pull.widths / pull.widths[0] if width else pull.forces
@@ -269,7 +275,8 @@ STUDY = Study(
             quantities=[QUANTITIES[PEAK], QUANTITIES[FRACTURE]],
             x=CONFINEMENT,
             x_label="confinement h/H [-]",
-            split=lambda points: one_by_one(COUNT, "n = {:g}".format)(baseline(points)),
+            rows=baseline,
+            split=one_by_one(COUNT, "n = {:g}".format),
             marks=RANGE,
             notes=["Means over trials, each with a seed of its own. Broken lines: the paper's range."],
         ),

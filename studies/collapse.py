@@ -1,23 +1,25 @@
-"""Free-standing columns on a vibrating floor: collapse times, and Δ of τ = (1/f) exp(Δ/Γ) against l/w.
+"""Collapse of free-standing columns on a vibrating floor: time τ and Δ in τ = (1/f) exp(Δ/Γ).
 
-Gravish, Franklin, Hu and Goldman, "Entangled granular media", Phys. Rev. Lett. 108, 208001 (2012), found Δ greatest at
-an intermediate l/w. A run pours, shakes with the wall, rests, takes the wall away, and shakes the floor.
+Gravish, Franklin, Hu and Goldman, "Entangled granular media", Phys. Rev. Lett. 108, 208001 (2012), found that Δ is
+greatest at an intermediate l/w. A run pours the pile, shakes it inside the wall, lets it rest, removes the wall, and
+vibrates the floor.
 
-What has not collapsed by the end of its run gives a bound, and is never left out: an acceleration Γ at which a run gave
-a bound is not used for Δ of its aspect ratio, since the others alone are the quick ones and would make it too small.
-The mean there, with bounds for times, is a bound in its turn.
+A column that has not collapsed by the end of its run gives a lower bound of τ. If a run at some acceleration Γ gives a
+bound, this Γ is not used for Δ at that l/w: the runs that did collapse are the fast ones, and would bias Δ to small
+values. The mean at that Γ, computed with the bounds, is a lower bound too.
 """
 
 from __future__ import annotations
 
 import hashlib
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from importlib.resources import files
 
 import numpy as np
 import pandas as pd
+from numpy.typing import ArrayLike, NDArray
 
 from dem.record.run import Run
 from postprocess.measures.collapse import (
@@ -37,7 +39,7 @@ from postprocess.statistics.seeds import SeedMean, Slope, difference, mean_over_
 from studies.framework.figures import ASPECT_LABEL, Histories, History, Means, one_by_one
 from studies.framework.findings import Effect, Finding, Outcome, Verdict, all_of, decide, within
 from studies.framework.provenance import Reference
-from studies.framework.runs import ASPECT_KEY, Key, Quantity, Row, duration, last_columns, sort_rows
+from studies.framework.runs import ASPECT_KEY, Key, Quantity, Row, duration, judging, last_columns, sort_rows
 from studies.framework.study import Study
 
 GAMMA, FREQUENCY, WATCHED = "peak acceleration [g]", "frequency [Hz]", "time vibrated [s]"
@@ -48,8 +50,8 @@ CENSORED, USED = "runs with a bound [-]", "Gamma used [g]"
 REFERENCE, DEVIATION, DEVIATION_95 = "Delta Gravish [-]", "deviation [%]", "deviation 95 % [%]"
 
 INTERMEDIATE = 0.40  #: l/w of Gravish's greatest Δ [-]
-CONSTANT = 0.20  #: How much Γ ln(fτ) may change from the least Γ to the greatest where the law holds, over its mean [-]
-CLOSE = 0.20  #: How far from Gravish's Δ ours may be, over it [-]: neighbouring points of theirs differ as much
+CONSTANT = 0.20  #: Accepted change of Γ ln(fτ) from the least to the greatest Γ, over its mean [-]; 0 by the law
+CLOSE = 0.20  #: Accepted deviation of Δ over Gravish's Δ [-], about the difference of their neighbouring points
 
 _DIGITISED = files("postprocess") / "reference" / "gravish2012_collapse.csv"
 KEYS = (
@@ -58,8 +60,7 @@ KEYS = (
     Key(column=GAMMA, label="Γ", form="g"),
 )
 
-
-_GRAVISH = pd.read_csv(str(_DIGITISED))  # `l_over_w` [-] and `delta` [-]; compared at equal l/w only
+_GRAVISH = pd.read_csv(str(_DIGITISED))  # columns `l_over_w` [-] and `delta` [-]; compared at equal l/w only
 DELTA_OF_POINT = Quantity(
     column=ACTIVATION,
     label="Δ",
@@ -70,10 +71,10 @@ DELTA_OF_POINT = Quantity(
 
 
 def measure(run: Run) -> Sequence[Row]:
-    """Measure the collapse time by each definition of the height, a row each."""
+    """Measure the collapse time by each definition of the height; return one row for each definition."""
     shaken = vibration(run)
     histories = {name: column_history(run, name, shaken) for name in HEIGHTS}
-    what: dict[str, object] = {
+    shared: dict[str, object] = {
         ASPECT: round(run.manifest.aspect_ratio, 6),
         GAMMA: shaken.acceleration,
         SEED: run.manifest.seed,
@@ -89,11 +90,11 @@ def measure(run: Run) -> Sequence[Row]:
     rows = []
     for name, history in histories.items():
         found = collapse_of(history, name, shaken)
-        # A time below a period has a negative logarithm, which is as good as any.
+        # Negative if the column collapses within one period.
         logarithm = math.log(shaken.frequency * (found.time if math.isfinite(found.time) else found.bound))
         rows.append(
             {
-                **what,
+                **shared,
                 DEFINITION: name,
                 "outcome": found.outcome,
                 TIME: found.time,
@@ -112,7 +113,7 @@ def measure(run: Run) -> Sequence[Row]:
 
 
 def times(runs: pd.DataFrame) -> pd.DataFrame:
-    """Average ln(fτ) over seeds by definition, l/w and Γ; a mean with a bound in it is a bound, and has no error."""
+    """Average ln(fτ) over seeds by definition, l/w and Γ; a mean that includes a bound has no error."""
     found = []
     for point, group in runs.groupby([DEFINITION, ASPECT, GAMMA], sort=False):
         bounds, mean = int(group[TIME].isna().sum()), mean_over_seeds(group[LOG])
@@ -123,11 +124,11 @@ def times(runs: pd.DataFrame) -> pd.DataFrame:
 
 
 def activations(runs: pd.DataFrame) -> pd.DataFrame:
-    """Fit Δ by definition and l/w: the slope of ln(fτ) against 1/Γ through the origin.
+    """Fit Δ, the slope of ln(fτ) against 1/Γ through the origin: one row per definition and l/w.
 
-    The slope is taken seed by seed over the accelerations at which every run collapsed; its mean over seeds has the
-    error. A seed that lacks a run at one of them does not count, since it would have another slope where the law does
-    not hold. Where there is no such acceleration Δ is empty, and there is only what it is at least.
+    Δ is fitted for each seed over those accelerations at which all runs collapsed, then averaged over seeds. A seed
+    that lacks a run at one of these accelerations is left out, since its slope would belong to other accelerations.
+    If there is no such acceleration, Δ is NaN, and the row has a lower bound only.
     """
     found = []
     every, gravish = times(runs), _GRAVISH.set_index("l_over_w")["delta"]
@@ -155,18 +156,18 @@ def activations(runs: pd.DataFrame) -> pd.DataFrame:
 
 
 def _used(runs: pd.DataFrame) -> pd.DataFrame:
-    """Select the rows by `REMAINING` at those l/w and Γ at which every run collapsed."""
+    """Return the rows of the definition `REMAINING` at those l/w and Γ at which all runs collapsed."""
     own = runs[runs[DEFINITION] == REMAINING]
     return own[own[TIME].notna().groupby([own[ASPECT], own[GAMMA]]).transform("all")]
 
 
 def rise(used: pd.DataFrame) -> Slope:
-    """Fit the slope of ln(fτ) against 1/Γ, free of the origin, with a level for each l/w and seed [-]."""
+    """Fit the slope of ln(fτ) against 1/Γ [-], with an intercept of its own for each l/w and seed."""
     return slope_within(list(1 / used[GAMMA]), list(used[LOG]), list(zip(used[ASPECT], used[SEED], strict=True)))
 
 
 def change(used: pd.DataFrame) -> Slope:
-    """Fit how Γ ln(fτ) changes from the least Γ to the greatest, over its mean at each l/w [-]; 0 by the law."""
+    """Fit the change of Γ ln(fτ) from the least to the greatest Γ, over its mean at each l/w [-]."""
     span = float(np.ptp(used[GAMMA])) if len(used) else 0.0
     if not span:
         return slope_within([], [], [])
@@ -265,6 +266,15 @@ def _with_bounds(table: pd.DataFrame) -> pd.DataFrame:
     return own.assign(**{LOG: own[LOG].where(own[CENSORED] == 0), AT_LEAST: own[LOG]})
 
 
+def _law_curves(
+    tables: Mapping[str, pd.DataFrame], rows: pd.DataFrame, _: str, places: NDArray[np.float64]
+) -> dict[str, tuple[ArrayLike, ArrayLike]]:
+    """Compute ln(fτ) = Δ/Γ of one l/w at places 1/Γ (n,), with 95 % half-widths (n,)."""
+    points = judging(tables["points"])
+    own = points[(points[DEFINITION] == REMAINING) & (points[ASPECT] == rows[ASPECT].iloc[0])].iloc[0]
+    return {"_Δ": (own[ACTIVATION] * places, own[marked(ACTIVATION, "95 %")] * places)}
+
+
 STUDY = Study(
     name="collapse",
     title="Collapse of columns against the findings of Gravish et al.",
@@ -284,7 +294,11 @@ STUDY = Study(
             rows=_with_bounds,
             bounds={LOG: AT_LEAST},
             split=one_by_one(ASPECT, lambda aspect: rf"$l/w$ = {aspect:g}"),
-            notes=["By the height `remaining`. Open, with an arrow: a run did not collapse, a bound."],
+            fit=_law_curves,
+            notes=[
+                "By the height `remaining`. Open, with an arrow: a run did not collapse, a bound. Lines: "
+                "τ = (1/f) exp(Δ/Γ) with the Δ of each l/w and its 95 % interval."
+            ],
         ),
         Means(
             name="delta_aspect",

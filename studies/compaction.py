@@ -1,20 +1,21 @@
-"""U-shapes of l/w = 0.7 are shaken for 200 s, ten times as long as Gravish's, at two coefficients of friction.
+"""U-shapes of l/w = 0.7 are shaken for 200 s at two coefficients of friction.
 
-Does φ still grow, and by which law: the stretched exponential of Kohlrausch, Williams and Watts, with which Gravish et
-al. (PRL 108, 208001, 2012) describe how piles of staples relax, or the inverse logarithm of Knight, Fandrich, Lau,
-Jaeger and Nagel, Phys. Rev. E 51, 3957 (1995), which tapped columns of beads follow? Both have four parameters, so that
-what they leave can be compared.
+This is ten times as long as Gravish et al. shook. Does φ still grow, and by which law? Gravish et al. (PRL 108, 208001,
+2012) describe the relaxation of staples by the stretched exponential of Kohlrausch, Williams and Watts. Tapped columns
+of beads follow the inverse logarithm of Knight, Fandrich, Lau, Jaeger and Nagel, Phys. Rev. E 51, 3957 (1995). Both
+laws have four parameters, so that their residuals can be compared.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from dataclasses import replace
 from itertools import product
 from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import least_squares
 
 from dem.record.run import Run
@@ -36,17 +37,18 @@ from studies.framework.study import Study
 
 Array = NDArray[np.float64]
 
-TIMES = (1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0)  # s; φ is a mean over the last fifth of each
-EARLY = 0.25  # share of the time that a law is fitted to, to see whether it predicts the rest
-FIRST, INTERVALS = 0.1, 40  # s, three periods of shaking: where fits begin; and in how many intervals
+TIMES = (1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0)  # s; φ is a mean over the last fifth of each time
+EARLY = 0.25  # share of the shaking time that a law is fitted to when it has to predict φ at the end
+FIRST = 0.1  # s, time at which fits begin: three periods of shaking
+INTERVALS = 40  # logarithmic intervals over which φ is averaged before a fit
 STRETCHED, LOGARITHMIC = "stretched exponential", "inverse logarithm"
 
-# Share of the way from begin to end that is left after a time, by τ [s] and β or B.
+# (φ_∞ − φ)/(φ_∞ − φ_b), the remaining share of the change, at times [s], by τ [s] and β or B.
 LAWS: dict[str, Callable[[Array, float, float], Array]] = {
     STRETCHED: lambda t, tau, beta: np.exp(-((t / tau) ** beta)),
     LOGARITHMIC: lambda t, tau, rate: 1 / (1 + rate * np.log1p(t / tau)),
 }
-_TAUS, _POWERS = (0.3, 3.0, 30.0), (0.3, 0.8)  # where fits begin
+_TAUS, _POWERS = (0.3, 3.0, 30.0), (0.3, 0.8)  # initial values of τ [s] and of β or B in fits
 
 BEGIN, END, TAU, POWER = "phi_b [-]", "phi_inf [-]", "tau [s]", "beta or B [-]"
 RESIDUAL, MISSED = "residual [-]", "missed at the end [-]"
@@ -55,32 +57,32 @@ _MEANINGS = {
     END: "φ in the end",
     TAU: "τ",
     POWER: "β or B",
-    RESIDUAL: "root mean square of what the law leaves",
-    MISSED: f"the law fitted to the first {100 * EARLY:g} % of the time less what φ is in the last tenth of it",
+    RESIDUAL: "root mean square of the residuals",
+    MISSED: f"mean φ over the last tenth of the time, by the law fitted to its first {100 * EARLY:g} %, less measured",
 }
 
 
 class Fit(NamedTuple):
-    """A law fitted to a history: φ as shaking begins and in the end [-], τ [s], β or B, and the root mean square left.
+    """A law fitted to φ against time; the end is uncertain if φ has not come near it."""
 
-    The end of a law that has not come near it is uncertain.
-    """
-
-    law: str
-    begin: float
-    end: float
-    tau: float
-    power: float
-    residual: float
+    law: str  #: Key of `LAWS`
+    begin: float  #: φ_b, when shaking begins [-]
+    end: float  #: φ_∞, after infinite time [-]
+    tau: float  #: τ [s]
+    power: float  #: β of the stretched exponential, B of the inverse logarithm [-]
+    residual: float  #: Root mean square of the residuals [-]
 
     def at(self, times: Array) -> Array:
-        """Compute φ at times since shaking began [s]."""
+        """Return φ (n,) [-] at times since shaking began (n,) [s]."""
         share = LAWS[self.law](np.asarray(times, dtype=np.float64), self.tau, self.power)
         return np.asarray(self.end - (self.end - self.begin) * share, dtype=np.float64)
 
 
 def fit(law: str, times: Array, packing: Array) -> Fit:
-    """Fit a law by least squares; begin and end enter linearly and are solved for exactly at every τ and power."""
+    """Fit a law to φ (n,) [-] at times (n,) [s] by least squares.
+
+    φ depends linearly on begin and end, so that these are solved for exactly at every τ and power.
+    """
 
     def solved(parameters: Array) -> tuple[Array, Array]:
         share = LAWS[law](times, float(np.exp(parameters[0])), float(np.exp(parameters[1])))
@@ -88,7 +90,7 @@ def fit(law: str, times: Array, packing: Array) -> Fit:
         ends, *_ = np.linalg.lstsq(matrix, packing, rcond=None)
         return np.asarray(ends, dtype=np.float64), np.asarray(matrix @ ends - packing, dtype=np.float64)
 
-    # Within what was seen: a τ far beyond the last time, or before the first one, says nothing.
+    # A τ far beyond the last time or far before the first one cannot be determined.
     low, high = np.log([times[0] / 10, 0.05]), np.log([10 * times[-1], 20.0])
     starts = (np.clip(np.log(pair), low + 1e-6, high - 1e-6) for pair in product(_TAUS, _POWERS))
     tries = (least_squares(lambda x: solved(x)[1], start, bounds=(low, high)) for start in starts)
@@ -99,7 +101,11 @@ def fit(law: str, times: Array, packing: Array) -> Fit:
 
 
 def spread_out(times: Array, packing: Array) -> tuple[Array, Array]:
-    """Average over intervals that are equally long on a logarithmic axis; gives geometric centres [s] and means [-]."""
+    """Average φ (n,) [-] at times (n,) [s] over logarithmic intervals; empty ones are left out.
+
+    Returns:
+        Geometric centres of the intervals (m,) [s], and means of φ (m,) [-].
+    """
     edges = np.geomspace(FIRST, times[-1] * (1 + 1e-9), INTERVALS + 1)
     place = np.searchsorted(edges, times, side="right") - 1
     inside = (place >= 0) & (place < INTERVALS)
@@ -109,36 +115,43 @@ def spread_out(times: Array, packing: Array) -> tuple[Array, Array]:
     return np.sqrt(edges[:-1] * edges[1:])[there], total[there] / number[there]
 
 
-def at(time: float) -> str:
-    """Name the column of φ after some time of shaking [s]."""
+def phi_column(time: float) -> str:
+    """Return the name of the column of φ after some time of shaking [s]."""
     return f"phi {time:g} s [-]"
 
 
-def of(law: str, column: str) -> str:
-    """Name the column of a law's number."""
+def law_column(law: str, column: str) -> str:
+    """Return the name of the column of a parameter or residual of a law."""
     return f"{law} {column}"
 
 
 def measure(run: Run) -> Row:
-    """Measure φ in the course of time, and fit both laws."""
+    """Measure φ at all times, and fit both laws; return the run's row."""
     row = timed_row(run, {FRICTION: common_friction(run)})
     history, shaken = packing_history(run), while_shaken(run)
     for time in TIMES:
         late = (history.times > 0.8 * time) & (history.times <= time * (1 + 1e-9))
         known = time <= history.active * (1 + 1e-9) and late.any()
-        row[at(time)] = float(history.values[late].mean()) if known else float("nan")
+        row[phi_column(time)] = float(history.values[late].mean()) if known else float("nan")
     times, values = shaken.times, shaken.values
     first, last = times <= EARLY * times[-1], times > 0.9 * times[-1]
     whole, early = spread_out(times, values), spread_out(times[first], values[first])
     for law in LAWS:
         found = fit(law, *whole)
-        row |= {of(law, name): number for name, number in zip(_MEANINGS, found[1:], strict=False)}
-        row[of(law, MISSED)] = float(np.mean(fit(law, *early).at(times[last]))) - float(np.mean(values[last]))
+        row |= {law_column(law, name): number for name, number in zip(_MEANINGS, found[1:], strict=False)}
+        row[law_column(law, MISSED)] = float(np.mean(fit(law, *early).at(times[last]))) - float(np.mean(values[last]))
     return row
 
 
 def positive(name: str, says: str, values: Callable[[pd.DataFrame], pd.Series], form: str) -> Finding:
-    """Make the finding that a number of each run is above 0 in the mean."""
+    """Make the finding that the mean of a value over all runs is above 0.
+
+    Args:
+        name: id of the finding.
+        says: statement.
+        values: computes the value of each run.
+        form: text with `{}` for the mean and its 95 % half-width.
+    """
 
     def outcome(runs: pd.DataFrame) -> list[Effect]:
         mean = mean_over_seeds(values(runs).dropna().tolist())
@@ -148,29 +161,38 @@ def positive(name: str, says: str, values: Callable[[pd.DataFrame], pd.Series], 
     return Finding(id=name, says=says, outcome=outcome)
 
 
+def _law_curves(
+    _: Mapping[str, pd.DataFrame], rows: pd.DataFrame, __: str, times: Array
+) -> dict[str, tuple[ArrayLike, ArrayLike]]:
+    """Compute φ at times (n,) by both laws, averaged over the runs of one coefficient of friction."""
+    fits = {law: rows[[law_column(law, name) for name in _MEANINGS][:5]].itertuples(index=False) for law in LAWS}
+    means = {law: np.mean([Fit(law, *run).at(times) for run in runs], axis=0) for law, runs in fits.items()}
+    return {law: (mean, np.full(len(times), np.nan)) for law, mean in means.items()}
+
+
 FINDINGS = (
     positive(
         "still-grows",
         f"phi still grows between {TIMES[-2]:g} and {TIMES[-1]:g} s",
-        lambda runs: 100 * (runs[at(TIMES[-1])] / runs[at(TIMES[-2])] - 1),
+        lambda runs: 100 * (runs[phi_column(TIMES[-1])] / runs[phi_column(TIMES[-2])] - 1),
         "by {} %",
     ),
     positive(
         "below-at-20-s",
         f"phi after Gravish's {SHAKE_TIME:g} s is below that after {TIMES[-1]:g} s",
-        lambda runs: -100 * (runs[at(SHAKE_TIME)] / runs[at(TIMES[-1])] - 1),
+        lambda runs: -100 * (runs[phi_column(SHAKE_TIME)] / runs[phi_column(TIMES[-1])] - 1),
         "below by {} %",
     ),
     positive(
         "stretched-leaves-less",
         "A stretched exponential leaves less than an inverse logarithm",
-        lambda runs: -100 * np.log(runs[of(STRETCHED, RESIDUAL)] / runs[of(LOGARITHMIC, RESIDUAL)]),
+        lambda runs: -100 * np.log(runs[law_column(STRETCHED, RESIDUAL)] / runs[law_column(LOGARITHMIC, RESIDUAL)]),
         "ln of the ratio of what they leave {} %",
     ),
     positive(
         "stretched-predicts",
         f"It tells the end better, fitted to the first {100 * EARLY:g} % of the time",
-        lambda runs: 1e3 * (runs[of(LOGARITHMIC, MISSED)].abs() - runs[of(STRETCHED, MISSED)].abs()),
+        lambda runs: 1e3 * (runs[law_column(LOGARITHMIC, MISSED)].abs() - runs[law_column(STRETCHED, MISSED)].abs()),
         "nearer by {}e-3",
     ),
 )
@@ -183,13 +205,26 @@ STUDY = Study(
     keys=(ASPECT_KEY, Key(column=FRICTION, label="friction", form="g")),
     quantities=(
         *(
-            Quantity(column=at(time), label=f"φ {time:g} s", form=".4f", meaning=f"φ after {time:g} s of shaking")
+            Quantity(
+                column=phi_column(time), label=f"φ {time:g} s", form=".4f", meaning=f"φ after {time:g} s of shaking"
+            )
             for time in TIMES
         ),
-        *(Quantity(column=of(law, name), meaning=f"{law}: {_MEANINGS[name]}") for law in LAWS for name in _MEANINGS),
+        *(
+            Quantity(column=law_column(law, name), meaning=f"{law}: {_MEANINGS[name]}")
+            for law in LAWS
+            for name in _MEANINGS
+        ),
     ),
     findings=FINDINGS,
-    figures=(PHI_TIME,),
+    figures=(
+        replace(
+            PHI_TIME,
+            fit=_law_curves,
+            marks=[SHAKE_TIME],
+            notes=[f"Laws: means over the runs; broken line: Gravish's {SHAKE_TIME:g} s."],
+        ),
+    ),
     order=(ASPECT, FRICTION, SEED),
     one_engine=True,
     remarks=(

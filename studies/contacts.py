@@ -1,8 +1,8 @@
-"""Friction between smarticles, friction at the container and restitution: which of them decides how a pile packs?
+"""Effect of friction between smarticles, friction at the container and restitution on packing.
 
-All combinations of two values of each at three l/w, shaken as by Gravish et al. The effect of a factor is the mean of
-paired differences, second level less first, all else alike; those of one l/w and seed are averaged first, so that a
-seed counts once.
+All combinations of two values of these three factors at three l/w, shaken as by Gravish et al. The effect of a factor
+is the mean of paired differences, second value less first, between runs that are equal in everything else. Differences
+at one l/w and seed are averaged first, so that the number of samples is that of the seeds.
 """
 
 from __future__ import annotations
@@ -41,10 +41,10 @@ from studies.framework.shaken import (
 )
 from studies.framework.study import Study
 
-MARGIN = 5.0  # % from Gravish's points
+MARGIN = 5.0  # %, accepted deviation from Gravish's points
 WALL, RESTITUTION = "friction at the container [-]", "restitution [-]"
 FACTORS: dict[str, tuple[float, float]] = {FRICTION: (0.4, 0.8), WALL: (0.4, 0.8), RESTITUTION: (0.7, 0.3)}
-"""From the paper's values to others."""
+"""First value, that of Savoie et al., and second value of each factor [-]."""
 
 CALLED = {FRICTION: "friction between smarticles", WALL: "friction at the container", RESTITUTION: "restitution"}
 RISEN, CROSSED = "lowest tenth after less before shaking [w]", "crossings after [-]"
@@ -55,7 +55,11 @@ QUANTITIES = declare(
         PHI_F: ("phi_f", ".4f", "packing fraction at the end of shaking"),
         PHI_RELAXED: ("phi_f at rest again", ".4f", "packing fraction after the rest that follows"),
         CROSSED: ("N after shaking", ".2f", "links through a smarticle's plane at the end of shaking"),
-        RISEN: ("the rise of the lowest tenth [w]", ".3f", "mean height of the lowest tenth of all, after less before"),
+        RISEN: (
+            "the rise of the lowest tenth [w]",
+            ".3f",
+            "mean height of the lowest tenth of smarticles, after less before",
+        ),
     },
     axes={RISEN: "rise of the lowest tenth [w]"},
 )
@@ -65,22 +69,22 @@ DEVIATION = "deviation of phi_f from Gravish [%]"
 
 
 def measure(run: Run) -> Row:
-    """Measure φ before, in the course of and after shaking, and by how much the lowest smarticles rose."""
+    """Measure φ before, during and after shaking, and the rise of the lowest smarticles; return the row."""
     contact = contact_of(run)
     known = {
         FRICTION: contact["friction_smarticle"],
         WALL: contact["friction_wall"],
         RESTITUTION: contact["restitution"],
-        RISEN: risen(run),
+        RISEN: lowest_rise(run),
     }
     return timed_row(run, known)
 
 
-def risen(run: Run) -> float:
-    """Measure by how much the lowest tenth of all smarticles rose while the pile was shaken [w].
+def lowest_rise(run: Run) -> float:
+    """Return the rise of the lowest tenth of all smarticles by shaking, over their middle length w [-].
 
-    A pile that packs lets it sink; one that climbs its container as a whole leaves a gap below. Heights are means over
-    the last `WINDOW` of the phase before shaking and of shaking.
+    It is negative in a pile that compacts, and positive if the whole pile climbs in its container and leaves a gap at
+    the floor. Mean heights of the lowest tenth are averaged over the last `WINDOW` of shaking and of the phase before.
     """
     frames, heights = run.frames, []
     shaken = next(phase.index for phase in run.phases if phase.type == "shake")
@@ -98,7 +102,10 @@ def _lowest_tenth(heights: NDArray[np.float64]) -> float:
 
 
 def points(runs: pd.DataFrame) -> pd.DataFrame:
-    """Average over seeds, and set φ_f against Gravish's, errors of both included."""
+    """Average over seeds, and compute the deviation of φ_f from Gravish's φ_f [%].
+
+    The error of the deviation combines that of our mean and that of reading Gravish's point.
+    """
     means = STUDY.points(runs)
     values = means[ASPECT].map(lambda aspect: gravish_at(aspect, "phi_f"))
     error = np.hypot(means[marked(PHI_F, "95 %")], DIGITISING_ERROR)
@@ -107,7 +114,7 @@ def points(runs: pd.DataFrame) -> pd.DataFrame:
 
 
 def by_seed(runs: pd.DataFrame, quantity: str, *changed: str) -> pd.DataFrame:
-    """Take what a quantity does when a factor changes, by l/w and seed; of two factors their interaction."""
+    """Return the change of a quantity with one factor, or the interaction of two, by l/w and seed."""
     table, left = runs, [*FACTORS, ASPECT, SEED]
     for factor in changed:
         left = [name for name in left if name != factor]
@@ -116,7 +123,7 @@ def by_seed(runs: pd.DataFrame, quantity: str, *changed: str) -> pd.DataFrame:
 
 
 def effects(runs: pd.DataFrame) -> pd.DataFrame:
-    """Tabulate the effect of each factor on each quantity by l/w, the last row of all l/w together."""
+    """Tabulate the effect of each factor on each quantity: a row for each l/w and one over all l/w."""
     rows = []
     for quantity, declared in QUANTITIES.items():
         for factor, changed in {**{CALLED[name]: (name,) for name in FACTORS}, TOGETHER: (FRICTION, WALL)}.items():
@@ -131,7 +138,16 @@ def effects(runs: pd.DataFrame) -> pd.DataFrame:
 
 
 def lowers(name: str, says: str, quantity: str, *changed: str, sign: int = -1, less: str = "") -> Finding:
-    """Make the finding that changing factors lowers (sign −1) or raises a quantity, or does so more than another."""
+    """Make the finding that a change of factors lowers a quantity.
+
+    Args:
+        name: id of the finding.
+        says: statement.
+        quantity: column of the quantity.
+        changed: factor, or two factors whose interaction is judged.
+        sign: −1 if the statement says lowers, +1 if raises.
+        less: factor whose effect is subtracted, if the statement says lowers more than that factor; empty: none.
+    """
 
     def outcome(runs: pd.DataFrame) -> Outcome:
         table = by_seed(runs, quantity, *changed)
@@ -149,7 +165,7 @@ def lowers(name: str, says: str, quantity: str, *changed: str, sign: int = -1, l
 
 
 def _near_gravish(means: pd.DataFrame) -> Outcome:
-    """Find a combination within the margin at every l/w, where errors leave no doubt."""
+    """Judge whether a combination is surely within the margin of Gravish's points at every l/w."""
     known = means[means[DEVIATION].notna()]
     if known.empty:
         return Outcome(note="no points of Gravish's at these l/w", verdict=Verdict.NOT_RESOLVED)
@@ -157,7 +173,7 @@ def _near_gravish(means: pd.DataFrame) -> Outcome:
     judged = known.assign(_inside=off + error <= MARGIN, _outside=off - error > MARGIN, _off=off)
     each = judged.groupby(list(FACTORS)).agg({"_inside": "all", "_outside": "any", "_off": ["max", "size"]})
     each.columns = pd.Index(["inside", "outside", "off", "places"])
-    # A combination that lacks an aspect ratio can be rejected by another one, and not accepted.
+    # A combination that was not run at every aspect ratio can be rejected by one of them, but not accepted.
     whole = each[each["places"] == each["places"].max()]
     best = pd.Series(dict(zip(FACTORS, whole["off"].idxmin(), strict=True)))
     rows = judged[np.all([judged[name] == best[name] for name in FACTORS], axis=0)]
@@ -166,11 +182,11 @@ def _near_gravish(means: pd.DataFrame) -> Outcome:
         for _, row in rows.iterrows()
     )
     verdict = decide(whole["inside"].any(), each["outside"].all())
-    return Outcome(note=f"nearest: {named(best)}; by l/w {places}", verdict=verdict)
+    return Outcome(note=f"nearest: {combination_name(best)}; by l/w {places}", verdict=verdict)
 
 
-def named(row: pd.Series) -> str:
-    """Name a combination."""
+def combination_name(row: pd.Series) -> str:
+    """Return the name of a combination of the three factors."""
     return f"μ = {row[FRICTION]:g}, container {row[WALL]:g}, e = {row[RESTITUTION]:g}"
 
 
@@ -226,7 +242,7 @@ STUDY: Study = Study(
         Rows(
             name="contacts",
             quantities=[Quantity(column=DEVIATION, axis=r"$\phi_\mathrm{f}$ less Gravish's [%]"), QUANTITIES[RISEN]],
-            row=named,
+            row=combination_name,
             split=one_by_one(ASPECT, "l/w = {:g}".format),
         ),
     ),

@@ -1,9 +1,10 @@
-"""The same seeds on both engines: each difference with its 95 % confidence interval against a margin chosen beforehand.
+"""Equal seeds on links and YADE: differences against margins that were chosen before the runs.
 
-Both engines pour the same seeds from the same poses. Two engines are equivalent in a quantity where the interval of the
-relative difference lies within the margin, different where it lies beyond it, and otherwise not resolved: a difference
-that is not significant proves nothing. (Two one-sided tests at 5 % would take the 90 % interval; ours is the stricter.)
-And YADE's chains of spheres ever finer: pitch 1.3, 1.0, 0.5, 0.25, links being the limit.
+Both engines pour equal seeds from equal poses. The engines are equivalent in a quantity if the 95 % confidence interval
+of the relative difference lies within the margin, different if it lies outside, and not resolved otherwise: that a
+difference is not significant does not prove equality. (Two one-sided tests at 5 % would take the 90 % interval, which
+is less strict.) The second part refines YADE's chains of spheres to pitches of 1.3, 1.0, 0.5 and 0.25; smooth links are
+their limit.
 """
 
 from __future__ import annotations
@@ -60,18 +61,18 @@ QUANTITIES = declare(
         FORCE: ("chain [N]", "", "largest force of the string that pulls the chain"),
     }
 )
-"""What is measured; a case leaves empty what it does not have."""
+"""Measured quantities; those that a case does not have are NaN."""
 
 
 class Compared(NamedTuple):
-    """A quantity that both engines give."""
+    """A quantity in which the engines are compared."""
 
-    label: str
-    #: Cases whose runs give it; several where all begin with the same pile: a seed's mean counts once
+    label: str  #: Name in tables and texts
+    #: Cases whose runs have the quantity; several if all start with one pile, whose mean over cases is one sample
     cases: tuple[str, ...]
     column: str  #: Of the table of runs
-    margin: float  #: By how much the engines may differ, in per cent of YADE's mean; chosen before the first run
-    why: str  #: Why that much
+    margin: float  #: Accepted difference [% of YADE's mean], chosen before the first run
+    why: str  #: Reason for this margin
 
 
 _PHI_WHY = "half of the 10 % within which the study gravish calls φ near Gravish's"
@@ -98,20 +99,20 @@ COMPARED: tuple[Compared, ...] = (
     Compared("collapse time", (COLLAPSE,), TAU, 30.0, _TAU_WHY),
     Compared("chain force", (CHAIN,), FORCE, 10.0, "the servos of a chain differ from each other by 10 %"),
 )
-"""What is compared, in the order of tables and figures."""
+"""Compared quantities in the order of tables and figures."""
 
 REFINED = tuple(
     one
     for one in COMPARED
     if one.cases == ACTIVE or (one.cases == (EXTERNAL,) and one.column in (PHI_ACTIVE, PHI, CROSSINGS))
 )
-"""What is followed to ever finer chains."""
+"""Quantities that are compared at every pitch of YADE's chains."""
 
 _WORDS = {Verdict.FOUND: "equivalent", Verdict.NOT_FOUND: "different"}
 
 
 def measure(run: Run) -> Row:
-    """Measure a few numbers, as the study measures them that the run is a small scene of."""
+    """Measure the quantities of the run's case; return the run's row, with NaN for all other quantities."""
     case, slash, variant = run.manifest.name.partition("/")
     if not slash or case not in (*ACTIVE, HOOK, COLLAPSE, CHAIN):
         msg = f"{run.path}: the scene's name is {run.manifest.name!r}, not CASE/VARIANT; give runs of the study engines"
@@ -146,14 +147,14 @@ def _measured(run: Run, case: str) -> dict[str, float]:
 
 
 def by_seed(runs: pd.DataFrame, one: Compared, variant: str) -> pd.Series:
-    """Average a quantity by seed over cases that begin alike; seeds without one are left out."""
+    """Return the mean of a quantity over its cases by seed; seeds without a value are left out."""
     chosen = runs[(runs[VARIANT] == variant) & runs[CASE].isin(one.cases)]
     means: pd.Series = chosen.groupby(SEED)[one.column].mean().dropna()
     return means
 
 
 def equivalence(runs: pd.DataFrame) -> pd.DataFrame:
-    """Compare the engines in each quantity that a run of either gives, paired by seed."""
+    """Compare the engines, paired by seed: a row for each quantity that was measured on one of them."""
     rows = []
     for one in COMPARED:
         links, yade = (by_seed(runs, one, variant) for variant in (LINKS, YADE))
@@ -184,16 +185,16 @@ def equivalence(runs: pd.DataFrame) -> pd.DataFrame:
 
 
 def pitch_of(variant: str) -> float:
-    """Give the pitch that a variant stands for [-]: links are the limit 0, YADE as it is 1; NaN for neither."""
+    """Return the pitch of a variant [-]: 0 for links, the limit, 1 for `yade`; NaN if it is unknown."""
     if variant in (LINKS, YADE):
         return 0.0 if variant == LINKS else 1.0
     return float(variant.removeprefix("pitch-")) if variant.startswith("pitch-") else math.nan
 
 
 def refinement(runs: pd.DataFrame) -> pd.DataFrame:
-    """Average the shaken pile by pitch of YADE's spheres, links as pitch 0, with differences to links, paired by seed.
+    """Compare the shaken piles at each pitch of YADE's spheres with links: a row per quantity and variant.
 
-    Only the shaken runs count, so that every pitch has equal ones.
+    Differences to links, which stand as pitch 0, are paired by seed. Other cases were not run at every pitch.
     """
     shaken = runs[runs[CASE] == EXTERNAL]
     rows: list[dict[str, object]] = []

@@ -1,8 +1,8 @@
-"""Which difference between the paper's text and its own code decides what a shape change leaves.
+"""Which difference between the paper's text and its own code changes the pile after a shape change.
 
-A full factorial of three differences that a shape change feels: the motor's law at its torque limit, friction, and
-the radius of the wall. The main effect of one is the mean of paired differences, code less text, over aspect ratios,
-seeds and all combinations of the other two.
+A full factorial of the three differences that act on a shape change: the motor's law at its torque limit, friction,
+and the radius of the wall. The main effect of each is the mean of paired differences, code less text, over aspect
+ratios, seeds and all combinations of the other two.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from studies.framework.study import Study
 
 LAW, FRICTION, RADIUS = "law", "friction [-]", "wall radius [m]"
 FACTORS: dict[str, tuple[object, object]] = {LAW: ("halt", "ease"), FRICTION: (0.4, 0.2), RADIUS: (0.0234, 0.0224)}
-"""Levels by the text, and by the code."""
+"""Value of each factor in the paper's text, and in its code."""
 
 NAMES = {
     LAW: ("law", "the motor's law (half speed, for a halt)"),
@@ -43,10 +43,10 @@ SIGNS = {CROSSINGS: ("⟨N⟩", 1), HEIGHT: ("h/h0", 1), PHI_ACTIVE: ("φ_f", -1
 
 
 def measure(run: Run) -> Row:
-    """Measure the shape change, and which rules it went by."""
+    """Measure the shape change, and read the three factors from the scene; return the run's row."""
     row = procedure_row(run)
     if row[PROCEDURE] != SHAPE:
-        raise InputError(f"{run.path}: {row[PROCEDURE]}, where factors are of shape changes; leave it out")
+        raise InputError(f"{run.path}: its activity is {row[PROCEDURE]}, not a shape change; leave the run out")
     scene = run.scene
     motor, contact = scene.get("motor"), scene.get("contact")
     return {
@@ -58,7 +58,7 @@ def measure(run: Run) -> Row:
 
 
 def effect(quantity: str, factor: str) -> Finding:
-    """Make the finding that a difference pushes a quantity in the sense of the paper's findings."""
+    """Make the finding that a factor changes a quantity with the sign that the paper's findings ask for."""
     (symbol, sign), (name, text) = SIGNS[quantity], NAMES[factor]
 
     def outcome(runs: pd.DataFrame) -> Outcome:

@@ -1,19 +1,21 @@
-"""Finite size: packing, entanglement and its percolation in piles of one shape and 100 to 10 000 smarticles.
+"""Finite size: packing, entanglement and percolation in piles of 100 to 10 000 smarticles.
 
-φ and ⟨N⟩ against N^(-1/3), and at which l/w entangled clusters begin to reach through piles of each size. A run is a
-pour, a rest, a shake and a rest.
+Measured are φ and ⟨N⟩ against N^(-1/3), where N is the number of smarticles, and the l/w from which entangled clusters
+span piles of each size. A run is a pour, a rest, a shake and a rest.
 
-A pile of 100 thin smarticles is lower than one of them is long, so that one that stands up spans its height alone. A
-pile counts as spanned where a cluster joins floor and top, and one wall and wall.
+A pile is spanned if one cluster joins floor and top, and one joins opposite sides of the wall. The height alone is not
+enough: a pile of 100 thin smarticles is lower than a single smarticle is long.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from functools import partial
 
 import numpy as np
 import pandas as pd
+from numpy.typing import ArrayLike, NDArray
 
 from dem.errors import InputError
 from dem.record.frames import FrameSequence
@@ -35,45 +37,45 @@ from studies.framework.study import Study
 COUNT, RADIUS = "smarticles [-]", "container radius over w [-]"
 BEFORE, AFTER = "before", "after"
 STAGES = {BEFORE: "phi_0", AFTER: "phi_f"}
-"""When a pile is at rest, before and after the shake, and what its φ is called."""
+"""Symbol of φ of the pile at rest, by stage: before and after the shake."""
 
 DEFINITIONS = (DEFINITION, "top-percentile", "voxel")
-"""Of φ: the paper's, one whose height no single smarticle decides, and one that leaves walls and top out."""
+"""Definitions of φ: that of the paper, one whose height does not depend on single smarticles, and one of the inside."""
 
 MOVING = f"phi_f shaken {DEFINITION} [-]"
-WINDOW = 1.0  #: Over how long φ is averaged at the end of the shake [s]: 30 periods
+WINDOW = 1.0  #: Time at the end of the shake over which φ is averaged [s]: 30 periods
 
 PHASES = ("deposit", "relax", "shake", "relax")
 PAPER_ASPECT, PAPER_COUNT = 0.7, 270
-"""The paper's pile that is asked about: its l/w, and its number of smarticles there."""
+"""l/w and number of smarticles of the paper's pile whose finite size is judged."""
 
-LARGEST = 0.2  #: l/w up to which piles are taken as near the threshold
+LARGEST = 0.2  #: Greatest l/w of the runs that the percolation threshold is fitted to
 
 AT_THRESHOLD = -0.155
 """Power of N with which the largest cluster's share falls just at the threshold of percolation in three dimensions,
 β/(νd) with β = 0.41 and ν = 0.88: Stauffer & Aharony, Introduction to Percolation Theory (1994), table 2."""
 
-_REJECTED = 0.05
-_DISTINCT = (1 / 6, 2 / 3)  # within half of 1/3 and twice it the law is distinguished from others
+_REJECTED = 0.05  # greatest p-value at which a law is rejected
+_DISTINCT = (1 / 6, 2 / 3)  # half and twice the power 1/3; an interval within them supports this power
 
 
 def phi(stage: str, definition: str = DEFINITION) -> str:
-    """Name the column of φ of a pile at rest."""
+    """Return the name of the column of φ of a pile at rest."""
     return f"{STAGES[stage]} {definition} [-]"
 
 
 def crossings(stage: str) -> str:
-    """Name the column of ⟨N⟩."""
+    """Return the name of the column of ⟨N⟩."""
     return f"crossings {stage} [-]"
 
 
 def share(stage: str) -> str:
-    """Name the column of the share of the smarticles in the largest entangled cluster."""
+    """Return the name of the column with the share of smarticles in the largest entangled cluster."""
     return f"largest cluster {stage} [-]"
 
 
 def spans(stage: str, what: str = "pile") -> str:
-    """Name the column of whether a cluster spans the height, the width or, both of them, the pile."""
+    """Return the name of the column that is 1 if clusters span the height, the width, or both ("pile")."""
     return f"spans {what} {stage} [-]"
 
 
@@ -87,15 +89,20 @@ QUANTITIES = declare(
     | {crossings(stage): (f"⟨N⟩ {stage}", "", f"⟨N⟩ {stage} the shake, at rest") for stage in STAGES}
     | {share(stage): (f"cluster {stage}", "", f"share of the largest entangled cluster {stage}") for stage in STAGES}
     | {spans(stage, "height"): ("", "", f"1 where a cluster joins floor and top {stage}") for stage in STAGES}
-    | {spans(stage, "width"): ("", "", f"1 where one joins wall and wall {stage}") for stage in STAGES}
-    | {spans(stage): (f"spanned {stage}", "", f"1 where both is so {stage}") for stage in STAGES}
+    | {spans(stage, "width"): ("", "", f"1 where a cluster joins wall and wall {stage}") for stage in STAGES}
+    | {spans(stage): (f"spanned {stage}", "", f"1 where clusters span height and width {stage}") for stage in STAGES},
+    axes={phi(stage): rf"$\phi_{end}$ {stage} the shake [-]" for stage, end in zip(STAGES, "0f", strict=True)}
+    | {phi(stage, "voxel"): rf"$\phi$ of the inside {stage} [-]" for stage in STAGES}
+    | {crossings(stage): rf"$\langle N\rangle$ {stage} the shake [-]" for stage in STAGES}
+    | {share(stage): f"largest cluster {stage} [-]" for stage in STAGES}
+    | {spans(stage): f"share of piles spanned {stage} [-]" for stage in STAGES},
 )
 SCALED = (
     *(phi(stage, one) for stage in STAGES for one in DEFINITIONS),
     MOVING,
     *(crossings(stage) for stage in STAGES),
 )
-"""Quantities that the law is fitted to."""
+"""Columns that the law q_∞ + a N^(-1/3) is fitted to."""
 
 ASKED = {
     phi(BEFORE): ("φ_0", ".4f", "phi-0"),
@@ -104,14 +111,14 @@ ASKED = {
     crossings(BEFORE): ("⟨N⟩_0", ".3f", "crossings-0"),
     crossings(AFTER): ("⟨N⟩_f", ".3f", "crossings-f"),
 }
-"""Quantities that are asked about: what they are called, how they are shown, and in ids."""
+"""Symbol, format and name in ids of findings of the quantities that are judged, by column."""
 
 
 def measure(run: Run) -> Row:
-    """Measure the pile at rest before and after the shake."""
+    """Measure the pile at rest before and after the shake, and φ at its end; return the run's row."""
     types = tuple(phase.type for phase in run.phases)
     if types != PHASES:
-        raise InputError(f"{run.path}: its phases are {', '.join(types)}, not {', '.join(PHASES)}")
+        raise InputError(f"{run.path}: its phases are {', '.join(types)}, not {', '.join(PHASES)}; leave it out")
     frames = run.frames
     row: dict[str, object] = {
         ASPECT: round(run.manifest.aspect_ratio, 6),
@@ -133,7 +140,7 @@ def measure(run: Run) -> Row:
 
 
 def _at_rest(run: Run, frames: FrameSequence, stage: str, phase: int) -> dict[str, object]:
-    """Measure the last frame of a rest."""
+    """Measure the last frame of a rest; return cells of the run's row."""
     part = frames.in_phase(phase)
     if not part:
         raise InputError(f"{run.path}: no frame of phase {phase} (relax); run it again")
@@ -153,7 +160,7 @@ def _at_rest(run: Run, frames: FrameSequence, stage: str, phase: int) -> dict[st
 
 
 def fitted(runs: pd.DataFrame, aspect: float, quantity: str) -> SizeLaw | None:
-    """Fit the law of one quantity at one l/w; nothing below two sizes."""
+    """Fit the law q_∞ + a N^(-1/3) to a quantity at one l/w; None if there are fewer than two sizes."""
     part = runs[(runs[ASPECT] == aspect) & np.isfinite(runs[quantity])]
     if part[COUNT].nunique() < 2:
         return None
@@ -161,7 +168,7 @@ def fitted(runs: pd.DataFrame, aspect: float, quantity: str) -> SizeLaw | None:
 
 
 def laws(runs: pd.DataFrame) -> pd.DataFrame:
-    """Fit the law of every quantity at every l/w, whether it holds, and which power does."""
+    """Tabulate the fits at every l/w and quantity: parameters of the law, p-value, and best power of N."""
     return pd.DataFrame(
         {
             ASPECT: aspect,
@@ -184,12 +191,12 @@ def laws(runs: pd.DataFrame) -> pd.DataFrame:
 
 
 def _column(stage: str, axis: str) -> str:
-    """Name the column that spanning is set against."""
+    """Return the column that belongs to an axis of the table of thresholds: "l/w" or "⟨N⟩"."""
     return ASPECT if axis == "l/w" else crossings(stage)
 
 
 def _profiles(runs: pd.DataFrame, stage: str, axis: str) -> dict[int, Profile]:
-    """Fit where piles near the threshold begin to be spanned, by size."""
+    """Fit the threshold from which piles are spanned along an axis ("l/w" or "⟨N⟩"), by size."""
     column = _column(stage, axis)
     part = runs[(runs[ASPECT] <= LARGEST) & np.isfinite(runs[column])]
     if part.empty:
@@ -199,7 +206,7 @@ def _profiles(runs: pd.DataFrame, stage: str, axis: str) -> dict[int, Profile]:
 
 
 def thresholds(runs: pd.DataFrame) -> pd.DataFrame:
-    """Fit where half of the piles are spanned, by stage, axis and size."""
+    """Tabulate the thresholds at which half of the piles are spanned: a row per stage, axis and size."""
     return pd.DataFrame(
         {
             "stage": stage,
@@ -219,7 +226,7 @@ def thresholds(runs: pd.DataFrame) -> pd.DataFrame:
 
 
 def growth(runs: pd.DataFrame) -> pd.DataFrame:
-    """Fit the power of N with which the largest cluster's share goes, by stage and l/w."""
+    """Fit the largest cluster's share of the pile as a power of N: a row per stage and l/w."""
     rows = []
     for stage in STAGES:
         for aspect, part in runs.groupby(ASPECT):
@@ -255,7 +262,7 @@ def _law(runs: pd.DataFrame, quantity: str) -> Outcome:
     return Outcome(note=f"{note}({low:.2f} to {high:.2f}{ends})", verdict=decide(right and not wrong, wrong))
 
 
-def _whole(runs: pd.DataFrame) -> Outcome:
+def _spanned_at_any_size(runs: pd.DataFrame) -> Outcome:
     part = runs[runs[ASPECT] == PAPER_ASPECT]
     if part.empty:
         return Outcome(verdict=Verdict.NO_DATA)
@@ -268,7 +275,7 @@ def _whole(runs: pd.DataFrame) -> Outcome:
     )
 
 
-def _shift(runs: pd.DataFrame, table: pd.DataFrame, stage: str, axis: str) -> Outcome:
+def _threshold_moves(runs: pd.DataFrame, table: pd.DataFrame, stage: str, axis: str) -> Outcome:
     rows = table[(table["stage"] == stage) & (table["against"] == axis)] if len(table) else table
     if rows.empty:
         return Outcome(verdict=Verdict.NO_DATA)
@@ -283,7 +290,7 @@ def _shift(runs: pd.DataFrame, table: pd.DataFrame, stage: str, axis: str) -> Ou
     return Outcome(note=note, verdict=decide(chance < _REJECTED))
 
 
-def _falls(table: pd.DataFrame, stage: str) -> Outcome:
+def _cluster_falls(table: pd.DataFrame, stage: str) -> Outcome:
     rows = table[(table["stage"] == stage) & table["power of N [-]"].notna()] if len(table) else table
     if rows.empty:
         return Outcome(verdict=Verdict.NO_DATA)
@@ -324,14 +331,14 @@ FINDINGS = (
         id="spanned-at-any-size",
         says=f"(ours) entangled clusters reach through all piles of l/w = {PAPER_ASPECT:g}, whatever their size",
         found_if="all runs are spanned, before and after the shake",
-        outcome=_whole,
+        outcome=_spanned_at_any_size,
     ),
     *(
         Finding(
             id=f"threshold-moves-{name}-{stage}",
             says=f"(ours) the {axis} at which clusters span half of the piles {stage} the shake goes with their size",
             found_if="one place for all sizes is rejected, p < 0.05",
-            outcome=partial(_shift, stage=stage, axis=axis),
+            outcome=partial(_threshold_moves, stage=stage, axis=axis),
             tables=["runs", "thresholds"],
         )
         for axis, name in (("l/w", "aspect"), ("⟨N⟩", "crossings"))
@@ -342,12 +349,24 @@ FINDINGS = (
             id=f"cluster-falls-{stage}",
             says=f"(ours) at some l/w the largest entangled cluster is ever less of larger piles {stage} the shake",
             found_if="power of N < 0 at 95 % at one l/w",
-            outcome=partial(_falls, stage=stage),
+            outcome=partial(_cluster_falls, stage=stage),
             tables=["growth"],
         )
         for stage in STAGES
     ),
 )
+
+
+def _law_curves(
+    tables: Mapping[str, pd.DataFrame], rows: pd.DataFrame, column: str, places: NDArray[np.float64]
+) -> dict[str, tuple[ArrayLike, ArrayLike]]:
+    """Compute the law of a quantity at places N^(-1/3) (n,), with 95 % half-widths (n,)."""
+    law = fitted(tables["runs"], float(rows[ASPECT].iloc[0]), column)
+    if law is None:
+        return {}
+    half_widths = [law.error(1, float(place)) for place in places]
+    return {r"fit of $q_\infty + a N^{-1/3}$": (law.bulk + law.slope * places, half_widths)}
+
 
 _SCALING = [column(stage) for column in (phi, partial(phi, definition="voxel"), crossings) for stage in STAGES]
 FIGURES = (
@@ -360,7 +379,10 @@ FIGURES = (
         rows=lambda points: points[points[ASPECT] == PAPER_ASPECT],
         split=one_by_one(ASPECT, "l/w = {:g}".format),
         marks=[PAPER_COUNT**-POWER],
-        notes=[f"0 is a pile without end; broken line: the paper's {PAPER_COUNT} smarticles. Fits: laws.csv."],
+        fit=_law_curves,
+        notes=[
+            f"Bands: 95 % of the fit; 0: a pile of infinite size; broken line: the paper's {PAPER_COUNT} smarticles."
+        ],
     ),
     Means(
         name="percolation",

@@ -1,8 +1,9 @@
-"""A hook is pulled out of piles that were prepared by each procedure, of several amplitudes θ and several l/w.
+"""A hook is pulled out of piles that were prepared by each procedure, at several θ and l/w.
 
-Force against time, peak force, work, and how they go with entanglement, against Savoie, Tuazon, Bhamla and Goldman,
-"Amorphous Entangled Active Matter", Soft Matter 2023, section "Tensile loading and fracture". Runs of one l/w and seed
-were poured alike and are compared seed by seed; a pile that held fast has a peak of at least the limit of the hook.
+Measured are force against time, peak force and work, and their correlation with entanglement. They are compared with
+Savoie, Tuazon, Bhamla and Goldman, "Amorphous Entangled Active Matter", Soft Matter 2023, section "Tensile loading and
+fracture". Runs of one l/w and seed are poured from equal poses and compared pair by pair. If the hook stops at its
+force limit ("held fast"), the peak force is a lower bound.
 """
 
 from __future__ import annotations
@@ -63,7 +64,7 @@ from studies.strength import (
     with_crossings,
 )
 
-SHOWN_ASPECT = 0.7  # at which procedures and amplitudes are compared, as in the paper
+SHOWN_ASPECT = 0.7  # l/w at which procedures and amplitudes are compared, as in the paper
 
 PEAK_TIME = "time of the peak [s]"
 WINDOWS = {
@@ -75,22 +76,22 @@ LEFT = "load at the end over n W_s [-]"
 CAME_FREE, FREE_TIME = "came free [-]", "time of coming free [s]"
 ACCOUNT = "work less that of the engine's account [-]"
 
-_FORCE = f"largest mean over {WINDOW:g} s of the force that raises the hook, over n W_s; at least, where it held"
+_FORCE = f"largest mean over {WINDOW:g} s of the force that raises the hook; a lower bound where it held fast"
 QUANTITIES = declare(
     {
         PEAK: ("peak", ".3f", _FORCE),
         HELD_FAST: ("held fast", ".2f", "1 where the hook was stopped by its force limit, 0 where it arrived"),
         **{column: ("", ".3f", f"largest mean over {window:g} s") for window, column in WINDOWS.items()},
-        HELD: ("lower hook at it", ".3f", "upwards on the lower hook at the peak: what goes from hook to hook"),
+        HELD: ("lower hook at it", ".3f", "upward force on the lower hook at the peak, transmitted from hook to hook"),
         NET: ("peak less lower hook", ".3f", "largest mean of the force on the upper hook less that on the lower"),
         PEAK_TIME: ("", ".3g", "time since the pull began at which the peak is"),
-        RAISED: ("raised at it [mm]", ".1f", "how far the hook had been raised then"),
+        RAISED: ("raised at it [mm]", ".1f", "displacement of the hook at the peak"),
         WORK: ("work / n W_s w", ".3f", "∫ F dz over the whole pull"),
         CAME_FREE: ("came free", ".2f", f"1 where the force came below {FREE:g} of its peak for good, 0 elsewhere"),
-        FREE_TIME: ("", ".3g", "when it did so, since the pull began; empty where it did not"),
+        FREE_TIME: ("", ".3g", "time since the pull began at which it came free; empty where it did not"),
         LEFT: ("load at the end", ".3f", f"mean force over the last {END:g} s of the pull"),
         BEFORE: ("", ".3g", f"mean force on the hook over the last {END:g} s before the pull"),
-        ABOVE: ("above the hook", ".2f", "share with the centre of mass above the hook before the pull"),
+        ABOVE: ("above the hook", ".2f", "share of smarticles with the centre of mass above the hook before the pull"),
         CROSSINGS: ("⟨N⟩", ".2f", "⟨N⟩ at rest before the pull: links of others through a smarticle's plane"),
         PHI: ("", ".3g", "packing fraction at rest before the pull"),
     },
@@ -100,7 +101,7 @@ QUANTITIES = declare(
 
 
 def measure(run: Run) -> Row:
-    """Measure the pile before the pull, and the forces on the hooks."""
+    """Measure the pile before the pull, and the forces on the hooks; return the run's row."""
     pile, pulled, series = prepared_by(run, PULL), run.phases[-1], run.series
     rest, asked = pulled.index - 1, run.scene["phases"][pulled.index]
     table = summarise_run(run, definitions=[DEFINITION], phases={rest, pulled.index}).set_index("phase")
@@ -138,30 +139,30 @@ def measure(run: Run) -> Row:
 
 
 def force_history(run: Run, *, net: bool = False) -> History:
-    """Read the force over n W_s against the time since the pull began; net of that on the lower hook."""
+    """Read the force on the upper hook over n W_s [-] against time; `net` subtracts the lower hook's."""
     pull = read_pull(run, run.series, run.phases[-1].index)
     force = (pull.net if net else pull).force / run.manifest.count / weight_of_one(run)
-    return History(times=pull.times, values=force, active=0.0)
+    return History(times=pull.times, values=force)
 
 
 def at_shown_aspect(table: pd.DataFrame) -> pd.DataFrame:
-    """Select what is at the aspect ratio at which procedures are compared."""
+    """Return the rows at the aspect ratio `SHOWN_ASPECT`."""
     return table[np.isclose(table[ASPECT], SHOWN_ASPECT)]
 
 
 def at_one_theta(table: pd.DataFrame) -> pd.DataFrame:
-    """Select what is compared: one l/w, of the internal oscillation one θ."""
+    """Return the rows at `SHOWN_ASPECT`, of the internal oscillation only those with θ = `AMPLITUDE`."""
     return compared(at_shown_aspect(table))
 
 
 def amplitudes(table: pd.DataFrame) -> pd.DataFrame:
-    """Select the internal oscillation at the shown l/w, where there are several θ."""
+    """Return the rows of the internal oscillation at `SHOWN_ASPECT`; none if they have one θ."""
     part = at_shown_aspect(table[table[PROCEDURE] == INTERNAL])
     return part if part[THETA].nunique() > 1 else part.iloc[:0]
 
 
 def aspects(table: pd.DataFrame) -> pd.DataFrame:
-    """Select the internal oscillation at the θ that is compared, where there are several l/w."""
+    """Return the rows of the internal oscillation at θ = `AMPLITUDE`; none if they have one l/w."""
     part = of_procedure(table, INTERNAL)
     return part if part[ASPECT].nunique() > 1 else part.iloc[:0]
 
@@ -177,13 +178,13 @@ _BY_ASPECT = one_by_one(ASPECT, lambda aspect: rf"$l/w$ = {aspect:g}")
 
 
 def _line(rows: Rows) -> Split:
-    """Make one series of the internal oscillation."""
-    look = {**procedure_marker(INTERNAL), "linestyle": (0, (2, 1.5))}
-    return lambda points: [Series(rows=rows(points), label="internal oscillation", look=look)]
+    """Return a split into one series, the internal oscillation."""
+    properties = {**procedure_marker(INTERNAL), "linestyle": (0, (2, 1.5))}
+    return lambda points: [Series(rows=rows(points), label="internal oscillation", properties=properties)]
 
 
 def _all_points(table: pd.DataFrame) -> list[Series]:
-    """Make series of the procedures, and of the internal oscillation at each other θ and l/w."""
+    """Return a series of each procedure, and of the internal oscillation at each other θ and l/w."""
     others = amplitudes(table), aspects(table)
     return [
         *by_procedure(line=False)(at_shown_aspect(table)),

@@ -1,9 +1,9 @@
-"""Which coefficient of friction μ, from 0.2 to 0.8, gives Gravish's packing fractions, and is it that of steel?
+"""Which coefficient of friction, 0.2 to 0.8, gives Gravish's packing fractions, and is it steel's?
 
-U-shapes of three l/w, poured and shaken for the 20 s of Gravish, Franklin, Hu and Goldman, "Entangled granular media",
-Phys. Rev. Lett. 108, 208001 (2012); smarticles and walls have the same friction. φ is interpolated linearly between the
-coefficients, Gravish's points never. Errors are 95 % by Student's t; scatter over seeds is relative to the mean, pooled
-over all points of a stage.
+U-shapes of three l/w are poured and shaken for 20 s as by Gravish, Franklin, Hu and Goldman, "Entangled granular
+media", Phys. Rev. Lett. 108, 208001 (2012). Smarticles and walls have equal friction. φ is interpolated linearly in
+friction; Gravish's points are not interpolated. Errors are 95 % by Student's t. The scatter over seeds is taken
+relative to the mean and pooled over all points of a stage.
 """
 
 from __future__ import annotations
@@ -47,16 +47,16 @@ from studies.framework.study import Study
 Array = NDArray[np.float64]
 
 PAPERS = 0.4  # coefficient of friction of Savoie et al.
-MARGIN = 5.0  # % from Gravish's points
-SURE = 0.95  # confidence from which a verdict is given, either way
-STEP = 0.001  # of friction, in which intervals and the best friction are found
-ROUNDING = 1e-12  # of φ, where a curve is Gravish's to the last digit and has no error
+MARGIN = 5.0  # %, accepted deviation from Gravish's points
+SURE = 0.95  # least confidence for a verdict
+STEP = 0.001  # of friction, resolution of intervals and of the best friction
+ROUNDING = 1e-12  # of φ, for a curve without errors that passes exactly through Gravish's φ
 
-# Published static coefficients of dry steel on steel, lowest and highest. As it comes: 0.12 to 0.60 (Lust, Engineering
+# Published static coefficients of dry steel on steel, lowest and highest. Untreated: 0.12 to 0.60 (Lust, Engineering
 # Guide CDA3000, table 7.21), 0.15 to 0.30 (Gieck, Technical Formulae), 0.27 with a thick film of oxide, 0.31 AISI 1032
-# on itself (Davis, Concise Metals Data Handbook); clean: 0.78, 0.74 mild steel (Lawrence Berkeley National Laboratory,
-# A. J. DeMello, Coefficient of Friction). Tabulated ones mislead where films and loads are ignored (Blau, Tribology
-# International 34 (2001) 585); what Gravish's staples are coated with is unknown.
+# on itself (Davis, Concise Metals Data Handbook). Clean: 0.78, 0.74 mild steel (Lawrence Berkeley National Laboratory,
+# A. J. DeMello, Coefficient of Friction). Tables can mislead since friction depends on films and loads (Blau, Tribology
+# International 34 (2001) 585); the coating of Gravish's staples is unknown.
 STEEL = {"dry steel as it comes": (0.12, 0.60), "clean, dry steel": (0.74, 0.78)}
 
 COMPARED = {
@@ -66,9 +66,9 @@ COMPARED = {
     "phi_f": "phi_f",
     "phi_f relaxed": "phi_f relaxed",
 }
-"""What is set against Gravish, and as which of their stages: φ after 5 and 10 s as if they had shaken no longer."""
+"""Stage of Gravish's that each of our stages is compared with: φ after 5 and 10 s too is compared with their φ_f."""
 
-# What is to be near Gravish's at the same friction.
+# Sets of stages that a finding asks to be near Gravish's at one friction, by their name.
 JUDGED: dict[str, Sequence[str]] = {
     "phi_0": ("phi_0",),
     "phi_f": ("phi_f",),
@@ -91,20 +91,20 @@ PHI_QUANTITY = Quantity(
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Curve:
-    """φ against friction at one l/w and stage, with what it is compared with."""
+    """φ against friction at one l/w and stage, with Gravish's φ."""
 
     friction: Array  #: (n,) coefficients, ascending [-]
     packing: Array  #: (n,) means of φ [-]
-    half_widths: Array  #: (n,) of their 95 % intervals [-]; NaN where unknown
-    reference: float  #: Gravish's φ [-], read to `DIGITISING_ERROR`
-    scatter: Scatter  #: Relative, of the stage
+    half_widths: Array  #: (n,) of the 95 % intervals of these means [-]; NaN where unknown
+    reference: float  #: Gravish's φ [-], with the error `DIGITISING_ERROR`
+    scatter: Scatter  #: Relative scatter over seeds, pooled over the stage
 
     def deviation(self, friction: Array) -> Array:
-        """Interpolate φ less Gravish's [-]."""
+        """Return φ less Gravish's φ (m,) [-] at coefficients of friction (m,), interpolated linearly."""
         return np.asarray(np.interp(friction, self.friction, self.packing) - self.reference, dtype=np.float64)
 
     def error(self, friction: Array) -> Array:
-        """Compute the 95 % half-width of the deviation: the errors of both neighbours and of the reading [-]."""
+        """Return the 95 % half-width (m,) [-] of the deviation, by the errors of both means and of reading."""
         if len(self.friction) == 1:
             return np.asarray(np.hypot(np.full(friction.shape, self.half_widths[0]), DIGITISING_ERROR))
         right = np.clip(np.searchsorted(self.friction, friction), 1, len(self.friction) - 1)
@@ -114,15 +114,18 @@ class Curve:
         return np.asarray(np.hypot(of_mean, DIGITISING_ERROR), dtype=np.float64)
 
     def grid(self) -> Array:
-        """List the measured points, and steps between them [-]."""
+        """Return all measured coefficients of friction, with steps of `STEP` between them (m,) [-]."""
         steps = np.arange(self.friction[0], self.friction[-1] + STEP / 2, STEP)
         return np.unique(np.concatenate([np.clip(steps, None, self.friction[-1]), self.friction]))
 
     def crossing(self) -> tuple[float, float, float, str]:
-        """Find the friction at which φ is Gravish's, its 95 % interval, and where it lies.
+        """Find the friction at which φ is Gravish's φ.
 
-        Where scatter makes φ cross it more than once: the middle between the first crossing and the last. The interval
-        has all friction at which φ is not clearly another than Gravish's; ±inf beyond what was measured.
+        Returns:
+            That friction [-], both ends of its 95 % interval [-], and "within", "above" or "below the range" measured.
+            If scatter makes φ cross Gravish's φ several times, the friction is the middle between the first and the
+            last crossing. The interval covers all friction at which φ does not clearly differ; its ends are ±inf
+            beyond the measured range, NaN without errors.
         """
         off = self.packing - self.reference
         left = np.nonzero(off[:-1] * off[1:] < 0)[0]
@@ -137,14 +140,14 @@ class Curve:
             return value, math.nan, math.nan, place
         near = grid[np.abs(self.deviation(grid)) <= errors + ROUNDING]
         first, last = float(grid[0]), float(grid[-1])
-        if not len(near):  # nothing near, so it is clearly beyond
+        if not len(near):  # φ clearly differs at every measured friction
             return (value, last, math.inf, place) if above else (value, -math.inf, first, place)
         low = -math.inf if near[0] == first or place == "below the range" else float(near[0])
         high = math.inf if near[-1] == last or place == "above the range" else float(near[-1])
         return value, low, high, place
 
     def within(self, margin: float, friction: float) -> float:
-        """Compute the confidence that φ differs by no more than a margin from Gravish's; NaN without errors."""
+        """Return the confidence that φ is within a margin [-] of Gravish's φ; NaN without errors."""
         at = np.array([friction])
         deviation, error = float(self.deviation(at)[0]), float(self.error(at)[0]) / _per_error(self.scatter)
         if not math.isfinite(error):
@@ -153,21 +156,21 @@ class Curve:
         return float(upper - lower)
 
 
-Curves = Mapping[tuple[str, float], Curve]  #: By stage and l/w; those that Gravish has a point of
+Curves = Mapping[tuple[str, float], Curve]  #: By stage and l/w, only where Gravish has a point
 
 
 def measure(run: Run) -> Row:
-    """Measure φ before, in the course of, at the end of and after shaking."""
+    """Measure φ before, during, at the end of and after shaking; return the run's row."""
     return timed_row(run, {FRICTION: common_friction(run)})
 
 
 def _per_error(scatter: Scatter) -> float:
-    """Compute the 95 % half-width over the standard error; NaN without a degree of freedom."""
+    """Return the ratio of the 95 % half-width to the standard error; NaN without degrees of freedom."""
     return float(stdtrit(scatter.freedom, (1 + LEVEL) / 2)) if scatter.freedom else math.nan
 
 
 def tabulate(runs: pd.DataFrame) -> dict[str, pd.DataFrame]:
-    """Make all tables of the table of runs."""
+    """Make the tables `points`, `crossings`, `verdicts`, `nearest`, `growth` and `scatter`."""
     scatters = {}
     for name in (stage for stage in COMPARED if phi(stage) in runs):
         groups = [group[phi(name)].dropna() for _, group in runs.groupby([ASPECT, FRICTION])]
@@ -186,7 +189,10 @@ def tabulate(runs: pd.DataFrame) -> dict[str, pd.DataFrame]:
 
 
 def points(runs: pd.DataFrame, scatters: Mapping[str, Scatter]) -> pd.DataFrame:
-    """Average φ by stage, l/w and friction, and set it against Gravish's, whose reading error counts as well."""
+    """Average φ and compute its deviation from Gravish's φ [%]: a row per stage, l/w and friction.
+
+    The error of the deviation includes that of reading Gravish's points.
+    """
     rows = []
     for stage, scatter in scatters.items():
         for (aspect, friction), group in runs.groupby([ASPECT, FRICTION]):
@@ -203,7 +209,7 @@ def points(runs: pd.DataFrame, scatters: Mapping[str, Scatter]) -> pd.DataFrame:
 
 
 def curves(table: pd.DataFrame, scatters: Mapping[str, Scatter]) -> Curves:
-    """Make curves of φ against friction, where Gravish has a point."""
+    """Make a curve of φ against friction for each stage and l/w with a point of Gravish's, from the means."""
     found = {}
     for (stage, aspect), group in table[table[REFERENCE].notna()].groupby([STAGE, ASPECT], sort=False):
         rows = group.sort_values(FRICTION)
@@ -218,7 +224,7 @@ def curves(table: pd.DataFrame, scatters: Mapping[str, Scatter]) -> Curves:
 
 
 def crossings(found: Curves) -> pd.DataFrame:
-    """Tabulate the friction at which each curve is Gravish's."""
+    """Tabulate the friction at which each curve has Gravish's φ, see `Curve.crossing`."""
     columns = [STAGE, ASPECT, REFERENCE, FRICTION, LOW, HIGH, "lies", FIRST, LAST]
     rows = [
         (stage, aspect, curve.reference, *curve.crossing(), curve.friction[0], curve.friction[-1])
@@ -228,7 +234,12 @@ def crossings(found: Curves) -> pd.DataFrame:
 
 
 def nearness(found: Curves, friction: float) -> dict[str, float | int | str]:
-    """Measure how near φ comes to Gravish's at a friction, and the confidence that all points are within `MARGIN`."""
+    """Compute deviations of all curves from Gravish's φ at a friction, and the confidence of being near.
+
+    Returns:
+        Cells by column: mean and largest deviation, the confidence that all points are within `MARGIN`, and that of
+        the worst point.
+    """
     at = np.array([friction])
     deviations = {
         f"{stage} at l/w = {aspect:g}": 100 * float(curve.deviation(at)[0]) / curve.reference
@@ -249,10 +260,10 @@ def nearness(found: Curves, friction: float) -> dict[str, float | int | str]:
 
 
 def verdict(near: Mapping[str, float | int | str], *, whole: bool) -> str:
-    """Judge whether all points are near Gravish's.
+    """Judge whether all points are within `MARGIN` of Gravish's: "yes", "no" or "undetermined".
 
-    Yes: the confidence that all are, errors taken as independent, is at least `SURE`, and all points are there. No: a
-    point is surely farther off, by Bonferroni's rule for as many points as were compared.
+    Yes: the confidence for all points together, with independent errors, is at least `SURE`, and no point is missing
+    (`whole`). No: one point is surely farther off, by Bonferroni's rule for the number of points.
     """
     confidence, least, count = (float(near[name]) for name in (CONFIDENCE, LEAST, COUNTED))
     if confidence >= 100 * SURE and whole:
@@ -261,7 +272,7 @@ def verdict(near: Mapping[str, float | int | str], *, whole: bool) -> str:
 
 
 def verdicts(found: Curves) -> pd.DataFrame:
-    """Tabulate, for each friction that was measured and what is to be near Gravish's, how near it comes."""
+    """Tabulate `nearness` and `verdict` for each set of stages in `JUDGED` and each measured friction."""
     rows = []
     for what, stages in JUDGED.items():
         wanted = {key: curve for key, curve in found.items() if key[0] in stages}
@@ -274,7 +285,7 @@ def verdicts(found: Curves) -> pd.DataFrame:
 
 
 def nearest(found: Curves) -> pd.DataFrame:
-    """Find the friction whose worst point is best, also between those measured."""
+    """Tabulate for each set of stages in `JUDGED` the friction with the smallest maximum deviation."""
     rows = []
     for what, stages in JUDGED.items():
         wanted = {key: curve for key, curve in found.items() if key[0] in stages}
@@ -293,14 +304,15 @@ def nearest(found: Curves) -> pd.DataFrame:
 
 
 def growth(runs: pd.DataFrame) -> pd.DataFrame:
-    """Tabulate by how much φ grew from time to time, run by run; the scatter is common to all points."""
+    """Tabulate the mean growth of φ between `TIMES` [%] by l/w and friction, with pooled scatter."""
     names = [phi(at_time(time)) for time in TIMES]
     grown = runs.reindex(columns=[*runs.columns, *(set(names) - set(runs.columns))])
     for name, (one, other) in zip(GROWTHS, itertools.pairwise(names), strict=True):
         grown[name] = 100 * (grown[other] / grown[one] - 1)
     groups = grown.groupby([ASPECT, FRICTION])
     table = groups.size().to_frame(SEEDS)
-    means = groups[[*names, *GROWTHS]].agg(lambda column: column.mean())  # not rounded as those of `mean` are
+    # `groups.mean()` would sum in another order and change the last digits.
+    means = groups[[*names, *GROWTHS]].agg(lambda column: column.mean())
     table[[f"{at_time(time)} [-]" for time in TIMES]] = means[names]
     for name in GROWTHS:
         scatter = pooled_scatter([group.tolist() for _, group in groups[name]])
@@ -317,15 +329,18 @@ def _crossings_note(found: pd.DataFrame) -> str:
     )
 
 
-def _of(table: pd.DataFrame, what: str) -> pd.DataFrame:
+def _of_stages(table: pd.DataFrame, what: str) -> pd.DataFrame:
     return table[table[WHAT] == what] if len(table) else table
 
 
 def one_friction(what: str) -> Finding:
-    """Make the finding that one friction brings φ near Gravish's at every l/w."""
+    """Make the finding that φ is near Gravish's φ at every l/w with one coefficient of friction.
+
+    `what`, a key of `JUDGED`, is the set of stages at which φ is compared.
+    """
 
     def outcome(tried: pd.DataFrame, best: pd.DataFrame) -> Outcome:
-        tried, best = _of(tried, what), _of(best, what)
+        tried, best = _of_stages(tried, what), _of_stages(best, what)
         if tried.empty or best.empty:
             return Outcome(note="no points of Gravish's at these l/w", verdict=Verdict.NOT_RESOLVED)
         one, verdicts = best.iloc[0], tried[VERDICT]
@@ -345,7 +360,7 @@ def one_friction(what: str) -> Finding:
 
 
 def _papers(tried: pd.DataFrame) -> Outcome:
-    found = _of(tried, "phi_f")
+    found = _of_stages(tried, "phi_f")
     found = found[found[FRICTION] == PAPERS] if len(found) else found
     if found.empty:
         return Outcome(note="no runs at it", verdict=Verdict.NOT_RESOLVED)
@@ -362,7 +377,10 @@ def _common(found: pd.DataFrame) -> Outcome:
 
 
 def of_steel(surface: str) -> Finding:
-    """Make the finding that the friction that φ_f asks for is that of steel."""
+    """Make the finding that the friction at which φ_f is Gravish's is that of steel.
+
+    `surface`, a key of `STEEL`, is the condition of the steel that the coefficients were published for.
+    """
     least, most = STEEL[surface]
 
     def outcome(found: pd.DataFrame) -> Outcome:
@@ -428,15 +446,22 @@ def _shown(points: pd.DataFrame) -> pd.DataFrame:
 
 
 def _gravish(points: pd.DataFrame) -> dict[str, float]:
-    values = {stage: gravish_at(points[ASPECT].iloc[0], stage) for stage in ("phi_0", "phi_f")}
-    return {f"Gravish, {stage}": value for stage, value in values.items() if math.isfinite(value)}
+    return {f"Gravish, {stage}": gravish_at(points[ASPECT].iloc[0], stage) for stage in ("phi_0", "phi_f")}
+
+
+def _crosses(tables: Mapping[str, pd.DataFrame], aspect: float) -> pd.DataFrame:
+    """Return friction (`x`, `low`, `high`) and φ (`y`) [-] at which φ_0 and φ_f of one l/w are Gravish's."""
+    found = tables["crossings"]
+    found = found[(found[ASPECT] == aspect) & found[STAGE].isin(["phi_0", "phi_f"]) & np.isfinite(found[FRICTION])]
+    low, high = (found[name].clip(found[FIRST], found[LAST]) for name in (LOW, HIGH))
+    return pd.DataFrame({"x": found[FRICTION], "low": low, "high": high, "y": found[REFERENCE]})
 
 
 STUDY = Study(
     name="friction",
     title="Friction that packs smarticles as Gravish et al. 2012 found",
     measure=measure,
-    keys=(ASPECT_KEY, Key(column=FRICTION, label="friction", form="g")),
+    keys=(Key(column=STAGE, label="stage"), ASPECT_KEY, Key(column=FRICTION, label="friction", form="g")),
     quantities=(
         PHI_QUANTITY,
         Quantity(column=DEVIATION, label="from Gravish [%]", form="+.1f", meaning="less Gravish's, over it"),
@@ -453,8 +478,12 @@ STUDY = Study(
             panels=ASPECT,
             levels=_gravish,
             share_y=True,
+            crosses=_crosses,
             bars=POOLED,
-            notes=[gravish_note((0.4, 0.7, 1.0))],
+            notes=[
+                "Crosses: friction at which φ is Gravish's, with its 95 % interval as far as it was measured.",
+                gravish_note((0.4, 0.7, 1.0)),
+            ],
         ),
         replace(PHI_TIME, panels=ASPECT),
     ),

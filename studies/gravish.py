@@ -1,7 +1,7 @@
-"""U-shapes of several l/w, poured and shaken at Γ = 2 and 30 Hz, against the packing fractions of Gravish et al.
+"""Packing fractions of poured and shaken U-shapes of several l/w, compared with Gravish et al.
 
-Gravish, Franklin, Hu and Goldman, "Entangled granular media", Phys. Rev. Lett. 108, 208001 (2012): steel staples shaken
-for 20 s. Their points are digitised (`postprocess/reference/README.md`); they are compared at equal l/w only and never
+Gravish, Franklin, Hu and Goldman, "Entangled granular media", Phys. Rev. Lett. 108, 208001 (2012), shook steel staples
+for 20 s. Their points were digitised (`postprocess/reference/README.md`). They are compared at equal l/w and not
 interpolated. --quick takes minutes.
 """
 
@@ -47,8 +47,8 @@ from studies.framework.shaken import (
 )
 from studies.framework.study import Study
 
-ACCEPTED = 10.0  # % of mean absolute deviation from Gravish's points
-COSTLY = "voronoi"  # takes seconds per frame, and is left out of drafts
+ACCEPTED = 10.0  # %, accepted mean absolute deviation from Gravish's points
+COSTLY = "voronoi"  # definition of φ that takes seconds per frame; not measured at the fidelity draft
 
 _SYMBOLS = {"phi_0": "φ_0", "phi_f": "φ_f", "phi_f relaxed": "φ_f at rest again"}
 QUANTITIES = declare(
@@ -72,20 +72,20 @@ QUANTITIES = declare(
 
 
 def measure(run: Run) -> Row:
-    """Measure φ and crossings before and after shaking."""
+    """Measure φ by all definitions and crossings before and after shaking; return the run's row."""
     row = measured_row(run, [name for name in DEFINITIONS if name != COSTLY or run.manifest.fidelity != "draft"])
     missing = dict.fromkeys([name for name in QUANTITIES if name not in row], math.nan)
     return row | missing | {SHAKEN: round(float(str(row[SHAKEN])), 3)}
 
 
 def phi_by_aspect(runs: pd.DataFrame, stage: str) -> Mapping[float, SeedMean]:
-    """Average φ of a stage over seeds, by ascending l/w."""
+    """Return the mean φ of a stage over seeds by l/w, in ascending order."""
     found = {float(aspect): mean_over_seeds(part[phi(stage)]) for aspect, part in runs.groupby(ASPECT)}
     return {aspect: mean for aspect, mean in found.items() if mean.count}
 
 
 def deviations(runs: pd.DataFrame) -> pd.DataFrame:
-    """Set φ against Gravish's points, one row per stage and l/w at which there is one."""
+    """Tabulate the deviation of φ from Gravish's points: a row per stage and l/w with a point."""
     rows = []
     for stage in STAGES:
         for aspect, mean in phi_by_aspect(runs, stage).items():
@@ -101,7 +101,10 @@ def deviations(runs: pd.DataFrame) -> pd.DataFrame:
 
 
 def steps(runs: pd.DataFrame) -> pd.DataFrame:
-    """Subtract φ at neighbouring l/w; errors are the root of the sum of squares of both half-widths."""
+    """Tabulate the difference of φ between neighbouring l/w: a row per stage and pair.
+
+    Its 95 % half-width is the root of the sum of squares of those of both means.
+    """
     rows = []
     for stage in STAGES:
         for (low, one), (high, other) in itertools.pairwise(phi_by_aspect(runs, stage).items()):
@@ -129,7 +132,7 @@ def falls(stage: str) -> Finding:
         text = f"{total.value:+.4f} ± {half_width:.4f} (95 %)"
         effect = Effect(label=f"change from l/w = {low:g} to {high:g}", value=total, sign=-1, text=text)
         note = f"steps: {', '.join(f'{count} {way}' for way, count in ways.items())}"
-        # A flat line with wide error bars is not monotone: the whole change must be beyond them.
+        # With wide error bars a constant φ would pass all steps, so the change from end to end must exceed its error.
         rises, clear = "rises" in ways, effect.verdict == Verdict.FOUND and "no error bar" not in ways
         return Outcome(effects=[effect], note=note, verdict=decide(clear and not rises, rises))
 
@@ -143,7 +146,7 @@ def falls(stage: str) -> Finding:
 
 
 def near(stage: str) -> Finding:
-    """Make the finding that φ of a stage is near Gravish's."""
+    """Make the finding that φ of a stage is near Gravish's points."""
 
     def outcome(runs: pd.DataFrame) -> Outcome:
         found = deviations(runs)
@@ -182,7 +185,7 @@ def _compacts(runs: pd.DataFrame) -> Outcome:
 
 
 def _line(points: pd.DataFrame) -> list[Series]:
-    return [Series(rows=points, label="simulation", look=procedure_marker(EXTERNAL))]
+    return [Series(rows=points, label="simulation", properties=procedure_marker(EXTERNAL))]
 
 
 _PUBLISHED = read_gravish()

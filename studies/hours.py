@@ -1,7 +1,7 @@
-"""Hours that studies were planned to take and took: `python -m studies.hours FOLDER [STUDY ...] [--out RESULTS]`.
+"""Planned and spent hours of studies: `python -m studies.hours FOLDER [STUDY ...] [--out RESULTS]`.
 
-Planned is what `smarticles sweep` expected of each run on one core when it wrote the folder; taken is the processor
-time in the manifests of finished runs. Runs whose directories are gone are not counted as done.
+Planned hours are the wall times on one core that were estimated when the sweep's folder was made. Spent hours are the
+processor times of finished runs; runs without a directory do not count as finished.
 """
 
 from __future__ import annotations
@@ -25,17 +25,22 @@ ALL = "all"
 
 
 def hours(folder: Path, studies: Sequence[str] = ()) -> pd.DataFrame:
-    """Sum hours of one core, planned and taken [h], by study and engine, and of all together.
+    """Sum planned and spent hours of one core [h] by study and engine.
 
-    Folders that are not those of studies or sweeps are passed over; of those that are named all count.
+    Args:
+        folder: folder that contains the folders of the studies.
+        studies: names of folders in it; empty: all folders of a sweep.
+
+    Returns:
+        One row per study and engine, and the total as the last row.
 
     Raises:
-        InputError: No folder of a sweep is there, one that is named is none, or a manifest is damaged.
+        InputError: There is no folder of a sweep, a named folder is not one, or a manifest is damaged.
     """
-    cause = "there is no such directory" if not folder.is_dir() else "none of its folders is that of a sweep"
+    cause = "no such directory" if not folder.is_dir() else "none of its folders is the folder of a sweep"
     sweeps = [folder / name for name in studies] or sorted(one.parent for one in folder.glob(f"*/{OF_SWEEP}"))
     if not folder.is_dir() or not sweeps:
-        raise InputError(f"{folder}: {cause}; give the one that `make paper` wrote into")
+        raise InputError(f"{folder}: {cause}; give the folder that contains the folders of the studies")
     runs = pd.DataFrame(
         {
             STUDY: path.name,
@@ -58,16 +63,16 @@ def hours(folder: Path, studies: Sequence[str] = ()) -> pd.DataFrame:
 
 
 def _taken(directory: Path) -> float:
-    """Hours that a run took; NaN unless it is done."""
+    """Return the processor time of a run [h]; NaN unless it is finished."""
     seconds = open_run(directory).status.cpu_s if (directory / MANIFEST).is_file() else None
     return math.nan if seconds is None else seconds / 3600
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
-    """Print the table, and write `hours.csv`."""
-    parser = argparse.ArgumentParser(prog="python -m studies.hours", description="Hours of studies, planned and taken.")
-    parser.add_argument("folder", type=Path, help="whose folders are those of studies")
-    parser.add_argument("studies", nargs="*", help="names of the folders wanted (default: all)")
+    """Print the table of hours and write it to `hours.csv`."""
+    parser = argparse.ArgumentParser(prog="python -m studies.hours", description="Planned and spent hours of studies.")
+    parser.add_argument("folder", type=Path, help="folder that contains the folders of the studies")
+    parser.add_argument("studies", nargs="*", help="names of these folders (default: all)")
     parser.add_argument("--out", type=Path, help="folder for hours.csv (default: FOLDER)")
     given = parser.parse_args(arguments)
     try:

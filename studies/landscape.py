@@ -1,16 +1,17 @@
-"""The landscape: φ, ⟨N⟩, linking number and strength of piles over l/w, the amplitude θ and the energy spent.
+"""Landscape: φ, ⟨N⟩, linking number and strength over l/w, the amplitude θ and the energy spent.
 
-Which measure goes with strength best, and which procedure buys it cheapest; by the rules of the paper's code. A hook
-that was poured over is raised out of the pile, within its wall, and nothing but weight and wall holds the pile down.
-What the hook takes at its peak, over the weight n W_s of all smarticles, is so the largest share of its own weight that
-the pile bears hanging: the weight that comes along at once, and what friction at the wall adds. A heap without any
-cohesion makes the hook lift about what lies above it; strength less that share is tabulated beside it, as what cohesion
-adds. The lower hook lies on the floor, where no smarticle gets hold of it (study `fracture`).
+Which measure is correlated best with strength, and which procedure gains strength with the least energy? All runs use
+the protocol `code`. A hook that lies in the pile is raised out of it, inside the wall; only its weight and the wall
+hold the pile down. Strength is the peak force on the hook over the weight n W_s of all smarticles: the share of its
+weight that the pile bears when it hangs from the hook, and friction at the wall. In a pile without cohesion the hook
+lifts about the smarticles above it, so that strength less the share of these smarticles is tabulated as the effect of
+cohesion. The lower hook lies on the floor, where no smarticle can hold it (study `fracture`).
 
-Rank correlations: no shape of the law is assumed. Runs of one l/w, procedure, θ and seed are one trajectory, cut off at
-several times: errors are by drawing trajectories of each l/w anew. A measure is compared with others in the same draws,
-so that what both share does not count. Gains are over the poured pile of the same l/w and seed, which a run began with;
-energies over W_s w, the work that lifts a smarticle by its width, so that heavier ones do not count as dearer.
+Correlations are rank correlations, which assume no form of a law. Runs of one l/w, procedure, θ and seed are one
+trajectory, cut off at several times, so errors come from resampling whole trajectories within each l/w. Measures are
+compared within each resample, where their common errors cancel. Gains are differences to the poured pile of equal l/w
+and seed. Energies are divided by W_s w, the work that lifts a smarticle by its width, so that shapes of different
+weight can be compared.
 """
 
 from __future__ import annotations
@@ -42,7 +43,7 @@ from postprocess.statistics.ranks import (
     resampled,
 )
 from postprocess.statistics.seeds import mean_over_seeds
-from studies.framework.figures import Means, Rows, Scatter, Series, marker, one_by_one, procedure_marker
+from studies.framework.figures import Heatmap, Means, Rows, Scatter, Series, marker, one_by_one, procedure_marker
 from studies.framework.findings import Finding, Outcome, Verdict, decide
 from studies.framework.procedures import (
     ACTIVE,
@@ -81,7 +82,7 @@ PREDICTORS = {
     ABOVE: "share above the hook",
     ENERGY: "energy spent",
 }
-"""What may predict strength, all at rest before the pull, and what it is called."""
+"""Measures of the pile at rest before the pull that may predict strength: names in texts by column."""
 
 STRENGTHS = {PEAK: "strength", BEYOND: "strength beyond the weight above the hook"}
 
@@ -103,7 +104,12 @@ QUANTITIES = declare(
         WORK: ("", "", "∫ F dz over the whole pull, over n W_s w"),
         HELD_FAST: ("", "", "1 where the hook was stopped by its force limit on the way, 0 elsewhere"),
     },
-    axes={PEAK: r"strength $F/(n W_\mathrm{s})$ [-]"},
+    axes={
+        PHI: r"$\phi$ [-]",
+        CROSSINGS: r"$\langle N\rangle$ [-]",
+        LINKING: "linking number [-]",
+        PEAK: r"strength $F/(n W_\mathrm{s})$ [-]",
+    },
 )
 
 _MEASURED = {
@@ -119,13 +125,15 @@ _NAMED = re.compile(r"[^_]+_(?P<time>\d+(?:\.\d+)?)s_.+")
 
 
 def measure(run: Run) -> Row:
-    """Measure the pile before the pull, the energy spent on it, and its strength."""
+    """Measure the pile before the pull, the energy spent on it, and its strength; return the run's row."""
     pile = prepared_by(run, PULL)
     active, pulled, named = pile.pop(ACTIVE), run.phases[-1], _NAMED.fullmatch(run.path.name)
     rest = pulled.index - 1
     settings, hooks, frames = run.scene["phases"][pulled.index], run.scene.get("hooks"), run.frames.in_phase(rest)
-    if named is None:  # the run's own time is rounded to whole swings
-        raise InputError(f"{run.path}: not named like a run of this study, such as internal10_2s_lw0.70_seed1")
+    if named is None:  # the planned time is only in the name: that of the run is rounded to whole swings
+        raise InputError(
+            f"{run.path}: not named like a run of this study, such as internal10_2s_lw0.70_seed1; restore its name"
+        )
     if hooks is None or not frames or settings["type"] != PULL:
         msg = f"{run.path}: no hooks or pull in scene.yaml, or no frame of the rest before the pull; run it again"
         raise InputError(msg)
@@ -156,7 +164,7 @@ def measure(run: Run) -> Row:
 
 
 def _spent(run: Run, procedure: str, rest: int) -> float:
-    """Read the work that an activity spent on the smarticles, to the end of the rest after it [J]."""
+    """Return the work that an activity did on all smarticles up to the end of the rest after it [J]."""
     if procedure == STATIC:
         return 0.0
     series = run.series
@@ -169,27 +177,28 @@ def _spent(run: Run, procedure: str, rest: int) -> float:
 
 # Which measure goes with strength
 
-RESAMPLES, DRAW = 1000, 17
+RESAMPLES, DRAW = 1000, 17  # number of resamples, and seed of their random numbers
 STRENGTH, SCOPE, PART, PREDICTOR = "strength", "scope", "runs", "measure"
 RHO, LOW, HIGH = "rank correlation [-]", "from [-]", "to [-]"
 FIRST, OTHER, VERDICT = "first in resamples [-]", "other", "verdict"
 LEAD = "rank correlation of the best less the other's, in size [-]"
 ALL, WITHIN = "over all l/w", "within l/w"
 EVERY, FREE, SWUNG = "all", "none held fast", "static and internal alone"
-"""Of which runs correlations are: all, those whose strength is no lower bound, and those of one procedure."""
+"""Parts of the runs: all, those whose strength is no lower bound, and those of the internal oscillation."""
 
 
 def trajectories(runs: pd.DataFrame) -> pd.Series:
-    """Number the trajectory of each run: those of one l/w, seed, procedure and θ are alike up to the shortest."""
+    """Number the trajectories (n,): runs of equal l/w, seed, procedure and θ share a trajectory."""
     return runs.groupby([ASPECT, SEED, PROCEDURE, THETA], dropna=False, sort=False).ngroup()
 
 
 def predicted(runs: pd.DataFrame) -> tuple[pd.DataFrame, pd.DataFrame]:
-    """Correlate each strength with each measure.
+    """Correlate both strengths with all measures.
 
     Returns:
-        One row per strength, part of the runs, scope and measure, best first: rank correlation and slope with 95 %
-        intervals; and one per other measure with the difference from the best.
+        The table `predictors`: rank correlation and slope with 95 % intervals, a row per strength, part of the runs,
+        scope (over all l/w, within l/w, or one l/w) and measure, best measure first. The table `comparisons`: the
+        difference of the best measure's rank correlation to that of each other measure.
     """
     each: list[dict[str, object]] = []
     against: list[dict[str, object]] = []
@@ -216,7 +225,7 @@ def predicted(runs: pd.DataFrame) -> tuple[pd.DataFrame, pd.DataFrame]:
 def _correlated(
     table: pd.DataFrame, strength: str, *, within: bool
 ) -> tuple[list[dict[str, object]], list[dict[str, object]]]:
-    """The rows of one part, scope and strength."""
+    """Return the rows of both tables of `predicted` for one part, scope and strength."""
     names = list(PREDICTORS)
     x, y = table[names].to_numpy(dtype=np.float64), table[strength].to_numpy(dtype=np.float64)
     strata = pd.factorize(table[ASPECT])[0].astype(np.int64)
@@ -234,7 +243,7 @@ def _correlated(
     rho = values[: len(names)]
     ends = [interval(float(value), column.tolist()) for value, column in zip(values, drawn.T, strict=True)]
     sizes = drawn[:, : len(names)] * np.sign(rho)
-    # Columns that are constant have no correlation, and none is first.
+    # A constant column has no correlation (NaN) and cannot be the best.
     order = [int(k) for k in np.argsort(-np.abs(np.where(np.isfinite(rho), rho, 0)), kind="stable")]
     first = np.bincount(np.nanargmax(np.where(np.isfinite(sizes), sizes, -np.inf), axis=1), minlength=len(names))
     unknown = ~np.isfinite(sizes).any()
@@ -273,24 +282,24 @@ _POINT = [PROCEDURE, THETA, PLANNED]
 
 
 def gains(runs: pd.DataFrame) -> pd.DataFrame:
-    """Select runs that were active, with what they gained over the poured pile of the same l/w and seed."""
+    """Return the runs with an activity, with the column `GAIN`: strength less that of the poured pile."""
     poured = runs[runs[PROCEDURE] == STATIC].groupby([ASPECT, SEED])[PEAK].mean().rename("poured")
     active = runs[runs[PROCEDURE] != STATIC].join(poured, on=[ASPECT, SEED], how="inner").reset_index(drop=True)
     return active.assign(**{GAIN: active[PEAK] - active["poured"]}).drop(columns="poured")
 
 
 def common_aspects(runs: pd.DataFrame) -> list[float]:
-    """List the aspect ratios with most combinations of procedure, θ and planned time: all of them, where it is done."""
+    """Return the aspect ratios with the greatest number of combinations of procedure, θ and planned time."""
     counts = runs.drop_duplicates([ASPECT, *_POINT]).groupby(ASPECT).size()
     return [float(ratio) for ratio in counts.index[counts == counts.max()]]
 
 
 def costs(runs: pd.DataFrame) -> pd.DataFrame:
-    """Average gain and energy over pairs by procedure, θ and planned time, over the common l/w and at each l/w.
+    """Average gain and energy over pairs of l/w and seed, at the `common_aspects` and at each l/w.
 
     Returns:
-        Means with their errors, the gain per energy with its 95 % interval, and whether no other point of the scope
-        gains as much for less energy.
+        A row per scope, procedure, θ and planned time: means with errors, the gain per energy with its 95 % interval,
+        and 1 in `FRONTIER` if no other row of the scope gains as much for less energy.
     """
     gained = gains(runs)
     scopes = {COMMON: gained[gained[ASPECT].isin(common_aspects(runs))]}
@@ -314,9 +323,10 @@ def costs(runs: pd.DataFrame) -> pd.DataFrame:
 
 
 def _drawn_ratio(values: Floats) -> Interval:
-    """Divide means of pairs, gain over energy, and where there are four columns that by the ratio of the others.
+    """Return the mean gain over the mean energy with its 95 % interval; NaN ends below 3 pairs.
 
-    With the 95 % interval by drawing pairs anew; NaN ends below three pairs.
+    Args:
+        values: gains and energies (n, 2), or those of two procedures (n, 4), whose gains per energy are divided.
     """
 
     def ratio(rows: Whole) -> Floats:
@@ -333,7 +343,10 @@ def _drawn_ratio(values: Floats) -> Interval:
 
 
 def best_points(table: pd.DataFrame) -> pd.DataFrame:
-    """Select of each procedure the point of the common l/w that gains most per energy, of those that surely gain."""
+    """Return for each procedure the row of `costs` with the greatest gain per energy, at the common l/w.
+
+    Rows whose 95 % interval of the gain per energy reaches 0 are left out.
+    """
     known = table[(table[SCOPE] == COMMON) & (table[LOW] > 0)] if len(table) else table
     if known.empty:
         return known
@@ -341,7 +354,7 @@ def best_points(table: pd.DataFrame) -> pd.DataFrame:
 
 
 def _at_point(gained: pd.DataFrame, point: pd.Series) -> pd.DataFrame:
-    """Pairs of one procedure, θ and planned time, by l/w and seed."""
+    """Return the runs of one procedure, θ and planned time, indexed by l/w and seed."""
     same = (gained[PROCEDURE] == point[PROCEDURE]) & np.isclose(gained[PLANNED], point[PLANNED])
     same &= np.isclose(gained[THETA], point[THETA], equal_nan=True)
     return gained[same].set_index([ASPECT, SEED])
@@ -351,7 +364,7 @@ def _at_point(gained: pd.DataFrame, point: pd.Series) -> pd.DataFrame:
 
 
 def _interval(value: float, low: float, high: float, form: str = "+.2f") -> str:
-    """`+0.71 (+0.60 to +0.79)`, with the 95 % interval as far as there is one."""
+    """Format a value with its 95 % interval, if known: `+0.71 (+0.60 to +0.79)`."""
     if math.isnan(value):
         return "-"
     return f"{value:{form}}" + (f" ({low:{form}} to {high:{form}})" if math.isfinite(low) else " (no error)")
@@ -368,7 +381,7 @@ def _at(table: pd.DataFrame, strength: str, part: str, scope: str) -> pd.DataFra
 
 
 def _named(row: pd.Series) -> str:
-    """`internal θ = 10° for 2 s`."""
+    """Format procedure, θ and time of a row: `internal θ = 10° for 2 s`."""
     theta = "" if math.isnan(row[THETA]) else f" θ = {row[THETA]:g}°"
     return f"{row[PROCEDURE]}{theta} for {row[PLANNED]:g} s"
 
@@ -405,7 +418,7 @@ def _cheapest(runs: pd.DataFrame, table: pd.DataFrame) -> Outcome:
     bought = bought[bought[ASPECT].isin(common_aspects(runs))]
     ratios = {}
     for _, row in best.iloc[1:].iterrows():
-        # Over the l/w and seeds that both have, drawn together.
+        # Over the l/w and seeds that both have, since both ratios must be resampled together.
         pair = [_at_point(bought, point)[[GAIN, LIFTS]] for point in (best.iloc[0], row)]
         both = pd.concat(pair, axis=1, join="inner").to_numpy(dtype=np.float64)
         ratios[row[PROCEDURE]] = _drawn_ratio(both)
@@ -486,19 +499,20 @@ FINDINGS = (
 
 # Figures
 
-_MAPPED = (PHI, CROSSINGS, LINKING, PEAK)
 _by_aspect = one_by_one(ASPECT, "l/w = {:g}".format)
 
 
 def _swung(table: pd.DataFrame) -> pd.DataFrame:
-    """Select the internal oscillation, from little energy to much."""
+    """Return the rows of the internal oscillation, in ascending order of energy."""
     return table[(table[PROCEDURE] == INTERNAL) & (table[ENERGY] > 0)].sort_values(ENERGY)
 
 
 def _bought(table: pd.DataFrame) -> list[Series]:
-    """Make a line of each θ of the internal oscillation, and markers of the other procedures."""
+    """Return a series for each θ of the internal oscillation, and for each other procedure."""
     others = [
-        Series(rows=table[table[PROCEDURE] == name], label=name, look={**procedure_marker(name), "linestyle": "none"})
+        Series(
+            rows=table[table[PROCEDURE] == name], label=name, properties={**procedure_marker(name), "linestyle": "none"}
+        )
         for name in (EXTERNAL, SHAPE)
     ]
     return [*one_by_one(THETA, "internal, θ = {:g}°".format)(_swung(table)), *others]
@@ -515,21 +529,31 @@ def _correlations(table: pd.DataFrame) -> pd.DataFrame:
 
 def _scopes(table: pd.DataFrame) -> list[Series]:
     styles = {WITHIN: marker("o", style.ORANGE, style.ORANGE), ALL: marker("D", style.BLUE, style.BLUE)}
-    return [Series(rows=table[table[SCOPE] == scope], label=scope, look=look) for scope, look in styles.items()]
+    return [
+        Series(rows=table[table[SCOPE] == scope], label=scope, properties=properties)
+        for scope, properties in styles.items()
+    ]
 
 
-_over_energy = partial(Means, x=ENERGY, x_label="energy per\nsmarticle [J]", log_x=True, share_y=True)
 FIGURES = (
-    _over_energy(
+    Heatmap(
         name="maps",
-        quantities=[QUANTITIES[name] for name in _MAPPED],
-        rows=_swung,
-        split=_by_aspect,
+        quantities=[QUANTITIES[name] for name in (PHI, CROSSINGS, LINKING, PEAK)],
+        x=Quantity(column=ENERGY, axis="energy per smarticle [J]"),
+        y=Quantity(column=ASPECT, axis=r"$l/w$ [-]"),
         panels=THETA,
         panel="θ = {:g}°",
+        notes=[
+            "Left of the broken line: poured, no energy spent. A cell is a mean over seeds; l/w and θ beyond what the "
+            "hinge reaches are empty."
+        ],
     ),
-    _over_energy(
+    Means(
         name="strength_energy",
+        x=ENERGY,
+        x_label="energy per\nsmarticle [J]",
+        log_x=True,
+        share_y=True,
         quantities=[QUANTITIES[PEAK]],
         split=_bought,
         panels=ASPECT,
@@ -573,7 +597,7 @@ def _extra(runs: pd.DataFrame) -> Mapping[str, pd.DataFrame]:
 
 
 def _shown(points: pd.DataFrame) -> pd.DataFrame:
-    """Select at each l/w the poured pile, those after a shape change, and the strongest oscillation."""
+    """Return the points of the short table: static, shape change, strongest oscillation at each l/w."""
     swung = points[points[PROCEDURE] == INTERNAL]
     strongest = swung.loc[swung[PEAK].notna()].groupby(ASPECT)[PEAK].idxmax()
     return points[points[PROCEDURE].isin([STATIC, SHAPE]) | points.index.isin(strongest)]

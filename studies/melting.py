@@ -1,8 +1,8 @@
-"""The container's wall is taken away, at once or lifted, after shape change, internal or external oscillation or none.
+"""The container's wall is removed, at once or by lifting it, from piles of each procedure.
 
-What holds together, spreads, comes off or falls over within 2 s, against Savoie, Tuazon, Bhamla and Goldman, "Amorphous
-Entangled Active Matter", Soft Matter 2023, section "Melting behavior". Runs of one l/w and seed were poured alike and
-are compared pair by pair.
+Measured within 2 s are the largest cluster, height and radius of the pile, smarticles that come off, and whether the
+pile falls over. Compared with Savoie, Tuazon, Bhamla and Goldman, "Amorphous Entangled Active Matter", Soft Matter
+2023, section "Melting behavior". Runs of one l/w and seed are poured from equal poses and compared pair by pair.
 """
 
 from __future__ import annotations
@@ -20,12 +20,12 @@ from postprocess.statistics.seeds import mean_over_seeds
 from studies.framework.figures import PROCEDURE_LABELS, Histories, by_procedure
 from studies.framework.findings import Effect, Finding, Outcome, Verdict, above, decide, mean, means_by
 from studies.framework.procedures import INTERNAL, PROCEDURE, SHAPE, STATIC, of_procedure, paired
-from studies.framework.release import ORDER, Pictures, around, named_columns, removal
+from studies.framework.release import ORDER, Pictures, named_columns, removal, removal_frames
 from studies.framework.runs import ASPECT_KEY, Key, MeasuredRun, declare, duration, last_columns
 from studies.framework.study import Study
 
-WHOLE = 0.95  # of the smarticles in one cluster: of 60, no more than 2 apart
-SAME_WIDTH = 0.05  # of a pile's radius; smarticles are 0.5 of it long
+WHOLE = 0.95  # least share of the largest cluster in a pile that holds together: at most 2 of 60 smarticles come off
+SAME_WIDTH = 0.05  # accepted change of a pile's radius, over the radius; a smarticle is half as long as the radius
 
 LIFT, SINCE = "lift speed [m/s]", "time since the wall began to go [s]"
 BASE, TOP, CENTRE = "radius of 95 % before [m]", "height of 95 % before [m]", "com height before [m]"
@@ -53,8 +53,8 @@ QUANTITIES = declare(
 
 
 def measure(run: Run) -> MeasuredRun:
-    """Measure the pile before its wall went, in the end, and of every frame between them."""
-    before, after = around(run)
+    """Measure the pile with the wall and in every frame after; return the run's row and history."""
+    before, after = removal_frames(run)
     phase = removal(run)
     settings = run.scene["phases"][phase.index]
     lift = 0.0 if settings.get("speed_m_per_s") is None else settings["speed_m_per_s"]
@@ -97,7 +97,7 @@ def measure(run: Run) -> MeasuredRun:
 
 
 def at_once(runs: pd.DataFrame) -> pd.DataFrame:
-    """Select the runs whose wall goes at once."""
+    """Return the rows of runs whose wall is removed at once, not lifted."""
     return runs[runs[LIFT] == 0]
 
 
@@ -116,7 +116,7 @@ def _topples(runs: pd.DataFrame) -> Outcome:
     fallen, total = int(part[TOPPLED].sum()), len(part)
     if not total:
         return Outcome(note="no runs", verdict=Verdict.NO_DATA)
-    # One-sided: the largest share with which none of n falls in one out of twenty.
+    # One-sided 95 % bound: with this probability of falling over, no pile out of n falls in 5 % of cases.
     most = "" if fallen else f", so at most {1 - 0.05 ** (1 / total):.0%} of such piles do, at 95 %"
     offsets = means_by(runs, OFFSET, PROCEDURE, ".3f")
     return Outcome(
@@ -135,7 +135,7 @@ def _lifted(runs: pd.DataFrame) -> Outcome:
         for part in [of_procedure(runs, name)]
         for quantity, label in ((HEIGHT, "com height kept"), (SLOUGHED, "sloughed"))
     ]
-    # Either sign is a difference.
+    # The statement asks for a difference of either sign.
     clear = any(effect.verdict in (Verdict.FOUND, Verdict.NOT_FOUND) for effect in effects)
     return Outcome(effects=effects, verdict=Verdict.FOUND if clear else None)
 

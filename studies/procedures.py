@@ -1,11 +1,11 @@
 """Shape change, external and internal oscillation of smarticles of several l/w and amplitudes θ.
 
-Smarticles poured into a cylinder go through one of three activities: packing fraction, entanglement, energy and
-height, against the findings of Savoie, Tuazon, Bhamla and Goldman, "Amorphous Entangled Active Matter", Soft Matter
-2023. There are no static runs: static is the state of every run before its activity.
+Smarticles are poured into a cylinder and go through one of three activities. Packing fraction, entanglement, energy and
+height are compared with the findings of Savoie, Tuazon, Bhamla and Goldman, "Amorphous Entangled Active Matter", Soft
+Matter 2023. There are no static runs: static is the state of every run before its activity.
 
-Runs of the same aspect ratio and seed begin with the same pile, so they are compared pair by pair, and slopes against
-θ are taken within them; the scatter over seeds and aspect ratios is what makes the error.
+Runs of equal aspect ratio and seed begin with one pile. So procedures are compared pair by pair, and slopes against θ
+are fitted within these blocks; errors come from the scatter over seeds and aspect ratios.
 """
 
 from __future__ import annotations
@@ -64,12 +64,12 @@ from studies.framework.procedures import (
 from studies.framework.runs import ASPECT_KEY, DEFINITION, THETA_KEY, Key, declare, duration
 from studies.framework.study import Study
 
-FLAT = 0.2  # of the mean of ⟨N⟩: by less it does not change with l/w
-NEAR = 0.15  # of l/w: how far from 1.0 a maximum is still near it, one and a half steps of the paper's l/w
-EARLY = 0.24  # of the activity: half of the compaction is early up to here, twice the paper's 12 %
-MARGINAL = 0.5  # of the gain in φ at θ = 10°: a gain below is marginal
-FACTOR = 10.0  # energy of the shape change over that of the internal oscillation, at least
-PEAK = 0.9  # l/w of the energy's local maximum
+FLAT = 0.2  # change of ⟨N⟩ from end to end over its mean, below which ⟨N⟩ hardly depends on l/w
+NEAR = 0.15  # distance in l/w from 1.0 at which a maximum is near 1.0: one and a half steps of the paper's l/w
+EARLY = 0.24  # share of the activity within which half of the compaction is early: twice the paper's 12 %
+MARGINAL = 0.5  # gain in φ over that at θ = 10°, below which a gain is marginal
+FACTOR = 10.0  # least energy of the shape change over that of the internal oscillation
+PEAK = 0.9  # l/w of the local maximum of the energy in the paper
 
 QUANTITIES = declare(
     {
@@ -77,7 +77,7 @@ QUANTITIES = declare(
         PHI: ("φ at rest again", ".4f", "packing fraction at rest: after the activity, or of the static state"),
         CROSSINGS: ("⟨N⟩", ".2f", "⟨N⟩ at rest: links of others through a smarticle's plane"),
         ENERGY: ("energy [J]", ".2e", "work of the motors, or of the shaken container, on the smarticles"),
-        SAMPLED: ("", "", "of the motors, torque times angle over moments so far apart, as the paper's code could"),
+        SAMPLED: ("", "", "work of the motors, summed as torque times change of angle, as the paper's code could"),
         HEIGHT: ("h/h0", ".3f", "height of the centre of mass at rest after the activity, over that before it"),
         STRAIGHT: ("", "", "height of the centre of mass over h0 at the end of the straight state of the shape change"),
         LOWEST: ("", "", "least height over h0, means over 0.1 s, while barbs close in the shape change"),
@@ -93,22 +93,22 @@ QUANTITIES = declare(
 
 
 def only(procedure: str, drop: str | None = None) -> Rows:
-    """Select one procedure, the internal oscillation at one θ; and rows with a value in a column."""
+    """Return a function that selects one procedure, and rows with a value in the column `drop`."""
     return lambda table: of_procedure(table, procedure).dropna(subset=[drop] if drop else [])
 
 
 def amplitudes(table: pd.DataFrame) -> pd.DataFrame:
-    """Select the internal oscillation at every θ."""
+    """Return the rows of the internal oscillation at all θ."""
     return table[table[PROCEDURE] == INTERNAL]
 
 
 def pairs_of(table: pd.DataFrame, quantity: str, one: str, other: str) -> pd.DataFrame:
-    """Values of two procedures for the same aspect ratio and seed: columns `one` and `other`."""
+    """Return values of two procedures at equal aspect ratio and seed: columns `one` and `other`."""
     return pairs(of_procedure(table, one), of_procedure(table, other), quantity)
 
 
 def gains(procedure: str) -> Rows:
-    """Subtract from φ_f that of the static state of the same aspect ratio and seed."""
+    """Return a function that computes φ_f of a procedure less that of the static state, pair by pair."""
 
     def rows(table: pd.DataFrame) -> pd.DataFrame:
         both = pairs_of(table, PHI_ACTIVE, procedure, STATIC)
@@ -118,12 +118,12 @@ def gains(procedure: str) -> Rows:
 
 
 def with_aspect(name: str, says: str, rows: Rows, quantity: str, sign: int = 1) -> Finding:
-    """Make a finding that a quantity rises (sign 1) or falls (−1) with the aspect ratio."""
+    """Make the finding that a quantity rises (sign +1) or falls (−1) with the aspect ratio."""
     return slope(name, says, quantity, ASPECT, sign=sign, rows=rows)
 
 
 def with_amplitude(name: str, says: str, quantity: str, sign: int = 1, rows: Rows = amplitudes) -> Finding:
-    """Make a finding that a quantity rises (sign 1) or falls (−1) with θ within runs that begin with one pile."""
+    """Make the finding that a quantity rises (sign +1) or falls (−1) with θ, within l/w and seed."""
     return slope(name, says, quantity, THETA, sign=sign, within=(ASPECT, SEED), rows=rows)
 
 
@@ -137,7 +137,7 @@ def _compacts_early(table: pd.DataFrame) -> Outcome:
     half = Effect(
         label="half is reached after, of the activity,", value=mean_over_seeds(table[HALF]), sign=-1, threshold=EARLY
     )
-    # Half of nothing is reached at any time: there must be a compaction first.
+    # The time of half of the compaction is meaningless unless the pile compacts.
     return Outcome(effects=[half, drop], verdict=drop.verdict if drop.verdict != Verdict.FOUND else half.verdict)
 
 
@@ -150,7 +150,7 @@ def _largest_gains_little(table: pd.DataFrame) -> list[Effect]:
 
 
 def _logarithms(table: pd.DataFrame, one: str, other: str) -> pd.Series:
-    """log10 of the ratio of energies, where both are above 0, by l/w."""
+    """Return log10 of the ratio of energies of pairs in which both are above 0, indexed by l/w."""
     both = pairs_of(table, ENERGY, one, other)
     both = both[(both["one"] > 0) & (both["other"] > 0)].set_index(ASPECT)
     return np.log10(both["one"] / both["other"])
@@ -216,7 +216,7 @@ def _static_flat(table: pd.DataFrame) -> Outcome:
 
 
 def _near_one(table: pd.DataFrame) -> Outcome:
-    """⟨N⟩ is greatest near l/w = 1.0, by a parabola where one describes the means, by the means else."""
+    """Judge whether ⟨N⟩ is greatest near l/w = 1.0, by a parabola if that describes the means."""
     before, after = (parabola(table[ASPECT], table[CROSSINGS], at=place) for place in (1 - NEAR, 1 + NEAR))
     by = f"by l/w {means_by(table, CROSSINGS, ASPECT, '.2f')}"
     beyond = bool((table[ASPECT] > 1.0).any())
@@ -259,7 +259,7 @@ def _peaks_with_amplitude(table: pd.DataFrame) -> list[Effect]:
 
 
 def _energies(suffix: str, how: str, quantity: str) -> tuple[Finding, Finding, Finding]:
-    """Make findings on the energy of the internal oscillation, by one of its two readings."""
+    """Make the findings on the energy of the internal oscillation, from the column integrated or sampled."""
     part, says = only(INTERNAL), "Internal oscillation: "
     return (
         with_amplitude(f"energy-grows-with-theta{suffix}", f"{says}energy grows with θ{how}", quantity),
@@ -447,25 +447,25 @@ ENTANGLEMENT = (
 
 
 def heights(run: Run) -> History:
-    """Read h/h0 against the time since the activity began."""
+    """Read the height of the centre of mass over h0 [-] against time, see `height_history`."""
     values, times = height_history(run)
     return History(times=times, values=values, active=duration(activity(run)))
 
 
 def nearest_aspect(runs: pd.DataFrame) -> pd.DataFrame:
-    """Select the runs of the aspect ratio of the paper's figure, 0.7, or the nearest one."""
+    """Return the runs at the aspect ratio nearest to 0.7, that of the paper's figure."""
     return runs[runs[ASPECT] == min(runs[ASPECT].unique(), key=lambda aspect: abs(aspect - 0.7))]
 
 
 def _energy_series(points: pd.DataFrame) -> list[Series]:
-    """Make series of the procedures, and of the internal oscillation at its other amplitudes."""
+    """Return a series of each procedure, and of the internal oscillation at each other amplitude."""
     internal = amplitudes(points)
     others = one_by_one(THETA, lambda theta: rf"internal, $\theta$ = {theta:g}°")
     return by_procedure(apart=0.004)(points) + others(internal[internal[THETA] != AMPLITUDE])
 
 
 def _aspect_series(points: pd.DataFrame) -> list[Series]:
-    """Make a series of the internal oscillation for each aspect ratio with more than one amplitude."""
+    """Return a series of the internal oscillation at each aspect ratio with several amplitudes."""
     internal = amplitudes(points).sort_values(THETA)
     several = internal[internal.groupby(ASPECT)[THETA].transform("nunique") > 1]
     return one_by_one(ASPECT, lambda aspect: rf"$l/w$ = {aspect:g}")(several)

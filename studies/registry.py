@@ -1,7 +1,7 @@
-"""The shipped studies: each `NAME.py` with a `NAME.yaml` beside it.
+"""The shipped studies: pairs of a script `NAME.py` and a sweep file `NAME.yaml` in this folder.
 
-A variant of the sweep is a study of its own, `strength-code` of `strength.yaml@code`, but for `quick`, which is the
-quick variant of them all. Nothing large is imported before a study is loaded.
+Each variant of a sweep file is a study too: `strength-code` is `strength.yaml@code`. The variant `quick` is instead
+applied to any of these studies by `--quick`. Libraries are imported when a study is loaded, so that `--help` is fast.
 """
 
 from __future__ import annotations
@@ -28,31 +28,26 @@ QUICK = "quick"
 
 @dataclass(frozen=True)
 class Script:
-    """A study: a script and its sweep file with some variants, and whether there is a quick one besides."""
+    """A shipped study before it is loaded: its script, sweep file and variants of the sweep."""
 
-    name: str
-    module: str
-    variants: tuple[str, ...] = ()
-    quick: bool = True
+    name: str  #: Such as `strength-code`
+    module: str  #: Such as `strength`
+    variants: tuple[str, ...] = ()  #: Such as `("code",)`
+    quick: bool = True  #: Whether there is a quick variant
 
     @cached_property
     def about(self) -> str:
-        """First paragraph of the script, for `--help`."""
+        """First paragraph of the script's docstring, for `--help`."""
         text = ast.get_docstring(ast.parse((FOLDER / f"{self.module}.py").read_text(encoding="utf-8"))) or ""
         return f"variant {' '.join(self.variants)} of {self.module}" if self.variants else text.split("\n\n")[0]
 
-    @property
-    def pictured(self) -> Mapping[str, object]:
-        """Values of the run that a picture is drawn of."""
-        return self.load().pictured
-
     def load(self) -> Study:
-        """Import the study."""
+        """Import the script and return its study."""
         study: Study = importlib.import_module(f"studies.{self.module}").STUDY
         return replace(study, name=self.name)
 
     def sweep_file(self, *, quick: bool = False) -> Path:
-        """Name the sweep file with its variants, as `load_sweep` reads it; InputError without a quick variant."""
+        """Return the sweep file with its variants, `FILE@VARIANT`; InputError if there is no quick variant."""
         if quick and not self.quick:
             raise InputError(f"study {self.name} has no quick variant; leave --quick out")
         variants = [*self.variants, *([QUICK] if quick else [])]
@@ -72,7 +67,7 @@ def _scripts() -> list[Script]:
             Script(name=f"{name}-{variant}", module=file.stem, variants=(variant,), quick=quick and not on_yade)
             for variant, changes in variants.items()
             if variant != QUICK
-            for on_yade in [(changes.get("constants") or {}).get("engine") == "yade"]  # which takes no minutes
+            for on_yade in [(changes.get("constants") or {}).get("engine") == "yade"]  # too slow to be quick
         ]
     return found
 
@@ -81,12 +76,7 @@ STUDIES: Mapping[str, Script] = MappingProxyType({study.name: study for study in
 
 
 def shipped(name: str) -> Script:
-    """Find a shipped study; InputError where there is none of this name."""
+    """Return the shipped study of a name; InputError if it does not exist."""
     if name not in STUDIES:
         raise InputError(f"study {name!r} does not exist; {nearest(name, sorted(STUDIES))}")
     return STUDIES[name]
-
-
-def study_file(name: str, *, quick: bool = False) -> Path:
-    """Name the sweep file of a study, see `Script.sweep_file`."""
-    return shipped(name).sweep_file(quick=quick)

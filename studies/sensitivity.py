@@ -1,7 +1,7 @@
-"""What φ before and after shaking owes to each choice of the contact model, one at a time, at l/w = 0.7.
+"""Sensitivity of φ before and after shaking to the parameters of the contact model, one at a time.
 
-The first variant is the baseline; each other one differs from it in one choice: restitution, friction, damping,
-stiffness or sphere diameter, and in `sensitivity-section` pitch and rows of spheres, up to the true section.
+The first variant is the baseline. Each other variant changes one parameter: restitution, friction, damping, stiffness
+or sphere diameter; in `sensitivity-section` pitch and rows of spheres, up to the true cross-section.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ VARIANTS = (
     "pitch-0.5",
     "two-rows",
 )
-"""In the order of the sweeps."""
+"""Variants in the order of the sweeps."""
 
 COMPARED = {"phi_0": phi("phi_0"), "phi_f": phi("phi_f"), "crossings after": "crossings after [-]"}
 QUANTITIES = declare(
@@ -48,24 +48,27 @@ QUANTITIES = declare(
 
 
 def measure(run: Run) -> Row:
-    """Measure φ and crossings before and after shaking; the variant is in the name of the run."""
+    """Measure φ and crossings before and after shaking, and read the variant from the run's name."""
     found = re.fullmatch(r"(.+)_seed(\d+)", run.path.name)
     if found is None or int(found[2]) != run.manifest.seed:
         raise InputError(
-            f"{run.path}: runs of this study are named VARIANT_seedN, here N = {run.manifest.seed}; do not rename runs"
+            f"{run.path}: must be named VARIANT_seed{run.manifest.seed}; give the run its name back, or run it again"
         )
     return {VARIANT: found[1], **measured_row(run, [DEFINITION])}
 
 
 def changes(runs: pd.DataFrame, column: str) -> dict[str, Difference]:
-    """Change of the mean of each variant against the baseline's, which is taken as exact, by Welch [%]."""
+    """Return the change of a column's mean against the baseline [%] by variant, with Welch's interval.
+
+    The baseline's mean, which changes are divided by, is taken as exact.
+    """
     means = {str(name): mean_over_seeds(part[column]) for name, part in runs.groupby(VARIANT, sort=False)}
     first, *others = means
     return {name: relative_difference(means[name], means[first]) for name in others}
 
 
 def summarise(runs: pd.DataFrame) -> dict[str, pd.DataFrame]:
-    """Make `summary`: means over seeds by variant, and changes against the first one."""
+    """Make the table `summary`: means over seeds, and changes against the baseline [%], a row per variant."""
     compared = {name: changes(runs, column) for name, column in COMPARED.items()}
     rows = []
     for variant, group in runs.groupby(VARIANT, sort=False):
@@ -80,8 +83,8 @@ def summarise(runs: pd.DataFrame) -> dict[str, pd.DataFrame]:
     return {"summary": pd.DataFrame(rows)}
 
 
-def owes(name: str) -> Finding:
-    """Make the finding that a quantity changes with a choice."""
+def depends(name: str) -> Finding:
+    """Make the finding that a quantity, key of `COMPARED`, depends on a parameter of the contact model."""
     column = COMPARED[name]
 
     def outcome(runs: pd.DataFrame) -> Outcome:
@@ -108,7 +111,7 @@ STUDY = Study(
     measure=measure,
     keys=(Key(column=VARIANT, label="variant", order=VARIANTS),),
     quantities=tuple(QUANTITIES.values()),
-    findings=tuple(map(owes, COMPARED)),
+    findings=tuple(map(depends, COMPARED)),
     figures=(
         Rows(
             name="sensitivity",

@@ -1,13 +1,14 @@
-"""Piles prepared by each procedure are torn between a grip on the floor and a hook, without a wall.
+"""Piles of each procedure are torn apart between a grid on the floor and a hook, without a wall.
 
-In the paper's own test (study `fracture`) one rigid smarticle may hold both hooks, and the hook feels the weight of a
-pile that comes along as a whole, rubbing on the wall. Here a grid of bars 2.5 mm above the floor holds the pile, the
-wall is gone before the pull, and the hook is farther from the grid than a smarticle is long: what it feels beyond
-what it lifts goes through the pile. Force against displacement, peak, work and what tears off, against Savoie et al.
-(Soft Matter 2023).
+In the paper's own test (study `fracture`) a single smarticle may hold both hooks, or the hook lifts the whole pile,
+which rubs on the wall. Here a grid of bars 2.5 mm above the floor holds the pile, the wall is removed before the pull,
+and the hook is farther from the grid than a smarticle is long. So the force beyond the lifted weight is transmitted
+through the pile. Measured are force against displacement, peak force, work and the share that is torn off. They are
+compared with the findings of Savoie et al. (Soft Matter 2023).
 
-A seed is poured alike for all procedures, and for both heights of the hook nearly so: means over the heights within a
-seed are compared, so that seeds alone are counted. A pile that held fast has a peak of at least what it took.
+All procedures start from equal poses at each seed, and both heights of the hook from nearly equal ones. Procedures are
+compared by means over both heights, seed by seed, so that the number of samples is that of the seeds. If the hook
+stops at its force limit ("held fast"), the peak force is a lower bound.
 """
 
 from __future__ import annotations
@@ -57,15 +58,19 @@ TOP, KEPT = "height of 95 % [m]", "com height without over with the wall [-]"
 
 QUANTITIES = declare(
     {
-        PEAK: ("peak", ".3f", f"largest mean over {WINDOW:g} s of the force on the hook; at least, where it held"),
-        RAISED: ("raised at it [mm]", ".1f", "how far the hook had been raised then"),
-        WORK: ("work / n W_s w", ".3f", "∫ F dz over the whole pull: to fracture, and to carry off what comes along"),
-        THROUGH: ("through to the grid", ".3f", "upwards on the grid at the peak less that before the pull"),
-        BEFORE: ("before", ".3f", "force on the hook before the pull: what rests on it, and a pile that is braced"),
+        PEAK: ("peak", ".3f", f"largest mean over {WINDOW:g} s of the force on the hook; a bound where it held fast"),
+        RAISED: ("raised at it [mm]", ".1f", "displacement of the hook at the peak"),
+        WORK: ("work / n W_s w", ".3f", "∫ F dz over the whole pull, which tears the pile and lifts the part torn off"),
+        THROUGH: ("through to the grid", ".3f", "upward force on the grid at the peak, less that before the pull"),
+        BEFORE: ("before", ".3f", "force on the hook before the pull, by weight and by bracing of the pile"),
         HELD_FAST: ("held fast", ".2f", "1 where the hook was stopped by its force limit, 0 where it arrived"),
-        CARRIED: ("carried off", ".3f", "share that rose by more than half of the hook's way; empty where held"),
-        BREAK: ("broke at [mm]", ".1f", "mean height of the lowest points of those before the pull"),
-        ABOVE: ("above the hook", ".2f", "share with the centre of mass above the hook before the pull"),
+        CARRIED: (
+            "carried off",
+            ".3f",
+            "share that rose by more than half of the hook's displacement; empty where held",
+        ),
+        BREAK: ("broke at [mm]", ".1f", "mean height, before the pull, of the lowest points of the part carried off"),
+        ABOVE: ("above the hook", ".2f", "share of smarticles with the centre of mass above the hook before the pull"),
         TOP: ("height [mm]", ".1f", "height below which 95 % of the material lies before the pull"),
         KEPT: ("kept without wall", ".3f", "height of the centre of mass before the pull over that with the wall"),
         CROSSINGS: ("⟨N⟩", ".2f", "links of others through a smarticle's plane at rest before the wall went"),
@@ -82,7 +87,7 @@ QUANTITIES = declare(
 
 
 def measure(run: Run) -> Row:
-    """Measure the pile before it is torn, the force on the hook, and what came off."""
+    """Measure the pile before the pull, the force on the hook, and the share torn off; return the row."""
     pile, pulled = prepared_by(run, "remove-container", PULL), run.phases[-1]
     rest, free = pulled.index - 2, pulled.index - 1
     settings, hooks = run.scene["phases"][pulled.index], run.scene.get("hooks")
@@ -123,22 +128,25 @@ def measure(run: Run) -> Row:
 
 
 def force_history(run: Run) -> History:
-    """Read the force over n W_s against the hook's way [mm]."""
+    """Read the force over n W_s [-] against the displacement of the hook [mm]."""
     pull = read_pull(run, run.series, run.phases[-1].index)
     times, force = moving_mean(pull)
-    way = 1e3 * np.interp(times, pull.edges, pull.raised)
-    return History(times=way, values=force / run.manifest.count / weight_of_one(run), active=0.0)
+    displacement = 1e3 * np.interp(times, pull.edges, pull.raised)
+    return History(times=displacement, values=force / run.manifest.count / weight_of_one(run))
 
 
 def over_heights(runs: pd.DataFrame) -> pd.DataFrame:
-    """Average over the heights of the hook, by procedure, l/w and seed, where there are runs at all heights."""
+    """Average runs over the heights of the hook: a row per procedure, l/w and seed.
+
+    A procedure, l/w and seed without a run at every height is left out.
+    """
     columns = [PEAK, RAISED, WORK, THROUGH, CARRIED, ABOVE, CROSSINGS, HELD_FAST]
     grouped = compared(runs).groupby([PROCEDURE, ASPECT, SEED])
     return grouped[columns].mean()[grouped[UPPER].nunique() == runs[UPPER].nunique()].reset_index()
 
 
 def order_findings(rows: Rows) -> tuple[Finding, Finding]:
-    """Make the findings that compare peak force with ⟨N⟩ and with the way to it."""
+    """Make the findings that peak force and ⟨N⟩ differ in order, and that shape change is brittle."""
     return (
         Finding(
             id="other-order-than-crossings",
@@ -164,7 +172,7 @@ def order_findings(rows: Rows) -> tuple[Finding, Finding]:
 
 
 def other_order(table: pd.DataFrame) -> Outcome:
-    """Find pairs of procedures that differ clearly both in ⟨N⟩ and in peak force, in one sense or in opposite ones."""
+    """Judge whether two procedures differ clearly in both ⟨N⟩ and peak force, with opposite signs."""
     pairs: dict[bool, list[str]] = {True: [], False: []}
     known = True
     for one, other in itertools.combinations(THREE, 2):
@@ -180,7 +188,7 @@ def other_order(table: pd.DataFrame) -> Outcome:
 
 
 def strongest(rows: Rows, suffix: str = "") -> tuple[Finding, Finding]:
-    """Make the findings that shape change is the strongest and internal oscillation the weakest of the procedures."""
+    """Make the findings that peak force is greatest after shape change, least after internal oscillation."""
     keys: dict[str, Any] = {"beside": (STATIC,), "bounds": HELD_FAST, "rows": rows}
     most, least = (f"has the {one} peak force of the three procedures{suffix}" for one in ("highest", "least"))
     return (
@@ -194,7 +202,14 @@ def strongest(rows: Rows, suffix: str = "") -> tuple[Finding, Finding]:
 def with_crossings(
     rows: Rows, within: Sequence[str], theta: Rows, within_theta: Sequence[str]
 ) -> tuple[Finding, Finding]:
-    """Make the findings that peak force goes with ⟨N⟩, over all procedures and over θ."""
+    """Make the findings that peak force rises with ⟨N⟩, over all procedures and over the amplitudes θ.
+
+    Args:
+        rows: selects the samples of the first finding.
+        within: columns whose values make blocks for the first finding.
+        theta: selects the samples of the second finding.
+        within_theta: columns whose values make blocks for the second finding.
+    """
     keys: dict[str, Any] = {"bounds": HELD_FAST, "unit": "n W_s per link"}
     where, where_theta = (", ".join(map(symbol, columns)) for columns in (within, within_theta))
     return (
@@ -222,7 +237,7 @@ def with_crossings(
 
 
 def several_amplitudes(runs: pd.DataFrame) -> pd.DataFrame:
-    """Select runs of the internal oscillation, where there are several θ."""
+    """Return the internal oscillation at those l/w and heights of the hook that have several θ."""
     internal = runs[runs[PROCEDURE] == INTERNAL]
     return internal[internal.groupby([ASPECT, UPPER])[THETA].transform("nunique") > 1]
 

@@ -69,7 +69,7 @@ def run_study(arguments: argparse.Namespace) -> int:
     from templates.sweep.sweep_file import load_sweep  # noqa: PLC0415
 
     shipped = registry.shipped(arguments.name)
-    file = registry.study_file(arguments.name, quick=arguments.quick)
+    file = shipped.sweep_file(quick=arguments.quick)
     constants = {} if arguments.fidelity is None else _fidelity(arguments.name, file, arguments.fidelity)
     try:
         sweep = changed_sweep(file, constants, arguments.engine)
@@ -80,13 +80,14 @@ def run_study(arguments: argparse.Namespace) -> int:
         msg = f"--engine {arguments.engine}: study {arguments.name} cannot be run on it ({error}); leave --engine out"
         raise InputError(msg) from None
     folder = folder_of(sweep, points, arguments.out, arguments.command_line)
-    lines = differences(points, expand(load_sweep(registry.study_file(arguments.name))))
+    lines = differences(points, expand(load_sweep(shipped.sweep_file())))
     note = f"not the full study: {'; '.join(lines)}" if lines else "the full study as shipped"
     print(note, flush=True)
     earlier = {} if arguments.earlier is None else _earlier(arguments.earlier, folder, shipped.load())
     if earlier:
         note += f"; {len(earlier)} runs from the tables of an earlier analysis, {arguments.earlier}"
-    return compute_and_analyse(folder, arguments, shipped.load, note=note, pictured=shipped.pictured, earlier=earlier)
+    pictured = shipped.load().pictured
+    return compute_and_analyse(folder, arguments, shipped.load, note=note, pictured=pictured, earlier=earlier)
 
 
 def compute_and_analyse(

@@ -1,1 +1,1 @@
-"""The claims of the paper, one by one, with the verdict of our studies: `results/CLAIMS.md`."""
+"""Claims of the paper with verdicts from the findings of the studies: `results/CLAIMS.md`."""

@@ -33,7 +33,7 @@ _HEADER = ("", "claim", "verdict", "by the text", "by the code", "text on YADE",
 
 
 def text(found: Sequence[Claim]) -> str:
-    """Make the page."""
+    """Return the text of `CLAIMS.md`."""
     counts = ", ".join(f"{n} {verdict}" for verdict, n in Counter(claim.verdict for claim in found).most_common())
     lines = [HEAD, f"{len(found)} claims: {counts}.", "", engines(found), ""]
     for part, group in groupby(found, key=lambda claim: claim.part):
@@ -59,7 +59,7 @@ def _numbers(tested: Tested | None) -> str:
 
 
 def engines(found: Sequence[Claim]) -> str:
-    """State how both engines judge the claims that both were asked about."""
+    """Return a statement on the findings that were judged on both engines."""
     asked = [(f"{claim.number} by the {protocol}", how) for claim in found for protocol, how in claim.engines.items()]
     which = {one: ", ".join(name for name, how in asked if how == one) or "none" for one in _HOW}
     claimed = len({name.split()[0] for name, _ in asked})
@@ -74,7 +74,7 @@ _HOW = ("opposite", "links alone", "YADE alone")
 
 
 def table(found: Sequence[Claim]) -> pd.DataFrame:
-    """Make one row per claim."""
+    """Make the table `claims.csv`: a row per claim, with verdict and numbers by protocol and engine."""
     rows = []
     for claim in found:
         row = {"number": claim.number, "part": claim.part, "claim": claim.says, "verdict": claim.verdict}
@@ -90,7 +90,7 @@ def table(found: Sequence[Claim]) -> pd.DataFrame:
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
-    """Write page and table."""
+    """Write `CLAIMS.md` and `claims.csv`."""
     parser = argparse.ArgumentParser(prog="python -m studies.claims", description=__doc__)
     parser.add_argument("results", type=Path, nargs="?", default=Path("results"), help="folder of the studies' results")
     folder: Path = parser.parse_args(arguments).results

@@ -1,7 +1,7 @@
-"""What the studies under `results/` say of the paper's claims.
+"""Verdicts on the paper's claims, read from the published tables of the studies.
 
-`claims.yaml` names for every claim the study that tests it and the finding there; verdict, numbers and what they rest
-on are taken from the tables of that study alone, so that the list of claims holds no number of its own.
+`claims.yaml` names for every claim a study and one of its findings. Verdict, numbers and runs come from the tables of
+that study in `results/`, so that `claims.yaml` holds no number of its own.
 """
 
 from __future__ import annotations
@@ -31,39 +31,41 @@ _FOUND = {
 
 @dataclass(frozen=True, kw_only=True)
 class Tested:
-    """What one study says of a claim."""
+    """Verdict of one study on a claim."""
 
     study: str  #: Folder under `results/`
     verdict: str  #: `reproduced`, `not`, `not resolved` or `no data`
-    ours: str  #: Its numbers
-    criterion: str  #: What its verdict asks for
-    basis: str  #: Smarticles, seeds and engine that it rests on
-    needed: str = ""  #: What it would take, where the verdict is not resolved and that is known; else empty
-    #: What a test of ours says where the paper's own cannot decide; None where there is none
-    instead: Tested | None = None
+    ours: str  #: Our numbers, as text
+    criterion: str  #: Criterion for the verdict `reproduced`
+    basis: str  #: Smarticles, aspect ratios, seeds and engine of the runs, as text
+    needed: str = ""  #: Text on how many more runs would resolve the claim; empty if resolved or unknown
+    instead: Tested | None = None  #: Verdict of a test of ours, used if the paper's test does not resolve the claim
 
     @property
     def settled(self) -> str:
-        """The verdict by the paper's own test, or that of ours where the paper's does not resolve it."""
+        """Verdict by the paper's test; by our own test if the paper's test does not resolve the claim."""
         unsettled = self.verdict in ("not resolved", "no data")
         return self.instead.verdict if unsettled and self.instead is not None else self.verdict
 
 
 @dataclass(frozen=True, kw_only=True)
 class Claim:
-    """One claim of the paper."""
+    """One claim of the paper, with the verdicts of the studies that tested it."""
 
     number: int  #: In the paper's order, from 1
-    part: str  #: Of the paper
+    part: str  #: Section of the paper
     says: str  #: The claim
-    #: By the rules of the `text` and of the paper's `code`, and each `on YADE` from results of its own; None where that
-    #: was not tested
+    #: Verdicts under the protocols `text` and `code`, and in the results `text on YADE` and `code on YADE`; None if not
+    #: tested
     tested: Mapping[str, Tested | None]
-    why: str  #: What decides the verdict, or why there is none
+    why: str  #: Reason for the verdict, or for having none
 
     @property
     def verdict(self) -> str:
-        """Of both protocols: partly where one finds it and the other does not; not where one finds the opposite."""
+        """Verdict under both protocols together.
+
+        It is their common verdict if they agree; otherwise `partly` if one reproduces the claim, `not` if none does.
+        """
         settled = [one.settled for one in (self.tested["text"], self.tested["code"]) if one is not None]
         known = set(settled) - {"no data"}
         if not known:
@@ -72,7 +74,10 @@ class Claim:
 
     @property
     def engines(self) -> dict[str, str]:
-        """How the engines agree, by protocol, where both judge a finding: alike, opposite, or which one resolves it."""
+        """Agreement of both engines by protocol: `alike`, `opposite`, `links alone`, or `YADE alone`.
+
+        `alone` is the engine that resolves the claim. Protocols not tested on both engines are left out.
+        """
         found = {}
         for name in ("text", "code"):
             verdicts = [one.verdict for one in (self.tested[name], self.tested[f"{name} on YADE"]) if one is not None]
@@ -84,11 +89,19 @@ class Claim:
 
 
 def claims(results: Path, listed: Path = CLAIMS) -> tuple[Claim, ...]:
-    """Judge all claims of a list by what the studies found; InputError where a study or a finding is not there."""
+    """Read the verdicts on all claims of a list from the published tables of the studies.
+
+    Args:
+        results: folder with a folder for each study.
+        listed: list of the claims, a YAML file.
+
+    Raises:
+        InputError: A study or a finding that the list names does not exist.
+    """
 
     @cache
     def read(study: str) -> _Findings:
-        # A study that has been run has its results in a folder of its own.
+        # `smarticles study` writes results/ inside the folder of the study; published results have no such folder.
         inside = results / study / "results"
         return _findings(inside if inside.is_dir() else results / study)
 
@@ -108,7 +121,7 @@ def claims(results: Path, listed: Path = CLAIMS) -> tuple[Claim, ...]:
     return tuple(found)
 
 
-_Findings = tuple[Mapping[str, Mapping[str, str]], str]  #: Row of each finding by id; what all of them rest on
+_Findings = tuple[Mapping[str, Mapping[str, str]], str]  #: Rows of `findings.csv` by id, and `Tested.basis`
 
 
 def _tested(
@@ -118,7 +131,7 @@ def _tested(
     *,
     optional: bool = False,
 ) -> Tested | None:
-    """Read what a study says, named with its finding, and what another one says instead; None of none."""
+    """Read the verdict of the finding [STUDY, ID] and of its substitute `instead`; None if there is none."""
     if named is None:
         return None
     study, finding = named
@@ -140,7 +153,7 @@ def _tested(
 
 
 def _findings(folder: Path) -> _Findings:
-    """Read the findings of a study; those of earlier tables by their sentence where they have no id."""
+    """Read the findings of a study by id; tables without ids by the text of the finding."""
     for name in ("findings.csv", "verdicts.csv"):
         path = folder / name
         if path.is_file():
@@ -154,11 +167,11 @@ def _findings(folder: Path) -> _Findings:
 
 
 def _basis(folder: Path) -> str:
-    """Format `168 – 494 smarticles, l/w 0.4 – 1.1, 8 seeds, links`."""
+    """Format the runs that findings rest on: `168 – 494 smarticles, l/w 0.4 – 1.1, 8 seeds, links`."""
     runs = pd.read_csv(folder / "runs.csv", comment="#")
     made = json.loads((folder / "provenance.json").read_text(encoding="utf-8"))["runs"]
     engines = sorted({"links" if "links" in run["versions"] else "YADE" for run in made})
-    # Seeds from the point with the fewest to that with the most; how many in all where no table has points.
+    # Least and greatest number of seeds at a point; without a table of points, the number of all seeds.
     points = [folder / name for name in ("points.csv", "summary.csv") if (folder / name).is_file()]
     counts = next((table[SEEDS] for path in points if SEEDS in (table := pd.read_csv(path, comment="#"))), None)
     seeds = _span(counts) if counts is not None else str(runs[SEED].nunique())

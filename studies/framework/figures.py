@@ -1,6 +1,6 @@
-"""Figures of studies: means against a variable, rows of means, histories and scatter.
+"""Figures of studies: means against a variable, rows of means, heat maps, histories and scatter plots.
 
-All error bars are 95 % intervals: `draw_means` draws them, `finish` names them once below the figure.
+All error bars are 95 % intervals: `draw_means` draws them, `finish` explains them once in the figure's footer.
 """
 
 from __future__ import annotations
@@ -15,69 +15,92 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 import pandas as pd
+from matplotlib.cm import ScalarMappable
+from matplotlib.colors import Normalize
 from matplotlib.container import ErrorbarContainer
+from numpy.typing import ArrayLike, NDArray
 
 from dem.errors import InputError
 from dem.record.run import Run
 from postprocess.report import figures as style
 from postprocess.report.figures import hold_everything
 from postprocess.statistics.points import marked
-from studies.framework.procedures import EXTERNAL, INTERNAL, SHAPE, STATIC, of_procedure
+from studies.framework.procedures import EXTERNAL, INTERNAL, PROCEDURE, SHAPE, STATIC, of_procedure
 from studies.framework.runs import ENGINE_NAMES, Quantity, engines_of, judging, of_engine
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure as Canvas
-    from numpy.typing import ArrayLike, NDArray
 
 ASPECT_LABEL, THETA_LABEL = r"aspect ratio $l/w$ [-]", r"amplitude $\theta$ [degree]"
 CROSSINGS_LABEL = r"links through a plane $\langle N\rangle$ [-]"
 BARS = "Error bars: 95 % confidence of the mean over seeds, Student's t"
 POOLED = f"{BARS}, scatter pooled over all points"
 
-_CONFIDENCE = "_95 %"  # label of the lines of error bars; those that begin with _ stay out of legends
+_CONFIDENCE = "_95 %"  # label of the lines of error bars; Matplotlib keeps labels that begin with _ out of legends
 _COLOURS = {SHAPE: style.ORANGE, EXTERNAL: style.BLUE, INTERNAL: style.SKY, STATIC: style.GREY}
 _SHAPES = {SHAPE: "s", EXTERNAL: "D", INTERNAL: "o", STATIC: "^"}
-_ASIDE = 0.16  # of the rows' places, so that bars do not lie on each other
-_LEAST_BIN, _BINS = 0.1, 100  # s: three periods of shaking at 30 Hz
-_PAGE = 2 * style.COLUMN_WIDTH
+_ASIDE = 0.16  # distance of the series in a row, over the distance of two rows: error bars must not overlap
+_LEAST_BIN = 0.1  # s, three periods of shaking at 30 Hz
+_BINS = 100  # intervals of a history
+_CELL = math.sqrt(2)  # factor in x from the outermost points of a heat map to the edges of their cells
+_PAGE = 2 * style.COLUMN_WIDTH  # inch
 
-Select = Callable[[pd.DataFrame], pd.DataFrame]
+Select = Callable[[pd.DataFrame], pd.DataFrame]  #: Selects the rows of a table that are drawn
 
 
 @dataclass(frozen=True, kw_only=True)
 class Analysis:
-    """What figures are drawn from."""
+    """Tables and runs that the figures of a study are drawn from."""
 
-    tables: Mapping[str, pd.DataFrame] = field(repr=False)
-    manifests: Mapping[str, Run] = field(repr=False)
-    footer: Sequence[str]  #: Origin, one statement each
+    tables: Mapping[str, pd.DataFrame] = field(repr=False)  #: By name
+    runs: Mapping[str, Run] = field(repr=False)  #: Measured runs by the name of their directory
+    footer: Sequence[str]  #: Statements about the origin of the results
 
     def table(self, name: str) -> pd.DataFrame:
-        """Select the rows of the engine that judges; empty where there is no such table."""
+        """Return a table's rows of the judging engine; empty if the study has no table of this name."""
         return judging(self.tables.get(name, pd.DataFrame()))
 
 
 @dataclass(frozen=True, kw_only=True)
 class Series:
-    """Rows that are drawn alike."""
+    """Rows of a table that are drawn with one marker and one entry in the legend."""
 
-    rows: pd.DataFrame = field(repr=False)  #: Points or runs, in the order of a line through them
-    label: str
-    look: Mapping[str, Any]  #: Marker and line, see `marker`
-    shift: float = 0.0  #: Along x, to keep error bars apart
+    rows: pd.DataFrame = field(repr=False)  #: Points or runs, in the order of the line through them
+    label: str  #: In the legend
+    properties: Mapping[str, Any]  #: Of marker and line, by Matplotlib's names, see `marker`
+    shift: float = 0.0  #: Added to x, so that error bars of neighbouring series do not overlap
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class History:
-    """A quantity of one run from the phase before its activity to the end."""
+    """Values of a quantity of one run over time, from the phase before its activity to the end."""
 
-    times: NDArray[np.float64]  #: (n,) since the activity began [s]
-    values: NDArray[np.float64]  #: (n,)
-    active: float = 0.0  #: Time at which the activity ended [s]
+    times: NDArray[np.float64]  #: (n,) since the activity began [s], or another variable that increases
+    values: NDArray[np.float64]  #: (n,) in the unit of the quantity
+    active: float = 0.0  #: Duration of the activity [s]; 0 if the figure is not to mark its beginning and end
 
 
 Split = Callable[[pd.DataFrame], list[Series]]  #: Makes the series of a table of points or runs
+
+
+@dataclass(frozen=True)
+class SplitBy:
+    """Splits a table of points or runs into series by the values of one column."""
+
+    column: str  #: `Study` checks that it is a key
+    series: Split
+
+    def __call__(self, table: pd.DataFrame) -> list[Series]:
+        """Return the series of a table."""
+        return self.series(table)
+
+
+Fit = Callable[
+    [Mapping[str, pd.DataFrame], pd.DataFrame, str, NDArray[np.float64]], Mapping[str, tuple[ArrayLike, ArrayLike]]
+]
+"""Computes curves fitted to a series from the study's tables, the rows of the series, the column that is drawn and
+places x (n,): values (n,) and their 95 % half-widths (n,), NaN where unknown, by the label of each curve."""
 
 
 class Figure(Protocol):
@@ -85,42 +108,45 @@ class Figure(Protocol):
 
     @property
     def name(self) -> str:
-        """Name of its files, without suffix."""
+        """Name of the figure's files without suffix."""
 
     def draw(self, path: Path, analysis: Analysis) -> list[Path]:
-        """Draw and write the figure; gives the files, none where there is nothing to draw."""
+        """Draw the figure and return the paths of its files; none if there is nothing to draw."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Means:
-    """Means with their error bars against a variable: a panel for each quantity and each value of a column."""
+    """Means with error bars against a variable: a panel for each quantity and each value of a column."""
 
-    name: str
-    quantities: Sequence[Quantity]
-    x: str
+    name: str  #: Of the files
+    quantities: Sequence[Quantity]  #: Drawn along y, in a panel each
+    x: str  #: Column that is drawn along x
     x_label: str
-    split: Split
-    table: str = "points"
+    split: Split  #: Makes the series of each panel
+    table: str = "points"  #: Name of the study's table that is drawn
     rows: Select = lambda table: table
-    panels: str = ""  #: Column with a column of panels for each value; empty: none
-    panel: str = "l/w = {:g}"  #: Title of a panel, with `{}` for its value
-    transform: Callable[[Any], Any] = lambda x: x  #: What is drawn of x
-    log: bool = False
-    log_x: bool = False
-    marks: Sequence[float] = ()
-    ticks: bool = False  #: Whether the x axis has ticks at the values of x alone
-    share_y: bool = False
-    #: Horizontal lines of a panel's rows, by label
+    panels: str = ""  #: Column whose values have a panel each; empty: one panel for each quantity
+    panel: str = "l/w = {:g}"  #: Title of a panel, with `{}` for the value of the column `panels`
+    transform: Callable[[Any], Any] = lambda x: x  #: Computes the place along x from the value in the column
+    log: bool = False  #: Whether y is logarithmic, unless a value is 0 or less
+    log_x: bool = False  #: Whether x is logarithmic
+    marks: Sequence[float] = ()  #: Places of vertical broken lines, in the unit of the x axis
+    ticks: bool = False  #: Whether the x axis has ticks only where there are values
+    share_y: bool = False  #: Whether all panels of one quantity, or of one line of panels, have one y axis
+    #: Computes horizontal lines from the rows of a panel: places on the y axis by label, NaN for a line left out
     levels: Callable[[pd.DataFrame], Mapping[str, float]] = lambda _: {}
-    #: Lower bounds for the quantities without a mean, by column
+    #: Column with the lower bound of a quantity where it has no mean, by the column of the quantity
     bounds: Mapping[str, str] = field(default_factory=dict)
-    #: Published values by the column that they are set against: places and values
+    #: Published values: places along x and values, by the column of the quantity
     reference: Mapping[str, tuple[pd.Series, pd.Series]] = field(default_factory=dict)
-    notes: Sequence[str] = ()
-    bars: str = BARS
+    fit: Fit | None = None  #: Computes curves from x = 0 to the last point of each series
+    #: Selects crosses from the study's tables and a panel's value: columns `x`, `low` and `high` (95 % interval), `y`
+    crosses: Callable[[Mapping[str, pd.DataFrame], Any], pd.DataFrame] | None = None
+    notes: Sequence[str] = ()  #: Sentences for the footer
+    bars: str = BARS  #: Explains the error bars in the footer
 
     def draw(self, path: Path, analysis: Analysis) -> list[Path]:
-        """Draw the judging engine filled, other engines open beside it."""
+        """Draw the means of the judging engine with filled markers, those of other engines open beside them."""
         every = analysis.tables.get(self.table, pd.DataFrame())
         every = self.rows(every) if len(every) else every
         columns = [quantity.column for quantity in self.quantities]
@@ -136,72 +162,98 @@ class Means:
         figure, grid = panels(len(columns) * len(values), **shape, sharex=True, sharey="row" if self.share_y else False)
         for axes, (quantity, value) in zip(grid, product(self.quantities, values), strict=True):
             part = every if value is None else every[every[self.panels] == value]
-            self._panel(axes, quantity, part)
+            self._panel(axes, quantity, part, analysis.tables)
+            for cross in () if self.crosses is None else self.crosses(analysis.tables, value).itertuples():
+                axes.plot([cross.low, cross.high], [cross.y] * 2, color=style.BLACK, linewidth=0.8, zorder=4)
+                axes.plot(cross.x, cross.y, "x", color=style.BLACK, markersize=4.5, zorder=5)
             if value is not None and (quantity is self.quantities[0]):
                 axes.set_title(self.panel.format(value), fontsize=8)
         return finish(figure, path, self.notes, analysis.footer, bars=self.bars)
 
-    def _panel(self, axes: Axes, quantity: Quantity, table: pd.DataFrame) -> None:
+    def _panel(self, axes: Axes, quantity: Quantity, table: pd.DataFrame, tables: Mapping[str, pd.DataFrame]) -> None:
         column, scale = quantity.column, quantity.scale
         for x in self.marks:
             axes.axvline(x, color=style.GREY, linewidth=0.6, linestyle=(0, (2, 2)))
         for (label, level), line in zip(self.levels(judging(table)).items(), ("solid", (0, (4, 3))), strict=False):
-            axes.axhline(level, color=style.ORANGE, linewidth=0.9, linestyle=line, label=label)
+            if math.isfinite(level):
+                axes.axhline(level, color=style.ORANGE, linewidth=0.9, linestyle=line, label=label)
         if column in self.reference:
-            look = {**marker("o", style.ORANGE, style.ORANGE), "linestyle": "none"}
-            draw_means(axes, *self.reference[column], None, look=look, label="experiment")
+            properties = {**marker("o", style.ORANGE, style.ORANGE), "linestyle": "none"}
+            draw_means(axes, *self.reference[column], None, properties=properties, label="experiment")
         positive = True
         for number, engine in enumerate(engines_of(table) or ("",)):
             label = f"simulation on {ENGINE_NAMES.get(engine, engine)}"
             for series in self.split(of_engine(table, engine) if engine else table):
                 rows = series.rows[series.rows[column].notna()]
-                x, look = self.transform(series.rows[self.x]) + series.shift * (1 + 2 * number), dict(series.look)
+                x, properties = (
+                    self.transform(series.rows[self.x]) + series.shift * (1 + 2 * number),
+                    dict(series.properties),
+                )
                 if number:
-                    look |= {"color": style.GREEN, "markerfacecolor": "white", "linestyle": "none"}
+                    properties |= {"color": style.GREEN, "markerfacecolor": "white", "linestyle": "none"}
+                if len(rows) and self.fit is not None and not number:
+                    places = np.linspace(0, 1.05 * float(x.max()), 60)
+                    draw_fits(axes, places, self.fit(tables, rows, column, places), properties["color"])
+                    properties["linestyle"] = "none"
                 if len(rows):
                     errors = scale * rows[marked(column, "95 %")].to_numpy()
                     across = rows.get(marked(self.x, "95 %"))
                     shown = label if number else series.label
-                    draw_means(axes, x[rows.index], scale * rows[column], errors, across=across, look=look, label=shown)
+                    draw_means(
+                        axes,
+                        x[rows.index],
+                        scale * rows[column],
+                        errors,
+                        across=across,
+                        properties=properties,
+                        label=shown,
+                    )
                     positive &= bool((rows[column] > 0).all())
                     label = "_"
                 if column in self.bounds:
                     least = scale * series.rows[self.bounds[column]].where(series.rows[column].isna())
-                    draw_bounds(axes, x, least, 0.05 * least.abs() + 0.2, look={**look, "markerfacecolor": "white"})
-        place = axes.get_subplotspec()
-        # Panels of one quantity share the label of their row; those of several quantities have their own.
-        if not (self.share_y and self.panels) or place is None or place.is_first_col():
-            axes.set_ylabel(quantity.axis or column)
-        axes.set_xlabel(self.x_label)
-        if self.ticks:
-            places = self.transform(np.unique(table[self.x].dropna()))
-            axes.set_xticks(places, labels=[f"{place:g}" for place in places])
+                    draw_bounds(
+                        axes, x, least, 0.05 * least.abs() + 0.2, properties={**properties, "markerfacecolor": "white"}
+                    )
+        self._label(axes, quantity, table)
         axes.set_xscale("log" if self.log_x else "linear")
         if self.log and positive:
             axes.set_yscale("log")
         elif positive:
             axes.set_ylim(bottom=0)
 
+    def _label(self, axes: Axes, quantity: Quantity, table: pd.DataFrame) -> None:
+        place = axes.get_subplotspec()
+        # A line of panels of one quantity has one label; panels of several quantities have a label each.
+        if not (self.share_y and self.panels) or place is None or place.is_first_col():
+            axes.set_ylabel(quantity.axis or quantity.column)
+        axes.set_xlabel(self.x_label)
+        if self.ticks:
+            places = self.transform(np.unique(table[self.x].dropna()))
+            axes.set_xticks(places, labels=[f"{place:g}" for place in places])
+
 
 @dataclass(frozen=True, kw_only=True)
 class Rows:
-    """Means with their error bars across, a row for each name and a panel for each quantity."""
+    """Means with horizontal error bars: a line for each name, and a panel for each quantity."""
 
-    name: str
-    quantities: Sequence[Quantity]
-    row: str | Callable[[pd.Series], str]  #: Column with the names of the rows, or a function of a row of the table
-    table: str = "points"
-    split: Split = lambda table: [Series(rows=table, label="mean over seeds", look=marker("o", style.BLUE, style.BLUE))]
-    rows: Select = lambda table: table  #: Selects what is drawn, in the order of the rows
-    ends: Sequence[str] = ()  #: Columns of the ends of the intervals; empty: means with half-widths
-    margin: str = ""  #: Column with the half-width of a band about 0
-    levels: Mapping[str, float] = field(default_factory=dict)
-    columns: int = 2
-    notes: Sequence[str] = ()
-    bars: str = BARS
+    name: str  #: Of the files
+    quantities: Sequence[Quantity]  #: Drawn along x, in a panel each
+    row: str | Callable[[pd.Series], str]  #: Column with the name of the line, or a function of a row of the table
+    table: str = "points"  #: Name of the study's table that is drawn
+    split: Split = lambda table: [
+        Series(rows=table, label="mean over seeds", properties=marker("o", style.BLUE, style.BLUE))
+    ]
+    rows: Select = lambda table: table  #: Selects the rows that are drawn, in the order of the lines
+    ends: Sequence[str] = ()  #: Columns with both ends of the 95 % interval; empty: half-widths as in all tables
+    margin: str = ""  #: Column with the half-width of a band about 0; empty: no band
+    levels: Mapping[str, float] = field(default_factory=dict)  #: Place of a vertical line, by column of the quantity
+    columns: int = 2  #: Panels beside each other
+    notes: Sequence[str] = ()  #: Sentences for the footer
+    bars: str = BARS  #: Explains the error bars in the footer
 
     def draw(self, path: Path, analysis: Analysis) -> list[Path]:
-        """Draw the series beside each other in every row."""
+        """Draw the means of all series, slightly apart within each line."""
         table = analysis.table(self.table)
         table = self.rows(table) if len(table) else table
         if table.empty:
@@ -224,8 +276,8 @@ class Rows:
                 across = rows.get(marked(column, "95 %"))
                 if self.ends:
                     across = np.abs(rows[list(self.ends)].to_numpy().T - rows[column].to_numpy())
-                look = {**series.look, "linestyle": "none"}
-                draw_means(axes, rows[column], y, None, across=across, look=look, label=series.label)
+                properties = {**series.properties, "linestyle": "none"}
+                draw_means(axes, rows[column], y, None, across=across, properties=properties, label=series.label)
             axes.set_xlabel(quantity.axis or column)
             axes.set_yticks(range(len(names)), list(names))
         grid[0].set_ylim(len(names) - 0.4, -0.6)
@@ -233,25 +285,75 @@ class Rows:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Histories:
-    """Quantities of runs against time or another variable: means over seeds, lowest to highest seed as a band."""
+class Heatmap:
+    """Means as colours over two variables: a panel for each quantity and each value of a column.
 
-    name: str
-    quantities: Mapping[str, str]  #: Label of the y axis by column of the table `times`, or "" for what `history` reads
+    Points at x = 0, which a logarithmic axis cannot show, are drawn left of a broken line in all panels.
+    """
+
+    name: str  #: Of the files
+    quantities: Sequence[Quantity]
+    x: Quantity  #: Drawn along x, on a logarithmic axis
+    y: Quantity
+    panels: str  #: Column whose values have a panel each
+    panel: str  #: Title of a panel, with `{}` for its value
+    notes: Sequence[str] = ()  #: Sentences for the footer
+
+    def draw(self, path: Path, analysis: Analysis) -> list[Path]:
+        """Draw a cell for each point; neighbouring cells meet midway, along x at the geometric mean."""
+        points, x, y = analysis.table("points"), self.x.column, self.y.column
+        table, zero = points[(points[x] > 0) & points[self.panels].notna()], points[points[x] == 0]
+        if table.empty:
+            return []
+        values, half = sorted(table[self.panels].unique()), np.diff(np.unique(table[y])).min(initial=0.1) / 2
+        left = table[x].min() / _CELL
+        size: dict[str, Any] = {"columns": len(values), "height": 1.45, "width": _PAGE, "sharex": True, "sharey": True}
+        figure, grid = panels(len(self.quantities) * len(values), **size)
+        for number, (axes, (quantity, value)) in enumerate(zip(grid, product(self.quantities, values), strict=True)):
+            means = pd.concat([table, zero])[quantity.column]
+            colours: dict[str, Any] = {"cmap": "viridis", "norm": Normalize(means.min(), means.max())}
+            for place, row in table[table[self.panels] == value].sort_values(x).groupby(y):
+                xs = row[x].to_numpy()
+                edges = [xs[0] / _CELL, *np.sqrt(xs[:-1] * xs[1:]), xs[-1] * _CELL]
+                axes.pcolormesh(edges, [place - half, place + half], [row[quantity.column]], **colours)
+                for mean in zero.loc[zero[y] == place, quantity.column]:
+                    axes.pcolormesh([left / 4, left / 2], [place - half, place + half], [[mean]], **colours)
+            axes.axvline(left / 1.4, color=style.GREY, linewidth=0.6, linestyle=(0, (4, 3)))
+            axes.set_xscale("log")
+            axes.grid(visible=False)
+            if number < len(values):
+                axes.set_title(self.panel.format(value), fontsize=8)
+            if number % len(values) == 0:
+                axes.set_ylabel(self.y.axis)
+                line = grid[number : number + len(values)]
+                figure.colorbar(ScalarMappable(**colours), ax=line, pad=0.01, aspect=12, label=quantity.axis)
+        grid[-len(values) // 2].set_xlabel(self.x.axis)
+        return finish(figure, path, self.notes, analysis.footer)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Histories:
+    """Quantities against time or another variable: means over seeds, with a band of all seeds."""
+
+    name: str  #: Of the files
+    #: Label of the y axis, by column of the table `times`; by "" if `history` reads the values
+    quantities: Mapping[str, str]
     x_label: str
-    split: Split  #: Makes the series of the runs; its look has a colour
-    #: Reads the history of a run; an InputError leaves the run out. None: the table `times`.
+    split: Split  #: Makes the series of the runs; their properties have a colour
+    #: Reads the history of a run; an InputError leaves the run out. None: the table `times` has the histories
     history: Callable[[Run], History] | None = None
-    x: str = ""  #: Column of the time in the table `times`
+    x: str = ""  #: Column of the table `times` that is drawn along x
     rows: Select = lambda runs: runs
-    panels: str = ""  #: Column with a panel for each value; empty: none
+    panels: str = ""  #: Column whose values have a panel each; empty: one panel
     panel: str = "l/w = {:g}"  #: Title of a panel, with `{}` for its value times `panel_scale`
     panel_scale: float = 1.0
-    width: float = 0.0  #: Of the intervals that are averaged over; 0: a hundredth of the longest activity
-    unit: str = "s"  #: Of that width
-    log: bool = False  #: Whether x and its intervals are logarithmic
-    level: float | None = None
-    notes: Sequence[str] = ()
+    width: float = 0.0  #: Of the intervals of x that are averaged over; 0: a hundredth of the longest activity
+    unit: str = "s"  #: Of `width`
+    log: bool = False  #: Whether x and the intervals are logarithmic
+    level: float | None = None  #: Place of a horizontal line
+    marks: Sequence[float] = ()  #: Places of vertical broken lines, in the unit of the x axis
+    fit: Fit | None = None  #: Computes curves over the times of each series
+    notes: Sequence[str] = ()  #: Sentences for the footer
 
     def draw(self, path: Path, analysis: Analysis) -> list[Path]:
         """Draw a line and a band for each series that has histories."""
@@ -274,9 +376,12 @@ class Histories:
             width = self.width or max(last / _BINS, _LEAST_BIN)
             for series, histories in drawn:
                 if histories:
-                    colour = series.look["color"]
-                    draw_history(axes, histories, width, log=self.log, color=colour, label=series.label)
-            for time in sorted({0.0, *ends}) if ends else ():
+                    colour = series.properties["color"]
+                    times = draw_history(axes, histories, width, log=self.log, color=colour, label=series.label)
+                    if self.fit is not None:
+                        fits = self.fit(analysis.tables, series.rows, quantity, times)
+                        draw_fits(axes, times, fits, style.BLACK, lines=((0, (4, 2)), "dotted"))
+            for time in sorted({0.0, *ends, *self.marks}) if ends or self.marks else ():
                 axes.axvline(time, color=style.GREY, linewidth=0.6, linestyle=(0, (4, 3)))
             if self.level is not None:
                 axes.axhline(self.level, color=style.GREY, linewidth=0.6)
@@ -297,40 +402,48 @@ class Histories:
             own = times[times["run"] == run]
             return History(times=own[self.x].to_numpy(), values=own[quantity].to_numpy()) if len(own) else None
         try:
-            return self.history(analysis.manifests[run])
+            return self.history(analysis.runs[run])
         except (InputError, KeyError):
             return None
 
 
 @dataclass(frozen=True, kw_only=True)
 class Scatter:
-    """A quantity against others, a panel each: every run as a small marker, means over seeds as large ones."""
+    """A quantity against others in a panel each: small markers for runs, large ones for means over seeds."""
 
-    name: str
-    xs: Sequence[Quantity]
-    y: Quantity
-    split: Split  #: Makes the series of runs and of points; its look has a marker and a colour
-    bounds: str  #: Column that is above 0 where y is a lower bound, drawn as an arrow
-    means: bool = True
+    name: str  #: Of the files
+    xs: Sequence[Quantity]  #: Drawn along x, in a panel each
+    y: Quantity  #: Drawn along y in all panels
+    split: Split  #: Makes the series of runs and of points; their properties have a marker and a colour
+    bounds: str  #: Column that is above 0 where y is a lower bound, which is drawn with an arrow
+    means: bool = True  #: Whether means over seeds are drawn
 
     def draw(self, path: Path, analysis: Analysis) -> list[Path]:
-        """Draw runs, then means with the error bars of both quantities."""
+        """Draw all runs, then means with error bars along x and y."""
         figure, grid = panels(len(self.xs), columns=3, sharey=True)
         runs, y = analysis.table("runs"), self.y.column
         length = 0.08 * float(runs[y].max())
         for axes, quantity in zip(grid, self.xs, strict=True):
             x = quantity.column
             for series in self.split(runs):
-                rows, colour = series.rows, series.look["color"]
+                rows, colour = series.rows, series.properties["color"]
                 small = {"color": colour, "alpha": 0.55}
                 label = "_" if self.means else series.label
-                axes.plot(rows[x], rows[y], series.look["marker"], markersize=1.8, **small, label=label)
+                axes.plot(rows[x], rows[y], series.properties["marker"], markersize=1.8, **small, label=label)
                 held = rows[rows[self.bounds] > 0]
-                draw_bounds(axes, held[x], held[y], length, look={**small, "elinewidth": 0.6, "capsize": 1.6})
+                draw_bounds(axes, held[x], held[y], length, properties={**small, "elinewidth": 0.6, "capsize": 1.6})
             for series in self.split(analysis.table("points")) if self.means else ():
-                look = {"markersize": 4.2, **series.look, "linestyle": "none"}
+                properties = {"markersize": 4.2, **series.properties, "linestyle": "none"}
                 errors, across = (series.rows[marked(name, "95 %")] for name in (y, x))
-                draw_means(axes, series.rows[x], series.rows[y], errors, across=across, look=look, label=series.label)
+                draw_means(
+                    axes,
+                    series.rows[x],
+                    series.rows[y],
+                    errors,
+                    across=across,
+                    properties=properties,
+                    label=series.label,
+                )
             axes.set_xlabel(quantity.axis or x)
             axes.set_ylabel(self.y.axis or y)
             axes.set_ylim(bottom=0)
@@ -338,18 +451,20 @@ class Scatter:
         return finish(figure, path, [note], analysis.footer)
 
 
-def one_by_one(column: str, label: Callable[[Any], str], *, last: float = 0.85) -> Split:
-    """Make a series of each value of a column, in colours from light to dark."""
+def one_by_one(column: str, label: Callable[[Any], str], *, last: float = 0.85) -> SplitBy:
+    """Make a series for each value of a column, in colours from dark to light; `last` is the lightest."""
 
     def split(table: pd.DataFrame) -> list[Series]:
         values = sorted(table[column].dropna().unique())
         shapes = np.resize(list("oD^sv<>p"), len(values))
         return [
-            Series(rows=table[table[column] == value], label=label(value), look=marker(str(shape), colour, colour))
+            Series(
+                rows=table[table[column] == value], label=label(value), properties=marker(str(shape), colour, colour)
+            )
             for value, shape, colour in zip(values, shapes, style.sequence(len(values), last=last), strict=True)
         ]
 
-    return split
+    return SplitBy(column, split)
 
 
 PROCEDURE_LABELS: Mapping[str, str] = MappingProxyType(
@@ -362,10 +477,13 @@ PROCEDURE_LABELS: Mapping[str, str] = MappingProxyType(
 )
 
 
-def by_procedure(labels: Mapping[str, str] = PROCEDURE_LABELS, *, apart: float = 0.0, line: bool = True) -> Split:
-    """Make a series of each procedure, the internal oscillation at the amplitude that procedures are compared at.
+def by_procedure(labels: Mapping[str, str] = PROCEDURE_LABELS, *, apart: float = 0.0, line: bool = True) -> SplitBy:
+    """Make a series for each procedure, of the internal oscillation only at θ = `AMPLITUDE`.
 
-    Labels are in the order of the legend; `apart` is the distance of neighbouring series along x.
+    Args:
+        labels: label of each procedure, in the order of the legend.
+        apart: distance of neighbouring series along x, in the unit of the x axis.
+        line: whether lines join the means.
     """
 
     def split(table: pd.DataFrame) -> list[Series]:
@@ -374,23 +492,23 @@ def by_procedure(labels: Mapping[str, str] = PROCEDURE_LABELS, *, apart: float =
             Series(
                 rows=of_procedure(table, name),
                 label=label,
-                look={**procedure_marker(name), **plain},
+                properties={**procedure_marker(name), **plain},
                 shift=apart * (number - (len(labels) - 1) / 2),
             )
             for number, (name, label) in enumerate(labels.items())
         ]
 
-    return split
+    return SplitBy(PROCEDURE, split)
 
 
 def marker(shape: str, colour: str, face: str) -> dict[str, Any]:
-    """Make a marker with an error bar of its colour."""
+    """Return the properties of a marker with a line and error bars of its colour, by Matplotlib's names."""
     edges = {"markeredgewidth": 0.9, "elinewidth": 0.8, "capthick": 0.8}
     return {"marker": shape, "color": colour, "markerfacecolor": face, **edges}
 
 
 def procedure_marker(procedure: str) -> dict[str, Any]:
-    """Make the marker of a procedure; that of the static state, which is none, is open."""
+    """Return the properties of a procedure's marker, which is open for the static state."""
     colour = _COLOURS[procedure]
     return marker(_SHAPES[procedure], colour, "white" if procedure == STATIC else colour)
 
@@ -398,7 +516,7 @@ def procedure_marker(procedure: str) -> dict[str, Any]:
 def panels(
     count: int, *, columns: int, width: float | None = None, height: float | None = None, **shared: Any
 ) -> tuple[Canvas, list[Axes]]:
-    """Make a figure with a number of panels, line by line [inch]."""
+    """Make a figure and its panels, line by line; its width, and the height of a line, are in inch."""
     columns = min(count, columns)
     lines = -(-count // columns)
     size = width or min(columns * style.COLUMN_WIDTH, _PAGE), height or 2.8
@@ -412,9 +530,12 @@ def panels(
 def binned(
     histories: Sequence[History], width: float, *, log: bool = False
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Average over equal intervals of time: centres (n,) [s] and values (seeds, n).
+    """Average each history over intervals of a width [s], or over 50 logarithmic intervals.
 
-    No interval reaches across the beginning of the activity; those without a sample of a seed are left out.
+    Intervals meet at the beginning of the activity, time 0. Those in which a history has no sample are left out.
+
+    Returns:
+        Centres of the intervals (n,) [s] and means of each history (histories, n).
     """
     first, last = (edge(one.times[at] for one in histories) for edge, at in ((min, 0), (max, -1)))
     if log:
@@ -424,7 +545,7 @@ def binned(
         start = math.floor(first / width)
         edges = width * np.arange(start, max(math.ceil(last / width), start + 1) + 1)
         centres = (edges[:-1] + edges[1:]) / 2
-        edges[-1] = np.inf  # a sample at the very end belongs to the last interval
+        edges[-1] = np.inf  # the last interval includes its right edge
     means = np.array(
         [
             pd.Series(one.values).groupby(np.searchsorted(edges, one.times + 1e-12, side="right") - 1).mean()
@@ -436,12 +557,31 @@ def binned(
     return centres[whole], means[:, whole]
 
 
-def draw_history(axes: Axes, histories: Sequence[History], width: float, *, log: bool = False, **look: Any) -> None:
-    """Draw the mean over seeds as a line, from the lowest to the highest seed as a band."""
+def draw_history(
+    axes: Axes, histories: Sequence[History], width: float, *, log: bool = False, **properties: Any
+) -> NDArray[np.float64]:
+    """Draw mean (line) and range (band) of histories, and return the times (n,) [s] that are drawn."""
     centres, means = binned(histories, width, log=log)
-    axes.plot(centres, means.mean(axis=0), **look)
+    axes.plot(centres, means.mean(axis=0), **properties)
     if len(means) > 1:
-        axes.fill_between(centres, means.min(axis=0), means.max(axis=0), color=look["color"], alpha=0.25, linewidth=0)
+        band = {"color": properties["color"], "alpha": 0.25, "linewidth": 0}
+        axes.fill_between(centres, means.min(axis=0), means.max(axis=0), **band)
+    return centres
+
+
+def draw_fits(
+    axes: Axes,
+    x: NDArray[np.float64],
+    fits: Mapping[str, tuple[ArrayLike, ArrayLike]],
+    colour: str,
+    *,
+    lines: Sequence[Any] = ("solid",),
+) -> None:
+    """Draw fitted curves at places x (n,), each with its own kind of line, and their 95 % bands."""
+    for (label, (values, half_widths)), line in zip(fits.items(), lines, strict=False):
+        axes.plot(x, values, color=colour, linewidth=0.9, linestyle=line, label=label)
+        low, high = np.asarray(values) - half_widths, np.asarray(values) + half_widths
+        axes.fill_between(x, low, high, color=colour, alpha=0.15, linewidth=0)
 
 
 def draw_means(
@@ -450,48 +590,60 @@ def draw_means(
     y: ArrayLike,
     half_widths: ArrayLike | None,
     *,
-    look: Mapping[str, Any],
+    properties: Mapping[str, Any],
     label: str,
     across: ArrayLike | None = None,
 ) -> None:
-    """Draw means (n,) with their error bars, the half-widths (n,) of the 95 % intervals of y, NaN where there is none.
+    """Draw means y (n,) at places x (n,) with their error bars.
 
-    Without half-widths y are no means; `across` are half-widths of x, (n,) or, below and above, (2, n).
+    Args:
+        axes: axes to draw into.
+        x: places (n,).
+        y: means (n,).
+        half_widths: of the 95 % intervals of y (n,), NaN where unknown; None: no vertical error bars.
+        properties: of markers and lines, by Matplotlib's names.
+        label: in the legend.
+        across: half-widths of the 95 % intervals of x (n,), or those downwards and upwards (2, n).
     """
     bars = axes.errorbar(
-        x, y, yerr=half_widths, xerr=across, **{"markersize": 3.4, "linewidth": 0.7, **look}, label=label
+        x, y, yerr=half_widths, xerr=across, **{"markersize": 3.4, "linewidth": 0.7, **properties}, label=label
     )
     if any(part is not None and np.isfinite(np.asarray(part, float)).any() for part in (half_widths, across)):
         for lines in bars.lines[2]:
             lines.set_label(_CONFIDENCE)
 
 
-def draw_bounds(axes: Axes, x: ArrayLike, least: ArrayLike, lengths: ArrayLike, *, look: Mapping[str, Any]) -> None:
-    """Draw lower bounds: markers with an arrow upwards of some length, which is no error; NaN are left out."""
+def draw_bounds(
+    axes: Axes, x: ArrayLike, least: ArrayLike, lengths: ArrayLike, *, properties: Mapping[str, Any]
+) -> None:
+    """Draw lower bounds (n,) as markers with arrows upwards; NaN are left out.
+
+    The lengths of the arrows (n,), in the unit of y, have no meaning.
+    """
     at, from_, long = np.broadcast_arrays(*(np.asarray(part, dtype=np.float64) for part in (x, least, lengths)))
     known = np.isfinite(from_)
     if known.any():
-        look = {"markersize": 3.4, **look, "linestyle": "none"}
-        axes.errorbar(at[known], from_[known], yerr=long[known], lolims=True, **look)
+        properties = {"markersize": 3.4, **properties, "linestyle": "none"}
+        axes.errorbar(at[known], from_[known], yerr=long[known], lolims=True, **properties)
 
 
 def finish(figure: Canvas, path: Path, notes: Sequence[str], footer: Sequence[str], *, bars: str = BARS) -> list[Path]:
-    """Put legend and footer to a figure, and write it; no limit of an axis hides anything.
+    """Add legend and footer to a figure, write it to a path without suffix, and return its files.
 
-    The path has no suffix; `bars` says what error bars are, where there are any.
+    Axes are widened until they show everything. The footer explains error bars by `bars` if the figure has any.
     """
     fullest = max(figure.axes, key=lambda axes: len(axes.get_legend_handles_labels()[1]))
-    handles, labels = fullest.get_legend_handles_labels()
-    if len(labels) > 1:
+    entries = {label: handle for handle, label in zip(*fullest.get_legend_handles_labels(), strict=True)}
+    if len(entries) > 1:
         columns = 2 if figure.get_size_inches()[0] < 1.5 * style.COLUMN_WIDTH else 4
-        figure.legend(handles, labels, loc="outside upper center", ncols=columns)
+        figure.legend(entries.values(), entries.keys(), loc="outside upper center", ncols=columns)
     hidden = hold_everything(figure)
-    there = any(
+    has_bars = any(
         lines.get_label() == _CONFIDENCE
         for axes in figure.axes
         for container in axes.containers
         if isinstance(container, ErrorbarContainer)
         for lines in container.lines[2]
     )
-    style.add_footer(figure, [*notes, *([f"{bars}."] if there else []), *hidden, *footer])
+    style.add_footer(figure, [*notes, *([f"{bars}."] if has_bars else []), *hidden, *footer])
     return style.save(figure, path)

@@ -1,9 +1,8 @@
-"""Findings: statements, each judged by effects with their errors that are computed from a table of runs.
+"""Findings: statements that are judged by effects, which are computed from tables of runs.
 
-A `Finding` has an id, by which `claims.yaml` refers to it, the statement, what makes it true, and a function from a
-table to effects. An `Effect` is a number with its 95 % interval, the sign that the statement asks for, and a
-threshold. The verdict and the text about our numbers follow from the effects. `above`, `slope`, `mean` and `ranks`
-make findings of the usual kinds; any other function of a table that gives an `Outcome` will do.
+A `Finding` is a statement with a function that computes effects from a table. An `Effect` is a number with its 95 %
+interval; it supports the statement if it lies beyond a threshold on the side that the statement asks for. The verdict
+and the text with our numbers follow from the effects. `above`, `slope`, `mean` and `ranks` make common findings.
 """
 
 from __future__ import annotations
@@ -24,11 +23,11 @@ from studies.framework.procedures import CROSSINGS, ENERGY, PHI, PHI_ACTIVE, PRO
 
 _SYMBOLS = {ASPECT: "l/w", SEED: "seed", THETA: "θ", PHI: "φ", PHI_ACTIVE: "φ_f", CROSSINGS: "⟨N⟩", ENERGY: "energy"}
 
-Rows = Callable[[pd.DataFrame], pd.DataFrame]  #: Selects or derives the rows that a finding is about
+Rows = Callable[[pd.DataFrame], pd.DataFrame]  #: Selects or computes the rows that a finding is judged by
 
 
 class Verdict(StrEnum):
-    """What our runs say of a finding."""
+    """Result of judging a finding by our runs."""
 
     FOUND = "found"
     NOT_FOUND = "not found"
@@ -38,22 +37,25 @@ class Verdict(StrEnum):
 
 @dataclass(frozen=True, kw_only=True)
 class Effect:
-    """A number with its error."""
+    """A number with its error, such as a difference or a slope."""
 
-    label: str  #: What it is
-    value: SeedMean | Slope  #: The estimate
-    #: +1 where the statement asks for more than the threshold, −1 for less, 0 where it is shown, not judged
+    label: str  #: Name of the number in texts
+    value: SeedMean | Slope  #: Estimate with its error
+    #: +1 if the statement asks for more than the threshold, −1 if for less, 0 if the number is shown but not judged
     sign: int = 1
     threshold: float = 0.0  #: In the unit of the estimate
-    unit: str = ""  #: Of the number shown, with a space before
-    text: str = ""  #: The number as shown, where it is not the estimate itself, such as that of a logarithm
-    note: str = ""  #: What is shown behind it
+    unit: str = ""  #: Unit of the number in texts, with a space before it
+    text: str = ""  #: Number in texts, if it is not the estimate itself but, for example, its exponential
+    note: str = ""  #: Text after the number
     may_be_higher: bool = False  #: Whether the estimate is a lower bound
-    may_be_lower: bool = False  #: Whether it is an upper bound
+    may_be_lower: bool = False  #: Whether the estimate is an upper bound
 
     @property
     def verdict(self) -> Verdict:
-        """Whether the effect is beyond its threshold."""
+        """Verdict on whether the estimate lies beyond its threshold on the side of its sign.
+
+        It is not resolved if the estimate is a bound and the true value may lie on the other side.
+        """
         verdict = Verdict(str(self._judged))
         high, low = (self.may_be_higher, self.may_be_lower)[:: self.sign or 1]
         if (verdict == Verdict.FOUND and low) or (verdict == Verdict.NOT_FOUND and high):
@@ -62,7 +64,7 @@ class Effect:
 
     @property
     def more(self) -> float:
-        """How many times as many runs would resolve it; NaN where it is resolved, or where that is not known."""
+        """Factor in the number of runs that would resolve the effect; NaN if it is resolved or unknown."""
         judged = self._judged
         return judged.more if isinstance(judged, Unresolved) else math.nan
 
@@ -72,33 +74,35 @@ class Effect:
         return judge(signed, threshold=self.sign * self.threshold)
 
     def __str__(self) -> str:
-        """`shape-change less internal +0.12 ± 0.01 (n = 8)`."""
+        """Format the effect with its error: `shape-change less internal +0.12 ± 0.01 (n = 8)`."""
         beside = "" if self.sign else ", not judged"
         return f"{self.label} {self.text or effect_text(self.value, 3, self.unit)}{self.note}{beside}"
 
 
 @dataclass(frozen=True, kw_only=True)
 class Outcome:
-    """What a finding comes to."""
+    """Effects that a finding is judged by, and text about them."""
 
-    effects: Sequence[Effect] = ()  #: All those with a sign must have it
-    note: str = ""  #: What is shown besides
-    verdict: Verdict | None = None  #: Where it does not follow from the effects
+    effects: Sequence[Effect] = ()  #: The finding is found if all effects with a sign are beyond their thresholds
+    note: str = ""  #: Text after the effects
+    verdict: Verdict | None = None  #: None: the verdict follows from the effects
 
 
 @dataclass(frozen=True, kw_only=True)
 class Finding:
-    """A statement and how it is judged."""
+    """A statement, with the function that computes the effects for its verdict."""
 
-    id: str  #: Short name, unique in its study
-    says: str  #: The statement, as the paper has it or our own
-    outcome: Callable[..., Outcome | Sequence[Effect]] = field(repr=False)  #: Effects of a table of runs or samples
-    rows: Rows = field(default=lambda table: table, repr=False)  #: Applied to the table before
-    tables: Sequence[str] = ()  #: Names of the study's tables that `outcome` takes instead, one argument each
-    found_if: str = ""  #: What makes it true, where that is more than all effects beyond their thresholds
+    id: str  #: Short name, unique in its study; `claims.yaml` refers to findings by it
+    says: str  #: The statement, of the paper or our own
+    #: Computes the effects from the samples (see `Study.samples`), or from the tables named by `tables`
+    outcome: Callable[..., Outcome | Sequence[Effect]] = field(repr=False)
+    rows: Rows = field(default=lambda table: table, repr=False)  #: Selects the samples that `outcome` gets
+    #: Names of the study's tables that are passed to `outcome`, one argument each; empty: `outcome` gets the samples
+    tables: Sequence[str] = ()
+    found_if: str = ""  #: Criterion in words; empty: all effects with a sign beyond their thresholds
 
     def judge(self, samples: pd.DataFrame, tables: Mapping[str, pd.DataFrame] | None = None) -> Judged:
-        """Judge the finding by a table of samples, or by the study's tables that it names."""
+        """Judge the finding by the samples, or by those tables of the study that the finding names."""
         given = [(tables or {})[name] for name in self.tables] if self.tables else [self.rows(samples)]
         outcome = self.outcome(*given)
         outcome = outcome if isinstance(outcome, Outcome) else Outcome(effects=outcome)
@@ -114,49 +118,49 @@ class Finding:
 
 @dataclass(frozen=True, kw_only=True)
 class Judged:
-    """A finding with its verdict."""
+    """A finding with its verdict and our numbers."""
 
     finding: Finding
-    ours: str  #: Our numbers; errors are standard errors
+    ours: str  #: Our numbers with standard errors, as text
     verdict: Verdict
-    more: float = math.nan  #: How many times as many runs would resolve it; NaN where that does not apply
-    criterion: str = ""  #: What makes the finding true
+    more: float = math.nan  #: Factor by which the number of runs would have to grow to resolve it; NaN if unknown
+    criterion: str = ""  #: Criterion for the verdict `found`
 
     @property
     def needed(self) -> str:
-        """What it would take to resolve the finding; empty where that does not apply."""
+        """Text on how many more runs would resolve the finding; empty if it is resolved or that is unknown."""
         return more_runs_text(Unresolved(more=self.more))
 
 
 def _verdict(effects: Sequence[Effect]) -> tuple[Verdict, float]:
-    """Judge by all effects, with `Effect.more` of the one that needs most."""
+    """Combine the verdicts of all effects; returns also the largest `Effect.more` of those not resolved."""
     verdict = all_of(effect.verdict for effect in effects)
     needed = [effect.more for effect in effects if effect.verdict == verdict == Verdict.NOT_RESOLVED]
     return verdict, float(np.max(needed)) if needed else math.nan
 
 
 def all_of(verdicts: Iterable[Verdict]) -> Verdict:
-    """Judge a finding that says several things: one that is clearly wrong refutes it."""
+    """Combine verdicts on the parts of a statement: a part that is not found refutes the whole statement."""
     found = list(verdicts)
     order = (Verdict.NOT_FOUND, Verdict.NO_DATA, Verdict.NOT_RESOLVED, Verdict.FOUND)
     return next((verdict for verdict in order if verdict in found), Verdict.NO_DATA)
 
 
 def decide(found: bool, wrong: bool = False, *, data: bool = True) -> Verdict:
-    """Turn what was found into a verdict; `wrong`: whether the opposite was."""
+    """Return the verdict: found, not found (the opposite was found, `wrong`), not resolved, or no data."""
     if not data:
         return Verdict.NO_DATA
     return Verdict.FOUND if found else Verdict.NOT_FOUND if wrong else Verdict.NOT_RESOLVED
 
 
 def within(value: float, half_width: float, margin: float) -> Verdict:
-    """Judge whether a number with its 95 % half-width is as near to 0 as a margin, both ways beyond its error."""
+    """Return found if the interval value ± half_width lies within ±margin, not found if outside of it."""
     size = abs(value)
     return decide(size + half_width <= margin, size - half_width > margin, data=not math.isnan(value))
 
 
 def findings_table(judged: Sequence[Judged]) -> pd.DataFrame:
-    """`findings.csv`: one row per finding."""
+    """Make the table `findings.csv`: statement, numbers, verdict and criterion, a row per finding."""
     rows = [
         {
             "finding in the paper": one.finding.says,
@@ -186,11 +190,21 @@ def above(
     shown: Sequence[str] = (),
     found_if: str = "",
 ) -> Finding:
-    """Judge whether a procedure is above (sign 1) or below (−1) each of others, paired by aspect ratio and seed.
+    """Make the finding that a procedure is above others in a quantity, paired by aspect ratio and seed.
 
-    Several quantities have a sign each. Procedures `beside`, by the column `beside_quantity` if it is another one, and
-    means of the columns `shown` are shown and not judged. Where the column `bounds` is above 0 the first quantity is a
-    lower bound, and the others are unknown.
+    Args:
+        name: id of the finding.
+        says: statement.
+        quantities: column, or several columns with a sign each: +1 if the statement says above, −1 if below.
+        one: procedure that is compared with `others`.
+        others: procedures that it must differ from, each.
+        sign: sign of a single column.
+        beside: procedures whose difference from `one` is shown but not judged.
+        beside_quantity: column of that difference; None: the column that is judged.
+        bounds: column that is above 0 if the first of the quantities is a lower bound and the others are unknown.
+        rows: selects the samples.
+        shown: columns whose means are shown but not judged.
+        found_if: criterion in words; empty: all differences have their sign.
     """
     signs = {quantities: sign} if isinstance(quantities, str) else quantities
 
@@ -237,9 +251,17 @@ def slope(
     rows: Rows = lambda table: table,
     label: str = "",
 ) -> Finding:
-    """Judge whether a quantity rises (sign 1) or falls (−1) with a variable, by a straight line within blocks.
+    """Make the finding that a quantity rises (sign +1) or falls (−1) with a variable, on straight lines.
 
-    Columns `within` make a block, which has its own level; without them there is one line through all rows.
+    Args:
+        name: id of the finding.
+        says: statement.
+        quantity: column of the quantity.
+        against: column of the variable.
+        sign: sign of the slope that the statement asks for.
+        within: columns whose values make blocks; lines of all blocks have one slope and levels of their own.
+        rows: selects the samples.
+        label: name of the quantity in texts; empty: its symbol.
     """
     label = f"{label or symbol(quantity)} against {symbol(against)}"
 
@@ -263,9 +285,17 @@ def mean(
     shown: Sequence[str] = (),
     by: str = PROCEDURE,
 ) -> Finding:
-    """Judge whether a value of each row is above a threshold in the mean.
+    """Make the finding that the mean of a value over all rows is above a threshold.
 
-    Means of the columns `shown` at each value of the column `by` are shown, not judged.
+    Args:
+        name: id of the finding.
+        says: statement.
+        values: computes the value of each row.
+        label: name of the mean in texts.
+        rows: selects the samples.
+        threshold: in the unit of the value.
+        shown: columns whose means are shown but not judged.
+        by: column; the means of the columns `shown` are taken at each of its values.
     """
 
     def outcome(table: pd.DataFrame) -> Outcome:
@@ -288,13 +318,21 @@ def ranks(
     unit: str,
     rows: Rows = lambda table: table,
 ) -> Finding:
-    """Judge whether y goes with x, by their rank correlation within blocks; a lower bound ranks above all others.
+    """Make the finding that y rises with x, by their rank correlation within blocks.
 
-    A pile that held fast has a peak of at least what it took, and one that a single smarticle braces has one many times
-    that of others: neither has a place on a straight line, but each has its rank among the piles of its block.
+    Ranks are used since peak forces do not follow a straight line: a pile that held fast gives a lower bound, which
+    ranks above all other values, and a pile that a single smarticle braces has a peak many times those of other piles.
 
-    Columns `within` make a block; the column `bounds` is above 0 where y is a lower bound; `unit` is that of the slope,
-    which is shown beside.
+    Args:
+        name: id of the finding.
+        says: statement.
+        x: column of x.
+        y: column of y.
+        within: columns whose values make blocks; ranks are taken within each block.
+        bounds: column that is above 0 if y is a lower bound.
+        found_if: criterion in words.
+        unit: unit of the slope of y against x, which is shown but not judged.
+        rows: selects the samples.
     """
 
     def outcome(table: pd.DataFrame) -> Outcome:
@@ -315,23 +353,23 @@ def ranks(
 
 
 def symbol(column: str) -> str:
-    """Give what a column is called in text: its symbol, or its name without the unit."""
+    """Return the symbol of a column for texts; its name without the unit if it has none."""
     return _SYMBOLS.get(column) or column.partition(" [")[0]
 
 
 def unit_of(column: str) -> str:
-    """Give the unit of a column, with a space before; empty for a pure number."""
+    """Return the unit in the name of a column, with a space before it; empty for a pure number."""
     unit = column.rpartition(" [")[2].removesuffix("]") if column.endswith("]") else "-"
     return "" if unit == "-" else f" {unit}"
 
 
 def blocks(table: pd.DataFrame, columns: Sequence[str]) -> Sequence[Hashable]:
-    """Block of each row, by the values of columns; one block without columns."""
+    """Return the block of each row, the values of some columns; without columns, one block for all rows."""
     return list(map(tuple, table[list(columns)].to_numpy().tolist())) if columns else ["all"] * len(table)
 
 
 def means_by(table: pd.DataFrame, quantity: str, by: str, form: str) -> str:
-    """`0.4: 1.02, 0.7: 1.05`: means at each value of a column."""
+    """Format the means of a quantity at each value of the column `by`: `0.4: 1.02, 0.7: 1.05`."""
     means = table.groupby(by)[quantity].mean().dropna()
     cells = {value if isinstance(value, str) else f"{value:g}": one for value, one in means.items()}
     return ", ".join(f"{value}: {one:{form}}" for value, one in cells.items()) or "none"

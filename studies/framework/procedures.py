@@ -1,9 +1,9 @@
-"""Procedures: what a pile goes through, how procedures are compared, and what is measured of one activity.
+"""Procedures (static, external and internal oscillation, shape change) and measures of one activity.
 
-A run of one activity is poured, rests, goes through the activity, and rests again. Both rests are averaged over their
-frames: the first one is the static state of its aspect ratio and seed, the last one what the activity left. φ_f is
-taken at the end of the activity, as the paper's own code does, and at rest again beside it: a shaken pile bounces, and
-is looser while it does.
+A run of one activity has four phases: pour, rest, activity, rest. Measures are averaged over the frames of both rests:
+the first rest is the static state of an aspect ratio and a seed, the second rest is the state after the activity. φ_f
+is measured at the end of the activity, as in the paper's own code, and again at rest, since a shaken pile bounces and
+is looser in motion.
 """
 
 from __future__ import annotations
@@ -19,7 +19,6 @@ from numpy.typing import NDArray
 from dem.errors import InputError
 from dem.record.document import Phase
 from dem.record.run import Run
-from dem.record.series import Series
 from postprocess.measures.motors import APART, SAMPLED_WORK
 from postprocess.measures.table import PASSIVE_PHASES, summarise_run
 from postprocess.statistics.points import ASPECT, SEED, mean_difference
@@ -31,9 +30,9 @@ ORDER = (STATIC, EXTERNAL, SHAPE, INTERNAL)
 PROCEDURES: Mapping[str, str] = MappingProxyType(
     {"shake": EXTERNAL, "shape-change": SHAPE, "internal-oscillation": INTERNAL}
 )
-"""Procedure of each type of activity."""
+"""Procedure by the type of the phase that is its activity."""
 
-AMPLITUDE = 10.0  #: θ of the internal oscillation where procedures are compared, as in the paper [deg]
+AMPLITUDE = 10.0  #: Amplitude θ at which the internal oscillation is compared with others, as in the paper [deg]
 
 PROCEDURE, THETA, ACTIVE = "procedure", "theta [deg]", "time active [s]"
 PHI, CROSSINGS = f"phi {DEFINITION} [-]", "crossings [-]"
@@ -44,24 +43,26 @@ HEIGHT, STRAIGHT, HALF = "com height over h0 [-]", "com height straight over h0 
 LOWEST = "lowest com height over h0 while closing [-]"
 
 BY_RANKS = "mean over seeds of the rank correlation of peak force and ⟨N⟩ > 0; what held fast is above all that did not"
-"""Criterion by which the force that tears a pile goes with its entanglement."""
+"""Criterion for the finding that peak force rises with entanglement."""
 
 _WORK = {EXTERNAL: "container_work_J", SHAPE: "motor_work_J", INTERNAL: "motor_work_J"}
-_WINDOW = 0.1  # s: over which heights are averaged; more than a period of θ = 10° and three of shaking at 30 Hz
+_WINDOW = 0.1  # s, of moving means of heights: longer than a swing at θ = 10° and than three periods at 30 Hz
 
 
 def prepared_by(run: Run, *then: str) -> dict[str, object]:
-    """Give procedure, θ and pile of a run: a pour, a rest, one activity with a rest or none, then phases of some types.
+    """Return the cells procedure, θ [deg], those of `run_columns`, and time of the activity [s].
+
+    The run must consist of a pour, a rest, one activity with a rest or none, and phases of the types `then`.
 
     Raises:
-        InputError: The phases are others.
+        InputError: The run has other phases.
     """
     types = [phase.type for phase in run.phases]
     active = [kind for kind in types if kind in PROCEDURES]
     if types != ["deposit", "relax", *([active[0], "relax"] if active else []), *then]:
         raise InputError(
             f"{run.path}: its phases are {', '.join(types)}, not a pour, a rest, one activity "
-            f"({', '.join(PROCEDURES)}) with a rest or none, {' and '.join(then)}"
+            f"({', '.join(PROCEDURES)}) with a rest or none, {' and '.join(then)}; leave it out"
         )
     procedure = PROCEDURES[active[0]] if active else STATIC
     theta = run.scene["phases"][2]["theta_deg"] if procedure == INTERNAL else math.nan
@@ -70,38 +71,43 @@ def prepared_by(run: Run, *then: str) -> dict[str, object]:
 
 
 def of_procedure(table: pd.DataFrame, procedure: str) -> pd.DataFrame:
-    """Select samples of one procedure; of the internal oscillation those that procedures are compared at."""
+    """Return the rows of one procedure; of the internal oscillation only those with θ = `AMPLITUDE`."""
     chosen = table[table[PROCEDURE] == procedure]
     return chosen[np.isclose(chosen[THETA], AMPLITUDE)] if procedure == INTERNAL and THETA in chosen else chosen
 
 
 def compared(table: pd.DataFrame) -> pd.DataFrame:
-    """Select the rows of all procedures that are compared: of the internal oscillation those of one θ."""
+    """Return the rows of all procedures; of the internal oscillation only those with θ = `AMPLITUDE`."""
     return pd.concat([of_procedure(table, name) for name in table[PROCEDURE].unique()]) if len(table) else table
 
 
 def paired(table: pd.DataFrame, quantity: str, one: str, other: str) -> SeedMean:
-    """Subtract one procedure from another, mean over pairs of the same aspect ratio and seed."""
+    """Return the mean difference of a quantity between procedures, `one` less `other`.
+
+    Runs are paired by aspect ratio and seed.
+    """
     return mean_difference(of_procedure(table, one), of_procedure(table, other), quantity)
 
 
 def activity(run: Run) -> Phase:
-    """Find the one activity of a run; InputError unless there is exactly one, of a known kind, between two rests."""
+    """Return the only activity of a run; InputError unless there is exactly one, between two rests."""
     active = [phase for phase in run.phases if phase.type not in PASSIVE_PHASES]
     around = run.phases[active[0].index - 1 : active[0].index + 2] if active else ()
     if len(active) != 1 or active[0].type not in PROCEDURES or len(around) != 3 or around[2].type != "relax":
         types = ", ".join(phase.type for phase in run.phases)
-        msg = f"{run.path}: not one activity ({', '.join(PROCEDURES)}) between two rests: its phases are {types}"
+        wanted = f"one activity ({', '.join(PROCEDURES)}) between two rests"
+        msg = f"{run.path}: its phases are {types}, not {wanted}; leave it out"
         raise InputError(msg)
     return active[0]
 
 
 def procedure_row(run: Run) -> dict[str, object]:
-    """Measure one activity between two rests: a row of the table of runs; InputError where it is none."""
+    """Measure a run of one activity between two rests and return its row; InputError for other runs."""
     active = activity(run)
     settings = run.scene["phases"][active.index]
     if settings["type"] != active.type:
-        msg = f"{run.path}: phase {active.index} is {active.type} in run.json, {settings['type']} in scene.yaml"
+        scene = f"{settings['type']} in scene.yaml"
+        msg = f"{run.path}: phase {active.index} is {active.type} in run.json, {scene}; run it again"
         raise InputError(msg)
     procedure = PROCEDURES[active.type]
     wanted = range(active.index - 1, active.index + 2)
@@ -126,17 +132,15 @@ def procedure_row(run: Run) -> dict[str, object]:
 
 
 def height_history(run: Run) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Read h/h0 of a run's centre of mass, (n,) [-], and its times since the activity began, (n,) [s].
+    """Read the height of the centre of mass against time, from the rest before the activity on.
 
-    h0 is the mean over the rest before the activity, with which the history begins.
+    Returns:
+        Heights over h0 (n,) [-], where h0 is the mean over that rest, and times since the activity began (n,) [s].
 
     Raises:
-        InputError: There is no series of it.
+        InputError: The height was not recorded.
     """
-    return _heights(run.series, activity(run))
-
-
-def _heights(series: Series, active: Phase) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    series, active = run.series, activity(run)
     height = np.asarray(series["com_height_m"], dtype=np.float64)
     shown = (series["phase"] >= active.index - 1) & np.isfinite(height)
     before = shown & (series["phase"] == active.index - 1)
@@ -147,9 +151,9 @@ def _heights(series: Series, active: Phase) -> tuple[NDArray[np.float64], NDArra
 
 
 def _of_series(run: Run, active: Phase, straight_until: float | None) -> dict[str, float]:
-    """Measure heights and energy by the series; barbs start to close again at `straight_until` [s].
+    """Measure heights [-] and energy per smarticle [J] from the series, by column; NaN if not recorded.
 
-    NaN stands where there was no recording.
+    In a shape change barbs start to close again `straight_until` [s] after the activity began; None: another activity.
     """
     found = {STRAIGHT: math.nan, LOWEST: math.nan, HALF: math.nan, ENERGY: math.nan}
     if not (run.path / "series.h5").exists():
@@ -159,7 +163,7 @@ def _of_series(run: Run, active: Phase, straight_until: float | None) -> dict[st
     if work in series.data:
         found[ENERGY] = gained(series[work], series["phase"] < active.index) / run.manifest.count
     if "com_height_m" in series.data:
-        height, time = _heights(series, active)
+        height, time = height_history(run)
         if straight_until is not None:
             last = (time > straight_until - _WINDOW) & (time <= straight_until)
             found[STRAIGHT] = float(height[last].mean()) if last.any() else math.nan
@@ -171,7 +175,7 @@ def _of_series(run: Run, active: Phase, straight_until: float | None) -> dict[st
 
 
 def _smooth(values: NDArray[np.float64], time: NDArray[np.float64], chosen: NDArray[np.bool_]) -> NDArray[np.float64]:
-    """Average over a moving window; empty if less than a window is chosen."""
+    """Return the moving mean of the chosen values over `_WINDOW`; empty if they cover less than that."""
     if chosen.sum() < 2:
         return np.empty(0)
     samples = max(round(_WINDOW / float(np.median(np.diff(time[chosen])))), 1)
@@ -180,7 +184,10 @@ def _smooth(values: NDArray[np.float64], time: NDArray[np.float64], chosen: NDAr
 
 
 def gained(work: NDArray[np.float64], before: NDArray[np.bool_]) -> float:
-    """Compute what a cumulative work gained since before the activity, to the end [J]."""
+    """Return the increase [J] of a cumulative work (n,) [J] from the last sample in `before` (n,) on.
+
+    NaN if the work was not recorded.
+    """
     known = np.isfinite(work)
     if not known.any():
         return math.nan
@@ -189,11 +196,15 @@ def gained(work: NDArray[np.float64], before: NDArray[np.bool_]) -> float:
 
 
 def half_compaction(time: NDArray[np.float64], height: NDArray[np.float64], duration: float) -> float:
-    """Find the share of the activity [-] after which the centre of mass has come down by half of what it does in all.
+    """Return the time at which half of the compaction is reached, over the duration of the activity [-].
 
-    Times (n,) [s] are since the activity began, with the rests before and after, heights (n,) over that before it [-];
-    NaN
-    if the centre of mass is not lower in the end.
+    Args:
+        time: times since the activity began (n,) [s], including the rests before and after it.
+        height: heights of the centre of mass over that in the rest before (n,) [-].
+        duration: duration of the activity [s].
+
+    Returns:
+        The share of the activity; NaN if the centre of mass is not lower in the rest after the activity.
     """
     final = height[time > duration]
     moving = (time >= 0) & (time <= duration)
@@ -203,24 +214,30 @@ def half_compaction(time: NDArray[np.float64], height: NDArray[np.float64], dura
     time = time[moving]
     samples = min(max(round(_WINDOW / float(np.median(np.diff(time)))), 1), len(time))
     kernel = np.full(samples, 1 / samples)
-    # The mean over a window stands at its middle; before the first middle the height is that of the rest.
+    # A moving mean belongs to the middle of its window; at time 0 the height is that of the rest before.
     centres, smooth = (
         np.concatenate([[start], np.convolve(values, kernel, mode="valid")])
         for start, values in ((0.0, time), (1.0, height[moving]))
     )
-    below = np.nonzero(smooth <= level)[0]
-    if not len(below):
+    reached = np.nonzero(smooth <= level)[0]
+    if not len(reached):
         return 1.0
-    k = int(below[0])
+    k = int(reached[0])
     share = (smooth[k - 1] - level) / (smooth[k - 1] - smooth[k])
     return float((centres[k - 1] + share * (centres[k] - centres[k - 1])) / duration)
 
 
 def samples(runs: pd.DataFrame) -> pd.DataFrame:
-    """Make one row per procedure, aspect ratio, θ and seed of rows as of `procedure_row`, the static state among them.
+    """Make the samples, a row per procedure, aspect ratio, θ and seed; static is a procedure too.
 
-    The static state of an aspect ratio and a seed is the mean over the runs that began with it: they are poured alike,
-    so they count as one sample. What a procedure does not have is NaN. "runs [-]" says how many a row stands for.
+    Runs of equal aspect ratio and seed are poured from equal poses. So the static state is one sample: the mean over
+    these runs.
+
+    Args:
+        runs: table of runs with the columns of `procedure_row`.
+
+    Returns:
+        The samples; "runs [-]" is the number of runs in a row, and quantities that a procedure lacks are NaN.
     """
     columns = {f"{STATIC} {quantity}": quantity for quantity in (PHI_ACTIVE, PHI, CROSSINGS)}
     static = runs.groupby([ASPECT, SEED], as_index=False)[list(columns)].mean().rename(columns=columns)

@@ -1,4 +1,4 @@
-"""Where the numbers of a study come from: footers, provenance, and tables that carry both."""
+"""Origin of the numbers of a study: footers of tables and figures, and the file `provenance.json`."""
 
 from __future__ import annotations
 
@@ -21,10 +21,10 @@ from studies.framework.runs import DEFINITION, Collected
 
 @dataclass(frozen=True, kw_only=True)
 class Reference:
-    """What a study is compared with: its name for footers, without a full stop, and facts for `provenance.json`."""
+    """Published numbers or statements that a study is compared with."""
 
-    statement: str
-    facts: Mapping[str, object]
+    statement: str  #: For footers, without a full stop
+    facts: Mapping[str, object]  #: For `provenance.json`
 
 
 SAVOIE = Reference(
@@ -37,16 +37,16 @@ NOTHING = Reference(statement="none; no published numbers", facts=MappingProxyTy
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Origin:
-    """What the results of a study come from."""
+    """Origin of the results of a study: runs, command and reference."""
 
-    found: Collected  #: The runs used, and those that could not be used
-    note: str  #: How these runs differ from the full study
+    found: Collected  #: Runs that were measured, and runs that are missing
+    note: str  #: How the planned runs differ from the full study
     command: str  #: Command line
-    reference: Reference  #: What they are compared with
+    reference: Reference
 
     @property
     def whole_note(self) -> str:
-        """How the runs used differ from the full study, missing ones included."""
+        """How the measured runs differ from the full study, with the number of missing runs."""
         used, missing = len(self.found.runs), len(self.found.missing)
         return f"only {used} of {used + missing} runs of what is planned: {self.note}" if missing else self.note
 
@@ -66,8 +66,13 @@ class Origin:
         lacking = f", {missing} missing" if missing else ""
         return f"Study {self.found.study}, fidelity {fidelities}{engines}: {used} of {used + missing} runs{lacking}"
 
-    def below_figures(self, points: str, text_name: str) -> list[str]:
-        """Make the short footer of a figure; which runs there are goes on from "… of … runs; "."""
+    def figure_footer(self, points: str, text_name: str) -> list[str]:
+        """Return the footer of a figure, two statements.
+
+        Args:
+            points: statement about points and seeds, which follows the number of runs.
+            text_name: name of the file that has the full footer.
+        """
         first, *more = (f"planned: {self.note}" if self.found.missing else self.note).split("; ")
         commits = self._versions("git")
         made = f"{len(commits)} commits" if len(commits) > 2 else f"Commit {', '.join(commits)}"
@@ -77,7 +82,12 @@ class Origin:
         ]
 
     def footer(self, points: str, *statements: str) -> list[str]:
-        """Make the footer of tables and texts, one statement each; `points` goes on from "… of … runs; "."""
+        """Return the footer of tables and texts, a line for each statement.
+
+        Args:
+            points: statement about points and seeds, which follows the number of runs.
+            statements: further statements.
+        """
         named = [("smarticles", ""), ("git", ""), *((engine, engine) for engine in self._engines)]
         versions = "; ".join(f"{name} {', '.join(self._versions(name, engine))}" for name, engine in named)
         return [
@@ -96,10 +106,16 @@ class Origin:
         tables: Mapping[str, pd.DataFrame],
         text: tuple[str, Sequence[str]],
     ) -> dict[str, Path]:
-        """Write tables, text and provenance; CSV files have the footer as comments, to be read with `comment="#"`.
+        """Write tables, text and provenance.
 
-        Tables go by name, without suffix; missing runs and footer are put below the lines of the text. Gives files by
-        name.
+        Args:
+            output: folder for the files.
+            footer: goes below the text, and into CSV files as comments, to be read with `comment="#"`.
+            tables: tables by name, without suffix.
+            text: name of the Markdown file and its lines; missing runs are listed below them.
+
+        Returns:
+            Paths of the files by their names.
         """
         missing = pd.DataFrame([asdict(run) for run in self.found.missing], columns=["directory", "status", "cause"])
         below = "".join(f"# {line}\n" for line in footer)
@@ -117,7 +133,7 @@ class Origin:
         return {file: output / file for file in texts}
 
     def _missing_lines(self) -> list[str]:
-        """Make the lines of the text on missing runs, one per cause."""
+        """Return the lines of the Markdown table of missing runs, one row for each cause."""
         rows: dict[tuple[str, str], list[str]] = {}
         for run in self.found.missing:
             rows.setdefault((run.status, run.common_cause), []).append(run.directory)
@@ -162,7 +178,7 @@ class Origin:
 
 
 def make_folder(path: Path | str) -> Path:
-    """Make a folder for results; InputError where it is a file, or cannot be made."""
+    """Make a folder for results unless it exists, and return its path; InputError if that is impossible."""
     path = Path(path)
     try:
         path.mkdir(parents=True, exist_ok=True)

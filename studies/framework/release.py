@@ -1,4 +1,4 @@
-"""Piles whose container is taken away: a pour, one activity or none, a rest, and `remove-container`, which is last."""
+"""Runs that end with `remove-container`, after a pour, one activity or none, and a rest."""
 
 from __future__ import annotations
 
@@ -23,16 +23,16 @@ _REMOVAL = "remove-container"
 
 
 def removal(run: Run) -> Phase:
-    """Find the phase that takes the wall away; InputError unless it is the last one, after a rest."""
+    """Return the phase that removes the wall; InputError unless it is the last one and follows a rest."""
     last = run.phases[-1]
     if last.type != _REMOVAL or len(run.phases) < 3 or run.phases[-2].type != "relax":
         types = ", ".join(phase.type for phase in run.phases)
-        raise InputError(f"{run.path}: does not end with a rest and {_REMOVAL}: its phases are {types}")
+        raise InputError(f"{run.path}: does not end with a rest and {_REMOVAL}: its phases are {types}; leave it out")
     return last
 
 
-def around(run: Run) -> tuple[Frame, FrameSequence]:
-    """Read the last frame with the wall, and all those since it began to go; InputError where there are none."""
+def removal_frames(run: Run) -> tuple[Frame, FrameSequence]:
+    """Return the last frame with the wall and all frames of the removal; InputError if either is missing."""
     phase, frames = removal(run), run.frames
     rest, after = frames.in_phase(phase.index - 1), frames.in_phase(phase.index)
     if not rest or not after:
@@ -41,24 +41,30 @@ def around(run: Run) -> tuple[Frame, FrameSequence]:
 
 
 def named_columns(run: Run) -> dict[str, object]:
-    """Give the cells that name a run; InputError where it has several activities, or an unknown one."""
+    """Return the cells procedure, aspect ratio, seed, count and fidelity of a run's row.
+
+    Raises:
+        InputError: The run has several activities, or one of an unknown type.
+    """
     active = [phase.type for phase in run.phases if phase.type not in {*PASSIVE_PHASES, _REMOVAL}]
     if len(active) > 1 or not set(active) <= set(PROCEDURES):
-        raise InputError(f"{run.path}: not one activity ({', '.join(PROCEDURES)}) or none: it has {', '.join(active)}")
+        raise InputError(
+            f"{run.path}: not one activity ({', '.join(PROCEDURES)}) or none: it has {', '.join(active)}; leave it out"
+        )
     return {PROCEDURE: PROCEDURES[active[0]] if active else STATIC, **run_columns(run)}
 
 
 @dataclass(frozen=True, kw_only=True)
 class Pictures:
-    """A row of pictures for the first seed of each procedure: with the wall, 0.1 s after, and later."""
+    """Pictures of the first seed of each procedure: with the wall, 0.1 s after its removal, and later."""
 
-    labels: Mapping[str, str]  #: Labels by procedure
-    after: float | None = None  #: When the last picture is, after the wall began to go [s]; None: at the end
-    select: Sequence[str] = ()  #: Selects the runs; the first one of each procedure is drawn
+    labels: Mapping[str, str]  #: Label of each procedure
+    after: float | None = None  #: Time of the last picture since the removal began [s]; None: the end of the run
+    select: Sequence[str] = ()  #: Columns that must be 0 in the runs that are drawn
     name: str = "pictures"  #: Of the file
 
     def draw(self, path: Path, analysis: Analysis) -> list[Path]:
-        """Draw the runs whose directories are there."""
+        """Draw the pictures and return the path of the file; none if no run directory exists."""
         from postprocess.pictures import strip  # noqa: PLC0415  (imports PyVista)
 
         runs, rows = analysis.table("runs"), []
@@ -66,14 +72,16 @@ class Pictures:
             runs = runs[(runs[list(self.select)] == 0).all(axis=1)]
         runs = runs.assign(apart=(runs[ASPECT] - 0.7).abs()).sort_values(["apart", SEED])
         for procedure, label in self.labels.items():
-            names = [name for name in runs.loc[runs[PROCEDURE] == procedure, "run"] if name in analysis.manifests]
+            names = [name for name in runs.loc[runs[PROCEDURE] == procedure, "run"] if name in analysis.runs]
             if not names:
                 continue
-            run = analysis.manifests[names[0]]
+            run = analysis.runs[names[0]]
             start, end = removal(run).start_s, run.status.time_s
             if start is not None and end is not None:
                 last = end if self.after is None else start + self.after
-                rows.append(strip.Row(directory=run.path, label=label, times=(around(run)[0].time, start + 0.1, last)))
+                rows.append(
+                    strip.Row(directory=run.path, label=label, times=(removal_frames(run)[0].time, start + 0.1, last))
+                )
         if not rows:
             return []
         columns = ("with the wall", "0.1 s after", "at the end" if self.after is None else f"{self.after:g} s after")

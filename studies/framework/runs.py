@@ -1,4 +1,7 @@
-"""The runs of a study and their tables: runs measured, listed or rejected, columns, and rows of several engines."""
+"""Runs of a study and their tables: finished and missing runs, columns, and several engines.
+
+If a study has runs on several engines, findings are judged by the runs on links, which is then the judging engine.
+"""
 
 from __future__ import annotations
 
@@ -22,19 +25,18 @@ from dem.scene.reading import load_scene
 from postprocess.statistics.points import ASPECT, SEED, format_with_error, marked
 from postprocess.statistics.seeds import mean_over_seeds
 
-Row = Mapping[str, object]  #: Cells of one row of a table, by the names of its columns
+Row = Mapping[str, object]  #: Cells of one row of a table by column
 
-# Runs without a relaxation at the end lack columns, and would put them behind these.
+# Always last in the table of runs, although runs that end without a relaxation have fewer columns before them.
 _TAIL = ["escaped at the end [-]", "frames averaged [-]", "scene_sha256", "run"]
 _REMEDY = "give the results folder of an earlier analysis of this study, with runs.csv and provenance.json"
-
 
 ENGINE = "engine"  #: Column of tables of runs of several engines
 
 ENGINE_NAMES: Mapping[str, str] = MappingProxyType({"links": "links", "yade": "YADE"})
-"""Engines in the order of tables and figures, the one that judges first, with their names in text."""
+"""Names of engines in texts, in the order of tables and figures; findings are judged by the runs of the first one."""
 
-DEFINITION = "second-highest-com"  #: Definition of the packing fraction that is compared with Gravish's
+DEFINITION = "second-highest-com"  #: Definition of the packing fraction, as in the papers that are compared with
 
 PAIRS = "pairs [-]"
 
@@ -43,16 +45,16 @@ PAIRS = "pairs [-]"
 class Quantity:
     """A column that is measured, averaged over seeds and shown."""
 
-    column: str  #: Name in tables, with its unit
-    meaning: str = ""  #: What it is, for readers of the table
-    label: str = ""  #: Header in the short table; empty: only in the CSV files
-    form: str = ".3g"  #: Format of a number there
-    scale: float = 1.0  #: Factor of the numbers in the short table and in figures, such as 1e3 for millimetres
-    axis: str = ""  #: Label of an axis of a figure; by default the column's name
-    bar: str = "SE"  #: Which error of the points stands behind a number: `SE` or `95 %`
+    column: str  #: Name with unit
+    meaning: str = ""  #: Explanation for readers of the tables
+    label: str = ""  #: Header in the short table; empty: the quantity is in the CSV files only
+    form: str = ".3g"  #: Format in the short table
+    scale: float = 1.0  #: Factor in the short table and in figures, such as 1e3 for millimetres
+    axis: str = ""  #: Label of the axis in figures; empty: the name of the column
+    bar: str = "SE"  #: Error that is shown in the short table: `SE` (standard error) or `95 %` (half-width)
 
     def cell(self, point: Mapping[str, float]) -> str:
-        """Format the mean of a point with its error, where it has one."""
+        """Format the mean over seeds of a point for the short table, with its error unless that is NaN."""
         error = point.get(marked(self.column, self.bar), math.nan)
         return format_with_error(self.scale * point[self.column], self.form, self.scale * error)
 
@@ -63,7 +65,16 @@ def declare(
     axes: Mapping[str, str] = MappingProxyType({}),
     scales: Mapping[str, float] = MappingProxyType({}),
 ) -> dict[str, Quantity]:
-    """Declare quantities by column: label, format and meaning; axes and factors where they are not the default."""
+    """Make quantities from label, format and meaning of each column.
+
+    Args:
+        rows: label, format (empty: `.3g`) and meaning by column.
+        axes: labels of axes by column, where they are not the name of the column.
+        scales: factors for short table and figures by column, where they are not 1.
+
+    Returns:
+        The quantities by column.
+    """
     return {
         column: Quantity(
             column=column,
@@ -79,17 +90,17 @@ def declare(
 
 @dataclass(frozen=True, kw_only=True)
 class Key:
-    """A column that names a point: one combination of a sweep's variables."""
+    """A column that names points; a point is one combination of a sweep's variables."""
 
     column: str  #: Name in tables
-    label: str  #: Header in the short table, and in statements about the runs
-    form: str = ""  #: Format; empty for words
-    unit: str = ""  #: Behind the number in the short table
-    scale: float = 1.0  #: Factor of the number shown
-    order: Sequence[str] = ()  #: Order of the values, where it is not their own
+    label: str  #: Header in the short table, and name in texts
+    form: str = ""  #: Format of numbers; empty for words
+    unit: str = ""  #: Text after the number
+    scale: float = 1.0  #: Factor from the value in the column to the number in texts
+    order: Sequence[str] = ()  #: Order of words in tables; empty: alphabetical
 
     def text(self, value: object) -> str:
-        """Format a value; empty where a point has none, such as θ of a pile at rest."""
+        """Format a value of the column; empty for NaN, such as θ of a pile without oscillation."""
         if not isinstance(value, int | float):
             return str(value)
         return "" if math.isnan(value) else f"{self.scale * value:{self.form}}{self.unit}"
@@ -100,7 +111,7 @@ THETA_KEY = Key(column="theta [deg]", label="θ", form="g", unit="°")
 
 
 def sort_rows(table: pd.DataFrame, columns: Sequence[str], keys: Sequence[Key]) -> pd.DataFrame:
-    """Sort rows by columns; a key with an order of its own is sorted by that."""
+    """Return a table sorted by columns; words are sorted by the `Key.order` of their column, if any."""
     ranks = {key.column: {name: rank for rank, name in enumerate(key.order)} for key in keys if key.order}
     return table.sort_values(
         list(columns),
@@ -111,25 +122,28 @@ def sort_rows(table: pd.DataFrame, columns: Sequence[str], keys: Sequence[Key]) 
 
 
 def engines_of(table: pd.DataFrame) -> tuple[str, ...]:
-    """List the engines of a table of runs, the one that judges first; none where the table has one engine."""
+    """Return the engines in a table, the judging one first; empty if the table has no column `engine`."""
     if ENGINE not in table.columns:
         return ()
     return tuple(sorted(set(table[ENGINE]), key=lambda name: (name not in ENGINE_NAMES, name)))
 
 
 def of_engine(table: pd.DataFrame, engine: str) -> pd.DataFrame:
-    """Select the rows of one engine, without the column `engine`."""
+    """Return the rows of one engine, without the column `engine`."""
     return table[table[ENGINE] == engine].drop(columns=ENGINE)
 
 
 def judging(table: pd.DataFrame) -> pd.DataFrame:
-    """Select the rows of the engine that judges: all where there is one engine."""
+    """Return the rows of the judging engine without the column `engine`; all rows if that is missing."""
     several = engines_of(table)
     return of_engine(table, several[0]) if several else table
 
 
 def by_engine(table: pd.DataFrame, made: Callable[[pd.DataFrame], pd.DataFrame]) -> pd.DataFrame:
-    """Make a table of the rows of each engine, one below the other; the column `engine` first, if there are several."""
+    """Apply a function to the rows of each engine and concatenate the tables that it returns.
+
+    The result has the column `engine` first if the given table has several engines.
+    """
     several = engines_of(table)
     if not several:
         return made(table)
@@ -138,14 +152,19 @@ def by_engine(table: pd.DataFrame, made: Callable[[pd.DataFrame], pd.DataFrame])
 
 
 def compared_engines(runs: pd.DataFrame, keys: Sequence[str], quantities: Iterable[str]) -> pd.DataFrame:
-    """Subtract the engines from each other, point by point, paired by seed.
+    """Compare the judging engine with the other engines: differences at each point, paired by seed.
 
-    Runs of the same point and seed were poured from the same poses on both engines. Granular piles are chaotic: a pair
-    shares its poses, and soon nothing else, so pairing narrows little.
+    Runs with equal point and seed were poured from equal poses. Piles are chaotic and soon forget their poses, so
+    pairing reduces the scatter only a little.
+
+    Args:
+        runs: table of runs with the column `engine`.
+        keys: columns that name a point.
+        quantities: columns that are compared.
 
     Returns:
-        One row per point, engine other than the judging one, and quantity: both means over the pairs, their
-        difference, its 95 % half-width by Student's t, and both in per cent of the other engine's mean.
+        One row per point, other engine and quantity: mean of each engine over the pairs, their difference with its
+        95 % half-width by Student's t, and the last two in per cent of the other engine's mean.
     """
     first, *others = engines_of(runs)
     rows = []
@@ -170,44 +189,43 @@ def compared_engines(runs: pd.DataFrame, keys: Sequence[str], quantities: Iterab
 
 @dataclass(frozen=True, kw_only=True)
 class MissingRun:
-    """A run directory that could not be used."""
+    """A run that is not in the tables of its study."""
 
-    directory: str  #: As given
-    status: str  #: "not started", "unfinished", "failed", "interrupted", or "unusable" for one that cannot be measured
-    cause: str  #: Why, as far as it is known
+    directory: str  #: Path as given
+    status: str  #: "not started", "unfinished", "failed", "interrupted", or "unusable" if it cannot be measured
+    cause: str  #: Reason as a text
 
     @property
     def common_cause(self) -> str:
-        """The cause without the name of the directory, to be counted."""
+        """The cause with RUN for the path of the directory, so that equal causes can be counted."""
         return self.cause.removeprefix(f"{self.directory}: ").replace(self.directory, "RUN")
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class MeasuredRun:
-    """A finished run and what was measured of it."""
+    """A finished run with its rows of the table of runs."""
 
     run: Run
-    #: Its rows of the table of runs: one, unless a study measures a run in several ways
-    rows: Sequence[Row] = field(repr=False)
-    #: Quantities against time by the names of columns, (n,) each; empty where a study has none
+    rows: Sequence[Row] = field(repr=False)  #: One, unless a study measures a run by several definitions
+    #: Columns of the table `times`, (n,) each: a time and quantities at that time; empty if a study has no such table
     history: Mapping[str, NDArray[Any]] = field(default_factory=dict, repr=False)
 
     @property
     def row(self) -> Row:
-        """The first of its rows."""
+        """First row of the run."""
         return self.rows[0]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Collected:
-    """The runs of a study that are done and were measured, in the order given, and the others."""
+    """Runs of a study: those that were measured, in the order given, and those that are missing."""
 
     study: str  #: Name of the study, for messages
     runs: Sequence[MeasuredRun]
     missing: Sequence[MissingRun]
 
     def table(self) -> pd.DataFrame:
-        """Make the table of runs: with their engine where there are several, and what names a run at its end."""
+        """Make the table of runs; it begins with the column `engine` if there are several engines."""
         several = len({run.run.manifest.engine for run in self.runs}) > 1
         table = pd.DataFrame(
             [{ENGINE: run.run.manifest.engine, **row} if several else row for run in self.runs for row in run.rows]
@@ -216,7 +234,7 @@ class Collected:
         return table[[*table.columns.difference(tail, sort=False), *tail]]
 
     def times(self) -> pd.DataFrame | None:
-        """Put the histories of all runs one below the other; None where no run has one."""
+        """Concatenate the histories of all runs, with the column `run`; None if no run has a history."""
         tables = [pd.DataFrame({"run": run.run.path.name, **run.history}) for run in self.runs if run.history]
         return pd.concat(tables, ignore_index=True) if tables else None
 
@@ -227,7 +245,13 @@ class Collected:
         *,
         within: Callable[[MeasuredRun], Hashable] = lambda _: None,
     ) -> None:
-        """Reject runs that differ in some quantity within a group, by an InputError."""
+        """Raise InputError if runs of one group differ in a quantity.
+
+        Args:
+            quantity: name of the quantity, for the message.
+            value: computes the quantity of a run.
+            within: computes the group of a run; by default all runs are one group.
+        """
         firsts: dict[Hashable, MeasuredRun] = {}
         for run in self.runs:
             first = firsts.setdefault(within(run), run)
@@ -238,7 +262,7 @@ class Collected:
                 )
 
     def reject_repeats(self, point: Callable[[MeasuredRun], str]) -> None:
-        """Reject two runs with the same seed of the same point, by an InputError."""
+        """Raise InputError if two runs have equal point, seed and engine; `point` names a run's point."""
         seen: dict[tuple[str, int, str], MeasuredRun] = {}
         for run in self.runs:
             key = (point(run), run.run.manifest.seed, run.run.manifest.engine)
@@ -256,9 +280,13 @@ def collect_runs(
     *,
     earlier: Mapping[str, MeasuredRun] | None = None,
 ) -> Collected:
-    """Measure the finished runs, and list the others; an InputError while measuring makes a run unusable.
+    """Measure finished runs and list the others as missing.
 
-    Of directories that are not there the runs of an earlier analysis stand in, by name.
+    Args:
+        study: name of the study, for messages.
+        run_dirs: directories of the runs.
+        measure: measures a run; an InputError lists the run as missing, with the status "unusable".
+        earlier: runs of an earlier analysis by name, which replace directories that do not exist.
 
     Raises:
         InputError: No run is done.
@@ -288,20 +316,26 @@ def collect_runs(
 
 @dataclass(frozen=True, kw_only=True)
 class Wanted:
-    """A run that a study plans: its scene file, and the hash of that scene."""
+    """A run that a study plans: path of its scene file and hash of its scene."""
 
     scene: Path
     scene_sha256: str
 
 
 def earlier_runs(results: Path | str, wanted: Mapping[str, Wanted]) -> dict[str, MeasuredRun]:
-    """Read those runs of an earlier analysis that are of the scenes wanted, by name.
+    """Read planned runs from the results of an earlier analysis, so that they need not be computed again.
 
-    What was measured comes from `runs.csv` in the results, to the six digits that are there; versions and command come
-    from `provenance.json`. Only a run of the very scene counts, by name and hash.
+    Rows come from `runs.csv`, with its six digits; versions and command come from `provenance.json`.
+
+    Args:
+        results: folder with both files.
+        wanted: planned runs by name; a run is only read if name and hash of its scene are equal.
+
+    Returns:
+        The runs by name.
 
     Raises:
-        InputError: The folder holds no such files, they are damaged, or none of its runs is wanted.
+        InputError: A file is missing or damaged, or none of its runs is planned.
     """
     results = Path(results)
     table = read_runs(results)
@@ -325,7 +359,7 @@ def earlier_runs(results: Path | str, wanted: Mapping[str, Wanted]) -> dict[str,
 
 
 def read_runs(results: Path) -> pd.DataFrame:
-    """Read the table of runs as a study wrote it; InputError where it is none."""
+    """Read the table `runs.csv` from a folder of results; InputError if it is missing or lacks columns."""
     path = results / "runs.csv"
     try:
         table = pd.read_csv(path, comment="#", dtype={"run": str, "scene_sha256": str, SEED: int})
@@ -338,7 +372,7 @@ def read_runs(results: Path) -> pd.DataFrame:
 
 
 def _manifest(run: Wanted, origin: Mapping[str, Any]) -> Run:
-    """Rebuild the run of an earlier analysis from its scene and provenance."""
+    """Make a run whose directory does not exist from its scene and its entry in `provenance.json`."""
     scene = load_scene(run.scene)
     versions = dict(origin["versions"])
     made = manifest(
@@ -350,20 +384,20 @@ def _manifest(run: Wanted, origin: Mapping[str, Any]) -> Run:
         threads=1,
     )
     found = Run(Path(origin["directory"]))
-    # Its directory is not here.
+    # A cached property: it would be read from the directory, which does not exist.
     vars(found)["manifest"] = made.model_copy(update={"started": origin["started"], "versions": versions})
     return found
 
 
 def duration(phase: Phase) -> float:
-    """Compute how long a phase of a finished run took [s]."""
+    """Return the simulated time of a phase [s]; NaN if the phase has not ended."""
     if phase.start_s is None or phase.end_s is None:
         return math.nan
     return phase.end_s - phase.start_s
 
 
 def run_columns(run: Run) -> dict[str, object]:
-    """Give the cells that say what pile a run is of."""
+    """Return the cells aspect ratio, seed, count and fidelity of a run's row."""
     return {
         ASPECT: round(run.manifest.aspect_ratio, 6),
         SEED: run.manifest.seed,
@@ -373,5 +407,5 @@ def run_columns(run: Run) -> dict[str, object]:
 
 
 def last_columns(run: Run) -> dict[str, object]:
-    """Give the cells that name a run, the last ones of its row."""
+    """Return the last cells of a run's row: hash of its scene and name of its directory."""
     return {"scene_sha256": run.manifest.scene_sha256, "run": run.path.name}

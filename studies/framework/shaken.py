@@ -1,4 +1,4 @@
-"""Shaken piles: packing fraction and crossings before and after shaking, and Gravish's points of them."""
+"""Shaken piles: packing fraction and crossings before and after shaking, and Gravish's points."""
 
 from __future__ import annotations
 
@@ -21,14 +21,14 @@ from studies.framework.provenance import Reference
 from studies.framework.runs import DEFINITION, duration, last_columns, run_columns
 
 SHAKEN = "time shaken [s]"
-SHAKE_TIME = 20.0  #: How long Gravish et al. shook [s]
+SHAKE_TIME = 20.0  #: Time for which Gravish et al. shook [s]
 
-DIGITISING_ERROR = 0.003  #: Taken as the error of each of Gravish's points [-]
+DIGITISING_ERROR = 0.003  #: Assumed error of reading φ from Gravish's figure [-]
 
 GRAVISH_COLUMNS: Mapping[str, str] = MappingProxyType(
     {"phi_0": "phi_initial", "phi_f": "phi_final", "phi_f relaxed": "phi_final"}
 )
-"""Column of Gravish's points that each stage is compared with."""
+"""Column of `read_gravish` that each stage is compared with."""
 
 _FILE = files("postprocess") / "reference" / "gravish2012_phi.csv"
 _CITATION = "Gravish et al., PRL 108, 208001 (2012), digitised"
@@ -48,34 +48,38 @@ STAGES: Mapping[str, str] = MappingProxyType(
         "phi_f relaxed": "after the relaxation that follows shaking",
     }
 )
-"""When a packing fraction is taken; each is a mean over the last frames of its phase."""
+"""Stages at which a packing fraction is measured, as a mean over the last frames of a phase."""
 
 WHEN = f"before shaking and at the end of shaking, means over the last {LAST_FRAMES} frames or fewer"
-"""How the stages are averaged, for footers."""
+"""Statement for footers on how φ_0 and φ_f are averaged."""
 
 FRICTION = "friction [-]"
 
-TIMES = (5.0, 10.0, 20.0)  #: When φ is taken in the course of shaking [s]
-WINDOW = 1.0  #: Over how long before those times it is averaged [s]: 30 periods of shaking
+TIMES = (5.0, 10.0, 20.0)  #: Times since shaking began at which φ is measured [s]
+WINDOW = 1.0  #: Time before each of `TIMES` over which φ is averaged [s]: 30 periods of shaking
 
 _SHAKE, _SERIES = "shake", "packing_fraction"
 
 
 def read_gravish() -> pd.DataFrame:
-    """Read Gravish's digitised points: columns `l_over_w`, `phi_initial`, `phi_final`; NaN where there is no point."""
+    """Read Gravish's digitised points.
+
+    Returns:
+        Columns `l_over_w`, `phi_initial`, `phi_final` [-]; NaN where their figure has no point.
+    """
     with _FILE.open(encoding="utf-8") as file:
         return pd.read_csv(file)
 
 
 def gravish_at(aspect: float, stage: str) -> float:
-    """Give Gravish's φ at exactly this aspect ratio, or NaN; a stage is a key of `GRAVISH_COLUMNS`."""
+    """Return Gravish's φ [-] at an aspect ratio and a stage (key of `GRAVISH_COLUMNS`); NaN if unknown."""
     points = read_gravish()
     same = np.isclose(points["l_over_w"], aspect, rtol=0, atol=1e-6)
     return float(points.loc[same, GRAVISH_COLUMNS[stage]].iloc[0]) if same.any() else math.nan
 
 
 def gravish_note(aspects: Sequence[float]) -> str:
-    """State what Gravish's points are, and at which l/w there are none, for figures that show them."""
+    """Return a statement for figures: source of Gravish's points, and aspect ratios without a point."""
     lacking = {
         stage: [f"{one:g}" for one in aspects if math.isnan(gravish_at(one, stage))] for stage in ("phi_0", "phi_f")
     }
@@ -84,17 +88,17 @@ def gravish_note(aspects: Sequence[float]) -> str:
 
 
 def phi(stage: str, definition: str = DEFINITION) -> str:
-    """Name the column of φ at a stage."""
+    """Return the name of the column of φ at a stage."""
     return f"{stage} {definition} [-]"
 
 
 def at_time(time: float) -> str:
-    """Name φ after some time of shaking [s]."""
+    """Return the name of the stage after some time of shaking [s], an argument of `phi`."""
     return f"phi {time:g} s"
 
 
 def contact_of(run: Run) -> SceneData:
-    """Read what the scene of a run says of its contacts; InputError where it says nothing."""
+    """Return the entry `contact` of a run's scene; InputError if the scene has none."""
     contact: SceneData | None = run.scene.get("contact")
     if contact is None:
         raise InputError(f"{run.path}: scene.yaml has no contact; give runs of a study of friction")
@@ -102,17 +106,19 @@ def contact_of(run: Run) -> SceneData:
 
 
 def common_friction(run: Run) -> float:
-    """Read the one coefficient of friction of a run [-]; InputError where its walls have another one."""
+    """Return the coefficient of friction of a run [-]; InputError if that of its walls differs."""
     contact = contact_of(run)
     between, wall = contact["friction_smarticle"], contact["friction_wall"]
     if between != wall:
-        msg = f"{run.path}: friction is {between:g} between smarticles, {wall:g} at walls; this study has one"
+        msg = (
+            f"{run.path}: friction is {between:g} between smarticles, {wall:g} at walls; this study asks for equal ones"
+        )
         raise InputError(msg)
     return float(between)
 
 
 def timed_row(run: Run, known: Mapping[str, object]) -> dict[str, object]:
-    """Measure φ by stage and in the course of shaking; columns known already come behind the aspect ratio."""
+    """Measure φ at each stage and at `TIMES` during shaking; return the row, which includes `known`."""
     history = packing_history(run)
     row = {**known, **measured_row(run, [DEFINITION])}
     for time in TIMES:
@@ -123,34 +129,37 @@ def timed_row(run: Run, known: Mapping[str, object]) -> dict[str, object]:
 
 
 def while_shaken(run: Run) -> History:
-    """Read φ against the time since shaking began, as long as it went on."""
+    """Read φ [-] against time while the pile is shaken; InputError if φ was not recorded."""
     history = packing_history(run)
     shaken = (history.times > 0) & (history.times <= history.active)
     return History(times=history.times[shaken], values=history.values[shaken], active=0.0)
 
 
 def measured_row(run: Run, definitions: Sequence[str]) -> dict[str, object]:
-    """Measure φ by each definition and the crossings before and after shaking: a row of the table of runs.
+    """Measure φ and crossings before and after shaking; return the run's row.
 
-    `DEFINITION` is always among the definitions. Costly ones are taken of the last frame alone, before and at the end
-    of shaking.
+    Args:
+        run: a finished run.
+        definitions: definitions of φ besides `DEFINITION`; costly ones are measured in the last frame only.
 
     Raises:
-        InputError: It was not shaken after another phase, or cannot be read.
+        InputError: The run has no shaking after another phase, or a frame is missing.
     """
     shakes = [phase for phase in run.phases if phase.type == _SHAKE]
     if not shakes or shakes[0].index == 0:
         types = ", ".join(phase.type for phase in run.phases)
-        raise InputError(f"{run.path}: no shaking after another phase: its phases are {types}")
+        raise InputError(
+            f"{run.path}: no phase of type shake after another phase: its phases are {types}; leave it out"
+        )
     wanted = {"phi_0": shakes[0].index - 1, "phi_f": shakes[-1].index}
     if shakes[-1].index < run.phases[-1].index:
         wanted["phi_f relaxed"] = run.phases[-1].index
     cheap = [DEFINITION, *(set(definitions) - {DEFINITION} - COSTLY_DEFINITIONS)]
     summary = summarise_run(run, definitions=cheap, phases=set(wanted.values()))
     table = summary.set_index("phase") if len(summary) else summary
-    gone = next((phase for phase in wanted.values() if phase not in table.index), None)
-    if gone is not None:
-        raise InputError(f"{run.path}: no frame of phase {gone} ({run.phases[gone].type}); run it again")
+    empty = next((phase for phase in wanted.values() if phase not in table.index), None)
+    if empty is not None:
+        raise InputError(f"{run.path}: no frame of phase {empty} ({run.phases[empty].type}); run it again")
     row: dict[str, object] = {**run_columns(run), SHAKEN: sum(map(duration, shakes))}
     for definition in DEFINITIONS:
         if definition in cheap:
@@ -171,7 +180,7 @@ def measured_row(run: Run, definitions: Sequence[str]) -> dict[str, object]:
 
 
 def packing_history(run: Run) -> History:
-    """Read φ of a run against the time since shaking began [-]; InputError where none was recorded."""
+    """Read φ [-] of a run from the phase before shaking to the end; InputError if φ was not recorded."""
     shakes = [phase for phase in run.phases if phase.type == _SHAKE]
     start, end = (shakes[0].start_s, shakes[-1].end_s) if shakes else (None, None)
     series = run.series
@@ -180,7 +189,7 @@ def packing_history(run: Run) -> History:
         shown = (series["phase"] >= shakes[0].index - 1) & np.isfinite(values)
         if shown.any():
             return History(times=series.time[shown] - start, values=values[shown], active=end - start)
-    raise InputError(f"{run.path}: no packing fraction was recorded while shaking")
+    raise InputError(f"{run.path}: no packing fraction was recorded while shaking; run it again")
 
 
 PHI_TIME = Histories(

@@ -1,4 +1,4 @@
-"""A study: what is measured of a run, what the columns are, what is judged, and the recipe from runs to results."""
+"""Studies: measure, columns, findings and figures, from which `analyse` makes results."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pandas as pd
 
+from dem.errors import InputError
 from dem.record.run import Run
 from postprocess.report import figures as style
 from postprocess.report.tables import meaning_lines, table_lines
@@ -42,52 +43,65 @@ _MEANS = "Means over seeds ± standard error."
 class Report:
     """Results of a study."""
 
-    header: Sequence[str]
-    rows: Sequence[Sequence[str]] = field(repr=False)
-    lines: Sequence[str]  #: Below it: what the numbers are, and every finding with its verdict
-    #: All tables by name, `runs`, `points` and `findings` among them
-    tables: Mapping[str, pd.DataFrame] = field(repr=False)
-    judged: Sequence[Judged]
-    missing: Sequence[MissingRun]  #: Runs that were given and are not in the tables
-    footer: Sequence[str] = field(repr=False)  #: Origin of the results, one statement each
-    files: Mapping[str, Path] = field(repr=False)  #: Everything that was written, by name
-    output: Path
+    header: Sequence[str]  #: Of the short table of points
+    rows: Sequence[Sequence[str]] = field(repr=False)  #: Of the short table of points
+    lines: Sequence[str]  #: Text for the terminal after the short table: every finding with its verdict
+    tables: Mapping[str, pd.DataFrame] = field(repr=False)  #: All tables by name, such as `runs` and `points`
+    judged: Sequence[Judged]  #: Findings with their verdicts
+    missing: Sequence[MissingRun]  #: Runs that are not in the tables
+    footer: Sequence[str] = field(repr=False)  #: Statements about the origin of the results
+    files: Mapping[str, Path] = field(repr=False)  #: Paths of all files written, by file name
+    output: Path  #: Folder with the files
 
 
 @dataclass(frozen=True, kw_only=True)
 class Study:
-    """A study."""
+    """A study: how runs are measured, which columns are averaged, what is judged, and what is drawn."""
 
-    name: str  #: For the command line, and in provenance
-    title: str
-    #: Measures one finished run: its row of the table of runs, several rows, or a `MeasuredRun` with a history. An
-    #: InputError lists the run as missing.
+    name: str  #: On the command line and in the provenance
+    title: str  #: Heading of the text
+    #: Measures one finished run and returns its row of the table of runs, several rows, or a `MeasuredRun` with a
+    #: history. An InputError lists the run as missing
     measure: Callable[[Run], Row | Sequence[Row] | MeasuredRun]
     keys: Sequence[Key]  #: Columns that name a point: one combination of the sweep's variables
     quantities: Sequence[Quantity]  #: Columns that are averaged over seeds
-    findings: Sequence[Finding]  #: What is judged, in the paper's order
+    findings: Sequence[Finding]  #: In the order of the paper
     figures: Sequence[Figure] = ()
-    #: Makes the table that is averaged and judged from the table of runs of one engine
+    #: Makes the samples, the table that is averaged and judged, from the table of runs of one engine
     samples: Callable[[pd.DataFrame], pd.DataFrame] = lambda runs: runs
     #: Makes further tables by name from the table of runs; one called `points` replaces the means over seeds
     extra: Callable[[pd.DataFrame], Mapping[str, pd.DataFrame]] = lambda _: {}
     shown: Callable[[pd.DataFrame], pd.DataFrame] = lambda points: points  #: Selects the points of the short table
-    same_count: Sequence[str] = (ASPECT,)  #: Columns within which all runs must have the same number of smarticles
-    same_fidelity: Sequence[str] = ()  #: Columns within which all runs must have the same fidelity
-    order: Sequence[str]  #: Columns that the table of runs is sorted by; none: as given
-    #: Columns that must be equal within groups, with the columns that make the groups
+    #: Runs that agree in these columns must have equal numbers of smarticles
+    same_count: Sequence[str] = (ASPECT,)
+    same_fidelity: Sequence[str] = ()  #: Runs that agree in these columns must have one fidelity
+    order: Sequence[str]  #: Columns that the table of runs is sorted by; empty: in the order of the runs given
+    #: Columns that must be equal in all runs that agree in other columns: those other columns by column
     constant: Mapping[str, Sequence[str]] = field(default_factory=dict)
-    #: Column that is above 0 where a run's quantities are lower bounds, with the word for such runs
+    #: Column that is above 0 if the quantities of a run are lower bounds, and the word for such runs in texts
     bounds: tuple[str, str] | None = None
-    count_values: bool = False  #: Whether the points have the number of seeds with a value of each quantity
+    count_values: bool = False  #: Whether points have, for each quantity, the number of seeds that gave a value
     one_engine: bool = False  #: Whether runs of several engines are rejected
-    #: Whether the table of runs is enough for everything but figures of histories, so that runs of an earlier analysis
-    #: need not be there
+    #: Whether everything but histories follows from the table of runs, so that `--earlier` can replace runs by their
+    #: rows of a published table
     from_tables: bool = False
-    #: Paragraphs for the text and statements of footers: definitions, and what to beware of
-    remarks: Sequence[str] = ()
-    reference: Reference = SAVOIE  #: What the runs are compared with
-    pictured: Mapping[str, object] = field(default_factory=dict)  #: Values of the run that a picture is drawn of
+    remarks: Sequence[str] = ()  #: Definitions and warnings, for the text and the footers
+    reference: Reference = SAVOIE  #: Published numbers or statements that the runs are compared with
+    #: Values of variables of the sweep; a picture is drawn of the first run that has them
+    pictured: Mapping[str, object] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        """Reject figures of points or runs that are split by a column that is no key, by an InputError."""
+        keys = [key.column for key in self.keys]
+        for figure in self.figures:
+            if getattr(figure, "table", "points") == "points":
+                split = getattr(getattr(figure, "split", None), "column", "")
+                for column in filter(None, (split, getattr(figure, "panels", ""))):
+                    if column not in keys:
+                        raise InputError(
+                            f"study {self.name}: figure {figure.name} is split by the column {column!r}, which is no "
+                            f"key; keys: {', '.join(keys)}; split by one of these, or add Key(column={column!r}, …)"
+                        )
 
     def analyse(
         self,
@@ -98,10 +112,17 @@ class Study:
         command: str,
         earlier: Mapping[str, MeasuredRun] | None = None,
     ) -> Report:
-        """Measure runs, and write tables, text, provenance and figures; earlier files are replaced.
+        """Measure runs and write tables, text, provenance and figures; existing files are replaced.
 
-        Runs that are not done, or cannot be read, are listed as missing; the note says how runs differ from the full
-        study.
+        Args:
+            run_dirs: directories of the runs; runs that are not done or cannot be read are listed as missing.
+            output: folder for the files.
+            note: how the runs differ from the full study, for footers.
+            command: command line, for footers.
+            earlier: runs of an earlier analysis by name, which replace directories that do not exist.
+
+        Returns:
+            The results, with the paths of the files.
 
         Raises:
             InputError: No run is done, runs must not be averaged or compared, or the output is no folder.
@@ -117,9 +138,9 @@ class Study:
         header, rows = self.table(tables)
         lines = self.text(tables, judged, table_lines(header, rows))
         files = origin.write(output, footer, tables=tables, text=(TEXT, lines))
-        manifests = {run.run.path.name: run.run for run in found.runs}
-        below = origin.below_figures(f"{self._seeds(tables)}.", TEXT)
-        analysis = Analysis(tables=tables, manifests=manifests, footer=below)
+        measured = {run.run.path.name: run.run for run in found.runs}
+        short = origin.figure_footer(f"{self._seeds(tables)}.", TEXT)
+        analysis = Analysis(tables=tables, runs=measured, footer=short)
         files |= {path.name: path for path in self.draw(output, analysis)}
         verdicts = [f"{one.verdict.upper()}: {one.finding.says}\n    {one.ours}" for one in judged]
         return Report(
@@ -135,14 +156,14 @@ class Study:
         )
 
     def measured(self, run: Run) -> MeasuredRun:
-        """Measure one finished run."""
+        """Measure one finished run and return its rows of the table of runs."""
         measured = self.measure(run)
         if isinstance(measured, MeasuredRun):
             return measured
         return MeasuredRun(run=run, rows=[measured] if isinstance(measured, Mapping) else measured)
 
     def reject_unlike(self, found: Collected) -> None:
-        """Reject runs that must not be averaged or compared, and seeds given twice, by an InputError."""
+        """Raise InputError for runs that must not be averaged or compared, and for seeds that are given twice."""
 
         def cells(columns: Sequence[str]) -> Callable[[MeasuredRun], tuple[object, ...]]:
             return lambda run: tuple(run.row[name] for name in columns)
@@ -160,12 +181,17 @@ class Study:
         found.reject_repeats(self.point_of)
 
     def point_of(self, run: MeasuredRun) -> str:
-        """Name the point of a run, such as `procedure internal, θ 10°, l/w 0.7`."""
+        """Return the name of a run's point, such as `procedure internal, θ 10°, l/w 0.7`."""
         cells = ((key.label, key.text(run.row[key.column])) for key in self.keys if key.column in run.row)
         return ", ".join(f"{label} {cell}" for label, cell in cells if cell)
 
     def tabulate(self, runs: pd.DataFrame, times: pd.DataFrame | None = None) -> dict[str, pd.DataFrame]:
-        """Make all tables of the table of runs: `runs`, `points`, `engines` if there are several, and extra ones."""
+        """Make all tables from the table of runs and the histories.
+
+        Returns:
+            Tables by name: `runs`, `points`, `engines` if there are several, `times` if there are histories, and those
+            of `extra`.
+        """
         runs = sort_rows(runs, self.order, self.keys) if self.order else runs
         extra = self.extra(runs)
         tables = {"runs": runs}
@@ -180,7 +206,10 @@ class Study:
         return tables | dict(extra)
 
     def points(self, samples: pd.DataFrame) -> pd.DataFrame:
-        """Average over seeds: `… SE` is the standard error, `… 95 %` the half-width of the confidence interval."""
+        """Average samples over seeds, one row per point.
+
+        For each quantity there are the mean, its standard error `… SE`, and `… 95 %`, half of its confidence interval.
+        """
         columns = [key.column for key in self.keys]
         rows = []
         for values, group in samples.groupby(columns, sort=True, dropna=False):
@@ -193,12 +222,12 @@ class Study:
         return sort_rows(pd.DataFrame(rows), columns, self.keys)
 
     def judge(self, tables: Mapping[str, pd.DataFrame]) -> tuple[Judged, ...]:
-        """Judge all findings, by the samples of the engine that judges or by the tables."""
+        """Judge all findings by the samples of the judging engine, or by the tables that a finding names."""
         samples = self.samples(judging(tables["runs"]))
         return tuple(finding.judge(samples, tables) for finding in self.findings)
 
     def table(self, tables: Mapping[str, pd.DataFrame]) -> tuple[list[str], list[list[str]]]:
-        """Make header and rows of the short table of points; quantities without a label are left out."""
+        """Return header and rows of the short table of points: keys, seeds, and quantities with a label."""
         points = self.shown(tables["points"])
         keys = [Key(column=ENGINE, label="engine")] if engines_of(points) else []
         keys += [key for key in self.keys if key.column in points]
@@ -210,12 +239,12 @@ class Study:
         return [*(key.label for key in keys), "seeds", *(one.label for one in shown)], rows
 
     def draw(self, output: Path, analysis: Analysis) -> list[Path]:
-        """Draw all figures into a folder."""
+        """Draw all figures into a folder and return the paths of the files."""
         with style.style():
             return [path for figure in self.figures for path in figure.draw(output / figure.name, analysis)]
 
     def text(self, tables: Mapping[str, pd.DataFrame], judged: Sequence[Judged], table: Sequence[str]) -> list[str]:
-        """Make the lines of the Markdown file."""
+        """Return the lines of the Markdown file: findings, remarks, and the short table of points."""
         findings = [
             [one.finding.says, one.ours, f"**{one.verdict}**{one.needed and f'; {one.needed}'}", one.criterion]
             for one in judged
@@ -230,7 +259,7 @@ class Study:
         ]
 
     def statements(self, tables: Mapping[str, pd.DataFrame]) -> list[str]:
-        """State which runs there are, and what numbers and verdicts are, for footers."""
+        """Return statements for footers: points, seeds, engines, remarks, error bars and criterion."""
         every = tables["runs"]
         runs = judging(every)
         parts = []
@@ -258,7 +287,7 @@ class Study:
 
 
 def format_numbers(numbers: Iterable[int]) -> str:
-    """Format `1 2 3`, or `1 to 8` where five or more follow each other.
+    """Format numbers in ascending order; five or more consecutive ones as `1 to 5`.
 
     Example:
         >>> format_numbers([1, 2, 3, 4, 5, 9])
@@ -274,5 +303,5 @@ def format_numbers(numbers: Iterable[int]) -> str:
 
 
 def format_range(counts: pd.Series) -> str:
-    """Format `3` or `1 to 3`: how many there are of each."""
+    """Format the least and the greatest of some counts: `1 to 3`, or `3` if all are equal."""
     return str(counts.min()) if counts.nunique() == 1 else f"{counts.min()} to {counts.max()}"

@@ -25,7 +25,7 @@ from dem.scene.reading import dump_scene
 from dem.scene.scene import Scene
 from studies.framework.runs import DEFINITION
 from studies.framework.study import Study
-from studies.registry import shipped, study_file
+from studies.registry import shipped
 from templates.sweep.expand import Point, expand
 from templates.sweep.sweep_file import SEED, load_sweep
 
@@ -108,7 +108,7 @@ class Cell:
 
 @cache
 def points(table: str) -> dict[str, Point]:
-    return {point.name: point for point in expand(load_sweep(study_file(table)))}
+    return {point.name: point for point in expand(load_sweep(shipped(table).sweep_file()))}
 
 
 @cache

@@ -11,13 +11,15 @@ import yaml
 
 from dem.record.run import open_run
 from studies.engines import STUDY
-from studies.registry import study_file
+from studies.registry import shipped
 from templates.sweep.expand import expand
 from templates.sweep.sweep_file import load_sweep
 
 
 def test_a_scene_for_yade_is_run_on_links_and_measured(tmp_path: Path) -> None:
-    point = next(p for p in expand(load_sweep(study_file("engines", quick=True))) if p.name == "external_yade_seed1")
+    point = next(
+        p for p in expand(load_sweep(shipped("engines").sweep_file(quick=True))) if p.name == "external_yade_seed1"
+    )
     data = point.scene.model_dump(mode="json") | {"count": 6, "name": "external/links"}
     data["phases"][2]["duration_s"] = 0.1
     data["phases"][1]["duration_s"] = data["phases"][3]["duration_s"] = 0.05

@@ -19,9 +19,9 @@ from studies.compaction import (
     STUDY,
     TIMES,
     Fit,
-    at,
     fit,
-    of,
+    law_column,
+    phi_column,
 )
 from studies.framework.figures import History
 
@@ -74,10 +74,10 @@ def test_the_law_that_made_the_histories_leaves_less(monkeypatch: pytest.MonkeyP
 def test_growth_is_that_of_the_law_and_noise_does_not_grow(monkeypatch: pytest.MonkeyPatch) -> None:
     runs = runs_of(monkeypatch, LOGARITHMIC, noise=0.0, seeds=(1, 2))
     inside = np.arange(round(0.8 * 200 / 0.02) + 1, round(200 / 0.02) + 1) * 0.02
-    np.testing.assert_allclose(runs[at(TIMES[-1])], TRUE[LOGARITHMIC].at(inside).mean(), rtol=1e-9)
-    assert np.isfinite(runs[[of(law, MISSED) for law in LAWS]]).all(axis=None)
+    np.testing.assert_allclose(runs[phi_column(TIMES[-1])], TRUE[LOGARITHMIC].at(inside).mean(), rtol=1e-9)
+    assert np.isfinite(runs[[law_column(law, MISSED) for law in LAWS]]).all(axis=None)
     # By chance one of twenty is beyond 95 %; seeds are fixed.
     assert verdicts(runs_of(monkeypatch, STRETCHED, begin=0.15, end=0.15))[:2] == ["not resolved", "not resolved"]
     short = runs_of(monkeypatch, STRETCHED, seeds=(1, 2), seconds=10.0)
-    assert short[[at(20.0), at(200.0)]].isna().all(axis=None)
+    assert short[[phi_column(20.0), phi_column(200.0)]].isna().all(axis=None)
     assert verdicts(short)[0] == "no data"

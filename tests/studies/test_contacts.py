@@ -32,8 +32,8 @@ from studies.contacts import (
     WALL,
     by_seed,
     effects,
+    lowest_rise,
     points,
-    risen,
 )
 from studies.framework.shaken import FRICTION, gravish_at
 
@@ -107,6 +107,6 @@ def test_the_lowest_tenth_rises_by_what_the_piles_height_makes_it(tmp_path: Path
     # Heights are shares of that of the pile; of twelve smarticles one is a tenth. Frames scatter by 0.2 % of φ.
     before = np.mean([run.height(0.105 * (1 + shift)) for shift in (0.002, -0.002)])
     after = run.height(0.090 * (1 - 0.002))
-    assert risen(manifest) == pytest.approx(
+    assert lowest_rise(manifest) == pytest.approx(
         run.shares()[0] * (after - before) / manifest.manifest.middle_length_m, rel=1e-5
     )

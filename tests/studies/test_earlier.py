@@ -11,7 +11,7 @@ from synthetic import write_run
 from dem.errors import InputError
 from dem.scene.reading import dump_scene
 from studies.framework.runs import MeasuredRun, Wanted, collect_runs, earlier_runs
-from studies.registry import shipped, study_file
+from studies.registry import shipped
 from templates.sweep.expand import Point, expand
 from templates.sweep.sweep_file import load_sweep
 
@@ -21,7 +21,7 @@ NAME = "shape-change_lw0.70_links_seed3"
 
 @pytest.fixture(scope="module")
 def points() -> dict[str, Point]:
-    return {point.name: point for point in expand(load_sweep(study_file("procedures")))}
+    return {point.name: point for point in expand(load_sweep(shipped("procedures").sweep_file()))}
 
 
 @pytest.fixture(scope="module")

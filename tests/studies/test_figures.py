@@ -18,7 +18,7 @@ from studies.framework.figures import BARS, draw_bounds, draw_means, finish, mar
 from studies.framework.shaken import gravish_note
 from studies.framework.study import format_numbers
 
-LOOK = {**marker("o", figures.BLUE, "white"), "linestyle": "none"}
+PROPERTIES = {**marker("o", figures.BLUE, "white"), "linestyle": "none"}
 ORIGIN = ("Study toy: 2 of 2 runs.", "More: toy.md.")
 
 
@@ -29,10 +29,7 @@ def footer(figure: Figure, tmp_path: Path, *, notes: Sequence[str] = (), bars: s
 
 
 def points(axes: Axes, middle: Sequence[float], half_widths: Sequence[float]) -> None:
-    draw_means(axes, range(len(middle)), middle, half_widths, look=LOOK, label="points")
-
-
-# -- error bars ------------------------------------------------------------------------------------------------------
+    draw_means(axes, range(len(middle)), middle, half_widths, properties=PROPERTIES, label="points")
 
 
 def test_error_bars_are_named_once_and_only_where_there_are_any(tmp_path: Path) -> None:
@@ -42,11 +39,8 @@ def test_error_bars_are_named_once_and_only_where_there_are_any(tmp_path: Path) 
     assert footer(figure, tmp_path, notes=["Note."]) == f"Note. {BARS}. {' '.join(ORIGIN)}"
     figure, axes = figures.new_figure()
     points(axes, [1.0, 2.0], [np.nan, np.nan])
-    draw_bounds(axes, [0.0, 1.0], [1.0, np.nan], 0.2, look=LOOK)
+    draw_bounds(axes, [0.0, 1.0], [1.0, np.nan], 0.2, properties=PROPERTIES)
     assert footer(figure, tmp_path) == " ".join(ORIGIN)
-
-
-# -- limits ----------------------------------------------------------------------------------------------------------
 
 
 def test_limits_are_widened_to_what_is_drawn(tmp_path: Path) -> None:
@@ -79,12 +73,6 @@ def test_what_a_logarithmic_axis_cannot_show_is_stated(
     said = footer(figure, tmp_path)
     assert (stated in said) if stated else "cut" not in said
     assert axes.get_ylim()[1] > 2 + half_widths[2]
-
-
-# -- footers ---------------------------------------------------------------------------------------------------------
-
-
-# -- points that were never digitised ----------------------------------------------------------------------------------
 
 
 def test_references_state_where_they_have_no_point() -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -10,6 +11,7 @@ import pandas as pd
 import pytest
 from synthetic import SyntheticRun, write_manifest
 
+import studies
 from dem.errors import InputError
 from dem.record.run import Run
 from postprocess.statistics.points import ASPECT, SEED
@@ -17,7 +19,7 @@ from studies.framework.figures import Means, one_by_one
 from studies.framework.findings import mean
 from studies.framework.provenance import NOTHING
 from studies.framework.runs import Key, Quantity, Row
-from studies.framework.study import Study
+from studies.framework.study import COUNT, Study
 
 ORIGIN = {"note": "the full study as shipped", "command": "smarticles study toy --out 'my toy'"}
 LEVEL = Quantity(column="level [m]", label="level [mm]", form=".1f", scale=1e3, meaning="a level")
@@ -141,3 +143,29 @@ def test_runs_that_must_not_be_averaged_are_rejected(
     with pytest.raises(InputError, match=message):
         TOY.analyse([runs[0], write(tmp_path / "other", **{"seed": 5, **other})], tmp_path / "out", **ORIGIN)
     assert list((tmp_path / "out").iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    "figure",
+    [
+        Means(name="odd", quantities=[LEVEL], x=ASPECT, x_label="l/w", split=one_by_one("colour", str)),
+        Means(name="odd", quantities=[LEVEL], x=ASPECT, x_label="l/w", split=lambda _: [], panels="colour"),
+    ],
+)
+def test_a_figure_split_by_a_column_that_is_no_key_is_rejected_when_the_study_is_made(figure: Means) -> None:
+    message = r"study toy: figure odd is split by the column 'colour', which is no key; keys: aspect ratio \[-\]; split"
+    with pytest.raises(InputError, match=message):
+        replace(TOY, figures=[figure])
+
+
+def test_the_study_of_the_readme_makes_its_points_and_findings() -> None:
+    readme = (Path(studies.__file__).parent / "README.md").read_text(encoding="utf-8")
+    names: dict[str, Any] = {}
+    exec(readme.split("```python\n")[1].split("```")[0], names)
+    cells = [(count, seed) for count in (12, 24) for seed in (1, 2, 3)]
+    runs = pd.DataFrame(
+        [{ASPECT: 0.7, COUNT: count, SEED: seed, names["HEIGHT"]: 1e-4 * (count + seed)} for count, seed in cells]
+    )
+    tables = names["STUDY"].tabulate(runs)
+    assert names["STUDY"].table(tables)[1] == [["0.7", "12", "3", "1.4 ± 0.1"], ["0.7", "24", "3", "2.6 ± 0.1"]]
+    assert [one.verdict for one in names["STUDY"].judge(tables)] == ["found"]

@@ -67,9 +67,9 @@ def test_hours_are_those_planned_and_those_that_finished_runs_took(studies: Path
 
 
 def test_what_holds_no_study_is_rejected(studies: Path, tmp_path: Path) -> None:
-    with pytest.raises(InputError, match="there is no such directory"):
+    with pytest.raises(InputError, match="no such directory"):
         hours(tmp_path / "none")
-    with pytest.raises(InputError, match="none of its folders is that of a sweep"):
+    with pytest.raises(InputError, match="none of its folders is the folder of a sweep"):
         hours(studies / "beside")
     with pytest.raises(InputError, match=r"beside: holds neither a run \(run.json\) nor a sweep"):
         hours(studies, ["beside"])

@@ -133,7 +133,7 @@ def test_seeds_are_whole_numbers_each_once() -> None:
     assert parse_seeds("3, 1,20") == (3, 1, 20)
     assert parse_seeds("1-3,7") == (1, 2, 3, 7)
     for text in ("3-1", "0-99999"):
-        with pytest.raises(InputError, match=f"{text} must go up, by fewer than 1000"):
+        with pytest.raises(InputError, match=f"{text} must be an ascending range of at most 1000"):
             parse_seeds(text)
     for text in ("", "1,x", "1.5", "-1", "²"):
         with pytest.raises(InputError, match="must be whole numbers from 0, such as 1,2,3"):

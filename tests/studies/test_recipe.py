@@ -147,6 +147,6 @@ def test_text_and_figures_are_made_from_the_tables(table: str, tmp_path: Path, m
     assert "seeds 1" in study.statements(tables)[0]
     text = "\n".join(study.text(tables, study.judge(tables), []))
     assert all(one.says in text for one in study.findings)
-    drawn = study.draw(tmp_path, Analysis(tables=tables, manifests={}, footer=["A footer."]))
+    drawn = study.draw(tmp_path, Analysis(tables=tables, runs={}, footer=["A footer."]))
     assert {path.stem for path in drawn} <= {figure.name for figure in study.figures}
     assert all(path.stat().st_size > 1000 for path in drawn)

@@ -56,7 +56,7 @@ def test_runs_of_other_names_or_aspect_ratios_are_rejected(tmp_path: Path) -> No
     good = write(tmp_path / "draft_seed1")
     renamed = write(tmp_path / "draft_seed2")
     report = STUDY.analyse([good, renamed], tmp_path / "out", **ORIGIN)
-    assert "runs of this study are named VARIANT_seedN, here N = 1" in report.missing[0].cause
+    assert "must be named VARIANT_seed1; give the run its name back" in report.missing[0].cause
     other = write(tmp_path / "pitch-0.5_seed1", aspect_ratio=1.0)
     with pytest.raises(InputError, match=r"runs of different aspect ratio \[-\] must not be averaged"):
         STUDY.analyse([good, other], tmp_path / "out", **ORIGIN)

@@ -14,7 +14,7 @@ from sweeps import of_one_seed
 from dem.phases.shake import Shake
 from dem.setting.fidelity import FIDELITIES, Fidelity
 from smarticles.commands.study import differences
-from studies.registry import STUDIES, study_file
+from studies.registry import STUDIES, shipped
 from templates.sweep.expand import Point, expand
 from templates.sweep.sweep_file import load_sweep, on_engine
 
@@ -25,12 +25,12 @@ AGAIN = {"gravish": 9, "melting": 8}
 @cache
 def points_of(name: str, *, quick: bool = False) -> list[Point]:
     """Points of a study, expanded once for all tests of this file."""
-    return expand(load_sweep(study_file(name, quick=quick)))
+    return expand(load_sweep(shipped(name).sweep_file(quick=quick)))
 
 
 def first_seed(name: str) -> list[Point]:
     """Points of a study with the first of its seeds."""
-    return expand(of_one_seed(load_sweep(study_file(name))))
+    return expand(of_one_seed(load_sweep(shipped(name).sweep_file())))
 
 
 @pytest.mark.parametrize("name", sorted(AGAIN))
@@ -51,7 +51,7 @@ def test_some_points_come_again_on_yade_from_the_same_poses(name: str) -> None:
 @pytest.mark.parametrize("name", sorted(set(STUDIES) - {"engines", "chain-bodies"}))
 @pytest.mark.parametrize("engine", ["yade", "links"])
 def test_every_study_runs_on_either_engine(name: str, engine: str) -> None:
-    found = expand(on_engine(of_one_seed(load_sweep(study_file(name))), engine))
+    found = expand(on_engine(of_one_seed(load_sweep(shipped(name).sweep_file())), engine))
     assert {point.scene.engine for point in found} == {engine}
     assert not any(point.again for point in found)
 
@@ -114,11 +114,11 @@ def test_the_quick_variant_says_how_it_differs() -> None:
 
 @pytest.mark.parametrize("name", STUDIES)
 def test_a_study_is_what_the_registry_calls_it(name: str) -> None:
-    shipped = STUDIES[name]
-    assert shipped.load().name == name
-    assert shipped.about
-    variables = expand(of_one_seed(load_sweep(shipped.sweep_file())))[0].values
-    assert set(shipped.pictured) <= set(variables)
+    script = STUDIES[name]
+    assert script.load().name == name
+    assert script.about
+    variables = expand(of_one_seed(load_sweep(script.sweep_file())))[0].values
+    assert set(script.load().pictured) <= set(variables)
 
 
 def test_the_registry_of_studies_loads_nothing_large() -> None:

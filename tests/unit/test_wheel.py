@@ -16,7 +16,7 @@ import pytest
 from synthetic import SyntheticRun, write_run
 
 from smarticles.sweeps import make_folder
-from studies.registry import study_file
+from studies.registry import shipped
 
 ROOT = Path(__file__).resolve().parents[2]
 PACKAGES = {"dem", "postprocess", "smarticles", "studies", "templates"}
@@ -92,7 +92,7 @@ def test_every_file_of_the_packages_is_in_the_wheel(wheel: Path, sources: list[s
 
 def test_a_study_is_analysed_from_the_wheel(smarticles: Callable[..., str], tmp_path: Path) -> None:
     out = tmp_path / "study"
-    folder = make_folder(study_file("gravish", quick=True), out, "test")
+    folder = make_folder(shipped("gravish").sweep_file(quick=True), out, "test")
     for entry in folder.entries:
         shake = SyntheticRun(
             aspect_ratio=entry.values["l_over_w"], seed=entry.values["seed"], count=6, frames_per_phase=1

@@ -16,7 +16,7 @@ from scenes import small
 from dem.scene.reading import dump_scene
 from smarticles.reporting.charts import thinned
 from smarticles.sweeps import make_folder
-from studies.registry import study_file
+from studies.registry import shipped
 
 
 class Read(HTMLParser):
@@ -170,7 +170,9 @@ def test_the_page_of_a_sweep_has_means_and_figures(
 
 
 def test_the_page_of_a_study_has_its_verdicts(tmp_path: Path, write_run: WriteRun, smarticles: Smarticles) -> None:
-    folder = make_folder(study_file("gravish", quick=True), tmp_path / "study", "smarticles study gravish --quick")
+    folder = make_folder(
+        shipped("gravish").sweep_file(quick=True), tmp_path / "study", "smarticles study gravish --quick"
+    )
     for entry in [one for one in folder.entries if not one.again and one.values["l_over_w"] in (0.4, 0.7)]:
         known = {"aspect_ratio": entry.values["l_over_w"], "seed": entry.values["seed"]}
         made = write_run(folder.run(entry), frames_per_phase=2, **known) / "run.json"

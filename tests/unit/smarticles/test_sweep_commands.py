@@ -9,7 +9,7 @@ import pytest
 from command_cases import Smarticles, WriteRun
 from synthetic import write_ended
 
-from studies.registry import study_file
+from studies.registry import shipped
 from templates.sweep.expand import expand
 from templates.sweep.folder import open_folder
 from templates.sweep.sweep_file import load_sweep
@@ -95,8 +95,8 @@ def test_a_failing_run_is_status_1_with_its_cause(sweep_file: Path, tmp_path: Pa
 def finished_study(tmp_path: Path, write_run: WriteRun, smarticles: Smarticles) -> Path:
     """The quick study with made-up finished runs, all but one."""
     out = tmp_path / "study"
-    points = expand(load_sweep(study_file("gravish", quick=True)))
-    smarticles("sweep", study_file("gravish", quick=True), "--out", out)
+    points = expand(load_sweep(shipped("gravish").sweep_file(quick=True)))
+    smarticles("sweep", shipped("gravish").sweep_file(quick=True), "--out", out)
     for point in points[:-1]:
         run = write_run(
             out / "runs" / point.name,
@@ -166,7 +166,7 @@ def test_a_sweep_runs_on_the_engine_that_is_asked_for(sweep_file: Path, tmp_path
     said = smarticles("sweep", sweep_file, "--engine", "links", "--out", tmp_path / "out")
     assert said.status == 2
     assert "constants: there is no 'engine' that could be links; add `engine: yade` there, and" in said.err
-    said = smarticles("sweep", study_file("gravish"), "--engine", "links", "--dry-run")
+    said = smarticles("sweep", shipped("gravish").sweep_file(), "--engine", "links", "--dry-run")
     assert said.out.splitlines()[-1].startswith("64 runs, ")
-    said = smarticles("sweep", study_file("gravish"), "--engine", "yode", "--dry-run")
+    said = smarticles("sweep", shipped("gravish").sweep_file(), "--engine", "yode", "--dry-run")
     assert "--engine: 'yode' is not known; did you mean 'yade'?" in said.err
