@@ -1,13 +1,13 @@
-"""Measure how contacts share the load, where a run recorded forces (`recording.contact_forces`).
+"""Measure how contacts share the load in runs that record forces (`recording.contact_forces`).
 
-A contact is all points at which a pair of links touches; those with floor, wall and hooks are left out. A contact is
-strong if its normal force is above the mean of the frame, and smarticles that strong contacts join make a chain: the
-strong network, which carries the stress of granular matter while the weak contacts prop it (Radjai, Jean, Moreau &
-Roux, Phys. Rev. Lett. 77, 274 (1996); Radjai, Wolf, Jean & Moreau, Phys. Rev. Lett. 80, 61 (1998)).
+All points at which two links touch count as one contact; contacts with floor, wall and hooks are left out. A contact is
+strong if its normal force exceeds the mean of the frame. Smarticles joined by strong contacts form force chains, which
+carry the stress of granular matter (Radjai, Jean, Moreau & Roux, Phys. Rev. Lett. 77, 274 (1996); Radjai, Wolf, Jean &
+Moreau, Phys. Rev. Lett. 80, 61 (1998)).
 
-The participation of the forces is 1 / (M Σ q²), q = f / Σ f: 1 where all M contacts carry alike, 1/M where one carries
-all (Makse, Johnson & Schwartz, Phys. Rev. Lett. 84, 4160 (2000)). Forces that are distributed as exp(-f/⟨f⟩) have
-e⁻¹ = 0.37 strong contacts, which carry 2/e = 0.74 of the load, and a participation of 0.5.
+The participation of the forces is 1 / (M Σ q²) with q = f / Σ f: 1 if all M contacts carry equal forces, 1/M if one
+carries the whole load (Makse, Johnson & Schwartz, Phys. Rev. Lett. 84, 4160 (2000)). Of forces distributed as
+exp(-f/⟨f⟩), the fraction e⁻¹ = 0.37 is strong and carries 2/e = 0.74 of the load; the participation is 0.5.
 """
 
 from __future__ import annotations
@@ -28,18 +28,18 @@ from postprocess.measures.registry import FrameMeasure, Quantity
 
 
 class ForceDistribution(NamedTuple):
-    """P(f), the density of normal forces over their mean."""
+    """P(f), the probability density of normal forces over their mean, in B bins."""
 
-    edges: Floats  #: (B + 1,) float64, of the bins, f / ⟨f⟩ [-]
-    density: Floats  #: (B,) float64 [-], its integral is 1 where the bins hold all forces
+    edges: Floats  #: (B + 1,) float64 [-], edges of the bins, f / ⟨f⟩
+    density: Floats  #: (B,) float64 [-], probability density; its integral is 1 if the bins hold all forces
 
 
 def checked_forces(normal: ArrayLike) -> Floats:
-    """Return normal forces as an array.
+    """Return normal forces as a float64 array (M,) [N] after checking them.
 
     Raises:
         InputError: Not (M,) finite numbers above 0.
-        UndefinedMeasureError: There is none.
+        UndefinedMeasureError: There is no force.
     """
     normal = np.asarray(normal, dtype=np.float64)
     if normal.ndim != 1 or not np.all(np.isfinite(normal)) or np.any(normal <= 0):
@@ -50,11 +50,11 @@ def checked_forces(normal: ArrayLike) -> Floats:
 
 
 def strong_contacts(normal: ArrayLike) -> Flags:
-    """Find strong contacts (M,): those whose normal force, of (M,) [N], is above the mean.
+    """Return which of M contacts are strong, by their normal forces (M,) [N]: (M,) bool.
 
     Raises:
         InputError: Not (M,) finite numbers above 0.
-        UndefinedMeasureError: There is none.
+        UndefinedMeasureError: There is no contact.
 
     Source:
         Radjai et al., Phys. Rev. Lett. 80, 61 (1998).
@@ -64,14 +64,18 @@ def strong_contacts(normal: ArrayLike) -> Flags:
         [False, False, True]
     """
     normal = checked_forces(normal)
-    found: Flags = normal > normal.mean()
-    return found
+    strong: Flags = normal > normal.mean()
+    return strong
 
 
 def force_participation(normal: ArrayLike) -> float:
-    """Compute how evenly contacts share the load [-], by their normal forces (M,) [N].
+    """Compute the participation [-] of M contacts by their normal forces (M,) [N].
 
-    1 where all carry alike, 1/M where one carries all; raises as `strong_contacts`.
+    It is 1 if all contacts carry equal forces, 1/M if one carries the whole load.
+
+    Raises:
+        InputError: Not (M,) finite numbers above 0.
+        UndefinedMeasureError: There is no contact.
 
     Source:
         Makse, Johnson & Schwartz, Phys. Rev. Lett. 84, 4160 (2000).
@@ -85,15 +89,16 @@ def force_participation(normal: ArrayLike) -> float:
 
 
 def force_distribution(normal: ArrayLike, *, edges: ArrayLike | None = None) -> ForceDistribution:
-    """Compute P(f), the density of normal forces (M,) [N] over their mean; average frames by hand.
+    """Compute P(f), the probability density of the normal forces (M,) [N] of one frame over their mean.
 
     Args:
-        edges: (B + 1,) of the bins, f / ⟨f⟩ [-]; 0 to 8 in steps of 0.25 if not given. Larger forces are left out of
-            the bins, and counted in the density.
+        normal: (M,) normal forces [N].
+        edges: (B + 1,) edges of the bins, f / ⟨f⟩ [-]; 0 to 8 in steps of 0.25 if not given. Forces beyond the last
+            edge fall into no bin but count in the normalisation.
 
     Raises:
         InputError: Not (M,) finite numbers above 0, or edges that do not ascend.
-        UndefinedMeasureError: There is none.
+        UndefinedMeasureError: There is no force.
 
     Source:
         Radjai et al., Phys. Rev. Lett. 77, 274 (1996): an exponential above the mean.
@@ -107,13 +112,13 @@ def force_distribution(normal: ArrayLike, *, edges: ArrayLike | None = None) -> 
 
 
 def force_chains(frame: Frame, forces: RecordedForces | None = None) -> Clusters:
-    """Join smarticles by strong contacts; clusters of one smarticle are no chain.
+    """Find clusters of smarticles joined by strong contacts; a cluster of one smarticle is no force chain.
 
-    The forces recorded with the frame are read if not given.
+    The recorded forces of the frame are read from its run directory if not given.
 
     Raises:
-        InputError: The run recorded no forces, or they are damaged.
-        UndefinedMeasureError: There is no smarticle, or none touches another.
+        InputError: The run recorded no forces, or their file is damaged.
+        UndefinedMeasureError: There is no smarticle, or no smarticle touches another.
     """
     forces = read_forces(frame) if forces is None else forces
     between = forces.between
@@ -127,13 +132,13 @@ def _taken_of(frame: Frame, _: Run) -> tuple[float, ...]:
     normal, tangential = forces.contacts.normal[between], forces.contacts.tangential[between]
     if not len(normal):
         return (0.0, *(math.nan,) * 6)
-    above = strong_contacts(normal)
+    strong = strong_contacts(normal)
     return (
         float(len(normal)),
         float(normal.mean()),
         float(tangential.sum() / normal.sum()),
-        float(above.mean()),
-        float(normal[above].sum() / normal.sum()),
+        float(strong.mean()),
+        float(normal[strong].sum() / normal.sum()),
         force_participation(normal),
         force_chains(frame, forces).largest,
     )
