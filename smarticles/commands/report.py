@@ -37,14 +37,14 @@ repeat it. The file holds all that it shows: it can be sent, kept, and opened wi
 
 def write_report(arguments: argparse.Namespace) -> int:
     """Write the page."""
-    from postprocess.report.figures import refuse_to_overwrite, whole_file  # noqa: PLC0415
+    from postprocess.report.figures import check_output, whole_file  # noqa: PLC0415
 
     directory: Path = arguments.directory
     output: Path = arguments.output or directory / "report.html"
     if output.suffix != ".html":
         raise InputError(f"--output {output}: a report is HTML; let its name end in .html")
     # Before a minute of measuring, not after it.
-    refuse_to_overwrite(output, overwrite=arguments.overwrite)
+    check_output(output, overwrite=arguments.overwrite)
     if arguments.output is not None and not output.parent.is_dir():
         msg = f"--output {output}: the folder {output.parent} does not exist; make it, or choose another one"
         raise InputError(msg)
