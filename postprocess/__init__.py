@@ -14,13 +14,7 @@ from dem.record.series import Series, read_series
 from postprocess.geometry.links import UndefinedMeasureError, centres_of_mass
 from postprocess.measures.contacts import ContactPairs, contact_pairs, pairs_in_contact
 from postprocess.measures.entanglement import CrossingPairs, crossing_pairs, has_plane, link_crossings
-from postprocess.measures.force_chains import (
-    ForceDistribution,
-    force_chains,
-    force_distribution,
-    force_participation,
-    strong_contacts,
-)
+from postprocess.measures.force_chains import force_chains, force_participation, strong_contacts
 from postprocess.measures.heights import material_height
 from postprocess.measures.linking import gauss_integral
 from postprocess.measures.nematic import NematicOrder, nematic_order
@@ -34,7 +28,6 @@ __all__ = [
     "DEFINITIONS",
     "ContactPairs",
     "CrossingPairs",
-    "ForceDistribution",
     "Frame",
     "FrameSequence",
     "Mean",
@@ -50,7 +43,6 @@ __all__ = [
     "contact_pairs",
     "crossing_pairs",
     "force_chains",
-    "force_distribution",
     "force_participation",
     "gauss_integral",
     "has_plane",

@@ -41,7 +41,7 @@ def rgb(colour: str) -> list[float]:
 
 
 def folder_of_export(given: str | None) -> Path:
-    """Find the .pvd files: in the given folder, that of the open file, that of this script, or this one."""
+    """Return the folder with the .pvd files: the given one, or that of the open file, or of this script."""
     source = simple.GetActiveSource()
     places = [Path(given)] if given else []
     if source is not None and hasattr(source, "FileName"):

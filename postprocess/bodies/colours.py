@@ -124,7 +124,7 @@ def scalars(field: Field, frame: Frame, run: Run) -> Floats:
 
 
 def span(values: Iterable[Floats]) -> Span:
-    """Return the least and the greatest finite value of several arrays; 0 and 1 if there is none."""
+    """Return the least and the greatest finite value of several arrays; 0 and 1 if no value is finite."""
     finite = [each[np.isfinite(each)] for each in values]
     joined = np.concatenate([np.empty(0), *finite])
     return (float(joined.min()), float(joined.max())) if joined.size else (0.0, 1.0)

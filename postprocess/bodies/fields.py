@@ -171,7 +171,7 @@ FIELDS: tuple[Field, ...] = (
     Field(
         "entanglement_cluster",
         "-",
-        "number of its cluster of smarticles of which one passes through the other's plane, 0 the largest",
+        "number of its cluster of smarticles joined by crossings, 0 the largest",
         _labels(lambda frame, _: entanglement_clusters(frame.vertices)),
         kind="name",
         available_for=in_space,

@@ -1,7 +1,7 @@
 """Make meshes [m] of the bodies of a run in a frame: links, walls, floor, hooks, strings, forces.
 
-Coordinates are those of the frames, z upwards, so that a shaken container moves. Sizes are those of the simulation. A
-wall without a height in the scene ends above the highest smarticle; walls and strings have no thickness.
+Meshes have the coordinates of the frames, z upwards, so that a shaken container moves, and the sizes of the simulation.
+A wall without a height in the scene ends above the highest smarticle; walls and strings have no thickness.
 """
 
 from __future__ import annotations
@@ -204,7 +204,7 @@ USUAL = tuple(kind for kind in KINDS if kind not in ON_REQUEST)
 
 BOX_POINTS, BOX_FACES = 8, 6
 _ROUND = 96  # corners of a circle
-_THINNEST = 0.05  # diameter of the thinnest tube of a force over that of the thickest
+_THINNEST = 0.05  # least thickness of a tube of force over the largest thickness
 
 # Corners of a box (along, in plane, normal), and its faces, counterclockwise seen from outside.
 _CORNERS = np.array([(i, j, k) for i in (-1, 1) for j in (-1, 1) for k in (-1, 1)]) / 2
@@ -448,7 +448,7 @@ def owners(mesh: pv.PolyData, frame: Frame) -> tuple[Whole, Whole]:
 
 
 def force_lines(forces: RecordedForces) -> pv.PolyData:
-    """Return a mesh [m] of lines from the centres of mass of smarticles to their contacts.
+    """Return a mesh [m] of lines from the smarticles' centres of mass to their contacts.
 
     A contact between smarticles has two lines, a contact with a boundary one. Lines share no points, because tubes
     around a sharp bend would be torn. The cell data `contact` are the indices of the contacts.

@@ -120,7 +120,7 @@ def _mirrored(points: Floats, container: Region, lid: float, band: float) -> Flo
 
 
 def _cell_volumes(points: Floats, count: int, *, reach: float, together: int = TOGETHER) -> Floats:
-    """Compute the volumes of the Voronoi cells of the first `count` of all points (n, 3) [m].
+    """Compute the Voronoi volumes of the first `count` points among points (n, 3) [m].
 
     The points are divided into slabs along x; the cells of a slab are computed among all points within a reach [m] of
     the slab. A cell is final if the spheres around its corners that pass through its point lie inside this region: they

@@ -180,12 +180,12 @@ def collapse_of(history: ColumnHistory, definition: str, shaken: Vibration) -> C
 
 
 def period_means(times: Floats, values: Floats, frequency: float) -> tuple[Floats, Floats]:
-    """Average samples over each period from time 0 on.
+    """Average samples over each period of a vibration that begins at time 0.
 
     Args:
-        times: (n,) times of the samples [s].
+        times: (n,) times of the samples [s]; samples up to time 0 are left out.
         values: (n,) values of the samples.
-        frequency: Inverse of the period [Hz].
+        frequency: Frequency of the vibration [Hz].
 
     Returns:
         Mean times (m,) [s] and mean values (m,) of the m periods that have a sample.

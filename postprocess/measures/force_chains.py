@@ -13,7 +13,6 @@ exp(-f/⟨f⟩), the fraction e⁻¹ = 0.37 is strong and carries 2/e = 0.74 of 
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -25,13 +24,6 @@ from dem.record.run import Run
 from postprocess.geometry.links import Flags, Floats, UndefinedMeasureError
 from postprocess.measures.clusters import Clusters, joined_clusters
 from postprocess.measures.registry import FrameMeasure, Quantity
-
-
-class ForceDistribution(NamedTuple):
-    """P(f), the probability density of normal forces over their mean, in B bins."""
-
-    edges: Floats  #: (B + 1,) float64 [-], edges of the bins, f / ⟨f⟩
-    density: Floats  #: (B,) float64 [-], probability density; its integral is 1 if the bins hold all forces
 
 
 def checked_forces(normal: ArrayLike) -> Floats:
@@ -86,29 +78,6 @@ def force_participation(normal: ArrayLike) -> float:
     """
     normal = checked_forces(normal)
     return float(normal.sum() ** 2 / (len(normal) * (normal**2).sum()))
-
-
-def force_distribution(normal: ArrayLike, *, edges: ArrayLike | None = None) -> ForceDistribution:
-    """Compute P(f), the probability density of the normal forces (M,) [N] of one frame over their mean.
-
-    Args:
-        normal: (M,) normal forces [N].
-        edges: (B + 1,) edges of the bins, f / ⟨f⟩ [-]; 0 to 8 in steps of 0.25 if not given. Forces beyond the last
-            edge fall into no bin but count in the normalisation.
-
-    Raises:
-        InputError: Not (M,) finite numbers above 0, or edges that do not ascend.
-        UndefinedMeasureError: There is no force.
-
-    Source:
-        Radjai et al., Phys. Rev. Lett. 77, 274 (1996): an exponential above the mean.
-    """
-    normal = checked_forces(normal)
-    edges = np.arange(0.0, 8.01, 0.25) if edges is None else np.asarray(edges, dtype=np.float64)
-    if edges.ndim != 1 or len(edges) < 2 or not np.all(np.diff(edges) > 0):
-        raise InputError(f"edges must be numbers that ascend, two or more: got {edges.tolist()}")
-    counts, _ = np.histogram(normal / normal.mean(), bins=edges)
-    return ForceDistribution(edges=edges, density=counts / (len(normal) * np.diff(edges)))
 
 
 def force_chains(frame: Frame, forces: RecordedForces | None = None) -> Clusters:

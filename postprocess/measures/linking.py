@@ -74,7 +74,7 @@ def gauss_integral(first: ArrayLike, second: ArrayLike) -> Floats:
         undefined and counts as 0.
 
     Raises:
-        InputError: The shapes are not those of chains.
+        InputError: An array has another shape.
 
     Source:
         Klenin & Langowski, Biopolymers 54, 307 (2000), method 1a, with four arcsines for the solid angle of a
@@ -91,7 +91,7 @@ def gauss_integral(first: ArrayLike, second: ArrayLike) -> Floats:
     for curve in (first, second):
         if curve.ndim < 2 or curve.shape[-1] != 3 or curve.shape[-2] < 2:
             raise InputError(f"a polygon must be (…, corners, 3) [m] with 2 corners or more: got {curve.shape}")
-    # Differences of all corners (…, m, n, 3); those of segments s and t are at [s:s+2, t:t+2].
+    # Differences of all corners (…, m, n, 3); segments s and t have the four differences at [s:s+2, t:t+2].
     apart = second[..., None, :, :] - first[..., :, None, :]
     length = np.sqrt(np.einsum("...c,...c->...", apart, apart))
     a, b = apart[..., :-1, :-1, :], apart[..., :-1, 1:, :]

@@ -20,8 +20,8 @@ _SAMPLES = 50  # points along a link
 class Cast:
     """Comparison of a pile in a mould of T tiers ("before") with that pile without the mould ("after").
 
-    The pile's volume is that inside its outline, see `postprocess.geometry.outline`. The Jaccard index of two regions
-    is the volume of their intersection over that of their union: 1 if they are identical, 0 if they are disjoint.
+    A pile takes the space inside its outline, see `postprocess.geometry.outline`. The Jaccard index of two regions is
+    the volume of their intersection over the volume of their union: 1 if they are identical, 0 if they are disjoint.
     """
 
     filled_before: Floats  #: (T,) fraction of each tier's volume that is inside the pile before [-]

@@ -1,7 +1,7 @@
 """Compute the packing fraction of a pile in a cylinder, by one of several named definitions.
 
-Values by two definitions differ by several per cent, so each result names its definition. The radius is that of the
-container, unless a scene states another with `container.packing_radius_m`.
+Values by two definitions differ by several per cent, so each result names its definition. A pile has the radius of its
+container, unless the scene states another radius with `container.packing_radius_m`.
 """
 
 from __future__ import annotations
@@ -134,7 +134,7 @@ def _packing(definition: str, frame: Frame, run: Run) -> tuple[float]:
     return (packing_of(frame, run, definition=definition),)
 
 
-# The first definition is that of experiments: short tables call it φ and show its error.
+# Experiments use the first definition: short tables call it φ and show its error.
 _SHOWN = {
     name: Shown(heading="φ" if place == 0 else name, place=10 + place, form=".4f", with_error=place == 0)
     for place, name in enumerate(DEFINITIONS)

@@ -85,7 +85,7 @@ def packing_profile(
 
 
 def profile_table(run: Run, *, rings: int = 6, layer: float | None = None) -> pd.DataFrame:
-    """Compute φ(r, z) of the last frame of each phase of a run.
+    """Compute φ(r, z) for the last frame of every phase.
 
     Args:
         run: A run in one cylinder.

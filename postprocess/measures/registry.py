@@ -1,4 +1,4 @@
-"""Define measures, and find those that the modules of this package register.
+"""Define measures, and find all measures that the modules of this package register.
 
 Each module lists its measures in a tuple `MEASURES`. A measure has a name, a function of a frame or of a phase, and the
 columns that this function fills, with units. Tables and `smarticles measure` read the registry, so that a new measure
@@ -127,7 +127,7 @@ def shown_quantities() -> tuple[tuple[Quantity, Shown], ...]:
 def frame_measures(definitions: Sequence[str]) -> tuple[FrameMeasure, ...]:
     """Return the measures of frames in the order of their columns.
 
-    Measures that have a definition come last: those of `definitions` alone, in the order given.
+    Measures with a definition come last, in the order of `definitions`; measures with other definitions are left out.
     """
     known = sorted((m for m in registered() if isinstance(m, FrameMeasure)), key=lambda measure: measure.place)
     defined = {measure.definition: measure for measure in known}

@@ -1,4 +1,4 @@
-"""Count smarticles and those that escaped; measure how a pile without a wall spreads and tilts."""
+"""Count all and escaped smarticles; measure how a pile without a wall spreads and tilts."""
 
 from __future__ import annotations
 
@@ -58,8 +58,7 @@ def free_pile(
         vertices: (N, 4, 3) [m].
         run: The run, which gives the sizes of container and smarticles.
         floor_z: Height of the floor [m].
-        foot: x and y [m] of the point on which the pile stood: best those of the centre of mass before the wall was
-            removed.
+        foot: x and y [m] of the point on which the pile stood, best the centre of mass before the wall was removed.
 
     Raises:
         UndefinedMeasureError: There is no smarticle.

@@ -1,7 +1,8 @@
 """Measure a strain test of a chain: force against strain, peak, yield, fracture, widening.
 
 The strain is the relative increase of the distance along x between the two points where strings are tied; the force is
-that of the pulled string. A chain has fractured after the last sample at which it carries a fifth of its peak force.
+the force of the pulled string. A chain has fractured after the last sample at which it carries a fifth of its peak
+force.
 """
 
 from __future__ import annotations

@@ -86,7 +86,7 @@ def summarise_run(
     Returns:
         A table with one row per phase and units in its column names. A column "… SE" follows each mean with its
         standard error, see `seeds.mean_with_error`. "frames averaged" is the number of frames. By default costly
-        measures are those of the last frame, without an error.
+        measures are computed for the last frame alone and have no error.
 
     Raises:
         InputError: Unknown definition, `last` below 1, or a file is missing or damaged.

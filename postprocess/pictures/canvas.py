@@ -169,7 +169,14 @@ def union(extents: Sequence[Floats]) -> Floats:
 
 
 def add_bodies(plotter: Any, meshes: Mapping[str, pv.PolyData], frame: Frame, colours: NDArray[np.uint8]) -> None:
-    """Replace the meshes in a window by those of `visible_meshes`, with links in sRGB colours (N, 3, 3)."""
+    """Replace the meshes in a window.
+
+    Args:
+        plotter: The window.
+        meshes: Meshes by `visible_meshes`.
+        frame: Their frame.
+        colours: (N, 3, 3) sRGB colours of the links, uint8.
+    """
     pale = "forces" in meshes
     for kind in (*PAINTS, "ghost"):
         for name in (kind, f"{kind} edges"):
@@ -288,7 +295,15 @@ class Canvas:
         colours: NDArray[np.uint8],
         caption: Sequence[str] = (),
     ) -> None:
-        """Show meshes of `visible_meshes` and a caption in a panel, with links in sRGB colours (N, 3, 3)."""
+        """Show meshes and a caption in a panel.
+
+        Args:
+            column: Index of the panel.
+            frame: The frame.
+            meshes: Its meshes by `visible_meshes`.
+            colours: (N, 3, 3) sRGB colours of the links, uint8.
+            caption: Lines of the caption; the first is the title.
+        """
         with quiet_vtk():
             self._plotter.subplot(0, column)
             add_bodies(self._plotter, meshes, frame, colours)

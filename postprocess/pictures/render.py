@@ -71,8 +71,8 @@ def render_run(
         time: Simulated time [s], of which the nearest frame is drawn; the last time common to all runs if not given.
         color_by: Name or short name of a field; None: crossings, for planar runs smarticle_id.
         limits: Ends of the colour scale; those of this picture if not given.
-        smarticle: Number of a smarticle, which is drawn alone with those that pass through its plane; the camera looks
-            into its mouth.
+        smarticle: Number of a smarticle, which is drawn alone with the smarticles that pass through its plane; the
+            camera points into its mouth.
         size: Width and height of the picture of one run [pixel].
         view: Key of `VIEWS`; None: "front", for planar runs "top".
         forces: Whether to draw contact forces as lines, with a thickness proportional to the normal force, in front of
@@ -259,9 +259,9 @@ def _span(subjects: Sequence[Subject], values: Sequence[dict[int, Floats]], styl
 
 
 def common_times(subjects: Sequence[Subject]) -> Floats:
-    """Return the times of the frames [s] in the interval common to all runs.
+    """Return the times [s] of one run's frames in the interval common to all runs.
 
-    They are those of the run with the fewest frames in this interval.
+    This run has the fewest frames in the interval.
 
     Raises:
         InputError: The runs have no common interval.
@@ -283,7 +283,7 @@ def _checked_output(directory: Path | str, output: Path | str | None, default: s
 
 
 def _focused(subject: Subject, index: int, smarticle: int, style: Style) -> Image.Image:
-    """Draw one smarticle and those that pass through its plane, seen obliquely through its mouth.
+    """Draw one smarticle and all that pass through its plane, seen obliquely through its mouth.
 
     The smarticle and its plane are orange, links that pass through the plane blue, other links grey.
     """

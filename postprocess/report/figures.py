@@ -118,7 +118,7 @@ def add_footer(figure: Figure, lines: Sequence[str]) -> None:
 
 
 def _most_lines(height: float) -> int:
-    """Return the largest number of lines of the footer of a figure with a height [inch], at least one."""
+    """Return the number of lines that a footer may have, at least one, by the figure's height [inch]."""
     room = height * FOOTER_SHARE / (1 - FOOTER_SHARE)
     return max(int((room - _FOOTER_MARGIN) / _FOOTER_LINE), 1)
 

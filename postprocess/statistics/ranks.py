@@ -76,9 +76,9 @@ def ranks_within(values: Floats, strata: Whole) -> Floats:
 def correlation_within(x: Sequence[float], y: Sequence[float], blocks: Sequence[Hashable]) -> SeedMean:
     """Average Spearman's rank correlation of y (n,) with x (n,) over blocks (n,) in which both vary.
 
-    A y of which only a lower bound is known counts as `inf`, the highest rank. Points with NaN are left out. The error
-    is that of the scatter over blocks. It is NaN for fewer than six blocks: five correlations have one sign by chance
-    in more than 5 % of all cases.
+    A y of which only a lower bound is known counts as `inf`, the highest rank. Points with NaN are left out. The
+    standard error is that of the scatter over blocks. It is NaN for fewer than six blocks: five correlations have one
+    sign by chance in more than 5 % of all cases.
 
     Example:
         >>> f'{correlation_within([1, 2, 1, 2], [5, 7, 1, math.inf], ["a", "a", "b", "b"]).value:.3f}'
@@ -138,9 +138,11 @@ def resamples(blocks: Whole, strata: Whole, *, count: int, seed: int) -> Iterato
 
 
 def interval(value: float, drawn: Sequence[float]) -> Interval:
-    """Return a value with the 95 % interval of its resampled values, by percentiles.
+    """Return a value with its 95 % interval, by percentiles of resampled values.
 
-    The interval is NaN if more than a tenth of the resampled values are not finite.
+    Args:
+        value: The value of the data.
+        drawn: The values of the resamples. If more than a tenth of them are not finite, the interval is NaN.
     """
     known = np.asarray(drawn, dtype=np.float64)
     known = known[np.isfinite(known)]

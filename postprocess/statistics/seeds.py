@@ -60,7 +60,7 @@ class Mean:
     value: float  #: Mean; NaN without samples, or if samples are infinite with both signs
     standard_error: float  #: Standard error; NaN for fewer than two samples, or if a sample is infinite
     count: int  #: Number of samples averaged
-    effective_count: float  #: Number of independent samples with the same error; NaN if a sample is infinite
+    effective_count: float  #: Number of independent samples whose mean has this error; NaN if a sample is infinite
 
 
 def mean_with_error(samples: ArrayLike) -> Mean:
@@ -144,7 +144,7 @@ def _estimate(value: float, error: float, freedom: int, count: int) -> SeedMean:
 def difference(mean: SeedMean, baseline: SeedMean, *, scatter: Scatter | None = None) -> Difference:
     """Return the difference of two independent means, `mean` less `baseline`.
 
-    The interval is that of a scatter common to both means, or, without a scatter, of their own errors by Welch.
+    The interval follows from `scatter`, common to both means, or, without it, from the error of each mean by Welch.
 
     Source:
         Welch, Biometrika 34 (1947) 28; degrees of freedom after Satterthwaite.
@@ -171,11 +171,10 @@ def relative_difference(mean: SeedMean, baseline: SeedMean, *, scatter: Scatter 
 
 
 def slope_within(x: Sequence[float], y: Sequence[float], blocks: Sequence[Hashable]) -> Slope:
-    """Fit a slope common to all blocks, with a separate intercept for each block.
+    """Fit a slope of y (n,) against x (n,) common to all blocks, with an intercept for each block.
 
-    y (n,) is fitted against x (n,); `blocks` (n,) names the block of each point.
     Differences between blocks, such as between initial piles, thus do not count as scatter. Points with NaN are left
-    out. The number of degrees of freedom is n − blocks − 1.
+    out. The number of degrees of freedom is n less the number of blocks less 1.
 
     Example:
         >>> slope_within([0, 1, 0, 1], [5, 7, 1, 3], ["a", "a", "b", "b"]).value

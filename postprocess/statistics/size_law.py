@@ -36,10 +36,7 @@ class Scatter:
     freedom: int  #: Number of degrees of freedom
 
     def error(self, count: float, runs: int) -> float:
-        """Return the half-width of the 95 % interval of a mean over runs of `count` smarticles.
-
-        The half-width is NaN without a degree of freedom.
-        """
+        """Return the 95 % half-width of a mean over `runs` runs with N = `count`; NaN without scatter."""
         if not self.freedom:
             return math.nan
         return float(stdtrit(self.freedom, (1 + CONFIDENCE) / 2)) * math.sqrt(self.variance * count**-self.fall / runs)
@@ -181,7 +178,7 @@ class Profile:
 
     @property
     def width(self) -> float:
-        """Width s of the logistic function at the best x_c; NaN if x_c is not known."""
+        """Width s of the logistic function 1/(1 + exp(-(x - x_c)/s)) at the best x_c; NaN if unknown."""
         return float(self.widths[self.likelihood.argmax()]) if self.known else math.nan
 
     @property

@@ -63,7 +63,7 @@ def format_time(seconds: float) -> str:
 
 
 class Partition(Strict):
-    """One partition (queue) of a cluster; the value "here" is that of the submitting machine."""
+    """One partition (queue) of a cluster; "here" stands for the value of the submitting machine."""
 
     cores_per_node: int | Literal["here"]
     memory_per_node_mib: int | Literal["here"]  #: [MiB]

@@ -100,7 +100,7 @@ def plan_request(expected_s: Sequence[float], cluster: Cluster, wishes: Wishes) 
         )
     if msg:
         raise InputError(msg)
-    # Expected times are those of one core, because the speed-up by ranks is unknown.
+    # Expected times are for one core, because the speed-up by ranks is unknown.
     longest = TIME_MARGIN * max(expected_s)
     time_s = _time(longest, cluster, partition, wishes.time, where)
     return Request(

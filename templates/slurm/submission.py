@@ -60,7 +60,7 @@ class Submission(Document):
         return f"{JOBS}/{self.number}/{SCRIPT}"
 
     def of_task(self, index: int) -> tuple[str, ...]:
-        """Return the names of the runs of the task with an index."""
+        """Return the names of the runs that a task computes, by its index in the array."""
         return self.runs[index * self.runs_per_task : (index + 1) * self.runs_per_task]
 
 
@@ -186,7 +186,7 @@ def tasks_of_runs(found: Sequence[Submission]) -> dict[str, Task]:
 
 
 def merged(status: RunStatus, task: Task | None) -> RunStatus:
-    """Return the status of a run by its directory and by its task in the queue.
+    """Combine the status of a run by its directory with the state of its task in the queue.
 
     The states `done` and `failed` of the directory take precedence.
     """

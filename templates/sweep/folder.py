@@ -55,7 +55,7 @@ class Entry(Document):
     scene_sha256: str
     expected_s: float  #: Expected wall time [s]
     values: Mapping[str, Any]  #: Values of the sweep's variables
-    again: bool = False  #: Whether the run repeats another one with other constants
+    again: bool = False  #: Whether the run repeats another run with other constants
 
 
 class SweepManifest(Document):
@@ -96,8 +96,8 @@ class Folder:
     def in_order_of_start(self, entries: Sequence[Entry]) -> list[Entry]:
         """Return runs in the order in which to start them, those with the longest expected time first.
 
-        If the sweep is computed seed by seed, all runs of its first seed come before those of the second. Runs with
-        `again` come last.
+        If the sweep is computed seed by seed, all runs with its first seed come before all runs with the second. Runs
+        with `again` come last.
         """
         seeds = list(dict.fromkeys(entry.values.get(SEED) for entry in self.entries))
         ranks = {seed: rank for rank, seed in enumerate(seeds) if self.manifest.seed_by_seed}

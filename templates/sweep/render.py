@@ -62,7 +62,7 @@ def _reject(error: Exception, where: str, values: Mapping[str, Value]) -> NoRetu
     raise InputError(msg) from error
 
 
-# Errors of templates and expressions: Jinja2's own and those of the values in them.
+# Errors of Jinja2, and of Python in expressions.
 _FAILURES = (jinja2.TemplateError, ArithmeticError, TypeError, ValueError, LookupError)
 
 
