@@ -81,7 +81,7 @@ def show(folder: Path) -> tuple[Any, Any]:
 
 
 def plain(kind: str, source: Any, view: Any) -> Any:
-    """Show a kind in its colour, and return ParaView's display properties."""
+    """Show a kind of body in its colour, and return ParaView's display properties."""
     shown = simple.Show(source, view)
     shown.ColorArrayName = ["POINTS", ""]
     shown.DiffuseColor = shown.AmbientColor = rgb(COLOURS[kind])

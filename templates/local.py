@@ -141,7 +141,7 @@ class Display:
 
 
 def smarticles_command(scene: Path, directory: Path, resume: bool) -> tuple[str, ...]:
-    """Return the command that computes a scene into a run directory with this interpreter, as words."""
+    """Return the command, as words, that computes a scene into a run directory with this interpreter."""
     # -P: files in the working directory must not replace libraries.
     words = (sys.executable, "-P", "-m", "smarticles", "run", str(scene), "--out", str(directory))
     return (*words, "--resume") if resume else words

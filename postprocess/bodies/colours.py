@@ -102,7 +102,7 @@ class ColourScale:
 
 
 def colour_field(name: str | None, run: Run) -> Field:
-    """Return the field of a run by name or short name; None: crossings, of planar runs smarticle_id.
+    """Return the field of a run by name or short name; None: crossings, for planar runs smarticle_id.
 
     Raises:
         InputError: The name is unknown, or the run lacks the field.
@@ -116,7 +116,7 @@ def colour_field(name: str | None, run: Run) -> Field:
 
 
 def scalars(field: Field, frame: Frame, run: Run) -> Floats:
-    """Return the values (N, 3) of a field, one per link; the length of a vector; NaN if it is missing."""
+    """Return one value of a field per link, (N, 3): of vectors the length; NaN if the frame lacks the field."""
     values = link_values(field, frame, run)
     if values is None:
         return np.full((frame.count, 3), np.nan)

@@ -38,13 +38,13 @@ _REMOVAL, _STRAIN, _ARRANGE = "remove-container", "strain", "arrange"
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class ChainStrings:
-    """The two strings of a strain test."""
+    """The two strings of a strain test, each from a knot on the chain to an anchor."""
 
-    phase: int  #: Index of the phase in which they are tied
+    phase: int  #: Index of the phase in which the strings are tied
     start: float  #: Time at which this phase begins [s]
     speed: float  #: Speed of the moved anchor [m/s]
     from_hinge: float  #: Distance of a knot from the hinge of its barb [m]
-    #: (2, 3) far ends of the strings at the start of the phase [m]: the fixed one at low x, and the one moved along +x
+    #: (2, 3) anchors at the start of the phase [m]: the fixed anchor at low x, and the anchor that moves along +x
     anchors: Floats = field(repr=False)
 
     def lines(self, frame: Frame) -> Floats:
@@ -438,9 +438,10 @@ def link_boxes(
 
 
 def owners(mesh: pv.PolyData, frame: Frame) -> tuple[Whole, Whole]:
-    """Return the smarticle, as index into the arrays of a frame, and the link of each box: (B,), (B,).
+    """Return the owners of the B boxes of a mesh, which must have the fields `IDENTITY`.
 
-    The mesh must have the fields `IDENTITY`.
+    Returns:
+        Indices of the smarticles in the arrays of the frame (B,), and links (B,), 0 to 2.
     """
     owner, link = (np.asarray(mesh.cell_data[name])[::BOX_FACES] for name in ("smarticle_id", "link"))
     order = np.argsort(frame.smarticle_ids)

@@ -43,7 +43,7 @@ def contact_clusters(vertices: Vertices, distance: float) -> Clusters:
 
 
 def entanglement_clusters(vertices: Vertices) -> Clusters:
-    """Find clusters of smarticles joined by crossings, links of one through the plane of the other.
+    """Find clusters of smarticles joined by crossings.
 
     Raises:
         UndefinedMeasureError: There is no smarticle.
@@ -84,7 +84,7 @@ def spans_height(clusters: Clusters, vertices: Vertices, *, diameter: float, flo
 
 
 def spans_width(clusters: Clusters, vertices: Vertices, *, diameter: float, wall_radius: float) -> bool:
-    """Return whether one cluster spans the container: its contacts with the wall lie on no half circle.
+    """Return whether one cluster spans the container: no half of the wall has all its contacts.
 
     A cluster that touches a round wall on one half alone is not wedged between opposite sides.
 

@@ -61,7 +61,7 @@ def sampled_work(angles: Floats, torques: Floats) -> float:
 
 
 def sampled(frames: FrameSequence, apart: float = APART) -> list[int]:
-    """Return the indices of the first frame and of those that follow it at intervals of `apart` [s].
+    """Return the indices of frames at intervals of `apart` [s], from the first frame on.
 
     The list is empty if a frame is missing at one of these times.
     """

@@ -161,7 +161,7 @@ def _mean_over(values: Floats, samples: float) -> Floats:
 
 
 def first_drop(forces: Floats) -> tuple[int, float]:
-    """Find the first maximum of the forces (n,) [N] that a loss of a tenth or more of the force follows.
+    """Find the first maximum of forces (n,) [N] that is followed by a loss of a tenth or more.
 
     Losses that begin below three tenths of the largest force do not count.
 

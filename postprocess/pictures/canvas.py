@@ -164,7 +164,7 @@ def extent(meshes: Iterable[pv.PolyData], axes: Floats) -> Floats:
 
 
 def union(extents: Sequence[Floats]) -> Floats:
-    """Return the smallest extent (2, 2) that holds several extents."""
+    """Return the smallest extent (2, 2) that contains several extents."""
     return np.stack([np.min(extents, axis=0)[0], np.max(extents, axis=0)[1]])
 
 

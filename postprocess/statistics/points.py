@@ -38,7 +38,10 @@ def mean_columns(quantity: str, mean: SeedMean) -> dict[str, float]:
 
 
 def averaged(group: pd.DataFrame, quantities: Iterable[str]) -> dict[str, float]:
-    """Average quantities over the rows of a table, one per seed; return their `mean_columns`."""
+    """Average quantities over the rows of a table, one row per seed: columns of means and errors.
+
+    `mean_columns` describes the columns.
+    """
     found: dict[str, float] = {}
     for quantity in quantities:
         found |= mean_columns(quantity, mean_over_seeds(group[quantity]))
@@ -102,7 +105,7 @@ def pairs(one: pd.DataFrame, other: pd.DataFrame, quantity: str) -> pd.DataFrame
 
 
 def mean_difference(one: pd.DataFrame, other: pd.DataFrame, quantity: str) -> SeedMean:
-    """Return the mean over pairs of runs of a quantity in `one` less that in `other`, see `pairs`."""
+    """Average the difference of a quantity over pairs of runs, `one` less `other`; see `pairs`."""
     both = pairs(one, other, quantity)
     return mean_over_seeds(both["one"] - both["other"])
 
