@@ -116,7 +116,7 @@ def colour_field(name: str | None, run: Run) -> Field:
 
 
 def scalars(field: Field, frame: Frame, run: Run) -> Floats:
-    """Return one value of a field per link, (N, 3): of vectors the length; NaN if the frame lacks the field."""
+    """Return one value of a field per link, (N, 3): of vectors the length; NaN if the frame lacks it."""
     values = link_values(field, frame, run)
     if values is None:
         return np.full((frame.count, 3), np.nan)
