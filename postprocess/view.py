@@ -159,7 +159,7 @@ class RunView:
         return [{"colour": "#{:02x}{:02x}{:02x}".format(*colour), "label": label} for colour, label in pairs]
 
     def pick_along(self, ray: Floats) -> None:
-        """Select the first smarticle on a ray from one point to another, (2, 3) [mm]; none if it meets none."""
+        """Select the first smarticle on a ray given by two points (2, 3) [mm], or none."""
         self.pick = None
         if "smarticles" in self._meshes:
             mesh = self._meshes["smarticles"]

@@ -42,7 +42,7 @@ def checked_forces(normal: ArrayLike) -> Floats:
 
 
 def strong_contacts(normal: ArrayLike) -> Flags:
-    """Return which of M contacts are strong, by their normal forces (M,) [N]: (M,) bool.
+    """Return which contacts are strong, with a normal force above the mean: (M,) bool for (M,) [N].
 
     Raises:
         InputError: Not (M,) finite numbers above 0.

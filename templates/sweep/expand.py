@@ -27,7 +27,7 @@ class Point:
     name: str  #: Name of the run and its directory
     values: Mapping[str, Value]  #: Values of all variables, with the seed
     scene: Scene
-    scene_sha256: str
+    scene_sha256: str  #: Hash of the scene
     again: bool = False  #: Whether the point repeats another one with other constants, see `Again`
 
 

@@ -52,7 +52,7 @@ class Entry(Document):
     """One run of a sweep in its manifest."""
 
     name: str  #: Name of the run, its scene and its directory
-    scene_sha256: str
+    scene_sha256: str  #: Hash of the scene
     expected_s: float  #: Expected wall time [s]
     values: Mapping[str, Any]  #: Values of the sweep's variables
     again: bool = False  #: Whether the run repeats another run with other constants
