@@ -188,7 +188,7 @@ def without_support(
 ) -> Flags:
     """Return which of N smarticles are rattlers, which touch no smarticle, floor or wall: (N,) bool.
 
-    Their number is a lower bound of those without force: frames do not record whether a contact carries a force.
+    More smarticles than the rattlers may be without force: frames do not record whether a contact carries a force.
 
     Args:
         vertices: (N, 4, 3) [m].
