@@ -154,7 +154,7 @@ def environment() -> dict[str, str]:
     paths = [os.path.abspath(path) for path in environment.get("PYTHONPATH", "").split(os.pathsep) if path]  # noqa: PTH100
     root = Path(__file__).resolve().parents[1]
     if "site-packages" not in root.parts and "dist-packages" not in root.parts:
-        # The source tree is not installed, so runs must find it.
+        # Runs must find this source tree, which is not installed.
         paths.insert(0, str(root))
     if paths:
         environment["PYTHONPATH"] = os.pathsep.join(paths)

@@ -10,7 +10,6 @@ from scipy.spatial import QhullError, Voronoi, cKDTree
 
 from dem.errors import InputError
 from postprocess.geometry.links import (
-    Flags,
     Floats,
     UndefinedMeasureError,
     Vertices,
@@ -30,8 +29,7 @@ class LocalPacking:
     """Set-Voronoi cells of the smarticles of a pile."""
 
     volumes: Floats = field(repr=False)  #: (N,) [m³], volume of each smarticle's cell; infinite or 0 without a cell
-    interior: Flags = field(repr=False)  #: (N,) bool, whether a smarticle's centre of mass lies in the region
-    value: float  #: Packing fraction: total solid volume over total cell volume of the interior smarticles [-]
+    value: float  #: Packing fraction: total solid volume over total cell volume of the smarticles in the region [-]
 
 
 def local_packing(
@@ -89,7 +87,7 @@ def local_packing(
     if not np.isfinite(total):
         raise UndefinedMeasureError("a smarticle in the inner region has no closed Voronoi cell: the pile is too thin")
     value = float(interior.sum() * solid_volume / total)
-    return LocalPacking(volumes=volumes, interior=interior, value=value)
+    return LocalPacking(volumes=volumes, value=value)
 
 
 def _sample(vertices: Floats, spacing: float) -> tuple[Floats, Whole]:

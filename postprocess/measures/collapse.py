@@ -116,7 +116,7 @@ def column_history(run: Run, definition: str, shaken: Vibration) -> ColumnHistor
         InputError: The run lacks its series or frames, or samples before the vibration.
     """
     times, heights = _core(run, shaken) if definition == CORE else _of_series(run, definition, shaken)
-    assert shaken.phase.start_s is not None  # of a finished run
+    assert shaken.phase.start_s is not None  # the run is finished
     times = times - shaken.phase.start_s
     resting = (times > -REST * (1 + 1e-6)) & (times < 1e-9)
     before = float(heights[resting].mean()) if resting.any() else math.nan

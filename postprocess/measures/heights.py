@@ -20,7 +20,7 @@ class Heights:
     """Heights of a pile above the floor."""
 
     mean_com: float  #: Height of the centre of mass of all smarticles [m]
-    highest_com: float  #: Largest height of a smarticle's centre of mass [m]
+
     second_highest_com: float  #: Second-largest height of a smarticle's centre of mass [m]; NaN for one smarticle
     top: float  #: Height below which 95 % of the material lies [m]
 
@@ -39,7 +39,6 @@ def heights(vertices: Vertices, *, floor_z: float = 0.0) -> Heights:
     return Heights(
         # Smarticles may differ in length, so their centres are weighted by it.
         mean_com=float(np.average(centres_of_mass(vertices)[:, 2], weights=weights) - floor_z),
-        highest_com=float(com[-1]),
         second_highest_com=second_highest(com),
         top=material_height(vertices, floor_z=floor_z),
     )

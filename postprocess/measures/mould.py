@@ -13,7 +13,7 @@ from postprocess.geometry.links import Flags, Floats, Vertices, checked_vertices
 from postprocess.geometry.outline import outlines
 from postprocess.geometry.voxel import Region
 
-_SAMPLES = 50  # points along a link
+_SAMPLES = 50  # number of points along a link
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -39,8 +39,6 @@ class PackingChange:
     before: Mean  #: φ_0, mean over the last frames of the phase before the first activity [-]
     after: Mean  #: φ_f, mean over the last frames of the last activity [-]
     definition: str  #: Key of `packing.DEFINITIONS`
-    phase_before: int  #: Index of the phase in which φ_0 was measured
-    phase_after: int  #: Index of the phase in which φ_f was measured
 
 
 def measure_run(
@@ -143,15 +141,14 @@ def packing_change(
             f"run {run} has no activity with a phase before it: its phases are {types}; "
             f"name its types of activity or choose another run"
         )
-    before, after = active[0] - 1, active[-1]
     means = []
-    for phase in (before, after):
+    for phase in (active[0] - 1, active[-1]):
         part = frames.in_phase(phase)[-last:]
         if not part:
             kind = run.phases[phase].type
             raise InputError(f"run {run} has no frame of phase {phase} ({kind}) yet; wait or resume it")
         means.append(mean_with_error([packing_of(frame, run, definition=definition) for frame in part]))
-    return PackingChange(before=means[0], after=means[1], definition=definition, phase_before=before, phase_after=after)
+    return PackingChange(before=means[0], after=means[1], definition=definition)
 
 
 def _check_last(last: int) -> None:

@@ -168,7 +168,7 @@ def whole_file(path: Path, *, overwrite: bool = True) -> Iterator[Path]:
     try:
         with whole(path, shared=True) as temporary:
             yield temporary
-    except OSError as error:  # which names the temporary file, or none
+    except OSError as error:  # whose text may name the temporary file
         msg = f"{path}: cannot be written ({error.strerror or error}); free space or choose another output"
         raise RunError(msg) from error
 

@@ -31,7 +31,7 @@ def write_table(table: pd.DataFrame, path: Path | str, *, overwrite: bool = Fals
             table.to_csv(file, index=False)
     except (FileNotFoundError, PermissionError) as error:
         raise InputError(f"cannot write table {path}: {error.strerror}; choose a folder that can be written") from None
-    except OSError as error:  # which names the temporary file, or none
+    except OSError as error:  # whose text may name the temporary file
         msg = f"cannot write table {path}: {error.strerror or error}; free space or choose another folder"
         raise RunError(msg) from error
     return path
