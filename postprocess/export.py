@@ -102,7 +102,7 @@ def export_run(
                     (made / f"frame_{index:06d}.{to}" if folder else made).write_bytes(content)
                     written += 1
         if not written:
-            raise InputError(f"nothing is left to export: of {', '.join(kinds)} there is none here; leave out less")
+            raise InputError(f"nothing to export: the run has no {', '.join(kinds)} at this time; leave out less")
     return path
 
 

@@ -228,7 +228,7 @@ def checked_kinds(wanted: Sequence[str], unwanted: Sequence[str], *, also: Seque
             raise InputError(f"{name!r} is nothing to export; {nearest(name, known, cutoff=0.5)}")
     kept = tuple(kind for kind in KINDS if kind in (*USUAL, *wanted) and kind not in unwanted)
     if not kept:
-        raise InputError("nothing is left to export; leave out less")
+        raise InputError("nothing to export: all kinds of bodies are left out; leave out less")
     return kept
 
 

@@ -130,7 +130,7 @@ def share_outside(vertices: Vertices, radius: float, *, axis: tuple[float, float
     """
     centres = centres_of_mass(vertices)
     if len(centres) == 0:
-        raise UndefinedMeasureError("a share of smarticles needs at least 1 of them: got 0")
+        raise UndefinedMeasureError("a fraction of smarticles needs at least 1 smarticle: got 0")
     return float((np.hypot(*(centres[:, :2] - axis).T) > radius).mean())
 
 
