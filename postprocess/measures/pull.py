@@ -31,7 +31,7 @@ END = 0.1  #: Time at the end of the pull over which the remaining force is aver
 class HookPull:
     """Forces and heights of the two hooks during a pull of the upper hook, at n samples."""
 
-    edges: Floats = field(repr=False)  #: (n + 1,) times since the pull began [s]; the first is the last sample before
+    edges: Floats = field(repr=False)  #: (n + 1,) times of the last sample before the pull, 0, and of the n samples [s]
     raised: Floats = field(repr=False)  #: (n + 1,) distance by which the hook has been raised at these times [m]
     force: Floats = field(repr=False)  #: (n,) force that raises the hook, mean between two times [N]
     #: (n,) upward force of the smarticles on the lower hook, mean between two times [N]: the load passed on to it

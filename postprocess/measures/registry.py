@@ -83,7 +83,7 @@ class PhaseMeasure:
     available_for: Callable[[Series, int], bool]  #: Returns whether the series holds enough samples of a phase
 
     def columns(self, run: Run, series: Series, phase: int) -> dict[str, float]:
-        """Return the values of a phase by column; empty if the measure does not apply or samples lack."""
+        """Return the values of a phase by column; empty if the measure does not apply or samples are few."""
         if run.phases[phase].type not in self.phases or not self.available_for(series, phase):
             return {}
         values = self.take(run, series, phase)

@@ -98,7 +98,7 @@ class FilmTimes:
 def durations(count: int, rate: float, unit: float) -> list[int]:
     """Return the time for which each of `count` pictures is shown, in whole multiples of a unit [s].
 
-    The sums of successive times deviate from the exact ones by at most half a unit.
+    The total time of the first k pictures deviates from k / rate by at most half a unit.
 
     Example:
         >>> durations(4, 15.0, 0.01)
