@@ -27,7 +27,7 @@ from dem.setting.fidelity import Fidelity, fidelities
 from postprocess.measures.packing import DEFINITIONS
 from postprocess.measures.pull import PULL, has_pull, peak, read_pull, weight_of_one
 from postprocess.measures.table import LAST_FRAMES, summarise_run
-from postprocess.statistics.points import ASPECT, SEED, SEEDS, marked, number_text, seeds_of
+from postprocess.statistics.points import ASPECT, SEED, SEEDS, marked, seeds_of, told_number
 from postprocess.statistics.seeds import Scatter, mean_over_seeds, pooled_scatter, relative_difference
 from studies.framework.figures import POOLED, Means, one_by_one
 from studies.framework.findings import Finding, Outcome, Verdict, decide
@@ -493,7 +493,7 @@ def _label(row: pd.Series) -> str:
 
 def _errors(row: pd.Series) -> str:
     """All errors of a rung with their bands."""
-    errors = {name: number_text(row[f"{name} error [%]"], "+.1f", row[f"{name} error 95 % [%]"]) for name in SYMBOLS}
+    errors = {name: told_number(row[f"{name} error [%]"], "+.1f", row[f"{name} error 95 % [%]"]) for name in SYMBOLS}
     return ", ".join(f"{SYMBOLS[name]} {error} %" for name, error in errors.items() if error != "-")
 
 

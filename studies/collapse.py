@@ -32,7 +32,7 @@ from postprocess.measures.collapse import (
     height_with_the_wall,
     vibration,
 )
-from postprocess.statistics.points import ASPECT, SEED, SEEDS, marked, mean_columns, number_text
+from postprocess.statistics.points import ASPECT, SEED, SEEDS, marked, mean_columns, told_number
 from postprocess.statistics.seeds import SeedMean, Slope, difference, mean_over_seeds, slope_within
 from studies.framework.figures import ASPECT_LABEL, Histories, History, Means, one_by_one
 from studies.framework.findings import Effect, Finding, Outcome, Verdict, all_of, decide, within
@@ -196,7 +196,7 @@ def _greatest_between(table: pd.DataFrame) -> Outcome:
         gaps = [difference(means[INTERMEDIATE], means[end]) for end in (min(means), max(means))]
         verdict = all_of(decide(gap.clear and gap.value > 0, gap.clear, data=not math.isnan(gap.value)) for gap in gaps)
     cells = [
-        f"{aspect:g}: " + (number_text(mean.value, ".2f", mean.standard_error) if mean.count else "a bound")
+        f"{aspect:g}: " + (told_number(mean.value, ".2f", mean.standard_error) if mean.count else "a bound")
         for aspect, mean in means.items()
     ]
     return Outcome(note=f"Δ by {REMAINING}: {', '.join(cells)}", verdict=verdict)
@@ -206,7 +206,7 @@ def _as_gravish(table: pd.DataFrame) -> Outcome:
     own = table[table[DEFINITION] == REMAINING].dropna(subset=[DEVIATION])
     numbers = list(zip(own[ASPECT], own[DEVIATION], own[DEVIATION_95], strict=True))
     verdict = all_of(within(value, error, 100 * CLOSE) for _, value, error in numbers) if numbers else Verdict.NO_DATA
-    cells = ", ".join(f"l/w = {aspect:g}: {number_text(value, '+.0f', error)} %" for aspect, value, error in numbers)
+    cells = ", ".join(f"l/w = {aspect:g}: {told_number(value, '+.0f', error)} %" for aspect, value, error in numbers)
     return Outcome(note=f"deviations with 95 % half-widths: {cells}", verdict=verdict)
 
 

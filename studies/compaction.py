@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
 from dem.record.run import Run
-from postprocess.statistics.points import ASPECT, SEED, number_text
+from postprocess.statistics.points import ASPECT, SEED, told_number
 from postprocess.statistics.seeds import mean_over_seeds
 from studies.framework.findings import Effect, Finding
 from studies.framework.runs import ASPECT_KEY, Key, Quantity, Row
@@ -142,7 +142,7 @@ def positive(name: str, says: str, values: Callable[[pd.DataFrame], pd.Series], 
 
     def outcome(runs: pd.DataFrame) -> list[Effect]:
         mean = mean_over_seeds(values(runs).dropna().tolist())
-        text = form.format(number_text(mean.value, "+.2f", mean.half_width))
+        text = form.format(told_number(mean.value, "+.2f", mean.half_width))
         return [Effect(label="mean over runs, ± 95 %:", value=mean, text=f"{text} (n = {mean.count})")]
 
     return Finding(id=name, says=says, outcome=outcome)

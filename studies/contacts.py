@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from dem.record.run import Run
 from postprocess.geometry.links import centres_of_mass
-from postprocess.statistics.points import ASPECT, SEED, SEEDS, marked, mean_columns, number_text, paired_differences
+from postprocess.statistics.points import ASPECT, SEED, SEEDS, marked, mean_columns, paired_differences, told_number
 from postprocess.statistics.seeds import mean_over_seeds
 from studies.framework.figures import Rows, one_by_one
 from studies.framework.findings import Effect, Finding, Outcome, Verdict, decide
@@ -132,7 +132,7 @@ def lowers(name: str, says: str, quantity: str, *changed: str, sign: int = -1, l
             table = both.assign(**{quantity: both[quantity] - both[f"{quantity} other"]})
         form, groups = QUANTITIES[quantity].form, {"": table, **dict(iter(table.groupby(ASPECT)))}
         means = {place: mean_over_seeds(group[quantity]) for place, group in groups.items()}
-        texts = {place: number_text(one.value, f"+{form}", one.half_width) for place, one in means.items()}
+        texts = {place: told_number(one.value, f"+{form}", one.half_width) for place, one in means.items()}
         text = f"{texts.pop('')} (n = {means[''].count})"
         effect = Effect(label="effect, ± 95 %,", value=means[""], sign=sign, text=text)
         return Outcome(effects=[effect], note="by l/w " + ", ".join(f"{one:g}: {text}" for one, text in texts.items()))
@@ -154,7 +154,7 @@ def _near_gravish(means: pd.DataFrame) -> Outcome:
     best = pd.Series(dict(zip(FACTORS, whole["off"].idxmin(), strict=True)))
     rows = judged[np.all([judged[name] == best[name] for name in FACTORS], axis=0)]
     places = ", ".join(
-        f"{row[ASPECT]:g}: {number_text(row[DEVIATION], '+.1f', row[marked(DEVIATION, '95 %')])} %"
+        f"{row[ASPECT]:g}: {told_number(row[DEVIATION], '+.1f', row[marked(DEVIATION, '95 %')])} %"
         for _, row in rows.iterrows()
     )
     verdict = decide(whole["inside"].any(), each["outside"].all())

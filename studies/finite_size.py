@@ -23,7 +23,7 @@ from postprocess.measures.entanglement import entanglement
 from postprocess.measures.packing import packing_of
 from postprocess.measures.spread import escaped
 from postprocess.statistics.findings import judge, negative
-from postprocess.statistics.points import ASPECT, SEED, number_text
+from postprocess.statistics.points import ASPECT, SEED, told_number
 from postprocess.statistics.seeds import slope_within
 from postprocess.statistics.size_law import POWER, POWERS, Profile, SizeLaw, alike, profiles, size_law
 from studies.framework.figures import Means, one_by_one
@@ -237,8 +237,8 @@ def _bias(runs: pd.DataFrame, quantity: str) -> Outcome:
     bias = law.bias(PAPER_COUNT)
     part, error = 100 * bias.value / law.bulk, 100 * bias.half_width / abs(law.bulk)
     text = (
-        f"by {number_text(part, '+.1f', error)} % at 95 %: {law.at(PAPER_COUNT):{form}} of "
-        f"{number_text(law.bulk, form, law.error(1, 0))}, {law.runs} runs of {law.sizes} sizes"
+        f"by {told_number(part, '+.1f', error)} % at 95 %: {law.at(PAPER_COUNT):{form}} of "
+        f"{told_number(law.bulk, form, law.error(1, 0))}, {law.runs} runs of {law.sizes} sizes"
     )
     return Outcome(effects=[Effect(label="differs", value=bias, sign=-1, text=text)])
 
@@ -278,7 +278,7 @@ def _shift(runs: pd.DataFrame, table: pd.DataFrame, stage: str, axis: str) -> Ou
         f"{row[COUNT]}: {row['half of piles span at [-]']:.3f} ({row['from [-]']:.3f} to {row['to [-]']:.3f})"
         for _, row in rows.iterrows()
     )
-    note = f"N = {cells}; all alike: p = {number_text(chance, '.2g')}; {axis} of {seen.min():.2g} to {seen.max():.2g}"
+    note = f"N = {cells}; all alike: p = {told_number(chance, '.2g')}; {axis} of {seen.min():.2g} to {seen.max():.2g}"
     return Outcome(note=note, verdict=decide(chance < _REJECTED))
 
 
@@ -287,7 +287,7 @@ def _falls(table: pd.DataFrame, stage: str) -> Outcome:
     if rows.empty:
         return Outcome(verdict=Verdict.NO_DATA)
     listed = ", ".join(
-        f"{row[ASPECT]:g}: {number_text(row['power of N [-]'], '+.2f', row['power of N 95 % [-]'])}"
+        f"{row[ASPECT]:g}: {told_number(row['power of N [-]'], '+.2f', row['power of N 95 % [-]'])}"
         for _, row in rows.iterrows()
     )
     verdicts = rows["falls as piles grow"]

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from scipy.special import stdtr, stdtrit
 
 from dem.record.run import Run
-from postprocess.statistics.points import ASPECT, SEED, SEEDS, marked, number_text, seeds_of
+from postprocess.statistics.points import ASPECT, SEED, SEEDS, marked, seeds_of, told_number
 from postprocess.statistics.seeds import CONFIDENCE as LEVEL
 from postprocess.statistics.seeds import Scatter, mean_over_seeds, pooled_scatter, slope_within
 from studies.framework.figures import POOLED, Means, one_by_one
@@ -331,7 +331,7 @@ def one_friction(what: str) -> Finding:
         one, verdicts = best.iloc[0], tried[VERDICT]
         note = f"nearest at {one[FRICTION]:.2f} (between measured points): {one[MEAN]:.1f} % on average over "
         note += f"{one[COUNTED]} points, at most {one[LARGEST]:+.1f} %, {one['largest at']}; confidence that all are "
-        note += f"within {MARGIN:g} %: {number_text(one[CONFIDENCE], '.0f')} %"
+        note += f"within {MARGIN:g} %: {told_number(one[CONFIDENCE], '.0f')} %"
         wrong = (verdicts == "no").all() and one[VERDICT] == "no"
         return Outcome(note=note, verdict=decide((verdicts == "yes").any(), wrong))
 
@@ -384,7 +384,7 @@ def of_steel(surface: str) -> Finding:
 def _grows(grown: pd.DataFrame) -> list[Effect]:
     late = grown[GROWTHS[-1]].dropna()
     mean = mean_over_seeds(late.tolist())
-    text = f"{number_text(mean.value, '+.1f', mean.half_width)} % over {mean.count} points"
+    text = f"{told_number(mean.value, '+.1f', mean.half_width)} % over {mean.count} points"
     return [Effect(label="growth, ± 95 %,", value=mean, text=text)]
 
 
@@ -392,7 +392,7 @@ def _grows_more(grown: pd.DataFrame) -> list[Effect]:
     known = grown[grown[GROWTHS[-1]].notna()]
     columns = (known[name].tolist() for name in (FRICTION, GROWTHS[-1], ASPECT))
     slope = slope_within(*columns)
-    text = f"{number_text(slope.value / 10, '+.2f', slope.half_width / 10)} %"
+    text = f"{told_number(slope.value / 10, '+.2f', slope.half_width / 10)} %"
     return [Effect(label="per 0.1 of friction, ± 95 %,", value=slope, text=text)]
 
 

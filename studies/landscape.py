@@ -30,7 +30,7 @@ from postprocess.measures.pull import PULL, WINDOW, held_fast, peak, read_pull, 
 from postprocess.measures.table import summarise_run
 from postprocess.report import figures as style
 from postprocess.statistics.findings import effect_text, judge
-from postprocess.statistics.points import ASPECT, SEED, averaged, number_text
+from postprocess.statistics.points import ASPECT, SEED, averaged, told_number
 from postprocess.statistics.ranks import (
     Floats,
     Interval,
@@ -381,7 +381,7 @@ def _best(predictors: pd.DataFrame, comparisons: pd.DataFrame, strength: str, sc
     rivals = against[against[VERDICT] == "not resolved"]
     listed = ", ".join(f"{PREDICTORS[row[PREDICTOR]]} {_rho(row)}" for _, row in found.iloc[:4].iterrows())
     open_ = f"; not resolved against {', '.join(PREDICTORS[name] for name in rivals[OTHER])}" if len(rivals) else ""
-    share = number_text(100 * first[FIRST], ".0f")
+    share = told_number(100 * first[FIRST], ".0f")
     return Outcome(
         note=f"{PREDICTORS[first[PREDICTOR]]}, first in {share} % of resamples; rank correlations {listed}{open_}",
         verdict=decide(rivals.empty and len(against) > 0 and math.isfinite(first[LOW])),

@@ -82,7 +82,7 @@ def seeds_of(group: pd.DataFrame) -> dict[str, object]:
     return {SEEDS: len(group), "seeds": " ".join(map(str, sorted(group[SEED])))}
 
 
-def number_text(value: float, form: str, error: float = math.nan) -> str:
+def told_number(value: float, form: str, error: float = math.nan) -> str:
     """Return `0.123 ± 0.004`: a number with its error; `-` for NaN, and no error if it is not finite.
 
     The format applies to both numbers, but the error has no sign.

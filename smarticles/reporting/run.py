@@ -23,7 +23,7 @@ from dem.record.run import Run, open_run
 from dem.scene.reading import load_scene
 from dem.setting.fidelity import fidelities
 from postprocess.measures.registry import shown_quantities
-from postprocess.statistics.points import marked, number_text
+from postprocess.statistics.points import marked, told_number
 from smarticles.measuring import has_frames, measured
 from smarticles.reporting.charts import against_time
 from smarticles.reporting.page import address, embedded, figure, listing, page, table, turntable, word, words
@@ -104,7 +104,7 @@ def short_table(found: pd.DataFrame, named: Sequence[str], caption: str) -> Mark
         [
             *(row[name] for name in named),
             *(
-                number_text(s.factor * row[name], s.form, s.factor * row.get(marked(name, "SE"), float("nan")))
+                told_number(s.factor * row[name], s.form, s.factor * row.get(marked(name, "SE"), float("nan")))
                 for name, s in wanted
             ),
         ]
@@ -245,7 +245,7 @@ def accuracy_blocks(scene: Scene | None, path: Path | None) -> list[Markup]:
 
 
 def _percent(error: Error) -> str:
-    return number_text(100 * error.value, "+.1f", 100 * error.band) + ("" if error.value != error.value else " %")
+    return told_number(100 * error.value, "+.1f", 100 * error.band) + ("" if error.value != error.value else " %")
 
 
 def warning_blocks(directories: Mapping[str, Path]) -> list[Markup]:

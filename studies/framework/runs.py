@@ -19,7 +19,7 @@ from dem.record.document import Phase
 from dem.record.run import Run, open_run
 from dem.run.run import manifest
 from dem.scene.reading import load_scene
-from postprocess.statistics.points import ASPECT, SEED, marked, number_text
+from postprocess.statistics.points import ASPECT, SEED, marked, told_number
 from postprocess.statistics.seeds import mean_over_seeds
 
 Row = Mapping[str, object]  #: Cells of one row of a table, by the names of its columns
@@ -54,7 +54,7 @@ class Quantity:
     def cell(self, point: Mapping[str, float]) -> str:
         """Format the mean of a point with its error, where it has one."""
         error = point.get(marked(self.column, self.bar), math.nan)
-        return number_text(self.scale * point[self.column], self.form, self.scale * error)
+        return told_number(self.scale * point[self.column], self.form, self.scale * error)
 
 
 def declare(

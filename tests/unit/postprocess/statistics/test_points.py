@@ -7,7 +7,7 @@ import math
 import pandas as pd
 import pytest
 
-from postprocess.statistics.points import ASPECT, SEED, SEEDS, averaged, mean_difference, number_text, pairs, seeds_of
+from postprocess.statistics.points import ASPECT, SEED, SEEDS, averaged, mean_difference, pairs, seeds_of, told_number
 
 FORCE = "force [N]"
 
@@ -41,7 +41,7 @@ def test_means_carry_their_errors(group: pd.DataFrame) -> None:
     ],
 )
 def test_numbers_have_the_error_that_there_is(value: float, form: str, error: float, text: str) -> None:
-    assert number_text(value, form, error) == text
+    assert told_number(value, form, error) == text
 
 
 def test_runs_are_compared_pair_by_pair() -> None:
