@@ -1,9 +1,9 @@
-"""Frames and series in; measures, tables, figures and pictures out.
+"""Read run directories and compute measures, tables, figures and pictures of them.
 
-Readers take a run directory (see docs/reference/files.md); measures are pure functions of NumPy arrays and return
-frozen results. Lengths are in metres, times in seconds. Vertices are (N, 4, 3) [m]: barb tip, hinge, hinge, barb tip of
-each smarticle; others are rejected with `InputError`. `heights`, `entanglement` and `linking` are functions of the
-modules of these names and are imported from there.
+Readers take a run directory (see docs/reference/files.md). Measures are functions of NumPy arrays and return frozen
+results. Lengths are in metres, times in seconds. Vertices are an array (N, 4, 3) [m] with barb tip, hinge, hinge and
+barb tip of each smarticle; measures reject other shapes with `InputError`. The functions `heights`, `entanglement` and
+`linking` are imported from their modules `postprocess.measures.heights`, `.entanglement` and `.linking`.
 """
 
 from dem.record.forces import RecordedForces, read_forces
@@ -12,15 +12,9 @@ from dem.record.frames import FrameSequence, read_frames
 from dem.record.run import Run, open_run
 from dem.record.series import Series, read_series
 from postprocess.geometry.links import UndefinedMeasureError, centres_of_mass
-from postprocess.measures.contacts import ContactPairs, contact_pairs, pairs_in_contact, touching_pairs
+from postprocess.measures.contacts import ContactPairs, contact_pairs, pairs_in_contact
 from postprocess.measures.entanglement import CrossingPairs, crossing_pairs, has_plane, link_crossings
-from postprocess.measures.force_chains import (
-    ForceDistribution,
-    force_chains,
-    force_distribution,
-    force_participation,
-    strong_contacts,
-)
+from postprocess.measures.force_chains import force_chains, force_participation, strong_contacts
 from postprocess.measures.heights import material_height
 from postprocess.measures.linking import gauss_integral
 from postprocess.measures.nematic import NematicOrder, nematic_order
@@ -34,7 +28,6 @@ __all__ = [
     "DEFINITIONS",
     "ContactPairs",
     "CrossingPairs",
-    "ForceDistribution",
     "Frame",
     "FrameSequence",
     "Mean",
@@ -50,7 +43,6 @@ __all__ = [
     "contact_pairs",
     "crossing_pairs",
     "force_chains",
-    "force_distribution",
     "force_participation",
     "gauss_integral",
     "has_plane",
@@ -71,6 +63,5 @@ __all__ = [
     "read_series",
     "strong_contacts",
     "summarise_run",
-    "touching_pairs",
     "write_table",
 ]

@@ -1,4 +1,4 @@
-"""A run as files for other programs: VTP and a script for ParaView, or triangles as STL, OBJ and glTF."""
+"""Export a run for other programs: VTP files for ParaView, or triangles as STL, OBJ or glTF."""
 
 from __future__ import annotations
 
@@ -25,12 +25,12 @@ from postprocess.bodies.fields import IDENTITY, fields_of
 from postprocess.bodies.meshes import BOX_FACES, BOX_POINTS, Bodies, checked_kinds, owners, solid
 
 SUFFIXES = ("stl", "obj", "gltf", "glb")
-FORMATS = ("vtp", *SUFFIXES)  #: What a run can be exported to
+FORMATS = ("vtp", *SUFFIXES)  #: Formats of exports
 
-SCRIPT = "show_in_paraview.py"  #: Name of the script beside the collections
+SCRIPT = "show_in_paraview.py"  #: Name of the script for ParaView in an export as vtp
 
 _FIELDLESS = ("stl", "obj")
-_Y_UP = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])  # rows: x, y, z of glTF in ours
+_Y_UP = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])  # rows: axes of glTF in coordinates of the run
 
 
 def export_run(
@@ -45,26 +45,28 @@ def export_run(
     color_by: str | None = None,
     progress: Callable[[int, int], None] = lambda _done, _all: None,
 ) -> Path:
-    """Write true bodies of a run for other programs.
+    """Export the bodies of a run to files for other programs.
 
     Args:
-        directory: A run directory with at least one frame; the run need not be done.
+        directory: A run directory with at least one frame; the run may be unfinished.
         to: One of `FORMATS`.
-        output: What to write, which must not exist: of vtp and of all frames a folder, else a file that ends as `to`
-            says; `export-TO` or `export.TO` in the run directory if not given.
-        time: Simulated time [s], the nearest frame is taken; the last one if not given.
-        wanted: Kinds of bodies besides the usual ones, see `postprocess.bodies.meshes.KINDS`.
-        unwanted: Kinds and fields to leave out.
-        color_by: Name of a field, for formats with colours; None: crossings, in a plane smarticle_id.
-        progress: Receives how many frames are written, and of how many.
+        output: Path that must not exist: a folder for vtp and for all frames, else a file with the suffix of the
+        format;
+            `export-TO` or `export.TO` in the run directory if not given.
+        time: Simulated time [s], of which the nearest frame is exported; that of the last frame if not given.
+        every_frame: Whether to export all frames.
+        wanted: Kinds of bodies besides `postprocess.bodies.meshes.USUAL`.
+        unwanted: Kinds of bodies and fields to leave out.
+        color_by: Name or short name of a field, for formats with colours; None: crossings, for planar runs
+        smarticle_id. progress: Called after each frame with the number of exported frames and the number of all.
 
     Returns:
-        What was written; it is whole or not there.
+        Path of the written file or folder, which exists only if the export is complete.
 
     Raises:
-        InputError: An unknown format, kind or field, no frame, a damaged one, a time before the first or after the last
-            frame, or an output that exists.
-        RunError: It cannot be written.
+        InputError: An unknown format, kind or field, no frame, a damaged file, a time outside the recorded frames, or
+            an output that exists.
+        RunError: The output cannot be written.
     """
     if to not in FORMATS:
         raise InputError(f"--to {to}: no such format; {nearest(to, FORMATS, cutoff=0.5)}")
@@ -96,11 +98,11 @@ def export_run(
             written = 0
             for index, frame in exported():
                 content = painter.content(frame, to)
-                if content is not None:  # a wall alone that was taken away is no file
+                if content is not None:  # there is no body of the wanted kinds
                     (made / f"frame_{index:06d}.{to}" if folder else made).write_bytes(content)
                     written += 1
         if not written:
-            raise InputError(f"nothing is left to export: of {', '.join(kinds)} there is none here; leave out less")
+            raise InputError(f"nothing to export: the run has no {', '.join(kinds)} at this time; leave out less")
     return path
 
 
@@ -119,7 +121,7 @@ def _checked_output(directory: Path, output: Path | str | None, to: str, *, fold
 
 @contextmanager
 def _whole(path: Path) -> Iterator[Path]:
-    """Give a path in a folder beside `path`; it is moved to `path` when the block ends well, else removed."""
+    """Yield a temporary path, which is renamed to `path` if the block ends without an error, else removed."""
     scratch: Path | None = None
     try:
         scratch = Path(tempfile.mkdtemp(prefix=f".{path.name}.", dir=path.parent))
@@ -135,19 +137,19 @@ def _whole(path: Path) -> Iterator[Path]:
 
 
 def _write_collection(folder: Path, bodies: Bodies, frames: Iterable[tuple[int, Frame]]) -> int:
-    """Write `KIND.pvd`, which lists `KIND/KIND_000000.vtp` …, of each kind; return the number of kinds.
+    """Write `KIND.pvd`, a list of `KIND/KIND_000000.vtp` …, for each kind; return the number of kinds.
 
-    A kind has a file for every frame, without a point where there is none of it: ParaView would show the one before, a
-    wall that is gone or the forces of a moment ago.
+    Each kind has a file for every frame. If a frame has no body of the kind, the file has no points: without a file
+    ParaView would show the body of the previous frame.
     """
     written: list[tuple[int, float, int]] = []  # number, time, phase
-    empty: dict[str, pv.PolyData] = {}  # what stands where there is none of a kind
+    empty: dict[str, pv.PolyData] = {}  # mesh without points of each kind
     for number, frame in frames:
         found = bodies.at(frame)
         for kind, mesh in found.items():
             if kind not in empty:
                 (folder / kind).mkdir()
-                # With the fields of a mesh: what reads or filters them finds them at all times.
+                # ParaView's filters need the fields at all times.
                 empty[kind] = pv.PolyData()
                 empty[kind].GetPointData().CopyStructure(mesh.GetPointData())
                 empty[kind].GetCellData().CopyStructure(mesh.GetCellData())
@@ -174,12 +176,12 @@ def _name(kind: str, number: int) -> str:
 
 def _write_mesh(folder: Path, kind: str, mesh: pv.PolyData, frame: tuple[int, float, int], run: Run) -> None:
     number, time, phase = frame
-    mesh.field_data["TimeValue"] = np.array([time])  # the name by which VTK's readers know the time
+    mesh.field_data["TimeValue"] = np.array([time])  # name required by VTK's readers
     mesh.field_data["phase"] = np.array([phase])
     mesh.field_data["middle_length_m"] = np.array([run.manifest.middle_length_m])
     mesh.field_data["thickness_m"] = np.array([min(run.manifest.thickness_in_plane_m, run.manifest.thickness_normal_m)])
     for name, value in (("run_name", run.manifest.name), ("scene_sha256", run.manifest.scene_sha256)):
-        # PyVista takes no alphabet but the Latin one without accents.
+        # PyVista writes ASCII text only.
         text = vtkStringArray()
         text.SetName(name)
         text.InsertNextValue(value)
@@ -188,10 +190,10 @@ def _write_mesh(folder: Path, kind: str, mesh: pv.PolyData, frame: tuple[int, fl
 
 
 class _Painter:
-    """Files of triangles, smarticles coloured by a field on one scale for all frames.
+    """Makes files of triangles, with smarticles coloured by a field on one scale for all frames.
 
     Raises:
-        InputError: There is no field of this name, or no value of it.
+        InputError: The field is unknown, or has no value in these frames.
     """
 
     def __init__(self, bodies: Bodies, color_by: str | None, frames: Iterable[Frame]) -> None:
@@ -204,7 +206,10 @@ class _Painter:
         self._scale = ColourScale.of(self._field, self._bounds)
 
     def content(self, frame: Frame, suffix: str) -> bytes | None:
-        """Return the file of a frame, an object per kind, in an STL one for all; None without bodies."""
+        """Return the content of the file of a frame; None if there is no body.
+
+        The file has one object per kind; an STL has one for all.
+        """
         scene: Any = trimesh.Scene()
         web = suffix in {"gltf", "glb"}
         for kind, mesh in self._bodies.at(frame).items():
@@ -233,7 +238,7 @@ class _Painter:
         points = np.asarray(triangles.points, dtype=np.float64)
         colours = np.tile(PAINTS[kind].rgb, (len(points), 1))
         if kind == "smarticles":
-            # Every box has its own points, in the order of the boxes, and so have its faces.
+            # The points of each box follow those of the previous box and are not shared.
             found = self._scale.painted(scalars(self._field, frame, run)[owners(mesh, frame)])
             colours = np.repeat(found, BOX_POINTS, axis=0)
         shape = trimesh.Trimesh(
@@ -243,7 +248,7 @@ class _Painter:
             process=False,
         )
         if web and kind == "smarticles":
-            # Names of own attributes begin with an underscore, and whole numbers of four bytes are not allowed.
+            # glTF demands an underscore in names of custom attributes, and has no integers of four bytes for them.
             for name, values in mesh.cell_data.items():
                 if values.ndim == 1 and np.isfinite(values).all():
                     each = np.repeat(np.asarray(values)[::BOX_FACES], BOX_POINTS, axis=0)
@@ -251,7 +256,7 @@ class _Painter:
         return shape
 
     def _finish(self, tree: dict[str, Any], frame: Frame) -> None:
-        """Make surfaces dull, which are mirror-like metal without materials, and say where they come from."""
+        """Add dull materials, because glTF's default is a metallic mirror, and the provenance of the file."""
         tree["materials"] = []
         for mesh in tree["meshes"]:
             opacity = PAINTS[mesh["name"]].opacity

@@ -1,11 +1,12 @@
-"""Show an exported run in ParaView: boxes by crossings, the wall cut open, time ready to run.
+"""Show an exported run in ParaView: smarticles coloured by crossings, and the wall cut open.
 
-    paraview --script=show_in_paraview.py                     in its window; then press play
-    pvpython show_in_paraview.py FOLDER --picture last.png    the last frame, without a window
-    pvpython show_in_paraview.py FOLDER --film pictures       one picture per frame into a new folder
+    paraview --script=show_in_paraview.py                     in ParaView's window; then press play
+    pvpython show_in_paraview.py FOLDER --picture last.png    a picture of the last frame, without a window
+    pvpython show_in_paraview.py FOLDER --film pictures       one picture per frame in a new folder
 
-As a macro (Macros, Import new macro) it shows the folder of the .pvd file that is open. It needs ParaView 5.11 or later
-and nothing of the simulator. FOLDER is what `smarticles export --to vtp` wrote; by default that of this script.
+FOLDER is the folder that `smarticles export --to vtp` wrote; by default the folder of this script. As a macro (Macros,
+Import new macro) the script shows the folder of the open .pvd file. It needs ParaView 5.11 or later, and no module of
+smarticles.
 """
 
 from __future__ import annotations
@@ -19,7 +20,7 @@ from typing import Any
 
 try:
     simple: Any = import_module("paraview.simple")
-except ImportError:  # where this script is imported, not run
+except ImportError:  # a Python without ParaView imports this module, too
     simple = None
 
 COLOURS = {
@@ -30,17 +31,17 @@ COLOURS = {
     "crossings": "#1a1a1a",
     "forces": "#a11a2e",
 }
-SIZE = [1000, 800]  # pixels
+SIZE = [1000, 800]  # of pictures [pixel]
 KINDS = ("smarticles", "wall", "floor", "hooks", "strings", "crossings", "forces")
 
 
 def rgb(colour: str) -> list[float]:
-    """Return shares of red, green and blue of a hexadecimal colour."""
+    """Return red, green and blue of a hexadecimal colour, from 0 to 1."""
     return [int(colour[k : k + 2], 16) / 255 for k in (1, 3, 5)]
 
 
 def folder_of_export(given: str | None) -> Path:
-    """Find the .pvd files: as given, else of what is open, else beside this script, else here."""
+    """Return the folder with the .pvd files: the given one, or that of the open file, or of this script."""
     source = simple.GetActiveSource()
     places = [Path(given)] if given else []
     if source is not None and hasattr(source, "FileName"):
@@ -54,7 +55,7 @@ def folder_of_export(given: str | None) -> Path:
 
 
 def show(folder: Path) -> tuple[Any, Any]:
-    """Read every collection, and show each kind as it is."""
+    """Read the collections in a folder and show them; return view and animation scene."""
     simple._DisableFirstRenderCameraReset()
     view = simple.GetActiveViewOrCreate("RenderView")
     view.UseColorPaletteForBackground = 0
@@ -75,12 +76,12 @@ def show(folder: Path) -> tuple[Any, Any]:
     stamp.Format = "t = {time:.3f} s"
     shown = simple.Show(stamp, view)
     shown.Color, shown.FontSize = [0.1, 0.1, 0.1], 16
-    look(view, sources["smarticles"])
+    aim(view, sources["smarticles"])
     return view, scene
 
 
 def plain(kind: str, source: Any, view: Any) -> Any:
-    """Show in one colour."""
+    """Show a kind of body in its colour, and return ParaView's display properties."""
     shown = simple.Show(source, view)
     shown.ColorArrayName = ["POINTS", ""]
     shown.DiffuseColor = shown.AmbientColor = rgb(COLOURS[kind])
@@ -88,36 +89,37 @@ def plain(kind: str, source: Any, view: Any) -> Any:
 
 
 def times(source: Any) -> list[float]:
-    """Return all times of a collection, the last one first; one alone is no list in ParaView."""
+    """Return the times of a collection [s], the last one first."""
+    # ParaView gives a single time as a number, not as a list.
     found = source.TimestepValues
     return [found] if isinstance(found, float) else list(found)[::-1]
 
 
 def data_at(source: Any, time: float) -> Any:
-    """Fetch the data of a time itself: what ParaView reports of it may be of another time."""
+    """Return the data of a collection at a time [s]; ParaView's own summaries may be of another time."""
     source.UpdatePipeline(time)
     found = simple.servermanager.Fetch(source)
     return found.GetBlock(0) if found.IsA("vtkMultiBlockDataSet") else found
 
 
 def points_at(source: Any, time: float) -> int:
-    """Read a time, and count its points."""
+    """Return the number of points of a collection at a time [s]."""
     return int(data_at(source, time).GetNumberOfPoints())
 
 
 def size(source: Any, name: str) -> float:
-    """Return a length of all smarticles [m]."""
+    """Return a length of the smarticles [m] by its name in the field data."""
     return float(data_at(source, times(source)[0]).GetFieldData().GetArray(name).GetValue(0))
 
 
 def largest_at(source: Any, time: float, name: str) -> float:
-    """Return the largest value of a field of cells at a time; 0 where there is none."""
+    """Return the largest value of a cell field at a time [s]; 0 if there is no value."""
     values = data_at(source, time).GetCellData().GetArray(name)
     return float(values.GetRange()[1]) if values is not None and values.GetNumberOfTuples() else 0.0
 
 
 def boxes(_kind: str, source: Any, view: Any) -> None:
-    """Colour by crossings, one scale for all times; of motion in a plane, which has none, by number."""
+    """Show smarticles coloured by crossings, or, of a planar run, by number, on one scale for all times."""
     shown = simple.Show(source, view)
     name = colouring(source)
     simple.ColorBy(shown, ("CELLS", name))
@@ -139,14 +141,14 @@ def boxes(_kind: str, source: Any, view: Any) -> None:
 
 
 def colouring(source: Any) -> str:
-    """Name the field that the boxes are coloured by."""
+    """Return the name of the field by which smarticles are coloured."""
     source.UpdatePipeline()
     return "crossings" if source.CellData.GetArray("crossings") is not None else "smarticle_id"
 
 
 def wall(kind: str, source: Any, view: Any) -> None:
-    """Show the half behind the pile, seen from the front; of a plane all of it."""
-    # One that was taken away is none at the end.
+    """Show the half of a round wall behind the pile, or all of the walls of a channel."""
+    # A removed wall has no points at the last time; load the last time at which it has.
     next(time for time in times(source) if points_at(source, time))
     low_x, high_x, low_y, high_y = source.GetDataInformation().GetBounds()[:4]
     if abs((high_x - low_x) - (high_y - low_y)) > 0.01 * (high_x - low_x):
@@ -160,13 +162,13 @@ def wall(kind: str, source: Any, view: Any) -> None:
 
 
 def strings(kind: str, source: Any, view: Any) -> None:
-    """Show as thin tubes."""
+    """Show strings as thick lines."""
     plain(kind, source, view).LineWidth = 3.0
 
 
 def arrows(kind: str, source: Any, view: Any) -> None:
-    """Show one arrow per passage."""
-    glyph = simple.Glyph(registrationName="passages", Input=source, GlyphType="Arrow")
+    """Show one arrow per crossing."""
+    glyph = simple.Glyph(registrationName="arrows", Input=source, GlyphType="Arrow")
     glyph.OrientationArray = ["POINTS", "direction"]
     glyph.ScaleArray = ["POINTS", "No scale array"]
     glyph.ScaleFactor = size(source, "middle_length_m") / 3
@@ -175,9 +177,10 @@ def arrows(kind: str, source: Any, view: Any) -> None:
 
 
 def forces(kind: str, source: Any, view: Any) -> None:
-    """Show lines through the smarticles, the darker the larger the normal force, one scale for all times.
+    """Show forces as lines that are darker for a larger normal force, on one scale for all times.
 
-    Not tubes whose radius is the force: ParaView 5.11 forgets which field that is where a time has no force.
+    Tubes with the force as radius are no alternative: ParaView 5.11 loses the name of the field at a time without
+    force.
     """
     name = "normal_force_N"
     largest = max(largest_at(source, time, name) for time in times(source))
@@ -201,8 +204,8 @@ SHOWERS: dict[str, Callable[[str, Any, Any], Any]] = {
 }
 
 
-def look(view: Any, source: Any) -> None:
-    """Look from the front, a little from above; at a chain in a plane from above."""
+def aim(view: Any, source: Any) -> None:
+    """Point the camera at the smarticles from the front, slightly from above; at a planar run from above."""
     low_x, high_x, low_y, high_y, low_z, high_z = source.GetDataInformation().GetBounds()
     focus = [(low_x + high_x) / 2, (low_y + high_y) / 2, (low_z + high_z) / 2]
     flat = colouring(source) != "crossings"
@@ -213,19 +216,19 @@ def look(view: Any, source: Any) -> None:
 
 
 def main() -> None:
-    """Do what the command line asks for."""
+    """Run the script with the arguments of the command line."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("folder", nargs="?")
     parser.add_argument("--picture", metavar="FILE.png")
     parser.add_argument("--film", metavar="FOLDER")
-    words = parser.parse_known_args()[0]
-    view, scene = show(folder_of_export(words.folder))
+    arguments = parser.parse_known_args()[0]
+    view, scene = show(folder_of_export(arguments.folder))
     simple.Render(view)
-    if words.picture:
-        simple.SaveScreenshot(words.picture, view, ImageResolution=SIZE)
-    if words.film:
-        Path(words.film).mkdir()
-        simple.SaveAnimation(str(Path(words.film) / "frame.png"), view, scene=scene, ImageResolution=SIZE)
+    if arguments.picture:
+        simple.SaveScreenshot(arguments.picture, view, ImageResolution=SIZE)
+    if arguments.film:
+        Path(arguments.film).mkdir()
+        simple.SaveAnimation(str(Path(arguments.film) / "frame.png"), view, scene=scene, ImageResolution=SIZE)
 
 
 if __name__ == "__main__":

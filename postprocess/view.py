@@ -1,4 +1,4 @@
-"""A run in a page of the browser, to look around in: a server on this machine, drawing in the page."""
+"""Show a run in the browser, in an interactive page that a server on this machine serves."""
 
 from __future__ import annotations
 
@@ -28,13 +28,13 @@ from postprocess.bodies.colours import ColourScale, colour_field, scalars, span
 from postprocess.bodies.fields import IDENTITY, fields_of, link_values
 from postprocess.bodies.meshes import BOX_FACES, USUAL, Bodies
 from postprocess.geometry.links import Floats
-from postprocess.pictures.canvas import VIEWS, add_bodies, axes_from, drawn
+from postprocess.pictures.canvas import VIEWS, add_bodies, axes_from, visible_meshes
 
-HOST = "127.0.0.1"  #: The loopback interface, which no other machine reaches
-PICKED = (255, 0, 170)  #: Colour of the smarticle that is picked, which no palette has
+HOST = "127.0.0.1"  #: Loopback interface, unreachable from other machines
+PICKED = (255, 0, 170)  #: Colour of the selected smarticle, which no colour scale has
 
-_SAMPLES, _COSTLY_SAMPLES = 12, 3  # frames that a scale of colours is taken from
-# The page's script compiles its templates as it runs; it may speak to this server alone.
+_SAMPLES, _COSTLY_SAMPLES = 12, 3  # number of frames that define a colour scale
+# 'unsafe-eval' because the page's script compiles its templates; it may connect to this server alone.
 _HEADERS = {
     "Content-Security-Policy": "default-src 'self' 'unsafe-inline' 'unsafe-eval' data: blob:; connect-src 'self' {own} "
     "data: blob:; frame-ancestors 'none'; base-uri 'self'; form-action 'none'",
@@ -42,9 +42,9 @@ _HEADERS = {
     "X-Content-Type-Options": "nosniff",
     "Cache-Control": "no-store",
 }
-_FRAMES_EVERY = 1.0  # s, between searches for new frames
-_FILM_STEP = 0.12  # s between frames while it plays
-_CLOSED_FOR = 5  # s without a window until the server ends; a page that is loaded anew comes back sooner
+_FRAMES_EVERY = 1.0  # time between searches for new frames [s]
+_FILM_STEP = 0.12  # time between two frames while the film plays [s]
+_CLOSED_FOR = 5  # time without a page until the server ends, longer than reloading a page takes [s]
 
 _STYLE = """
 html, body { margin: 0; height: 100%; font: 14px system-ui, sans-serif; color: #1a1a1a; background: #fff; }
@@ -66,17 +66,17 @@ html, body { margin: 0; height: 100%; font: 14px system-ui, sans-serif; color: #
 
 
 class Pick(NamedTuple):
-    """The smarticle that is picked, and which of its links."""
+    """The selected smarticle and its selected link, 0 to 2."""
 
     smarticle_id: int
     link: int
 
 
 class RunView:
-    """What a page shows of a run with at least one frame: frame, colours, and what is picked.
+    """State of the page of a run: shown frame, coloured field, and selected smarticle.
 
     Raises:
-        InputError: There is none, or it is damaged.
+        InputError: The run has no frame, or is damaged.
     """
 
     def __init__(self, directory: Path | str) -> None:
@@ -99,28 +99,28 @@ class RunView:
 
     @property
     def phase(self) -> str:
-        """Type of the phase of the frame shown."""
+        """Type of the phase to which the shown frame belongs."""
         phases = self.run.phases
         return phases[self.frame.phase].type if self.frame.phase < len(phases) else "?"
 
     @property
     def ended(self) -> bool:
-        """Whether no more frames will come, by the run directory as it is now; true where it is gone."""
+        """Whether the run directory will get no more frames; true if it does not exist any more."""
         try:
             return open_run(self.run.path).status.state not in ("running", "stopped")
         except InputError:
             return True
 
     def grow(self) -> bool:
-        """Search for new frames; whether there are any."""
+        """Search for new frames, and return whether there are any."""
         before, self.frames = len(self.frames), read_frames(self.run.path)
         return len(self.frames) > before
 
     def go_to(self, index: int) -> None:
-        """Show another frame.
+        """Show the frame with an index.
 
         Raises:
-            InputError: Its file is damaged; the frame shown stays.
+            InputError: The file of the frame is damaged; the shown frame does not change.
         """
         index = min(max(index, 0), len(self.frames) - 1)
         frame = self.frames[index]
@@ -128,38 +128,38 @@ class RunView:
         self.index, self.frame = index, frame
 
     def colour_by(self, name: str) -> None:
-        """Colour by another field.
+        """Colour smarticles by the field with a name.
 
         Raises:
-            InputError: There is none of this name.
+            InputError: The name is unknown.
         """
         self.field = colour_field(name, self.run)
 
     def draw(self) -> None:
-        """Put all bodies into the window."""
+        """Draw the bodies of the shown frame."""
         values = scalars(self.field, self.frame, self.run)
         colours = ColourScale.of(self.field, self._widened(values)).painted(values)
         if self.pick is not None:
             colours[self.frame.smarticle_ids == self.pick.smarticle_id] = PICKED
-        self._meshes = drawn(self._bodies, self.frame, np.zeros(3))
+        self._meshes = visible_meshes(self._bodies, self.frame, np.zeros(3))
         add_bodies(self.plotter, self._meshes, self.frame, colours)
 
     def aim(self) -> None:
-        """Turn the camera to all that is drawn: from the front, a little from above; at a plane from above."""
+        """Point the camera at all bodies from the front, slightly from above; at a planar run from above."""
         _, up, forward = axes_from(*VIEWS["top" if self.run.manifest.planar else "front"])
         camera = self.plotter.camera
         camera.focal_point, camera.position, camera.up = (0.0, 0.0, 0.0), tuple(-forward), tuple(up)
         self.plotter.reset_camera(render=False)
 
     def legend(self) -> list[dict[str, str]]:
-        """Return colours with their labels, from the greatest; none where colours only show identity."""
+        """Return the colours and labels of the legend, from the greatest value; empty for identity fields."""
         scale = ColourScale.of(self.field, self._bounds.get(self.field.name, (0.0, 1.0)))
         colours = scale.painted(np.array(list(scale.labels))).tolist()
         pairs = reversed(list(zip(colours, scale.labels.values(), strict=True)))
         return [{"colour": "#{:02x}{:02x}{:02x}".format(*colour), "label": label} for colour, label in pairs]
 
     def pick_along(self, ray: Floats) -> None:
-        """Pick the smarticle that a ray (2, 3) [mm] meets first, or none."""
+        """Select the first smarticle on a ray given by two points (2, 3) [mm], or none."""
         self.pick = None
         if "smarticles" in self._meshes:
             mesh = self._meshes["smarticles"]
@@ -169,7 +169,7 @@ class RunView:
                 self.pick = Pick(*(int(mesh.cell_data[name][face]) for name in IDENTITY))
 
     def describe(self) -> list[dict[str, str]]:
-        """Return all fields of what is picked, as text: name, unit, value; none where nothing is."""
+        """Return name, unit, value and meaning of all fields of the selected link, as text."""
         if self.pick is None:
             return []
         (found,) = np.nonzero(self.frame.smarticle_ids == self.pick.smarticle_id)
@@ -187,12 +187,12 @@ class RunView:
         return sorted({round(place) for place in np.linspace(0, len(self.frames) - 1, number)})
 
     def _widened(self, values: Floats) -> tuple[float, float]:
-        """Return bounds of the field's scale: of some frames of the run and of all that were shown."""
+        """Return the bounds of the colour scale, by some frames of the run and by all shown frames."""
         name = self.field.name
         samples = [np.array(self._bounds.get(name, ())), values]
         if name not in self._bounds:
             for index in self._sampled(_COSTLY_SAMPLES if self.field.costly else _SAMPLES):
-                with contextlib.suppress(InputError):  # reported when that frame is gone to
+                with contextlib.suppress(InputError):  # reported when this frame is shown
                     samples.append(scalars(self.field, self.frames[index], self.run))
         self._bounds[name] = span(samples)
         return self._bounds[name]
@@ -205,9 +205,12 @@ def _text(value: Any) -> str:
 
 
 class Viewer:
-    """One run in one page, and the server of that page, on a port or, if 0, on any that is free.
+    """The page of a run, and its server.
 
-    Once it listens `opened` is called with the address.
+    Args:
+        view: State of the page.
+        port: Port of the server; 0: any free port.
+        opened: Called with the address of the page once the server listens.
     """
 
     def __init__(self, view: RunView, *, port: int, opened: Callable[[str], None]) -> None:
@@ -218,7 +221,7 @@ class Viewer:
         self._server: Any = get_server(f"smarticles-{id(self)}", client_type="vue3")
         self._stopping: asyncio.Future[None] | None = None
         state = self._state = self._server.state
-        # All texts of the run are values, shown as they are: none becomes part of the page's code.
+        # Texts of the run are values of variables, so that none can become code of the page.
         state.trame__title = "smarticles"
         state.run_name = view.run.manifest.name
         state.fields = [
@@ -243,8 +246,12 @@ class Viewer:
         self._lay_out()
 
     def serve(self) -> None:
-        """Serve until the window is closed."""
-        # The library reads the arguments of the process unless it is given some.
+        """Serve the page until it is closed.
+
+        Raises:
+            InputError: The port is taken.
+        """
+        # Otherwise trame would read the arguments of this process.
         os.environ["TRAME_ARGS"] = f"--server --host {HOST} --authKey={self._token} --nosignalhandlers"
         os.environ["WSLINK_READY_MSG"] = ""
         try:
@@ -256,7 +263,7 @@ class Viewer:
 
     async def _run(self) -> None:
         loop = asyncio.get_running_loop()
-        # A signal that interrupts VTK anywhere would end in a crash; this waits for it, and closes the windows.
+        # A signal that interrupts VTK would crash the process; a handler of the event loop runs between calls.
         for number in (signal.SIGINT, signal.SIGTERM):
             if threading.current_thread() is threading.main_thread():
                 loop.add_signal_handler(number, self._stop)
@@ -317,7 +324,7 @@ class Viewer:
                     html.Span(" follow the run")
 
     def _describe(self) -> None:
-        """Draw the frame shown, and update what the page says of it."""
+        """Draw the shown frame, and update the texts of the page."""
         view, state = self._view, self._state
         view.draw()
         state.caption = f"N = {view.frame.count} of {view.run.manifest.count}, {view.phase}"
@@ -365,12 +372,12 @@ class Viewer:
             await asyncio.sleep(_FILM_STEP)
 
     async def _watch(self) -> None:
-        """Follow a run that goes on."""
+        """Search for new frames at intervals, and show the last one if the page follows the run."""
         while True:
             await asyncio.sleep(_FRAMES_EVERY)
             try:
                 grown = self._view.grow()
-            except InputError:  # just being rewritten, or gone: what was read stays
+            except InputError:  # the run directory is being rewritten, or was deleted
                 continue
             with self._state as state:
                 state.growing = not self._view.ended
@@ -381,35 +388,35 @@ class Viewer:
 
 
 def view_run(directory: Path | str, *, port: int = 0, opened: Callable[[str], None]) -> None:
-    """Serve a page of a run, until its window is closed.
+    """Serve the page of a run to browsers on this machine, until the page is closed.
 
     Args:
-        directory: A run directory with at least one frame; the run may still go on.
-        port: To listen on, on this machine alone; 0: any that is free.
-        opened: Called with the address once the server listens.
+        directory: A run directory with at least one frame; the run may be unfinished.
+        port: Port of the server; 0: any free port.
+        opened: Called with the address of the page once the server listens.
 
     Raises:
-        InputError: There is no frame, or it is damaged; or the port is taken.
+        InputError: There is no frame, a file is damaged, or the port is taken.
     """
-    # VTK warns that there is no display, which nothing here needs.
+    # The page needs no display, of whose absence VTK would warn.
     vtkLogger.SetStderrVerbosity(vtkLogger.VERBOSITY_ERROR)
     Viewer(RunView(directory), port=port, opened=opened).serve()
 
 
 def protect(app: web.Application, token: str) -> None:
-    """Answer 403 to every request, of pages, files and messages alike, that does not bring the token.
+    """Reject every request without the token by status 403.
 
-    The address brings it once; then a cookie does, which no other site's page can send along.
+    The first request has the token in its address; later ones have it in a cookie, which other sites cannot use.
     """
 
     @web.middleware
     async def guard(
         request: web.Request, handler: Callable[[web.Request], Awaitable[web.StreamResponse]]
     ) -> web.StreamResponse:
-        # Cookies are shared by all ports of a machine, so their names are not.
+        # Servers on several ports share the cookies of a machine.
         name = f"smarticles-{request.url.port}"
-        brought = request.query.get("token", ""), request.cookies.get(name, "")
-        allowed = [secrets.compare_digest(word.encode(), token.encode()) for word in brought]
+        tokens = request.query.get("token", ""), request.cookies.get(name, "")
+        allowed = [secrets.compare_digest(word.encode(), token.encode()) for word in tokens]
         if not any(allowed):
             raise web.HTTPForbidden(text="403: open the address that `smarticles view` printed, with its token\n")
         response = await handler(request)
@@ -421,7 +428,7 @@ def protect(app: web.Application, token: str) -> None:
         return response
 
     async def session(request: web.Request) -> web.StreamResponse:
-        """Answer the page's script, which asks first where to send messages and what proves them."""
+        """Return the address and the token for the messages of the page's script."""
         return web.json_response({"sessionURL": f"ws://{HOST}:{request.url.port}/ws", "secret": token})
 
     app.middlewares.append(guard)

@@ -1,1 +1,1 @@
-"""Template engine: sweeps become run directories, run directories become results."""
+"""Make and compute sweeps: run directories from a template, on this machine or through Slurm."""

@@ -1,7 +1,7 @@
-"""Run many runs on this machine: one process each, at most one per core, the longest first.
+"""Compute the runs of a sweep on this machine, one process per run, by default one run per core.
 
-A sweep may want its runs seed by seed; then the longest of each seed come first. A run that fails does not stop the
-others. Ctrl-C stops all of them, and lets each close its files.
+Runs with the longest expected time start first, see `Folder.in_order_of_start`. A run that fails does not stop the
+others. Ctrl-C stops all runs, after they have closed their files.
 """
 
 from __future__ import annotations
@@ -31,25 +31,25 @@ from dem.record.run import Run
 from templates.sweep.folder import Entry, Folder
 
 RunCommand = Callable[[Path, Path, bool], Sequence[str]]
-"""(scene file, run directory, whether to resume) -> the command of one run, started in the sweep's directory."""
+"""Returns the command of a run from scene file, run directory and whether to resume, for the sweep's directory."""
 
-# Threads that find no free core spin: one thread per run, set before its interpreter starts.
+# More threads than cores would slow down all runs.
 _ONE_THREAD = {name: "1" for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")}
 _MARKS = {"done": "✔", "kept": "=", "failed": "✘", "interrupted": "■"}
 
 
 @dataclass(frozen=True, kw_only=True)
 class Outcome:
-    """How a run ended; `kept`: it was finished before."""
+    """Result of computing one run."""
 
-    name: str
-    status: Literal["done", "kept", "failed", "interrupted"]
-    cause: str | None = None
-    wall_s: float = 0.0
+    name: str  #: Name of the run
+    status: Literal["done", "kept", "failed", "interrupted"]  #: "kept": the run had finished before
+    cause: str | None = None  #: Cause of a failure
+    wall_s: float = 0.0  #: Wall time [s]
 
     @property
     def missing(self) -> bool:
-        """Whether the run still has no result."""
+        """Whether the run has no result yet."""
         return self.status not in ("done", "kept")
 
     def __str__(self) -> str:
@@ -60,13 +60,13 @@ class Outcome:
 
 @dataclass(frozen=True, kw_only=True)
 class Snapshot:
-    """All runs at one moment; `running` has name, wall time so far [s] and progress of those being computed."""
+    """State of all runs at one time."""
 
-    total: int
-    ended: int
-    failed: int
-    running: tuple[tuple[str, float, Progress], ...]
-    left_s: float
+    total: int  #: Number of runs
+    ended: int  #: Number of runs that ended, with or without a result
+    failed: int  #: Number of runs that ended without a result
+    running: tuple[tuple[str, float, Progress], ...]  #: Name, wall time [s] and progress of the running ones
+    left_s: float  #: Expected wall time left [s]
 
     def __str__(self) -> str:
         failed = f", {self.failed} failed" if self.failed else ""
@@ -74,7 +74,7 @@ class Snapshot:
 
     @property
     def rows(self) -> list[tuple[str, ...]]:
-        """Name, phase, simulated time, packing fraction and wall time of the running ones."""
+        """Name, phase, simulated time, packing fraction and wall time of each running run, as text."""
         rows: list[tuple[str, ...]] = []
         for name, wall, progress in self.running:
             end = " s" if progress.end_s is None else f" of {progress.end_s:.2f} s"
@@ -85,14 +85,14 @@ class Snapshot:
 
 
 def duration(seconds: float) -> str:
-    """Format a time as `3:05` or `2:03:05`."""
+    """Return a time [s] as text `3:05` or `2:03:05`."""
     minutes, rest = divmod(round(seconds), 60)
     hours, minutes = divmod(minutes, 60)
     return f"{hours}:{minutes:02d}:{rest:02d}" if hours else f"{minutes}:{rest:02d}"
 
 
 class Display:
-    """One line per run and a bar, redrawn in place, at a terminal; elsewhere a line at intervals [s]."""
+    """Shows the progress of a sweep: at a terminal a table that is redrawn, else a line at intervals [s]."""
 
     def __init__(self, console: Console, interval_s: float = 30.0) -> None:
         self._console = console
@@ -110,16 +110,16 @@ class Display:
             self._live.stop()
 
     def started(self, name: str) -> None:
-        """Report that a run was started; a live display shows it anyway."""
+        """Report that a run was started."""
         if not self._live:
             self._print(f"{name} started")
 
     def ended(self, outcome: Outcome) -> None:
-        """Report that a run ended, or was found finished."""
+        """Report the outcome of a run."""
         self._print(f"{_MARKS[outcome.status]} {outcome}" if self._live else str(outcome))
 
     def update(self, snapshot: Snapshot) -> None:
-        """Show the runs at this moment."""
+        """Show the state of all runs."""
         if self._live:
             table, total = Table.grid(padding=(0, 2)), Table.grid(padding=(0, 2))
             for row in snapshot.rows:
@@ -132,29 +132,29 @@ class Display:
             self._print(f"{snapshot}; {runs}")
 
     def stopping(self, count: int) -> None:
-        """Report that some runs were asked to stop."""
+        """Report that `count` runs were signalled to stop."""
         self._print(f"stopping {count} runs, which close their files; Ctrl-C again does not wait")
 
     def _print(self, line: str) -> None:
-        # Names of runs are data, not markup.
+        # A run's name may contain brackets, which rich would take for markup.
         self._console.print(line, markup=False, highlight=False, soft_wrap=True)
 
 
 def smarticles_command(scene: Path, directory: Path, resume: bool) -> tuple[str, ...]:
-    """Return the command that runs one scene into one run directory, with this interpreter."""
-    # -P: a file called like a library in the working directory must not be imported.
+    """Return the command, as words, that computes a scene into a run directory with this interpreter."""
+    # -P: files in the working directory must not replace libraries.
     words = (sys.executable, "-P", "-m", "smarticles", "run", str(scene), "--out", str(directory))
     return (*words, "--resume") if resume else words
 
 
 def environment() -> dict[str, str]:
-    """Return variables of a process that runs one scene: one thread, and the code that this process uses."""
+    """Return the environment variables of a run's process: one thread, and the modules of this process."""
     environment = {**os.environ, **_ONE_THREAD}
-    # Runs start in another directory.
+    # Runs start in another directory, where relative paths would be wrong.
     paths = [os.path.abspath(path) for path in environment.get("PYTHONPATH", "").split(os.pathsep) if path]  # noqa: PTH100
     root = Path(__file__).resolve().parents[1]
     if "site-packages" not in root.parts and "dist-packages" not in root.parts:
-        # A source tree that is not installed: runs use the same code as this process.
+        # Runs must find this source tree, which is not installed.
         paths.insert(0, str(root))
     if paths:
         environment["PYTHONPATH"] = os.pathsep.join(paths)
@@ -170,19 +170,22 @@ def run_folder(
     poll_s: float = 0.25,
     grace_s: float = 60.0,
 ) -> list[Outcome]:
-    """Run what a sweep's directory is missing; return one outcome per run, in the manifest's order.
+    """Compute the unfinished runs of a sweep, and return one outcome per run in the order of the manifest.
 
-    Finished runs are kept. Unfinished ones go on from their checkpoint; those without one, and those that failed, are
-    set aside and run anew.
+    An unfinished run continues from its last checkpoint. A run without a checkpoint, or one that failed, starts from
+    its beginning; its old directory is renamed.
 
     Args:
-        slots: how many runs at once; by default one per core.
-        poll_s: between updates of the display [s].
-        grace_s: between asking a process to stop and making it stop [s].
+        folder: Directory of the sweep.
+        display: Display of the progress.
+        slots: Number of runs at once; one per core if not given.
+        command: Returns the command of a run.
+        poll_s: Time between updates of the display [s].
+        grace_s: Time between one signal to stop and the next stronger one [s].
 
     Raises:
-        InputError: another process computes this sweep already.
-        KeyboardInterrupt: Ctrl-C; all runs were stopped.
+        InputError: Another process already computes this sweep.
+        KeyboardInterrupt: Ctrl-C was pressed; all runs were stopped.
     """
     with folder.lock() as lock, display:
         runner = _Runner(folder, display, command, slots or usable_cores(), poll_s, grace_s, lock)
@@ -218,7 +221,7 @@ class _Runner:
                     waiting = self._collect(waiting, self.poll_s)
                     self.display.update(self._snapshot())
             finally:
-                # Ctrl-C, or a display that failed: no process outlives its runner.
+                # After Ctrl-C or an error no process may outlive this one.
                 self._stop(waiting)
 
     def _collect(self, waiting: set[Future[Outcome | None]], timeout: float) -> set[Future[Outcome | None]]:
@@ -233,7 +236,7 @@ class _Runner:
         self.display.ended(outcome)
 
     def _compute(self, entry: Entry) -> Outcome | None:
-        """Run one run to its end; return None where it was not started any more."""
+        """Compute one run to its end, and return its outcome; None if the sweep was stopped before its start."""
         resume = self.folder.can_resume(entry)
         home, directory, log = self.folder.path, self.folder.run(entry), self.folder.log(entry)
         with self.guard:
@@ -246,16 +249,16 @@ class _Runner:
             began = time.monotonic()
             with log.open("wb") as output:
                 process = subprocess.Popen(
-                    # Seen from the sweep's directory, so that a run's record does not name this machine's folders.
+                    # Relative paths, so that the run's record does not depend on this machine.
                     self.command(self.folder.scene(entry).relative_to(home), directory.relative_to(home), resume),
                     cwd=home,
                     stdin=subprocess.DEVNULL,
                     stdout=output,
                     stderr=subprocess.STDOUT,
                     env=environment(),
-                    # A run that outlives its runner keeps the sweep locked.
+                    # A run that outlives this process keeps the sweep locked.
                     pass_fds=(self.lock,),
-                    # Ctrl-C at the terminal reaches this process only, which then asks each run once.
+                    # Ctrl-C at the terminal must reach this process only, which signals each run once.
                     start_new_session=True,
                 )
             self.active[entry.name] = (process, began)
@@ -270,7 +273,7 @@ class _Runner:
         return Outcome(name=entry.name, status="failed", cause=status.cause or _cause(log, returncode), wall_s=wall_s)
 
     def _stop(self, waiting: set[Future[Outcome | None]]) -> None:
-        """Ask every run to stop, wait, insist; a second Ctrl-C does not wait."""
+        """Stop all runs by ever stronger signals; a second Ctrl-C skips the waiting."""
         with self.guard:
             self.stopping = True
         for future in waiting:
@@ -290,8 +293,7 @@ class _Runner:
         self._collect(waiting, 0.0)
 
     def _snapshot(self) -> Snapshot:
-        now = time.monotonic()
-        running = {name: now - began for name, (_, began) in list(self.active.items())}
+        running = {name: time.monotonic() - began for name, (_, began) in list(self.active.items())}
         return Snapshot(
             total=len(self.folder.entries),
             ended=len(self.outcomes),
@@ -303,7 +305,7 @@ class _Runner:
         )
 
     def _left(self, running: dict[str, float]) -> float:
-        """Return the expected wall time left [s], by the pace of the runs that finished."""
+        """Return the expected wall time left [s], by the ratio of true to expected time of finished runs."""
         expected = {entry.name: entry.expected_s for entry in self.folder.entries}
         done = [outcome for outcome in self.outcomes.values() if outcome.status == "done"]
         planned = sum(expected[outcome.name] for outcome in done)
@@ -317,7 +319,7 @@ class _Runner:
 
 
 def _cause(log: Path, returncode: int) -> str:
-    """Return why a process without `failed.json` ended: its error line, else its end and last line."""
+    """Return why a process without `failed.json` ended: its error, else its exit status and last line."""
     try:
         lines = [
             line.strip() for line in log.read_text(encoding="utf-8", errors="replace").splitlines() if line.strip()
@@ -331,4 +333,4 @@ def _cause(log: Path, returncode: int) -> str:
     if returncode < 0:
         name = signal.Signals(-returncode).name
         reason = f"killed by {name}" + (" (out of memory?)" if name == "SIGKILL" else "")
-    return f"{reason}: {lines[-1]}" if lines else f"{reason}, without a word; see {log}"
+    return f"{reason}: {lines[-1]}" if lines else f"{reason}, without output; see {log}"

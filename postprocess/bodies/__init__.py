@@ -1,1 +1,1 @@
-"""True bodies of a run at a time, as meshes with fields, for pictures, exports and pages."""
+"""Meshes of the bodies of a run with fields and colours, for pictures, exports and the viewer."""

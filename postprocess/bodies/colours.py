@@ -1,4 +1,4 @@
-"""Colours of bodies: smarticles by any field on one scale, everything else by its kind."""
+"""Colour bodies: smarticles by the values of a field, all other bodies by their kind."""
 
 from __future__ import annotations
 
@@ -21,11 +21,11 @@ from postprocess.geometry.links import Floats
 from postprocess.report import figures
 
 ALIASES: Mapping[str, str] = MappingProxyType({"speed": "speed_m_per_s", "height": "height_m", "id": "smarticle_id"})
-"""Short names of fields."""
+"""Fields by their short names."""
 
-_MOST_COUNTS = 12  # with colours of their own; larger ones share the last
+_MOST_COUNTS = 12  # larger counts have the colour of this one
 
-UNKNOWN = (201, 201, 201)  #: Where a field has no value
+UNKNOWN = (201, 201, 201)  #: Colour of a missing value
 
 Span = tuple[float, float]
 
@@ -39,13 +39,13 @@ class Paint:
 
     @property
     def rgb(self) -> NDArray[np.uint8]:
-        """(3,) sRGB, 0 to 255."""
+        """Colour as sRGB, (3,) uint8."""
         return np.round(255 * np.array(to_rgb(self.colour))).astype(np.uint8)
 
 
 PAINTS: Mapping[str, Paint] = MappingProxyType(
     {
-        "smarticles": Paint("#ffffff"),  # under the colours of a field
+        "smarticles": Paint("#ffffff"),  # multiplied by the colours of a field
         "wall": Paint("#9db4c8", 0.22),
         "floor": Paint("#e9e9e7"),
         "hooks": Paint("#b3261e"),
@@ -58,17 +58,17 @@ PAINTS: Mapping[str, Paint] = MappingProxyType(
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class ColourScale:
-    """Turns values of a field into colours."""
+    """Mapping from the values of a field to colours, with its colour bar."""
 
-    kind: Literal["count", "value", "name"]  #: Of the field
-    colours: Colormap | None = None  #: Of the bar; None where colours only show identity
-    low: float = 0.0  #: Value at the bar's lower end
-    high: float = 1.0  #: Value at its upper end
-    labels: Mapping[float, str] = dataclasses.field(default_factory=dict)  #: By value, what is written beside the bar
+    kind: Literal["count", "value", "name"]  #: Kind of the field
+    colours: Colormap | None = None  #: Colour map of the bar; None if colours only show identity
+    low: float = 0.0  #: Value at the lower end of the bar
+    high: float = 1.0  #: Value at the upper end of the bar
+    labels: Mapping[float, str] = dataclasses.field(default_factory=dict)  #: Labels of the bar, by value
 
     @classmethod
     def of(cls, field: Field, bounds: Span) -> Self:
-        """Return the scale of a field for values between two bounds."""
+        """Return the colour scale of a field for values from the first to the second bound."""
         low, high = bounds
         if field.kind == "name":
             return cls(kind="name")
@@ -79,33 +79,33 @@ class ColourScale:
                 labels[float(top)] = f"≥ {top}"
             colours = ListedColormap(["#c9c9c9", *figures.sequence(top)])
             return cls(kind="count", colours=colours, low=-0.5, high=top + 0.5, labels=labels)
-        if not high > low:  # one smarticle, or all alike
+        if not high > low:  # all values are equal
             low, high = low - 0.5, high + 0.5
         factor = field.shown[0] if field.shown else 1.0
         labels = {float(value): f"{factor * value:.3g}" for value in np.linspace(low, high, 5)}
         return cls(kind="value", colours=ListedColormap(figures.sequence(256)), low=low, high=high, labels=labels)
 
     def painted(self, values: NDArray[Any]) -> NDArray[np.uint8]:
-        """Return sRGB colours (…, 3), 0 to 255, of values; grey where there is none."""
+        """Return the sRGB colours (…, 3) uint8 of values (…); grey for a value that is not finite."""
         values = np.asarray(values, dtype=np.float64)
         known = np.isfinite(values)
         found = np.full((*values.shape, 3), UNKNOWN, dtype=np.uint8)
         if self.colours is None:
-            # Hues that differ between neighbours in number: golden-ratio steps.
+            # Golden-ratio steps give successive numbers very different hues.
             hue = (values[known] * (math.sqrt(5) - 1) / 2) % 1
             tone = np.stack([hue, np.full_like(hue, 0.50), np.full_like(hue, 0.88)], axis=-1)
             found[known] = (255 * hsv_to_rgb(tone)).astype(np.uint8)
         else:
-            shares = Normalize(self.low, self.high, clip=True)(values[known])
-            found[known] = self.colours(np.asarray(shares), bytes=True)[..., :3]
+            places = Normalize(self.low, self.high, clip=True)(values[known])
+            found[known] = self.colours(np.asarray(places), bytes=True)[..., :3]
         return found
 
 
 def colour_field(name: str | None, run: Run) -> Field:
-    """Return the field to colour by; None: crossings, or in a plane the number of the smarticle.
+    """Return the field of a run by name or short name; None: crossings, for planar runs smarticle_id.
 
     Raises:
-        InputError: It is no field, or the run has no such.
+        InputError: The name is unknown, or the run lacks the field.
     """
     usual = "smarticle_id" if run.manifest.planar else "crossings"
     field = checked_field(usual if name is None else name, ALIASES)
@@ -116,7 +116,7 @@ def colour_field(name: str | None, run: Run) -> Field:
 
 
 def scalars(field: Field, frame: Frame, run: Run) -> Floats:
-    """Return values (N, 3) to colour by, one per link: of a vector its length; NaN where there is none."""
+    """Return one value of a field per link, (N, 3): of vectors the length; NaN if the frame lacks it."""
     values = link_values(field, frame, run)
     if values is None:
         return np.full((frame.count, 3), np.nan)
@@ -124,18 +124,18 @@ def scalars(field: Field, frame: Frame, run: Run) -> Floats:
 
 
 def span(values: Iterable[Floats]) -> Span:
-    """Return the least and the greatest of all values that there are; 0 and 1 without any."""
+    """Return the least and the greatest finite value of several arrays; 0 and 1 if no value is finite."""
     finite = [each[np.isfinite(each)] for each in values]
     joined = np.concatenate([np.empty(0), *finite])
     return (float(joined.min()), float(joined.max())) if joined.size else (0.0, 1.0)
 
 
 def linear(colours: NDArray[np.uint8]) -> NDArray[np.uint8]:
-    """Return sRGB colours as shares of light, 0 to 255, as glTF has the colours of points.
+    """Convert sRGB colours to linear colours, which glTF uses for vertices; both are uint8.
 
     Source:
         IEC 61966-2-1; glTF 2.0, section 3.9.2.
     """
-    shares = colours / 255
-    light = np.where(shares <= 0.04045, shares / 12.92, ((shares + 0.055) / 1.055) ** 2.4)
+    values = colours / 255
+    light = np.where(values <= 0.04045, values / 12.92, ((values + 0.055) / 1.055) ** 2.4)
     return np.round(255 * light).astype(np.uint8)

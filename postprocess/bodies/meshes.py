@@ -1,8 +1,7 @@
-"""True bodies of a run at a time, as meshes in metres: links, walls, floor, hooks, strings, forces.
+"""Make meshes [m] of the bodies of a run in a frame: links, walls, floor, hooks, strings, forces.
 
-Coordinates are those of the frames, z upwards: a container that is shaken moves. Everything is as large as in the
-simulation, but for what has no size there: a wall without a height ends above the highest smarticle, a string has no
-thickness, a wall neither.
+Meshes have the coordinates of the frames, z upwards, so that a shaken container moves, and the sizes of the simulation.
+A wall without a height in the scene ends above the highest smarticle; walls and strings have no thickness.
 """
 
 from __future__ import annotations
@@ -39,17 +38,17 @@ _REMOVAL, _STRAIN, _ARRANGE = "remove-container", "strain", "arrange"
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class ChainStrings:
-    """Strings of a strain test; lengths in m."""
+    """The two strings of a strain test, each from a knot on the chain to an anchor."""
 
-    phase: int  #: Index of the phase while they are tied
-    start: float  #: Time at which that phase begins [s]
-    speed: float  #: Of the end that is moved [m/s]
-    from_hinge: float  #: Where on a barb they are tied, from its hinge [m]
-    #: (2, 3) the other ends at the start: at lower x, held, and at higher x, moved away along x
+    phase: int  #: Index of the phase in which the strings are tied
+    start: float  #: Time at which this phase begins [s]
+    speed: float  #: Speed of the moved anchor [m/s]
+    from_hinge: float  #: Distance of a knot from the hinge of its barb [m]
+    #: (2, 3) anchors at the start of the phase [m]: the fixed anchor at low x, and the anchor that moves along +x
     anchors: Floats = field(repr=False)
 
     def lines(self, frame: Frame) -> Floats:
-        """Return knot and other end (2, 2, 3) of each string [m]; (0, 2, 3) while none is tied."""
+        """Return the ends of both strings, (2, 2, 3) [m]: knot and anchor of each; (0, 2, 3) if untied."""
         if frame.phase != self.phase:
             return np.empty((0, 2, 3))
         ends = self.anchors.copy()
@@ -58,33 +57,36 @@ class ChainStrings:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Surroundings:
-    """The rigid boundaries of a run."""
+class RunBoundaries:
+    """Walls and strings of a run, and their motion."""
 
-    #: Radius and top of each tier of a mould, from the bottom up [m]; empty for one cylinder
+    #: Radius and top of each tier of a mould, from the lowest [m]; empty for one cylinder
     tiers: tuple[tuple[float, float], ...] = ()
-    height: float | None = None  #: Of the cylinder's wall [m]; None: as high as the pile needs
+    height: float | None = None  #: Height of the cylinder's wall [m]; None: as high as the pile needs
     #: Indices of phases that move the floor and leave the wall at rest, at z = 0
     floor_alone: frozenset[int] = frozenset()
-    removed: int | None = None  #: Index of the phase that takes the wall away; None if none does
-    #: Start [s], end [s] and speed [m/s] of its lifting; None if it goes at once
+    removal: int | None = None  #: Index of the phase that removes the wall; None if no phase does
+    #: Start [s], end [s] and speed [m/s] of the wall's lifting; None if it disappears at once
     lift: tuple[float, float, float] | None = None
-    strings: ChainStrings | None = field(default=None, repr=False)  #: Of a strain test; None in scenes without
+    strings: ChainStrings | None = field(default=None, repr=False)  #: Strings of a strain test, if there is one
 
     @property
     def corners(self) -> list[tuple[float, float]]:
-        """Radius and height of the corners of a mould's wall, from the floor up [m]: walls and ceilings in turn."""
+        """Radius and height of each corner in the profile of a mould's wall, from the floor up [m]."""
         found = [(self.tiers[0][0], 0.0), self.tiers[0]] if self.tiers else []
         for (_, top), (radius, higher) in pairwise(self.tiers):
             found += [(radius, top), (radius, higher)]
         return found
 
     def raised(self, time: float, phase: int, top: float) -> float | None:
-        """Return how far the wall has been lifted [m] at a time [s] in a phase; None once it is gone.
+        """Return the height by which the wall has been lifted [m]; None if there is no wall any more.
 
-        A wall that is lifted clear of the pile's top, at a height above the floor [m], is gone.
+        Args:
+            time: [s].
+            phase: Index of the phase.
+            top: Height of the pile above the floor [m]; a wall lifted above this height counts as removed.
         """
-        if self.removed is None or phase < self.removed:
+        if self.removal is None or phase < self.removal:
             return 0.0
         if self.lift is None:
             return None
@@ -93,27 +95,27 @@ class Surroundings:
         return raised if raised <= top else None
 
 
-def read_surroundings(run: Run) -> Surroundings:
-    """Read the rigid boundaries of a run from its scene and its series.
+def read_boundaries(run: Run) -> RunBoundaries:
+    """Read walls and strings of a run from its scene and its series.
 
     Raises:
-        InputError: `scene.yaml` or `series.h5` is damaged, or lacks what it should have.
+        InputError: `scene.yaml` or `series.h5` is damaged or lacks a key.
     """
     scene, phases = run.scene, run.scene.get("phases", ())
     series = run.series if run.has_series else None
-    removed = next((phase.index for phase in run.phases if phase.type == _REMOVAL), None)
-    return Surroundings(
+    removal = next((phase.index for phase in run.phases if phase.type == _REMOVAL), None)
+    return RunBoundaries(
         tiers=tuple((tier.radius, tier.top) for tier in read_tiers(run)),
         height=(scene.get("container") or {}).get("height_m"),
         floor_alone=frozenset(index for index, phase in enumerate(phases) if phase.get("moves") == "floor"),
-        removed=removed,
-        lift=None if removed is None else _lift(phases[removed], _start(run, removed, series)),
+        removal=removal,
+        lift=None if removal is None else _lift(phases[removal], _start(run, removal, series)),
         strings=_strings(run, series) if run.manifest.planar else None,
     )
 
 
 def _start(run: Run, index: int, series: Series | None) -> float | None:
-    """Return when a phase begins [s]; one that is not done began with the last sample before it."""
+    """Return the start of a phase [s]; of an unfinished run the time of the last sample before the phase."""
     start = run.phases[index].start_s
     if start is None and series is not None:
         start = float(series.time[series["phase"] < index].max(initial=0.0))
@@ -127,20 +129,20 @@ def _lift(phase: SceneData, start: float | None) -> tuple[float, float, float] |
 
 
 def _cross(length: float, side: float, count: int, height: float) -> pv.PolyData:
-    """Return the bars of a hook's cross, evenly spaced up to a disc, as `dem.setting.hooks.Cross` has them."""
-    thick, bars = side / 2, []
+    """Return a hook: `count` bars along x and along y, cut to a disc, as in `dem.setting.hooks.Cross`."""
+    half, bars = side / 2, []
     for k in range(count):
         place = length * ((k + 1) / (count + 1) - 0.5)
         long = math.sqrt((length / 2) ** 2 - place**2)
-        for sides in ((-long, long, place - thick, place + thick), (place - thick, place + thick, -long, long)):
-            bars.append(pv.Box((*sides, height - thick, height + thick)))
+        for sides in ((-long, long, place - half, place + half), (place - half, place + half, -long, long)):
+            bars.append(pv.Box((*sides, height - half, height + half)))
     return joined(bars)
 
 
 def knots(vertices: Floats, from_hinge: float) -> Floats:
-    """Return points (2, 3) on the outer barbs of a chain, at a distance [m] from their hinges.
+    """Return the points (2, 3) [m] at which strings are tied to the outer barbs of a chain.
 
-    Every second smarticle is turned by half a turn.
+    They are at a distance [m] from the hinges. Every second smarticle of a chain is rotated by 180°.
 
     Source:
         `dem.body.chain.Chain.ties`.
@@ -154,13 +156,12 @@ def knots(vertices: Floats, from_hinge: float) -> Floats:
 
 
 def _strings(run: Run, series: Series | None) -> ChainStrings | None:
-    """Return the strings of a run's strain test; None where there is no such phase.
+    """Return the strings of a run's strain test; None if there is no such phase.
 
-    They are tied to the chain as it was laid out; a chain that moved before it was pulled has them where they are to
-    within that motion.
+    The anchors follow from the initial layout of the chain; motion of the chain before the test is neglected.
 
     Source:
-        `dem.body.chain.Chain`: how a chain is laid out.
+        `dem.body.chain.Chain`, which lays out a chain.
     """
     planned = run.scene["phases"]
     phases = {phase["type"]: phase for phase in planned}
@@ -169,7 +170,7 @@ def _strings(run: Run, series: Series | None) -> ChainStrings | None:
     strain, gap = phases[_STRAIN], phases[_ARRANGE]["gap_m"]
     index = planned.index(strain)
     radius, barb = run.manifest.sphere_diameter_m / 2, run.manifest.barb_length_m
-    offset = barb + gap + run.manifest.bulge_m + radius  # of the two rows of middle links
+    offset = barb + gap + run.manifest.bulge_m + radius  # distance of the two rows of middle links
     from_hinge = barb - radius if strain.get("tied_at") == "tip" else offset / 2
     reach = (
         (run.manifest.count - 1) * (run.manifest.middle_length_m - 2 * radius - gap) + run.manifest.middle_length_m
@@ -188,33 +189,38 @@ def _strings(run: Run, series: Series | None) -> ChainStrings | None:
 KINDS: Mapping[str, str] = MappingProxyType(
     {
         "smarticles": "a box per link, with all fields",
-        "wall": "of the container, tiers and ceilings of a mould, or the two of a plane",
-        "floor": "of the container",
+        "wall": "wall of the container, tiers and ceilings of a mould, or the two walls of a channel",
+        "floor": "floor of the container",
         "hooks": "the two crosses",
-        "strings": "the two of a strain test, as lines",
+        "strings": "the two strings of a strain test, as lines",
         "crossings": "on request: a point and a vector for each link that passes through a smarticle's plane",
         "forces": "on request: lines from centre to contact to centre, where the run records forces",
     }
 )
-"""Kinds of bodies."""
+"""Kinds of bodies with their descriptions."""
 
 ON_REQUEST = ("crossings", "forces")
 USUAL = tuple(kind for kind in KINDS if kind not in ON_REQUEST)
 
 BOX_POINTS, BOX_FACES = 8, 6
 _ROUND = 96  # corners of a circle
-_THINNEST = 0.05  # of the thickest tube of a force
+_THINNEST = 0.05  # least thickness of a tube of force over the largest thickness
 
-# Corners of a box (along, in plane, normal) and its faces, seen from outside.
+# Corners of a box (along, in plane, normal), and its faces, counterclockwise seen from outside.
 _CORNERS = np.array([(i, j, k) for i in (-1, 1) for j in (-1, 1) for k in (-1, 1)]) / 2
 _FACES = np.array([[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]])
 
 
 def checked_kinds(wanted: Sequence[str], unwanted: Sequence[str], *, also: Sequence[str] = ()) -> tuple[str, ...]:
-    """Return the kinds to export: usual and wanted ones without the unwanted; `also` may be unwanted too.
+    """Return the kinds of bodies to export: `USUAL` and the wanted kinds, without the unwanted kinds.
+
+    Args:
+        wanted: Kinds to add.
+        unwanted: Kinds to leave out.
+        also: Other names that `unwanted` may contain.
 
     Raises:
-        InputError: An unknown kind, or nothing is left.
+        InputError: A kind is unknown, or none is left.
     """
     for name in (*wanted, *(name for name in unwanted if name not in also)):
         if name not in KINDS:
@@ -222,12 +228,18 @@ def checked_kinds(wanted: Sequence[str], unwanted: Sequence[str], *, also: Seque
             raise InputError(f"{name!r} is nothing to export; {nearest(name, known, cutoff=0.5)}")
     kept = tuple(kind for kind in KINDS if kind in (*USUAL, *wanted) and kind not in unwanted)
     if not kept:
-        raise InputError("nothing is left to export; leave out less")
+        raise InputError("nothing to export: all kinds of bodies are left out; leave out less")
     return kept
 
 
 class Bodies:
-    """The bodies of one run, frame after frame; with `cut` walls end a little above the pile, as in pictures.
+    """Makes the meshes of a run's bodies in its frames.
+
+    Args:
+        run: The run.
+        kinds: Kinds of bodies, keys of `KINDS`.
+        fields: Fields of the mesh of the smarticles.
+        cut: Whether walls end a little above the pile, as in pictures.
 
     Raises:
         InputError: The scene or the series is damaged, or forces are wanted and not recorded.
@@ -240,15 +252,15 @@ class Bodies:
             raise InputError(f"{run.path}: records no forces; {NO_FORCES}")
         self.run = run
         self.kinds = kinds
-        self.around = read_surroundings(run)
+        self.boundaries = read_boundaries(run)
         self._fields = fields
         self._cut = cut
-        self._top = 0.0  # of the highest smarticle above the floor
-        self._reach = 0.0  # of the farthest one from the axis
-        self._span = math.inf, -math.inf  # of all along x
+        self._top = 0.0  # height of the highest point above the floor
+        self._reach = 0.0  # distance of the farthest point from the axis
+        self._span = math.inf, -math.inf  # least and largest x
 
     def hold(self, frames: Iterable[Frame]) -> None:
-        """Make walls and floor large enough for these frames too."""
+        """Enlarge walls and floor so that they hold the smarticles of these frames."""
         for frame in frames:
             if frame.count:
                 points = frame.vertices.reshape(-1, 3)
@@ -258,7 +270,7 @@ class Bodies:
                 self._span = min(self._span[0], low), max(self._span[1], high)
 
     def at(self, frame: Frame) -> dict[str, pv.PolyData]:
-        """Return the bodies of a frame by kind, [m]; only those that there are."""
+        """Return the meshes [m] of a frame by kind; kinds without a body are left out."""
         made = {kind: getattr(self, f"_{kind}")(frame) for kind in self.kinds}
         return {kind: mesh for kind, mesh in made.items() if mesh is not None and mesh.n_points}
 
@@ -287,17 +299,18 @@ class Bodies:
                 for y in (-half, half)
             )
         top = float(frame.vertices[..., 2].max(initial=floor)) - floor
-        raised = self.around.raised(frame.time, frame.phase, top)
+        raised = self.boundaries.raised(frame.time, frame.phase, top)
         if raised is None:
             return None
-        return self.wall_at((0.0 if frame.phase in self.around.floor_alone else floor) + raised)
+        return self.wall_at((0.0 if frame.phase in self.boundaries.floor_alone else floor) + raised)
 
     def wall_at(self, base: float) -> pv.PolyData:
-        """Return the wall of a container that stands at a height [m]."""
-        corners = self.around.corners
+        """Return the wall of a container whose floor is at a height [m]."""
+        corners = self.boundaries.corners
         if not corners:
-            top = self._top + self.run.manifest.middle_length_m if self.around.height is None else self.around.height
-            corners = [(self.run.manifest.container_radius_m, 0.0), (self.run.manifest.container_radius_m, top)]
+            height, radius = self.boundaries.height, self.run.manifest.container_radius_m
+            top = self._top + self.run.manifest.middle_length_m if height is None else height
+            corners = [(radius, 0.0), (radius, top)]
         if self._cut:
             *below, (radius, height) = corners
             margin = self.run.manifest.middle_length_m / 4
@@ -320,12 +333,12 @@ class Bodies:
         settings = self.run.scene.get("hooks")
         if settings is None:
             return None
-        upper = settings["upper_height_m"]  # without a series it is where it started
+        upper = settings["upper_height_m"]  # without a series its motion is unknown
         if self.run.has_series:
             series = self.run.series
             upper = float(np.interp(frame.time, series.time, series["hook_upper_z_m"] - series["container_z_m"]))
         side, length = settings["side_m"], settings["length_m"]
-        # Older scenes have two equal crosses.
+        # Scenes without these keys have two equal crosses.
         lower_length, count = settings.get("lower_length_m", length), round(settings.get("lower_bars", 1))
         crosses = [
             _cross(lower_length, side, count, frame.floor_z + settings["lower_height_m"]),
@@ -336,7 +349,7 @@ class Bodies:
         return mesh
 
     def _strings(self, frame: Frame) -> pv.PolyData | None:
-        lines = () if self.around.strings is None else self.around.strings.lines(frame)
+        lines = () if self.boundaries.strings is None else self.boundaries.strings.lines(frame)
         if not len(lines):
             return None
         mesh = joined(pv.MultipleLines(line) for line in lines)
@@ -369,7 +382,7 @@ class Bodies:
             above[forces.between] = strong_contacts(found.normal[forces.between])
         first, second = found.smarticles.T
         values = {
-            "first_id": frame.smarticle_ids[first],  # as the field smarticle_id has them
+            "first_id": frame.smarticle_ids[first],
             "second_id": np.where(second < 0, second, frame.smarticle_ids[second]),
             "fixture": found.boundaries,
             "normal_force_N": found.normal,
@@ -385,17 +398,19 @@ class Bodies:
 def link_boxes(
     vertices: Vertices, *, thickness_normal: float, thickness_in_plane: float | Sequence[float]
 ) -> pv.PolyData:
-    """Return the links of all smarticles as one mesh of boxes [m], six quadrilaterals each.
+    """Return the boxes of all links as one mesh [m] of quadrilaterals, six per box.
 
-    The section of a straight smarticle, or of one without barbs, is turned about its length by an angle that four
-    vertices do not give: some angle is taken. Links without length have no box.
+    The cross-section of a straight smarticle may be turned around its length by any angle, which its vertices do not
+    determine; an arbitrary angle is used. Links without length have no box.
 
     Args:
+        vertices: (N, 4, 3) [m].
         thickness_normal: t1, along the normal of the smarticle's plane [m].
-        thickness_in_plane: t2, in the smarticle's plane [m]; of all links, or of barb 1, middle link and barb 2.
+        thickness_in_plane: t2, in the smarticle's plane [m]: one for all links, or one each for barb 1, middle link and
+            barb 2.
 
     Returns:
-        The mesh, with cell data `smarticle`, the index into `vertices`, and `link`, 0 to 2.
+        The mesh with two arrays of cell data: `smarticle`, the index into `vertices`, and `link`, 0 to 2.
 
     Raises:
         InputError: Bad thicknesses.
@@ -410,7 +425,7 @@ def link_boxes(
     along = end - start
     across = np.cross(plane_frames(vertices)[smarticle, 2], along)
     across /= np.linalg.norm(across, axis=1, keepdims=True)
-    # Square to the link even where the four vertices are not quite in one plane.
+    # Perpendicular to the link even if the four vertices are not quite in one plane.
     normal = np.cross(along, across)
     normal /= np.linalg.norm(normal, axis=1, keepdims=True)
     edges = np.stack([along, in_plane[link, None] * across, thickness_normal * normal], axis=1)
@@ -423,17 +438,21 @@ def link_boxes(
 
 
 def owners(mesh: pv.PolyData, frame: Frame) -> tuple[Whole, Whole]:
-    """Return places in a frame's arrays of the boxes' smarticles, and links; the mesh carries both fields."""
+    """Return the owners of the B boxes of a mesh, which must have the fields `IDENTITY`.
+
+    Returns:
+        Indices of the smarticles in the arrays of the frame (B,), and links (B,), 0 to 2.
+    """
     owner, link = (np.asarray(mesh.cell_data[name])[::BOX_FACES] for name in ("smarticle_id", "link"))
     order = np.argsort(frame.smarticle_ids)
     return order[np.searchsorted(frame.smarticle_ids, owner, sorter=order)], link
 
 
 def force_lines(forces: RecordedForces) -> pv.PolyData:
-    """Return lines from centres of mass to contacts [m]: two for each, one where a boundary is touched.
+    """Return a mesh [m] of lines from the smarticles' centres of mass to their contacts.
 
-    Straight lines, each with two points of its own: a tube about a line that bends at a sharp angle is torn. Cell data
-    `contact`, the place of the contact.
+    A contact between smarticles has two lines, a contact with a boundary one. Lines share no points, because tubes
+    around a sharp bend would be torn. The cell data `contact` are the indices of the contacts.
     """
     halves = [np.stack([forces.ends[:, k], forces.contacts.points], axis=1) for k in (0, 1)]
     segments = np.concatenate([halves[0], halves[1][forces.between]])
@@ -445,20 +464,25 @@ def force_lines(forces: RecordedForces) -> pv.PolyData:
 
 
 def solid(kind: str, mesh: pv.PolyData, run: Run, *, largest: float | None = None) -> pv.PolyData:
-    """Return a body of a kind as triangles alone.
+    """Return the mesh of a kind of body as triangles, with solids in place of lines and points.
 
-    Strings become tubes a fifth of a link thick, crossings arrows a third of w long, forces tubes as thick as a link at
-    most, whose thickness is in proportion to the normal force; boxes stay what they are. The thickest tube is that of
-    the normal force `largest` [N], or of the mesh's largest one.
+    Strings become tubes, a fifth as thick as a link; crossings become arrows of length w/3; forces become tubes, at
+    most as thick as a link, with a thickness proportional to the normal force.
+
+    Args:
+        kind: Key of `KINDS`.
+        mesh: Mesh of this kind by `Bodies.at`.
+        run: The run, which gives the sizes.
+        largest: Normal force of the thickest tube [N]; the largest of the mesh if not given.
     """
     thin = min(run.manifest.thickness_in_plane_m, run.manifest.thickness_normal_m)
     if kind == "strings":
         mesh = mesh.tube(radius=thin / 10, n_sides=8, capping=True)
     if kind == "forces":
         normal = np.asarray(mesh.cell_data["normal_force_N"])
-        shares = np.clip(normal / (largest or float(normal.max())), _THINNEST, 1.0)
+        relative = np.clip(normal / (largest or float(normal.max())), _THINNEST, 1.0)
         bare = pv.PolyData(mesh.points, lines=mesh.lines)
-        bare.point_data["radius"] = np.repeat(thin / 2 * shares, 2)
+        bare.point_data["radius"] = np.repeat(thin / 2 * relative, 2)
         mesh = bare.tube(radius=1.0, scalars="radius", absolute=True, n_sides=8, capping=True)
     if kind == "crossings":
         arrow = pv.Arrow(start=(-0.5, 0.0, 0.0), tip_resolution=8, shaft_resolution=6)
@@ -468,7 +492,7 @@ def solid(kind: str, mesh: pv.PolyData, run: Run, *, largest: float | None = Non
 
 
 def joined(parts: Iterable[pv.PolyData]) -> pv.PolyData:
-    """Return several meshes as one."""
+    """Join several meshes into one."""
     first, *rest = parts
     mesh: pv.PolyData = first.append_polydata(*rest)
     return mesh

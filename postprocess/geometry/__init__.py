@@ -1,1 +1,1 @@
-"""Lines and the space they take: of vertices alone, with no idea of frames and runs."""
+"""Geometry of smarticles from their vertices alone, without frames and runs."""

@@ -1,7 +1,8 @@
-"""Lengths, centres and planes of smarticles by their vertices, and the spheres in their place.
+"""Compute lengths, centres of mass and planes of smarticles, and the spheres that represent them.
 
-Frames hold the centrelines alone. Where each sphere of a chain is follows from them, from the chain's rows and pitch,
-and, of several rows, from the plane of the smarticle; a straight smarticle has none, some plane through it is taken.
+Frames hold the vertices of the centrelines alone. The spheres of a smarticle follow from its vertices and from the rows
+and the pitch of its chain. Several rows lie side by side along the normal of the smarticle's plane; a straight
+smarticle has no such plane, and an arbitrary plane through it is used.
 """
 
 from __future__ import annotations
@@ -20,25 +21,24 @@ Whole = NDArray[np.int64]
 Flags = NDArray[np.bool_]
 
 Vertices = ArrayLike
-"""(N, 4, 3) [m]: barb tip, hinge, hinge, barb tip of each smarticle. Functions that take them check them first, see
-`checked_vertices`."""
+"""(N, 4, 3) [m]: barb tip, hinge, hinge and barb tip of each smarticle, not yet checked; see `checked_vertices`."""
 
-# `dem.body.particle.HINGE_CLEARANCE` and `INWARDS`; a test compares the two places.
+# Copies of `dem.body.particle.HINGE_CLEARANCE` and `INWARDS`; a test compares them.
 _CLEARANCE, _INWARDS = 0.01, math.radians(15)
 
 
 class UndefinedMeasureError(InputError):
-    """The measure has no meaning for this frame, e.g. a packing fraction of one smarticle.
+    """Raised if a measure is undefined for a frame, such as the packing fraction of one smarticle.
 
-    Tables over whole runs show such values as NaN; every other error stops them.
+    Tables of whole runs show such a value as NaN; every other error ends the measurement.
     """
 
 
 def checked_vertices(vertices: Vertices) -> Floats:
-    """Return vertices as a float64 array (N, 4, 3) [m] that every measure can rely on.
+    """Return vertices as a float64 array (N, 4, 3) [m] after checking them.
 
     Raises:
-        InputError: Wrong shape, a value that is not finite, or a smarticle without any length.
+        InputError: Wrong shape, a value that is not finite, or a smarticle of length 0.
     """
     array = np.asarray(vertices, dtype=np.float64)
     if array.ndim != 3 or array.shape[1:] != (4, 3):
@@ -54,13 +54,13 @@ def checked_vertices(vertices: Vertices) -> Floats:
 
 
 def link_lengths(vertices: Floats) -> Floats:
-    """Return lengths (N, 3) [m] of barb 1, middle link and barb 2."""
+    """Return the lengths of barb 1, middle link and barb 2 of each smarticle, (N, 3) [m]."""
     lengths: Floats = np.linalg.norm(np.diff(vertices, axis=1), axis=2)
     return lengths
 
 
 def centres_of_mass(vertices: Vertices) -> Floats:
-    """Return centres of mass (N, 3) [m] of smarticles whose three links have one cross-section."""
+    """Return the centres of mass (N, 3) [m] of smarticles whose three links have equal cross-sections."""
     vertices = checked_vertices(vertices)
     weights = link_lengths(vertices)[:, :, None]
     middles = (vertices[:, :-1] + vertices[:, 1:]) / 2
@@ -69,15 +69,16 @@ def centres_of_mass(vertices: Vertices) -> Floats:
 
 
 def bounding_spheres(vertices: Floats) -> tuple[Floats, Floats]:
-    """Return centres (N, 3) [m] and radii (N,) [m] of spheres that hold all four vertices of each."""
+    """Return centres (N, 3) [m] and radii (N,) [m] of spheres around the four vertices of each smarticle."""
     centres = vertices.mean(axis=1)
     return centres, np.linalg.norm(vertices - centres[:, None], axis=2).max(axis=1)
 
 
 def close_pairs(vertices: Floats) -> tuple[Whole, Whole]:
-    """Find pairs of smarticles (P,), (P,), lower index first, whose bounding spheres overlap.
+    """Find the pairs of smarticles whose bounding spheres overlap; others neither touch nor cross.
 
-    Only they can touch, or pass through each other.
+    Returns:
+        The lower indices (P,) and the higher indices (P,).
     """
     if len(vertices) < 2:
         return np.empty(0, dtype=np.int64), np.empty(0, dtype=np.int64)
@@ -89,10 +90,10 @@ def close_pairs(vertices: Floats) -> tuple[Whole, Whole]:
 
 
 def swept_axes(vertices: Floats, diameter: float) -> Floats:
-    """Return the lines (N, 4, 3) [m] that a sphere is swept along: tips pulled in by its radius.
+    """Return the axes (N, 4, 3) [m] of the bodies that a sphere sweeps along each smarticle.
 
-    A barb shorter than the radius shrinks to its hinge; a smarticle without barbs is pulled in at the ends of its
-    middle link.
+    An axis is the centrelines with both tips moved inwards by the sphere's radius, so that the body ends at the tips. A
+    barb shorter than the radius shrinks to its hinge; without barbs the ends of the middle link move inwards.
 
     Source:
         `dem.engine.links.shape`; the sphere chains of `dem.body.particle` lie along these axes too.
@@ -113,8 +114,8 @@ def swept_axes(vertices: Floats, diameter: float) -> Floats:
 def plane_frames(vertices: Floats) -> Floats:
     """Return right-handed axes (N, 3, 3) of each smarticle's best-fitting plane, the normal last.
 
-    The normal is the direction of least spread of the four vertices: unlike a cross product of two links it is as good
-    for every shape, and it averages over slightly bent hinges. Of a straight smarticle it is some vector across it.
+    The normal is the direction in which the four vertices spread least, by singular value decomposition. It averages
+    over vertices that are not quite in one plane. The normal of a straight smarticle is an arbitrary vector across it.
     """
     _, _, axes = np.linalg.svd(vertices - vertices.mean(axis=1, keepdims=True))
     axes[np.linalg.det(axes) < 0, 2] *= -1
@@ -124,27 +125,28 @@ def plane_frames(vertices: Floats) -> Floats:
 
 @dataclass(frozen=True, kw_only=True)
 class Chain:
-    """How spheres stand for a smarticle."""
+    """Sizes of the sphere chain or the strands that represent a smarticle."""
 
-    diameter: float  #: Of the spheres [m]
-    rows: int  #: Rows, or strands, side by side along the smarticle's normal
-    width: float  #: Of the rows together, along the normal [m]
-    pitch: float  #: Largest distance of neighbouring centres along a link [m]; 0: spheres are swept along the links
-    #: By how much the middle link is thicker than the barbs, to either side in the plane [m]; not of what is swept
-    bulge: float = 0.0
+    diameter: float  #: Diameter of the spheres [m]
+    rows: int  #: Number of rows or strands side by side along the smarticle's normal
+    width: float  #: Total width of all rows, along the normal [m]
+    pitch: float  #: Largest distance of neighbouring centres along a link [m]; 0: strands, swept by a sphere
+    bulge: float = 0.0  #: Extra thickness of the middle link on either side in the plane [m]; 0 for strands
 
 
 def strands(vertices: Floats, chain: Chain) -> Floats:
-    """Return the lines (N, R, 4, 3) [m] that a sphere is swept along in R strands."""
+    """Return the axes (N, R, 4, 3) [m] of the R strands of each smarticle, see `swept_axes`."""
     return _side_by_side(swept_axes(vertices, chain.diameter), vertices, chain)
 
 
 def spheres(vertices: Floats, chain: Chain) -> Floats:
-    """Return the centres (N, S, 3) [m] of the spheres of smarticles.
+    """Return the centres (N, S, 3) [m] of the S spheres of each smarticle.
+
+    The spheres at the hinges belong to the middle link. The first sphere of a barb is a little more than a diameter
+    from the hinge, the surface of its last sphere touches the tip.
 
     Source:
-        `dem.body.particle`: the hinges' spheres belong to the middle link; a barb's begin a diameter and a little from
-        there, and end where the last one's surface is the tip; a thicker middle link has rows beside each other.
+        `dem.body.particle`.
     """
     lengths = link_lengths(vertices).mean(axis=0)
     parts = []
@@ -155,7 +157,7 @@ def spheres(vertices: Floats, chain: Chain) -> Floats:
         points = vertices[:, start, None] + stations[:, None] * along[:, None]
         if link == 1 and chain.bulge:
             across = np.cross(plane_frames(vertices)[:, 2], along)[:, None]
-            count = 2 * math.ceil(chain.bulge / chain.diameter) + 1  # rows of a thicker middle link in the plane
+            count = 2 * math.ceil(chain.bulge / chain.diameter) + 1  # rows side by side in the plane
             parts += [points + side * across for side in np.linspace(-chain.bulge, chain.bulge, count)]
         else:
             parts.append(points)
@@ -163,7 +165,7 @@ def spheres(vertices: Floats, chain: Chain) -> Floats:
 
 
 def _side_by_side(points: Floats, vertices: Floats, chain: Chain) -> Floats:
-    """Repeat points (N, P, 3) of smarticles once per row: (N, R, P, 3)."""
+    """Repeat points (N, P, 3) of smarticles in each of R rows, shifted along the normal: (N, R, P, 3)."""
     if chain.rows == 1:
         return points[:, None]
     reach = (chain.width - chain.diameter) / 2
@@ -173,7 +175,7 @@ def _side_by_side(points: Floats, vertices: Floats, chain: Chain) -> Floats:
 
 
 def _stations(length: float, chain: Chain, *, middle: bool, barbs: bool) -> Floats:
-    """Return distances of the centres along a link from its hinge [m]."""
+    """Return the distances (S,) [m] of the sphere centres of a link from its hinge."""
     if middle:
         inset = 0.0 if barbs else chain.diameter / 2
         start, end = inset, length - inset

@@ -1,9 +1,8 @@
-"""The region of space that a pile takes up as a body: what a ball that rolls around it cannot reach.
+"""Find the region inside the outline of a pile: the morphological closing of its links by a ball.
 
-Links are thin and the space between them is most of a pile, so its shape is that of a region and not of the links. Here
-it is the closing of the links by a ball: the ball keeps its distance from the links and from the floor, and what none
-of its places covers belongs to the pile. A gap that the ball does not fit into is part of the pile, one that it
-enters from outside is not; a flat face stays where it is, so a pile that fills a box has the box's volume.
+The ball may be at every position at which it overlaps neither a link nor the floor. All space that no such ball covers
+belongs to the pile. A gap narrower than the ball is thus part of the pile, a wider one that is open to the outside is
+not. Flat faces keep their position, so that a pile that fills a box has the volume of the box.
 """
 
 from __future__ import annotations
@@ -23,25 +22,25 @@ from postprocess.geometry.voxel import Region
 BALL = 0.25
 """Radius of the ball over w [-].
 
-It must not fit between links that are packed as loosely as poured ones: of straight lines laid at random with the
-length per volume of U-shapes at φ = 0.1, 0.158 /mm², none comes within r of a point with probability exp(-0.158 π r²);
-with the links' own half thickness r = 3.5 mm, that is 0.2 %. At half of that density it is 5 %."""
+The ball must not fit between the links of a poured pile. Among random straight lines, 0.158 mm of length per mm³ as in
+U-shapes at φ = 0.1, a ball of radius 3.5 mm (with half a link's thickness) fits at a random point with probability
+exp(-0.158 π r²) = 0.2 %; at half of that density with 5 %."""
 
-FINENESS = 4  #: Voxels to the ball's radius
+FINENESS = 4  #: Number of voxels per radius of the ball
 
 _MOST_VOXELS = 40_000_000
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Outlines:
-    """The regions of one or more piles on one grid of voxels above the floor."""
+    """Regions of P piles on a common grid of voxels above the floor."""
 
     pitch: float  #: Side of a voxel [m]
-    origin: Floats  #: (3,) [m], centre of the first voxel, above the floor
-    inside: Flags = field(repr=False)  #: (P, x, y, z) bool, which voxels belong to each pile
+    origin: Floats  #: (3,) [m], centre of the first voxel; z from the floor
+    inside: Flags = field(repr=False)  #: (P, X, Y, Z) bool, whether a voxel belongs to a pile
 
     def within(self, region: Region) -> Flags:
-        """Return which voxels (x, y, z) have their centre in a cylinder whose heights are above the floor."""
+        """Return whether each voxel's centre lies in a cylinder with heights above the floor: (X, Y, Z) bool."""
         x, y, z = (
             start + self.pitch * np.arange(count)
             for start, count in zip(self.origin, self.inside.shape[1:], strict=True)
@@ -59,20 +58,20 @@ def outlines(
     pitch: float | None = None,
     regions: Sequence[Region] = (),
 ) -> Outlines:
-    """Find the regions that piles take up, all on one grid.
+    """Find the regions inside the outlines of piles, on a common grid.
 
-    A flat face is found to within half a voxel, a volume therefore to much less.
+    The position of a flat face is accurate to half a voxel.
 
     Args:
-        piles: Vertices of each, heights above the floor.
-        thickness: Of the links, taken as round [m].
+        piles: Vertices (N, 4, 3) of each pile, heights above the floor [m].
+        thickness: Diameter of the links, taken as round [m].
         ball: Radius of the ball [m]; see `BALL`.
         pitch: Side of a voxel [m]; a fourth of the ball's radius if not given.
-        regions: What the grid must hold besides the piles.
+        regions: Cylinders that the grid must contain besides the piles.
 
     Raises:
-        InputError: Bad sizes, or piles that need more voxels than there is memory for.
-        UndefinedMeasureError: There is no smarticle.
+        InputError: A size is not above 0, or the grid would exceed 40 million voxels.
+        UndefinedMeasureError: There is no pile, or a pile without a smarticle.
     """
     checked = [checked_vertices(vertices) for vertices in piles]
     pitch = ball / FINENESS if pitch is None else pitch
@@ -85,10 +84,10 @@ def outlines(
     for region in regions:
         for sign, height in ((-1, region.bottom), (1, region.top)):
             corners.append(np.array([sign * region.radius, sign * region.radius, height]))
-    # Around the piles there is room for the ball on every side.
+    # The ball must be able to pass around the piles on every side.
     margin = 2 * ball + thickness + 2 * pitch
     first, last = np.min(corners, axis=0) - margin, np.max(corners, axis=0) + margin
-    # The floor is a face of voxels.
+    # The floor must coincide with faces of voxels.
     first[2] = pitch * (math.floor(min(first[2], -margin) / pitch) + 0.5)
     counts = np.ceil((last - first) / pitch).astype(int) + 1
     if math.prod(counts.tolist()) > _MOST_VOXELS:
@@ -101,9 +100,12 @@ def outlines(
 
 
 def _closed(vertices: Floats, axes: Sequence[Floats], *, ball: float, thickness: float) -> Flags:
-    """Find voxels, given by the coordinates of their centres, that no ball covers clear of links and floor."""
+    """Return which voxels no ball covers that overlaps neither links nor floor: (X, Y, Z) bool.
+
+    Axes are the coordinates of the voxels' centres along x, y and z [m].
+    """
     first, pitch = np.array([axis[0] for axis in axes]), float(axes[0][1] - axes[0][0])
-    # Where the ball's centre cannot be; the floor holds it off as links do.
+    # Voxels at which the ball's centre cannot be.
     blocked = np.zeros(tuple(map(len, axes)), dtype=bool)
     blocked |= axes[2] < ball
     reach = ball + thickness / 2
@@ -112,21 +114,21 @@ def _closed(vertices: Floats, axes: Sequence[Floats], *, ball: float, thickness:
         high = np.ceil((np.maximum(start, end) + reach - first) / pitch).astype(int) + 1
         box = tuple(slice(a, b) for a, b in zip(low, high, strict=True))
         blocked[box] |= _near_link(tuple(axis[part] for axis, part in zip(axes, box, strict=True)), start, end, reach)
-    # The nearest free voxel's centre lies beyond where freedom begins: by half a voxel behind a face along the grid, by
-    # an eighth or so behind any other one, where many voxels are nearly as near.
+    # The centre of the nearest free voxel lies beyond the boundary of the free region: by half a voxel at a face along
+    # the grid, by about an eighth at other faces. 0.25 is a mean.
     free_at = (distance_transform_edt(blocked) - 0.25) * pitch
     closed: Flags = free_at > ball
     return closed
 
 
 def _near_link(axes: tuple[Floats, ...], start: Floats, end: Floats, reach: float) -> Flags:
-    """Find points of a grid, given by its coordinates, within a distance [m] of a link's centreline."""
+    """Return which points of a grid, given by its axes, lie within a distance [m] of a link's centreline."""
     along = end - start
     square = float(along @ along)
     x, y, z = (axis - place for axis, place in zip(axes, start, strict=True))
     dot = (x * along[0])[:, None, None] + (y * along[1])[:, None] + z * along[2]
-    share = np.clip(dot / square, 0, 1) if square else np.zeros_like(dot)
+    # |p - s a|², where s a is the point of the link that is nearest to p.
+    s = np.clip(dot / square, 0, 1) if square else np.zeros_like(dot)
     apart = (x**2)[:, None, None] + (y**2)[:, None] + z**2
-    # |p - s a|^2, of the foot s of the perpendicular kept on the link.
-    near: Flags = apart - 2 * share * dot + share**2 * square < reach**2
+    near: Flags = apart - 2 * s * dot + s**2 * square < reach**2
     return near

@@ -1,4 +1,4 @@
-"""Local packing: the set-Voronoi cell of each smarticle, approximately."""
+"""Compute local packing fractions from approximate set-Voronoi cells of the smarticles."""
 
 from __future__ import annotations
 
@@ -10,7 +10,6 @@ from scipy.spatial import QhullError, Voronoi, cKDTree
 
 from dem.errors import InputError
 from postprocess.geometry.links import (
-    Flags,
     Floats,
     UndefinedMeasureError,
     Vertices,
@@ -22,38 +21,36 @@ from postprocess.geometry.links import (
 )
 from postprocess.geometry.voxel import Region
 
-TOGETHER = 60_000  #: Most points per call of Qhull; each takes about 15 kB of memory during it
+TOGETHER = 60_000  #: Most points per call of Qhull, which takes about 15 kB of memory per point
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class LocalPacking:
     """Set-Voronoi cells of the smarticles of a pile."""
 
-    volumes: Floats = field(repr=False)  #: (N,) [m³], of the cell of each smarticle; infinite or zero where it has none
-    interior: Flags = field(repr=False)  #: (N,) bool, which smarticles lie in the region asked for
-    value: float  #: Solid volume over cell volume of the interior ones together [-]
+    volumes: Floats = field(repr=False)  #: (N,) [m³], volume of each smarticle's cell; infinite or 0 without a cell
+    value: float  #: Packing fraction: total solid volume over total cell volume of the smarticles in the region [-]
 
 
 def local_packing(
     vertices: Vertices, container: Region, region: Region, *, solid_volume: float, spacing: float | None = None
 ) -> LocalPacking:
-    """Compute the packing fraction of smarticles in a region by the volume nearer to them than to others.
+    """Compute the packing fraction in a region by the set-Voronoi cells of its smarticles.
 
-    Points are sampled along the centrelines, and their Voronoi cells united per smarticle. That is the set-Voronoi cell
-    of thin links, up to the spacing and to differences of thickness. Images of the points mirrored in floor, wall and
-    lid bound the cells there; the wall is thereby a polygon around the circle, the lid lies at the highest point of the
-    smarticles below the container's top. Only smarticles with their centre of mass in the region count, so that walls
-    and lid matter little.
+    The set-Voronoi cell of a smarticle is the volume that is nearer to it than to any other smarticle. Here it is the
+    union of the Voronoi cells of points along its centrelines. Mirror images of the points bound the cells at floor,
+    wall and lid; the lid lies at the highest point of the smarticles with their centre of mass inside the container.
 
     Args:
+        vertices: (N, 4, 3) [m].
         container: The container from its floor to the pile's height.
-        region: The smarticles with their centre of mass in here are counted.
+        region: Region in which the centres of mass of the counted smarticles lie.
         solid_volume: Volume of one smarticle [m³].
-        spacing: Largest distance of points along a link [m]; w/8 if not given, which is within 0.5 % of the
-            limit of close points in piles of 270.
+        spacing: Largest distance of points along a link [m]; w/8 if not given, which is within 0.5 % of the limit of
+            small spacings in piles of 270.
 
     Raises:
-        InputError: Bad spacing.
+        InputError: The spacing is not above 0.
         UndefinedMeasureError: No smarticle in the region, or one of them has no closed cell.
 
     Source:
@@ -68,12 +65,12 @@ def local_packing(
         spacing = float(np.median(link_lengths(vertices)[:, 1])) / 8
     if not spacing > 0:
         raise InputError(f"spacing of the points along the links must be above 0 m: got {spacing} m")
-    below = vertices[centres[:, 2] < container.top]
-    # A little higher, lest the highest point coincide with its own image.
-    lid = float(below[:, :, 2].max(initial=container.top)) + spacing / 2
+    contained = vertices[centres[:, 2] < container.top]
+    # Half a spacing higher, so that the highest point does not coincide with its image.
+    lid = float(contained[:, :, 2].max(initial=container.top)) + spacing / 2
     points, owners = _sample(vertices, spacing)
     x, y = points[:, :2].T
-    # Points outside the container have no image that would bound their cells.
+    # No image would bound the cells of points outside the container.
     kept = (np.hypot(x, y) < container.radius) & (points[:, 2] > container.bottom)
     kept &= points[:, 2] < lid
     points, owners = points[kept], owners[kept]
@@ -90,29 +87,29 @@ def local_packing(
     if not np.isfinite(total):
         raise UndefinedMeasureError("a smarticle in the inner region has no closed Voronoi cell: the pile is too thin")
     value = float(interior.sum() * solid_volume / total)
-    return LocalPacking(volumes=volumes, interior=interior, value=value)
+    return LocalPacking(volumes=volumes, value=value)
 
 
 def _sample(vertices: Floats, spacing: float) -> tuple[Floats, Whole]:
-    """Place points (n, 3) evenly along each link, none at a hinge; return them and their smarticles (n,)."""
-    # Lengths differ by rounding, which must not give one link a point more than its equals.
+    """Place points evenly along each link, none at a hinge: points (n, 3) [m], indices of smarticles (n,)."""
+    # Rounding of lengths must not give one of several equal links an extra point.
     cuts = np.ceil(link_lengths(vertices) / spacing - 1e-6).astype(int).ravel()
     link = np.repeat(np.arange(len(cuts)), cuts)
     step = np.arange(len(link)) - np.repeat(np.cumsum(cuts) - cuts, cuts)
-    share = (step + 0.5) / cuts[link]
+    fraction = (step + 0.5) / cuts[link]
     start = vertices[:, :-1].reshape(-1, 3)[link]
     along = np.diff(vertices, axis=1).reshape(-1, 3)[link]
-    return start + share[:, None] * along, link // 3
+    return start + fraction[:, None] * along, link // 3
 
 
 def _mirrored(points: Floats, container: Region, lid: float, band: float) -> Floats:
-    """Mirror the points nearer than `band` to floor, lid or wall."""
+    """Return the mirror images of points that are nearer to floor, lid or wall than `band` [m]."""
     floor = points[points[:, 2] < container.bottom + band] * [1, 1, -1]
     floor[:, 2] += 2 * container.bottom
     top = points[points[:, 2] > lid - band] * [1, 1, -1]
     top[:, 2] += 2 * lid
     distance = np.hypot(*points[:, :2].T)
-    # On the axis itself there is no direction to the wall.
+    # A point on the axis has no direction to the wall.
     near = (distance > container.radius - band) & (distance > 1e-3 * container.radius)
     wall = points[near].copy()
     stretch = (2 * container.radius - distance[near]) / distance[near]
@@ -121,42 +118,46 @@ def _mirrored(points: Floats, container: Region, lid: float, band: float) -> Flo
 
 
 def _cell_volumes(points: Floats, count: int, *, reach: float, together: int = TOGETHER) -> Floats:
-    """Compute volumes (count,) of the Voronoi cells of the first of points (n, 3) [m], infinite for open ones.
+    """Compute the Voronoi volumes of the first `count` points among points (n, 3) [m].
 
-    Cells are found slab by slab along x, among all points within a reach [m] of it. A point's cell among them is its
-    cell among all points where the spheres around its corners through the point, in which there must be no other, do
-    not go beyond. The few others are found again among all points within twice the reach of one of them, where those
-    spheres lie if the reach is twice the distance of the farthest corner; and so on.
+    The points are divided into slabs along x; the cells of a slab are computed among all points within a reach [m] of
+    the slab. A cell is final if the spheres around its corners that pass through its point lie inside this region: they
+    must hold no other point. The remaining cells are computed again among all points within twice the reach of them,
+    and so on, until the reach is twice the distance of their farthest corner.
+
+    Returns:
+        (count,) [m³]; infinite for open cells.
     """
     if count <= together:
         return _cells(points)[0][:count]
     volumes, tree, across = np.empty(count), cKDTree(points), points[:, 0]
     for slab in np.array_split(np.argsort(across[:count], kind="stable"), -(-count // together)):
         low, high = across[slab[0]] - reach, across[slab[-1]] + reach
-        near, wanted, now = np.flatnonzero((across >= low) & (across <= high)), slab, reach
-        found, _, lowest, highest = _cells(points[near])
-        sure = (lowest > low) & (highest < high)
+        near, missing, radius = np.flatnonzero((across >= low) & (across <= high)), slab, reach
+        cells, _, lowest, highest = _cells(points[near])
+        final = (lowest > low) & (highest < high)
         while True:
-            places = np.searchsorted(near, wanted)
-            known = sure[places]
-            volumes[wanted[known]] = found[places[known]]
-            wanted, now = wanted[~known], 2 * now
-            if not len(wanted):
+            places = np.searchsorted(near, missing)
+            known = final[places]
+            volumes[missing[known]] = cells[places[known]]
+            missing, radius = missing[~known], 2 * radius
+            if not len(missing):
                 break
-            near = np.unique(np.concatenate(tree.query_ball_point(points[wanted], now)).astype(np.int64))
-            found, farthest, *_ = _cells(points[near])
-            sure = (2 * farthest < now) | (len(near) == len(points))
+            near = np.unique(np.concatenate(tree.query_ball_point(points[missing], radius)).astype(np.int64))
+            cells, farthest, *_ = _cells(points[near])
+            final = (2 * farthest < radius) | (len(near) == len(points))
     return volumes
 
 
 def _cells(points: Floats) -> tuple[Floats, Floats, Floats, Floats]:
-    """Compute the Voronoi cells of all points.
+    """Compute the Voronoi cells of points (n, 3) [m].
 
-    A cell is the sum of the pyramids from its point over its faces, whose height is half the distance to the neighbour.
+    A cell is the union of pyramids with their apex at its point and a face as base; the height of a pyramid is half the
+    distance to the neighbour behind the face.
 
     Returns:
-        Volumes (n,) [m³], distances of the farthest corner, least and greatest x of the spheres around the corners
-        through the point [m]; lengths are infinite for open cells.
+        Volumes (n,) [m³], infinite for open cells; distances (n,) of the farthest corner from the point [m]; least and
+        greatest x (n,) of the spheres around the corners through the point [m].
     """
     diagram = Voronoi(points)
     pairs = np.asarray(diagram.ridge_points)
@@ -167,7 +168,7 @@ def _cells(points: Floats) -> tuple[Floats, Floats, Floats, Floats]:
     open_faces = np.minimum.reduceat(corners, starts) < 0
     followers = np.roll(corners, -1)
     followers[starts + sizes - 1] = corners[starts]
-    # Relative to a corner of the face: cross products of far-away vectors would cancel badly.
+    # Corners relative to one of the face: cross products of long vectors would lose digits.
     reference = diagram.vertices[np.repeat(corners[starts], sizes)]
     areas = np.add.reduceat(
         np.cross(diagram.vertices[corners] - reference, diagram.vertices[followers] - reference),

@@ -1,4 +1,4 @@
-"""Upright cylinders, and points of a fine grid inside the true boxes of the links."""
+"""Find the points of a fine grid that lie inside the boxes of the links."""
 
 from __future__ import annotations
 
@@ -21,33 +21,33 @@ from postprocess.geometry.links import (
     plane_frames,
 )
 
-# Point tests held in memory at a time.
+# Point tests per block, which limits memory.
 _CHUNK = 1_000_000
-# A fixed rotation by no simple angle about no simple axis: boxes in line with x, y, z meet the grid as all others do.
+# An arbitrary fixed rotation of the grid, so that boxes along x, y or z are not special.
 _TURN = Rotation.from_quat([2**0.5 - 1, 3**0.5 - 1, 5**0.5 - 2, 1.0]).as_matrix()
 
 
 @dataclass(frozen=True, kw_only=True)
 class Region:
-    """An upright cylinder about x = y = 0: its radius, and the heights of its lower and its upper end [m]."""
+    """An upright cylinder around x = y = 0."""
 
-    radius: float
-    bottom: float
-    top: float
+    radius: float  #: [m]
+    bottom: float  #: Height of the lower end [m]
+    top: float  #: Height of the upper end [m]
 
     @property
     def volume(self) -> float:
-        """[m³]."""
+        """Volume [m³]."""
         return math.pi * self.radius**2 * (self.top - self.bottom)
 
     @property
     def inner(self) -> Region:
-        """The part, 0.75 r and 20 % to 80 % of the height, that stays clear of wall, floor and free surface."""
+        """The inner cylinder of 0.75 r, from 20 % to 80 % of the height, away from wall, floor and surface."""
         height = self.top - self.bottom
         return Region(radius=0.75 * self.radius, bottom=self.bottom + 0.2 * height, top=self.bottom + 0.8 * height)
 
     def contains(self, points: Floats) -> Flags:
-        """Find which of (n, 3) points [m] lie inside."""
+        """Return which points (n, 3) [m] lie inside: (n,) bool."""
         x, y, z = points.T
         inside: Flags = (x**2 + y**2 < self.radius**2) & (z > self.bottom) & (z < self.top)
         return inside
@@ -61,13 +61,11 @@ def solid_fraction(
     thickness_in_plane: float,
     pitch: float | None = None,
 ) -> float:
-    """Return the share of a region inside a link's box, above 0; arguments as `solid_points`.
+    """Return the fraction of a region's volume inside the boxes of the links [-].
 
-    A point in two boxes counts once. Links of one smarticle overlap at the hinges, so a U reads lower than
-    t1 t2 (w + 2l) by t2 / (2 (w + 2l)), about 1 % for the usual sizes.
-
-    The section of a straight smarticle is turned about its length by an angle that four vertices do not give: some
-    angle is taken.
+    `solid_points` describes the arguments.
+    A point in two boxes counts once. The boxes of a smarticle overlap at its hinges, so the volume of a U is smaller
+    than t1 t2 (w + 2l), by about 1 % for usual sizes.
 
     Raises:
         InputError: Bad sizes.
@@ -94,10 +92,20 @@ def solid_points(
     pitch: float | None = None,
     region: Region | None = None,
 ) -> tuple[Floats, float]:
-    """Return points (n, 3) [m] of a cubic grid inside a link's box, each once, and their pitch [m].
+    """Find the points of a cubic grid that lie inside the boxes of the links.
 
-    Thicknesses [m] are t1, along the normal of the smarticle's plane, and t2, in it; a point stands for its cube, as
-    wide as the pitch [m] or, without one, as half the smaller thickness.
+    The cross-section of a straight smarticle may be turned around its length by any angle, which its vertices do not
+    determine; an arbitrary angle is used.
+
+    Args:
+        vertices: (N, 4, 3) [m].
+        thickness_normal: t1, along the normal of the smarticle's plane [m].
+        thickness_in_plane: t2, in the smarticle's plane [m].
+        pitch: Distance of neighbouring points [m]; half the smaller thickness if not given.
+        region: Region to which points are restricted; None: no restriction.
+
+    Returns:
+        The points (n, 3) [m], each once, and the pitch [m].
 
     Raises:
         InputError: Bad sizes.
@@ -119,12 +127,12 @@ def solid_points(
 def _grid_points(
     vertices: Floats, normal: float, in_plane: float, pitch: float, region: Region | None
 ) -> Iterator[Whole]:
-    """Yield indices (n, 3) of the turned grid's points inside the links' boxes, some of them repeated.
+    """Yield indices (n, 3) of points of the rotated grid inside the links' boxes, perhaps repeated.
 
-    Boxes are cut into pieces about as long as thick, so that few grid points lie around each.
+    Each box is cut into pieces about as long as thick, so that few grid points must be tested for each piece.
     """
     lengths = link_lengths(vertices)
-    # A link of no length (l = 0) has no direction; it yields no piece either.
+    # A link without length (l = 0) has no direction, and yields no piece.
     along = np.diff(vertices, axis=1) / np.maximum(lengths, 1e-300)[..., None]
     across = np.cross(plane_frames(vertices)[:, None, 2], along)
     across /= np.maximum(np.linalg.norm(across, axis=2), 1e-300)[..., None]
@@ -137,7 +145,7 @@ def _grid_points(
     section = np.broadcast_to([in_plane / 2, normal / 2], (len(link), 2))
     halves = np.column_stack([lengths.ravel()[link] / cuts[link] / 2, section])
     reach = float(np.linalg.norm(halves, axis=1).max(initial=0.0))
-    if region is not None:  # the pieces that may reach into it
+    if region is not None:  # pieces that may overlap the region
         x, y, z = centres.T
         keep = np.hypot(x, y) < region.radius + reach
         keep &= (z > region.bottom - reach) & (z < region.top + reach)
@@ -152,7 +160,7 @@ def _grid_points(
         planes = pitch * (first[part, :, None] + steps) - centres[part, :, None]
         inside = np.ones((len(planes), *[len(steps)] * 3), dtype=bool)
         for axis, half in zip(axes[part].swapaxes(0, 1), halves[part].T, strict=True):
-            # A dot product with the axis, as a sum over the planes' own contributions.
+            # The dot product of axis and point is a sum of one term per plane, which needs less memory.
             x, y, z = (axis[:, :, None] * planes).swapaxes(0, 1)
             local = (x[:, :, None] + y[:, None, :])[..., None] + z[:, None, None, :]
             inside &= np.abs(local) <= half[:, None, None, None]
@@ -161,10 +169,10 @@ def _grid_points(
 
 
 def _distinct(indices: Whole) -> Whole:
-    """Return each of (n, 3) indices once."""
+    """Return indices (n, 3) without repetitions."""
     if len(indices) == 0:
         return indices
-    # One number per grid point sorts much faster than rows of three.
+    # One number per point sorts much faster than rows of three numbers.
     low = indices.min(axis=0)
     shape = tuple(indices.max(axis=0) - low + 1)
     keys = np.unique(np.ravel_multi_index(tuple((indices - low).T), shape))

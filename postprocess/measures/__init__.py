@@ -1,4 +1,4 @@
-"""Measures of frames and series, and tables of them; one file each, registered by its tuple `MEASURES`.
+"""Measures of frames and series, one file each, and tables of their values.
 
-They know nothing of reports and pictures.
+A file registers its measures in its tuple `MEASURES`.
 """

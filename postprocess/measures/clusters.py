@@ -1,4 +1,4 @@
-"""Find which smarticles hang together, by contact or by crossings, and what they span."""
+"""Find clusters of smarticles joined by contacts or crossings, and whether one spans the container."""
 
 from __future__ import annotations
 
@@ -20,22 +20,22 @@ from postprocess.measures.registry import FrameMeasure, Quantity
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Clusters:
-    """Connected parts of a graph whose nodes are the smarticles of a frame."""
+    """The C connected components of a graph whose nodes are the N smarticles of a frame."""
 
-    labels: Whole = field(repr=False)  #: (N,) int64, number of each smarticle's cluster, 0 for the largest one
-    sizes: Whole  #: (C,) int64, smarticles of each cluster, descending
+    labels: Whole = field(repr=False)  #: (N,) int64, number of each smarticle's cluster; 0 is the largest cluster
+    sizes: Whole  #: (C,) int64, number of smarticles in each cluster, descending
 
     @property
     def largest(self) -> float:
-        """Share of the smarticles that belong to the largest cluster [-]."""
+        """Fraction of the smarticles that belong to the largest cluster [-]."""
         return float(self.sizes[0] / len(self.labels))
 
 
 def contact_clusters(vertices: Vertices, distance: float) -> Clusters:
-    """Join smarticles whose centrelines come as close as a distance [m], see `contacts.contact_pairs`.
+    """Find clusters of smarticles whose centrelines are at most a distance [m] apart.
 
     Raises:
-        InputError: Bad distance.
+        InputError: The distance is not above 0.
         UndefinedMeasureError: There is no smarticle.
     """
     pairs = contact_pairs(vertices, distance)
@@ -43,7 +43,7 @@ def contact_clusters(vertices: Vertices, distance: float) -> Clusters:
 
 
 def entanglement_clusters(vertices: Vertices) -> Clusters:
-    """Join smarticles of which a link of one passes through the plane of the other.
+    """Find clusters of smarticles joined by crossings.
 
     Raises:
         UndefinedMeasureError: There is no smarticle.
@@ -53,7 +53,7 @@ def entanglement_clusters(vertices: Vertices) -> Clusters:
 
 
 def contact_graph(frame: Frame, run: Run) -> Clusters:
-    """Join smarticles that touch by their shapes in the run's engine, see `contacts.pairs_in_contact`.
+    """Find clusters of smarticles that touch in the run's engine, see `contacts.pairs_in_contact`.
 
     Raises:
         InputError: The scene of the run cannot be read.
@@ -64,10 +64,13 @@ def contact_graph(frame: Frame, run: Run) -> Clusters:
 
 
 def spans_height(clusters: Clusters, vertices: Vertices, *, diameter: float, floor_z: float) -> bool:
-    """Whether one cluster reaches from the floor, at a height [m], to the top of the pile.
+    """Return whether one cluster reaches from the floor to the top of the pile.
 
-    The top is where 95 % of the links' material lie below; alone on top there may be one smarticle. Links are swept by
-    a sphere of a diameter [m].
+    Args:
+        clusters: Clusters of the smarticles.
+        vertices: (N, 4, 3) [m].
+        diameter: Diameter of the spheres along the links [m].
+        floor_z: Height of the floor [m]. The top is the height below which 95 % of the material lies.
 
     Source:
         Stauffer & Aharony, Introduction to Percolation Theory (1994), section 2: a cluster percolates if it joins
@@ -81,10 +84,15 @@ def spans_height(clusters: Clusters, vertices: Vertices, *, diameter: float, flo
 
 
 def spans_width(clusters: Clusters, vertices: Vertices, *, diameter: float, wall_radius: float) -> bool:
-    """Whether one cluster reaches from wall to wall: no half of the wall has all its contacts with it.
+    """Return whether one cluster spans the container: no half of the wall has all its contacts.
 
-    A round wall, of a radius [m] about x = y = 0, has no opposite faces, and what touches it on one side alone is not
-    wedged. Links are swept by a sphere of a diameter [m].
+    A cluster that touches a round wall on one half alone is not wedged between opposite sides.
+
+    Args:
+        clusters: Clusters of the smarticles.
+        vertices: (N, 4, 3) [m].
+        diameter: Diameter of the spheres along the links [m].
+        wall_radius: Radius of the wall around the axis x = y = 0 [m].
     """
     vertices = checked_vertices(vertices)
     smarticle, vertex = np.nonzero(at_wall(vertices, diameter=diameter, wall_radius=wall_radius))
@@ -97,7 +105,7 @@ def spans_width(clusters: Clusters, vertices: Vertices, *, diameter: float, wall
 
 
 def joined_clusters(count: int, i: Whole, j: Whole) -> Clusters:
-    """Join smarticles, of which there are `count`, the i-th with the j-th.
+    """Find the clusters of a graph of `count` smarticles, by the indices i (P,) and j (P,) of its P edges.
 
     Raises:
         UndefinedMeasureError: There is no smarticle.
@@ -116,7 +124,7 @@ def joined_clusters(count: int, i: Whole, j: Whole) -> Clusters:
 def _spans_of(clusters: Clusters, frame: Frame, run: Run) -> tuple[float, float, float]:
     vertices, diameter = frame.vertices, run.manifest.sphere_diameter_m
     height = spans_height(clusters, vertices, diameter=diameter, floor_z=frame.floor_z)
-    # After its wall is gone a pile has nothing to span from.
+    # Without a wall there is no width to span.
     walled = run.manifest.walled(frame.phase)
     width = walled and spans_width(clusters, vertices, diameter=diameter, wall_radius=run.manifest.container_radius_m)
     return clusters.largest, float(height), float(width) if walled else math.nan

@@ -1,8 +1,8 @@
 """Measure how a free-standing column collapses on a vibrating floor: height against time, and τ.
 
-A column on a floor without end loses height in two ways: it sinks, and smarticles leave it. On a floor that shakes with
-several g, those that have left hop millimetres high, as high as a low column, so heights of all smarticles, or of the
-uppermost ones, do not go to the height of a layer. `remaining` is free of this: it counts.
+A column loses height because it sinks and because smarticles leave it. On a floor that shakes with several g,
+smarticles that have left hop as high as a low column, so that the mean height of all smarticles does not fall to that
+of a layer. The height `remaining` avoids this bias: it counts the smarticles that have not left.
 """
 
 from __future__ import annotations
@@ -27,72 +27,69 @@ REMAINING, COM, CORE = "remaining", "com", "core"
 
 HEIGHTS: Mapping[str, str] = MappingProxyType(
     {
-        REMAINING: "smarticles still within the container's radius, over those before vibration: the height that the "
-        "column has left above its base at the density it had",
-        COM: "height of the centre of mass of all smarticles, over that before vibration",
-        CORE: "height of the centre of mass of those within the container's radius, over that before vibration; from "
-        "frames",
+        REMAINING: "smarticles still within the container's radius, over their number before vibration: the height "
+        "that a column of unchanged density would have",
+        COM: "height of the centre of mass of all smarticles, over its height before vibration",
+        CORE: "height of the centre of mass of the smarticles within the container's radius, over its height before "
+        "vibration; from frames",
     }
 )
-"""Definitions of a column's height by name, each over that before vibration."""
+"""Definitions of a column's height by name, each relative to the height before vibration."""
 
 _KNOWN_ENDS: Mapping[str, Mapping[str, float]] = MappingProxyType({REMAINING: {"start": 1.0, "end": 0.0}})
-"""Start and end of the fitted curve [-] where they are known: in the end all have left. The other heights bounce up at
-the start and hop in the end, so theirs are fitted."""
+"""Start and end of the fitted curve [-] for heights of which they are known: in the end all smarticles have left. The
+other heights need a fit, because smarticles bounce at the start and hop in the end."""
 
-REST = 0.1  #: How long before vibration the height is averaged that others are taken over [s]
-LEAST_FALL = 0.25  #: A column that has lost less of its height than this share still stands [-]
-WORST_ERROR = 0.5  #: Relative error beyond which a time is not taken for known [-]
+REST = 0.1  #: Time before vibration over which the reference height is averaged [s]
+LEAST_FALL = 0.25  #: A column that has lost less than this fraction of its height still stands [-]
+WORST_ERROR = 0.5  #: Largest relative error of a collapse time that counts as measured [-]
 
 _LEAST_SAMPLES = 10
-_EXPONENTS = (0.3, 3.0)
-_LONGEST = 1e4  # τ over the time watched: beyond it a curve is flat, whatever τ
+_EXPONENTS = (0.3, 3.0)  # bounds of β
+_LONGEST = 1e4  # bound of τ over the observation time; for larger ones the curve is flat, whatever τ
 
 
 @dataclass(frozen=True, kw_only=True)
 class Vibration:
-    """The phase that shakes a free-standing column: peak acceleration over g [-], frequency [Hz]."""
+    """The phase that shakes a free-standing column."""
 
     phase: Phase
-    acceleration: float
-    frequency: float
+    acceleration: float  #: Peak acceleration of the floor over g [-]
+    frequency: float  #: Frequency of the floor's motion [Hz]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class ColumnHistory:
     """Heights of one column against time."""
 
-    times: Floats  #: (n,) since the vibration began [s], some of them before
-    heights: Floats  #: (n,) over the mean height in the last `REST` before [-]
-    before: float  #: That height: [m], or a share of the smarticles by `REMAINING` [-]
+    times: Floats  #: (n,) times since the vibration began [s]; negative before
+    heights: Floats  #: (n,) heights over `before` [-]
+    before: float  #: Mean height in the last `REST` seconds before the vibration [m]; a fraction [-] for `REMAINING`
 
 
 @dataclass(frozen=True, kw_only=True)
 class CollapseTime:
-    """The collapse of one column.
+    """Fit of h(t) = h_end + (h_start − h_end) exp(−(t/τ)^β) to the height of a collapsing column."""
 
-    h(t) = h_end + (h_start − h_end) exp(−(t/τ)^β).
-    """
-
-    #: "collapsed": τ was seen; "collapsing": it has lost height, but τ is beyond the end, or not known from what was
-    #: seen; "standing": it has lost less than `LEAST_FALL`
+    #: "collapsed": τ was measured; "collapsing": the column has lost height, but τ is longer than the observation or
+    #: its error too large; "standing": the column has lost less than `LEAST_FALL` of its height
     outcome: Literal["collapsed", "collapsing", "standing"]
     time: float  #: τ [s]; NaN unless collapsed
-    #: Standard error of the fit [s], with the correlation of successive residuals, or the first sample's time where τ
+    #: Standard error of τ [s], enlarged by the correlation of successive residuals; the time of the first sample if τ
     #: is shorter than that; NaN unless collapsed
     error: float
-    bound: float  #: Lower bound of τ [s]: the time watched; NaN if collapsed
-    exponent: float  #: β of the fit [-]
-    start: float  #: h_start of the fit, in the heights' unit
-    end: float  #: h_end of the fit, in the heights' unit
-    fall: float  #: Share of the height that the fit loses while it is watched [-]
+    bound: float  #: Lower bound of τ [s]: the observation time; NaN if collapsed
+    exponent: float  #: β [-]
+    start: float  #: h_start, in the heights' unit
+    end: float  #: h_end, in the heights' unit
+    fall: float  #: Fraction of the height that the fitted curve loses during the observation [-]
 
 
 def vibration(run: Run) -> Vibration:
-    """Find the first phase of a run that shakes the floor after the wall was taken away.
+    """Find the first phase of a run that shakes the floor after the wall was removed.
 
     Raises:
-        InputError: There is none, or the scene does not say how it shakes.
+        InputError: The run has no such phase, or the scene lacks its acceleration or frequency.
     """
     kinds = [phase.type for phase in run.phases]
     after = kinds.index("remove-container") if "remove-container" in kinds else len(kinds)
@@ -108,13 +105,18 @@ def vibration(run: Run) -> Vibration:
 
 
 def column_history(run: Run, definition: str, shaken: Vibration) -> ColumnHistory:
-    """Read a column's heights, by one of `HEIGHTS`, from the phase before its vibration to the end of that.
+    """Read a column's heights from the phase before its vibration to the end of the vibration.
+
+    Args:
+        run: A finished run.
+        definition: Key of `HEIGHTS`.
+        shaken: The vibration, see `vibration`.
 
     Raises:
         InputError: The run lacks its series or frames, or samples before the vibration.
     """
     times, heights = _core(run, shaken) if definition == CORE else _of_series(run, definition, shaken)
-    assert shaken.phase.start_s is not None  # of a finished run
+    assert shaken.phase.start_s is not None  # the run is finished
     times = times - shaken.phase.start_s
     resting = (times > -REST * (1 + 1e-6)) & (times < 1e-9)
     before = float(heights[resting].mean()) if resting.any() else math.nan
@@ -127,16 +129,16 @@ def column_history(run: Run, definition: str, shaken: Vibration) -> ColumnHistor
 
 
 def height_with_the_wall(run: Run) -> float:
-    """Read the height of the centre of mass when the wall was last there [m].
+    """Return the height of the centre of mass at the last sample before the wall was removed [m].
 
     Raises:
-        InputError: The run lacks its series, or samples before its wall went.
+        InputError: The run lacks its series, or samples before the wall was removed.
     """
     series = run.series
-    gone = [phase.type for phase in run.phases].index("remove-container")
-    heights = series["com_height_m"][series["phase"] < gone]
+    removal = [phase.type for phase in run.phases].index("remove-container")
+    heights = series["com_height_m"][series["phase"] < removal]
     if not len(heights):
-        raise InputError(f"{run.path}: no height of the column before its wall went; record more often")
+        raise InputError(f"{run.path}: no height of the column before its wall was removed; record more often")
     return float(heights[-1])
 
 
@@ -163,18 +165,32 @@ def _core(run: Run, shaken: Vibration) -> tuple[Floats, Floats]:
 
 
 def collapse_of(history: ColumnHistory, definition: str, shaken: Vibration) -> CollapseTime:
-    """Fit the collapse time of a column to means over periods: bouncing within one does not count.
+    """Fit the collapse time of a column to its heights, averaged over each period of the vibration.
+
+    Args:
+        history: Heights of the column.
+        definition: Key of `HEIGHTS` by which the heights were read.
+        shaken: The vibration.
 
     Raises:
-        InputError: It was sampled too rarely, or watched for too short a time.
+        InputError: The samples are too few, or the vibration too short.
     """
     times, heights = period_means(history.times, history.heights, shaken.frequency)
     return collapse_time(times, heights, **_KNOWN_ENDS.get(definition, {}))
 
 
 def period_means(times: Floats, values: Floats, frequency: float) -> tuple[Floats, Floats]:
-    """Average over whole periods from time 0 on: times (m,) [s] and values (m,) of those with a sample."""
-    # A sample at the end of a period belongs to it.
+    """Average samples over each period of a vibration that begins at time 0.
+
+    Args:
+        times: (n,) times of the samples [s]; samples up to time 0 are left out.
+        values: (n,) values of the samples.
+        frequency: Frequency of the vibration [Hz].
+
+    Returns:
+        Mean times (m,) [s] and mean values (m,) of the m periods that have a sample.
+    """
+    # A sample at the end of a period belongs to this period.
     period = np.ceil(times * frequency - 1e-6).astype(np.int64)
     used = period > 0
     _, place = np.unique(period[used], return_inverse=True)
@@ -185,20 +201,20 @@ def period_means(times: Floats, values: Floats, frequency: float) -> tuple[Float
 def collapse_time(
     times: ArrayLike, heights: ArrayLike, *, start: float | None = None, end: float | None = None
 ) -> CollapseTime:
-    """Fit a stretched exponential to a height against time, and say whether its time was seen.
+    """Fit a stretched exponential to height against time, and decide whether τ was measured.
 
-    Least squares with 0.3 ≤ β ≤ 3 and 0 ≤ h_end ≤ h_start. A τ counts as seen where it is shorter than the time
-    watched, so that 63 % of the fall are before the end, and its error is below `WORST_ERROR`; the column must have
-    fallen by `LEAST_FALL` at all. Otherwise the time watched is a bound that τ is not below.
+    Least squares with 0.3 ≤ β ≤ 3 and 0 ≤ h_end ≤ h_start. τ counts as measured if the column lost at least
+    `LEAST_FALL` of its height, τ is shorter than the observation, and its relative error is at most `WORST_ERROR`.
+    Otherwise the observation time is a lower bound of τ.
 
     Args:
-        times: (n,) since the collapse was set going [s], ascending and above 0; n ≥ 10.
-        heights: (n,) in any unit, above or equal to 0.
-        start: h_start where it is known, in that unit; None: fitted.
-        end: h_end likewise.
+        times: (n,) times since the collapse began [s], ascending and above 0; n ≥ 10.
+        heights: (n,) heights in any unit, not below 0.
+        start: h_start if it is known, in the unit of the heights; None: fitted.
+        end: h_end if it is known, in the unit of the heights; None: fitted.
 
     Raises:
-        InputError: Too few samples, or times or heights that cannot be.
+        InputError: Too few samples, or times or heights out of their range.
 
     Source:
         τ of Gravish, Franklin, Hu, Goldman, Phys. Rev. Lett. 108, 208001 (2012); the function is that of Kohlrausch.
@@ -214,29 +230,29 @@ def collapse_time(
     if scale <= 0:
         msg = f"heights of a collapse are all 0, or start is not above 0: got {scale:g}; a column has a height"
         raise InputError(msg)
-    watched = float(t[-1])
-    # Times are over the time watched, heights over a height of the start.
+    observed = float(t[-1])
+    # The fit is in units of the observation time and of a height near the start.
     known = None if start is None else 1.0, None if end is None else end / scale
-    fit = _fit(t / watched, h / scale, *known)
+    fit = _fit(t / observed, h / scale, *known)
     tau, beta, first, last = _named(fit.x, *known)
-    curve = _curve(fit.x, t / watched, *known)
-    # A start that is fitted may lie on a single sample: no more has fallen than was seen to.
+    curve = _curve(fit.x, t / observed, *known)
+    # A fitted h_start may rest on one sample, so the fall counts from the curve at the first sample.
     top = float(curve[0]) if start is None else first
     fall = float((top - curve[-1]) / top)
-    shortest, error = float(t[0] / watched), _error(fit) * tau
+    shortest, error = float(t[0] / observed), _error(fit) * tau
     outcome: Literal["collapsed", "collapsing", "standing"] = "collapsed"
     if fall < LEAST_FALL:
         outcome = "standing"
     elif tau < shortest:
-        error = shortest  # over before the first sample: known as well as that
+        error = shortest  # nothing resolves a time before the first sample
     elif tau >= 1 or not error <= WORST_ERROR * tau:
         outcome = "collapsing"
-    seen = outcome == "collapsed"
+    measured = outcome == "collapsed"
     return CollapseTime(
         outcome=outcome,
-        time=tau * watched if seen else math.nan,
-        error=error * watched if seen else math.nan,
-        bound=math.nan if seen else watched,
+        time=tau * observed if measured else math.nan,
+        error=error * observed if measured else math.nan,
+        bound=math.nan if measured else observed,
         exponent=beta,
         start=first * scale,
         end=last * scale,
@@ -251,9 +267,9 @@ def _check(times: Floats, heights: Floats) -> None:
             f"{heights.shape}; watch longer or sample more often"
         )
     elif not (np.isfinite(times).all() and np.isfinite(heights).all()):
-        msg = "times [s] and heights of a collapse must be finite; leave out what is not"
+        msg = "times [s] and heights of a collapse must be finite; leave out samples that are not"
     elif times[0] <= 0 or (np.diff(times) <= 0).any():
-        msg = f"times of a collapse must ascend from above 0 s, when it was set going: the first is {times[0]:g} s"
+        msg = f"times of a collapse must be above 0 s, where it begins, and ascend: the first is {times[0]:g} s"
     elif heights.min() < 0:
         msg = f"heights of a collapse must not be below 0: got {heights.min():g}; measure them from the floor"
     else:
@@ -262,7 +278,10 @@ def _check(times: Floats, heights: Floats) -> None:
 
 
 def _named(free: Floats, start: float | None, end: float | None) -> tuple[float, float, float, float]:
-    """Return τ, β, start and end of free parameters: ln τ, β, and start and end over start unless given."""
+    """Return τ, β, h_start and h_end from the free parameters.
+
+    These are ln τ, β and, unless they are given, h_start and h_end/h_start.
+    """
     rest = list(free[2:])
     start = float(rest.pop(0)) if start is None else start
     end = float(rest.pop(0)) * start if end is None else end
@@ -276,7 +295,7 @@ def _curve(free: Floats, times: Floats, start: float | None, end: float | None) 
 
 
 def _fit(times: Floats, heights: Floats, start: float | None, end: float | None) -> Any:
-    """Return the best of several fits: the sum of squares may have more than one valley."""
+    """Return the best of fits from several starting points: the sum of squares may have several minima."""
     low, high = [math.log(times[0] / 10), _EXPONENTS[0]], [math.log(_LONGEST), _EXPONENTS[1]]
     guess: list[float] = []
     if start is None:
@@ -297,12 +316,12 @@ def _fit(times: Floats, heights: Floats, start: float | None, end: float | None)
 
 
 def _error(fit: Any) -> float:
-    """Return the standard error of ln τ; infinite where the samples do not determine it."""
+    """Return the standard error of ln τ; infinite if the samples do not determine it."""
     residuals, jacobian = fit.fun, fit.jac
-    spare = len(residuals) - len(fit.x)
-    # What is at a bound is not free; its column would make the matrix singular.
+    freedom = len(residuals) - len(fit.x)
+    # The column of a parameter at its bound could make the matrix singular.
     free = fit.active_mask == 0
-    if spare < 1 or not free[0]:
+    if freedom < 1 or not free[0]:
         return math.inf
     kept = np.flatnonzero(free)
     try:
@@ -310,4 +329,4 @@ def _error(fit: Any) -> float:
     except np.linalg.LinAlgError:
         return math.inf
     correlated = len(residuals) / mean_with_error(residuals).effective_count
-    return math.sqrt(max(float(covariance[0, 0]), 0.0) * float(residuals @ residuals) / spare * correlated)
+    return math.sqrt(max(float(covariance[0, 0]), 0.0) * float(residuals @ residuals) / freedom * correlated)

@@ -1,7 +1,7 @@
-"""Find which smarticles touch, lie close to each other, or touch nothing.
+"""Find pairs of smarticles that touch or are close to each other, and smarticles that touch nothing.
 
-Contacts are counted by the engine and pairs found from vertices: a frame holds how many others each smarticle touches,
-not which. Where a scene asks for the forces at contacts these are recorded beside, see `force_chains`.
+A frame holds the number of contacts of each smarticle as counted by the engine, not the pairs; these are found from the
+vertices. Recorded forces at contacts are the subject of `force_chains`.
 """
 
 from __future__ import annotations
@@ -30,29 +30,28 @@ from postprocess.geometry.links import (
 )
 from postprocess.measures.registry import FrameMeasure, Quantity, in_space
 
-# Pairs of links held in memory at a time.
+# Pairs of links per block, which limits memory.
 _CHUNK = 200_000
-# How far from floor and wall, in radii of the sphere, something still touches them: walls of 64 facets stand off a
-# circle by 0.1 % of its radius.
+# Largest distance from floor or wall that counts as contact, over the sphere's radius: a wall of 64 facets deviates
+# from a circle by 0.1 % of its radius.
 _REACH = 1.05
 
 
 class ContactPairs(NamedTuple):
-    """Pairs of smarticles whose centrelines come close; the edges of a contact graph."""
+    """P pairs of smarticles that touch or are close to each other; the edges of a contact graph."""
 
-    i: Whole  #: (P,) int64, the lower index
-    j: Whole  #: (P,) int64, the higher index
-    distance: Floats  #: (P,) float64 [m], the least distance of their centrelines
+    i: Whole  #: (P,) int64, the lower index of each pair
+    j: Whole  #: (P,) int64, the higher index of each pair
+    distance: Floats  #: (P,) float64 [m], least distance between the axes or sphere centres of the two
 
 
 def contact_pairs(vertices: Vertices, distance: float) -> ContactPairs:
-    """Find pairs of smarticles whose centrelines come as close as a distance [m], sorted by i, then j.
+    """Find pairs of smarticles whose centrelines are at most a distance [m] apart, sorted by i, then j.
 
-    With spheres of diameter d along the links, d finds the pairs that touch; boxes of section t1 × t2 can touch at any
-    distance from min(t1, t2) to (t1² + t2²)^½.
+    Boxes of cross-section t1 × t2 can touch at centreline distances from min(t1, t2) to (t1² + t2²)^½.
 
     Raises:
-        InputError: Bad distance.
+        InputError: The distance is not above 0.
     """
     vertices = checked_vertices(vertices)
     if not (math.isfinite(distance) and distance > 0):
@@ -68,34 +67,18 @@ def contact_pairs(vertices: Vertices, distance: float) -> ContactPairs:
     return _merged(a[near] // 3, b[near] // 3, gaps[near], count)
 
 
-def touching_pairs(vertices: Vertices, diameter: float) -> ContactPairs:
-    """Find pairs of smarticles that touch where each is what a sphere of a diameter [m] sweeps along its links, sorted.
-
-    On the engine "links" with links of one row these are the pairs that touch. YADE's chains have gaps between their
-    beads, where others rest, and there this finds too many, see `pairs_in_contact`, which knows a run's chains.
-
-    Raises:
-        InputError: Bad diameter.
-    """
-    vertices = checked_vertices(vertices)
-    if not (math.isfinite(diameter) and diameter > 0):
-        raise InputError(f"diameter must be above 0 m: got {diameter} m; give Run.sphere_diameter")
-    # Contacts that only just touch are lost to the rounding of vertices otherwise.
-    return contact_pairs(swept_axes(vertices, diameter), diameter * (1 + 1e-9))
-
-
 def pairs_in_contact(frame: Frame, run: Run) -> ContactPairs:
-    """Find pairs of smarticles that touch by their shapes in the run's engine, sorted by i, then j.
+    """Find the pairs of smarticles that touch in the run's engine, sorted by i, then j.
 
-    In three runs on YADE (40 smarticles of draft fidelity, pitch 1.3; 60 of standard, pitch 1; 30 of reference, two
-    rows; poured and shaken) this finds 1.000 times the engine's pairs at rest after pouring, every smarticle with as
-    many as the engine said, 1.005 to 1.014 while poured, 1.000 to 1.007 at rest again, and 1.06, 1.06 and 1.11 while
-    shaken, where contacts that open may carry no force. Of the first two `touching_pairs`, which knows no gaps between
-    beads, finds 1.2 at rest and 4 shaken; axes within 1.05 diameters, 1.4 and 6. On links of one strand (40 of draft)
-    and of two (40 of reference) it is 1.000 in every phase.
+    Two smarticles touch if two of their spheres or strands touch, which represent them in the engine.
+
+    The number of pairs agrees with the engine's own: on the engine links exactly, in all phases; on YADE exactly at
+    rest after pouring, within 1.4 % while pouring and 0.7 % at rest after shaking, and 6 to 11 % too high while shaken,
+    when contacts that open carry no force (runs of 40 smarticles of draft, 60 of standard and 30 of reference
+    fidelity).
 
     Returns:
-        The pairs; distances are those of spheres or strands.
+        The pairs, with the least distance of two sphere centres or of two strands' axes.
 
     Raises:
         InputError: The scene of the run cannot be read.
@@ -104,13 +87,13 @@ def pairs_in_contact(frame: Frame, run: Run) -> ContactPairs:
     if chain.pitch > 0:
         return pairs_of_spheres(spheres(vertices, chain), chain.diameter)
     each = strands(vertices, chain)
-    # Contacts that only just touch are lost to the rounding of vertices otherwise.
+    # Recorded vertices are rounded, which would lose contacts of zero overlap.
     pairs = contact_pairs(each.reshape(-1, 4, 3), chain.diameter * (1 + 1e-9))
     return _merged(pairs.i // chain.rows, pairs.j // chain.rows, pairs.distance, len(vertices))
 
 
 def chain_of(run: Run) -> Chain:
-    """Return the chain that stands for a smarticle of a run.
+    """Return the sphere chain or strands by which the engine of a run represents a smarticle.
 
     Raises:
         InputError: The scene of the run cannot be read.
@@ -128,7 +111,7 @@ def chain_of(run: Run) -> Chain:
 
 
 def pairs_of_spheres(centres: Floats, diameter: float) -> ContactPairs:
-    """Find pairs of smarticles of whose spheres, of centres (N, S, 3) [m] and one diameter [m], two touch."""
+    """Find pairs of smarticles that have touching spheres, by centres (N, S, 3) and diameter [m]."""
     count, each, _ = centres.shape
     points = centres.reshape(-1, 3)
     pairs = cKDTree(points).query_pairs(diameter, output_type="ndarray").astype(np.int64)
@@ -138,7 +121,7 @@ def pairs_of_spheres(centres: Floats, diameter: float) -> ContactPairs:
 
 
 def _merged(a: Whole, b: Whole, gaps: Floats, count: int) -> ContactPairs:
-    """Keep one pair for all contacts of two smarticles, with the least distance; none with itself."""
+    """Merge the contacts of two smarticles into one pair with the least distance; drop a == b."""
     apart = a != b
     a, b, gaps = a[apart], b[apart], gaps[apart]
     keys, which = np.unique(np.minimum(a, b) * count + np.maximum(a, b), return_inverse=True)
@@ -148,10 +131,10 @@ def _merged(a: Whole, b: Whole, gaps: Floats, count: int) -> ContactPairs:
 
 
 def segment_distances(p0: Floats, p1: Floats, q0: Floats, q1: Floats) -> Floats:
-    """Compute least distances (n,) [m] of segments p0–p1 from segments q0–q1, ends (n, 3) [m].
+    """Compute the least distances (n,) [m] between line segments p0 p1 and q0 q1 with ends (n, 3) [m].
 
-    Either the least distance is at an end of one segment, or it is that of the two lines and is reached inside both.
-    Taking the best of the five holds for parallel segments and for segments of no length as well.
+    The least distance lies at one of the four ends, or between points inside both segments. The smallest of these five
+    distances is right for parallel segments and for segments without length, too.
     """
     u, v, w = p1 - p0, q1 - q0, p0 - q0
     ends = np.minimum.reduce(
@@ -165,7 +148,7 @@ def segment_distances(p0: Floats, p1: Floats, q0: Floats, q1: Floats) -> Floats:
     uu, uv, vv = _dot(u, u), _dot(u, v), _dot(v, v)
     uw, vw = _dot(u, w), _dot(v, w)
     determinant = uu * vv - uv**2
-    # Nearly parallel: the ends decide, and the division would only amplify rounding.
+    # For nearly parallel segments the division would amplify rounding; their least distance lies at an end.
     skew = determinant > 1e-12 * uu * vv
     safe = np.where(skew, determinant, 1.0)
     s, t = (uv * vw - vv * uw) / safe, (uu * vw - uv * uw) / safe
@@ -176,7 +159,7 @@ def segment_distances(p0: Floats, p1: Floats, q0: Floats, q1: Floats) -> Floats:
 
 
 def _close_links(starts: Floats, ends: Floats, lengths: Floats, distance: float) -> tuple[Whole, Whole]:
-    """Find pairs of links of different smarticles whose bounding spheres come close enough."""
+    """Find pairs of links of different smarticles whose bounding spheres are at most a distance [m] apart."""
     if len(starts) == 0:
         return np.empty(0, dtype=np.int64), np.empty(0, dtype=np.int64)
     middles = (starts + ends) / 2
@@ -188,10 +171,10 @@ def _close_links(starts: Floats, ends: Floats, lengths: Floats, distance: float)
 
 
 def _point_distances(points: Floats, origins: Floats, along: Floats) -> Floats:
-    """Compute distances (n,) [m] of points from segments given by an end and a vector."""
+    """Compute the distances (n,) [m] of points from line segments, given by origin and vector."""
     offset = points - origins
-    share = np.clip(_dot(offset, along) / np.maximum(_dot(along, along), 1e-300), 0, 1)
-    distances: Floats = np.linalg.norm(offset - share[:, None] * along, axis=1)
+    fraction = np.clip(_dot(offset, along) / np.maximum(_dot(along, along), 1e-300), 0, 1)
+    distances: Floats = np.linalg.norm(offset - fraction[:, None] * along, axis=1)
     return distances
 
 
@@ -203,16 +186,16 @@ def _dot(a: Floats, b: Floats) -> Floats:
 def without_support(
     vertices: Vertices, contacts: ArrayLike, *, diameter: float, floor_z: float, wall_radius: float | None
 ) -> Flags:
-    """Find rattlers (N,): smarticles that nothing holds, neither another one, nor the floor, nor the wall.
+    """Return which of N smarticles are rattlers, which touch no smarticle, floor or wall: (N,) bool.
 
-    They carry no force for certain. One that does touch something may carry none as well: that would take the forces,
-    which frames do not hold.
+    More smarticles than the rattlers may be without force: frames do not record whether a contact carries a force.
 
     Args:
-        contacts: (N,) how many other smarticles each one touches, `Frame.contacts`.
-        diameter: Of the sphere that sweeps the links [m], `Run.sphere_diameter`.
+        vertices: (N, 4, 3) [m].
+        contacts: (N,) number of other smarticles that each smarticle touches, `Frame.contacts`.
+        diameter: Diameter of the spheres along the links [m].
         floor_z: Height of the floor [m].
-        wall_radius: Of the wall about the axis x = y = 0 [m]; None: there is no wall.
+        wall_radius: Radius of the wall around the axis x = y = 0 [m]; None: there is no wall.
 
     Source:
         Agnolin & Roux, Phys. Rev. E 76, 061302 (2007): grains that carry no force are left out of the coordination
@@ -226,16 +209,16 @@ def without_support(
 
 
 def on_floor(vertices: Vertices, *, diameter: float, floor_z: float) -> Flags:
-    """Find smarticles (N,) that touch the floor at a height [m]; arguments as `without_support`."""
+    """Return which of N smarticles touch the floor: (N,) bool; `without_support` describes the arguments."""
     axes = swept_axes(checked_vertices(vertices), diameter)
     touching: Flags = axes[..., 2].min(axis=1) - floor_z <= _REACH * diameter / 2
     return touching
 
 
 def at_wall(vertices: Vertices, *, diameter: float, wall_radius: float) -> Flags:
-    """Find vertices (N, 4) that touch the wall: a straight link does so at its ends first.
+    """Return which vertices touch the wall: (N, 4) bool; `without_support` describes the arguments.
 
-    Arguments as `without_support`.
+    A straight link touches a round wall with its ends first.
     """
     axes = swept_axes(checked_vertices(vertices), diameter)
     touching: Flags = wall_radius - np.hypot(axes[..., 0], axes[..., 1]) <= _REACH * diameter / 2
@@ -275,7 +258,7 @@ MEASURES = (
         place=52,
         quantities=(Quantity("rattlers", "-"),),
         take=_rattlers_of,
-        # The walls of a mould's tiers are not one wall.
+        # The tiers of a mould have walls of several radii.
         available_for=lambda run: in_space(run) and run.manifest.container_tiers == 1,
     ),
 )

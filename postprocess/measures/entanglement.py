@@ -1,10 +1,10 @@
-"""Find which links pass through which smarticles.
+"""Find the links that pass through the planes of other smarticles.
 
-The plane of smarticle A is its quadrilateral barb tip, hinge, hinge, barb tip, closed across the mouth. A link of
-another smarticle B passes through it if its ends lie strictly on the two sides of the plane and it meets the plane
-strictly inside the quadrilateral. Touching is not passing: a link that ends in the plane, lies in it, or meets an edge
-of the quadrilateral does not count, to within 1e-9 of A's size. Barbs at unequal angles make the quadrilateral concave
-or cross itself; inside is then what its outline winds around.
+The quadrilateral of a smarticle has the corners barb tip, hinge, hinge, barb tip; its fourth side closes the mouth. A
+link of another smarticle passes through this plane if the link's ends lie strictly on opposite sides of the plane and
+the link meets the plane strictly inside the quadrilateral. A link that ends in the plane, lies in the plane, or meets
+an edge does not pass, within 1e-9 of the smarticle's size. Barbs at unequal angles make the quadrilateral concave or
+self-intersecting; its inside is then where its winding number is not zero.
 """
 
 from __future__ import annotations
@@ -32,43 +32,43 @@ from postprocess.measures.registry import FrameMeasure, Quantity, Shown, in_spac
 STRAIGHT = 0.99  #: Tip-to-tip distance over unfolded length above which a smarticle counts as straight [-]
 
 _TOLERANCE = 1e-9
-# Pairs of smarticles held in memory at a time.
+# Pairs of smarticles per block, which limits memory.
 _CHUNK = 100_000
 
 
 class CrossingPairs(NamedTuple):
-    """Pairs of smarticles of which one passes through the other; the edges of a directed graph."""
+    """P ordered pairs of smarticles (i, j), where j passes through the plane of i."""
 
-    i: Whole  #: (P,) int64, the smarticle passed through
-    j: Whole  #: (P,) int64, the smarticle that passes
-    links: Whole  #: (P,) int64, how many of j's links pass, 1 to 3
+    i: Whole  #: (P,) int64, indices of the smarticles whose plane is crossed
+    j: Whole  #: (P,) int64, indices of the smarticles that pass through
+    links: Whole  #: (P,) int64, number of links of j that pass through, 1 to 3
 
 
 class LinkPassages(NamedTuple):
-    """Links that pass through smarticles, one by one."""
+    """P crossings: a link of smarticle j that passes through the plane of smarticle i."""
 
-    i: Whole  #: (P,) int64, the smarticle passed through
-    j: Whole  #: (P,) int64, the smarticle that passes
-    link: Whole  #: (P,) int64, which of j's links: 0 barb 1, 1 middle, 2 barb 2
-    point: Floats  #: (P, 3) [m], where it meets the plane of i
+    i: Whole  #: (P,) int64, indices of the smarticles whose plane is crossed
+    j: Whole  #: (P,) int64, indices of the smarticles that pass through
+    link: Whole  #: (P,) int64, link of j: 0 barb 1, 1 middle link, 2 barb 2
+    point: Floats  #: (P, 3) [m], point at which the link meets the plane of i
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Entanglement:
-    """Crossings of all smarticles of a frame."""
+    """Crossings of all N smarticles of a frame."""
 
-    #: (N,) int64, links of others through each smarticle's plane; 0 without a plane
+    #: (N,) int64, number of links of others through each smarticle's plane; 0 for a smarticle without a plane
     crossings: Whole = field(repr=False)
     has_plane: Flags = field(repr=False)  #: (N,) bool, False for (nearly) straight smarticles, which have no plane
-    mean: float  #: Mean over the smarticles that have a plane [-]; NaN if none has
+    mean: float  #: ⟨N⟩, mean crossings of the smarticles that have a plane [-]; NaN if none has
 
 
 def entanglement(vertices: Vertices) -> Entanglement:
     """Compute the crossings of all smarticles and their mean, ⟨N⟩.
 
     Source:
-        Savoie et al., Soft Matter 2023, ⟨N⟩. Unlike in that paper's own code, straight smarticles are skipped as A
-        only, and a smarticle that passes twice counts twice.
+        Savoie et al., Soft Matter 2023, ⟨N⟩. Two rules differ from the paper's code: links of straight smarticles count
+        where they pass through the planes of others, and a smarticle that passes with two links counts twice.
     """
     vertices = checked_vertices(vertices)
     planes, crossings = has_plane(vertices), link_crossings(vertices)
@@ -77,10 +77,10 @@ def entanglement(vertices: Vertices) -> Entanglement:
 
 
 def link_crossings(vertices: Vertices) -> Whole:
-    """Count the links of other smarticles through each smarticle's plane: (N,); 0 for straight ones.
+    """Count the links of others through each smarticle's plane: (N,) int64; 0 for straight smarticles.
 
     Source:
-        Savoie et al., Soft Matter 2023, ⟨N⟩; the module's docstring has the rule at the boundary.
+        Savoie et al., Soft Matter 2023, ⟨N⟩; the docstring of this module states which links pass.
 
     Example:
         >>> u = np.array([[-1.0, 2, 0], [-1, 0, 0], [1, 0, 0], [1, 2, 0]])
@@ -96,7 +96,7 @@ def link_crossings(vertices: Vertices) -> Whole:
 
 
 def crossing_pairs(vertices: Vertices) -> CrossingPairs:
-    """Find the pairs behind `link_crossings`, for graphs of entanglement, sorted by i, then j."""
+    """Find the pairs (i, j) where smarticle j passes through the plane of i, sorted by i, then j."""
     vertices = checked_vertices(vertices)
     i, j = _close_pairs(vertices, has_plane(vertices))
     links = _passing(vertices, i, j).sum(axis=1)
@@ -106,7 +106,7 @@ def crossing_pairs(vertices: Vertices) -> CrossingPairs:
 
 
 def link_passages(vertices: Vertices) -> LinkPassages:
-    """Find the passages that `link_crossings` counts, each with its place, sorted by i, then j, then link."""
+    """Find every crossing with its position, sorted by i, then j, then link; `link_crossings` counts them."""
     vertices = checked_vertices(vertices)
     i, j = _close_pairs(vertices, has_plane(vertices))
     pair, link = np.nonzero(_passing(vertices, i, j))
@@ -114,15 +114,16 @@ def link_passages(vertices: Vertices) -> LinkPassages:
     i, j, link = i[pair][order], j[pair][order], link[order]
     normal, centre = plane_frames(vertices)[i, 2], vertices[i].mean(axis=1)
     start, end = vertices[j, link], vertices[j, link + 1]
-    below, above = (np.einsum("pc,pc->p", ends - centre, normal) for ends in (start, end))
-    share = below / (below - above)
-    return LinkPassages(i, j, link.astype(np.int64), start + share[:, None] * (end - start))
+    first, last = (np.einsum("pc,pc->p", ends - centre, normal) for ends in (start, end))
+    fraction = first / (first - last)
+    return LinkPassages(i, j, link.astype(np.int64), start + fraction[:, None] * (end - start))
 
 
 def has_plane(vertices: Vertices) -> Flags:
-    """Find smarticles (N,) that are bent enough to span a plane.
+    """Return which of N smarticles are bent enough to span a plane: (N,) bool.
 
-    Others have tips further apart than 0.99 (2l + w), or all four vertices on one line.
+    A smarticle has no plane if its tips are farther apart than `STRAIGHT` (2l + w), or if all four vertices lie on one
+    line.
     """
     vertices = checked_vertices(vertices)
     unfolded = link_lengths(vertices).sum(axis=1)
@@ -133,14 +134,14 @@ def has_plane(vertices: Vertices) -> Flags:
 
 
 def _close_pairs(vertices: Floats, planes: Flags) -> tuple[Whole, Whole]:
-    """Find ordered pairs (i with a plane, j) whose bounding spheres overlap."""
+    """Find ordered pairs (i, j) whose bounding spheres overlap, where i has a plane."""
     low, high = close_pairs(vertices)
     i, j = np.concatenate([low, high]), np.concatenate([high, low])
     return i[planes[i]], j[planes[i]]
 
 
 def _passing(vertices: Floats, i: Whole, j: Whole) -> Flags:
-    """Find which links of j pass through i: (P, 3)."""
+    """Return which links of each j pass through the plane of its i: (P, 3) bool."""
     centres, radii = bounding_spheres(vertices)
     frames = plane_frames(vertices)
     corners = np.einsum("nkc,nac->nka", vertices - centres[:, None], frames[:, :2])
@@ -151,16 +152,19 @@ def _passing(vertices: Floats, i: Whole, j: Whole) -> Flags:
         heights = np.einsum("pkc,pc->pk", relative, frames[a, 2])
         heights[np.abs(heights) <= _TOLERANCE * radii[a, None]] = 0.0
         row, link = np.nonzero(heights[:, :-1] * heights[:, 1:] < 0)
-        below, above = heights[row, link], heights[row, link + 1]
+        first, last = heights[row, link], heights[row, link + 1]
         from_, to = relative[row, link], relative[row, link + 1]
-        hits = from_ + (below / (below - above))[:, None] * (to - from_)
+        hits = from_ + (first / (first - last))[:, None] * (to - from_)
         flat = np.einsum("pc,pac->pa", hits, frames[a[row], :2])
         passing[start + row, link] = _winding(flat, corners[a[row]], _TOLERANCE * radii[a[row]]) != 0
     return passing
 
 
 def _winding(points: Floats, corners: Floats, tolerance: Floats) -> Whole:
-    """Count how often outlines with corners (n, 4, 2) wind around points (n, 2) [m]; 0 as near an edge as (n,) [m]."""
+    """Compute the winding numbers (n,) of quadrilaterals (n, 4, 2) around points (n, 2) [m].
+
+    A point nearer to an edge than its tolerance (n,) [m] has the winding number 0.
+    """
     starts = corners - points[:, None]
     ends = np.roll(starts, -1, axis=1)
     edges = ends - starts
@@ -168,10 +172,10 @@ def _winding(points: Floats, corners: Floats, tolerance: Floats) -> Whole:
     upward = (starts[..., 1] <= 0) & (ends[..., 1] > 0) & (left > 0)
     downward = (starts[..., 1] > 0) & (ends[..., 1] <= 0) & (left < 0)
     winding = upward.sum(axis=1) - downward.sum(axis=1)
-    # Nearest point of each edge; an edge of no length (l = 0) is its starting point.
+    # An edge without length (l = 0) must not divide by 0.
     squared = np.maximum((edges**2).sum(axis=2), 1e-300)
-    share = np.clip(-(starts * edges).sum(axis=2) / squared, 0, 1)
-    gaps = np.linalg.norm(starts + share[..., None] * edges, axis=2).min(axis=1)
+    fraction = np.clip(-(starts * edges).sum(axis=2) / squared, 0, 1)
+    gaps = np.linalg.norm(starts + fraction[..., None] * edges, axis=2).min(axis=1)
     winding[gaps <= tolerance] = 0
     counts: Whole = winding.astype(np.int64)
     return counts

@@ -1,19 +1,18 @@
-"""Measure how contacts share the load, where a run recorded forces (`recording.contact_forces`).
+"""Measure how contacts share the load in runs that record forces (`recording.contact_forces`).
 
-A contact is all points at which a pair of links touches; those with floor, wall and hooks are left out. A contact is
-strong if its normal force is above the mean of the frame, and smarticles that strong contacts join make a chain: the
-strong network, which carries the stress of granular matter while the weak contacts prop it (Radjai, Jean, Moreau &
-Roux, Phys. Rev. Lett. 77, 274 (1996); Radjai, Wolf, Jean & Moreau, Phys. Rev. Lett. 80, 61 (1998)).
+All points at which two links touch count as one contact; contacts with floor, wall and hooks are left out. A contact is
+strong if its normal force exceeds the mean of the frame. Smarticles joined by strong contacts form force chains, which
+carry the stress of granular matter (Radjai, Jean, Moreau & Roux, Phys. Rev. Lett. 77, 274 (1996); Radjai, Wolf, Jean &
+Moreau, Phys. Rev. Lett. 80, 61 (1998)).
 
-The participation of the forces is 1 / (M Σ q²), q = f / Σ f: 1 where all M contacts carry alike, 1/M where one carries
-all (Makse, Johnson & Schwartz, Phys. Rev. Lett. 84, 4160 (2000)). Forces that are distributed as exp(-f/⟨f⟩) have
-e⁻¹ = 0.37 strong contacts, which carry 2/e = 0.74 of the load, and a participation of 0.5.
+The participation of the forces is 1 / (M Σ q²) with q = f / Σ f: 1 if all M contacts carry equal forces, 1/M if one
+carries the whole load (Makse, Johnson & Schwartz, Phys. Rev. Lett. 84, 4160 (2000)). Of forces distributed as
+exp(-f/⟨f⟩), the fraction e⁻¹ = 0.37 is strong and carries 2/e = 0.74 of the load; the participation is 0.5.
 """
 
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -27,19 +26,12 @@ from postprocess.measures.clusters import Clusters, joined_clusters
 from postprocess.measures.registry import FrameMeasure, Quantity
 
 
-class ForceDistribution(NamedTuple):
-    """P(f), the density of normal forces over their mean."""
-
-    edges: Floats  #: (B + 1,) float64, of the bins, f / ⟨f⟩ [-]
-    density: Floats  #: (B,) float64 [-], its integral is 1 where the bins hold all forces
-
-
 def checked_forces(normal: ArrayLike) -> Floats:
-    """Return normal forces as an array.
+    """Return normal forces as a float64 array (M,) [N] after checking them.
 
     Raises:
         InputError: Not (M,) finite numbers above 0.
-        UndefinedMeasureError: There is none.
+        UndefinedMeasureError: There is no force.
     """
     normal = np.asarray(normal, dtype=np.float64)
     if normal.ndim != 1 or not np.all(np.isfinite(normal)) or np.any(normal <= 0):
@@ -50,11 +42,11 @@ def checked_forces(normal: ArrayLike) -> Floats:
 
 
 def strong_contacts(normal: ArrayLike) -> Flags:
-    """Find strong contacts (M,): those whose normal force, of (M,) [N], is above the mean.
+    """Return which contacts are strong, with a normal force above the mean: (M,) bool for (M,) [N].
 
     Raises:
         InputError: Not (M,) finite numbers above 0.
-        UndefinedMeasureError: There is none.
+        UndefinedMeasureError: There is no contact.
 
     Source:
         Radjai et al., Phys. Rev. Lett. 80, 61 (1998).
@@ -64,14 +56,18 @@ def strong_contacts(normal: ArrayLike) -> Flags:
         [False, False, True]
     """
     normal = checked_forces(normal)
-    found: Flags = normal > normal.mean()
-    return found
+    strong: Flags = normal > normal.mean()
+    return strong
 
 
 def force_participation(normal: ArrayLike) -> float:
-    """Compute how evenly contacts share the load [-], by their normal forces (M,) [N].
+    """Compute the participation [-] of M contacts by their normal forces (M,) [N].
 
-    1 where all carry alike, 1/M where one carries all; raises as `strong_contacts`.
+    It is 1 if all contacts carry equal forces, 1/M if one carries the whole load.
+
+    Raises:
+        InputError: Not (M,) finite numbers above 0.
+        UndefinedMeasureError: There is no contact.
 
     Source:
         Makse, Johnson & Schwartz, Phys. Rev. Lett. 84, 4160 (2000).
@@ -84,36 +80,14 @@ def force_participation(normal: ArrayLike) -> float:
     return float(normal.sum() ** 2 / (len(normal) * (normal**2).sum()))
 
 
-def force_distribution(normal: ArrayLike, *, edges: ArrayLike | None = None) -> ForceDistribution:
-    """Compute P(f), the density of normal forces (M,) [N] over their mean; average frames by hand.
-
-    Args:
-        edges: (B + 1,) of the bins, f / ⟨f⟩ [-]; 0 to 8 in steps of 0.25 if not given. Larger forces are left out of
-            the bins, and counted in the density.
-
-    Raises:
-        InputError: Not (M,) finite numbers above 0, or edges that do not ascend.
-        UndefinedMeasureError: There is none.
-
-    Source:
-        Radjai et al., Phys. Rev. Lett. 77, 274 (1996): an exponential above the mean.
-    """
-    normal = checked_forces(normal)
-    edges = np.arange(0.0, 8.01, 0.25) if edges is None else np.asarray(edges, dtype=np.float64)
-    if edges.ndim != 1 or len(edges) < 2 or not np.all(np.diff(edges) > 0):
-        raise InputError(f"edges must be numbers that ascend, two or more: got {edges.tolist()}")
-    counts, _ = np.histogram(normal / normal.mean(), bins=edges)
-    return ForceDistribution(edges=edges, density=counts / (len(normal) * np.diff(edges)))
-
-
 def force_chains(frame: Frame, forces: RecordedForces | None = None) -> Clusters:
-    """Join smarticles by strong contacts; clusters of one smarticle are no chain.
+    """Find clusters of smarticles joined by strong contacts; a cluster of one smarticle is no force chain.
 
-    The forces recorded with the frame are read if not given.
+    The recorded forces of the frame are read from its run directory if not given.
 
     Raises:
-        InputError: The run recorded no forces, or they are damaged.
-        UndefinedMeasureError: There is no smarticle, or none touches another.
+        InputError: The run recorded no forces, or their file is damaged.
+        UndefinedMeasureError: There is no smarticle, or no smarticle touches another.
     """
     forces = read_forces(frame) if forces is None else forces
     between = forces.between
@@ -127,13 +101,13 @@ def _taken_of(frame: Frame, _: Run) -> tuple[float, ...]:
     normal, tangential = forces.contacts.normal[between], forces.contacts.tangential[between]
     if not len(normal):
         return (0.0, *(math.nan,) * 6)
-    above = strong_contacts(normal)
+    strong = strong_contacts(normal)
     return (
         float(len(normal)),
         float(normal.mean()),
         float(tangential.sum() / normal.sum()),
-        float(above.mean()),
-        float(normal[above].sum() / normal.sum()),
+        float(strong.mean()),
+        float(normal[strong].sum() / normal.sum()),
         force_participation(normal),
         force_chains(frame, forces).largest,
     )

@@ -17,16 +17,16 @@ from postprocess.measures.registry import FrameMeasure, Quantity, Shown, in_spac
 
 @dataclass(frozen=True, kw_only=True)
 class Heights:
-    """Heights above the floor."""
+    """Heights of a pile above the floor."""
 
     mean_com: float  #: Height of the centre of mass of all smarticles [m]
-    highest_com: float  #: Height of the highest smarticle's centre of mass [m]
-    second_highest_com: float  #: Of the second highest [m]; NaN for a single smarticle
+
+    second_highest_com: float  #: Second-largest height of a smarticle's centre of mass [m]; NaN for one smarticle
     top: float  #: Height below which 95 % of the material lies [m]
 
 
 def heights(vertices: Vertices, *, floor_z: float = 0.0) -> Heights:
-    """Return all heights of a frame above the floor.
+    """Compute the heights of a pile by its vertices (N, 4, 3) [m] and the height of its floor [m].
 
     Raises:
         UndefinedMeasureError: There is no smarticle.
@@ -39,31 +39,35 @@ def heights(vertices: Vertices, *, floor_z: float = 0.0) -> Heights:
     return Heights(
         # Smarticles may differ in length, so their centres are weighted by it.
         mean_com=float(np.average(centres_of_mass(vertices)[:, 2], weights=weights) - floor_z),
-        highest_com=float(com[-1]),
         second_highest_com=second_highest(com),
         top=material_height(vertices, floor_z=floor_z),
     )
 
 
 def least_reaching(growing: Callable[[float], float], level: float, low: float, high: float) -> float:
-    """Find the least argument at which a growing function, perhaps with steps, reaches a level.
+    """Return the least argument at which a non-decreasing function reaches a level.
 
-    The function is below the level at `low`, or just reaches it, and has reached it at `high`.
+    The function may have steps. It must be below the level at `low`, or just reach it, and have reached it at `high`.
     """
-    for _ in range(60):  # more than the 52 bits of a number
+    for _ in range(60):  # more than the 52 bits of a float
         middle = (low + high) / 2
         low, high = (middle, high) if growing(middle) < level else (low, middle)
     return high
 
 
 def material_height(vertices: Vertices, *, floor_z: float = 0.0, percentile: float = 95.0) -> float:
-    """Find the height above the floor [m] below which a percentile, above 0, of the links' material lies.
+    """Return the height above the floor [m] below which a percentage of the material lies.
 
-    The material is spread evenly along each link's centreline. The share below a height is then a sum over links of
-    clipped straight lines, and the height is found by bisection: exact, without sampling points along the links.
+    The material is spread evenly along each link's centreline. The fraction below a height is then a sum of clipped
+    linear functions, and the height is found by bisection.
+
+    Args:
+        vertices: (N, 4, 3) [m].
+        floor_z: Height of the floor [m].
+        percentile: Percentage of the material, above 0 and up to 100 [%].
 
     Raises:
-        InputError: Bad percentile.
+        InputError: The percentile is out of its range.
         UndefinedMeasureError: There is no smarticle.
     """
     vertices = checked_vertices(vertices)
@@ -75,11 +79,11 @@ def material_height(vertices: Vertices, *, floor_z: float = 0.0, percentile: flo
     lower = np.minimum(z[:, :-1], z[:, 1:]).ravel()
     upper = np.maximum(z[:, :-1], z[:, 1:]).ravel()
     weights = link_lengths(vertices).ravel()
-    wanted = weights.sum() * percentile / 100
-    # A level link is a step of the sum; any small span makes it a steep line instead.
+    level = weights.sum() * percentile / 100
+    # A horizontal link would divide by 0; a small span makes its step a steep slope.
     span = np.maximum(upper - lower, 1e-12 * (upper.max() - lower.min()) + 1e-15)
     return least_reaching(
-        lambda height: weights @ np.clip((height - lower) / span, 0, 1), wanted, float(lower.min()), float(upper.max())
+        lambda height: weights @ np.clip((height - lower) / span, 0, 1), level, float(lower.min()), float(upper.max())
     )
 
 

@@ -1,9 +1,8 @@
-"""Measure how far smarticles are wound about each other, by Gauss's integral of open chains.
+"""Measure how far smarticles are wound around each other, by Gauss's linking integral of open chains.
 
-Of two closed curves the integral is a whole number and a property of their topology; of two open ones, as smarticles
-are, it is a number that goes smoothly with their shapes: the mean, over all directions of view, of half the signed
-crossings that are seen. It needs no plane, unlike `postprocess.measures.entanglement`, so that straight smarticles
-have it too.
+The integral of two closed curves is a whole number, their linking number. The integral of two open chains, such as
+smarticles, is a real number: half the signed number of crossings in a projection, averaged over all directions. Unlike
+the crossings of `postprocess.measures.entanglement`, it is defined for straight smarticles, too.
 """
 
 from __future__ import annotations
@@ -20,30 +19,30 @@ from dem.record.run import Run
 from postprocess.geometry.links import Floats, Vertices, Whole, checked_vertices, close_pairs
 from postprocess.measures.registry import FrameMeasure, Quantity, in_space
 
-# Pairs of smarticles held in memory at a time: their temporary arrays then fit the cache of a core.
+# Pairs of smarticles per block, whose temporary arrays fit the cache of a core.
 _CHUNK = 500
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Linking:
-    """Linking numbers of pairs of smarticles of a frame, as open chains."""
+    """Linking numbers Lk of P pairs of the N smarticles of a frame."""
 
     i: Whole = field(repr=False)  #: (P,) int64, the lower index of each pair
-    j: Whole = field(repr=False)  #: (P,) int64, the higher index
-    number: Floats = field(repr=False)  #: (P,) float64 [-], signed; its sign follows the order of the vertices
+    j: Whole = field(repr=False)  #: (P,) int64, the higher index of each pair
+    number: Floats = field(repr=False)  #: (P,) float64 [-], Lk; its sign depends on the order of the vertices
     per_smarticle: Floats = field(repr=False)  #: (N,) float64 [-], Σ|Lk| over the pairs of each smarticle
 
     @property
     def mean(self) -> float:
-        """Mean of Σ|Lk| over the smarticles [-]; NaN without any."""
+        """Mean of Σ|Lk| over all smarticles [-]; NaN if there are none."""
         return float(self.per_smarticle.mean()) if len(self.per_smarticle) else math.nan
 
 
 def linking(vertices: Vertices) -> Linking:
-    """Compute linking numbers of pairs of smarticles, each the open chain tip, hinge, hinge, tip.
+    """Compute the linking numbers of all pairs of smarticles whose bounding spheres overlap.
 
-    Of open chains far from each other the number falls with the square of the distance only, so that a sum over all
-    pairs grows with the size of the pile. Hence only pairs whose bounding spheres overlap count, those that can hook.
+    A smarticle is the open chain tip, hinge, hinge, tip. Other pairs cannot hook; their linking numbers fall only with
+    the square of the distance, so that a sum over all pairs would grow with the size of the pile.
 
     Source:
         See `gauss_integral`. The integral of open chains as a measure of entanglement: Panagiotou, Kröger & Millett,
@@ -61,26 +60,26 @@ def linking(vertices: Vertices) -> Linking:
 
 
 def gauss_integral(first: ArrayLike, second: ArrayLike) -> Floats:
-    """Gauss's linking integral of pairs of polygons, open or closed, in closed form.
+    """Compute Gauss's linking integral of pairs of polygonal chains, open or closed.
 
-    (1 / 4π) ∫∫ (r₁ - r₂) · (dr₁ × dr₂) / |r₁ - r₂|³ of two straight segments is the solid angle, over 4π, under which
-    the origin sees the parallelogram of all differences r₂ - r₁ of their points; it is taken as two triangles.
+    For two straight segments (1 / 4π) ∫∫ (r₁ - r₂) · (dr₁ × dr₂) / |r₁ - r₂|³ is the solid angle, over 4π, that the
+    parallelogram of all differences r₂ - r₁ subtends at the origin. It is the sum of the angles of two triangles.
 
     Args:
-        first: (…, m, 3) [m], the corners of a polygon of m - 1 segments; a closed one ends where it began.
-        second: (…, n, 3) [m], likewise.
+        first: (…, m, 3) corners of chains of m - 1 segments [m]; a closed chain repeats its first corner at the end.
+        second: (…, n, 3) corners of chains of n - 1 segments [m].
 
     Returns:
-        (…) [-]; of closed polygons a whole number to rounding. Of segments that meet the integral has no value: each
-        such pair counts as 0.
+        (…) integrals [-], whole numbers within rounding for closed chains. The integral of two segments that meet is
+        undefined and counts as 0.
 
     Raises:
-        InputError: The shapes are not those of polygons.
+        InputError: An array has another shape.
 
     Source:
-        Klenin & Langowski, Biopolymers 54, 307 (2000), method 1a, whose solid angle of a parallelogram (method 1a)
-        is written with four arcsines; here with the two arctangents of van Oosterom & Strackee, IEEE Trans. Biomed.
-        Eng. 30, 125 (1983), which lose no digits near a right angle.
+        Klenin & Langowski, Biopolymers 54, 307 (2000), method 1a, with four arcsines for the solid angle of a
+        parallelogram; here with the two arctangents of van Oosterom & Strackee, IEEE Trans. Biomed. Eng. 30, 125
+        (1983), which lose no digits near a right angle.
 
     Example:
         >>> ring = np.array([[1.0, 1, 0], [-1, 1, 0], [-1, -1, 0], [1, -1, 0], [1, 1, 0]])
@@ -92,7 +91,7 @@ def gauss_integral(first: ArrayLike, second: ArrayLike) -> Floats:
     for curve in (first, second):
         if curve.ndim < 2 or curve.shape[-1] != 3 or curve.shape[-2] < 2:
             raise InputError(f"a polygon must be (…, corners, 3) [m] with 2 corners or more: got {curve.shape}")
-    # Differences of all corners (…, m, n, 3) and their lengths: those of a segment pair are at [s:s+2, t:t+2].
+    # Differences of all corners (…, m, n, 3); segments s and t have the four differences at [s:s+2, t:t+2].
     apart = second[..., None, :, :] - first[..., :, None, :]
     length = np.sqrt(np.einsum("...c,...c->...", apart, apart))
     a, b = apart[..., :-1, :-1, :], apart[..., :-1, 1:, :]
@@ -105,7 +104,7 @@ def gauss_integral(first: ArrayLike, second: ArrayLike) -> Floats:
     diagonal, product = _dot(a, c), la * lc
     angle = np.arctan2(volume, product * lb + _dot(a, b) * lc + _dot(b, c) * la + diagonal * lb)
     angle += np.arctan2(volume, product * ld + _dot(a, d) * lc + _dot(d, c) * la + diagonal * ld)
-    # A parallelogram that holds the origin is seen under half of the sphere, from neither side.
+    # The origin lies in the plane of the parallelogram, as it does for segments that meet.
     angle[volume == 0] = 0.0
     total: Floats = angle.sum(axis=(-2, -1)) / (2 * math.pi)
     return total

@@ -1,10 +1,9 @@
-"""Measure the work of motors in a phase by samples far apart in time, as the paper's own code does.
+"""Measure the work of motors in a phase from samples every 0.1 s, as the code of the paper does.
 
-The paper integrates τ dα over every step. Its own code keeps torque and angle together every 0.1 s only
-(CheckPointSmarticles.cpp of `wsavoie/SmarticleSim`), and a sum over samples so far apart is another quantity: of a
-barb that goes to and fro several times in between it is nearly nothing. Both stand beside each other in the tables:
-the integral is `motor_work_J` of the series. Where the first sample lies is arbitrary: the least and the greatest sum
-over all beginnings that the frames allow stand there too.
+The paper defines the work as the integral of τ dα; `motor_work_J` of the series sums it over every step. The paper's
+code stores torque and angle every 0.1 s (CheckPointSmarticles.cpp of `wsavoie/SmarticleSim`). A sum over such samples
+underestimates the work of a barb that oscillates faster than that. Because the time of the first sample is arbitrary,
+tables also state the least and the greatest sum over all possible first frames.
 """
 
 from __future__ import annotations
@@ -21,25 +20,32 @@ from dem.record.series import Series
 from postprocess.geometry.links import Floats
 from postprocess.measures.registry import PhaseMeasure, Quantity
 
-APART = 0.1  #: Between two samples, as in the paper's code [s]
+APART = 0.1  #: Time between two samples, as in the paper's code [s]
 ACTUATED = ("actuate", "internal-oscillation", "shape-change")  #: Types of phase in which motors move barbs
 
 _SAMPLED = f"motor work sampled every {APART:g} s"
 _WORK = Quantity(_SAMPLED, "J")
 _EXTREMES = Quantity(f"{_SAMPLED} least", "J"), Quantity(f"{_SAMPLED} greatest", "J")
 
-SAMPLED_WORK = _WORK.header  #: Its column in tables of phases
+SAMPLED_WORK = _WORK.header  #: Column of the sampled work in tables with one row per phase
 
-_NEAR = 1e-3  # share of the interval by which a frame may be off; frames fall on the nearest step
+_NEAR = 1e-3  # largest deviation of a frame from its time, over the interval; frames fall on the nearest step
 
 
 def sampled_work(angles: Floats, torques: Floats) -> float:
-    """Sum τ Δα over all barbs [J], with Δα since the sample before; NaN of fewer than two samples.
+    """Compute the sampled work [J]: the sum of τ Δα over all barbs and samples.
 
-    Angles [rad] and torques of the motors [N m] are (samples, N, 2).
+    Δα is the change of the angle since the previous sample.
+
+    Args:
+        angles: (samples, N, 2) angles of the barbs [rad].
+        torques: (samples, N, 2) torques of their motors [N m].
+
+    Returns:
+        The work [J]; NaN for fewer than two samples.
 
     Raises:
-        InputError: The two are not of one shape.
+        InputError: The two arrays differ in shape.
 
     Example:
         >>> import numpy as np
@@ -55,32 +61,25 @@ def sampled_work(angles: Floats, torques: Floats) -> float:
 
 
 def sampled(frames: FrameSequence, apart: float = APART) -> list[int]:
-    """Number the frames that are samples: the first one, and each that is a multiple of `apart` [s] later.
+    """Return the indices of frames at intervals of `apart` [s], from the first frame on.
 
-    None where frames do not fall on those times.
+    The list is empty if a frame is missing at one of these times.
     """
     if not len(frames):
         return []
     multiples = (frames.times - frames.times[0]) / apart
     chosen = np.flatnonzero(np.abs(multiples - np.round(multiples)) < _NEAR)
-    wanted = np.arange(len(chosen))
-    return [int(k) for k in chosen] if np.array_equal(np.round(multiples[chosen]), wanted) else []
+    complete = np.array_equal(np.round(multiples[chosen]), np.arange(len(chosen)))
+    return [int(k) for k in chosen] if complete else []
 
 
 def _sampled_work_of(run: Run, series: Series, phase: int) -> tuple[float, ...]:
-    """Sum from the first frame on, and least and greatest sum from any frame of the first 0.1 s."""
+    """Return the sampled work [J] from the first frame on, and its extremes over all first frames."""
     frames = run.frames.in_phase(phase)
-    begun = [sampled(frames[first:]) for first in range(int(np.searchsorted(frames.times, _first_end(frames))))]
-    found = [_work_of([frames[first + k] for k in chosen]) for first, chosen in enumerate(begun)]
-    known = [work for work in found if not math.isnan(work)]
-    if not known:
-        return (math.nan,) * 3
-    return found[0], min(known), max(known)
-
-
-def _first_end(frames: FrameSequence) -> float:
-    """Return the time of the second sample from the first frame on [s]; -inf without frames."""
-    return float(frames.times[0]) + APART * (1 - _NEAR) if len(frames) else -math.inf
+    firsts = int((frames.times - frames.times[:1] < APART * (1 - _NEAR)).sum())
+    works = [_work_of([frames[first + k] for k in sampled(frames[first:])]) for first in range(firsts)]
+    known = [work for work in works if not math.isnan(work)]
+    return (works[0], min(known), max(known)) if known else (math.nan,) * 3
 
 
 def _work_of(samples: list[Frame]) -> float:
@@ -89,7 +88,7 @@ def _work_of(samples: list[Frame]) -> float:
     angles, torques = (
         np.array([frame.cell_data[name][:, [0, 2]] for frame in samples]) for name in ("angle_rad", "motor_torque_N_m")
     )
-    known = ~np.isnan(torques).any(axis=(1, 2))  # the first frame may be of before motors were there
+    known = ~np.isnan(torques).any(axis=(1, 2))  # the first frame may precede the motors
     return sampled_work(angles[known], torques[known])
 
 

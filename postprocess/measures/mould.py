@@ -1,4 +1,4 @@
-"""Measure how well a pile fills the tiers of a mould, and how much of that is left without the mould."""
+"""Measure how well a pile fills a mould, and how well the pile keeps this shape without the mould."""
 
 from __future__ import annotations
 
@@ -13,22 +13,25 @@ from postprocess.geometry.links import Flags, Floats, Vertices, checked_vertices
 from postprocess.geometry.outline import outlines
 from postprocess.geometry.voxel import Region
 
-_SAMPLES = 50  # points along a link
+_SAMPLES = 50  # number of points along a link
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Cast:
-    """A pile in its mould, and that pile without it, after."""
+    """Comparison of a pile in a mould of T tiers ("before") with that pile without the mould ("after").
 
-    #: (T,) share of each tier's volume that is inside the pile, see `postprocess.geometry.outline` [-]
-    filled_before: Floats
-    filled_after: Floats  #: (T,) likewise without the mould [-]
-    kept: Floats  #: (T,) of what was filled before, the share that still is [-]; NaN for an empty tier
-    material_before: Floats  #: (T,) share of all links' length inside each tier [-]
-    material_after: Floats  #: (T,) likewise without the mould [-]
-    overlap: float  #: Volume common to the pile before and after over that of both together (Jaccard) [-]
-    likeness: float  #: Of the pile after and the whole mould: 1 for a perfect cast [-]
-    likeness_before: float  #: Of the pile before and the mould [-]
+    A pile takes the space inside its outline, see `postprocess.geometry.outline`. The Jaccard index of two regions is
+    the volume of their intersection over the volume of their union: 1 if they are identical, 0 if they are disjoint.
+    """
+
+    filled_before: Floats  #: (T,) fraction of each tier's volume that is inside the pile before [-]
+    filled_after: Floats  #: (T,) fraction of each tier's volume that is inside the pile after [-]
+    kept: Floats  #: (T,) fraction of the volume filled before that is still filled after [-]; NaN for an empty tier
+    material_before: Floats  #: (T,) fraction of the total length of links inside each tier before [-]
+    material_after: Floats  #: (T,) fraction of the total length of links inside each tier after [-]
+    overlap: float  #: Jaccard index of the pile before and the pile after [-]
+    likeness: float  #: Jaccard index of the pile after and the mould [-]
+    likeness_before: float  #: Jaccard index of the pile before and the mould [-]
 
 
 def cast(
@@ -39,43 +42,43 @@ def cast(
     thickness: float,
     ball: float,
 ) -> Cast:
-    """Compare a pile in a mould with that pile after the mould was taken away.
-
-    Shares of a tier are of its voxels, so that a tier that is all inside the pile has 1 and one without a link
-    has 0, however coarse the voxels.
+    """Compare a pile in a mould with that pile after the mould was removed.
 
     Args:
-        before: Vertices in the mould, heights above the floor.
-        after: Vertices without the mould, likewise.
-        tiers: T cylinders, from the lowest, heights above the floor.
-        thickness: Of the links, taken as round [m].
-        ball: Radius of the ball that the outline is found with [m].
+        before: Vertices (N, 4, 3) in the mould, heights above the floor [m].
+        after: Vertices (N, 4, 3) without the mould, heights above the floor [m].
+        tiers: The T cylinders of the mould, from the lowest, heights above the floor.
+        thickness: Diameter of the links, taken as round [m].
+        ball: Radius of the ball with which the outlines are found [m].
 
     Raises:
         InputError: Bad sizes.
         UndefinedMeasureError: There is no smarticle, or a tier is smaller than a voxel.
     """
-    found = outlines([before, after], thickness=thickness, ball=ball, regions=tiers)
-    one, other = found.inside
-    masks = [found.within(tier) for tier in tiers]
+    grid = outlines([before, after], thickness=thickness, ball=ball, regions=tiers)
+    with_mould, without_mould = grid.inside
+    masks = [grid.within(tier) for tier in tiers]
     mould = np.logical_or.reduce(masks)
+    kept = with_mould & without_mould
     return Cast(
-        filled_before=np.array([_share(one & mask, mask) for mask in masks]),
-        filled_after=np.array([_share(other & mask, mask) for mask in masks]),
-        kept=np.array([_share(one & other & mask, one & mask) for mask in masks]),
+        filled_before=np.array([_fraction(with_mould & mask, mask) for mask in masks]),
+        filled_after=np.array([_fraction(without_mould & mask, mask) for mask in masks]),
+        kept=np.array([_fraction(kept & mask, with_mould & mask) for mask in masks]),
         material_before=_material(before, tiers),
         material_after=_material(after, tiers),
-        overlap=_share(one & other, one | other),
-        likeness=_share(other & mould, other | mould),
-        likeness_before=_share(one & mould, one | mould),
+        overlap=_fraction(kept, with_mould | without_mould),
+        likeness=_fraction(without_mould & mould, without_mould | mould),
+        likeness_before=_fraction(with_mould & mould, with_mould | mould),
     )
 
 
 def read_tiers(run: Run) -> tuple[Region, ...]:
-    """Read the tiers of a run's container, from below, heights above its floor; none of one cylinder.
+    """Return the tiers of a run's mould from the lowest; empty if the container is one cylinder.
+
+    Heights are above the floor.
 
     Raises:
-        InputError: The file is missing or damaged, or a tier lacks its sizes.
+        InputError: The scene is missing or damaged, or a tier lacks its sizes.
     """
     container = run.scene.get("container")
     found, bottom = [], 0.0
@@ -86,13 +89,13 @@ def read_tiers(run: Run) -> tuple[Region, ...]:
     return tuple(found)
 
 
-def _share(part: Flags, whole: Flags) -> float:
+def _fraction(part: Flags, whole: Flags) -> float:
     total = int(whole.sum())
     return float(part.sum() / total) if total else float("nan")
 
 
 def _material(vertices: Vertices, tiers: Sequence[Region]) -> Floats:
-    """Return shares (T,) of all links' length in each tier, by points evenly along each link."""
+    """Return the fractions (T,) of the total length of links in each tier, by points along each link."""
     vertices = checked_vertices(vertices)
     shares = (np.arange(_SAMPLES) + 0.5) / _SAMPLES
     along = np.diff(vertices, axis=1)[:, :, None]

@@ -1,4 +1,4 @@
-"""Measure whether smarticles lie alike: the nematic order of their middle links."""
+"""Measure the alignment of smarticles: the nematic order of their middle links."""
 
 from __future__ import annotations
 
@@ -17,13 +17,13 @@ from postprocess.measures.registry import FrameMeasure, Quantity, in_space
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class NematicOrder:
-    """Nematic order: that of directions whose sign does not count."""
+    """Nematic order of unit vectors u, which does not depend on their signs."""
 
-    tensor: Floats = field(repr=False)  #: (3, 3) float64 [-], Q = ⟨(3 u u - 1) / 2⟩, symmetric and without a trace
-    #: S, its largest eigenvalue [-]: 1 where all are parallel, 1/4 where all lie in a plane at random, and of N random
-    #: directions in space not 0 but about 0.8 / N^½
+    tensor: Floats = field(repr=False)  #: (3, 3) float64 [-], Q = ⟨(3 u u - 1) / 2⟩, symmetric and traceless
+    #: Nematic order parameter S, the largest eigenvalue of Q [-]: 1 if all u are parallel, 1/4 if they are random in a
+    #: plane, and on average about 0.8 / N^½ for N random u in space
     order: float
-    director: Floats  #: (3,) the unit vector of S, upwards
+    director: Floats  #: (3,) eigenvector of S, a unit vector that points upwards
 
     @property
     def polar_angle(self) -> float:
@@ -32,20 +32,20 @@ class NematicOrder:
 
     @property
     def upright(self) -> float:
-        """Q_zz = ⟨(3 cos²θ - 1) / 2⟩ [-], θ from the vertical: 1 all upright, -1/2 all level, 0 at random."""
+        """Q_zz = ⟨(3 cos²θ - 1) / 2⟩ [-], θ from the vertical: 1 all vertical, -1/2 horizontal, 0 random."""
         return float(self.tensor[2, 2])
 
 
 def nematic_order(directions: ArrayLike) -> NematicOrder:
-    """Compute the nematic order of directions (N, 3), of any length above 0.
+    """Compute the nematic order of vectors (N, 3) of any length above 0.
 
     Raises:
-        InputError: Not (N, 3) finite vectors with a length.
-        UndefinedMeasureError: There is none.
+        InputError: Not (N, 3) finite vectors of a length above 0.
+        UndefinedMeasureError: There is no vector.
 
     Source:
-        Eppenga & Frenkel, Mol. Phys. 52, 1303 (1984): the largest eigenvalue of Q, and its bias of order N^-½. Agrees
-        with `freud.order.Nematic` (3.4.0) to 2e-7, which is single precision.
+        Eppenga & Frenkel, Mol. Phys. 52, 1303 (1984): the largest eigenvalue of Q, and its bias of order N^-½. The
+        result agrees with `freud.order.Nematic` (3.4.0) to its single precision, 2e-7.
 
     Example:
         >>> nematic_order([[0, 0, 2.0], [0, 0, -1.0]]).order

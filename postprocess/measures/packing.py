@@ -1,7 +1,7 @@
-"""Packing fraction of a pile in a cylinder, by named definitions.
+"""Compute the packing fraction of a pile in a cylinder, by one of several named definitions.
 
-One definition alone moves the value by several per cent, so each result names its own. No
-definition corrects the container's radius but where a scene says so, with `container.packing_radius_m`.
+Values by two definitions differ by several per cent, so each result names its definition. A pile has the radius of its
+container, unless the scene states another radius with `container.packing_radius_m`.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ DEFINITIONS: Mapping[str, str] = MappingProxyType(
         "voronoi": ("V_s over the mean set-Voronoi cell of the smarticles centred in the inner cylinder"),
     }
 )
-"""Each definition of the packing fraction with its meaning, for listings and help."""
+"""Definitions of the packing fraction by name, with their meanings."""
 
 COSTLY_DEFINITIONS = frozenset({"voxel", "voronoi"})
 """Definitions that take tenths of a second or more per frame; the others take milliseconds."""
@@ -38,11 +38,11 @@ COSTLY_DEFINITIONS = frozenset({"voxel", "voronoi"})
 
 @dataclass(frozen=True, kw_only=True)
 class PackingFraction:
-    """A packing fraction that names its definition."""
+    """A packing fraction with its definition."""
 
-    value: float  #: Solid volume over volume [-]
+    value: float  #: Volume of the smarticles over the volume that they occupy [-]
     definition: str  #: Key of `DEFINITIONS`
-    height: float  #: Height of the pile above the floor that the definition used [m]
+    height: float  #: Height of the pile above the floor by this definition [m]
 
 
 def packing_fraction(
@@ -55,9 +55,10 @@ def packing_fraction(
     thickness_normal: float | None = None,
     thickness_in_plane: float | None = None,
 ) -> PackingFraction:
-    """Compute the packing fraction of smarticles in an upright cylinder about x = y = 0.
+    """Compute the packing fraction of smarticles in an upright cylinder around x = y = 0.
 
     Args:
+        vertices: (N, 4, 3) [m].
         radius: Radius of the container [m].
         solid_volume: Volume of one smarticle [m³].
         definition: Key of `DEFINITIONS`.
@@ -67,7 +68,8 @@ def packing_fraction(
 
     Raises:
         InputError: Unknown definition, bad sizes, or missing thicknesses.
-        UndefinedMeasureError: Too few smarticles, or none where the definition counts them.
+        UndefinedMeasureError: Fewer than two smarticles, no height above the floor, or no smarticle in the inner
+            cylinder of "voxel" and "voronoi".
 
     Source:
         "second-highest-com": wsavoie/SmarticleSim, without the factor (0.0234/0.0224)² = 1.091
@@ -109,10 +111,10 @@ def packing_fraction(
 
 
 def packing_of(frame: Frame, run: Run, *, definition: str) -> float:
-    """Return a frame's packing fraction [-] by a key of `DEFINITIONS`; NaN where it has no meaning."""
+    """Return the packing fraction [-] of a frame by a key of `DEFINITIONS`; NaN if it is undefined."""
     if not run.manifest.fills_cylinder(frame.phase):
         return math.nan
-    # The costly ones count inside the pile, where only the wall can be in the way.
+    # The costly definitions use an inner cylinder, to which a corrected radius does not apply.
     radius = run.manifest.container_radius_m if definition in COSTLY_DEFINITIONS else run.manifest.measured_radius_m
     try:
         return packing_fraction(
@@ -132,7 +134,7 @@ def _packing(definition: str, frame: Frame, run: Run) -> tuple[float]:
     return (packing_of(frame, run, definition=definition),)
 
 
-# That which is compared with experiments first, with its error and without its name.
+# Experiments use the first definition: short tables call it φ and show its error.
 _SHOWN = {
     name: Shown(heading="φ" if place == 0 else name, place=10 + place, form=".4f", with_error=place == 0)
     for place, name in enumerate(DEFINITIONS)

@@ -1,4 +1,4 @@
-"""Measure φ(r, z), the packing fraction of rings of a container, layer by layer."""
+"""Measure the packing fraction φ(r, z) in concentric rings and horizontal layers of a cylinder."""
 
 from __future__ import annotations
 
@@ -16,25 +16,24 @@ from postprocess.geometry.voxel import solid_points
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class PackingProfile:
-    """Packing fraction in rings and layers of an upright cylinder."""
+    """Packing fraction in R rings and Z layers of an upright cylinder; a cell is one ring of one layer."""
 
     radii: Floats = field(repr=False)  #: (R + 1,) float64 [m], edges of the rings, 0 to the container's radius
     heights: Floats = field(repr=False)  #: (Z + 1,) float64 [m], edges of the layers, from the floor up
-    #: (R, Z) float64 [-], share of each ring of each layer that lies inside a link's box
-    packing: Floats = field(repr=False)
-    outside: float  #: Volume of the links' boxes that is in no ring of any layer [m³]
+    packing: Floats = field(repr=False)  #: (R, Z) float64 [-], fraction of each cell inside the links' boxes
+    outside: float  #: Volume of the links' boxes outside all cells [m³]
 
     @property
     def volumes(self) -> Floats:
-        """(R, Z) [m³], of each ring of each layer."""
+        """(R, Z) volumes of the cells [m³]."""
         volumes: Floats = math.pi * np.outer(np.diff(self.radii**2), np.diff(self.heights))
         return volumes
 
     @property
     def solid_volume(self) -> float:
-        """Volume of all links' boxes, in rings and layers and outside, counted once where they overlap [m³].
+        """Volume of the union of all links' boxes [m³], inside and outside the cells.
 
-        Links of a U overlap at their hinges by t1 t2² / 2, which t1 t2 (w + 2l) counts twice.
+        The two boxes at a hinge of a U share the volume t1 t2² / 2; t1 t2 (w + 2l) counts this twice.
         """
         return float((self.packing * self.volumes).sum()) + self.outside
 
@@ -50,19 +49,20 @@ def packing_profile(
     layer: float | None = None,
     pitch: float | None = None,
 ) -> PackingProfile:
-    """Compute φ(r, z) of smarticles in an upright cylinder about x = y = 0, by points as of "voxel".
+    """Compute φ(r, z) in an upright cylinder around x = y = 0, by grid points inside the links' boxes.
 
     Args:
-        radius: Of the container [m].
+        vertices: (N, 4, 3) [m].
+        radius: Radius of the container [m].
         thickness_normal: t1, along the normal of the smarticle's plane [m].
         thickness_in_plane: t2, in the smarticle's plane [m].
         floor_z: Height of the container's floor [m].
-        layer: Thickness of the layers [m]; a ring's width if not given. The uppermost reaches above the pile.
-        pitch: Spacing of the points that the boxes are made of [m]; half the smaller thickness if not given, which
-            makes 16 points of the section of 1.27 × 0.5 mm² and some hundreds in the smallest ring of a loose pile.
+        rings: Number of rings, all of one width.
+        layer: Thickness of the layers [m]; the width of a ring if not given. The uppermost layer ends above the pile.
+        pitch: Spacing of the grid points [m]; half the smaller thickness if not given.
 
     Raises:
-        InputError: Bad sizes or numbers of rings and layers.
+        InputError: A size is not above 0, or the number of rings below 1.
     """
     if not (math.isfinite(radius) and radius > 0 and rings >= 1):
         raise InputError(f"a profile needs a radius above 0 m and 1 ring or more: got {radius} m, {rings} rings")
@@ -85,16 +85,22 @@ def packing_profile(
 
 
 def profile_table(run: Run, *, rings: int = 6, layer: float | None = None) -> pd.DataFrame:
-    """Compute φ(r, z) of the last frame of each phase of a run: a row per phase, ring and layer.
+    """Compute φ(r, z) for the last frame of every phase.
 
-    Layers are as thick as a ring is wide, unless given [m].
+    Args:
+        run: A run in one cylinder.
+        rings: Number of rings.
+        layer: Thickness of the layers [m]; the width of a ring if not given.
+
+    Returns:
+        A table with one row per phase, ring and layer, and units in its column names.
 
     Raises:
-        InputError: The run is in a plane, its container is no one cylinder, or as `packing_profile`.
+        InputError: The run is planar, its container has several tiers, or `rings` or `layer` are not above 0.
     """
     if run.manifest.planar or run.manifest.container_tiers > 1:
         what = "moves in a plane" if run.manifest.planar else f"has a container of {run.manifest.container_tiers} tiers"
-        raise InputError(f"{run.path}: φ(r, z) is of one upright cylinder: this run {what}; leave out the profile")
+        raise InputError(f"{run.path}: φ(r, z) needs one upright cylinder: this run {what}; leave out the profile")
     frames = run.frames
     rows: list[dict[str, object]] = []
     for phase in run.phases:

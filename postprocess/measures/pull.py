@@ -1,8 +1,8 @@
-"""Measure the pull of a hook out of a pile: force against time, peak, work, whether it came free.
+"""Measure the pull of a hook out of a pile: force against time, peak force, work, time of coming free.
 
-Forces are those that it takes to raise the hook, upwards positive: what the smarticles exert on it, with the other
-sign. The series holds means between samples, so nothing is missed between two of them, but contacts come and go and
-one sample scatters: a peak is the largest mean over a window.
+The force is the one that raises the hook, positive upwards; the smarticles exert the opposite force on the hook. A
+sample of the series is the mean over the time since the previous sample. Single samples scatter, because contacts open
+and close; the peak force is therefore the largest mean over a window.
 """
 
 from __future__ import annotations
@@ -21,43 +21,43 @@ from postprocess.measures.registry import PhaseMeasure, Quantity, Shown
 PULL = "pull-hook"  #: Type of the phase
 
 WINDOW = 0.04
-"""Over which forces are averaged for a peak [s]: at w per second the hook rises by 0.47 mm meanwhile, less than t2."""
+"""Time over which the peak force is averaged [s]; at w per second a hook rises by 0.47 mm meanwhile, less than t2."""
 
-FREE = 0.1  #: A hook is free once its force stays below this share of the peak [-]
-END = 0.1  #: At the end of the pull, over which the force is averaged that is left [s]
+FREE = 0.1  #: A hook is free once its force stays below this fraction of the peak force [-]
+END = 0.1  #: Time at the end of the pull over which the remaining force is averaged [s]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class HookPull:
-    """A hook's history while it is pulled."""
+    """Forces and heights of the two hooks during a pull of the upper hook, at n samples."""
 
-    edges: Floats = field(repr=False)  #: (n + 1,) times since the pull began, of samples and of the one before them [s]
-    raised: Floats = field(repr=False)  #: (n + 1,) how far the hook has been raised there [m]
-    force: Floats = field(repr=False)  #: (n,) needed to raise it, mean between two samples [N]
-    #: (n,) with which the smarticles pull the other hook upwards, likewise [N]: what goes from hook to hook
+    edges: Floats = field(repr=False)  #: (n + 1,) times of the last sample before the pull, 0, and of the n samples [s]
+    raised: Floats = field(repr=False)  #: (n + 1,) distance by which the hook has been raised at these times [m]
+    force: Floats = field(repr=False)  #: (n,) force that raises the hook, mean between two times [N]
+    #: (n,) upward force of the smarticles on the lower hook, mean between two times [N]: the load passed on to it
     held: Floats = field(repr=False)
-    before: float  #: The force before the pull [N]: what rested on the hook; negative where it was held up
-    engine_work: float  #: Work of the hook on the smarticles by the engine's own ledger [J]; NaN where not recorded
+    before: float  #: Mean force on the hook before the pull [N]: weight resting on it; negative if it is pushed up
+    engine_work: float  #: Work of the hook on the smarticles by the engine's energy ledger [J]; NaN if not recorded
 
     @property
     def times(self) -> Floats:
-        """(n,) middles of the intervals that forces are means over [s]."""
+        """(n,) middles of the intervals over which forces are averaged, since the pull began [s]."""
         middles: Floats = (self.edges[:-1] + self.edges[1:]) / 2
         return middles
 
     @property
     def work(self) -> float:
-        """∫ F dz over the whole pull [J]; a hook that came free adds nothing from then on."""
+        """Work of the hook, ∫ F dz over the whole pull [J]."""
         return float(self.force @ np.diff(self.raised))
 
     @property
     def net(self) -> HookPull:
-        """The history with the force that does not go on to the other hook: that of pile and container."""
+        """The pull with `force` less `held`: the force that pile and container bear, not the lower hook."""
         return replace(self, force=self.force - self.held)
 
     @property
     def left(self) -> float:
-        """Mean force over the last `END` of the pull [N]: what the hook still holds, less friction."""
+        """Mean force over the last `END` seconds of the pull [N]: weight still on the hook, and friction."""
         return float(self.force[self.times > self.edges[-1] - END].mean())
 
 
@@ -65,20 +65,20 @@ class HookPull:
 class Peak:
     """The largest force of a pull."""
 
-    force: float  #: Mean over the window [N]
-    time: float  #: Of the window's middle, since the pull began [s]
-    raised: float  #: How far the hook had been raised then [m]
+    force: float  #: Mean force over the window [N]
+    time: float  #: Time of the window's middle, since the pull began [s]
+    raised: float  #: Distance by which the hook had been raised at this time [m]
 
 
 def read_pull(run: Run, series: Series, phase: int) -> HookPull:
-    """Read a hook's history in a phase, by its index, so far as it has come.
+    """Read forces and heights of the hooks in the phase with the given index, as far as the run has come.
 
     Raises:
-        InputError: The series lacks the hook's force or height, or does not reach into the phase.
+        InputError: The series lacks the hook's force or height, or has fewer than two samples of the phase.
     """
     inside = np.nonzero(series["phase"] == phase)[0]
     force = -series["hook_upper_force_N"][:, 2]
-    # The hooks move with the container, which does not move now.
+    # Hooks move with the container, which is at rest during a pull.
     height = series["hook_upper_z_m"]
     if len(inside) < 2 or inside[0] == 0 or not np.isfinite(force[inside]).all():
         raise InputError(f"{series.path}: no force of a hook throughout phase {phase} of {run.path}; run it again")
@@ -97,18 +97,18 @@ def read_pull(run: Run, series: Series, phase: int) -> HookPull:
 
 
 def weight_of_one(run: Run) -> float:
-    """Return W_s, weight of one smarticle [N].
+    """Return the weight of one smarticle, W_s [N].
 
     Raises:
-        InputError: The scene cannot be read, or lacks gravity.
+        InputError: The scene cannot be read, or has no gravity.
     """
     return float(run.manifest.smarticle_mass_kg * run.scene["gravity_m_per_s2"])
 
 
 def moving_mean(pull: HookPull, window: float = WINDOW) -> tuple[Floats, Floats]:
-    """Average the force over every window: middles (m,) [s] and forces (m,) [N].
+    """Return the moving mean of the force: middles of the windows (m,) [s] and mean forces (m,) [N].
 
-    The window [s] is rounded to whole samples, one at least, all at most.
+    The window [s] is rounded to whole samples: at least one, at most all.
     """
     count = _samples(pull.edges, window)
     weights = np.full(count, 1 / count)
@@ -116,7 +116,7 @@ def moving_mean(pull: HookPull, window: float = WINDOW) -> tuple[Floats, Floats]
 
 
 def peak(pull: HookPull, window: float = WINDOW) -> Peak:
-    """Return the largest mean over a window; arguments as in `moving_mean`."""
+    """Return the peak of a pull: the largest mean force over a window [s]."""
     times, means = moving_mean(pull, window)
     highest = int(means.argmax())
     time = float(times[highest])
@@ -124,13 +124,13 @@ def peak(pull: HookPull, window: float = WINDOW) -> Peak:
 
 
 def held_at(pull: HookPull, time: float) -> float:
-    """Average the force on the other hook [N] over a window about a time since the pull began [s]."""
+    """Return the mean force on the lower hook [N] over a window around a time since the pull began [s]."""
     times, means = moving_mean(replace(pull, force=pull.held))
     return float(np.interp(time, times, means))
 
 
 def freed(pull: HookPull) -> float:
-    """Return when the windowed force falls below `FREE` of its peak for good [s]; NaN if it never does."""
+    """Return the time since the pull began [s] at which the hook came free, see `FREE`; NaN if it did not."""
     times, means = moving_mean(pull)
     held = np.nonzero(means > FREE * means.max())[0]
     if not len(held) or held[-1] + 1 == len(means):
@@ -139,17 +139,24 @@ def freed(pull: HookPull) -> float:
 
 
 def held_fast(pull: HookPull, asked: SceneData) -> bool:
-    """Whether the hook was stopped by its force limit in a whole pull, so that its peak is a lower bound.
+    """Return whether the force limit stopped the hook of a finished pull.
+
+    The peak force is then a lower bound.
+
+    Args:
+        asked: The phase in the scene.
 
     Raises:
-        InputError: The scene does not say how far.
+        InputError: The phase has a force limit and lacks `distance_m`.
     """
-    # A hook that nothing stops arrives within a time step.
-    return bool(pull.raised[-1] < 0.99 * asked["distance_m"])
+    if asked.get("force_limit_N") is None:
+        return False  # nothing else stops a hook
+    # The last sample may be one interval before the hook's arrival.
+    last = pull.raised[-1] + np.diff(pull.raised).max()
+    return bool(last < 0.99 * asked["distance_m"])
 
 
 def _pull_of(run: Run, series: Series, phase: int) -> tuple[float, ...]:
-    """Measure a pull for a table, forces over the weight of all smarticles, n W_s."""
     pull, weight = read_pull(run, series, phase), weight_of_one(run)
     highest = peak(pull)
     ended = run.phases[phase].end_s is not None
@@ -167,12 +174,12 @@ def _pull_of(run: Run, series: Series, phase: int) -> tuple[float, ...]:
 
 
 def has_pull(series: Series, phase: int) -> bool:
-    """Whether there is enough of a pull in a series to measure."""
+    """Return whether a series holds at least two samples of the hook's force in the phase with this index."""
     return "hook_upper_force_N" in series.data and int((series["phase"] == phase).sum()) >= 2
 
 
 def _samples(edges: Floats, window: float) -> int:
-    """Return the samples in a window [s], one at least and all at most."""
+    """Return the number of samples in a window [s]: at least one, at most all."""
     return min(max(round(window / float(np.median(np.diff(edges)))), 1), len(edges) - 1)
 
 

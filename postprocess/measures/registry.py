@@ -1,8 +1,8 @@
-"""What a measure is, and all that there are.
+"""Define measures, and find all measures that the modules of this package register.
 
-A measure is one module of this package with one tuple `MEASURES`: its name, what it takes of a frame or of a phase,
-and the columns of that with their units. Tables, `smarticles measure` and its CSV and JSON take them from here, so
-that a new one needs its module, a test, and a line in README.
+Each module lists its measures in a tuple `MEASURES`. A measure has a name, a function of a frame or of a phase, and the
+columns that this function fills, with units. Tables and `smarticles measure` read the registry, so that a new measure
+needs its module, a test, and a line in README.
 """
 
 from __future__ import annotations
@@ -22,13 +22,13 @@ _PACKAGE = __name__.rpartition(".")[0]
 
 @dataclass(frozen=True, kw_only=True)
 class Shown:
-    """A column of short tables for a person; most columns are for CSV alone."""
+    """Format of a quantity in the short tables of the terminal, which have few of all columns."""
 
-    heading: str  #: With the unit that it is shown in
-    place: int  #: Among the others: lower ones come first
+    heading: str  #: Heading of the column, with the unit of its numbers
+    place: int  #: Order of the columns: lower numbers come first
     form: str  #: Format of the number
-    factor: float = 1.0  #: From SI to the unit of the heading [1]
-    with_error: bool = False  #: Whether its standard error stands beside
+    factor: float = 1.0  #: Factor from the SI unit to the unit of the heading [-]
+    with_error: bool = False  #: Whether a column with the standard error follows
 
 
 @dataclass(frozen=True)
@@ -40,51 +40,50 @@ class Quantity:
         'com height [m]'
     """
 
-    label: str  #: Its name
-    unit: str  #: SI, or "-" for a pure number, "degree", "smarticles"
-    shown: Shown | None = None  #: In short tables; None: not at all
+    label: str  #: Name of the quantity
+    unit: str  #: SI unit, or "-" for a pure number, "degree", "smarticles"
+    shown: Shown | None = None  #: Its column in short tables; None: short tables leave it out
 
     @property
     def header(self) -> str:
-        """Name of its column."""
+        """Name of the column: label and unit."""
         return f"{self.label} [{self.unit}]"
 
 
 @dataclass(frozen=True, kw_only=True)
 class FrameMeasure:
-    """A measure of each frame."""
+    """A measure that is computed from one frame."""
 
-    name: str  #: Of the measure, unique
-    place: int  #: Among the columns of a table: those of lower places come first
+    name: str  #: Unique name of the measure
+    place: int  #: Order of its columns in a table: lower numbers come first
     quantities: tuple[Quantity, ...]  #: Its columns
-    #: The values of a frame of a run, one per column; NaN where they have no meaning in this frame
+    #: Returns the values of a frame of a run, one per column; NaN for a value that is undefined in this frame
     take: Callable[[Frame, Run], Sequence[float]]
-    #: Whether a run has it at all; else its tables have no such columns
+    #: Returns whether the measure applies to a run; tables of other runs lack its columns
     available_for: Callable[[Run], bool] = lambda _: True
-    definition: str | None = None  #: Where several measures define one quantity, by what name this one is chosen
-    #: Whether it takes longer than all that is cheap together, tens of milliseconds per frame or more: tables have it
-    #: of the last frame of a phase, unless asked for at every frame
+    definition: str | None = None  #: Key of the definition if the quantity has several, as the packing fraction has
+    #: Whether it takes tens of milliseconds per frame or more; tables then have its values for the last frame of each
+    #: phase alone, unless the user asks for every frame
     costly: bool = False
 
     def columns(self, frame: Frame | None, run: Run) -> dict[str, float]:
-        """Return its values by column; NaN without a frame."""
+        """Return the values of a frame by column; all are NaN if the frame is None."""
         values = [float("nan")] * len(self.quantities) if frame is None else self.take(frame, run)
         return dict(zip((quantity.header for quantity in self.quantities), values, strict=True))
 
 
 @dataclass(frozen=True, kw_only=True)
 class PhaseMeasure:
-    """A measure of a whole phase."""
+    """A measure that is computed from a whole phase."""
 
-    name: str  #: Of the measure, unique
-    phases: tuple[str, ...]  #: Types of the phases that have it
+    name: str  #: Unique name of the measure
+    phases: tuple[str, ...]  #: Types of phase to which the measure applies
     quantities: tuple[Quantity, ...]  #: Its columns
-    take: Callable[[Run, Series, int], Sequence[float]]  #: The values of a phase of an index, one per column
-    #: Whether the series holds enough of a phase of an index; else there are no such columns
-    available_for: Callable[[Series, int], bool]
+    take: Callable[[Run, Series, int], Sequence[float]]  #: Returns the values of a phase by its index, one per column
+    available_for: Callable[[Series, int], bool]  #: Returns whether the series holds enough samples of a phase
 
     def columns(self, run: Run, series: Series, phase: int) -> dict[str, float]:
-        """Return its values by column; none where the phase is of another type or the series holds too little."""
+        """Return the values of a phase by column; empty if the measure does not apply or samples are few."""
         if run.phases[phase].type not in self.phases or not self.available_for(series, phase):
             return {}
         values = self.take(run, series, phase)
@@ -92,13 +91,17 @@ class PhaseMeasure:
 
 
 def in_space(run: Run) -> bool:
-    """Whether smarticles move in space, not in a plane, where all lie at one height."""
+    """Return whether the smarticles of a run move in three dimensions, not in a plane."""
     return not run.manifest.planar
 
 
 @cache
 def registered() -> tuple[FrameMeasure | PhaseMeasure, ...]:
-    """Return all measures of this package, by module."""
+    """Return all measures of this package, in alphabetical order of their modules.
+
+    Raises:
+        ValueError: Two measures have one name, or two quantities one header.
+    """
     package = import_module(_PACKAGE)
     modules = [import_module(f"{_PACKAGE}.{found.name}") for found in pkgutil.iter_modules(package.__path__)]
     measures = tuple(measure for module in modules for measure in getattr(module, "MEASURES", ()))
@@ -111,18 +114,26 @@ def registered() -> tuple[FrameMeasure | PhaseMeasure, ...]:
 
 
 def shown_quantities() -> tuple[tuple[Quantity, Shown], ...]:
-    """Return the columns of short tables, in their order."""
-    found = [(one, one.shown) for measure in registered() for one in measure.quantities if one.shown is not None]
+    """Return the quantities of short tables with their format, in the order of the columns."""
+    found = [
+        (quantity, quantity.shown)
+        for measure in registered()
+        for quantity in measure.quantities
+        if quantity.shown is not None
+    ]
     return tuple(sorted(found, key=lambda pair: pair[1].place))
 
 
 def frame_measures(definitions: Sequence[str]) -> tuple[FrameMeasure, ...]:
-    """Return the measures of frames in the order of columns, those with definitions as given."""
+    """Return the measures of frames in the order of their columns.
+
+    Measures with a definition come last, in the order of `definitions`; measures with other definitions are left out.
+    """
     known = sorted((m for m in registered() if isinstance(m, FrameMeasure)), key=lambda measure: measure.place)
-    chosen = {measure.definition: measure for measure in known}
+    defined = {measure.definition: measure for measure in known}
     return (
         *(measure for measure in known if measure.definition is None),
-        *(chosen[definition] for definition in definitions),
+        *(defined[definition] for definition in definitions),
     )
 
 

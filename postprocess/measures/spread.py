@@ -1,4 +1,4 @@
-"""Count smarticles and those that escaped; measure how a pile without a wall spreads, leans and sheds."""
+"""Count all and escaped smarticles; measure how a pile without a wall spreads and tilts."""
 
 from __future__ import annotations
 
@@ -23,43 +23,42 @@ from postprocess.measures.heights import least_reaching
 from postprocess.measures.registry import FrameMeasure, Quantity, Shown, in_space
 
 TOUCHING = 1.05
-"""Distance of centrelines over the diameter of the spheres up to which two smarticles count as touching [-].
+"""Largest distance of two centrelines at which smarticles count as neighbours, over the diameter of the spheres [-].
 
-Spheres that touch are a diameter apart or, pressed, less; beads rest in the gaps of the other chain, so that
-centrelines come nearer still. A twentieth more keeps contacts that open and close while a pile settles.
-
-It measures nearness, not contact: of piles on YADE it finds 1.4 times as many pairs as touch at rest after pouring,
-1.9 to 2.1 at rest after shaking, 6 while shaken; see `contacts.pairs_in_contact`, which finds those that touch."""
+The 5 % keep contacts that open and close while a pile settles. Neighbours need not touch: on YADE this finds 1.4 times
+as many pairs as touch at rest after pouring, 1.9 to 2.1 times at rest after shaking, 6 times while shaken.
+`contacts.pairs_in_contact` finds the pairs that touch."""
 
 OUTSIDE = 0.5
-"""How far beyond the wall that was, in w, a centre of mass must be to have come off the pile [-].
+"""Distance beyond the former wall at which a smarticle has come off the pile, over w [-].
 
-A smarticle reaches about w/2 from its centre of mass: it then lies as a whole where no smarticle was. Distances are
-from the middle of the pile, wherever that is by now: a pile that fell over as a whole has shed nothing."""
+A smarticle reaches about w/2 from its centre of mass, so at this distance no part of it lies inside the former wall.
+The distance is measured from the present middle of the pile: a pile that fell over as a whole has lost no smarticle."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class FreePile:
-    """A pile without a wall."""
+    """Measures of a pile without a wall."""
 
-    touching: float  #: Share of the smarticles in the largest cluster joined by contact [-]
-    entangled: float  #: Share of them in the largest cluster joined by entanglement [-]
-    radius_half: float  #: Radius about the vertical through the centre of mass that holds half of the material [m]
-    radius_most: float  #: Radius that holds 95 % of it [m]
-    sloughed: float  #: Share of the smarticles farther from the pile's middle than the wall was, see `OUTSIDE` [-]
+    touching: float  #: Fraction of the smarticles in the largest cluster of neighbours, see `TOUCHING` [-]
+    entangled: float  #: Fraction of the smarticles in the largest cluster joined by crossings [-]
+    radius_half: float  #: Radius around the vertical through the centre of mass that holds 50 % of the material [m]
+    radius_most: float  #: Radius around the vertical through the centre of mass that holds 95 % of the material [m]
+    sloughed: float  #: Fraction of the smarticles that have come off the pile, see `OUTSIDE` [-]
     tilt: float  #: Angle of the pile from the vertical [degree], see `tilt`
-    offset: float  #: Distance of the centre of mass from the vertical through the foot [m]
+    offset: float  #: Horizontal distance of the centre of mass from the foot [m]
 
 
 def free_pile(
     vertices: Vertices, run: Run, *, floor_z: float = 0.0, foot: tuple[float, float] = (0.0, 0.0)
 ) -> FreePile:
-    """Measure a pile without a wall, of a run's container and smarticles.
+    """Measure a pile without a wall.
 
     Args:
+        vertices: (N, 4, 3) [m].
+        run: The run, which gives the sizes of container and smarticles.
         floor_z: Height of the floor [m].
-        foot: x and y of the point that the pile stands on [m]: the container's axis if not given, better the place
-            of the centre of mass while the wall was there.
+        foot: x and y [m] of the point on which the pile stood, best the centre of mass before the wall was removed.
 
     Raises:
         UndefinedMeasureError: There is no smarticle.
@@ -95,14 +94,18 @@ def centre_of_mass(vertices: Vertices) -> Floats:
 
 
 def spread_radius(vertices: Vertices, *, share: float, axis: tuple[float, float] | None = None) -> float:
-    """Find the radius [m] about a vertical axis that holds a share of the links' material, above 0 and up to 1.
+    """Return the radius [m] around a vertical axis that holds a fraction of the material.
 
-    The material is spread evenly along each link's centreline. What of a link lies within a radius is where a straight
-    line is inside a circle, seen from above; the radius is found by bisection: exact, without sampling. The axis, x and
-    y [m], is that of the pile's centre of mass if not given.
+    The material is spread evenly along each link's centreline. The part of each centreline inside a circle, seen from
+    above, is exact; the radius is found by bisection.
+
+    Args:
+        vertices: (N, 4, 3) [m].
+        share: Fraction of the material, above 0 and up to 1 [-].
+        axis: x and y of the axis [m]; that of the pile's centre of mass if not given.
 
     Raises:
-        InputError: Bad share.
+        InputError: The fraction is out of its range.
         UndefinedMeasureError: There is no smarticle.
     """
     vertices = checked_vertices(vertices)
@@ -112,37 +115,42 @@ def spread_radius(vertices: Vertices, *, share: float, axis: tuple[float, float]
     points = vertices[:, :, :2] - centre
     start, along = points[:, :-1].reshape(-1, 2), np.diff(points, axis=1).reshape(-1, 2)
     weights = link_lengths(vertices).ravel()
-    wanted = share * weights.sum()
+    level = share * weights.sum()
     farthest = float(np.linalg.norm(points, axis=2).max())
-    return least_reaching(lambda radius: float(weights @ _shares_within(start, along, radius)), wanted, 0.0, farthest)
+    return least_reaching(lambda radius: float(weights @ _shares_within(start, along, radius)), level, 0.0, farthest)
 
 
 def share_outside(vertices: Vertices, radius: float, *, axis: tuple[float, float] = (0.0, 0.0)) -> float:
-    """Return the share [-] of smarticles whose centre of mass is farther than a radius [m] from an axis.
+    """Return the fraction [-] of smarticles outside a cylinder around a vertical axis.
+
+    The position of a smarticle is its centre of mass. The cylinder has a radius [m] and an axis through x and y [m].
 
     Raises:
         UndefinedMeasureError: There is no smarticle.
     """
     centres = centres_of_mass(vertices)
     if len(centres) == 0:
-        raise UndefinedMeasureError("a share of smarticles needs at least 1 of them: got 0")
+        raise UndefinedMeasureError("a fraction of smarticles needs at least 1 smarticle: got 0")
     return float((np.hypot(*(centres[:, :2] - axis).T) > radius).mean())
 
 
 def middle(vertices: Vertices) -> tuple[float, float]:
-    """Return the middle of a pile seen from above, x and y [m]: medians, which ignore strays."""
+    """Return the middle of a pile, x and y [m]: medians, on which outliers have little influence."""
     x, y = np.median(centres_of_mass(vertices)[:, :2], axis=0)
     return float(x), float(y)
 
 
 def tilt(vertices: Vertices, *, foot: tuple[float, float] = (0.0, 0.0), floor_z: float = 0.0) -> float:
-    """Return the angle [rad] from the vertical to the line from a pile's foot on the floor to its centre of mass.
+    """Return the angle [rad] between the vertical and the line from a pile's foot to its centre of mass.
 
-    A pile that is turned rigidly about its foot by an angle has that tilt; one that spreads evenly to all sides has
-    none. The principal axis of the pile's inertia would not do: it lies level in every pile that is lower than about
-    1.7 times its radius (a solid cylinder's axes change places there), and a leaning pile has the axis of a sheared
-    one. The foot, x and y [m] on a floor of a height [m], is not the middle of what now lies on it: a column that has
-    fallen over lies above the middle of its side, and would be upright.
+    A rigid rotation of a pile about its foot changes the tilt by the angle of rotation; a pile that spreads evenly to
+    all sides keeps the tilt 0. The principal axis of inertia is no substitute: it is horizontal in every pile lower
+    than about 1.7 times its radius.
+
+    Args:
+        vertices: (N, 4, 3) [m].
+        foot: x and y [m] of the point on which the pile stood before it tilted.
+        floor_z: Height of the floor [m].
 
     Raises:
         UndefinedMeasureError: There is no smarticle, or the centre of mass is not above the floor.
@@ -154,20 +162,19 @@ def tilt(vertices: Vertices, *, foot: tuple[float, float] = (0.0, 0.0), floor_z:
 
 
 def has_toppled(offset: float, base_radius: float) -> bool:
-    """Whether a pile has fallen over: its centre of mass is no longer above the base that it stood on.
+    """Return whether a pile has fallen over: its centre of mass is no longer above its former base.
 
-    A body stands as long as the vertical through its centre of mass, at an offset [m] from that through the foot, meets
-    its base, of a radius [m] before the pile was free. A pile that spreads or sheds smarticles to all sides keeps its
-    centre of mass where it was.
+    The offset is the horizontal distance of the centre of mass from the foot [m]; the base is a circle around the foot
+    with the radius of the pile before the wall was removed [m].
     """
     return offset > base_radius
 
 
 def _shares_within(start: Floats, along: Floats, radius: float) -> Floats:
-    """Return shares (n,) of lines (start, start + along), each (n, 2), within a circle about the origin."""
+    """Return the fractions (n,) of line segments inside a circle at the origin; start, along: (n, 2)."""
     square, mixed = (along**2).sum(axis=1), (start * along).sum(axis=1)
     inside = radius**2 - (start**2).sum(axis=1)
-    # Upright links are points seen from above.
+    # A vertical link is a point seen from above.
     upright = square <= 1e-24 + 1e-18 * radius**2
     safe = np.where(upright, 1.0, square)
     root = mixed**2 + safe * inside
@@ -185,7 +192,7 @@ def _free_pile_of(frame: Frame, run: Run) -> tuple[float, ...]:
 
 
 def escaped(frame: Frame, run: Run) -> int:
-    """Count smarticles with their centre of mass beside or below the container."""
+    """Count the smarticles whose centre of mass is outside the container's radius or below its floor."""
     centres = centres_of_mass(frame.vertices)
     outside = np.hypot(centres[:, 0], centres[:, 1]) > run.manifest.container_radius_m
     return int((outside | (centres[:, 2] < frame.floor_z)).sum())
@@ -217,7 +224,7 @@ MEASURES = (
             Quantity("tilt", "degree"),
         ),
         take=_free_pile_of,
-        # Of a run that takes its wall away.
+        # The last phase of such a run has no wall any more.
         available_for=lambda run: not (run.manifest.planar or run.manifest.walled(run.phases[-1].index)),
     ),
 )

@@ -1,7 +1,8 @@
 """Measure a strain test of a chain: force against strain, peak, yield, fracture, widening.
 
-Strain is that of the distance along x between the two points where strings are tied; force is that of the pulled
-string. A chain holds as long as it carries a fifth of its peak force; what comes after is its fracture.
+The strain is the relative increase of the distance along x between the two points where strings are tied; the force is
+the force of the pulled string. A chain has fractured after the last sample at which it carries a fifth of its peak
+force.
 """
 
 from __future__ import annotations
@@ -27,7 +28,7 @@ _MEANINGS = {
     ): "largest force of the pulled string, means over 1 ms",
     Quantity(
         "strain at the peak", "-", Shown(heading="strain at it", place=51, form=".3f")
-    ): "strain where it is reached",
+    ): "strain at the peak force",
     Quantity(
         "strain at fracture", "-", Shown(heading="at fracture", place=53, form=".3f")
     ): "largest strain while the force is a fifth of the peak or more",
@@ -36,16 +37,18 @@ _MEANINGS = {
     ): "slope of force against strain, from 20 % to 80 % of the force at the first maximum",
     Quantity(
         "second over first slope", "-"
-    ): "the same for the upper half of these forces over that for the lower half: 1 for a straight line",
+    ): "slope from 50 % to 80 % of the force at the first maximum over slope from 20 % to 50 %: 1 for a straight line",
     Quantity(
         "strain at the yield drop", "-", Shown(heading="at yield", place=52, form=".3f")
     ): "strain at the first maximum that is followed by a loss of a tenth of the "
     "force or more, and by more strain of 0.05 at least before the fracture; empty without any",
-    Quantity("force lost at the yield drop", "-"): "share of the force that is lost there",
+    Quantity("force lost at the yield drop", "-"): "fraction of the force that is lost at the yield drop",
     Quantity(
         "widening", "-", Shown(heading="widening", place=54, form=".3f")
     ): "largest width of the chain before the fracture over the width at the start, less 1",
-    Quantity("widening at the first maximum", "-"): "the same at the first maximum of the force",
+    Quantity(
+        "widening at the first maximum", "-"
+    ): "width of the chain at the first maximum of the force over the width at the start, less 1",
     Quantity(
         "greatest force on a wall", "N"
     ): "largest force on either wall across the channel before the fracture, means over 0.1 s",
@@ -54,37 +57,37 @@ _MEANINGS = {
     ): "root mean square difference of the two strings' forces along x before the fracture",
 }
 QUANTITIES: Mapping[str, str] = MappingProxyType({quantity.header: text for quantity, text in _MEANINGS.items()})
-"""What is measured of a strain test: names of columns with their units, and what they are."""
+"""Quantities of a strain test: names of columns with their units, and their meanings."""
 PEAK, AT_PEAK, FRACTURE, STIFFNESS, BEND, YIELD, DROP, WIDENING, SLIP_WIDENING, WALL, IMBALANCE = QUANTITIES
 
-LEAST_SAMPLES = 3  # of a strain test
-CARRIES = 0.2  # of the peak force, below which a chain no longer holds
-LOSS = 0.1  # of the force; a smaller one is no yield drop
-GOES_ON = 0.05  # strain between a yield drop and the fracture at least
-_WINDOW = 0.1  # s, over which the force on walls is averaged
-_QUIET = 0.05  # s, over which forces are averaged where maxima and slopes are looked for
-_TAUT = 0.3  # of the peak force: what is lost below is the jolt of the start
+LEAST_SAMPLES = 3  #: Least number of samples of a strain test
+CARRIES = 0.2  #: Fraction of the peak force that a chain carries until its fracture [-]
+LOSS = 0.1  #: Least fraction of the force that is lost at a yield drop [-]
+GOES_ON = 0.05  #: Least strain between a yield drop and the fracture [-]
+_WINDOW = 0.1  # time over which the force on walls is averaged [s]
+_QUIET = 0.05  # time over which forces are averaged to find maxima and slopes [s]
+_TAUT = 0.3  # fraction of the peak force below which a loss of force is only the jolt at the start
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class StrainTest:
-    """One strain test."""
+    """Forces, strains and widths of a strain test at its n samples, while the strings are tied."""
 
-    times: Floats  #: (n,) [s], while the strings are tied
-    strains: Floats  #: (n,) [-]
-    forces: Floats  #: (n,) of the pulled string along x [N]
-    held: Floats  #: (n,) of the other string, in the opposite direction [N]
-    widths: Floats  #: (n,) of the chain [m]
-    walls: Floats  #: (n,) the greater of the forces on the two walls, outwards [N]
+    times: Floats  #: (n,) times since the start of the run [s]
+    strains: Floats  #: (n,) strains of the chain [-]
+    forces: Floats  #: (n,) forces of the pulled string along +x [N]
+    held: Floats  #: (n,) forces of the fixed string along -x [N]
+    widths: Floats  #: (n,) widths of the chain [m]
+    walls: Floats  #: (n,) outward force on a wall of the channel, the larger of the two [N]
 
     @property
     def fracture(self) -> int:
-        """Index of the last sample at which the chain holds."""
+        """Index of the last sample before the fracture, see `CARRIES`."""
         return int(np.flatnonzero(self.forces >= CARRIES * self.forces.max())[-1])
 
 
 def has_strain(series: Series) -> bool:
-    """Whether there is enough of a strain test in a series to measure: a string that pulled."""
+    """Return whether a series holds a strain test: samples enough, and a force on the pulled string."""
     if "string_pulled_force_N" not in series.data:
         return False
     force = series["string_pulled_force_N"][:, 0]
@@ -93,18 +96,18 @@ def has_strain(series: Series) -> bool:
 
 
 def _strain_of(run: Run, _: Series, __: int) -> tuple[float, ...]:
-    """Measure a strain test for a table; what depends on its end is NaN while the run is not done."""
-    found = measured(read_strain_test(run))
+    values = measured(read_strain_test(run))
     if run.status.state != "done":
-        found |= dict.fromkeys((FRACTURE, YIELD, DROP), math.nan)
-    return tuple(found[name] for name in QUANTITIES)
+        # The chain may yet carry more, so that fracture and yield are unknown.
+        values |= dict.fromkeys((FRACTURE, YIELD, DROP), math.nan)
+    return tuple(values[name] for name in QUANTITIES)
 
 
 def read_strain_test(run: Run) -> StrainTest:
-    """Read the strain test of a run.
+    """Read the strain test of a run from its series.
 
     Raises:
-        InputError: There is none, or its series cannot be read.
+        InputError: The run has no strain test, or its series cannot be read.
     """
     series = run.series
     if not has_strain(series):
@@ -125,7 +128,7 @@ def read_strain_test(run: Run) -> StrainTest:
 
 
 def measured(pull: StrainTest) -> dict[str, float]:
-    """Return the quantities of one strain test, see `QUANTITIES`."""
+    """Compute the quantities of a strain test, by their names in `QUANTITIES`."""
     end = pull.fracture + 1
     strains, forces = pull.strains[:end], pull.forces[:end]
     peak = int(np.argmax(forces))
@@ -151,19 +154,20 @@ def measured(pull: StrainTest) -> dict[str, float]:
 
 
 def _mean_over(values: Floats, samples: float) -> Floats:
-    """Return the moving mean over a number of samples, over fewer at the ends."""
+    """Return the moving mean (n,) of values (n,) over a number of samples; fewer are averaged at the ends."""
     window = np.ones(max(1, round(samples)))
     means: Floats = np.convolve(values, window, "same") / np.convolve(np.ones_like(values), window, "same")
     return means
 
 
 def first_drop(forces: Floats) -> tuple[int, float]:
-    """Find the first maximum after which a tenth of the force (n,) [N] is lost, or the greatest one.
+    """Find the first maximum of forces (n,) [N] that is followed by a loss of a tenth or more.
 
-    What is lost below three tenths of the peak does not count.
+    Losses that begin below three tenths of the largest force do not count.
 
     Returns:
-        Its index, and the share of the force that is lost before the maximum is passed again [-].
+        Index of this maximum, and the fraction of its force that is lost before the force exceeds it again [-]. Without
+        such a loss: index of the largest force, and 0.
     """
     highest = np.maximum.accumulate(forces)
     lost = np.flatnonzero((forces < (1 - LOSS) * highest) & (highest > _TAUT * forces.max()))
@@ -176,7 +180,7 @@ def first_drop(forces: Floats) -> tuple[int, float]:
 
 
 def _slopes(strains: Floats, forces: Floats) -> tuple[float, float]:
-    """Return the slope of force against strain [N], and that of the upper half over that of the lower [-]."""
+    """Return the slope of force against strain [N], and upper over lower slope, see `QUANTITIES` [-]."""
     top = forces[-1]
     ranges = ((0.2, 0.8), (0.2, 0.5), (0.5, 0.8))
     slopes = []

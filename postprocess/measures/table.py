@@ -1,4 +1,4 @@
-"""Measures of whole runs as tidy tables: one row per frame, or one per phase."""
+"""Measure whole runs and return tables with one row per frame, or one row per phase."""
 
 from __future__ import annotations
 
@@ -18,54 +18,49 @@ from postprocess.measures.registry import frame_measures, phase_measures
 from postprocess.statistics.points import ASPECT, SEED, marked
 from postprocess.statistics.seeds import Mean, mean_with_error
 
-Costly = Literal["never", "phase-end", "every-frame"]  #: When to take the packing fractions of `COSTLY_DEFINITIONS`
+Costly = Literal["never", "phase-end", "every-frame"]  #: Frames for which costly measures are computed
 
 PASSIVE_PHASES = frozenset({"deposit", "take-over", "relax"})
-"""Types of phase in which nothing drives the pile; all others count as activity."""
+"""Types of phase in which nothing drives the pile; all other types count as activity."""
 
-LAST_FRAMES = 20  #: Frames averaged at the end of a phase, as in Savoie et al
+LAST_FRAMES = 20  #: Number of frames averaged at the end of a phase, as in Savoie et al
 
 _LABELS = ("run", "name", SEED, ASPECT, "count", "fidelity", "scene_sha256")
-# What the columns of a series of vectors are, by their number.
+# Names of a vector's components, by their number.
 _COMPONENTS = {2: ("barb 1", "barb 2"), 3: ("x", "y", "z")}
-# Recorded by the engine and measured here from the frames as well.
+# Left out, because the table computes these from the frames.
 _SERIES_MEASURED = frozenset({"time_s", "phase", "count", "com_height_m", "packing_fraction"})
 
 
 @dataclass(frozen=True, kw_only=True)
 class PackingChange:
-    """Packing fraction before and at the end of the activity of a run."""
+    """Packing fraction of a run before its first activity and at the end of its last activity."""
 
     before: Mean  #: φ_0, mean over the last frames of the phase before the first activity [-]
     after: Mean  #: φ_f, mean over the last frames of the last activity [-]
     definition: str  #: Key of `packing.DEFINITIONS`
-    phase_before: int  #: Index of the phase of φ_0
-    phase_after: int  #: Index of the phase of φ_f
 
 
 def measure_run(
     run: Run, *, definitions: Sequence[str] = tuple(DEFINITIONS), costly: Costly = "phase-end"
 ) -> pd.DataFrame:
-    """Measure a run, which may be done, failed or still going on: one row per frame.
-
-    A value without meaning for its frame (a packing fraction of one smarticle, the mean crossings of straight ones) is
-    NaN, as are costly values where they were not asked for. What the engine recorded in `series.h5` is taken at the
-    sample nearest in time, if that file exists.
+    """Measure every frame of a run, which may be finished, failed or still running.
 
     Args:
         definitions: Definitions of the packing fraction, keys of `packing.DEFINITIONS`.
-        costly: Whether the costly ones among them are taken never, at the last frame of each phase recorded so far, or
-            at every frame.
+        costly: Frames for which costly measures are computed: none, the last recorded frame of each phase, or all.
 
     Returns:
-        A table with units in its column names.
+        A table with one row per frame and units in its column names. Columns of `series.h5`, if that file exists, have
+        the sample nearest in time. A value is NaN if it is undefined for its frame, such as the packing fraction of one
+        smarticle, or if it is costly and not computed.
 
     Raises:
         InputError: Unknown definition, or a file is missing or damaged.
     """
     frames, series = _open(run, definitions)
     rows: list[dict[str, object]] = []
-    for part in _phases(run, frames):
+    for part in _frames_by_phase(run, frames):
         rows += _rows(part, run, series, definitions, costly, offset=len(rows))
     return pd.DataFrame(rows)
 
@@ -78,20 +73,18 @@ def summarise_run(
     costly: Costly = "phase-end",
     phases: Collection[int] | None = None,
 ) -> pd.DataFrame:
-    """Measure a run averaged over the last frames of each phase: one row per phase.
-
-    Each measure has a second column, "… SE", with the standard error of the mean as in `seeds.mean_with_error`, which
-    allows for correlated frames. Costly packing fractions are those of the last frame alone, without an error, unless
-    asked for at every frame. Measures of whole phases stand beside, see `registry.PhaseMeasure`.
+    """Measure each phase of a run: means over its last frames, and measures of the whole phase.
 
     Args:
-        last: Frames to average; "frames averaged" says how many there were.
+        last: Number of frames to average; a phase with fewer frames is averaged over these.
         definitions: Definitions of the packing fraction, keys of `packing.DEFINITIONS`.
-        costly: When to take the costly ones among them, see `measure_run`.
-        phases: Indices of the phases wanted; all if not given.
+        costly: Frames for which costly measures are computed, see `measure_run`.
+        phases: Indices of the phases to measure; all if not given.
 
     Returns:
-        A table with units in its column names.
+        A table with one row per phase and units in its column names. A column "… SE" follows each mean with its
+        standard error, see `seeds.mean_with_error`. "frames averaged" is the number of frames. By default costly
+        measures are computed for the last frame alone and have no error.
 
     Raises:
         InputError: Unknown definition, `last` below 1, or a file is missing or damaged.
@@ -99,7 +92,7 @@ def summarise_run(
     _check_last(last)
     frames, series = _open(run, definitions)
     summaries = []
-    for part in _phases(run, frames):
+    for part in _frames_by_phase(run, frames):
         if phases is not None and part[0].phase not in phases:
             continue
         table = pd.DataFrame(_rows(part[-last:], run, series, definitions, costly))
@@ -109,7 +102,6 @@ def summarise_run(
             mean = mean_with_error(table[name])
             summary |= {name: mean.value, marked(name, "SE"): mean.standard_error}
         if series is not None:
-            # Of the whole phase, not of its last frames.
             for measure in phase_measures():
                 summary |= measure.columns(run, series, part[0].phase)
         summaries.append(summary)
@@ -123,18 +115,15 @@ def packing_change(
     last: int = LAST_FRAMES,
     activity: Collection[str] | None = None,
 ) -> PackingChange:
-    """Compute φ_0 and φ_f of a run: before its first activity and at the end of its last one.
-
-    Only frames of the one phase are averaged, even if it has fewer than asked for: those before it belong to another
-    state of the pile.
+    """Compute the packing fractions φ_0 and φ_f of a run, before and after its activity.
 
     Args:
         definition: Key of `packing.DEFINITIONS`.
-        last: Frames to average; the results say how many there were.
+        last: Number of frames to average; a phase with fewer frames is averaged over these.
         activity: Types of phase that count as activity; all but `PASSIVE_PHASES` if not given.
 
     Raises:
-        InputError: The run has no activity, has not come to it, or a file is missing or damaged.
+        InputError: The run has no activity, or no frame of it yet, or a file is missing or damaged.
 
     Source:
         changeInPhiAmp.m of wsavoie/SmarticleSim: means over 20 samples.
@@ -152,15 +141,14 @@ def packing_change(
             f"run {run} has no activity with a phase before it: its phases are {types}; "
             f"name its types of activity or choose another run"
         )
-    before, after = active[0] - 1, active[-1]
     means = []
-    for phase in (before, after):
+    for phase in (active[0] - 1, active[-1]):
         part = frames.in_phase(phase)[-last:]
         if not part:
             kind = run.phases[phase].type
             raise InputError(f"run {run} has no frame of phase {phase} ({kind}) yet; wait or resume it")
         means.append(mean_with_error([packing_of(frame, run, definition=definition) for frame in part]))
-    return PackingChange(before=means[0], after=means[1], definition=definition, phase_before=before, phase_after=after)
+    return PackingChange(before=means[0], after=means[1], definition=definition)
 
 
 def _check_last(last: int) -> None:
@@ -173,12 +161,12 @@ def _open(run: Run, definitions: Iterable[str]) -> tuple[FrameSequence, Series |
         if definition not in DEFINITIONS:
             raise InputError(f"unknown definition of the packing fraction '{definition}': {list(DEFINITIONS)}")
     _ = run.manifest
-    # A run that failed early may have frames and no series.
+    # A run that failed in its first seconds may have frames and no series.
     return run.frames, run.series if run.has_series else None
 
 
-def _phases(run: Run, frames: FrameSequence) -> list[FrameSequence]:
-    """Return the frames of each phase that has any."""
+def _frames_by_phase(run: Run, frames: FrameSequence) -> list[FrameSequence]:
+    """Return the frames of each phase, without phases that have none."""
     parts = [frames.in_phase(phase.index) for phase in run.phases]
     if sum(map(len, parts)) != len(frames):
         raise InputError(
@@ -191,7 +179,7 @@ def _phases(run: Run, frames: FrameSequence) -> list[FrameSequence]:
 def _rows(
     part: FrameSequence, run: Run, series: Series | None, definitions: Sequence[str], costly: Costly, *, offset: int = 0
 ) -> list[dict[str, object]]:
-    """Return one row per frame of a part of one phase; `offset` is the number of its first frame."""
+    """Return one row for each of some frames of one phase; `offset` is the number of the first of them."""
     rows: list[dict[str, object]] = []
     measures = [measure for measure in frame_measures(definitions) if measure.available_for(run)]
     made = run.manifest
@@ -220,9 +208,9 @@ def _series_columns(series: Series, time: float) -> dict[str, float]:
     for name, values in series.data.items():
         if name in _SERIES_MEASURED:
             continue
-        # Of a column that this version does not know, as its file has it.
+        # A newer version may have recorded a column that is unknown here.
         label = EVERY[name].label if name in EVERY else name
-        # The recorder writes the SI unit one; the tables write a dash.
+        # Files write a pure number's unit as 1, tables as a dash.
         unit = "-" if series.units[name] in {"1", ""} else series.units[name]
         if values.ndim == 1:
             columns[f"{label} [{unit}]"] = float(values[index])

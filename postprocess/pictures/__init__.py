@@ -1,1 +1,1 @@
-"""Pictures and films of runs: at the top of the package, on measures and report."""
+"""Draw pictures and films of runs."""

@@ -1,6 +1,6 @@
-"""Draw bodies of one or more runs side by side, in parallel projection, by PyVista.
+"""Draw the bodies of one or more runs side by side, in parallel projection, by PyVista.
 
-It is drawn at twice its size and scaled down. No display is needed: VTK falls back to EGL.
+Pictures are drawn at twice their size and scaled down. No display is needed: VTK falls back to EGL.
 """
 
 from __future__ import annotations
@@ -38,36 +38,42 @@ from postprocess.report import figures
 VIEWS: Mapping[str, tuple[float, float]] = MappingProxyType(
     {"front": (-90.0, 14.0), "oblique": (-62.0, 34.0), "top": (-90.0, 90.0)}
 )
-"""Named views: the camera's azimuth and elevation [degree], seen from the pile."""
+"""Named views: azimuth and elevation of the camera from the centre of the pile [degree]."""
 
-MILLIMETRE = 1e3  #: Drawn in mm: VTK's tolerances do not suit scenes of centimetres in m
+MILLIMETRE = 1e3  #: Factor from m to mm, the unit of all drawing: VTK's tolerances do not suit centimetres in m
 
 _OVERSAMPLING = 2
-_LEAST_SIZE, _LARGEST_SIZE = 200, 8000  # pixel
-_FILL = 0.97  # share of the view that bodies take
+_LEAST_SIZE, _LARGEST_SIZE = 200, 8000  # of a picture [pixel]
+_FILL = 0.97  # fraction of the free width or height that bodies take
 _EDGE = "#7d8f9f"
-_PALE = 0.15  # opacity of smarticles in front of forces
-# In hundredths of a picture's shorter side: height of the captions, of scale and colour bar, margin, text.
+_PALE = 0.15  # opacity of smarticles if forces are drawn
+# In `Style.unit`: height of the captions, of scale and colour bar, margin, size of title and text.
 _HEAD, _FOOT, _MARGIN, _TITLE, _TEXT = 11.5, 10.0, 2.6, 2.5, 1.9
-_LEAST_UNIT = 4.4  # pixel: smaller text cannot be read
+_LEAST_UNIT = 4.4  # so that text stays readable [pixel]
 _LETTER = 0.62  # width of a letter over its height
 _LIGHTS = ((-0.6, 1.1, 0.85), (0.9, 0.35, 0.32), (0.0, 0.0, 0.25))  # right, up, intensity
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Look:
-    """What colours mean, size [pixel] of a panel, and axes (3, 3) of the camera: right, up, forward."""
+class Style:
+    """Style of a picture: coloured field, size and camera."""
 
-    field: Field
-    size: tuple[int, int]
-    axes: Floats
+    field: Field  #: Field by which smarticles are coloured
+    size: tuple[int, int]  #: Width and height of the panel of one run [pixel]
+    axes: Floats  #: (3, 3) unit vectors of the camera: right, up, forward
 
     @classmethod
     def of(cls, runs: Sequence[Run], *, color_by: str | None, size: tuple[int, int], view: str | None) -> Self:
-        """Return a look by names.
+        """Return the style of a picture of runs.
+
+        Args:
+            runs: Runs side by side.
+            color_by: Name or short name of a field; None: crossings, for planar runs smarticle_id.
+            size: Width and height of the panel of one run [pixel].
+            view: Key of `VIEWS`; None: "front", for planar runs "top".
 
         Raises:
-            InputError: Unknown field or view, a bad size, or runs that have no view in common.
+            InputError: An unknown field or view, a bad size, or planar runs beside others.
         """
         if len({run.manifest.planar for run in runs}) > 1:
             raise InputError("a run in a plane and one in space have no view in common; compare runs of one kind")
@@ -81,25 +87,25 @@ class Look:
 
     @property
     def unit(self) -> float:
-        """A hundredth of the picture's shorter side, or what can just be read [pixel]."""
+        """Unit of text sizes and margins: a hundredth of the shorter side, at least `_LEAST_UNIT` [pixel]."""
         return max(min(self.size) / 100, _LEAST_UNIT)
 
     def pixel(self, extent: Floats) -> float:
-        """Return the length of a pixel [mm] of a picture that shows an extent (2, 2) [mm]."""
+        """Return the length that a pixel stands for [mm] in a picture that shows an extent (2, 2) [mm]."""
         width, height = np.diff(extent, axis=0)[0]
         free = self.size[1] - (_HEAD + _FOOT) * self.unit
         return float(max(width / (_FILL * self.size[0]), height / (_FILL * free))) or 1.0
 
     def panel(self, image: Image.Image) -> Image.Image:
-        """Return the bodies of a picture alone, without what is written around them."""
+        """Return a picture without the space of captions and bars."""
         return image.crop((0, round(_HEAD * self.unit), image.width, image.height - round(_FOOT * self.unit)))
 
 
-class Shot:
-    """A run to be drawn: its frames, and its bodies cut open in front.
+class Subject:
+    """A run to be drawn, with its frames and bodies.
 
     Raises:
-        InputError: Something of it is missing or damaged, or forces are wanted and not recorded.
+        InputError: A file of the run is missing or damaged, or forces are wanted and not recorded.
     """
 
     def __init__(self, directory: Path | str, *, forces: bool = False) -> None:
@@ -109,30 +115,38 @@ class Shot:
         self.frames = read_frames(directory)
 
     def extent(self, indices: Iterable[int], axes: Floats) -> Floats:
-        """Return the part (2, 2) of the picture's plane that some frames take [mm]."""
-        return union([extent(drawn(self.bodies, self.frames[i], axes[2]).values(), axes) for i in indices])
+        """Return the extent (2, 2) [mm] of some frames in the plane of the picture, see `extent`."""
+        return union([extent(visible_meshes(self.bodies, self.frames[i], axes[2]).values(), axes) for i in indices])
 
-    def values(self, indices: Iterable[int], look: Look) -> list[Floats]:
-        """Return values (N, 3) that the colours of some frames show."""
-        return [scalars(look.field, self.frames[i], self.run) for i in indices]
+    def values(self, indices: Iterable[int], style: Style) -> list[Floats]:
+        """Return the values (N, 3) of the coloured field for each of some frames."""
+        return [scalars(style.field, self.frames[i], self.run) for i in indices]
 
 
 def axes_from(azimuth: float, elevation: float) -> Floats:
-    """Return right, up and forward (3, 3) of a camera, by its direction from the pile [degree]."""
+    """Return the unit vectors (3, 3) right, up and forward of a camera by azimuth and elevation [degree]."""
     a, e = math.radians(azimuth), math.radians(elevation)
     right = np.array([-math.sin(a), math.cos(a), 0.0])
     forward = -np.array([math.cos(e) * math.cos(a), math.cos(e) * math.sin(a), math.sin(e)])
     return np.stack([right, np.cross(right, forward), forward])
 
 
-def drawn(bodies: Bodies, frame: Frame, forward: Floats, *, largest: float | None = None) -> dict[str, pv.PolyData]:
-    """Return what is drawn of a frame, [mm] above the floor: walls cut open in front, lines as tubes.
+def visible_meshes(
+    bodies: Bodies, frame: Frame, forward: Floats, *, largest: float | None = None
+) -> dict[str, pv.PolyData]:
+    """Return the meshes of a frame by kind, [mm] above the floor, with lines as tubes.
 
-    A wall that was taken away is there as `ghost`. With a direction of view (3,) of zeros walls stay whole; `largest`
-    is the normal force of the thickest line of force [N].
+    Args:
+        bodies: Bodies of the run.
+        frame: The frame.
+        forward: (3,) direction of view; the half of the wall in front is cut away, unless this vector is zero.
+        largest: Normal force of the thickest line of force [N]; the largest of the frame if not given.
+
+    Returns:
+        The meshes by kind. A removed wall has the kind `ghost`.
     """
     made = bodies.at(frame)
-    if "wall" in bodies.kinds and "wall" not in made and bodies.around.removed is not None:
+    if "wall" in bodies.kinds and "wall" not in made and bodies.boundaries.removal is not None:
         made["ghost"] = bodies.wall_at(frame.floor_z)
     found = {}
     for kind, mesh in made.items():
@@ -144,18 +158,25 @@ def drawn(bodies: Bodies, frame: Frame, forward: Floats, *, largest: float | Non
 
 
 def extent(meshes: Iterable[pv.PolyData], axes: Floats) -> Floats:
-    """Return the least and the largest x and y (2, 2) of meshes [mm] in the picture's plane."""
+    """Return the extent of meshes in the plane of the picture: (2, 2) [mm], lower left and upper right."""
     places = np.concatenate([np.asarray(mesh.points) @ axes[:2].T for mesh in meshes])
     return np.stack([places.min(axis=0), places.max(axis=0)])
 
 
 def union(extents: Sequence[Floats]) -> Floats:
-    """Return the extent around some."""
+    """Return the smallest extent (2, 2) that contains several extents."""
     return np.stack([np.min(extents, axis=0)[0], np.max(extents, axis=0)[1]])
 
 
 def add_bodies(plotter: Any, meshes: Mapping[str, pv.PolyData], frame: Frame, colours: NDArray[np.uint8]) -> None:
-    """Put meshes of `drawn` into a window in place of those there, links in colours (N, 3, 3), 0 to 255."""
+    """Replace the meshes in a window.
+
+    Args:
+        plotter: The window.
+        meshes: Meshes by `visible_meshes`.
+        frame: Their frame.
+        colours: (N, 3, 3) sRGB colours of the links, uint8.
+    """
     pale = "forces" in meshes
     for kind in (*PAINTS, "ghost"):
         for name in (kind, f"{kind} edges"):
@@ -163,7 +184,7 @@ def add_bodies(plotter: Any, meshes: Mapping[str, pv.PolyData], frame: Frame, co
     for kind, mesh in meshes.items():
         options = {"name": kind, "reset_camera": False, "render": False, "culling": False}
         if kind in {"wall", "floor", "ghost"}:
-            # Points that coincide would make seams, which would be drawn.
+            # Coinciding points would be drawn as edges.
             edges = mesh.clean(tolerance=1e-6).extract_feature_edges(feature_angle=30, manifold_edges=False)
             opacity = 0.3 if kind == "ghost" else 1.0
             line = {"color": _EDGE, "line_width": 1.8 * _OVERSAMPLING, "lighting": False, "opacity": opacity}
@@ -171,11 +192,11 @@ def add_bodies(plotter: Any, meshes: Mapping[str, pv.PolyData], frame: Frame, co
         if kind == "smarticles":
             mesh.point_data["colour"] = np.repeat(colours[owners(mesh, frame)], BOX_POINTS, axis=0)
             options |= {"scalars": "colour", "rgb": True, "opacity": _PALE if pale else 1.0, "specular": 0.12}
-            # The faces behind of a closed box are not seen; drawing them took a quarter of a film's time.
+            # Hidden back faces would take a quarter of a film's time.
             options |= {"culling": not pale and "back", "ambient": 0.22, "diffuse": 0.85, "specular_power": 20}
             options |= {"show_edges": True, "edge_color": "#101418", "edge_opacity": 0.55, "line_width": _OVERSAMPLING}
         elif kind != "ghost":
-            grazed = kind == "floor"  # light that grazes it would leave it black
+            grazed = kind == "floor"  # light at grazing incidence would leave it black
             options |= {"color": PAINTS[kind].colour, "opacity": PAINTS[kind].opacity, "lighting": kind != "wall"}
             options |= {"ambient": 0.45 if grazed else 0.25, "diffuse": 0.6 if grazed else 0.8}
         if kind != "ghost":
@@ -183,13 +204,15 @@ def add_bodies(plotter: Any, meshes: Mapping[str, pv.PolyData], frame: Frame, co
 
 
 class Canvas:
-    """A window of one or more panels with one camera, one scale of colours and one scale bar.
+    """An off-screen window with one panel per run, one camera, one colour scale and one scale bar.
 
     Args:
-        extent: (2, 2) of what the camera has in view [mm].
-        run: By whose sizes corners are shaded.
-        scale: Of colours; None: no bar of colours.
-        quick: Whether to leave out the shade in corners, which takes most of the time of a picture.
+        style: Style of the picture.
+        extent: (2, 2) extent in the camera's view [mm].
+        run: Run by whose sizes corners are shaded.
+        columns: Number of panels.
+        scale: Colour scale; None: no colour bar.
+        quick: Whether to leave out the shading of corners, which takes most of the time of a picture.
 
     Raises:
         RunError: This machine lacks the libraries to draw without a display.
@@ -197,7 +220,7 @@ class Canvas:
 
     def __init__(
         self,
-        look: Look,
+        style: Style,
         extent: Floats,
         run: Run,
         *,
@@ -206,11 +229,11 @@ class Canvas:
         quick: bool = False,
     ) -> None:
         check_graphics()
-        self._look, self._columns = look, columns
-        self.size = look.size[0] * columns, look.size[1]
-        self.pixel = look.pixel(extent)
-        # Captions take more of the picture than the bars do.
-        lift = (_HEAD - _FOOT) / 2 * look.unit * self.pixel
+        self._style, self._columns = style, columns
+        self.size = style.size[0] * columns, style.size[1]
+        self.pixel = style.pixel(extent)
+        # Captions are higher than the bars below, so the centre is not that of the picture.
+        lift = (_HEAD - _FOOT) / 2 * style.unit * self.pixel
         self._centre = extent.mean(axis=0) + np.array([0.0, lift])
         self._reach = 4 * self.pixel * max(self.size)
         with quiet_vtk():
@@ -221,7 +244,7 @@ class Canvas:
             self._plotter = plotter
             plotter.disable_anti_aliasing()  # drawn larger and scaled down, edges are smooth already
             plotter.set_background("white")
-            vtkTextRenderer.GetInstance().SetDefaultBackend(vtkTextRenderer.FreeType)  # names are no formulas
+            vtkTextRenderer.GetInstance().SetDefaultBackend(vtkTextRenderer.FreeType)  # no formulas in names
             for column in range(columns):
                 plotter.subplot(0, column)
                 for aside, rise, strength in _LIGHTS:
@@ -233,11 +256,11 @@ class Canvas:
             bias=0.4 * run.manifest.thickness_in_plane_m * MILLIMETRE,
                         kernel_size=64, blur=True,
                     )  # fmt: skip
-            self.turn(look.axes)
+            self.turn(style.axes)
             if scale is not None and scale.colours is not None:
                 self._add_colour_bar(scale, scale.colours)
-            self._length = round_length(0.2 * look.size[0] * self.pixel)
-            at = self._bar[2] + look.unit, self._bar[3]
+            self._length = round_length(0.2 * style.size[0] * self.pixel)
+            at = self._bar[2] + style.unit, self._bar[3]
             self._write(0, "scale", f"{self._length:g} mm", at, _TEXT)
 
     def __enter__(self) -> Self:
@@ -248,19 +271,19 @@ class Canvas:
 
     @property
     def _bar(self) -> tuple[float, float, float, float]:
-        """The scale bar from the lower left [pixel]: left, top, right, bottom."""
-        unit = self._look.unit
+        """Left, top, right and bottom of the scale bar, from the lower left of the picture [pixel]."""
+        unit = self._style.unit
         return _MARGIN * unit, (_FOOT / 2 + 0.9) * unit, _MARGIN * unit + self._length / self.pixel, _FOOT / 2 * unit
 
     def turn(self, axes: Floats) -> None:
-        """Turn all cameras."""
+        """Turn the camera of all panels to axes (3, 3): right, up, forward."""
         right, up, forward = axes
         focus = self._centre[0] * right + self._centre[1] * up
         for column in range(self._columns):
             self._plotter.subplot(0, column)
             camera = self._plotter.camera
             camera.parallel_projection = True
-            camera.parallel_scale = self.pixel * self._look.size[1] / 2
+            camera.parallel_scale = self.pixel * self._style.size[1] / 2
             camera.focal_point, camera.position = tuple(focus), tuple(focus - self._reach * forward)
             camera.up, camera.clipping_range = tuple(up), (self._reach / 1000, 2 * self._reach)
 
@@ -272,23 +295,31 @@ class Canvas:
         colours: NDArray[np.uint8],
         caption: Sequence[str] = (),
     ) -> None:
-        """Put meshes of `drawn` into a panel, links in colours (N, 3, 3), a title and lines above."""
+        """Show meshes and a caption in a panel.
+
+        Args:
+            column: Index of the panel.
+            frame: The frame.
+            meshes: Its meshes by `visible_meshes`.
+            colours: (N, 3, 3) sRGB colours of the links, uint8.
+            caption: Lines of the caption; the first is the title.
+        """
         with quiet_vtk():
             self._plotter.subplot(0, column)
             add_bodies(self._plotter, meshes, frame, colours)
-            unit, down = self._look.unit, self._look.size[1] - 2.0 * self._look.unit
+            unit, down = self._style.unit, self._style.size[1] - 2.0 * self._style.unit
             for number, text in enumerate(caption):
                 size = _TEXT if number else _TITLE
                 down -= 1.4 * size * unit
                 self._write(column, f"line {number}", text, (_MARGIN * unit, down), size, bold=not number)
 
     def add_patch(self, corners: Floats, colour: str) -> None:
-        """Add a flat see-through patch with corners (n, 3) [mm]."""
+        """Add a translucent polygon with corners (n, 3) [mm]."""
         patch = pv.PolyData.from_regular_faces(corners, [list(range(len(corners)))])
         self._plotter.add_mesh(patch, color=colour, opacity=0.25, lighting=False, reset_camera=False, render=False)
 
     def image(self) -> Image.Image:
-        """Return the picture as it stands."""
+        """Return the picture of all panels."""
         with quiet_vtk():
             self._plotter.render()
             image = Image.fromarray(self._plotter.screenshot(return_img=True)).reduce(_OVERSAMPLING)
@@ -299,10 +330,10 @@ class Canvas:
     def _write(
         self, column: int, name: str, text: str, at: tuple[float, float], size: float, *, bold: bool = False
     ) -> None:
-        """Write a line at a place from the lower left [pixel], smaller or cut where it has no room."""
-        (x, y), width = at, self._look.size[0]
+        """Write a line at a position from the lower left [pixel]; shrink or cut it if it is too long."""
+        (x, y), width = at, self._style.size[0]
         text = "".join(letter if letter.isprintable() else "?" for letter in text)
-        points, room = size * self._look.unit, (width - x) / _LETTER
+        points, room = size * self._style.unit, (width - x) / _LETTER
         points = min(points, max(room / max(len(text), 1), 0.6 * points))
         if len(text) * points > room:
             text = f"{text[: int(room / points) - 1]}…"
@@ -314,22 +345,22 @@ class Canvas:
         self._plotter.add_actor(line, name=name, reset_camera=False, render=False)
 
     def _add_colour_bar(self, scale: ColourScale, colours: Colormap) -> None:
-        unit, height = self._look.unit * _OVERSAMPLING, self._look.size[1]
+        unit, height = self._style.unit * _OVERSAMPLING, self._style.size[1]
         table = pv.LookupTable(colours, n_values=min(colours.N, 256), scalar_range=(scale.low, scale.high))
         table.annotations = dict(scale.labels)
         mapper = pv.DataSetMapper(pv.PolyData())
         mapper.lookup_table = table
         self._plotter.subplot(0, self._columns - 1)
         self._plotter.add_scalar_bar(
-            self._look.field.title, mapper=mapper, vertical=False, n_labels=0, color=figures.BLACK, render=False,
-            position_x=0.45, position_y=3.2 * self._look.unit / height, width=0.52,
-            height=5.6 * self._look.unit / height,
+            self._style.field.title, mapper=mapper, vertical=False, n_labels=0, color=figures.BLACK, render=False,
+            position_x=0.45, position_y=3.2 * self._style.unit / height, width=0.52,
+            height=5.6 * self._style.unit / height,
             title_font_size=round(_TEXT * unit), label_font_size=round(_TEXT * unit), use_opacity=False,
         )  # fmt: skip
 
 
 def round_length(most: float) -> float:
-    """Return the largest of 1, 2, 5, 10, … that is no longer than a length above 0, in its unit.
+    """Return the largest of the lengths …, 0.5, 1, 2, 5, 10, … that is at most `most`, which is above 0.
 
     Example:
         >>> round_length(37.0), round_length(0.6)
@@ -340,7 +371,7 @@ def round_length(most: float) -> float:
 
 
 def check_graphics() -> None:
-    """Reject a machine on which VTK would end the process by a segmentation fault.
+    """Check that VTK can draw on this machine; without a library it would end by a segmentation fault.
 
     Raises:
         RunError: There is neither a display nor a library to draw without one.
@@ -360,7 +391,7 @@ def check_graphics() -> None:
 
 @contextmanager
 def quiet_vtk() -> Iterator[None]:
-    """Keep VTK from warning, on standard error, that there is no display."""
+    """Suppress VTK's warning that there is no display."""
     before = vtkLogger.GetCurrentVerbosityCutoff()
     vtkLogger.SetStderrVerbosity(vtkLogger.VERBOSITY_ERROR)
     try:

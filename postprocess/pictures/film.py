@@ -1,4 +1,4 @@
-"""Films: which frames they show, how fast they play, and their files."""
+"""Choose the frames and the speed of films, and write films to files."""
 
 from __future__ import annotations
 
@@ -18,30 +18,30 @@ from dem.errors import InputError
 from postprocess.geometry.links import Floats
 
 KINDS = (".gif", ".webp", ".mp4")  #: Suffixes of films
-MOST = 150  #: Pictures of a film, unless a time between them is asked for
-RATE = 15.0  #: Pictures per second of a film [1/s], unless asked for
+MOST = 150  #: Largest number of pictures of a film by default
+RATE = 15.0  #: Default rate of a film [pictures/s]
 
-_TICKS = {".gif": 0.01, ".webp": 0.001}  # unit of the time that a picture is shown [s]
+_TICKS = {".gif": 0.01, ".webp": 0.001}  # resolution of the time for which a picture is shown [s]
 _BT709 = (*("-colorspace", "bt709"), *("-color_primaries", "bt709"), *("-color_trc", "bt709"))
-# 4:2:0 colours and the index in front, which browsers, phones and slides play.
+# Index in front, so that browsers start to play before they have read the whole file.
 _H264 = ("-crf", "18", "-movflags", "+faststart", "-vf", "scale=out_color_matrix=bt709", *_BT709)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Moments:
-    """Times at equal distances, so that a film plays at one speed."""
+class FilmTimes:
+    """Simulated times of the n pictures of a film, at equal intervals."""
 
-    times: Floats = field(repr=False)  #: (n,) simulated times [s]; each is shown by the recorded frame nearest to it
-    every: float  #: From one to the next [s]
-    rate: float  #: Pictures per second [1/s]
+    times: Floats = field(repr=False)  #: (n,) simulated times [s]; a picture shows the recorded frame nearest in time
+    every: float  #: Simulated time between two pictures [s]
+    rate: float  #: Pictures per second of playing time [1/s]
 
     @property
     def pace(self) -> str:
-        """Simulated time over playing time, in words."""
+        """Simulated time over playing time, as text: `0.5 × real time`."""
         return f"{float(f'{self.every * self.rate:.3g}'):g} × real time"
 
     @classmethod
-    def chosen(
+    def choose(
         cls,
         recorded: ArrayLike,
         *,
@@ -51,10 +51,18 @@ class Moments:
         rate: float = RATE,
         most: int = MOST,
     ) -> Self:
-        """Choose the moments of a film of frames at (m,) ascending times [s]; arguments as in `render_film`.
+        """Choose the times of a film's pictures.
+
+        Args:
+            recorded: (m,) times of the recorded frames [s], ascending.
+            start: Simulated time of the first picture [s]; that of the first frame if not given.
+            end: Simulated time at which the film ends [s]; that of the last frame if not given.
+            every: Simulated time between two pictures [s]; if not given, a multiple of the recorded interval.
+            rate: Pictures per second of playing time [1/s].
+            most: Largest number of pictures if `every` is not given.
 
         Raises:
-            InputError: Fewer than two moments, or times out of order or out of the run.
+            InputError: Fewer than two frames or pictures, or an argument out of its range.
         """
         recorded = np.asarray(recorded, dtype=np.float64)
         if most < 2:
@@ -82,13 +90,15 @@ class Moments:
         return cls(times=low + every * np.arange(steps + 1.0), every=every, rate=rate)
 
     def indices(self, recorded: Floats) -> list[int]:
-        """Return the frame nearest to each moment, of frames at (m,) times [s]."""
+        """Return the index of the frame nearest to each picture, by the times (m,) of the frames [s]."""
         nearest: list[int] = np.abs(recorded[None] - self.times[:, None]).argmin(axis=1).tolist()
         return nearest
 
 
 def durations(count: int, rate: float, unit: float) -> list[int]:
-    """Return how long each picture is shown, in whole units of time [s], right to half a unit in sum.
+    """Return the time for which each of `count` pictures is shown, in whole multiples of a unit [s].
+
+    The total time of the first k pictures deviates from k / rate by at most half a unit.
 
     Example:
         >>> durations(4, 15.0, 0.01)
@@ -98,10 +108,10 @@ def durations(count: int, rate: float, unit: float) -> list[int]:
 
 
 def check_film(path: Path, size: tuple[int, int]) -> None:
-    """Reject a film that cannot be written here, before anything is drawn.
+    """Check that a film of this size [pixel] can be written to a path.
 
     Raises:
-        InputError: A package is missing, or the size [pixel] does not suit.
+        InputError: The encoder of `.mp4` is missing, or the size is odd for `.mp4`.
     """
     if path.suffix != ".mp4":
         return
@@ -115,7 +125,7 @@ def check_film(path: Path, size: tuple[int, int]) -> None:
 
 
 def write_film(path: Path, images: Iterable[Image.Image], *, count: int, rate: float) -> None:
-    """Write a film of so many pictures of one size, one at a time, at a rate [1/s]."""
+    """Write a film of `count` pictures of equal size, at a rate [pictures/s]."""
     frames = iter(images)
     first = next(frames)
     if path.suffix == ".mp4":

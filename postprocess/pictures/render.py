@@ -1,4 +1,4 @@
-"""Pictures and films of runs, off-screen."""
+"""Draw pictures and films of runs, without a display."""
 
 from __future__ import annotations
 
@@ -20,20 +20,30 @@ from postprocess.geometry.links import Floats, plane_frames
 from postprocess.measures.entanglement import entanglement, has_plane, link_passages
 from postprocess.measures.packing import packing_of
 from postprocess.pictures import film
-from postprocess.pictures.canvas import MILLIMETRE, VIEWS, Canvas, Look, Shot, axes_from, drawn, extent, union
+from postprocess.pictures.canvas import (
+    MILLIMETRE,
+    VIEWS,
+    Canvas,
+    Style,
+    Subject,
+    axes_from,
+    extent,
+    union,
+    visible_meshes,
+)
 from postprocess.report import figures
 
 DEFINITION = "second-highest-com"
 """Definition of the packing fraction in captions, as in the first column of `smarticles measure`."""
 
 Limits = Span | Literal["run"] | None
-"""Ends of the scale of colours: given, of all frames of the runs, or of what is shown."""
+"""Ends of the colour scale: two values; "run": those of all frames of the runs; None: those of the drawn frames."""
 
 Track = Callable[[Iterable[Image.Image], int], Iterable[Image.Image]]
-"""Follows the pictures of a film, of which there are so many."""
+"""Shows the progress of a film: takes its pictures and their number, returns the pictures."""
 
 _OTHERS = "#c4ccd4"
-_ASKEW = np.radians([25.0, 20.0])  # how far the camera is turned from the normal, across and along the middle link
+_ASKEW = np.radians([25.0, 20.0])  # angles of the camera from the smarticle's normal, across and along the middle link
 
 
 def render_run(
@@ -50,27 +60,31 @@ def render_run(
     forces: bool = False,
     overwrite: bool = False,
 ) -> Path:
-    """Draw one frame of a run: real boxes of links, a container cut open in front, hooks and strings.
+    """Draw one frame of a run: boxes of the links, hooks, strings, and the container cut open in front.
 
-    A wall that is being lifted is where it is then; of one that was taken away its outline is left, faint.
+    A removed wall is drawn as a faint outline.
 
     Args:
-        directory: A run directory with at least one frame; the run need not be done.
-        compare: Further runs, drawn beside it at the same time, from the same distance and in the same colours.
+        directory: A run directory with at least one frame; the run may be unfinished.
+        compare: Further runs, drawn side by side at one time, with one scale and one colour scale.
         output: File to write, `.png`; `render.png` in the run directory if not given.
-        time: Simulated time [s], the nearest frame is taken; the last one that all runs have if not given.
-        color_by: Name of a field, or height, speed, id; None: crossings, and of motion in a plane, which has none, id.
-        limits: Ends of the scale of colours; those of this picture if not given.
-        smarticle: Number of a smarticle: only it and those that pass through its plane are drawn, seen through
-            its mouth.
+        time: Simulated time [s], of which the nearest frame is drawn; the last time common to all runs if not given.
+        color_by: Name or short name of a field; None: crossings, for planar runs smarticle_id.
+        limits: Ends of the colour scale; those of this picture if not given.
+        smarticle: Number of a smarticle, which is drawn alone with the smarticles that pass through its plane; the
+            camera points into its mouth.
         size: Width and height of the picture of one run [pixel].
-        view: Key of `VIEWS`; None: from the front, of motion in a plane from above.
-        forces: Whether lines of force are drawn, in front of pale smarticles; their thickness is in proportion to
-            the normal force.
+        view: Key of `VIEWS`; None: "front", for planar runs "top".
+        forces: Whether to draw contact forces as lines, with a thickness proportional to the normal force, in front of
+            pale smarticles.
+        overwrite: Whether to replace an existing file.
+
+    Returns:
+        Path of the written file.
 
     Raises:
-        InputError: No frame, unknown field or view, a time before the first or after the last
-            frame, a bad size, bad limits, no such smarticle, or an output that exists.
+        InputError: No frame, an unknown field or view, a time outside the recorded frames, a bad size, bad limits, an
+            unknown smarticle, or an output that exists.
         RunError: This machine lacks the libraries to draw without a display.
 
     Example:
@@ -78,20 +92,19 @@ def render_run(
         'render.png'
     """
     output = _checked_output(directory, output, "render.png", (".png",))
-    shots = [Shot(path, forces=forces) for path in (directory, *compare)]
+    subjects = [Subject(path, forces=forces) for path in (directory, *compare)]
     if time is None and compare:
-        time = float(common_times(shots)[-1])
-    indices = [[len(shot.frames) - 1 if time is None else shot.frames.nearest(time)] for shot in shots]
-    look = Look.of([shot.run for shot in shots], color_by=color_by, size=size, view=view)
-    # Before an hour of drawing, not after it; and after all that is wrong with what was asked for.
+        time = float(common_times(subjects)[-1])
+    indices = [[len(subject.frames) - 1 if time is None else subject.frames.nearest(time)] for subject in subjects]
+    style = Style.of([subject.run for subject in subjects], color_by=color_by, size=size, view=view)
     figures.reject_existing(output, overwrite=overwrite)
     if smarticle is not None:
         if compare or color_by is not None or view is not None or forces:
-            msg = f"smarticle {smarticle}: is drawn alone, in colours and from a side of its own; leave out the others"
+            msg = f"smarticle {smarticle}: is drawn alone, with its own colours and view; leave out the other options"
             raise InputError(msg)
-        image = _focused(shots[0], indices[0][0], smarticle, look)
+        image = _focused(subjects[0], indices[0][0], smarticle, style)
     else:
-        image = next(pictures(shots, indices, look, limits))
+        image = next(pictures(subjects, indices, style, limits))
     with figures.whole_file(output, overwrite=overwrite) as temporary:
         image.save(temporary)
     return output
@@ -115,96 +128,116 @@ def render_film(
     track: Track | None = None,
     overwrite: bool = False,
 ) -> Path:
-    """Draw a film of a run with one camera and one scale of colours throughout.
+    """Draw a film of a run with one camera and one colour scale.
 
-    Its pictures are at equal distances in simulated time, each the nearest recorded frame, so that it plays at one
-    speed, which its caption states.
-
-    Arguments without a description are those of `render_run`.
+    The pictures are at equal intervals of simulated time; each shows the nearest recorded frame. The caption states the
+    speed.
 
     Args:
-        directory: A run directory with at least two frames.
-        output: File to write: `.gif` or `.webp`, or `.mp4`, which needs the package imageio-ffmpeg;
-            `film.gif` in the run directory if not given.
-        compare: Further runs; the film shows the times that all have come to.
-        limits: Ends of the scale of colours; those of the film if not given.
-        size: Width and height of the picture of one run [pixel]; for `.mp4` even numbers.
-        start: Simulated time at which it begins [s]; that of the first frame if not given.
-        end: Simulated time at which it ends [s]; that of the last frame if not given.
-        every: Simulated time from one picture to the next [s]; if not given, that between frames.
-        most_frames: Unless `every` is given, longer runs are thinned evenly to so many pictures.
-        track: Follows the drawing, see `Track`.
+        directory: A run directory with at least two frames; the run may be unfinished.
+        output: File to write: `.gif` or `.webp`, or `.mp4`, which needs the package imageio-ffmpeg; `film.gif` in the
+            run directory if not given.
+        compare: Further runs, drawn side by side; the film ends at the last time common to all runs.
+        color_by: Name or short name of a field; None: crossings, for planar runs smarticle_id.
+        limits: Ends of the colour scale; those of the film if not given.
+        size: Width and height of the picture of one run [pixel]; even numbers for `.mp4`.
+        view: Key of `VIEWS`; None: "front", for planar runs "top".
+        frames_per_second: Pictures per second of playing time [1/s].
+        start: Simulated time at which the film begins [s]; that of the first frame if not given.
+        end: Simulated time at which the film ends [s]; that of the last frame if not given.
+        every: Simulated time between two pictures [s]; if not given, a multiple of the recorded interval.
+        most_frames: Largest number of pictures if `every` is not given.
+        forces: Whether to draw contact forces, see `render_run`.
+        track: Shows the progress, see `Track`.
+        overwrite: Whether to replace an existing file.
+
+    Returns:
+        Path of the written file.
 
     Raises:
-        InputError: Fewer than two frames, a kind of file that cannot be written here, an output
-            that exists, times that make no film, or as in `render_run`.
+        InputError: Fewer than two frames, an output that exists or cannot be written, or an argument out of its range.
+        RunError: This machine lacks the libraries to draw without a display.
     """
     output = _checked_output(directory, output, "film.gif", film.KINDS)
-    shots = [Shot(path, forces=forces) for path in (directory, *compare)]
-    look = Look.of([shot.run for shot in shots], color_by=color_by, size=size, view=view)
-    film.check_film(output, (size[0] * len(shots), size[1]))
-    moments = film.Moments.chosen(
-        common_times(shots), start=start, end=end, every=every, rate=frames_per_second, most=most_frames
+    subjects = [Subject(path, forces=forces) for path in (directory, *compare)]
+    style = Style.of([subject.run for subject in subjects], color_by=color_by, size=size, view=view)
+    film.check_film(output, (size[0] * len(subjects), size[1]))
+    film_times = film.FilmTimes.choose(
+        common_times(subjects), start=start, end=end, every=every, rate=frames_per_second, most=most_frames
     )
-    indices = [moments.indices(shot.frames.times) for shot in shots]
+    indices = [film_times.indices(subject.frames.times) for subject in subjects]
     figures.reject_existing(output, overwrite=overwrite)
-    images, count = pictures(shots, indices, look, limits, quick=True, pace=moments.pace), len(moments.times)
+    images, count = pictures(subjects, indices, style, limits, quick=True, pace=film_times.pace), len(film_times.times)
     with figures.whole_file(output, overwrite=overwrite) as temporary:
-        film.write_film(temporary, track(images, count) if track else images, count=count, rate=moments.rate)
+        film.write_film(temporary, track(images, count) if track else images, count=count, rate=film_times.rate)
     return output
 
 
 def turntable(directory: Path | str, *, views: int = 24, size: int = 560) -> list[Image.Image]:
-    """Draw the last frame of a run from all around, at equal angles from the front.
+    """Draw the last frame of a run from `views` directions all around, at equal angles.
+
+    Args:
+        directory: A run directory with at least one frame.
+        views: Number of pictures.
+        size: Width and height of a picture [pixel].
 
     Raises:
-        InputError: No frame, or a damaged one.
+        InputError: There is no frame, or it is damaged.
         RunError: This machine lacks the libraries to draw without a display.
     """
-    shot = Shot(directory)
-    index, frame = len(shot.frames) - 1, shot.frames[-1]
-    shot.bodies.hold([frame])
-    look = Look.of([shot.run], color_by=None, size=(size, size), view=None)
+    subject = Subject(directory)
+    index, frame = len(subject.frames) - 1, subject.frames[-1]
+    subject.bodies.hold([frame])
+    style = Style.of([subject.run], color_by=None, size=(size, size), view=None)
     around = [axes_from(VIEWS["front"][0] + 360.0 * number / views, 26.0) for number in range(views)]
-    (values,) = shot.values([index], look)
-    colours = ColourScale.of(look.field, span([values])).painted(values)
+    (values,) = subject.values([index], style)
+    colours = ColourScale.of(style.field, span([values])).painted(values)
     images = []
-    in_view = union([shot.extent([index], axes) for axes in around])
-    with Canvas(replace(look, axes=around[0]), in_view, shot.run, quick=True) as canvas:
+    in_view = union([subject.extent([index], axes) for axes in around])
+    with Canvas(replace(style, axes=around[0]), in_view, subject.run, quick=True) as canvas:
         for axes in around:
             canvas.turn(axes)
-            canvas.show(0, frame, drawn(shot.bodies, frame, axes[2]), colours)
-            images.append(look.panel(canvas.image()))
+            canvas.show(0, frame, visible_meshes(subject.bodies, frame, axes[2]), colours)
+            images.append(style.panel(canvas.image()))
     return images
 
 
 def pictures(
-    shots: Sequence[Shot],
+    subjects: Sequence[Subject],
     indices: Sequence[Sequence[int]],
-    look: Look,
+    style: Style,
     limits: Limits = None,
     *,
     quick: bool = False,
     pace: str = "",
 ) -> Iterator[Image.Image]:
-    """Draw runs side by side under one camera, in one scale of colours, frame after frame by its index."""
-    titles = titles_of([shot.run for shot in shots])
-    pairs = list(zip(shots, indices, strict=True))
-    for shot, shown in pairs:
-        shot.bodies.hold(shot.frames[i] for i in shown)
-    values = [dict(zip(shown, shot.values(shown, look), strict=True)) for shot, shown in pairs]
-    scale = ColourScale.of(look.field, _span(shots, values, look, limits))
+    """Yield pictures of runs side by side, with one camera and one colour scale.
+
+    Args:
+        subjects: The runs.
+        indices: Indices of the frames of each run, one per picture.
+        style: Style of the pictures.
+        limits: Ends of the colour scale.
+        quick: Whether to leave out the shading of corners.
+        pace: Speed of a film, for the caption.
+    """
+    titles = titles_of([subject.run for subject in subjects])
+    pairs = list(zip(subjects, indices, strict=True))
+    for subject, shown in pairs:
+        subject.bodies.hold(subject.frames[i] for i in shown)
+    values = [dict(zip(shown, subject.values(shown, style), strict=True)) for subject, shown in pairs]
+    scale = ColourScale.of(style.field, _span(subjects, values, style, limits))
     force = None
-    if "forces" in shots[0].bodies.kinds:
-        # A millinewton where no contact carries a force.
-        force = max(_largest_force(shot.frames[i]) for shot, shown in pairs for i in shown) or 1e-3
-    in_view = union([shot.extent(shown, look.axes) for shot, shown in pairs])
-    with Canvas(look, in_view, shots[0].run, columns=len(shots), scale=scale, quick=quick) as canvas:
+    if "forces" in subjects[0].bodies.kinds:
+        # The scale of the lines must be above 0 if no contact carries a force.
+        force = max(_largest_force(subject.frames[i]) for subject, shown in pairs for i in shown) or 1e-3
+    in_view = union([subject.extent(shown, style.axes) for subject, shown in pairs])
+    with Canvas(style, in_view, subjects[0].run, columns=len(subjects), scale=scale, quick=quick) as canvas:
         for step in zip(*indices, strict=True):
-            for column, (shot, index) in enumerate(zip(shots, step, strict=True)):
-                frame = shot.frames[index]
-                meshes = drawn(shot.bodies, frame, look.axes[2], largest=force)
-                caption = caption_of(frame, shot.run, title=titles[column], pace=pace, force=force)
+            for column, (subject, index) in enumerate(zip(subjects, step, strict=True)):
+                frame = subject.frames[index]
+                meshes = visible_meshes(subject.bodies, frame, style.axes[2], largest=force)
+                caption = caption_of(frame, subject.run, title=titles[column], pace=pace, force=force)
                 canvas.show(column, frame, meshes, scale.painted(values[column][index]), caption)
             yield canvas.image()
 
@@ -213,31 +246,33 @@ def _largest_force(frame: Frame) -> float:
     return float(read_forces(frame).contacts.normal.max(initial=0.0))
 
 
-def _span(shots: Sequence[Shot], values: Sequence[dict[int, Floats]], look: Look, limits: Limits) -> Span:
+def _span(subjects: Sequence[Subject], values: Sequence[dict[int, Floats]], style: Style, limits: Limits) -> Span:
     if isinstance(limits, tuple):
         low, high = limits
         if not (math.isfinite(low) and math.isfinite(high) and low < high):
             raise InputError(f"limits of the colours must be two finite numbers in order: got {low:g} and {high:g}")
-        factor = look.field.shown[0] if look.field.shown else 1.0
+        factor = style.field.shown[0] if style.field.shown else 1.0
         return low / factor, high / factor
     if limits == "run":
-        return span(each for shot in shots for each in shot.values(range(len(shot.frames)), look))
+        return span(each for subject in subjects for each in subject.values(range(len(subject.frames)), style))
     return span(each for of_run in values for each in of_run.values())
 
 
-def common_times(shots: Sequence[Shot]) -> Floats:
-    """Return times of the frames that all runs have come to: those of the one with the fewest [s].
+def common_times(subjects: Sequence[Subject]) -> Floats:
+    """Return the times [s] of one run's frames in the interval common to all runs.
+
+    This run has the fewest frames in the interval.
 
     Raises:
-        InputError: There is no time at which all have frames.
+        InputError: The runs have no common interval.
     """
-    low = max(float(shot.frames.times[0]) for shot in shots)
-    high = min(float(shot.frames.times[-1]) for shot in shots)
+    low = max(float(subject.frames.times[0]) for subject in subjects)
+    high = min(float(subject.frames.times[-1]) for subject in subjects)
     if low > high:
-        spans = ", ".join(f"{shot.run.path} {shot.frames.times[0]:g} to {shot.frames.times[-1]:g} s" for shot in shots)
+        spans = ", ".join(f"{one.run.path} {one.frames.times[0]:g} to {one.frames.times[-1]:g} s" for one in subjects)
         raise InputError(f"the runs have no time in common: {spans}; compare runs that overlap in time")
-    inside = [shot.frames.times[(shot.frames.times >= low) & (shot.frames.times <= high)] for shot in shots]
-    return min(inside, key=len)
+    recorded = [subject.frames.times for subject in subjects]
+    return min((times[(times >= low) & (times <= high)] for times in recorded), key=len)
 
 
 def _checked_output(directory: Path | str, output: Path | str | None, default: str, kinds: tuple[str, ...]) -> Path:
@@ -247,13 +282,12 @@ def _checked_output(directory: Path | str, output: Path | str | None, default: s
     return path
 
 
-def _focused(shot: Shot, index: int, smarticle: int, look: Look) -> Image.Image:
-    """Draw one smarticle and those that pass through its plane.
+def _focused(subject: Subject, index: int, smarticle: int, style: Style) -> Image.Image:
+    """Draw one smarticle and all that pass through its plane, seen obliquely through its mouth.
 
-    It is orange, the plane through its four vertices faintly so; links that pass through are blue, other links of
-    theirs grey. The camera points into its mouth, somewhat askew.
+    The smarticle and its plane are orange, links that pass through the plane blue, other links grey.
     """
-    frame, run = shot.frames[index], shot.run
+    frame, run = subject.frames[index], subject.run
     if run.manifest.planar:
         msg = f"smarticle {smarticle}: in a plane no link passes through another smarticle; draw the whole run"
         raise InputError(msg)
@@ -279,24 +313,27 @@ def _focused(shot: Shot, index: int, smarticle: int, look: Look) -> Image.Image:
     colours[shown == own] = Paint(figures.ORANGE).rgb
     colours[np.searchsorted(shown, passages.j[through]), passages.link[through]] = Paint(figures.BLUE).rgb
     links, others = int(through.sum()), len(shown) - 1
-    said = "straight: it has no plane"
+    crossed = "straight: it has no plane"
     if has_plane(frame.vertices[own][None])[0]:
-        said = f"{links} link{'s' * (links != 1)} of {others} other{'s' * (others != 1)} through its plane"
+        crossed = f"{links} link{'s' * (links != 1)} of {others} other{'s' * (others != 1)} through its plane"
     caption = (
         f"{run.manifest.name}: smarticle {smarticle}",
-        f"{said}   t = {frame.time:.3f} s ({run.phases[frame.phase].type})",
+        f"{crossed}   t = {frame.time:.3f} s ({run.phases[frame.phase].type})",
         "orange: the smarticle, faintly its plane; blue: links through it",
     )
     axes = _through_the_mouth(frame.vertices[own])
-    boxes = {"smarticles": drawn(shot.bodies, part, axes[2])["smarticles"]}
-    with Canvas(replace(look, axes=axes), extent(boxes.values(), axes), run) as canvas:
+    boxes = {"smarticles": visible_meshes(subject.bodies, part, axes[2])["smarticles"]}
+    with Canvas(replace(style, axes=axes), extent(boxes.values(), axes), run) as canvas:
         canvas.add_patch((frame.vertices[own] - [0.0, 0.0, frame.floor_z]) * MILLIMETRE, figures.ORANGE)
         canvas.show(0, part, boxes, colours, caption)
         return canvas.image()
 
 
 def _through_the_mouth(vertices: Floats) -> Floats:
-    """Return axes (3, 3): right, along the middle link, up, towards the mouth, and forward; askew."""
+    """Return camera axes (3, 3), right, up and forward, for an oblique view through a smarticle's mouth.
+
+    Before the camera is turned by `_ASKEW`, right is along the middle link, and up points towards the mouth.
+    """
     normal = plane_frames(vertices[None])[0, 2]
     right = vertices[2] - vertices[1]
     right -= (right @ normal) * normal
@@ -314,12 +351,12 @@ def _through_the_mouth(vertices: Floats) -> Floats:
 
 
 def titles_of(runs: Sequence[Run]) -> list[str]:
-    """Return the headings of runs beside each other: names, with folders where these are alike."""
+    """Return the titles of runs side by side: their names, followed by folders if names are equal."""
     names = [run.manifest.name for run in runs]
     if len(set(names)) == len(names):
         return names
     folders = [run.path.resolve() for run in runs]
-    # As much of the path as they differ in: runs of sweeps differ in their last part, others may not.
+    # The shortest ends of the paths that differ.
     depth = 1
     longest = max(len(folder.parts) for folder in folders)
     while len({folder.parts[-depth:] for folder in folders}) < len(set(folders)) and depth < longest:
@@ -330,7 +367,12 @@ def titles_of(runs: Sequence[Run]) -> list[str]:
 def caption_of(frame: Frame, run: Run, *, title: str, pace: str = "", force: float | None = None) -> list[str]:
     """Return the lines of the caption of a frame.
 
-    The pace of a film is how fast it plays; the force is that of the thickest line [N], None where none are drawn.
+    Args:
+        frame: The frame.
+        run: Its run.
+        title: First line.
+        pace: Speed of a film.
+        force: Normal force of the thickest line [N]; None: no forces are drawn.
     """
     count = f"{run.manifest.count}" if frame.count == run.manifest.count else f"{frame.count} of {run.manifest.count}"
     phase = run.phases[frame.phase].type if frame.phase < len(run.phases) else "?"
@@ -338,7 +380,7 @@ def caption_of(frame: Frame, run: Run, *, title: str, pace: str = "", force: flo
     lines = [f"l/w = {run.manifest.aspect_ratio:g}   N = {count}   {when}"]
     if pace:
         lines[0] += f"   {pace}"
-    if not run.manifest.planar:  # neither packing nor crossings have a meaning there
+    if not run.manifest.planar:  # packing and crossings are undefined in a plane
         mean = entanglement(frame.vertices).mean
         passed = f"⟨N⟩ = {mean:.2f}" if math.isfinite(mean) else "no ⟨N⟩: all are straight"
         lines.append(f"{packing_text(frame, run)}   {passed}")
@@ -348,14 +390,14 @@ def caption_of(frame: Frame, run: Run, *, title: str, pace: str = "", force: flo
 
 
 def packing_text(frame: Frame, run: Run) -> str:
-    """Return φ as `smarticles measure --frames` gives it for this frame, or why it does not."""
+    """Return φ of a frame as text, or the reason why it is undefined."""
     value = packing_of(frame, run, definition=DEFINITION)
     if math.isfinite(value):
         return f"φ = {value:.4f} ({DEFINITION})"
     if run.manifest.container_tiers > 1:
         return f"no φ: a mould of {run.manifest.container_tiers} tiers"
     if not run.manifest.walled(frame.phase):
-        return "no φ: the wall is gone"
+        return "no φ: no wall"
     if frame.count < 2:
         return "no φ: fewer than 2 smarticles"
     return "no φ: the pile has no height"

@@ -1,4 +1,4 @@
-"""Pictures of several runs at several times in one figure: a row for each run, all in one scale."""
+"""Draw pictures of several runs at several times in one figure, with one row per run and one scale."""
 
 from __future__ import annotations
 
@@ -9,49 +9,58 @@ from pathlib import Path
 import numpy as np
 
 from postprocess.bodies.colours import ColourScale
-from postprocess.pictures.canvas import Canvas, Look, Shot, drawn, union
+from postprocess.pictures.canvas import Canvas, Style, Subject, union, visible_meshes
 from postprocess.report import figures
 
-_SIZE = (400, 400)  # pixel, of a picture with its caption, which is left out
+_SIZE = (400, 400)  # of a picture with room for a caption, which is cut off [pixel]
 
 
 @dataclass(frozen=True, kw_only=True)
 class Row:
-    """Pictures of one run."""
+    """One row of pictures, all of one run."""
 
-    directory: Path  #: The run
-    label: str  #: What is written beside them
-    times: tuple[float, ...]  #: Simulated times [s]; of each the nearest frame is drawn
+    directory: Path  #: Run directory
+    label: str  #: Text beside the row
+    times: tuple[float, ...]  #: Simulated times of the pictures [s]; each shows the nearest frame
 
 
 def draw_strip(rows: Sequence[Row], output: Path, *, columns: Sequence[str], footer: Sequence[str]) -> Path:
-    """Draw a picture of each run at each of its times, and write them as one figure, columns named above.
+    """Draw a row of pictures for each run, and write them as one figure.
 
     A smarticle has one colour in all pictures of a run.
+
+    Args:
+        rows: The rows, with one time per column.
+        output: File to write, `.png`.
+        columns: Titles of the columns.
+        footer: Lines below the pictures.
+
+    Returns:
+        Path of the written file.
 
     Raises:
         InputError: A run has no frames.
         RunError: This machine lacks the libraries to draw without a display.
     """
-    shots = [Shot(row.directory) for row in rows]
-    look = Look.of([shot.run for shot in shots[:1]], color_by="id", size=_SIZE, view="front")
+    subjects = [Subject(row.directory) for row in rows]
+    style = Style.of([subject.run for subject in subjects[:1]], color_by="id", size=_SIZE, view="front")
     shown = [
-        [int(np.argmin(np.abs(shot.frames.times - time))) for time in row.times]
-        for shot, row in zip(shots, rows, strict=True)
+        [int(np.argmin(np.abs(subject.frames.times - time))) for time in row.times]
+        for subject, row in zip(subjects, rows, strict=True)
     ]
-    for shot, indices in zip(shots, shown, strict=True):
-        shot.bodies.hold(shot.frames[i] for i in indices)
-    extent = union([shot.extent(indices, look.axes) for shot, indices in zip(shots, shown, strict=True)])
-    scale, pictures = ColourScale.of(look.field, (0.0, 1.0)), []
-    for shot, indices in zip(shots, shown, strict=True):
-        with Canvas(look, extent, shot.run) as canvas:
-            for index, values in zip(indices, shot.values(indices, look), strict=True):
-                frame = shot.frames[index]
-                canvas.show(0, frame, drawn(shot.bodies, frame, look.axes[2]), scale.painted(values))
-                pictures.append(np.asarray(look.panel(canvas.image())))
+    for subject, indices in zip(subjects, shown, strict=True):
+        subject.bodies.hold(subject.frames[i] for i in indices)
+    extent = union([subject.extent(indices, style.axes) for subject, indices in zip(subjects, shown, strict=True)])
+    scale, pictures = ColourScale.of(style.field, (0.0, 1.0)), []
+    for subject, indices in zip(subjects, shown, strict=True):
+        with Canvas(style, extent, subject.run) as canvas:
+            for index, values in zip(indices, subject.values(indices, style), strict=True):
+                frame = subject.frames[index]
+                canvas.show(0, frame, visible_meshes(subject.bodies, frame, style.axes[2]), scale.painted(values))
+                pictures.append(np.asarray(style.panel(canvas.image())))
     inked = np.flatnonzero((np.array(pictures) < 255).any(axis=(0, 2, 3)))
     part = slice(inked[0], inked[-1] + 1)
-    height, width = inked[-1] + 1 - inked[0], look.pixel(extent) * _SIZE[0]
+    height, width = inked[-1] + 1 - inked[0], style.pixel(extent) * _SIZE[0]
     with figures.style():
         wide = 2 * figures.COLUMN_WIDTH
         figure = figures.blank_figure(wide + 0.3, wide * len(rows) * height / (len(columns) * _SIZE[0]))

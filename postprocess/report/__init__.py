@@ -1,1 +1,1 @@
-"""Figures, tables and texts on disk."""
+"""Write figures and tables to files."""

@@ -1,6 +1,6 @@
-"""The style of every figure: size, colours, footer, limits that hide nothing, whole files.
+"""Make figures with a common style, and write them to files.
 
-A figure is drawn inside `style()`, gets its provenance from `add_footer` and is written by `save`.
+A figure is drawn inside `style()`; `add_footer` adds its provenance, and `save` writes the files.
 """
 
 from __future__ import annotations
@@ -18,8 +18,7 @@ from dem.errors import InputError, RunError
 from dem.record.files import whole
 
 with warnings.catch_warnings():
-    # The distribution's mpl_toolkits shadows ours where the environment sees system packages; no
-    # figure here is three-dimensional.
+    # A system-wide mpl_toolkits may hide that of the environment; no figure here is three-dimensional.
     warnings.filterwarnings("ignore", message="Unable to import Axes3D")
     import matplotlib.figure
     import matplotlib.style
@@ -33,7 +32,7 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 COLUMN_WIDTH = 3.5  #: Width of a journal column [inch]
-RESOLUTION = 300  #: Of bitmaps [dots per inch]
+RESOLUTION = 300  #: Resolution of bitmaps [dots per inch]
 
 BLACK = "#1a1a1a"
 BLUE = "#0072b2"
@@ -41,7 +40,7 @@ SKY = "#56b4e9"
 ORANGE = "#d55e00"
 GREEN = "#009e73"
 GREY = "#6e6e6e"
-"""Okabe and Ito's colours: distinct with every common colour blindness, and in grey print."""
+"""Okabe and Ito's colours, distinct with common colour blindness and in grey print."""
 
 _STYLE: dict[Any, Any] = {
     "axes.edgecolor": BLACK,
@@ -73,38 +72,38 @@ _STYLE: dict[Any, Any] = {
 }
 
 _FOOTER_SIZE = 4.6
-_FOOTER_LINE = 0.082  # inch per line of footer
-_FOOTER_MARGIN = 0.06  # inch above and below it together
-_FOOTER_COLUMNS = 97  # characters of that size across one column width
+_FOOTER_LINE = 0.082  # height of a line of the footer [inch]
+_FOOTER_MARGIN = 0.06  # space above and below the footer together [inch]
+_FOOTER_COLUMNS = 97  # characters of the footer per `COLUMN_WIDTH`
 
-FOOTER_SHARE = 0.2  #: The most of a figure's height that its footer takes [-]
+FOOTER_SHARE = 0.2  #: Largest fraction of a figure's height that its footer takes [-]
 
 
 @contextmanager
 def style() -> Iterator[None]:
-    """Set Matplotlib's settings for our figures, and restore them afterwards."""
+    """Set Matplotlib's parameters for figures, and restore them afterwards."""
     with rc_context(_STYLE):
         yield
 
 
 def new_figure(*, width: float = COLUMN_WIDTH, height: float = 2.6) -> tuple[Figure, Axes]:
-    """Make a figure with one pair of axes; the height [inch] is without the footer."""
+    """Make a figure with one pair of axes, of a width and a height without the footer [inch]."""
     figure = blank_figure(width, height)
     return figure, figure.add_subplot()
 
 
 def blank_figure(width: float, height: float) -> Figure:
-    """Make a figure without axes, of a size [inch], drawn by Agg whatever the machine's display."""
+    """Make a figure without axes, of a width and height [inch], which needs no display."""
     figure = matplotlib.figure.Figure(figsize=(width, height), dpi=RESOLUTION, facecolor="white")
     FigureCanvasAgg(figure)
     return figure
 
 
 def add_footer(figure: Figure, lines: Sequence[str]) -> None:
-    """Put the provenance below a figure drawn completely, which grows by the height of the text.
+    """Add a footer with the provenance to a finished figure, which grows by the height of the text.
 
-    The footer takes `FOOTER_SHARE` of the figure at most: of what is longer the last statement stays, which says where
-    the rest is to be read, and the others are cut at "…".
+    The footer takes at most `FOOTER_SHARE` of the figure. A longer text is cut with "…" before its last statement,
+    which names the file with the full text.
     """
     width, height = figure.get_size_inches()
     text = _fitting(lines, int(_FOOTER_COLUMNS * width / COLUMN_WIDTH), _most_lines(height))
@@ -119,13 +118,13 @@ def add_footer(figure: Figure, lines: Sequence[str]) -> None:
 
 
 def _most_lines(height: float) -> int:
-    """Return how many lines of footer a figure of some height [inch] bears, one at least."""
+    """Return the number of lines that a footer may have, at least one, by the figure's height [inch]."""
     room = height * FOOTER_SHARE / (1 - FOOTER_SHARE)
     return max(int((room - _FOOTER_MARGIN) / _FOOTER_LINE), 1)
 
 
 def _fitting(lines: Sequence[str], columns: int, most: int) -> list[str]:
-    """Break statements at a number of columns, and cut all but the last beyond `most` lines."""
+    """Wrap statements at a number of columns; cut them to `most` lines, but keep the last statement."""
     broken = [textwrap.wrap(line, columns, break_on_hyphens=False) or [""] for line in lines]
     text = [part for parts in broken for part in parts]
     if len(text) <= most:
@@ -138,9 +137,12 @@ def _fitting(lines: Sequence[str], columns: int, most: int) -> list[str]:
 
 
 def save(figure: Figure, path: Path, *, formats: Sequence[str] = ("png", "svg", "pdf")) -> list[Path]:
-    """Write a figure in several formats, each beside and then renamed; the path has no suffix.
+    """Write a figure to one file per format, whose name is the path with the format as suffix.
 
-    The files hold no date: one figure always gives the same bytes.
+    The files contain no date, so that equal figures have equal bytes.
+
+    Returns:
+        Paths of the written files.
     """
     dates: dict[str, dict[str, None]] = {"svg": {"Date": None}, "pdf": {"CreationDate": None, "ModDate": None}}
     written = []
@@ -154,7 +156,7 @@ def save(figure: Figure, path: Path, *, formats: Sequence[str] = ("png", "svg", 
 
 @contextmanager
 def whole_file(path: Path, *, overwrite: bool = True) -> Iterator[Path]:
-    """Give a temporary path beside `path`, renamed to it when the block ends well.
+    """Yield a temporary path, and rename this file to `path` when the block ends without an error.
 
     Raises:
         InputError: The file exists and must not be replaced, or its folder does not exist.
@@ -166,13 +168,13 @@ def whole_file(path: Path, *, overwrite: bool = True) -> Iterator[Path]:
     try:
         with whole(path, shared=True) as temporary:
             yield temporary
-    except OSError as error:  # which names the temporary file, or none
+    except OSError as error:  # whose text may name the temporary file
         msg = f"{path}: cannot be written ({error.strerror or error}); free space or choose another output"
         raise RunError(msg) from error
 
 
 def reject_existing(path: Path, *, overwrite: bool) -> None:
-    """Reject an output file that exists already.
+    """Check that an output does not exist, unless it may be replaced.
 
     Raises:
         InputError: the file exists and `overwrite` is false.
@@ -183,25 +185,27 @@ def reject_existing(path: Path, *, overwrite: bool) -> None:
 
 
 def sequence(colours: int, *, last: float = 1.0) -> list[str]:
-    """Return hexadecimal colours, dark to light: steps of viridis, lightened so that shading shows.
+    """Return hexadecimal colours of viridis from dark to light, brightened so that shading is visible.
 
-    The last one has the place `last` in the map, up to 1.
+    Args:
+        colours: Number of colours.
+        last: Position of the last colour in the map, up to 1.
     """
     steps = [0.16 + (last - 0.16) * i / max(colours - 1, 1) for i in range(colours)]
     plain = np.array([matplotlib.colormaps["viridis"](step)[:3] for step in steps])
     return [to_hex(colour) for colour in 1 - 0.86 * (1 - plain)]
 
 
-_MARGIN = 0.03  # of the axis, beyond what would be cut: what ends at the frame looks cut
+_MARGIN = 0.03  # space between the data and a widened limit, over the length of the axis
 
 
 def hold_everything(figure: Figure) -> list[str]:
-    """Widen limits that cut what was drawn, of a figure drawn completely but for its footer.
+    """Widen the limits of axes that would cut lines, error bars or bands; call this before `add_footer`.
 
-    On a logarithmic axis nothing at or below 0 has a place: bars that reach there end at the axis, which is stated.
+    A logarithmic axis cannot show values at or below 0: error bars that reach there are cut.
 
     Returns:
-        What could not be shown whole, one statement each, for the footer.
+        Statements for the footer about error bars that are cut.
     """
     cut = 0
     for axes in figure.axes:
@@ -214,7 +218,7 @@ def hold_everything(figure: Figure) -> list[str]:
 
 
 def _hold(axes: Axes, place: int, *, log: bool) -> None:
-    """Widen one axis, x (0) or y (1)."""
+    """Widen the limits of one axis, 0 for x or 1 for y."""
     values = np.concatenate([np.empty(0), *(points[:, place] for points in _drawn(axes))])
     values = values[np.isfinite(values) & ((values > 0) if log else True)]
     if not len(values):
@@ -231,9 +235,9 @@ def _hold(axes: Axes, place: int, *, log: bool) -> None:
 
 
 def _drawn(axes: Axes) -> list[NDArray[np.float64]]:
-    """Return points (n, 2) of lines, error bars and bands that stand in coordinates of the data.
+    """Return points (n, 2) of all lines, error bars and bands in data coordinates.
 
-    Not `Axes.dataLim`: of error bars it knows the corners of them all together, not the least that is above 0.
+    `Axes.dataLim` does not suffice: it lacks the least end above 0 of error bars.
     """
     lines = [line for line in axes.lines if line.get_transform() == axes.transData]
     bands = [band for band in axes.collections if isinstance(band, FillBetweenPolyCollection)]
@@ -245,7 +249,7 @@ def _drawn(axes: Axes) -> list[NDArray[np.float64]]:
 
 
 def _bars(axes: Axes) -> list[NDArray[np.float64]]:
-    """Return ends (n, 2) of error bars."""
+    """Return the two ends (2, 2) of each error bar in data coordinates."""
     return [
         np.asarray(ends, dtype=np.float64)
         for bars in axes.collections

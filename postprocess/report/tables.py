@@ -1,4 +1,4 @@
-"""Tables on disk, whole or absent, and as lines of Markdown."""
+"""Write tables to CSV files, and format tables as Markdown."""
 
 from __future__ import annotations
 
@@ -12,11 +12,14 @@ from dem.record.files import whole
 
 
 def write_table(table: pd.DataFrame, path: Path | str, *, overwrite: bool = False) -> Path:
-    """Write a table as CSV beside its place and rename it, so that it is whole or absent.
+    """Write a table as CSV to a temporary file and rename it, so that the file is never incomplete.
+
+    Returns:
+        The path.
 
     Raises:
-        InputError: The file exists already, its folder does not, or it is no `.csv`.
-        RunError: The disk is full, or the like.
+        InputError: The path does not end in `.csv`, the file exists, or its folder is missing or read-only.
+        RunError: Writing fails, for example because the disk is full.
     """
     path = Path(path)
     if path.suffix != ".csv":
@@ -28,18 +31,18 @@ def write_table(table: pd.DataFrame, path: Path | str, *, overwrite: bool = Fals
             table.to_csv(file, index=False)
     except (FileNotFoundError, PermissionError) as error:
         raise InputError(f"cannot write table {path}: {error.strerror}; choose a folder that can be written") from None
-    except OSError as error:  # which names the temporary file, or none
+    except OSError as error:  # whose text may name the temporary file
         msg = f"cannot write table {path}: {error.strerror or error}; free space or choose another folder"
         raise RunError(msg) from error
     return path
 
 
 def table_lines(header: Sequence[str], rows: Iterable[Sequence[str]]) -> list[str]:
-    """Return the lines of a table."""
+    """Return the lines of a Markdown table."""
     lines = [f"| {' | '.join(header)} |", "| --- " * len(header) + "|"]
     return [*lines, *(f"| {' | '.join(row)} |" for row in rows)]
 
 
 def meaning_lines(file: str, meanings: Mapping[str, str]) -> list[str]:
-    """Return lines that say what the columns of a file are."""
-    return ["", f"What the columns of `{file}` are:", "", *(f"- `{name}`: {text}" for name, text in meanings.items())]
+    """Return lines of Markdown that describe the columns of a file."""
+    return ["", f"Columns of `{file}`:", "", *(f"- `{name}`: {text}" for name, text in meanings.items())]

@@ -1,1 +1,1 @@
-"""Means, errors and comparisons of numbers, by NumPy, SciPy and pandas alone."""
+"""Means with errors, comparisons and fits, by NumPy, SciPy and pandas alone."""

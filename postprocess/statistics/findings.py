@@ -1,4 +1,4 @@
-"""Judge findings of a paper by our own runs: an effect with its error, a verdict, and words for both."""
+"""Judge findings by effects with errors: a verdict, and the text that states both."""
 
 from __future__ import annotations
 
@@ -11,24 +11,26 @@ from scipy.special import stdtrit
 
 from postprocess.statistics.seeds import CONFIDENCE, SeedMean
 
-_MOST_RUNS = 1 << 20  # counted up to
-_MOST_TIMES = 100  # times as many runs that are stated as a number
+_MOST_RUNS = 1 << 20  # more runs count as infinitely many
+_MOST_TIMES = 100  # a larger ratio of runs is stated as "more than 100"
 
 
 class Unresolved(str):
-    """The verdict `not resolved`, and what it would take."""
+    """The verdict `not resolved`, with the number of runs that would resolve the effect.
+
+    Attributes:
+        more: Runs needed over present runs [-], if effect and scatter stay; infinite for an effect of 0, NaN if the
+            scatter is unknown.
+    """
 
     __slots__ = ("more",)
+    more: float
 
     def __new__(cls, more: float) -> Unresolved:
-        """Make the verdict."""
+        """Return the verdict with this number."""
         verdict = super().__new__(cls, "not resolved")
         verdict.more = more
         return verdict
-
-    # So many times as many runs of the same scatter would resolve an effect as large as the one seen [-]; infinite
-    # where no effect is seen at all, NaN where one run has no scatter
-    more: float
 
 
 Verdict = Literal["found", "not found", "not resolved", "no data"] | Unresolved
@@ -38,11 +40,11 @@ CRITERION = (
     "not found where the opposite does, not resolved in between; where nothing holds at all, "
     "one verdict in forty is still `found`"
 )
-"""How verdicts come about, for footers."""
+"""Definition of the verdicts, for footers of figures and tables."""
 
 
 def judge(effect: SeedMean, *, threshold: float = 0.0) -> Verdict:
-    """Decide whether an effect is clearly above a threshold."""
+    """Decide whether an effect is above a threshold, by its 95 % interval; see `CRITERION`."""
     if math.isnan(effect.value):
         return "no data"
     if effect.value - effect.half_width > threshold:
@@ -53,7 +55,7 @@ def judge(effect: SeedMean, *, threshold: float = 0.0) -> Verdict:
 
 
 def _runs_needed(effect: SeedMean, size: float) -> float:
-    """Count runs of this scatter whose 95 % half-width is no larger than a size; inf beyond a million."""
+    """Return the least number of runs whose 95 % half-width is at most a size; infinite above a million."""
     scatter = effect.standard_error * math.sqrt(effect.count)
     if not math.isfinite(scatter):
         return math.nan
@@ -67,7 +69,7 @@ def _runs_needed(effect: SeedMean, size: float) -> float:
 
 
 def more_runs_text(verdict: Verdict) -> str:
-    """Write `an effect of this size would take 3.1 times as many runs` if unresolved; else nothing."""
+    """Return `an effect of this size would take 3.1 times as many runs` if unresolved, else an empty text."""
     more = verdict.more if isinstance(verdict, Unresolved) else math.nan
     if math.isnan(more):
         return ""
@@ -76,12 +78,12 @@ def more_runs_text(verdict: Verdict) -> str:
 
 
 def negative(effect: SeedMean) -> SeedMean:
-    """Return the effect with the other sign."""
+    """Return the effect with the opposite sign and an unchanged error."""
     return replace(effect, value=-effect.value)
 
 
 def effect_text(effect: SeedMean, digits: int = 4, unit: str = "") -> str:
-    """Write `+0.0123 ± 0.0011 (n = 15)`: a signed number with its standard error."""
+    """Return `+0.0123 ± 0.0011 (n = 15)`: effect, standard error and number of runs, or `no data`."""
     if math.isnan(effect.value):
         return "no data"
     error = f" ± {effect.standard_error:.{digits}g}" if math.isfinite(effect.standard_error) else " without an error"

@@ -1,7 +1,7 @@
-"""Tables over runs: means of runs that are alike, and differences between runs that were poured alike.
+"""Compute tables over runs: means over the seeds of a point, and differences between paired runs.
 
-A difference is taken between two runs that differ in one factor alone, so that what they share, such as the poses that
-they were poured from, does not count as scatter. The difference of such differences is an interaction.
+The two runs of a pair differ in one factor alone. Their difference has no scatter from conditions that both runs share,
+such as the initial poses. The difference of such differences is an interaction.
 
 Source:
     Box, Hunter and Hunter, Statistics for Experimenters, 2nd ed. (Wiley 2005), chapter 5.
@@ -19,17 +19,17 @@ from postprocess.statistics.seeds import SeedMean, mean_over_seeds
 ASPECT, SEED, SEEDS = "aspect ratio [-]", "seed", "seeds [-]"
 
 
-RUNS = "runs [-]"  #: Column with the number of runs that a row is the mean of
+RUNS = "runs [-]"  #: Column with the number of runs over which a row is averaged
 
 
 def marked(quantity: str, mark: str) -> str:
-    """Name a column that belongs to a quantity's: the mark stands before the unit."""
+    """Return the name of a column with a mark before its unit: `phi [-]` and `SE` give `phi SE [-]`."""
     name, _, unit = quantity.rpartition(" [")
     return f"{name} {mark} [{unit}"
 
 
 def mean_columns(quantity: str, mean: SeedMean) -> dict[str, float]:
-    """Return a mean over seeds as columns, `… SE` the standard error, `… 95 %` the half-width."""
+    """Return the columns of a mean over seeds: `phi [-]`, `phi SE [-]` and the half-width `phi 95 % [-]`."""
     return {
         quantity: mean.value,
         marked(quantity, "SE"): mean.standard_error,
@@ -38,7 +38,10 @@ def mean_columns(quantity: str, mean: SeedMean) -> dict[str, float]:
 
 
 def averaged(group: pd.DataFrame, quantities: Iterable[str]) -> dict[str, float]:
-    """Average columns over the seeds of a point, each as its `mean_columns`."""
+    """Average quantities over the rows of a table, one row per seed: columns of means and errors.
+
+    `mean_columns` describes the columns.
+    """
     found: dict[str, float] = {}
     for quantity in quantities:
         found |= mean_columns(quantity, mean_over_seeds(group[quantity]))
@@ -46,16 +49,16 @@ def averaged(group: pd.DataFrame, quantities: Iterable[str]) -> dict[str, float]
 
 
 def means_by(table: pd.DataFrame, by: Sequence[str]) -> pd.DataFrame:
-    """Average the rows of each group, with standard errors from row to row.
+    """Average the rows of each group of a table, with standard errors from the scatter of the rows.
 
     Args:
-        table: One row per run, or per run and phase; quantities carry their unit in brackets. Errors within a run
-            ("… SE […]") are left out: what counts from run to run is the scatter of the runs.
-        by: Columns whose values make a group; groups keep the order in which they first appear.
+        table: One row per run, or per run and phase; names of quantities end with their unit in brackets. Standard
+            errors within a run ("… SE […]") are ignored.
+        by: Columns whose values define the groups.
 
     Returns:
-        The columns of `by`, `RUNS`, then each quantity with "… SE […]" beside: s/√n, NaN for one run alone, as in
-        `seeds.mean_over_seeds`; a NaN among the values is left out.
+        One row per group, in the order of its first row: the columns `by`, `RUNS`, then each quantity with its standard
+        error "… SE […]", NaN for a single run. Values of NaN are left out of the means.
 
     Example:
         >>> runs = pd.DataFrame({"friction": [0.2, 0.2, 0.4], "phi [-]": [0.1, 0.3, 0.5]})
@@ -75,7 +78,7 @@ def means_by(table: pd.DataFrame, by: Sequence[str]) -> pd.DataFrame:
 
 
 def seeds_of(group: pd.DataFrame) -> dict[str, object]:
-    """Return the number of a point's seeds, and the seeds, as columns."""
+    """Return two columns of a point: the number of its seeds, and the seeds as text."""
     return {SEEDS: len(group), "seeds": " ".join(map(str, sorted(group[SEED])))}
 
 
@@ -90,7 +93,11 @@ def format_with_error(value: float, form: str, error: float = math.nan) -> str:
 
 
 def pairs(one: pd.DataFrame, other: pd.DataFrame, quantity: str) -> pd.DataFrame:
-    """Join a quantity of two tables of runs by aspect ratio and seed: columns `one` and `other`."""
+    """Join a quantity of two tables of runs by aspect ratio and seed.
+
+    Returns:
+        One row per pair of runs: aspect ratio, seed, and the quantity in the columns `one` and `other`.
+    """
     keys = [ASPECT, SEED]
     left = one[[*keys, quantity]].rename(columns={quantity: "one"})
     right = other[[*keys, quantity]].rename(columns={quantity: "other"})
@@ -98,7 +105,7 @@ def pairs(one: pd.DataFrame, other: pd.DataFrame, quantity: str) -> pd.DataFrame
 
 
 def mean_difference(one: pd.DataFrame, other: pd.DataFrame, quantity: str) -> SeedMean:
-    """Average one table less the other over pairs."""
+    """Average the difference of a quantity over pairs of runs, `one` less `other`; see `pairs`."""
     both = pairs(one, other, quantity)
     return mean_over_seeds(both["one"] - both["other"])
 
@@ -106,14 +113,20 @@ def mean_difference(one: pd.DataFrame, other: pd.DataFrame, quantity: str) -> Se
 def paired_differences(
     table: pd.DataFrame, quantity: str, factor: str, levels: tuple[object, object], others: Sequence[str]
 ) -> pd.DataFrame:
-    """Return what a quantity does when a factor goes from one level to another, all else alike.
+    """Compute the change of a quantity between two levels of a factor, for each pair of runs.
+
+    The function applied to its own result with another factor gives interactions.
 
     Args:
-        others: Columns of all else that runs differ in, such as the other factors and the seed.
+        table: One row per run.
+        quantity: Column of the quantity.
+        factor: Column of the factor.
+        levels: Its first and second level.
+        others: Columns of all other factors in which runs differ, and the seed; equal in both runs of a pair.
 
     Returns:
-        One row per pair: `others`, and the difference in the quantity's column, in its unit. What lacks a run at
-        either level is left out. Given to this function again with another factor: interactions.
+        One row per pair: the columns `others`, and the quantity at the second level less that at the first. Runs
+        without a partner are left out.
 
     Example:
         >>> runs = pd.DataFrame({"mu": [0.4, 0.8, 0.4, 0.8], "seed": [1, 1, 2, 2], "N": [5.0, 6.0, 5.5, 7.5]})

@@ -1,8 +1,8 @@
-"""Rank correlations and slopes within strata, and their errors by resampling whole blocks of runs.
+"""Compute rank correlations and slopes within strata, with errors from resampling of blocks.
 
-Runs that share a history, such as those that stopped at different times on one trajectory, are no independent ones.
-They make a block, and blocks are drawn, never single runs. What a study has set by itself, such as the aspect ratio, is
-a stratum: each keeps as many blocks as it has.
+Runs with a common history, such as several stops on one trajectory, are not independent. They form a block, and
+resampling (the bootstrap) draws whole blocks. Runs that agree in a factor set by the study, such as the aspect ratio,
+form a stratum; a resample has as many blocks of each stratum as the data.
 """
 
 from __future__ import annotations
@@ -20,29 +20,34 @@ from postprocess.statistics.seeds import CONFIDENCE, SeedMean, mean_over_seeds
 Floats = NDArray[np.float64]
 Whole = NDArray[np.int64]
 
-_NONE = 1e-12  # of a spread: what rounding leaves of none
-_COINS = 6  # that show the same side in less than 5 % of all throws
+_NONE = 1e-12  # relative spread below which values are equal within rounding
+_COINS = 6  # least number of fair coins that all show one side in less than 5 % of all throws
 
 
 @dataclass(frozen=True, kw_only=True)
 class Interval:
-    """A value with its 95 % interval, perhaps uneven; NaN ends where blocks are too few."""
+    """A value with its 95 % interval, which may be asymmetric."""
 
     value: float
-    low: float
-    high: float
+    low: float  #: Lower end of the interval; NaN if there are too few blocks
+    high: float  #: Upper end of the interval; NaN if there are too few blocks
 
     @property
     def clear(self) -> bool:
-        """Whether 0 is outside."""
+        """Whether the interval excludes 0."""
         return self.low > 0 or self.high < 0
 
 
 def rank_correlations(x: Floats, y: Floats, strata: Whole) -> Floats:
-    """Compute Spearman's correlations of the columns of x (n, m) with y (n,), ranked in strata (n,).
+    """Compute Spearman's rank correlations of columns with one variable, ranked within strata.
+
+    Args:
+        x: (n, m) columns.
+        y: (n,) variable.
+        strata: (n,) stratum of each row.
 
     Returns:
-        (m,) from -1 to 1; NaN where a column or y is constant in every stratum.
+        (m,) correlations from -1 to 1; NaN if the column, or y, is constant in every stratum.
 
     Example:
         >>> x, y = np.array([[1.0], [2], [3], [10], [20], [30]]), np.array([7.0, 8, 9, 1, 2, 3])
@@ -57,7 +62,10 @@ def rank_correlations(x: Floats, y: Floats, strata: Whole) -> Floats:
 
 
 def ranks_within(values: Floats, strata: Whole) -> Floats:
-    """Rank columns (n, m) within strata, about the mean, over their rows plus one; ties share."""
+    """Return ranks (n, m) of columns within strata (n,), from -1/2 to 1/2: rank over (rows + 1), less 1/2.
+
+    Equal values have their mean rank.
+    """
     found = np.empty(values.shape)
     for stratum in np.unique(strata):
         inside = strata == stratum
@@ -66,11 +74,11 @@ def ranks_within(values: Floats, strata: Whole) -> Floats:
 
 
 def correlation_within(x: Sequence[float], y: Sequence[float], blocks: Sequence[Hashable]) -> SeedMean:
-    """Average Spearman's rank correlation of y with x over blocks in which both vary, such as piles.
+    """Average Spearman's rank correlation of y (n,) with x (n,) over blocks (n,) in which both vary.
 
-    A rank does not mind a value of which only a lower bound is known, as long as all others are below: such a y is
-    `inf`. Points with NaN are left out. The error is by the scatter over blocks; there is none where these are fewer
-    than six: by chance alone five coins show the same side more often than one time in twenty.
+    A y of which only a lower bound is known counts as `inf`, the highest rank. Points with NaN are left out. The
+    standard error is that of the scatter over blocks. It is NaN for fewer than six blocks: five correlations have one
+    sign by chance in more than 5 % of all cases.
 
     Example:
         >>> f'{correlation_within([1, 2, 1, 2], [5, 7, 1, math.inf], ["a", "a", "b", "b"]).value:.3f}'
@@ -87,14 +95,20 @@ def correlation_within(x: Sequence[float], y: Sequence[float], blocks: Sequence[
 
 def _correlation(part: Floats) -> float:
     one = np.zeros(len(part), dtype=np.int64)
-    # Without what rounding leaves of none, which would be printed as a number.
+    # Rounded, so that a correlation of 0 is not printed as 1e-17.
     return round(float(rank_correlations(part[:, :1], part[:, 1], one)[0]), 12)
 
 
 def common_slopes(x: Floats, y: Floats, strata: Whole) -> Floats:
-    """Fit slopes (m,) of y (n,) against columns of x (n, m), common to strata with own levels.
+    """Fit slopes of y against each column of x, with a separate intercept for each stratum.
 
-    NaN where a column is constant in every stratum.
+    Args:
+        x: (n, m) columns.
+        y: (n,) variable.
+        strata: (n,) stratum of each row.
+
+    Returns:
+        (m,) slopes; NaN if the column is constant in every stratum.
     """
     values = np.column_stack([x, y])
     for stratum in np.unique(strata):
@@ -105,9 +119,15 @@ def common_slopes(x: Floats, y: Floats, strata: Whole) -> Floats:
 
 
 def resamples(blocks: Whole, strata: Whole, *, count: int, seed: int) -> Iterator[Whole]:
-    """Draw rows of tables: of each stratum as many blocks as it has, with replacement.
+    """Yield `count` bootstrap resamples of a table, as indices of rows.
 
-    Blocks and strata (n,) are those of each row; a block lies in one stratum.
+    A resample has as many blocks of each stratum as the table, drawn with replacement.
+
+    Args:
+        blocks: (n,) block of each row; a block lies in one stratum.
+        strata: (n,) stratum of each row.
+        count: Number of resamples.
+        seed: Seed of the random numbers.
     """
     random = np.random.default_rng(seed)
     rows = {block: np.nonzero(blocks == block)[0] for block in np.unique(blocks)}
@@ -118,7 +138,12 @@ def resamples(blocks: Whole, strata: Whole, *, count: int, seed: int) -> Iterato
 
 
 def interval(value: float, drawn: Sequence[float]) -> Interval:
-    """Take the 95 % interval from percentiles of resamples; NaN where one of ten has no value."""
+    """Return a value with its 95 % interval, by percentiles of resampled values.
+
+    Args:
+        value: The value of the data.
+        drawn: The values of the resamples. If more than a tenth of them are not finite, the interval is NaN.
+    """
     known = np.asarray(drawn, dtype=np.float64)
     known = known[np.isfinite(known)]
     if len(known) < 0.9 * len(drawn) or not len(known):
@@ -128,10 +153,13 @@ def interval(value: float, drawn: Sequence[float]) -> Interval:
 
 
 def few_blocks(blocks: Whole, strata: Whole) -> bool:
-    """Whether any stratum has too few blocks for resampling to give an error."""
+    """Return whether a stratum has fewer than three blocks, too few for an error by resampling."""
     return any(len(np.unique(blocks[strata == stratum])) < 3 for stratum in np.unique(strata))
 
 
 def resampled(measures: Callable[[Whole], Floats], blocks: Whole, strata: Whole, *, count: int, seed: int) -> Floats:
-    """Compute the values (count, m) that `measures` takes of each table of `resamples`."""
+    """Return the m values of `measures` for each of `count` resamples, (count, m); see `resamples`.
+
+    `measures` takes indices of rows and returns values (m,).
+    """
     return np.array([measures(rows) for rows in resamples(blocks, strata, count=count, seed=seed)])

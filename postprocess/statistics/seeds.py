@@ -1,7 +1,7 @@
-"""Means with errors, over seeds and over successive frames; differences, slopes, parabolas.
+"""Compute means with errors over seeds and over successive frames, differences, slopes and parabolas.
 
-Runs that differ in their seed alone are independent, and their intervals are those of Student's t; one seed has a mean
-and no error. Successive frames of one run are correlated, see `mean_with_error`.
+Runs that differ in their seed alone are independent; their 95 % intervals are by Student's t, and a single seed has no
+error. Successive frames of one run are correlated, see `mean_with_error`.
 """
 
 from __future__ import annotations
@@ -16,59 +16,59 @@ from scipy.special import fdtrc, stdtrit
 
 Floats = NDArray[np.float64]
 
-CONFIDENCE = 0.95
+CONFIDENCE = 0.95  #: Confidence level of all intervals
 
 
 @dataclass(frozen=True, kw_only=True)
 class SeedMean:
-    """A mean over seeds, or another estimate from independent runs."""
+    """A mean over n seeds, or another estimate from independent runs or points, with its error."""
 
-    value: float  #: NaN without data
-    standard_error: float  #: Of a mean s/√n; NaN without a degree of freedom to spare
-    half_width: float  #: Of the 95 % confidence interval by Student's t; NaN without an error
-    count: int  #: n, runs or points
+    value: float  #: Estimate; NaN without data
+    standard_error: float  #: Standard error, for a mean s/√n; NaN without a degree of freedom
+    half_width: float  #: Half-width of the 95 % confidence interval by Student's t; NaN without an error
+    count: int  #: n, number of runs or points
 
 
-Slope = SeedMean  #: A slope that several blocks of points share; NaN where x is the same throughout every block
+Slope = SeedMean  #: A slope common to several blocks of points; NaN if x is constant in every block
 
 
 @dataclass(frozen=True, kw_only=True)
 class Difference:
-    """The difference of two means with the half-width of its 95 % interval; NaN where one has none."""
+    """The difference of two means."""
 
     value: float
-    half_width: float
+    half_width: float  #: Half-width of the 95 % interval; NaN if a mean has no error
 
     @property
     def clear(self) -> bool:
-        """Whether it is beyond its own error."""
+        """Whether the 95 % interval excludes 0."""
         return abs(self.value) > self.half_width
 
 
 @dataclass(frozen=True, kw_only=True)
 class Scatter:
-    """Standard deviation from seed to seed that several points share."""
+    """Standard deviation from seed to seed, common to several points."""
 
-    value: float  #: In the unit of what scatters; NaN where no point has two seeds
-    freedom: int  #: Its degrees of freedom
+    value: float  #: Standard deviation, in the unit of the quantity; NaN if no point has two seeds
+    freedom: int  #: Number of degrees of freedom
 
 
 @dataclass(frozen=True, kw_only=True)
 class Mean:
-    """A mean over successive frames."""
+    """A mean over successive, correlated samples."""
 
-    value: float  #: The mean; NaN without samples. Infinite if a sample is, NaN if samples are of either sign.
-    standard_error: float  #: NaN with fewer than two samples, or infinite ones
+    value: float  #: Mean; NaN without samples, or if samples are infinite with both signs
+    standard_error: float  #: Standard error; NaN for fewer than two samples, or if a sample is infinite
     count: int  #: Number of samples averaged
-    effective_count: float  #: Number of independent samples they are worth; NaN with infinite ones
+    effective_count: float  #: Number of independent samples whose mean has this error; NaN if a sample is infinite
 
 
 def mean_with_error(samples: ArrayLike) -> Mean:
-    """Average successive samples (n,) in time order, with an error that allows for their correlation, without NaN.
+    """Average successive samples (n,) in time order, with an error that allows for their correlation.
 
-    The naive error s/√n is too small. It is widened by the square root of the integrated correlation time, summed up to
-    where pairs of correlations turn negative. From some 20 samples that time is itself known only to tens of per cent
-    and rather too short: read the error as a lower bound for slow drifts.
+    The error is s/√n times the square root of the integrated correlation time, which is summed until a pair of
+    successive correlations turns negative. From 20 samples this time is known only to tens of per cent and rather too
+    short, so that the error is a lower bound if the samples drift slowly. Samples of NaN are left out.
 
     Source:
         Geyer, Statistical Science 7 (1992) 473 (initial positive sequence).
@@ -80,7 +80,7 @@ def mean_with_error(samples: ArrayLike) -> Mean:
         return Mean(value=math.nan, standard_error=math.nan, count=0, effective_count=0.0)
     infinite = values[np.isinf(values)]
     if len(infinite):
-        # E.g. the unbalanced force over no contact force, while everything is still in the air.
+        # The unbalanced force, for example, is infinite while no smarticle touches another.
         mean = float(infinite[0]) if (infinite == infinite[0]).all() else math.nan
         return Mean(value=mean, standard_error=math.nan, count=count, effective_count=math.nan)
     mean = float(values.mean())
@@ -92,7 +92,7 @@ def mean_with_error(samples: ArrayLike) -> Mean:
 
 
 def _correlation_time(deviations: Floats) -> float:
-    """Integrate the correlation time, in samples; 1 if they are independent."""
+    """Return the integrated correlation time in samples; 1 if the samples are independent."""
     count = len(deviations)
     covariance = np.correlate(deviations, deviations, mode="full")[count - 1 :]
     if covariance[0] <= 0:
@@ -105,9 +105,7 @@ def _correlation_time(deviations: Floats) -> float:
 
 
 def pooled_scatter(groups: Iterable[Sequence[float]]) -> Scatter:
-    """Pool the scatter within groups, taken as equal in all of them; NaN are left out.
-
-    A few seeds of each of many points know it far better than those of one point alone.
+    """Estimate the standard deviation within groups, assumed equal in all groups; NaN are left out.
 
     Example:
         >>> pooled_scatter([[1.0, 3.0], [10.0, 12.0], [5.0]])
@@ -122,7 +120,7 @@ def pooled_scatter(groups: Iterable[Sequence[float]]) -> Scatter:
 
 
 def mean_over_seeds(values: Sequence[float]) -> SeedMean:
-    """Average independent values, one per seed; NaN are left out.
+    """Average independent values (n,), one per seed; values of NaN are left out.
 
     Example:
         >>> mean = mean_over_seeds([1.0, 2.0, 3.0])
@@ -144,9 +142,9 @@ def _estimate(value: float, error: float, freedom: int, count: int) -> SeedMean:
 
 
 def difference(mean: SeedMean, baseline: SeedMean, *, scatter: Scatter | None = None) -> Difference:
-    """Subtract an independent mean from another one.
+    """Return the difference of two independent means, `mean` less `baseline`.
 
-    The scatter of a single seed may be common to both; without it each has its own, by Welch.
+    The interval follows from `scatter`, common to both means, or, without it, from the error of each mean by Welch.
 
     Source:
         Welch, Biometrika 34 (1947) 28; degrees of freedom after Satterthwaite.
@@ -166,17 +164,17 @@ def difference(mean: SeedMean, baseline: SeedMean, *, scatter: Scatter | None = 
 
 
 def relative_difference(mean: SeedMean, baseline: SeedMean, *, scatter: Scatter | None = None) -> Difference:
-    """Return `difference` in per cent of the baseline's mean, taken as exact; NaN where that is 0."""
+    """Return the `difference` in per cent of the baseline, taken as exact; NaN if the baseline is 0."""
     change = difference(mean, baseline, scatter=scatter)
     scale = 100 / baseline.value if baseline.value else math.nan
     return Difference(value=scale * change.value, half_width=abs(scale) * change.half_width)
 
 
 def slope_within(x: Sequence[float], y: Sequence[float], blocks: Sequence[Hashable]) -> Slope:
-    """Fit one slope of y against x to all blocks, each of which has a level of its own.
+    """Fit a slope of y (n,) against x (n,) common to all blocks, with an intercept for each block.
 
-    What the points of a block share, such as the pile that they all began with, does not count as scatter. Points with
-    NaN are left out; n − blocks − 1 degrees of freedom.
+    Differences between blocks, such as between initial piles, thus do not count as scatter. Points with NaN are left
+    out. The number of degrees of freedom is n less the number of blocks less 1.
 
     Example:
         >>> slope_within([0, 1, 0, 1], [5, 7, 1, 3], ["a", "a", "b", "b"]).value
@@ -195,28 +193,28 @@ def slope_within(x: Sequence[float], y: Sequence[float], blocks: Sequence[Hashab
     if spread == 0:
         return Slope(value=math.nan, standard_error=math.nan, half_width=math.nan, count=count)
     value, freedom = float(across @ up) / spread, count - len(numbers) - 1
-    rest = up - value * across
-    error = math.sqrt(float(rest @ rest) / freedom / spread) if freedom > 0 else math.nan
+    residuals = up - value * across
+    error = math.sqrt(float(residuals @ residuals) / freedom / spread) if freedom > 0 else math.nan
     return _estimate(value, error, freedom, count)
 
 
 @dataclass(frozen=True, kw_only=True)
 class Parabola:
-    """A parabola through points."""
+    """A parabola fitted to points."""
 
-    slope: Slope  #: At the place that was asked for; NaN where x has fewer than three values
-    bend: Slope  #: Half the second derivative, everywhere; below 0 where the parabola has a maximum
-    top: float  #: Where its slope is 0; NaN without a bend
-    #: Probability of means at equal x that are off it by as much or more, if it were the truth (F test of the lack of
-    #: fit); NaN where x has no more than three values, or no value twice
+    slope: Slope  #: Slope at the given x; NaN if x has fewer than three distinct values
+    bend: Slope  #: Half the second derivative; below 0 if the parabola has a maximum
+    top: float  #: x at which the slope is 0; NaN if the bend is 0
+    #: p-value of the F test for lack of fit, by the scatter of points at equal x; NaN if x has at most three distinct
+    #: values, or no value twice
     fits: float
 
 
 def parabola(x: Sequence[float], y: Sequence[float], *, at: float) -> Parabola:
-    """Fit a parabola, described by its bend and by its slope at x = `at`; points with NaN are left out.
+    """Fit a parabola of y (n,) against x (n,), described by its bend and its slope at x = `at`.
 
-    The slope there says on which side a flat top lies; its error does not grow without bound as that of the top itself
-    does when the bend is small. Errors are by the scatter about the parabola, n − 3 degrees of freedom.
+    The sign of the slope says on which side of `at` the extremum lies, and its error stays finite if the bend is small.
+    Errors are by the residuals, with n − 3 degrees of freedom. Points with NaN are left out.
 
     Example:
         >>> round(parabola([0, 1, 2, 3], [0, 3, 4, 3], at=1.0).slope.value, 9)
@@ -232,24 +230,24 @@ def parabola(x: Sequence[float], y: Sequence[float], *, at: float) -> Parabola:
     powers = np.stack([np.ones(count), across, across**2], axis=1)
     inverse = np.linalg.pinv(powers)
     coefficients = inverse @ up
-    rest = up - powers @ coefficients
-    variance = float(rest @ rest) / freedom if freedom > 0 else math.nan
+    residuals = up - powers @ coefficients
+    variance = float(residuals @ residuals) / freedom if freedom > 0 else math.nan
     errors = np.sqrt(variance * np.sum(inverse**2, axis=1))
     slope, bend = (_estimate(float(coefficients[k]), float(errors[k]), freedom, count) for k in (1, 2))
     top = at - slope.value / (2 * bend.value) if bend.value else math.nan
-    return Parabola(slope=slope, bend=bend, top=top, fits=_fits(across, rest))
+    return Parabola(slope=slope, bend=bend, top=top, fits=_lack_of_fit(across, residuals))
 
 
-def _fits(x: Floats, rest: Floats) -> float:
+def _lack_of_fit(x: Floats, residuals: Floats) -> float:
     _, place, members = np.unique(x, return_inverse=True, return_counts=True)
-    means = np.bincount(place, rest) / members
-    off, repeats = len(members) - 3, len(rest) - len(members)
-    pure = float(np.sum((rest - means[place]) ** 2))
-    if off < 1 or repeats < 1 or pure == 0:
+    means = np.bincount(place, residuals) / members
+    lack, repeats = len(members) - 3, len(residuals) - len(members)
+    pure = float(np.sum((residuals - means[place]) ** 2))
+    if lack < 1 or repeats < 1 or pure == 0:
         return math.nan
-    return float(fdtrc(off, repeats, float(members @ means**2) / off / (pure / repeats)))
+    return float(fdtrc(lack, repeats, float(members @ means**2) / lack / (pure / repeats)))
 
 
 def _quantile(freedom: float) -> float:
-    """Return how many standard errors the half-width has."""
+    """Return the half-width of the 95 % interval over the standard error, Student's t."""
     return float(stdtrit(freedom, (1 + CONFIDENCE) / 2))

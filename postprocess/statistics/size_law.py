@@ -1,14 +1,12 @@
-"""Fit how a quantity changes with the size of piles: q = q_∞ + a N^(-1/3), surface over volume.
+"""Fit how a quantity depends on the number of smarticles N, q = q_∞ + a N^(-1/3), and find thresholds.
 
-The scatter from seed to seed falls with the size of a pile, and a few seeds of one size hardly know it. It is taken as
-a power of N that all sizes share, fitted to what seeds differ by within sizes alone, so that it knows nothing of the
-law. Where the law leaves more than that scatter explains, errors are larger by the square root of the ratio (Birge,
-Phys. Rev. 40, 207, 1932), and the law is rejected beyond 95 %.
+N^(-1/3) is proportional to the surface of a pile over its volume. The variance from seed to seed is fitted as a power
+of N, by the differences of seeds at equal N. If the means deviate from the law by more than this variance explains,
+errors are multiplied by the square root of the ratio (Birge, Phys. Rev. 40, 207, 1932); the law is rejected at 95 %.
 
-A threshold is the place x_c at which half of all runs have a property, with its 95 % interval by profile likelihood.
-
-The share of runs that have it rises with x as a logistic function 1/(1 + exp(-(x - x_c)/s)), the width s of whatever
-the data allow. So it is sound also where no run below some x has it and all above do, and nothing else is known of s.
+A threshold is the x_c at which half of all runs have a property. The fraction of runs with the property rises with x as
+a logistic function 1/(1 + exp(-(x - x_c)/s)). The 95 % interval of x_c is by profile likelihood over all widths s; it
+is valid even if no run below some x has the property and all runs above have it.
 """
 
 from __future__ import annotations
@@ -24,21 +22,21 @@ from scipy.special import chdtrc, chdtri, fdtrc, fdtri, stdtrit
 from postprocess.statistics.seeds import CONFIDENCE, Floats, Slope
 
 POWER = 1 / 3
-POWERS = np.arange(0.02, 1.501, 0.01)  #: Powers that are tried; an interval that ends there may be longer
+POWERS = np.arange(0.02, 1.501, 0.01)  #: Powers of N in the fit of `SizeLaw.powers`
 
 _FALLS = np.arange(0.0, 2.01, 0.02)
 
 
 @dataclass(frozen=True, kw_only=True)
 class Scatter:
-    """Scatter of one run, σ² = c N^(-fall)."""
+    """Variance from seed to seed, σ² = c N^(-fall)."""
 
     variance: float  #: c, in the square of the quantity's unit
-    fall: float  #: Power of N that σ² falls with [1]
-    freedom: int  #: Its degrees of freedom
+    fall: float  #: Exponent [-]
+    freedom: int  #: Number of degrees of freedom
 
     def error(self, count: float, runs: int) -> float:
-        """Half-width of the 95 % interval of a mean over runs of one size; NaN where no scatter is known."""
+        """Return the 95 % half-width of a mean over `runs` runs with N = `count`; NaN without scatter."""
         if not self.freedom:
             return math.nan
         return float(stdtrit(self.freedom, (1 + CONFIDENCE) / 2)) * math.sqrt(self.variance * count**-self.fall / runs)
@@ -46,33 +44,32 @@ class Scatter:
 
 @dataclass(frozen=True, kw_only=True)
 class SizeLaw:
-    """q = bulk + slope N^(-1/3), fitted to runs."""
+    """The law q = q_∞ + a N^(-1/3), fitted to runs."""
 
-    bulk: float  #: q of a pile without end
+    bulk: float  #: q_∞
     slope: float  #: a
-    covariance: Floats  #: (2, 2) of the two, enlarged where the law leaves more than scatter; NaN without scatter
-    scatter: Scatter  #: Of one run
-    #: Variance that the law leaves of the means of sizes, over what scatter explains; NaN below three sizes
-    excess: float
-    p_value: float  #: Probability of so much, were the law true [1]; likewise
-    powers: tuple[float, float, float]  #: Best power of N and its 95 % interval [1]; likewise
-    sizes: int  #: How many sizes
-    runs: int  #: How many runs
+    covariance: Floats  #: (2, 2) covariance of q_∞ and a, enlarged by `excess` above 1; NaN without scatter
+    scatter: Scatter  #: Variance from seed to seed
+    excess: float  #: Variance of the means about the law over that from the scatter [-]; NaN below three sizes
+    p_value: float  #: Probability of an excess as large or larger, if the law holds [-]; NaN below three sizes
+    powers: tuple[float, float, float]  #: Best power of N and its 95 % interval [-]; NaN below three sizes
+    sizes: int  #: Number of distinct N
+    runs: int  #: Number of runs
 
     def error(self, bulk: float, slope: float) -> float:
-        """Half-width of the 95 % interval of bulk · q_∞ + slope · a; NaN without scatter."""
-        share = np.array([bulk, slope])
-        return self._quantile * math.sqrt(float(share @ self.covariance @ share))
+        """Return the half-width of the 95 % interval of bulk · q_∞ + slope · a; NaN without scatter."""
+        weights = np.array([bulk, slope])
+        return self._quantile * math.sqrt(float(weights @ self.covariance @ weights))
 
     def at(self, count: float) -> float:
-        """The quantity of so many smarticles."""
+        """Return q for N = `count`."""
         return self.bulk + self.slope * math.pow(count, -POWER)
 
     def bias(self, count: float) -> Slope:
-        """The quantity of so many smarticles less that of a pile without end."""
-        share = math.pow(count, -POWER)
-        half = self.error(0, share)
-        return Slope(value=self.slope * share, standard_error=half / self._quantile, half_width=half, count=self.runs)
+        """Return the finite-size effect, q for N = `count` less q_∞, with its error."""
+        power = math.pow(count, -POWER)
+        half = self.error(0, power)
+        return Slope(value=self.slope * power, standard_error=half / self._quantile, half_width=half, count=self.runs)
 
     @property
     def _quantile(self) -> float:
@@ -80,7 +77,12 @@ class SizeLaw:
 
 
 def scatter_of(counts: Floats, values: Floats) -> Scatter:
-    """Fit the scatter within sizes, by maximum likelihood; arguments as those of `size_law`."""
+    """Fit the variance from seed to seed by maximum likelihood.
+
+    Args:
+        counts: (n,) number of smarticles of each run.
+        values: (n,) finite values of the quantity.
+    """
     sizes, place = np.unique(counts, return_inverse=True)
     members = np.bincount(place)
     squares = np.bincount(place, (values - (np.bincount(place, values) / members)[place]) ** 2)
@@ -97,7 +99,12 @@ def scatter_of(counts: Floats, values: Floats) -> Scatter:
 
 
 def size_law(counts: Floats, values: Floats) -> SizeLaw:
-    """Fit the law to runs of two sizes at least, by their counts of smarticles (n,) and finite values (n,)."""
+    """Fit q = q_∞ + a N^(-1/3) to runs with at least two distinct N.
+
+    Args:
+        counts: (n,) number of smarticles of each run.
+        values: (n,) finite values of the quantity.
+    """
     scatter = scatter_of(counts, values)
     bulk, slope, left = _fit(counts, values, scatter, POWER)
     sizes = len(np.unique(counts))
@@ -124,7 +131,7 @@ def size_law(counts: Floats, values: Floats) -> SizeLaw:
 
 
 def _fit(counts: Floats, values: Floats, scatter: Scatter, power: float) -> tuple[float, float, float]:
-    """Bulk and slope, and the weighted squares that they leave of the means of sizes."""
+    """Return q_∞, a, and the weighted sum of squared residuals of the means at each N."""
     sizes, place = np.unique(counts, return_inverse=True)
     members = np.bincount(place)
     means = np.bincount(place, values) / members
@@ -136,7 +143,7 @@ def _fit(counts: Floats, values: Floats, scatter: Scatter, power: float) -> tupl
 
 
 def _powers(counts: Floats, values: Floats, scatter: Scatter) -> tuple[float, float, float]:
-    """Return the best power and the interval that the data admit at 95 %, errors enlarged as the law's."""
+    """Return the best power of N and its 95 % interval, with errors enlarged as those of the law."""
     left = np.array([_fit(counts, values, scatter, float(power))[2] for power in POWERS]) / scatter.variance
     free = len(np.unique(counts)) - 3
     larger = max(left.min() / free, 1.0) if free > 0 else 1.0
@@ -149,43 +156,49 @@ _PLACES, _WIDTHS = 401, 30
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Profile:
-    """What the runs of one group say of x_c."""
+    """Profile likelihood of the threshold x_c, for the runs of one group."""
 
-    places: Floats  #: (n,) where x_c may be, common to all groups
-    likelihood: Floats  #: (n,) log of it, of the best width at each place
-    widths: Floats  #: (n,) these widths
+    places: Floats  #: (n,) tried values of x_c, common to all groups
+    likelihood: Floats  #: (n,) log-likelihood at each x_c, with the best width s
+    widths: Floats  #: (n,) best width s at each x_c
     runs: int  #: Number of runs
     having: int  #: Number of runs with the property
 
     @property
     def known(self) -> bool:
-        """Whether some runs have the property and some do not."""
+        """Whether some runs have the property and some do not, so that x_c can be estimated."""
         return 0 < self.having < self.runs
 
     @property
     def best(self) -> float:
-        """x_c; where a whole range is as good, its middle. NaN where it is not known."""
+        """Estimate of x_c, the middle of a range of equal likelihood; NaN if x_c is not known."""
         if not self.known:
             return math.nan
         return float(self.places[self.likelihood >= self.likelihood.max() - 1e-3].mean())
 
     @property
     def width(self) -> float:
-        """The logistic function's at the best place; at least the narrowest that is tried."""
+        """Width s of the logistic function 1/(1 + exp(-(x - x_c)/s)) at the best x_c; NaN if unknown."""
         return float(self.widths[self.likelihood.argmax()]) if self.known else math.nan
 
     @property
     def interval(self) -> tuple[float, float]:
-        """95 % interval of x_c; infinite where it reaches the end of what is tried."""
+        """95 % interval of x_c; an end is infinite if the interval reaches the first or last tried value."""
         kept = self.likelihood >= self.likelihood.max() - chdtri(1, 1 - CONFIDENCE) / 2
         low, high = self.places[kept][[0, -1]]
         return (-math.inf if kept[0] else float(low), math.inf if kept[-1] else float(high))
 
 
 def profiles(x: Floats, having: Floats, groups: NDArray[np.int64]) -> dict[int, Profile]:
-    """Compute the profile likelihoods of x_c of each group, such as a size, on common places.
+    """Compute the profile likelihood of the threshold x_c for each group of runs.
 
-    Runs have a finite x (n,), the property or not, 0 or 1 (n,), and a group (n,).
+    Args:
+        x: (n,) finite x of each run.
+        having: (n,) 1 if a run has the property, else 0.
+        groups: (n,) group of each run, such as its size.
+
+    Returns:
+        The profiles by group, at common values of x_c.
     """
     span = float(np.ptp(x)) or 1.0
     places = np.linspace(x.min() - span / 2, x.max() + span / 2, _PLACES)
@@ -193,7 +206,7 @@ def profiles(x: Floats, having: Floats, groups: NDArray[np.int64]) -> dict[int, 
     found = {}
     for group in np.unique(groups):
         own = groups == group
-        # (places, widths, runs); log of the probability of what was seen, without an overflow.
+        # (places, widths, runs); logaddexp avoids an overflow.
         steps = (places[:, None, None] - x[own]) / widths[:, None] * (2 * having[own] - 1)
         likelihood = -np.logaddexp(0, steps).sum(axis=2)
         found[int(group)] = Profile(
@@ -207,9 +220,10 @@ def profiles(x: Floats, having: Floats, groups: NDArray[np.int64]) -> dict[int, 
 
 
 def alike(found: Collection[Profile]) -> float:
-    """Return the probability of places so unlike, were they all one, by the ratio of likelihoods [1].
+    """Return the p-value of the hypothesis that all groups have one threshold x_c [-].
 
-    NaN where fewer than two groups know theirs.
+    The test is by the likelihood ratio.
+    It is NaN if x_c is known for fewer than two groups.
     """
     known = [one.likelihood for one in found if one.known]
     if len(known) < 2:

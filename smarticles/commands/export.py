@@ -14,7 +14,7 @@ _LAMMPS = "lammps"
 
 # One line each; tests hold this table against `postprocess.export`, which is slow to import.
 _FIELDS = """\
-  smarticle_id [-]                     number of the smarticle, the same in all frames
+  smarticle_id [-]                     number of the smarticle, constant in all frames
   link [-]                             0 barb 1, 1 middle link, 2 barb 2
   speed_m_per_s [m/s]                  of the centre of mass
   height_m [m]                         of the centre of mass above the floor

@@ -172,7 +172,7 @@ def _notes(table: pd.DataFrame) -> list[str]:
             )
         if row["hook held fast [-]"] == 1:
             way = 1e3 * row["hook raised at the end [m]"]
-            notes.append(f"{where}: force_limit_N stopped the hook after {way:.3g} mm; its peak is a lower bound")
+            notes.append(f"{where}: force_limit_N stopped the hook after {way:.3g} mm, so the peak is a lower bound")
     return notes
 
 

@@ -1,1 +1,1 @@
-"""Many runs through a batch system."""
+"""Compute sweeps through Slurm, a batch system."""

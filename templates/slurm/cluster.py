@@ -1,4 +1,4 @@
-"""Facts about a cluster, as data: partitions, limits, modules, container."""
+"""Read the description of a cluster from a file: partitions, limits, modules, container."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from templates.sweep.sweep_file import read_text
 SHIPPED = Path(__file__).parent / "clusters"
 
 
-# These go into lines that Slurm reads without a shell: nothing in them may need quoting.
+# Slurm reads these values without a shell, so none may need quoting.
 def _plain_word(text: str) -> str:
     if not re.fullmatch(r"[A-Za-z0-9][A-Za-z0-9._+/:@=,-]*", text):
         raise ValueError(f"{text!r} would need quoting in a job script; use letters, digits and . _ + / : @ = , - only")
@@ -36,10 +36,10 @@ Option = Annotated[str, Field(max_length=200), AfterValidator(_plain_option)]
 
 
 def parse_time(text: str) -> int:
-    """Return the seconds of a time as Slurm writes it: `M`, `M:S`, `H:M:S`, `D-H`, `D-H:M`, `D-H:M:S`.
+    """Return a time [s] from Slurm's notation: `M`, `M:S`, `H:M:S`, `D-H`, `D-H:M` or `D-H:M:S`.
 
     Raises:
-        ValueError: it is not such a time, or not longer than zero.
+        ValueError: The text is no such time, or the time is 0.
     """
     days, dash, rest = text.rpartition("-")
     parts = rest.split(":")
@@ -51,26 +51,23 @@ def parse_time(text: str) -> int:
     seconds = int(days or 0) * 86400
     seconds += sum(int(part) * factor[name] for part, name in zip(parts, names[len(parts)], strict=True))
     if seconds == 0:
-        raise ValueError(f"{text!r} is no time at all; give at least one minute")
+        raise ValueError(f"{text!r} is a time of 0; give at least one minute")
     return seconds
 
 
 def format_time(seconds: float) -> str:
-    """Format a time as `D-HH:MM:SS`, or `HH:MM:SS` below a day."""
+    """Return a time [s] as text `D-HH:MM:SS`, or `HH:MM:SS` for less than a day."""
     days, rest = divmod(round(seconds), 86400)
     clock = f"{rest // 3600:02d}:{rest // 60 % 60:02d}:{rest % 60:02d}"
     return f"{days}-{clock}" if days else clock
 
 
 class Partition(Strict):
-    """One queue of a cluster.
-
-    `cores_per_node` and `memory_per_node_mib` may be "here": those of the machine that submits.
-    """
+    """One partition (queue) of a cluster; "here" stands for the value of the submitting machine."""
 
     cores_per_node: int | Literal["here"]
-    memory_per_node_mib: int | Literal["here"]
-    max_time: str
+    memory_per_node_mib: int | Literal["here"]  #: [MiB]
+    max_time: str  #: Longest wall time of a job, in Slurm's notation
     named: bool = Field(default=True, description="false: leave --partition out, Slurm takes its default")
 
     @field_validator("cores_per_node", "memory_per_node_mib", mode="before")
@@ -94,7 +91,7 @@ class Partition(Strict):
 
     @property
     def cores(self) -> int:
-        """Cores of one node."""
+        """Number of cores of one node."""
         return (os.cpu_count() or 1) if self.cores_per_node == "here" else self.cores_per_node
 
     @property
@@ -113,7 +110,7 @@ class Container(Strict):
 
 
 class Cluster(Strict):
-    """Everything the job scripts need to know of a cluster."""
+    """Description of a cluster, for job scripts."""
 
     schema_version: Literal[1]
     name: Word
@@ -138,10 +135,10 @@ class Cluster(Strict):
         return self
 
     def partition(self, name: str | None) -> tuple[str, Partition]:
-        """Return a partition and its name; by default the cluster's default.
+        """Return the name and the data of a partition; of the default partition if no name is given.
 
         Raises:
-            InputError: the cluster has no such partition.
+            InputError: The cluster has no partition of this name.
         """
         wanted = name or self.default_partition
         if wanted not in self.partitions:
@@ -151,15 +148,15 @@ class Cluster(Strict):
 
 
 def shipped_clusters() -> list[str]:
-    """Return the names of the clusters that come with the project."""
+    """Return the names of the clusters described in this package."""
     return sorted(path.stem for path in SHIPPED.glob("*.toml"))
 
 
 def load_cluster(reference: str) -> Cluster:
-    """Read the facts about a cluster, by a shipped one's name or from a file that ends in .toml.
+    """Read the description of a cluster by its name in this package, or from a file that ends in .toml.
 
     Raises:
-        InputError: unknown name, unreadable file, unknown key, bad value.
+        InputError: An unknown name, an unreadable file, an unknown key, or an invalid value.
     """
     own = reference.endswith(".toml")
     if not own and reference not in shipped_clusters():

@@ -1,4 +1,4 @@
-"""Array jobs of Slurm: what is asked of a cluster for some runs, checked against its limits, and the job script."""
+"""Plan an array job of Slurm within the limits of a cluster, and render its job script."""
 
 from __future__ import annotations
 
@@ -19,46 +19,44 @@ from templates.slurm.cluster import Cluster, Partition, format_time, parse_time
 TEMPLATES = Path(__file__).parent / "jobs"
 SCRIPT, RUN_LIST = "array.sh", "runs.txt"
 
-# Machines differ by a factor of two from the one that costs were measured on, and runs on a node share its memory bus.
+# Factor from expected to requested time: machines differ by a factor of two, and runs on a node share its memory bus.
 TIME_MARGIN = 3.0
-LEAST_TIME_S = 600
-# A run of 1000 smarticles takes less than half of it (`make bench` measures); --memory changes it.
-MEMORY_PER_RUN_MIB = 1024
-LEAST_REQUEUES = 3
-# Between the signal to end at once and the time limit [s]; half of the lead where that is shorter.
-CLOSING_S = 30
+LEAST_TIME_S = 600  #: Least requested time without the lead [s]
+MEMORY_PER_RUN_MIB = 1024  #: Default memory of a run [MiB]; 1000 smarticles take less than half (`make bench`)
+LEAST_REQUEUES = 3  #: Least number of times that a task may return to the queue
+CLOSING_S = 30  #: Time between the signal TERM and the time limit [s], at most half of the lead
 
 
 @dataclass(frozen=True, kw_only=True)
 class Wishes:
-    """Options of the user; None leaves a value to the cluster and the runs."""
+    """Options of the user; None: the value follows from the cluster and the runs."""
 
     partition: str | None = None
     account: str | None = None
-    time: str | None = None  #: Wall time, as Slurm writes it
+    time: str | None = None  #: Wall time of a task, in Slurm's notation
     runs_per_task: int | None = None
-    memory_mib: int | None = None  #: Per run [MiB]
-    ranks: int | None = None  #: Processes of a run, one core each
+    memory_mib: int | None = None  #: Memory of a run [MiB]
+    ranks: int | None = None  #: Number of processes of a run, one core each
 
 
 @dataclass(frozen=True, kw_only=True)
 class Request:
-    """An array of tasks, each of which computes several runs at once, one core each; or one run on several ranks."""
+    """Request for an array job; a task computes several runs on a core each, or one on several ranks."""
 
-    partition: str | None  #: None is Slurm's default
+    partition: str | None  #: None: Slurm's default
     account: str | None
-    tasks: int
-    runs_per_task: int  #: Runs, and cores, of a task; one where it has several ranks
+    tasks: int  #: Number of tasks
+    runs_per_task: int  #: Number of runs, and of cores, of a task; 1 if a run has several ranks
     time_s: int  #: Wall time of a task [s], whole minutes
     memory_mib: int  #: Memory of a task on each node [MiB]
-    lead_s: int  #: Between the signal and the time limit [s]
-    grace_s: int  #: Between the signal and the end of runs that have not reached a checkpoint [s]
-    requeues: int  #: How often a task may be put back into the queue
-    ranks: int = 1  #: Processes of a run, one core each, on `nodes` nodes
-    nodes: int = 1
+    lead_s: int  #: Time between the signal USR1 and the time limit [s]
+    grace_s: int  #: Time between the signals USR1, to end at the next checkpoint, and TERM, to end at once [s]
+    requeues: int  #: Number of times that a task may return to the queue
+    ranks: int = 1  #: Number of processes of a run, one core each
+    nodes: int = 1  #: Number of nodes of a task
 
     def to_text(self) -> str:
-        """Return one line for the terminal."""
+        """Return the request as one line of text."""
         each = f"{self.runs_per_task} runs" if self.runs_per_task > 1 else "1 run"
         where = f"{self.runs_per_task} cores, {self.memory_mib} MiB"
         if self.ranks > 1:
@@ -68,10 +66,10 @@ class Request:
 
 
 def plan_request(expected_s: Sequence[float], cluster: Cluster, wishes: Wishes) -> Request:
-    """Return what to ask for, for runs of some expected wall times [s].
+    """Return the request for runs with given expected wall times [s].
 
     Raises:
-        InputError: it is more than the cluster gives.
+        InputError: The request exceeds a limit of the cluster.
     """
     name, partition = cluster.partition(wishes.partition)
     where = f"partition {name} of {cluster.name}"
@@ -102,7 +100,7 @@ def plan_request(expected_s: Sequence[float], cluster: Cluster, wishes: Wishes) 
         )
     if msg:
         raise InputError(msg)
-    # Costs are those of one core; the gain by ranks is unknown, and left out.
+    # Expected times are for one core, because the speed-up by ranks is unknown.
     longest = TIME_MARGIN * max(expected_s)
     time_s = _time(longest, cluster, partition, wishes.time, where)
     return Request(
@@ -121,7 +119,7 @@ def plan_request(expected_s: Sequence[float], cluster: Cluster, wishes: Wishes) 
 
 
 def _runs_per_task(count: int, partition: Partition, wanted: int | None, memory: int) -> int:
-    """Return what is wanted, but no more than there are runs; by default a full node, with tasks of equal size."""
+    """Return the runs per task: at most all runs; by default a full node, with tasks of equal size."""
     if wanted is not None:
         return wanted if wanted > partition.cores else min(wanted, count)
     most = max(1, min(partition.cores, partition.memory_mib // memory))
@@ -129,7 +127,7 @@ def _runs_per_task(count: int, partition: Partition, wanted: int | None, memory:
 
 
 def _time(longest: float, cluster: Cluster, partition: Partition, wanted: str | None, where: str) -> int:
-    """Return the wall time to ask for [s]: whole minutes, since Slurm counts in them."""
+    """Return the wall time to request [s], in whole minutes, as Slurm counts."""
     if wanted is None:
         needed = max(LEAST_TIME_S, longest) + cluster.signal_lead_s
         time_s = min(60 * math.ceil(needed / 60), partition.max_time_s)
@@ -152,17 +150,17 @@ def _time(longest: float, cluster: Cluster, partition: Partition, wanted: str | 
 
 
 def smarticles_words() -> tuple[str, ...]:
-    """Return the command `smarticles` of this installation, by its full path."""
+    """Return the command `smarticles` of this installation with its full path, as words."""
     console = Path(sys.executable).with_name("smarticles")
     if os.access(console, os.X_OK):
         return (str(console),)
-    # A source tree that is not installed.
+    # The source tree is not installed.
     root = str(Path(__file__).resolve().parents[2])
     return ("env", f"PYTHONPATH={root}", sys.executable, "-P", "-m", "smarticles")
 
 
 def job_name(sweep: str, token: str) -> str:
-    """Return a name for Slurm: plain letters, and a token by which the job is found again."""
+    """Return a job name without special characters, with a token that makes it unique."""
     plain = re.sub(r"[^A-Za-z0-9._-]+", "-", sweep).strip("-.")[:40]
     return f"{plain or 'sweep'}.{token}"
 
@@ -170,10 +168,19 @@ def job_name(sweep: str, token: str) -> str:
 def render_script(
     cluster: Cluster, request: Request, *, sweep: Path, number: str, name: str, count: int, command: Sequence[str]
 ) -> str:
-    """Return the text of an array job's script; what is not plain is quoted for the shell.
+    """Return the text of the script of an array job.
+
+    Args:
+        cluster: The cluster.
+        request: The request.
+        sweep: Directory of the sweep.
+        number: Name of the submission's folder in `jobs/`.
+        name: Name of the job.
+        count: Number of runs.
+        command: Command that starts `smarticles`, as words.
 
     Raises:
-        InputError: a template fails, or a path cannot stand in a script.
+        InputError: The template fails, or the path of the sweep cannot be written into a script.
     """
     folder = f"jobs/{number}"
     where = str(sweep.resolve())

@@ -1,6 +1,6 @@
-"""Submissions of a sweep to Slurm: what was submitted, what the queue says of it, what is to be submitted.
+"""Submit runs of a sweep to Slurm, and read their state from the queue.
 
-DIR/jobs/001/array.sh    the job script; works by hand
+DIR/jobs/001/array.sh    the job script, which can be submitted by hand, too
 DIR/jobs/001/runs.txt    its runs, one name per line; task i computes the i-th group of lines
 DIR/jobs/001/job.json    cluster, job name, job number once it is submitted
 DIR/jobs/001/0.txt       output of task 0
@@ -40,33 +40,33 @@ JOBS, JOB = "jobs", "job.json"
 
 
 class Submission(Document):
-    """Runs that were given to a queue, or written for it: `job.json`."""
+    """Runs that were submitted to a queue, or whose script was only written: `job.json`."""
 
     remedy: ClassVar[str] = (
-        "it is not known which runs are in the queue; look with `squeue --me`, cancel them, and remove its folder"
+        "the runs in the queue are unknown; list them with `squeue --me`, cancel them, and remove the file's folder"
     )
     format: Literal[1] = 1
-    job_name: str  #: Name of the job; unique, so that the job is found even if its number was lost
-    job_id: int | None = None  #: Number of the job; None where the script was only written
-    cluster: str  #: The value of --cluster
+    job_name: str  #: Name of the job, unique, which finds the job in the queue even if its number was lost
+    job_id: int | None = None  #: Number of the job; None if the script was only written
+    cluster: str  #: Value of --cluster
     runs_per_task: int
-    stored: str = ""
+    stored: str = ""  #: Date and time of writing
     runs: tuple[str, ...]  #: Names of the runs, in the order of the tasks
-    number: str = Field("", exclude=True)  #: Name of its folder in `jobs/`
+    number: str = Field("", exclude=True)  #: Name of the submission's folder in `jobs/`
 
     @property
     def script(self) -> str:
-        """Path of its script in the sweep's directory."""
+        """Path of the job script, relative to the directory of the sweep."""
         return f"{JOBS}/{self.number}/{SCRIPT}"
 
     def of_task(self, index: int) -> tuple[str, ...]:
-        """Return the names of the runs of one task."""
+        """Return the names of the runs that a task computes, by its index in the array."""
         return self.runs[index * self.runs_per_task : (index + 1) * self.runs_per_task]
 
 
 @dataclass(frozen=True, kw_only=True)
 class Draft:
-    """A submission that is rendered but not written."""
+    """A submission with its rendered script, before it is written."""
 
     submission: Submission
     request: Request
@@ -75,15 +75,15 @@ class Draft:
 
     @property
     def run_list(self) -> str:
-        """Text of the list of runs."""
+        """Content of the list of runs, `runs.txt`."""
         return "".join(f"{entry.name}\n" for entry in self.entries)
 
 
 def submissions(folder: Path) -> list[Submission]:
-    """Return what was submitted or written for submission, oldest first.
+    """Return the submissions in a directory of a sweep, oldest first.
 
     Raises:
-        InputError: a record is damaged.
+        InputError: A `job.json` is damaged.
     """
     files = sorted(folder.glob(f"{JOBS}/*/{JOB}"))
     return [Submission.read(file).model_copy(update={"number": file.parent.name}) for file in files]
@@ -92,19 +92,22 @@ def submissions(folder: Path) -> list[Submission]:
 def draft(
     path: Path, name: str, entries: Sequence[Entry], reference: str, wishes: Wishes, *, token: str | None = None
 ) -> Draft:
-    """Render a submission; write nothing.
+    """Plan and render a submission without writing it.
 
     Args:
-        path: the sweep's directory; it may be absent.
-        reference: a shipped cluster's name, or a file that ends in .toml.
-        token: makes the job's name unique; by default a random one.
+        path: Directory of the sweep, which may be absent.
+        name: Name of the sweep.
+        entries: Runs to submit.
+        reference: Name of a cluster in this package, or a file that ends in .toml.
+        wishes: Options of the user.
+        token: Text that makes the name of the job unique; random if not given.
 
     Raises:
-        InputError: unknown cluster, a request beyond its limits, or the script cannot be rendered.
+        InputError: An unknown cluster, a request beyond its limits, or a script that cannot be rendered.
     """
     cluster = load_cluster(reference)
     request = plan_request([entry.expected_s for entry in entries], cluster, wishes)
-    # Runs that take about as long share a task: then no core waits for a longer neighbour.
+    # Runs of a task should take equally long, so that no core is idle.
     ordered = tuple(sorted(entries, key=lambda entry: -entry.expected_s))
     taken = [int(folder.name) for folder in path.glob(f"{JOBS}/*") if folder.name.isdecimal()]
     submission = Submission(
@@ -127,7 +130,10 @@ def draft(
 
 
 def write(folder: Folder, draft: Draft) -> Path:
-    """Write a submission's files, set aside runs that cannot go on, and return its folder."""
+    """Write the files of a submission, and return their folder.
+
+    Directories of runs that cannot continue are renamed, so that these runs start from their beginning.
+    """
     for entry in draft.entries:
         if not folder.can_resume(entry):
             folder.set_aside(entry)
@@ -141,18 +147,18 @@ def write(folder: Folder, draft: Draft) -> Path:
 
 
 def submit(folder: Folder, draft: Draft) -> Submission:
-    """Submit what was written, and keep the job's number.
+    """Submit a written submission to Slurm, and store the number of the job.
 
     Raises:
-        RunError: Slurm rejects it, or its answer is no job number.
+        RunError: Slurm rejects the job, or its answer is no job number.
     """
-    # The name was stored before: a job whose number is lost here is still found in the queue by its name.
+    # The stored name finds the job in the queue even if this process is killed before it stores the number.
     script = folder.path / draft.submission.script
     try:
         answer = _call(("sbatch", "--parsable", draft.submission.script), folder.path)
     except (OSError, subprocess.SubprocessError) as error:
         raise RunError(
-            f"{script}: sbatch rejects it: {_reason(error)}; "
+            f"{script}: sbatch rejects the job: {_reason(error)}; "
             f"correct that, then: smarticles resume {folder.path} --submit slurm"
         ) from error
     submitted = draft.submission.model_copy(update={"job_id": parse_job_id(answer, script)})
@@ -166,11 +172,11 @@ def _store(folder: Folder, submission: Submission) -> None:
 
 
 def tasks_of_runs(found: Sequence[Submission]) -> dict[str, Task]:
-    """Return the task of each run: its newest one that waits or computes, else its newest.
+    """Return the task of each run by the run's name: the newest task that has not ended, else the newest.
 
     Raises:
-        QueueError: the queue cannot be asked.
-        RunError: an answer of the queue is not understood.
+        QueueError: Slurm's queue cannot be queried.
+        RunError: The answer of Slurm cannot be parsed.
     """
     by_name = {submission.job_name: submission for submission in found}
     order = {submission.job_name: place for place, submission in enumerate(found)}
@@ -180,9 +186,9 @@ def tasks_of_runs(found: Sequence[Submission]) -> dict[str, Task]:
 
 
 def merged(status: RunStatus, task: Task | None) -> RunStatus:
-    """Return the state of a run from its directory and from the queue together.
+    """Combine the status of a run by its directory with the state of its task in the queue.
 
-    The directory decides about an end: `done` and `failed` stay.
+    The states `done` and `failed` of the directory take precedence.
     """
     if task is None:
         return status
@@ -200,16 +206,16 @@ def merged(status: RunStatus, task: Task | None) -> RunStatus:
 
 
 def to_submit(folder: Folder, tasks: Mapping[str, Task]) -> list[Entry]:
-    """Return the runs without a result that no task of the queue is going to compute."""
+    """Return the runs that are not done and are in no waiting or running task."""
     busy = {run for run, task in tasks.items() if task.state != "ended"}
     return [entry for entry in folder.entries if entry.name not in busy and not folder.is_done(entry)]
 
 
 def reject_queued(folder: Folder) -> None:
-    """Reject to compute here what a queue may be computing elsewhere.
+    """Check that no run of a sweep is in Slurm's queue.
 
     Raises:
-        InputError: runs are in the queue, or it cannot be asked.
+        InputError: A run is in the queue, or the queue cannot be queried.
     """
     found = submissions(folder.path)
     try:
@@ -217,7 +223,7 @@ def reject_queued(folder: Folder) -> None:
     except QueueError as error:
         jobs = ", ".join(str(one.job_id or one.job_name) for one in found)
         raise InputError(
-            f"{folder.path}: was submitted to Slurm (jobs {jobs}), and {error}; resume where the queue can be asked, "
+            f"{folder.path}: was submitted to Slurm (jobs {jobs}), and {error}; resume on a machine with this queue, "
             f"or, if none of these jobs is left, remove {folder.path / JOBS}"
         ) from error
     busy = sorted({str(task.job_id) for task in tasks.values() if task.state != "ended"})
@@ -240,38 +246,42 @@ _BY_MEANING: dict[JobState, str] = {
         LAUNCH_FAILED RECONFIG_FAIL""",
 }
 STATES: dict[str, JobState] = {state: meaning for meaning, states in _BY_MEANING.items() for state in states.split()}
-"""Slurm's job states (man squeue, 22.05 to 25.05), and their meaning for the runs of a task."""
+"""State of a task by Slurm's job state (man squeue, 22.05 to 25.05)."""
 
 _TIMEOUT_S = 60.0
 
 
 class QueueError(RunError):
-    """The queue cannot be asked."""
+    """Raised if Slurm's queue cannot be queried."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Task:
-    """One task of an array job in the queue; state and reason in Slurm's words."""
+    """One task of an array job in the queue."""
 
     job_name: str
     job_id: int
-    index: int
-    slurm_state: str
-    reason: str
+    index: int  #: Index of the task in its array
+    slurm_state: str  #: Slurm's job state, a key of `STATES`
+    reason: str  #: Slurm's reason for the state
 
     @property
     def state(self) -> JobState:
-        """Meaning of the state."""
+        """Whether the task is queued, running or ended."""
         return STATES[self.slurm_state]
 
     @property
     def label(self) -> str:
-        """`12_3`, as Slurm writes it."""
+        """Job and index in Slurm's notation, `12_3`."""
         return f"{self.job_id}_{self.index}"
 
 
 def require_sbatch() -> None:
-    """Reject to submit where Slurm is not installed."""
+    """Check that Slurm's command sbatch is installed.
+
+    Raises:
+        InputError: There is no sbatch.
+    """
     if shutil.which("sbatch") is None:
         raise InputError(
             "--submit slurm: there is no `sbatch` on this machine; submit on the cluster, "
@@ -280,30 +290,30 @@ def require_sbatch() -> None:
 
 
 def parse_job_id(answer: str, script: Path) -> int:
-    """Return the number in the answer of `sbatch --parsable`: `12` or `12;cluster`.
+    """Return the job number from the answer of `sbatch --parsable`: `12` or `12;cluster`.
 
     Raises:
-        RunError: it is something else.
+        RunError: The answer has another form.
     """
     lines = [line for line in answer.splitlines() if line.strip()]
     found = re.fullmatch(r"([1-9][0-9]*)(?:;\S+)?", lines[-1].strip()) if lines else None
     if found is None:
         raise RunError(
             f"{script}: sbatch answered {answer.strip()!r}, which is no job number; "
-            "look with `squeue --me` whether the job is in the queue before submitting again"
+            "check with `squeue --me` whether the job is in the queue before submitting again"
         )
     return int(found[1])
 
 
 def _ask_queue(names: Sequence[str]) -> list[Task]:
-    """Return tasks of jobs by name: a number that Slurm has forgotten is an error."""
+    """Return the tasks of jobs by the names of the jobs, because Slurm reports an old number as an error."""
     if not names:
         return []
     asked = ("--noheader", "--array", "--states=all", f"--name={','.join(names)}", "--format=%j|%F|%K|%T|%r")
     try:
         answer = _call(("squeue", *asked), None)
     except (OSError, subprocess.SubprocessError) as error:
-        raise QueueError(f"the queue cannot be asked: {_reason(error)}") from error
+        raise QueueError(f"the queue cannot be queried: {_reason(error)}") from error
     return parse_queue(answer)
 
 
@@ -311,19 +321,19 @@ def parse_queue(answer: str) -> list[Task]:
     """Return the tasks from squeue's lines `name|job|index|state|reason`.
 
     Raises:
-        RunError: a line is not understood, or names an unknown state.
+        RunError: A line has another form, or an unknown state.
     """
     tasks = []
     for line in answer.splitlines():
         found = re.fullmatch(r"([^|]+)\|([0-9]+)\|([0-9]+)\|([A-Z_]+)\|(.*)", line.strip())
         if found is None:
-            msg = f"squeue answered {line.strip()!r}, which is not understood; please report it with `squeue --version`"
+            msg = f"squeue answered {line.strip()!r}, an unknown form; please report it with `squeue --version`"
             raise RunError(msg)
         name, job, index, state, reason = found.groups()
         if state not in STATES:
             raise RunError(
-                f"Slurm says that task {job}_{index} is {state}, a state that is not known here, so nothing is assumed "
-                "about its runs; please report it with `squeue --version`"
+                f"squeue reports the unknown state {state} of task {job}_{index}, so the state of its runs is unknown; "
+                "please report it with `squeue --version`"
             )
         reason = "" if reason == "None" else reason
         tasks.append(Task(job_name=name, job_id=int(job), index=int(index), slurm_state=state, reason=reason))
@@ -348,5 +358,5 @@ def _reason(error: Exception) -> str:
         return f"there is no `{error.filename}` on this machine"
     if isinstance(error, subprocess.TimeoutExpired):
         return f"no answer within {_TIMEOUT_S:.0f} s"
-    said = getattr(error, "stderr", None) or str(error)
-    return " ".join(said.split()) or f"exit status {getattr(error, 'returncode', '?')}"
+    text = getattr(error, "stderr", None) or str(error)
+    return " ".join(text.split()) or f"exit status {getattr(error, 'returncode', '?')}"

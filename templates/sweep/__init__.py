@@ -1,1 +1,1 @@
-"""A sweep file becomes run directories."""
+"""Read sweep files, make their points, and keep the directory of a sweep."""

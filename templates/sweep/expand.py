@@ -1,4 +1,4 @@
-"""A sweep becomes points: named, rendered, validated scenes."""
+"""Make the points of a sweep: named and validated scenes."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ from dem.scene.scene import Scene
 from templates.sweep.render import Value, evaluate, render_text, render_yaml
 from templates.sweep.sweep_file import SEED, Sweep, matching
 
-MAX_POINTS = 10_000  #: Runs of one sweep, unless the user asks for more: a slip in a grid makes millions
+MAX_POINTS = 10_000  #: Largest number of runs of a sweep by default, because a mistake in a grid makes millions
 
-# A directory name everywhere, which needs no quoting in a shell and does not look like an option.
+# Valid as directory name on every system, needs no quoting in a shell, and cannot be taken for an option.
 _RUN_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._+=-]{0,99}\Z")
 
 
@@ -24,20 +24,20 @@ _RUN_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._+=-]{0,99}\Z")
 class Point:
     """One run of a sweep."""
 
-    name: str  #: Directory name of the run
-    values: Mapping[str, Value]  #: Every variable, the seed included
+    name: str  #: Name of the run and its directory
+    values: Mapping[str, Value]  #: Values of all variables, with the seed
     scene: Scene
-    scene_sha256: str
-    again: bool = False  #: Whether it is another point once more, with other constants
+    scene_sha256: str  #: Hash of the scene
+    again: bool = False  #: Whether the point repeats another one with other constants, see `Again`
 
 
 def expand(sweep: Sweep, *, max_points: int = MAX_POINTS) -> list[Point]:
-    """Return all points of a sweep, in the order of its file.
+    """Make all points of a sweep, in the order of its file.
 
     Raises:
-        InputError: too many runs, a name is unknown, two runs share a name or a scene, a scene is not valid.
+        InputError: More than `max_points` runs, an unknown name, two runs with one name or scene, an invalid scene.
     """
-    # Counted first without making them.
+    # Counted before they are made, which could exhaust the memory.
     sources = _sources(sweep)
     repeats, again = sweep.content.repeats, sweep.content.again
     _check_count(sweep, math.prod([*map(len, sources), len(repeats.seeds) if repeats else 1]), max_points)
@@ -72,7 +72,7 @@ def _check_count(sweep: Sweep, count: int, most: int) -> None:
 
 
 def _sources(sweep: Sweep) -> list[Sequence[Mapping[str, Value]]]:
-    """Return lists of values that are crossed with each other; later ones vary faster."""
+    """Return lists of values whose combinations are the points; values of later lists vary faster."""
     points = sweep.content.points
     sources: dict[str, Sequence[Sequence[Mapping[str, Value]]]] = {
         "constants": [[sweep.content.constants]],
@@ -111,7 +111,7 @@ def _repeated(sweep: Sweep, points: Sequence[dict[str, Value]]) -> Iterator[dict
 
 
 def _derived(sweep: Sweep, values: Mapping[str, Value]) -> dict[str, Value]:
-    """Return values with those that follow from them."""
+    """Return the values of a point with its derived variables."""
     values = dict(values)
     for name, expression in sweep.content.derived.items():
         where = f"{sweep.path}: derived.{name}"
@@ -139,7 +139,7 @@ def _reject_twins(sweep: Sweep, points: list[Point]) -> None:
         twin = scenes.setdefault(point.scene_sha256, point)
         if twin is not point:
             raise InputError(
-                f"{sweep.path}: runs {twin.name} and {point.name} are the same scene although "
+                f"{sweep.path}: runs {twin.name} and {point.name} have identical scenes although "
                 f"{difference(twin.values, point.values)}; use that variable in {sweep.template}"
             )
 

@@ -1,10 +1,10 @@
-"""The directory of a sweep: what belongs to it, what is done, what is missing.
+"""Create and read the directory of a sweep.
 
-DIR/sweep.json          manifest: files it was made of, points with scene hashes, versions
+DIR/sweep.json          manifest: texts of the sweep's files, points with scene hashes, versions
 DIR/scenes/NAME.yaml    the resolved scene of each run
 DIR/runs/NAME/          the run directories
 DIR/logs/NAME.txt       output of the run's process
-DIR/jobs/               what was given to a queue, see `templates.slurm.submission`
+DIR/jobs/               submissions to a queue, see `templates.slurm.submission`
 """
 
 from __future__ import annotations
@@ -31,11 +31,11 @@ from templates.sweep.sweep_file import SEED, Sweep
 
 @dataclass(frozen=True, kw_only=True)
 class RunStatus(Status):
-    """How far one run of a sweep is; `job`: number of the queue's task that computes it, or did last."""
+    """Status of one run of a sweep."""
 
     name: str
     directory: Path
-    job: str | None = None
+    job: str | None = None  #: Number of the latest task of a queue that computes the run, such as `12_3`
 
     def to_dict(self) -> dict[str, Any]:
         """Return plain data for JSON."""
@@ -44,22 +44,22 @@ class RunStatus(Status):
 
 
 def run_status(directory: Path) -> RunStatus:
-    """Return the state of one run directory, which may be absent, from its files alone."""
+    """Return the status of a run by the files in its directory, which may be absent."""
     return RunStatus(name=directory.name, directory=directory, **vars(Run(directory).status))
 
 
 class Entry(Document):
-    """One run of a sweep."""
+    """One run of a sweep in its manifest."""
 
     name: str  #: Name of the run, its scene and its directory
-    scene_sha256: str
-    expected_s: float  #: Expected wall time; only its proportion to the others' matters
-    values: Mapping[str, Any]  #: The sweep's variables
-    again: bool = False  #: Whether it is another run once more, with other constants
+    scene_sha256: str  #: Hash of the scene
+    expected_s: float  #: Expected wall time [s]
+    values: Mapping[str, Any]  #: Values of the sweep's variables
+    again: bool = False  #: Whether the run repeats another run with other constants
 
 
 class SweepManifest(Document):
-    """What made a sweep, `sweep.json`; `files` are the texts of the files that it was made of, by name."""
+    """Manifest of a sweep, `sweep.json`; `files` are the texts of sweep file, template and table by name."""
 
     remedy: ClassVar[str] = "write the sweep to a new directory"
     format: Literal[1] = 1
@@ -74,56 +74,57 @@ class SweepManifest(Document):
 
 @dataclass(frozen=True)
 class Folder:
-    """A sweep's directory and its `sweep.json`."""
+    """The directory of a sweep and its manifest."""
 
     path: Path
     manifest: SweepManifest
 
     @property
     def name(self) -> str:
-        """The sweep's name."""
+        """Name of the sweep."""
         return self.manifest.name
 
     @property
     def entries(self) -> tuple[Entry, ...]:
-        """Its runs."""
+        """All runs of the sweep, in the order of its file."""
         return self.manifest.points
 
     def only(self, entries: Sequence[Entry]) -> Folder:
-        """Return this directory with some of its runs alone."""
+        """Return a folder that lists only the given runs."""
         return Folder(self.path, self.manifest.model_copy(update={"points": tuple(entries)}))
 
     def in_order_of_start(self, entries: Sequence[Entry]) -> list[Entry]:
-        """Return runs in the order in which to start them: the longest first, seed by seed if the sweep wants that.
+        """Return runs in the order in which to start them, those with the longest expected time first.
 
-        Runs that come once more, such as on a slower engine, come after all others.
+        If the sweep is computed seed by seed, all runs with its first seed come before all runs with the second. Runs
+        with `again` come last.
         """
         seeds = list(dict.fromkeys(entry.values.get(SEED) for entry in self.entries))
         ranks = {seed: rank for rank, seed in enumerate(seeds) if self.manifest.seed_by_seed}
         return sorted(entries, key=lambda entry: (entry.again, ranks.get(entry.values.get(SEED), 0), -entry.expected_s))
 
     def scene(self, entry: Entry) -> Path:
-        """Scene file of a run."""
+        """Return the path of the scene of a run."""
         return self.path / "scenes" / f"{entry.name}.yaml"
 
     def run(self, entry: Entry) -> Path:
-        """Run directory of a run."""
+        """Return the directory of a run."""
         return self.path / "runs" / entry.name
 
     def runs(self) -> list[Run]:
-        """Return all runs in order, begun or not."""
+        """Return all runs in the order of the sweep, also those whose directory does not exist yet."""
         return [Run(self.run(entry)) for entry in self.entries]
 
     def log(self, entry: Entry) -> Path:
-        """Output of the run's process."""
+        """Return the path of the output of a run's process."""
         return self.path / "logs" / f"{entry.name}.txt"
 
     def is_done(self, entry: Entry) -> bool:
-        """Return whether the run finished, with the scene that the manifest lists."""
+        """Return whether a run is done, with the scene of the manifest."""
         return Run(self.run(entry)).status.state == "done" and self._is_of_scene(entry)
 
     def can_resume(self, entry: Entry) -> bool:
-        """Return whether the run was stopped, did not fail, and left a checkpoint to go on from."""
+        """Return whether a run can continue from a checkpoint, with the scene of the manifest."""
         return Run(self.run(entry)).can_resume and self._is_of_scene(entry)
 
     def _is_of_scene(self, entry: Entry) -> bool:
@@ -133,11 +134,11 @@ class Folder:
             return False
 
     def status(self) -> list[RunStatus]:
-        """Return the state of every run."""
+        """Return the status of all runs."""
         return [run_status(self.run(entry)) for entry in self.entries]
 
     def set_aside(self, entry: Entry) -> None:
-        """Rename what an unfinished run left, so that the run can start anew; nothing is deleted."""
+        """Rename the directory of an unfinished run, so that the run can start from its beginning."""
         directory = self.run(entry)
         if directory.is_dir() and any(directory.iterdir()):
             number = 1
@@ -147,13 +148,13 @@ class Folder:
 
     @contextmanager
     def lock(self) -> Iterator[int]:
-        """Hold the sweep for one runner; yields the descriptor that its runs inherit.
+        """Lock the sweep, and yield the file descriptor that the processes of its runs must inherit.
 
-        The lock lives as long as any process holds the descriptor: also after the runner was
-        killed and left runs behind, which still write.
+        The lock lasts until the last process with this descriptor ends, so that runs which outlive a killed parent
+        process keep the sweep locked.
 
         Raises:
-            InputError: another process holds it.
+            InputError: Another process holds the lock.
         """
         with (self.path / ".lock").open("a") as file:
             try:
@@ -167,7 +168,7 @@ class Folder:
 
 
 def entry_of(point: Point, expected_s: float) -> Entry:
-    """Return a point as the manifest lists it."""
+    """Return the entry of the manifest for a point with an expected wall time [s]."""
     return Entry(
         name=point.name,
         scene_sha256=point.scene_sha256,
@@ -187,17 +188,21 @@ def create_folder(
     expected_s: Callable[[Scene], float],
     extend: bool = False,
 ) -> Folder:
-    """Make a sweep's directory, or take up the one that holds the same sweep.
+    """Create the directory of a sweep, or open a directory that already holds this sweep.
 
     Args:
-        path: the directory; absent, empty, or made by the same sweep.
-        expected_s: expected wall time [s] of a scene.
-        extend: whether a directory that holds some of these runs, and no others, takes up the rest.
+        path: The directory, which is absent, empty, or holds this sweep.
+        sweep: The sweep.
+        points: Its points.
+        command: Command line, for the manifest.
+        versions: Versions of the software, for the manifest.
+        expected_s: Returns the expected wall time [s] of a scene.
+        extend: Whether to add the missing runs to a directory that holds some of these runs and no others.
 
     Raises:
-        InputError: the directory holds something else, or is to be extended while its runs are being computed.
+        InputError: The directory holds something else, or its runs are being computed while it is to be extended.
     """
-    # By their names as seen from the sweep file, wherever that lies on this machine.
+    # Names relative to the sweep file, which do not depend on this machine.
     files = {sweep.path.name: sweep.text, sweep.content.template: sweep.template_text}
     if sweep.content.points.table is not None and sweep.table_text is not None:
         files[sweep.content.points.table.file] = sweep.table_text
@@ -248,7 +253,7 @@ def create_folder(
 
 
 def _some(what: str, names: Sequence[str], most: int = 8) -> str:
-    """Return `what` and the first few names; nothing where there are none."""
+    """Return `what` and at most the first `most` names as text; an empty text if there is no name."""
     more = f" and {len(names) - most} more" if len(names) > most else ""
     return f"{what}{', '.join(names[:most])}{more}" if names else ""
 
@@ -257,7 +262,7 @@ def open_folder(path: Path) -> Folder:
     """Open the directory of a sweep.
 
     Raises:
-        InputError: it is not the directory of a sweep, or its manifest is damaged.
+        InputError: The path is not the directory of a sweep, or its manifest is damaged.
     """
     if (path / MANIFEST).is_file():
         return Folder(path, SweepManifest.read(path / MANIFEST))

@@ -1,8 +1,7 @@
-"""Jinja2 templates whose values cannot break out of the YAML they are put into.
+"""Render Jinja2 templates as text or as YAML data.
 
-A template is text, so that loops and conditions may shape a scene. Each `{{ … }}` leaves a placeholder, the text is
-read as YAML, and the placeholders are then replaced by the values themselves: a value that stands alone keeps its type,
-and no string can add a key or end a quotation.
+For YAML, each `{{ … }}` becomes a placeholder in the text. The text is parsed, and the placeholders in the data are
+then replaced by the values. A value that is alone keeps its type, and no value can change the structure of the YAML.
 """
 
 from __future__ import annotations
@@ -19,11 +18,11 @@ from jinja2.sandbox import ImmutableSandboxedEnvironment
 from dem.errors import InputError, nearest
 from dem.scene.yaml_text import StrictLoader, parse_yaml
 
-Value = Any  #: Value of a variable: None, bool, int, float, str, and lists and mappings of these
+Value = Any  #: Value of a variable: None, bool, int, float, str, or lists and mappings of such values
 
 
 def _environment(finalize: Callable[..., Any] | None = None) -> ImmutableSandboxedEnvironment:
-    """Return a sandbox in which a misspelt name is an error."""
+    """Return a sandbox in which an unknown name is an error."""
     return ImmutableSandboxedEnvironment(
         undefined=jinja2.StrictUndefined,
         finalize=finalize,
@@ -42,7 +41,7 @@ def _plain(value: Value) -> bool:
 
 
 def _line(error: BaseException) -> int | None:
-    """Return the line of the template in which a rendering error arose."""
+    """Return the line of the template at which rendering failed; None if it is unknown."""
     line, step = None, error.__traceback__
     while step is not None:
         if step.tb_frame.f_code.co_filename == "<template>":
@@ -52,7 +51,7 @@ def _line(error: BaseException) -> int | None:
 
 
 def _reject(error: Exception, where: str, values: Mapping[str, Value]) -> NoReturn:
-    """Raise the InputError that explains why a template or an expression failed."""
+    """Raise an InputError about the failure of a template or an expression."""
     text = " ".join(str(error).split())
     if isinstance(error, jinja2.UndefinedError):
         name = re.match(r"'([^']+)' is undefined", text)
@@ -63,7 +62,7 @@ def _reject(error: Exception, where: str, values: Mapping[str, Value]) -> NoRetu
     raise InputError(msg) from error
 
 
-# Errors of templates and expressions: Jinja2's own and those of the values in them.
+# Errors of Jinja2, and of Python in expressions.
 _FAILURES = (jinja2.TemplateError, ArithmeticError, TypeError, ValueError, LookupError)
 
 
@@ -71,7 +70,7 @@ def evaluate(expression: str, values: Mapping[str, Value], source: str) -> Value
     """Return the value of a Jinja2 expression such as `(n / 2) | round | int`, evaluated in a sandbox.
 
     Raises:
-        InputError: it uses an unknown name, fails, or gives something that is not plain data.
+        InputError: The expression uses an unknown name, fails, or has a value that is not plain data.
     """
     environment = _environment()
     try:
@@ -82,15 +81,15 @@ def evaluate(expression: str, values: Mapping[str, Value], source: str) -> Value
         _reject(error, f"{source} = {expression!r}", values)
     if not _plain(result):
         what = type(result).__name__
-        raise InputError(f"{source} = {expression!r}: gives {what}; it must give numbers or text")
+        raise InputError(f"{source} = {expression!r}: gives {what}; an expression must give numbers or text")
     return result
 
 
 def render_text(template: str, values: Mapping[str, Value], source: str) -> str:
-    """Render a short text with `{{ … }}` in it as it stands; for names, not for YAML.
+    """Render a template as text; `render_yaml` is for YAML.
 
     Raises:
-        InputError: it uses an unknown name, or fails.
+        InputError: The template uses an unknown name, or fails.
     """
     try:
         return _environment().from_string(template).render(**values)
@@ -99,17 +98,17 @@ def render_text(template: str, values: Mapping[str, Value], source: str) -> str:
 
 
 def render_yaml(template: str, values: Mapping[str, Value], source: str) -> Any:
-    """Return the data, mappings, lists and plain values, of a YAML template with Jinja2 in it.
+    """Render a template of YAML, and return its data.
 
     Raises:
-        InputError: an unknown name, a Jinja2 or YAML mistake; the message names the line.
+        InputError: An unknown name, or an error of Jinja2 or YAML; the message names the line.
     """
     prefix = "value"
     while prefix in template or prefix in repr(values):
         prefix += "x"
     held: list[Value] = []
 
-    @jinja2.pass_context  # called while rendering only, not when constants are folded
+    @jinja2.pass_context  # so that Jinja2 does not call this at compile time for constants
     def hold(_: Context, value: Value) -> str:
         if isinstance(value, jinja2.Undefined):
             str(value)  # StrictUndefined raises, with the name
@@ -129,7 +128,7 @@ def render_yaml(template: str, values: Mapping[str, Value], source: str) -> Any:
 
 
 def _loader(placeholder: re.Pattern[str], held: list[Value]) -> type[StrictLoader]:
-    """Return a loader that puts held values in the place of their placeholders."""
+    """Return a YAML loader that replaces placeholders by the held values."""
 
     class Loader(StrictLoader):
         pass

@@ -1,6 +1,7 @@
-"""The sweep file: how one template makes many scenes; `smarticles sweep --help` shows one with all its keys.
+"""Read sweep files, which make many scenes from one template.
 
-Variants are JSON merge patches (RFC 7386) of the file: FILE@quick applies one, FILE@code,quick two in this order.
+`smarticles sweep --help` shows a sweep file with all its keys. Variants are JSON merge patches (RFC 7386) of the file:
+FILE@quick applies the variant `quick`, FILE@code,quick applies `code` and then `quick`.
 """
 
 from __future__ import annotations
@@ -54,7 +55,7 @@ class Table(Strict):
 
 
 class Points(Strict):
-    """Where the points come from. Several sources are crossed; later ones vary faster."""
+    """Sources of the points, of which all combinations are made; values of later sources vary faster."""
 
     table: Table | None = None
     list_: list[dict[str, Value]] | None = Field(default=None, alias="list", min_length=1)
@@ -90,22 +91,22 @@ Seeds = Annotated[tuple[int, ...], AfterValidator(_once_each)]
 
 
 class MoreSeeds(Strict):
-    """Further seeds of some points, after those that all points have."""
+    """Further seeds for some of the points, computed after the seeds of all points."""
 
-    seeds: Seeds = Field(min_length=1, description="seeds beside those of all points, one run each")
+    seeds: Seeds = Field(min_length=1, description="further seeds, one run each")
     only: dict[str, list[Value]] = Field(
         min_length=1, description="the points whose variable holds one of these values"
     )
 
 
 class Repeats(Strict):
-    """The same point with other random numbers."""
+    """Seeds with which every point is repeated."""
 
     seeds: Seeds = Field(min_length=1, description="seeds of the scene, one run each")
     seed_by_seed: bool = Field(
         default=False,
-        description="start every point with the first seed before any with the second, so that what is there when the "
-        "sweep is interrupted covers all points",
+        description="start every point with the first seed before any with the second, so that the finished runs of an "
+        "interrupted sweep cover all points",
     )
     more: MoreSeeds | None = None
 
@@ -118,16 +119,16 @@ class Repeats(Strict):
 
 
 class Again(Strict):
-    """Some of the points once more, with other constants, after all others; such as on another engine."""
+    """Repetition of some points with other constants, such as another engine, after all other points."""
 
-    constants: dict[str, Value] = Field(min_length=1, description="constants that differ there")
+    constants: dict[str, Value] = Field(min_length=1, description="constants that differ in the repetition")
     only: dict[str, list[Value]] = Field(
         default={}, description="the points whose variable holds one of these values; the seed is one of them"
     )
 
 
 class SweepFile(Strict):
-    """A sweep file, validated."""
+    """Validated content of a sweep file."""
 
     schema_version: Literal[1]
     name: str = Field(min_length=1)
@@ -167,7 +168,7 @@ class SweepFile(Strict):
 
 @dataclass(frozen=True, kw_only=True)
 class Sweep:
-    """A sweep file with its text, its scene template, and its table, of which `table` has the rows that are kept."""
+    """A sweep file with its scene template and its table; `table` are the rows that `only` keeps."""
 
     path: Path
     text: str
@@ -179,17 +180,17 @@ class Sweep:
 
 
 def load_sweep(path: Path) -> Sweep:
-    """Read a sweep file, template and table; FILE@VARIANT,VARIANT applies variants in order.
+    """Read a sweep file with its template and table; FILE@VARIANT,VARIANT applies variants in order.
 
     Raises:
-        InputError: a file is missing or malformed, a key or variant unknown, a value out of range.
+        InputError: A missing or malformed file, an unknown key or variant, or a value out of its range.
     """
     name, _, variants = path.name.partition("@")
     text = read_text(path.with_name(name), "sweep file")
     data = parse_yaml(text, str(path))
     if variants and isinstance(data, dict):
         data = _varied(path, data, variants.split(","))
-        # The resolved file, so that the record of a sweep is complete.
+        # The manifest must hold the file with its variants applied.
         text = yaml.safe_dump(data, sort_keys=False, allow_unicode=True)
     if not isinstance(data, dict):
         raise InputError(f"{path}: a sweep file holds keys such as template and points: got {shown(data)}")
@@ -220,14 +221,14 @@ def _varied(path: Path, data: Mapping[str, Any], variants: Sequence[str]) -> dic
             known = nearest(variant, sorted(patches)) if patches else "it has none"
             raise InputError(f"{path}: there is no variant {variant!r}; {known}")
         varied = {
-            **merged(varied, patches[variant]),
+            **patched(varied, patches[variant]),
             "name": patches[variant].get("name", f"{varied['name']}-{variant}"),
         }
     return varied
 
 
-def merged(value: Any, patch: Any) -> Any:
-    """Apply a JSON merge patch (RFC 7386): mappings are merged, null removes a key, all else replaces."""
+def patched(value: Any, patch: Any) -> Any:
+    """Apply a JSON merge patch (RFC 7386): merge mappings, remove keys with null, replace other values."""
     if not isinstance(patch, Mapping):
         return patch
     result = dict(value) if isinstance(value, Mapping) else {}
@@ -235,7 +236,7 @@ def merged(value: Any, patch: Any) -> Any:
         if part is None:
             result.pop(key, None)
         else:
-            result[key] = merged(result.get(key), part)
+            result[key] = patched(result.get(key), part)
     return result
 
 
@@ -243,7 +244,7 @@ def with_constants(sweep: Sweep, constants: Mapping[str, Value]) -> Sweep:
     """Return a sweep with other values for some of its constants.
 
     Raises:
-        InputError: the sweep has no such constant.
+        InputError: The sweep has no constant of this name.
     """
     for name in constants:
         if name not in sweep.content.constants:
@@ -257,10 +258,10 @@ ENGINE = "engine"  #: The constant of a sweep that names the engine of its scene
 
 
 def on_engine(sweep: Sweep, engine: str) -> Sweep:
-    """Return a sweep with all its runs on one engine, none of them once more on another.
+    """Return a sweep with all runs on one engine; repetitions on another engine are left out.
 
     Raises:
-        InputError: the sweep has no constant that names its engine.
+        InputError: The sweep has no constant `engine`.
     """
     content = sweep.content
     points = content.points
@@ -281,10 +282,10 @@ def on_engine(sweep: Sweep, engine: str) -> Sweep:
 
 
 def read_text(path: Path, what: str) -> str:
-    """Return the text of a file.
+    """Return the text of a file; `what` names the kind of file in messages.
 
     Raises:
-        InputError: the file cannot be read, or is not UTF-8 text.
+        InputError: The file cannot be read, or is not UTF-8 text.
     """
     try:
         return path.read_text(encoding="utf-8")
@@ -295,10 +296,10 @@ def read_text(path: Path, what: str) -> str:
 
 
 def parse_table(text: str, source: str) -> list[dict[str, int | float | str]]:
-    """Return the rows of a CSV text whose first line names the columns; cells are numbers where they can be.
+    """Return the rows of a CSV text whose first line names the columns; cells become numbers if possible.
 
     Raises:
-        InputError: no rows, a bad column name, a row of another length, an empty cell.
+        InputError: No row, an invalid column name, a row of another length, or an empty cell.
     """
     rows = [row for row in csv.reader(io.StringIO(text)) if row]
     if len(rows) < 2:
@@ -346,10 +347,16 @@ def _read_table(path: Path, table: Table | None) -> tuple[list[dict[str, Value]]
 def matching(
     rows: Sequence[dict[str, Value]], only: Mapping[str, Sequence[Value]], where: str, nouns: tuple[str, str]
 ) -> list[dict[str, Value]]:
-    """Return the rows, or points, with one of the values wanted; `nouns` are for messages.
+    """Return the rows that have one of the wanted values in each variable of `only`.
+
+    Args:
+        rows: Rows of a table, or points.
+        only: Wanted values by variable.
+        where: Place of `only`, for messages.
+        nouns: Words for a variable and for a row, for messages.
 
     Raises:
-        InputError: a variable is unknown, no row has one of its values, or no row has all of them.
+        InputError: A variable is unknown, no row has one of the wanted values, or no row is kept.
     """
     variable, row_ = nouns
     kept = list(rows)

@@ -14,22 +14,22 @@
 # 72 runs of the sweep in /home/user/sweeps/friction, made by `smarticles`.
 # By hand:  cd -- /home/user/sweeps/friction && sbatch jobs/001/array.sh
 # Task number i computes 36 runs at once, one core each: lines 36 i + 1 and following of
-# jobs/001/runs.txt. Runs that are done or failed are passed over, others go on from their last checkpoint.
+# jobs/001/runs.txt. Runs that are done or failed are skipped, others continue from their last checkpoint.
 set -euo pipefail
 cd -- /home/user/sweeps/friction
 
-# One thread per run: threads that find no free core spin, and bits depend on their number.
+# One thread per run: results depend on the number of threads, and more threads than cores are slow.
 export OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 MKL_NUM_THREADS=1
 set +u # module systems use variables that are not set
 module load apptainer
 set -u
-# The image's run script is the command; the sweep is seen inside under the same path.
+# The run script of the image is smarticles; the sweep has one path inside and outside of the container.
 smarticles=(apptainer run --bind "$PWD" /shared/images/smarticles.sif)
 
 task=${SLURM_ARRAY_TASK_ID:?submit this script with sbatch}
 mapfile -t -s $((task * 36)) -n 36 runs <jobs/001/runs.txt
 began=jobs/001/$task.began
-: >"$began" # what is newer was made by this task
+: >"$began" # this task makes all newer files
 pids=()
 signalled=
 
@@ -53,7 +53,7 @@ start() {
 send() {
     local pid
     for pid in "${pids[@]}"; do
-        kill -s "$1" "$pid" 2>/dev/null || true # it has ended
+        kill -s "$1" "$pid" 2>/dev/null || true # the process may have ended
     done
 }
 
@@ -73,8 +73,8 @@ mkdir -p runs logs
 for run in "${runs[@]}"; do
     [ "$(state "$run")" != open ] || start "$run"
 done
-[ -z "$signalled" ] || send "$signalled" # those that were not started yet
-until wait; do # a signal ends it early
+[ -z "$signalled" ] || send "$signalled" # to runs that started after the signal
+until wait; do # a signal interrupts wait
     patience=$((SECONDS + 270))
     while computing && ((SECONDS < patience)); do
         sleep 1
@@ -98,7 +98,7 @@ if [ "$signalled" = USR1 ] && [ "$open" -gt 0 ]; then
     if [ "$progress" = no ]; then
         echo "task $task: not queued again: no run reached a checkpoint; ask for more --time" >&2
     elif ((${SLURM_RESTART_COUNT:-0} >= 3)); then
-        echo "task $task: not queued again: it was 3 times; go on with smarticles resume" >&2
+        echo "task $task: not queued again: it was queued again 3 times; continue with smarticles resume" >&2
     else
         echo "task $task: queued again"
         scontrol requeue "$SLURM_JOB_ID"

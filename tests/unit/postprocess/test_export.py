@@ -247,7 +247,7 @@ def test_errors_are_one_line_and_leave_nothing(pile, asked, message):
 @pytest.mark.parametrize("suffix", ["vtp", "glb"])
 def test_a_file_of_nothing_is_rejected(pile, tmp_path, suffix):
     # This run has neither hooks nor strings.
-    with pytest.raises(InputError, match="of hooks, strings there is none here; leave out less"):
+    with pytest.raises(InputError, match="the run has no hooks, strings at this time; leave out less"):
         export_run(pile, to=suffix, output=tmp_path / f"out.{suffix}", unwanted=["smarticles", "wall", "floor"])
     assert list(tmp_path.iterdir()) == [pile]
 

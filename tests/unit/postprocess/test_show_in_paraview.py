@@ -108,7 +108,7 @@ def test_boxes_by_crossings_wall_cut_open_time_running(tmp_path, pvpython):
     assert scene["times"] == pytest.approx(read_frames(run).times.tolist())
     # The half towards the camera, at negative y, is cut away.
     assert scene["cut"][2:4] == pytest.approx((0.0, RADIUS), abs=1e-3 * RADIUS)
-    assert scene["shown"] == ["floor", "passages", "smarticles", "time", "wall, cut open"]
+    assert scene["shown"] == ["arrows", "floor", "smarticles", "time", "wall, cut open"]
     pictures = [pixels(path) for path in sorted(film.glob("*.png"))]
     assert len(pictures) == 4
     coloured = [int((np.ptp(picture, axis=2) > 40).sum()) for picture in pictures]

@@ -267,7 +267,7 @@ def test_bad_points_are_input_errors(old: str, new: str, message: str, write_swe
 
 def test_a_variable_that_changes_nothing_is_an_error(write_sweep: WriteSweep) -> None:
     sweep = load_sweep(write_sweep(scene=SCENE.replace("{{ count }}", "10")))
-    with pytest.raises(InputError, match=r"n10_seed1 and n20_seed1 are the same scene .*count 10"):
+    with pytest.raises(InputError, match=r"n10_seed1 and n20_seed1 have identical scenes .*count 10"):
         expand(sweep)
 
 

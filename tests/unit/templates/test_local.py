@@ -120,7 +120,7 @@ def test_a_failing_run_does_not_stop_the_others(folder: Folder) -> None:
         "killed by SIGKILL (out of memory?): Segmentation something",
         "scene.yaml: count: -1 is negative; use 1",
         "left through the wall",
-        f"ended without done.json, without a word; see {folder.log(folder.entries[3])}",
+        f"ended without done.json, without output; see {folder.log(folder.entries[3])}",
     ]
 
 
@@ -192,7 +192,7 @@ def test_a_run_that_does_not_listen_is_made_to_stop(folder: Folder) -> None:
     watcher = Watcher(when=lambda _: progress.exists())
     with pytest.raises(KeyboardInterrupt):
         run_folder(folder, watcher, slots=1, command=deaf, poll_s=0.01, grace_s=1.0)
-    assert [outcome.cause for outcome in watcher.ends] == ["killed by SIGTERM, without a word; see "
+    assert [outcome.cause for outcome in watcher.ends] == ["killed by SIGTERM, without output; see "
         f"{folder.log(folder.entries[2])}"]  # fmt: skip
     assert is_free(folder)
 

@@ -83,7 +83,7 @@ def test_expressions(expression: str, value: Any) -> None:
         ("n.__class__", "unsafe"),
         ("n.__class__.__base__.__subclasses__()", "unsafe"),
         ("(n", "derived.x = '\\(n'"),
-        ("range(3)", "gives range; it must give numbers or text"),
+        ("range(3)", "gives range; an expression must give numbers or text"),
         ("n / 0", "division by zero"),
         ("(-1) ** 0.5", "gives complex"),
     ],

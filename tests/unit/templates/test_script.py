@@ -247,5 +247,5 @@ def test_requeues_are_bounded(by_hand: ByHand) -> None:
     process = by_hand.start("stop1", restarts=3)
     said = by_hand.signal_when_ready(process, "stop1")
     assert "scontrol" not in said
-    assert "not queued again: it was 3 times; go on with smarticles resume" in said
+    assert "not queued again: it was queued again 3 times; continue with smarticles resume" in said
     assert process.returncode == 1

@@ -52,8 +52,8 @@ def test_the_queue_is_read() -> None:
 @pytest.mark.parametrize(
     ("line", "message"),
     [
-        ("six.1|12|0|DREAMING|None", "task 12_0 is DREAMING, a state that is not known here"),
-        ("slurm_load_jobs: something\n", "which is not understood"),
+        ("six.1|12|0|DREAMING|None", "unknown state DREAMING of task 12_0"),
+        ("slurm_load_jobs: something\n", "an unknown form"),
     ],
 )
 def test_an_unknown_state_or_line_is_an_error(line: str, message: str) -> None:
@@ -166,7 +166,7 @@ def test_a_queue_that_does_not_answer_is_no_empty_queue(folder: Folder, monkeypa
         raise subprocess.CalledProcessError(1, command, stderr="Unable to contact\nslurm controller")
 
     monkeypatch.setattr(submission, "_call", call)
-    with pytest.raises(QueueError, match="the queue cannot be asked: Unable to contact slurm controller"):
+    with pytest.raises(QueueError, match="the queue cannot be queried: Unable to contact slurm controller"):
         tasks_of_runs(submissions(folder.path))
     with pytest.raises(InputError, match="was submitted to Slurm"):
         reject_queued(folder)
@@ -176,7 +176,7 @@ def test_a_queue_that_does_not_answer_is_no_empty_queue(folder: Folder, monkeypa
 def test_a_damaged_record_is_an_error(folder: Folder, text: str) -> None:
     submitted(folder)
     (folder.path / "jobs/001/job.json").write_text(text)
-    with pytest.raises(InputError, match=r"job.json: .*; it is not known which runs are in the queue"):
+    with pytest.raises(InputError, match=r"job.json: .*; the runs in the queue are unknown"):
         submissions(folder.path)
 
 

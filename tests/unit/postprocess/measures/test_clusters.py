@@ -3,11 +3,10 @@
 import numpy as np
 import pytest
 
-from postprocess import touching_pairs
+from postprocess.geometry.links import swept_axes
 from postprocess.measures.clusters import (
     contact_clusters,
     entanglement_clusters,
-    joined_clusters,
     spans_height,
     spans_width,
 )
@@ -63,8 +62,7 @@ def upright(at, low=0.0, long=0.02):
 
 
 def touching(vertices):
-    pairs = touching_pairs(vertices, D)
-    return joined_clusters(len(vertices), pairs.i, pairs.j)
+    return contact_clusters(swept_axes(vertices, D), D * (1 + 1e-9))  # the factor is for rounding
 
 
 def test_a_stack_spans_the_height_until_one_is_missing():

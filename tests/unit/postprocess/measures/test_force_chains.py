@@ -15,13 +15,7 @@ from dem.record.forces import has_forces, read_forces
 from dem.record.frames import read_frames
 from dem.record.run import Run, open_run
 from postprocess.geometry.links import UndefinedMeasureError
-from postprocess.measures.force_chains import (
-    MEASURES,
-    force_chains,
-    force_distribution,
-    force_participation,
-    strong_contacts,
-)
+from postprocess.measures.force_chains import MEASURES, force_chains, force_participation, strong_contacts
 from postprocess.measures.table import measure_run
 
 MEASURE = MEASURES[0]
@@ -38,11 +32,6 @@ def test_exponential_forces_have_the_shares_of_theory() -> None:
     assert above.mean() == pytest.approx(math.exp(-1), rel=0.01)
     assert forces[above].sum() / forces.sum() == pytest.approx(2 / math.e, rel=0.01)
     assert force_participation(forces) == pytest.approx(0.5, rel=0.01)
-    found = force_distribution(forces)
-    middles = (found.edges[1:] + found.edges[:-1]) / 2
-    near = middles < 3
-    np.testing.assert_allclose(found.density[near], np.exp(-middles[near]), rtol=0.05)
-    assert (found.density * np.diff(found.edges)).sum() == pytest.approx(1 - math.exp(-8), abs=1e-4)
 
 
 @pytest.mark.parametrize("count", [1, 7])
@@ -51,11 +40,9 @@ def test_forces_that_are_alike_share_alike_and_none_is_strong(count: int) -> Non
     assert not strong_contacts([2.0] * count).any()
 
 
-def test_no_contact_has_no_chain_and_bad_bins_are_rejected() -> None:
+def test_no_contact_has_no_chain() -> None:
     with pytest.raises(UndefinedMeasureError, match="at least 1 contact"):
         force_participation([])
-    with pytest.raises(InputError, match="edges must be numbers that ascend"):
-        force_distribution([1.0], edges=[0.0, 0.0])
 
 
 def test_chains_are_joined_by_strong_contacts_alone(run: Path) -> None:

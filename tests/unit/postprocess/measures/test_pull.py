@@ -11,7 +11,7 @@ from synthetic.hooked import AFTER_REST, INTERVAL, SPEED, write_hooked_run
 from dem.errors import InputError
 from dem.record.run import Run, open_run
 from dem.record.series import read_series
-from postprocess.measures.pull import FREE, WINDOW, freed, moving_mean, peak, read_pull
+from postprocess.measures.pull import FREE, WINDOW, freed, held_fast, moving_mean, peak, read_pull
 from postprocess.measures.table import summarise_run
 
 HEIGHT, APEX, BASE = 0.02, 0.6, 0.5  # N; s; s to either side
@@ -97,3 +97,11 @@ def test_a_pull_that_has_just_begun_is_not_measured(tmp_path):
     with pytest.raises(InputError, match=r"series\.h5: no force of a hook throughout phase 2 of"):
         read_pull(open_run(directory), read_series(directory), 2)
     assert "hook work [J]" not in summarise_run(Run(directory)).columns
+
+
+def test_only_a_force_limit_stops_a_hook_on_the_way(pulled):
+    pull, farther = pulled(triangle), {"distance_m": 1.02 * DISTANCE}
+    assert held_fast(pull, {**farther, "force_limit_N": HEIGHT})
+    # Without a limit the last sample lies before the arrival because samples are rare.
+    assert not held_fast(pull, farther)
+    assert not held_fast(pull, {**farther, "force_limit_N": None})

@@ -13,7 +13,7 @@ from synthetic import SyntheticRun, write_run
 
 from dem.errors import InputError
 from postprocess.pictures import film
-from postprocess.pictures.film import Moments, durations
+from postprocess.pictures.film import FilmTimes, durations
 from postprocess.pictures.render import render_film
 
 SIZE = (240, 240)
@@ -48,16 +48,16 @@ def shown(path):
 
 def test_every_frame_is_shown_at_the_stated_speed():
     recorded = 0.04 * np.arange(1, 101)
-    moments = Moments.chosen(recorded, rate=25.0)
+    moments = FilmTimes.choose(recorded, rate=25.0)
     assert moments.indices(recorded) == list(range(100))
     assert moments.pace == "1 × real time"
-    assert Moments.chosen(recorded, rate=12.5).pace == "0.5 × real time"
+    assert FilmTimes.choose(recorded, rate=12.5).pace == "0.5 × real time"
 
 
 def test_frames_at_odd_times_are_shown_nearest_to_theirs():
     """One that is missing is made up for by its neighbour: the speed stays."""
     recorded = np.array([0.0, 1.0, 2.0, 2.2, 3.0, 6.0, 7.0])
-    moments = Moments.chosen(recorded, rate=10.0)
+    moments = FilmTimes.choose(recorded, rate=10.0)
     assert moments.every == 1.0
     assert recorded[moments.indices(recorded)].tolist() == [0, 1, 2, 3, 3, 6, 6, 7]
 
@@ -75,7 +75,7 @@ def test_frames_at_odd_times_are_shown_nearest_to_theirs():
 )
 def test_times_that_make_no_film_are_named(wrong, message):
     with pytest.raises(InputError, match=message):
-        Moments.chosen(0.1 * np.arange(101), **wrong)
+        FilmTimes.choose(0.1 * np.arange(101), **wrong)
 
 
 @pytest.mark.parametrize("rate", [15.0, 24.0, 29.97, 7.0])
