@@ -57,6 +57,8 @@ class Phase:
     """Whether it brings the smarticles: a run begins with one such phase and has no other."""
     sources: ClassVar[frozenset[str]] = frozenset()
     """Keys that name the source of content which another key pins; a scene's hash omits them."""
+    at_rest: ClassVar[bool] = False
+    """Whether nothing drives the smarticles in it; all other phases count as activity, around which φ is measured."""
     pours: ClassVar[bool] = False  #: Whether the pile grows from nothing in it
     frees: ClassVar[bool] = False  #: Whether it takes the container away
     planar: ClassVar[bool | None] = False

@@ -100,6 +100,7 @@ class TakeOver(Part, Phase):
     """Begin with the smarticles of another run, of any engine, at rest where a frame of it has them; they settle."""
 
     begins: ClassVar[bool] = True
+    at_rest: ClassVar[bool] = True
     sources: ClassVar[frozenset[str]] = frozenset({"run", "frame"})
     type: Literal["take-over"]
     run: str = Field(..., min_length=1, description="directory of the run, as seen from the scene file")
