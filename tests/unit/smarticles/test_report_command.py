@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+from functools import partial
 from html.parser import HTMLParser
 from pathlib import Path
 
@@ -14,6 +15,7 @@ from command_cases import Smarticles, WriteRun
 from scenes import small
 
 from dem.scene.reading import dump_scene
+from postprocess.pictures import render
 from smarticles.reporting.charts import thinned
 from smarticles.sweeps import make_folder
 from studies.registry import study_file
@@ -53,6 +55,12 @@ class Read(HTMLParser):
 
     def row(self, *first: str) -> list[str]:
         return next(row for row in self.rows if row[: len(first)] == list(first))
+
+
+@pytest.fixture(autouse=True)
+def _two_views(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Piles are drawn from two sides: all 24 are drawn in `test_report_browser.py`."""
+    monkeypatch.setattr(render, "turntable", partial(render.turntable, views=2))
 
 
 @pytest.fixture
