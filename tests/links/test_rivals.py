@@ -93,26 +93,6 @@ def flight(times: Array) -> tuple[Array, float]:
     return np.where((times > leaves) & (times < lands), above(times), 0.0), lands
 
 
-def thickness(given: Task, shape: str) -> float:
-    """How high the centre of one that lies flat is [m]."""
-    particle = given.scene.particle
-    return particle.boxes.thickness_normal / 2 if shape == "boxes" else particle.radius
-
-
-@pytest.mark.parametrize("engine", CHOSEN)
-def test_a_smarticle_lies_on_the_floor_and_goes_with_it(engine: str, tmp_path: Path) -> None:
-    # At half of gravity the floor never leaves it, and moves by 0.28 mm.
-    given, found = simulated(engine, tmp_path, activity=SHAKE, seconds=0.03, gamma=0.5)
-    heights = found.positions[:, 0, :, 2]
-    assert len(heights) == 2 + 30
-    assert heights == pytest.approx(thickness(given, setting_of(engine).shape), abs=1.5e-5)
-    # As it was put down: not turned, at its place.
-    assert np.abs(found.frames - given.state.link_rotations).max() < 0.02
-    assert found.positions[0, 0, :, :2] == pytest.approx(given.state.link_positions[0, :, :2], abs=2e-5)
-    assert found.processor_s > 0
-    assert found.version.lower().startswith(("links", "lammps", "mujoco", "pybullet", "rapier"))
-
-
 @pytest.mark.parametrize("engine", CHOSEN)
 def test_a_smarticle_is_thrown_as_far_as_theory_says(engine: str, tmp_path: Path) -> None:
     _, found = simulated(engine, tmp_path, activity=SHAKE, seconds=0.03)

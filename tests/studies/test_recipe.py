@@ -123,19 +123,6 @@ def test_scenes_of_the_table_are_those_of_the_sweep(table: str) -> None:
     assert known == runs[list(known)].to_dict()
 
 
-@pytest.mark.parametrize("table", SCRIPTS)
-def test_ids_quantities_and_columns_are_declared_once(table: str) -> None:
-    study = study_of(table)
-    for names in (
-        [finding.id for finding in study.findings],
-        [finding.says for finding in study.findings],
-        [quantity.column for quantity in study.quantities],
-        [figure.name for figure in study.figures],
-    ):
-        assert len(set(names)) == len(names)
-    assert all(quantity.meaning for quantity in study.quantities)
-
-
 @pytest.mark.parametrize("table", [name for name in SCRIPTS if not STUDIES[name].variants])
 def test_text_and_figures_are_made_from_the_tables(table: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("studies.landscape.RESAMPLES", 30)

@@ -89,13 +89,6 @@ def test_a_failing_run_is_status_1_with_its_cause(sweep_file: Path, tmp_path: Pa
     assert (out / "logs" / "n5.txt").read_text(encoding="utf-8").startswith("smarticles: error: ")
 
 
-def test_a_study_without_a_finished_run_has_nothing_to_analyse(tmp_path: Path, smarticles: Smarticles) -> None:
-    said = smarticles("study", "gravish", "--quick", "--analyse", "--out", tmp_path / "out")
-    assert said.status == 2
-    assert "is finished; leave --analyse out to start them" in said.err
-    assert not (tmp_path / "out" / "results").exists()
-
-
 @pytest.mark.parametrize(
     ("words", "message"),
     [
