@@ -81,12 +81,6 @@ def test_what_a_logarithmic_axis_cannot_show_is_stated(
     assert axes.get_ylim()[1] > 2 + half_widths[2]
 
 
-# -- footers ---------------------------------------------------------------------------------------------------------
-
-
-# -- points that were never digitised ----------------------------------------------------------------------------------
-
-
 def test_references_state_where_they_have_no_point() -> None:
     assert gravish_note([0.4, 0.7]).endswith("at every l/w shown.")
     assert gravish_note([0.4, 0.5, 0.55]).endswith("no φ_0 at l/w = 0.5, 0.55; no φ_f at l/w = 0.55.")

@@ -60,8 +60,6 @@ def test_an_equal_sweep_continues_in_its_directory(make_folder: MakeFolder) -> N
             "[1, 3]",
             "runs only in the file: n10_seed3, n20_seed3; only in the directory: n10_seed2, n20_seed2; give",
         ),
-        ("[1, 2]", "[1]", "runs only in the directory: n10_seed2, n20_seed2; give"),
-        ("[1, 2]", "[1, 2, 3]", "runs only in the file: n10_seed3, n20_seed3; give"),
     ],
 )
 def test_another_sweep_is_rejected(make_folder: MakeFolder, old: str, new: str, message: str) -> None:
