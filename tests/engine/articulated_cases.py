@@ -202,23 +202,14 @@ def reloaded(data: dict[str, Any], *, angle: float, spin: Any, folder: str) -> d
     engine.load(engine.save(Path(folder)), Path(folder))
     loaded = (engine.motors._hinges.angles(), engine.motors._hinges.gaps(), engine.motors._hinges.torques())
     engine.motors.actuate(np.full((1, 1, 2), angle), scene.fidelity.control_interval_s)
-    return {
-        "saved": saved,
-        "loaded": loaded,
-        "after": engine.motors._hinges.torques(),
-        "state": engine.state().angles,
-    }
+    return {"saved": saved, "loaded": loaded, "after": engine.motors._hinges.torques(), "state": engine.state().angles}
 
 
 # -- hinges and motors -------------------------------------------------------------------------------------------------
 
 
 def gait(
-    data: dict[str, Any],
-    *,
-    straight_in: float,
-    velocity: Any = (0, 0, 0),
-    spin: Any = (0, 0, 0),
+    data: dict[str, Any], *, straight_in: float, velocity: Any = (0, 0, 0), spin: Any = (0, 0, 0)
 ) -> dict[str, Any]:
     """A free smarticle straightens and bends back; conserved sums every millisecond."""
     scene, engine = floating(data, velocity=velocity, spin=spin)
@@ -265,11 +256,7 @@ def sweep(data: dict[str, Any], *, corners: list[tuple[float, float]], speed: fl
             touching += own_contacts(engine)
             gap = max(gap, engine.motors.gaps().max())
             reached.append(engine.state().angles[0])
-    return {
-        "touching": touching,
-        "angles": np.degrees(reached),
-        "gap": gap / scene.sphere_diameter,
-    }
+    return {"touching": touching, "angles": np.degrees(reached), "gap": gap / scene.sphere_diameter}
 
 
 def hold_all(engine: Any, blocked: str) -> None:

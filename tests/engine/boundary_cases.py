@@ -38,11 +38,7 @@ def energies(engine: YadeEngine) -> dict[str, float]:
         if contact.isReal:
             phys, depth = contact.phys, max(0.0, contact.geom.penetrationDepth)
             elastic += phys.kn * depth**2 / 2 + phys.shearForce.squaredNorm() / (2 * phys.ks)
-    return {
-        "kinetic": state.kinetic_energy,
-        "height": state.potential_energy(engine.gravity, 0.0),
-        "elastic": elastic,
-    }
+    return {"kinetic": state.kinetic_energy, "height": state.potential_energy(engine.gravity, 0.0), "elastic": elastic}
 
 
 def hang(data: dict[str, Any], *, settle: float, pull: float) -> dict[str, Any]:

@@ -76,10 +76,7 @@ def test_the_wall_holds_what_circles_inside_it() -> None:
 
 def test_a_smarticle_hangs_on_a_hook_with_its_weight() -> None:
     side = 0.5e-3
-    hooks = (
-        Cross(height=5e-3, side=side, length=builds.W),
-        Cross(height=40e-3, side=side, length=builds.W),
-    )
+    hooks = (Cross(height=5e-3, side=side, length=builds.W), Cross(height=40e-3, side=side, length=builds.W))
     made = builds.engine(gravity=9.81, hooks=hooks, dt=2e-5, law=replace(builds.LAW, wall_friction=0.8))
     # An upside-down U over the bar along y: the middle link lies across it, barbs hang down.
     turn = Rotation.from_euler("x", -90, degrees=True)

@@ -159,11 +159,7 @@ ORIGIN = {"note": "knobs time-step of scene.yaml", "command": "smarticles accura
 
 
 def run(**changes: Any) -> SyntheticRun:
-    keys: dict[str, Any] = {
-        "phases": ("deposit", "relax", "shake", "relax"),
-        "shake_time": 2.0,
-        "frames_per_phase": 2,
-    }
+    keys: dict[str, Any] = {"phases": ("deposit", "relax", "shake", "relax"), "shake_time": 2.0, "frames_per_phase": 2}
     return SyntheticRun(**{**keys, **changes})
 
 

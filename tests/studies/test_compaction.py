@@ -11,18 +11,7 @@ import pandas as pd
 import pytest
 
 from studies import compaction
-from studies.compaction import (
-    LAWS,
-    LOGARITHMIC,
-    MISSED,
-    STRETCHED,
-    STUDY,
-    TIMES,
-    Fit,
-    at,
-    fit,
-    of,
-)
+from studies.compaction import LAWS, LOGARITHMIC, MISSED, STRETCHED, STUDY, TIMES, Fit, at, fit, of
 from studies.framework.figures import History
 
 TRUE = {law: Fit(law=law, begin=0.11, end=0.17, tau=4.0, power=0.5, residual=0.0) for law in LAWS}

@@ -10,14 +10,7 @@ from dem.errors import InputError
 from dem.scene.reading import load_scene, scene_hash
 from dem.scene.scene import Scene
 from dem.setting.fidelity import FIDELITIES, fidelities
-from studies.accuracy import (
-    BASE,
-    Ladder,
-    affordable,
-    build_ladder,
-    ladder_sweep,
-    parse_seeds,
-)
+from studies.accuracy import BASE, Ladder, affordable, build_ladder, ladder_sweep, parse_seeds
 from templates.sweep.expand import expand
 
 SCENE = """\

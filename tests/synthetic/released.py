@@ -41,12 +41,7 @@ def write_released(
     """A run of four frames per phase; the pile is `before` in the rest, and `after` from half of the removal on."""
     phases = ("deposit", *ACTIVITY[procedure], "relax", "remove-container")
     run = SyntheticRun(
-        phases=phases,
-        seed=seed,
-        count=len(before),
-        aspect_ratio=aspect_ratio,
-        frames_per_phase=FRAMES,
-        series=False,
+        phases=phases, seed=seed, count=len(before), aspect_ratio=aspect_ratio, frames_per_phase=FRAMES, series=False
     )
     write_run(directory, run)
     start = sum(run.durations[kind] for kind in phases[:-1])

@@ -29,10 +29,7 @@ def contracts() -> list[str]:
 @pytest.mark.parametrize("contract", contracts())
 def test_contract(contract: str, capsys: pytest.CaptureFixture[str]) -> None:
     status = lint_imports(
-        config_filename=str(ROOT / ".importlinter"),
-        limit_to_contracts=(contract,),
-        no_cache=True,
-        no_logo=True,
+        config_filename=str(ROOT / ".importlinter"), limit_to_contracts=(contract,), no_cache=True, no_logo=True
     )
     assert status == EXIT_STATUS_SUCCESS, capsys.readouterr().out
 

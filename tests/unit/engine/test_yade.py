@@ -142,11 +142,7 @@ def bounce(damping: float, step: float) -> tuple[float, float]:
             viscous = -damping * speed
             speed += max(KN * overlap + viscous, 0.0) / MASS * step
             said += contact(
-                before=(0, 0, before),
-                after=(0, 0, speed),
-                overlap=overlap,
-                viscous=viscous,
-                damping=(damping, 0.0),
+                before=(0, 0, before), after=(0, 0, speed), overlap=overlap, viscous=viscous, damping=(damping, 0.0)
             ).dissipated(step)
         height += speed * step
         if speed > 0 and height > 1e-4:

@@ -32,12 +32,7 @@ points: {points_text}
 def test_grid_is_crossed_with_the_seeds(write_sweep: WriteSweep) -> None:
     found = points(SWEEP, write_sweep)
     assert [point.name for point in found] == ["n10_seed1", "n10_seed2", "n20_seed1", "n20_seed2"]
-    assert [(point.scene.count, point.scene.seed) for point in found] == [
-        (10, 1),
-        (10, 2),
-        (20, 1),
-        (20, 2),
-    ]
+    assert [(point.scene.count, point.scene.seed) for point in found] == [(10, 1), (10, 2), (20, 1), (20, 2)]
     assert len({point.scene_sha256 for point in found}) == 4
 
 
@@ -93,11 +88,7 @@ def test_on_one_engine_nothing_comes_again(write_sweep: WriteSweep) -> None:
     [
         ("seed: [2]", "sead: [2]", r"again.only.sead: no such variable; did you mean 'seed'\?"),
         ("seed: [2]", "seed: [3]", "again.only.seed: no point has 3; there are 1, 2"),
-        (
-            "constants: {engine: yade,",
-            "constants: {enigne: yade,",
-            "'enigne' is none of the constants",
-        ),
+        ("constants: {engine: yade,", "constants: {enigne: yade,", "'enigne' is none of the constants"),
         ("only:", "olny:", r"again: unknown key 'olny'; did you mean 'only'\?"),
     ],
 )
@@ -141,8 +132,7 @@ def test_more_seeds_must_be_of_known_points(write_sweep: WriteSweep, old: str, n
 
 def test_table_rows_are_points_and_derived_values_follow(write_sweep: WriteSweep) -> None:
     text = sweep_with(
-        "{table: {file: counts.csv}}",
-        more="derived: {half: n / 2, count: half | int, fixed: 3}\nrepeats: {seeds: [1]}",
+        "{table: {file: counts.csv}}", more="derived: {half: n / 2, count: half | int, fixed: 3}\nrepeats: {seeds: [1]}"
     )
     found = points(text, write_sweep, counts_csv=COUNTS)
     assert [point.scene.count for point in found] == [247, 135, 96]
@@ -159,8 +149,7 @@ def test_table_rows_are_points_and_derived_values_follow(write_sweep: WriteSweep
 
 def test_table_keeps_only_the_wanted_rows(write_sweep: WriteSweep) -> None:
     text = sweep_with(
-        "{table: {file: counts.csv, only: {l_over_w: [1.0, 0.4]}}}",
-        more="derived: {count: n}\nrepeats: {seeds: [1]}",
+        "{table: {file: counts.csv, only: {l_over_w: [1.0, 0.4]}}}", more="derived: {count: n}\nrepeats: {seeds: [1]}"
     )
     found = points(text, write_sweep, counts_csv=COUNTS)
     assert [point.values["l_over_w"] for point in found] == [0.4, 1.0]
@@ -168,9 +157,7 @@ def test_table_keeps_only_the_wanted_rows(write_sweep: WriteSweep) -> None:
 
 def test_sources_are_crossed_and_the_later_varies_faster(write_sweep: WriteSweep) -> None:
     text = sweep_with(
-        "{grid: {count: [1, 2]}, list: [{a: 1}, {a: 2}]}",
-        run_name="{{ a }}{{ count }}",
-        more="constants: {seed_: 5}",
+        "{grid: {count: [1, 2]}, list: [{a: 1}, {a: 2}]}", run_name="{{ a }}{{ count }}", more="constants: {seed_: 5}"
     )
     scene = SCENE.replace("seed }}", "seed_ }}").replace("name: test", "name: t{{ a }}")
     found = points(text, write_sweep, scene=scene)
@@ -207,12 +194,7 @@ def test_sources_are_crossed_and_the_later_varies_faster(write_sweep: WriteSweep
     ],
 )
 def test_bad_sweep_files_are_input_errors(text: str, message: str, write_sweep: WriteSweep) -> None:
-    file = write_sweep(
-        text,
-        counts_csv=COUNTS,
-        ragged_csv="a,b\n1,2\n3\n",
-        header_csv="l/w,n\n1,2\n",
-    )
+    file = write_sweep(text, counts_csv=COUNTS, ragged_csv="a,b\n1,2\n3\n", header_csv="l/w,n\n1,2\n")
     with pytest.raises(InputError, match=message) as caught:
         load_sweep(file)
     assert "\n" not in str(caught.value)
@@ -223,17 +205,9 @@ def test_bad_sweep_files_are_input_errors(text: str, message: str, write_sweep: 
     ("old", "new", "message"),
     [
         ("n{{ count }}_", "n{{ cuont }}_", "run_name.*'cuont' is undefined; did you mean 'count'?"),
-        (
-            "n{{ count }}_",
-            "n_",
-            "two runs are called 'n_seed1': count 10 and 20; put what differs into run_name",
-        ),
+        ("n{{ count }}_", "n_", "two runs are called 'n_seed1': count 10 and 20; put what differs into run_name"),
         ("n{{ count }}_", "../{{ count }}", "gives '../10seed1', which cannot be a directory"),
-        (
-            "repeats:",
-            "derived: {count: 3}\nrepeats:",
-            "'count' is set in both points.grid and derived",
-        ),
+        ("repeats:", "derived: {count: 3}\nrepeats:", "'count' is set in both points.grid and derived"),
         ("repeats:", "derived: {x: contu}\nrepeats:", "derived.x = 'contu': 'contu' is undefined"),
         ("[10, 20]", "[10, -20]", r"scene.yaml.j2, rendered for run n-20_seed1: count: .*-20"),
     ],
