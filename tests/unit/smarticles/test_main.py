@@ -43,10 +43,8 @@ def test_help_lists_the_commands_and_the_exit_status(smarticles: Smarticles) -> 
     [
         ([], "command", "known: init, schema, run, plan, "),
         (["stduy"], "COMMAND: 'stduy'", "'study'"),
-        (["--frobnicate"], "--frobnicate", "known: "),
         (["run"], "SCENE.yaml, --out", ""),
         (["run", "s.yaml", "--out", "d", "--sett", "a=1"], "--sett", "'--set'"),
-        (["run", "s.yaml", "--out", "d", "more"], "'more'", ""),
         (["study", "gravitsh", "--out", "d"], "NAME: 'gravitsh'", "'gravish'"),
         (["sweep", "s.yaml", "--submit", "slrum"], "--submit: 'slrum'", "'slurm'"),
         (["resume", "d", "--jobs", "0"], "--jobs", "from 1: got '0'"),

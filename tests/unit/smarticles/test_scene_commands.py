@@ -35,7 +35,6 @@ def test_schema_is_a_json_schema(smarticles: Smarticles) -> None:
         ("count=-3", "count"),
         ("cuont=3", "'cuont'; did you mean 'count'?"),
         ("count", "--set count: write KEY=VALUE"),
-        ("phases.7.duration_s=1", "phases.7.duration_s=1"),
         ("fidelity.time_step_s=1", "scene.yaml: fidelity.time_step_s: 1 s is above the stable step"),
     ],
 )

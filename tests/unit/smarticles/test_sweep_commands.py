@@ -97,9 +97,7 @@ def test_a_failing_run_is_status_1_with_its_cause(sweep_file: Path, tmp_path: Pa
             "sensitivity --fidelity reference",
             "--fidelity reference: study sensitivity sets the fidelity of its runs itself; leave --fidelity out",
         ),
-        ("sensitivity --fidelity fine", "--fidelity fine: is not known; known: draft, standard, reference"),
         ("engines --engine links", "--engine links: study engines cannot be run on it ("),
-        ("chain --quick --fidelity reference", "--fidelity reference: study chain cannot be run at it ("),
     ],
 )
 def test_what_a_study_does_not_have_is_rejected(
