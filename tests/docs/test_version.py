@@ -1,7 +1,5 @@
 """One version, and one way to cite it."""
 
-from __future__ import annotations
-
 import re
 import subprocess
 import sys

@@ -1,7 +1,5 @@
 """Articulated smarticles, hinges and motors at work: small simulations with a known answer; see `cases.py`."""
 
-from __future__ import annotations
-
 import dataclasses
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """Hooks and the container's removal: small simulations with a known answer; see `cases.py`."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import cases

@@ -4,8 +4,6 @@ YADE keeps one scene per process, installs handlers, and must not meet PyVista's
 returns plain numbers and arrays; the tests compare them with the answer. SI throughout.
 """
 
-from __future__ import annotations
-
 import math
 from collections import defaultdict
 from collections.abc import Callable

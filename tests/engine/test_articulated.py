@@ -1,7 +1,5 @@
 """Articulated smarticles: what splitting and welding keep, what hinges survive, and how motors meet loads."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from pathlib import Path

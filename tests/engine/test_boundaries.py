@@ -1,7 +1,5 @@
 """Hooks and the container's wall: forces, work, and a removal that leaves no contact and adds no energy."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any

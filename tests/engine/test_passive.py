@@ -1,7 +1,5 @@
 """Welded smarticles: mass and inertia of the boxes, piles at rest, a container that moves as prescribed."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Sweeps through a real Slurm, started here: a run fails, one meets the time limit and goes on with its bits."""
 
-from __future__ import annotations
-
 import json
 import os
 import signal

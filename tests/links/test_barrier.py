@@ -1,7 +1,5 @@
 """The barrier: smooth, linear for ordinary contacts, and never passed, whatever the speed or the load."""
 
-from __future__ import annotations
-
 import itertools
 import math
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """A clock that is set back while a run goes on: durations are of a clock that nobody sets, and results know none."""
 
-from __future__ import annotations
-
 import json
 import os
 import subprocess

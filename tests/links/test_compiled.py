@@ -1,7 +1,5 @@
 """Compiled code: only what a scene calls for, the same bits cold and warm, and no cache is a reason to fail."""
 
-from __future__ import annotations
-
 import os
 import subprocess
 import sys

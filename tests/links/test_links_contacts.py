@@ -1,7 +1,5 @@
 """Contacts with the floor, the wall, hooks, rims and each other, where the answer is known."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 

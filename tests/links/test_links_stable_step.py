@@ -1,7 +1,5 @@
 """The stable time step: modes that it knows are stable just below it, and blow up above."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import builds

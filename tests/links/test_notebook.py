@@ -4,8 +4,6 @@ The notebook's cells are plain Python and are run as such: a Jupyter kernel woul
 that YADE imports.
 """
 
-from __future__ import annotations
-
 import json
 import os
 import re

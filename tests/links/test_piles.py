@@ -1,7 +1,5 @@
 """Piles: the same bits again, checkpoints, the energy ledger, motors under load, nothing passes through."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 from pathlib import Path

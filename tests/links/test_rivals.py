@@ -1,10 +1,7 @@
 """Engines of the bench beside the rivals: each adapter on a known answer; skipped where an engine is not installed."""
 
-from __future__ import annotations
-
 import importlib
 import math
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -103,15 +100,3 @@ def test_a_smarticle_is_thrown_as_far_as_theory_says(engine: str, tmp_path: Path
     assert lands > 0.02
     flying = times < lands - SAMPLE
     assert np.abs(heights[2:] - heights[1] - expected)[flying].max() < 0.05 * expected.max()
-
-
-def test_what_is_missing_is_reported_in_one_line_and_left_out(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    absent = {**ENGINES, "bullet": replace(ENGINES["bullet"], needs="no_such_package")}
-    monkeypatch.setattr(bench, "ENGINES", absent)
-    monkeypatch.setattr("sys.argv", ["rivals", "--engines", "bullet", "--out", str(tmp_path / "out")])
-    assert bench.main() == 1
-    printed = capsys.readouterr()
-    assert printed.out.splitlines() == ["Bullet: left out, no_such_package is not installed (make rivals)"]
-    assert printed.err == "nothing was run\n"

@@ -1,7 +1,5 @@
 """The study of accuracy: verdicts from made-up numbers, published tables, and an analysis of made-up runs."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path

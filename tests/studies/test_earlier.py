@@ -1,7 +1,5 @@
 """Runs of which only the tables of an earlier analysis are left."""
 
-from __future__ import annotations
-
 import shutil
 from pathlib import Path
 

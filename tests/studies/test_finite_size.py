@@ -1,7 +1,5 @@
 """The study of finite size: what is measured of a pile, and answers to laws and thresholds that were put in."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

@@ -1,7 +1,5 @@
 """The study of Gravish's packing: each finding from tables that deserve each verdict, and runs of known packing."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 
 import numpy as np

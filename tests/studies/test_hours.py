@@ -1,7 +1,5 @@
 """Hours of studies: planned ones are those of the sweep, taken ones those of finished runs alone."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

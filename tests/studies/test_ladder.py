@@ -1,7 +1,5 @@
 """The ladder of accuracy: its rungs, what is left out, and the sweep that it becomes."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

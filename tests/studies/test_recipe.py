@@ -1,7 +1,5 @@
 """Every study against its published tables: points, verdicts and numbers follow from the stored table of runs."""
 
-from __future__ import annotations
-
 import io
 import re
 from functools import cache, partial

@@ -1,7 +1,5 @@
 """The studies of sensitivity: run directories with known packing fractions."""
 
-from __future__ import annotations
-
 import math
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """Run directories whose wall was taken away, with piles laid by hand before and after."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

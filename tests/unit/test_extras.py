@@ -1,7 +1,5 @@
 """With the project's dependencies alone a scene is run, swept and measured; other commands name what they need."""
 
-from __future__ import annotations
-
 import json
 import os
 import subprocess

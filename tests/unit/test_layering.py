@@ -1,7 +1,5 @@
 """Imports between packages: the contracts of `.importlinter`, and what those cannot express."""
 
-from __future__ import annotations
-
 import subprocess
 import sys
 from configparser import ConfigParser
@@ -32,13 +30,6 @@ def test_contract(contract: str, capsys: pytest.CaptureFixture[str]) -> None:
         config_filename=str(ROOT / ".importlinter"), limit_to_contracts=(contract,), no_cache=True, no_logo=True
     )
     assert status == EXIT_STATUS_SUCCESS, capsys.readouterr().out
-
-
-def test_packages_are_those_of_this_checkout() -> None:
-    assert {Path(sys.modules[name].__path__[0]) for name in PACKAGES if name in sys.modules} <= {
-        ROOT / name for name in PACKAGES
-    }
-    assert len(MODULES) > 100
 
 
 @pytest.mark.parametrize("packages", [["dem"], ["postprocess"], ["smarticles", "studies", "templates"]])

@@ -1,7 +1,5 @@
 """Overlaps of smarticles against known answers."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """A wheel of this checkout, installed elsewhere: five packages with their data, and commands that work from it."""
 
-from __future__ import annotations
-
 import json
 import os
 import shutil

@@ -1,7 +1,5 @@
 """Volume, mass and inertia of the boxes against independent ways to get them; the layout of the spheres."""
 
-from __future__ import annotations
-
 import itertools
 import math
 

@@ -1,7 +1,5 @@
 """LAMMPS as an engine, without running it: what is rejected, commands, contacts, a child that is missing or ends."""
 
-from __future__ import annotations
-
 import math
 import re
 from collections.abc import Callable

@@ -1,7 +1,5 @@
 """YADE as an engine, without running it: the stable step, dissipation of contacts, a machine without YADE."""
 
-from __future__ import annotations
-
 import math
 import sys
 from pathlib import Path

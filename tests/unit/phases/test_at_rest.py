@@ -1,7 +1,5 @@
 """Phases in which nothing drives the pile: a kind of one's own counts as at rest in all that is measured."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 from typing import Any, Literal

@@ -1,7 +1,5 @@
 """Another run's smarticles taken over: how a scene names them, what is rejected, what the stage does to an engine."""
 
-from __future__ import annotations
-
 import json
 import shutil
 from collections.abc import Callable

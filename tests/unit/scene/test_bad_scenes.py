@@ -1,7 +1,5 @@
 """Every bad scene is rejected with one line: key, value with its unit, way out."""
 
-from __future__ import annotations
-
 import math
 import re
 from collections.abc import Mapping

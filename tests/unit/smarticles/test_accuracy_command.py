@@ -1,7 +1,5 @@
 """accuracy, and plan with limits: from the command line to the advice."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """--completion: the script completes words in a real bash."""
 
-from __future__ import annotations
-
 import subprocess
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """`smarticles doctor` without YADE: what it concludes from what it finds."""
 
-from __future__ import annotations
-
 import shutil
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """The command line: help, rejections, and what becomes of errors."""
 
-from __future__ import annotations
-
 import os
 import signal
 import subprocess

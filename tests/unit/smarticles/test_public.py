@@ -1,7 +1,5 @@
 """`import smarticles`: what it offers, and that nothing is loaded before it is used."""
 
-from __future__ import annotations
-
 import subprocess
 import sys
 from pathlib import Path

@@ -1,7 +1,5 @@
 """report: what stands on the page of a run, a sweep and a study. Its layout is tested in `test_report_browser.py`."""
 
-from __future__ import annotations
-
 import json
 import math
 from functools import partial
@@ -216,12 +214,6 @@ def test_a_study_is_analysed_drawn_and_reported(tmp_path: Path, write_run: Write
     # The results alone make a page as well.
     assert smarticles("report", results, "--output", tmp_path / "results.html").status == 0
     assert Read(tmp_path / "results.html").row("φ_f is above φ_0 at every l/w")
-
-
-def test_results_that_are_damaged_are_rejected(tmp_path: Path, smarticles: Smarticles) -> None:
-    (tmp_path / "provenance.json").write_text("{")
-    said = smarticles("report", tmp_path)
-    assert (said.status, "analyse the study again" in said.err) == (2, True)
 
 
 # -- parts -------------------------------------------------------------------------------------------------------------

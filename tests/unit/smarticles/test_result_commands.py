@@ -1,7 +1,5 @@
 """measure and render: run directories in, tables and pictures out."""
 
-from __future__ import annotations
-
 import csv
 import json
 from pathlib import Path
@@ -65,17 +63,6 @@ def test_measure_has_the_variables_of_a_sweep_and_means_by_them(
     # Of 0.12 and 0.14: their mean, and half their difference.
     assert lines[3].split()[5:7] == ["0.1300", "0.0100"]
     assert "standard error over runs" in said.out
-
-
-def test_measure_rejects_groups_that_are_none(tmp_path: Path, write_run: WriteRun, smarticles: Smarticles) -> None:
-    run = write_run(tmp_path / "a")
-    said = smarticles("measure", run, "--by", "seeed")
-    assert (said.status, said.err) == (
-        2,
-        "smarticles: error: --by seeed: 'seeed' is no column of these runs; did you mean 'seed'?\n",
-    )
-    assert "leave --frames out" in smarticles("measure", run, "--by", "seed", "--frames").err
-    assert "names no column" in smarticles("measure", run, "--by", ",").err
 
 
 def test_a_frame_that_is_cut_off_has_a_way_out_that_works(

@@ -1,7 +1,5 @@
 """run, plan, schema: one scene, as far as it goes without YADE."""
 
-from __future__ import annotations
-
 import json
 import os
 import shutil
@@ -20,12 +18,6 @@ def test_plan_in_json_and_with_other_values(scene_file: Path, smarticles: Smarti
     answer = json.loads(said.out)
     assert answer["count"] == 7
     assert answer["phases"][1]["duration_s"] == 3
-
-
-def test_schema_is_a_json_schema(smarticles: Smarticles) -> None:
-    schema = json.loads(smarticles("schema").out)
-    assert schema["type"] == "object"
-    assert {"seed", "count", "phases"} <= set(schema["properties"])
 
 
 @pytest.mark.parametrize("command", ["run", "plan"])

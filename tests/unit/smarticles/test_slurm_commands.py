@@ -1,7 +1,5 @@
 """sweep, status and resume with a queue: rejections before anything is written, dry runs, states."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

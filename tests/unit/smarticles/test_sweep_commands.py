@@ -1,7 +1,5 @@
 """sweep, status, resume, study: from the command line to the directory."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

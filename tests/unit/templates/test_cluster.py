@@ -1,7 +1,5 @@
 """Clusters as data, and requests that one cannot give."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

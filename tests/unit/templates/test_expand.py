@@ -1,7 +1,5 @@
 """Sweep files: what they may say, and the points they give."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

@@ -1,7 +1,5 @@
 """The directory of a sweep: manifest, scenes, states, rejections."""
 
-from __future__ import annotations
-
 import json
 import subprocess
 import sys

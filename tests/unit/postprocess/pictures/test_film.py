@@ -98,12 +98,6 @@ def test_film_moves_and_lasts_as_long_as_its_speed_says(run, tmp_path, suffix, u
     assert list(tmp_path.iterdir()) == [path]
 
 
-def test_film_needs_two_frames(tmp_path):
-    run = write_run(tmp_path / "a", SyntheticRun(frames_per_phase=1, phases=("relax",), packing=(0.1,)))
-    with pytest.raises(InputError, match="a film needs at least 2 frames: got 1"):
-        render_film(run, tmp_path / "a.gif", size=SIZE)
-
-
 def test_mp4_without_an_encoder_is_rejected_before_drawing(run, tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, "imageio_ffmpeg", None)
     with pytest.raises(InputError, match=r"\.mp4 needs an encoder .*imageio-ffmpeg, or choose \.gif or \.webp"):
