@@ -14,6 +14,7 @@ from scenes import small
 
 from dem.scene.reading import dump_scene
 from postprocess.pictures import render
+from postprocess.report import figures
 from smarticles.reporting.charts import thinned
 from smarticles.sweeps import make_folder
 from studies.registry import study_file
@@ -56,9 +57,10 @@ class Read(HTMLParser):
 
 
 @pytest.fixture(autouse=True)
-def _two_views(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Piles are drawn from two sides: all 24 are drawn in `test_report_browser.py`."""
+def _few_pictures(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Piles are drawn from two sides, all 24 in `test_report_browser.py`; figures are not written as PDF, slow here."""
     monkeypatch.setattr(render, "turntable", partial(render.turntable, views=2))
+    monkeypatch.setattr(figures, "save", partial(figures.save, formats=("png", "svg")))
 
 
 @pytest.fixture
@@ -180,7 +182,7 @@ def test_a_study_is_analysed_drawn_and_reported(tmp_path: Path, write_run: Write
     *finished, last = folder.entries
     for entry in finished:
         known = {"aspect_ratio": entry.values["l_over_w"], "seed": entry.values["seed"]}
-        made = write_run(folder.run(entry), frames_per_phase=2, **known) / "run.json"
+        made = write_run(folder.run(entry), count=6, frames_per_phase=1, **known) / "run.json"
         facts = {"scene_sha256": entry.scene_sha256, "engine": entry.values["engine"]}
         made.write_text(json.dumps(json.loads(made.read_text(encoding="utf-8")) | facts), encoding="utf-8")
     # What remains fails before an engine is needed.
@@ -196,9 +198,9 @@ def test_a_study_is_analysed_drawn_and_reported(tmp_path: Path, write_run: Write
     assert "shake_s: 1.5 instead of 20.0" in lines[0]
     assert lines[2].split()[:4] == ["links", "0.4", "20", "3"]
     assert "FOUND: φ_f is above φ_0 at every l/w" in lines
-    figures = [line.removeprefix("figure: ") for line in lines if line.startswith("figure: ")]
-    assert figures
-    assert all(Path(figure).is_file() for figure in figures)
+    drawn = [line.removeprefix("figure: ") for line in lines if line.startswith("figure: ")]
+    assert drawn
+    assert all(Path(figure).is_file() for figure in drawn)
     assert lines[-1] == f"picture of lw0.70_links_seed1: {results / 'run.png'}"
     assert f"1 of 18 runs are missing: {last.name}: " in said.err.splitlines()[-1]
     assert last.name in (results / "missing.csv").read_text(encoding="utf-8")
