@@ -1,7 +1,5 @@
 """What all tests share: reproducible random cases, and factories of scenes that are valid until a test breaks them."""
 
-from __future__ import annotations
-
 import signal
 import subprocess
 from collections.abc import Callable, Iterator

@@ -1,7 +1,5 @@
 """What tests are about: small scenes, valid until a test breaks them, and the paper's smarticle."""
 
-from __future__ import annotations
-
 import copy
 import math
 from collections.abc import Mapping

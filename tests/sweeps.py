@@ -1,7 +1,5 @@
 """Sweeps for tests: shipped ones, made smaller."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 from templates.sweep.sweep_file import Sweep

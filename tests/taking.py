@@ -1,7 +1,5 @@
 """A pile poured on one engine and taken over on another, step by step; where both run, or links alone."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

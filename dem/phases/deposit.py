@@ -36,6 +36,7 @@ class Deposit(Part, Phase):
     """
 
     begins: ClassVar[bool] = True
+    at_rest: ClassVar[bool] = True
     pours: ClassVar[bool] = True
     type: Literal["deposit"]
     per_layer: int = Field(10, ge=1, le=100_000, description="smarticles per layer [1]")

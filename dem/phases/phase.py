@@ -56,6 +56,8 @@ class Phase:
     begins: ClassVar[bool] = False  #: Whether the phase adds the smarticles; a run begins with one such phase
     sources: ClassVar[frozenset[str]] = frozenset()
     """Keys that name the source of content whose hash is another key; a scene's hash omits them."""
+    at_rest: ClassVar[bool] = False
+    """Whether nothing drives the smarticles; all other phases count as activity, around which φ is measured."""
     pours: ClassVar[bool] = False  #: Whether the phase pours the smarticles
     frees: ClassVar[bool] = False  #: Whether the phase takes the container away
     planar: ClassVar[bool | None] = False

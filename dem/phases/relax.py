@@ -15,6 +15,7 @@ class Relax(Part, Phase):
     """Let the pile rest under gravity, with smarticles welded."""
 
     planar: ClassVar[bool | None] = None
+    at_rest: ClassVar[bool] = True
     type: Literal["relax"]
     duration_s: Duration = Field(0.5, description="length of the phase [s]")
 

@@ -101,6 +101,7 @@ class TakeOver(Part, Phase):
     """Take the smarticles' poses from a frame of another run, at rest, then wait until the pile settles."""
 
     begins: ClassVar[bool] = True
+    at_rest: ClassVar[bool] = True
     sources: ClassVar[frozenset[str]] = frozenset({"run", "frame"})
     type: Literal["take-over"]
     run: str = Field(..., min_length=1, description="directory of the run, relative to the scene file")

@@ -324,8 +324,7 @@ def _notes(scene: Scene, table: AccuracyTable, measured: Measured, max_error: fl
             )
     if not table.reference.endswith(_FINEST):
         notes.append(f"errors are against {table.reference}: the table has no finished runs of {_FINEST[0]}")
-    kinds = dict.fromkeys(phase.type for phase in scene.phases)
-    activity = " ".join(kind for kind in kinds if kind not in ("deposit", "take-over", "relax"))
+    activity = " ".join(dict.fromkeys(phase.type for phase in scene.phases if not phase.at_rest))
     here = {
         "l/w": (f"{scene.smarticle.aspect_ratio:g}", f"{table.aspect_ratio:g}"),
         "N": (str(scene.count), str(table.count)),

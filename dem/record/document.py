@@ -64,6 +64,8 @@ class Phase(Document):
 
     index: NonNegativeInt
     type: str
+    #: Whether nothing drives the smarticles in it; absent in files written before the key was added
+    at_rest: bool = Field(default_factory=lambda data: data.get("type") in ("deposit", "take-over", "relax"))
     time_step_s: PositiveFloat | None = None
     start_s: NonNegativeFloat | None = None
     end_s: NonNegativeFloat | None = None

@@ -210,7 +210,7 @@ def manifest(
         spheres_per_smarticle=len(particle.centres),
         time_step_s=min(steps),
         phases=tuple(
-            Phase(index=k, type=phase.kind, time_step_s=dt)
+            Phase(index=k, type=phase.kind, at_rest=phase.at_rest, time_step_s=dt)
             for k, (phase, dt) in enumerate(zip(scene.phases, steps, strict=True))
         ),
         planar=scene.plane is not None,

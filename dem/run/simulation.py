@@ -81,7 +81,7 @@ class Simulation:
             if self.engine.time_step != self.time_steps[self._phase]:
                 self.engine.set_time_step(self.time_steps[self._phase])
                 self.recorder.schedule(self.engine)
-            begun = {"index": self._phase, "type": phase.type, "start_s": self.engine.time}
+            begun = {"index": self._phase, "type": phase.type, "at_rest": phase.at_rest, "start_s": self.engine.time}
             self._performed.append({**begun, "wall_s": -self.wall, "cpu_s": -self.cpu})
             self.log.info("phase %d %s begins at t = %.4f s", self._phase, phase.type, self.engine.time)
         entry = self._performed[-1]

@@ -20,9 +20,6 @@ from postprocess.statistics.seeds import Mean, mean_with_error
 
 Costly = Literal["never", "phase-end", "every-frame"]  #: Frames for which costly measures are computed
 
-PASSIVE_PHASES = frozenset({"deposit", "take-over", "relax"})
-"""Types of phase in which nothing drives the pile; all other types count as activity."""
-
 LAST_FRAMES = 20  #: Number of frames averaged at the end of a phase, as in Savoie et al
 
 _LABELS = ("run", "name", SEED, ASPECT, "count", "fidelity", "scene_sha256")
@@ -120,7 +117,7 @@ def packing_change(
     Args:
         definition: Key of `packing.DEFINITIONS`.
         last: Number of frames to average; a phase with fewer frames is averaged over these.
-        activity: Types of phase that count as activity; all but `PASSIVE_PHASES` if not given.
+        activity: Types of phase that count as activity; if not given, all phases that are not at rest.
 
     Raises:
         InputError: The run has no activity, or no frame of it yet, or a file is missing or damaged.
@@ -131,9 +128,7 @@ def packing_change(
     _check_last(last)
     frames, _ = _open(run, [definition])
     active = [
-        phase.index
-        for phase in run.phases
-        if (phase.type not in PASSIVE_PHASES if activity is None else phase.type in activity)
+        phase.index for phase in run.phases if (not phase.at_rest if activity is None else phase.type in activity)
     ]
     if not active or active[0] == 0:
         types = ", ".join(phase.type for phase in run.phases)

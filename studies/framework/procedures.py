@@ -20,7 +20,7 @@ from dem.errors import InputError
 from dem.record.document import Phase
 from dem.record.run import Run
 from postprocess.measures.motors import APART, SAMPLED_WORK
-from postprocess.measures.table import PASSIVE_PHASES, summarise_run
+from postprocess.measures.table import summarise_run
 from postprocess.statistics.points import ASPECT, SEED, mean_difference
 from postprocess.statistics.seeds import SeedMean
 from studies.framework.runs import DEFINITION, duration, last_columns, run_columns
@@ -46,6 +46,7 @@ BY_RANKS = "mean over seeds of the rank correlation of peak force and ⟨N⟩ > 
 """Criterion for the finding that peak force rises with entanglement."""
 
 _WORK = {EXTERNAL: "container_work_J", SHAPE: "motor_work_J", INTERNAL: "motor_work_J"}
+_REST = "at rest"
 _WINDOW = 0.1  # s, of moving means of heights: longer than a swing at θ = 10° and than three periods at 30 Hz
 
 
@@ -59,7 +60,8 @@ def prepared_by(run: Run, *then: str) -> dict[str, object]:
     """
     types = [phase.type for phase in run.phases]
     active = [kind for kind in types if kind in PROCEDURES]
-    if types != ["deposit", "relax", *([active[0], "relax"] if active else []), *then]:
+    steps = [_REST if phase.at_rest and phase.index else phase.type for phase in run.phases]
+    if steps != ["deposit", _REST, *([active[0], _REST] if active else []), *then]:
         raise InputError(
             f"{run.path}: its phases are {', '.join(types)}, not a pour, a rest, one activity "
             f"({', '.join(PROCEDURES)}) with a rest or none, {' and '.join(then)}; leave it out"
@@ -91,9 +93,9 @@ def paired(table: pd.DataFrame, quantity: str, one: str, other: str) -> SeedMean
 
 def activity(run: Run) -> Phase:
     """Return the only activity of a run; InputError unless there is exactly one, between two rests."""
-    active = [phase for phase in run.phases if phase.type not in PASSIVE_PHASES]
+    active = [phase for phase in run.phases if not phase.at_rest]
     around = run.phases[active[0].index - 1 : active[0].index + 2] if active else ()
-    if len(active) != 1 or active[0].type not in PROCEDURES or len(around) != 3 or around[2].type != "relax":
+    if len(active) != 1 or active[0].type not in PROCEDURES or len(around) != 3 or not around[2].at_rest:
         types = ", ".join(phase.type for phase in run.phases)
         wanted = f"one activity ({', '.join(PROCEDURES)}) between two rests"
         msg = f"{run.path}: its phases are {types}, not {wanted}; leave it out"

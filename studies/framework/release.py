@@ -11,7 +11,6 @@ from dem.record.document import Phase
 from dem.record.frame import Frame
 from dem.record.frames import FrameSequence
 from dem.record.run import Run
-from postprocess.measures.table import PASSIVE_PHASES
 from postprocess.statistics.points import ASPECT, SEED
 from studies.framework.figures import Analysis
 from studies.framework.procedures import EXTERNAL, INTERNAL, PROCEDURE, PROCEDURES, SHAPE, STATIC
@@ -25,7 +24,7 @@ _REMOVAL = "remove-container"
 def removal(run: Run) -> Phase:
     """Return the phase that removes the wall; InputError unless it is the last one and follows a rest."""
     last = run.phases[-1]
-    if last.type != _REMOVAL or len(run.phases) < 3 or run.phases[-2].type != "relax":
+    if last.type != _REMOVAL or len(run.phases) < 3 or not run.phases[-2].at_rest:
         types = ", ".join(phase.type for phase in run.phases)
         raise InputError(f"{run.path}: does not end with a rest and {_REMOVAL}: its phases are {types}; leave it out")
     return last
@@ -46,7 +45,7 @@ def named_columns(run: Run) -> dict[str, object]:
     Raises:
         InputError: The run has several activities, or one of an unknown type.
     """
-    active = [phase.type for phase in run.phases if phase.type not in {*PASSIVE_PHASES, _REMOVAL}]
+    active = [phase.type for phase in run.phases if not phase.at_rest and phase.type != _REMOVAL]
     if len(active) > 1 or not set(active) <= set(PROCEDURES):
         raise InputError(
             f"{run.path}: not one activity ({', '.join(PROCEDURES)}) or none: it has {', '.join(active)}; leave it out"

@@ -5,8 +5,6 @@ comment that names a file, and are written to it; `text` is output of a program.
 reason in the line above it: `<!-- not run: REASON -->`.
 """
 
-from __future__ import annotations
-
 import re
 from dataclasses import dataclass
 from functools import cached_property

@@ -3,8 +3,6 @@
 RENEW_PICTURES=1 pytest tests/docs/test_commands_run.py      takes the pictures that the pages' commands made
 """
 
-from __future__ import annotations
-
 import os
 import re
 import subprocess

@@ -1,8 +1,5 @@
 """One version, and one way to cite it."""
 
-from __future__ import annotations
-
-import datetime
 import re
 import subprocess
 import sys
@@ -33,10 +30,3 @@ def test_one_version_everywhere() -> None:
     assert _citation()["version"] == version
     assert released[0].split()[0] == version
     assert said.split() == ["smarticles", version]
-
-
-def test_day_of_the_release_is_equal_everywhere() -> None:
-    changes = (REPOSITORY / "CHANGELOG.md").read_text(encoding="utf-8")
-    day = re.search(r"^## \d+\.\d+\.\d+ \((.+)\)$", changes, re.MULTILINE)
-    assert day is not None, "the newest section of CHANGELOG.md: '## VERSION (YYYY-MM-DD)'"
-    assert day[1] == _citation()["date-released"] == datetime.date.fromisoformat(day[1]).isoformat()

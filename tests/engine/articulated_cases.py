@@ -1,9 +1,6 @@
 """Articulated smarticles, hinges and motors at work: small simulations with a known answer; see `cases.py`."""
 
-from __future__ import annotations
-
 import dataclasses
-import math
 from pathlib import Path
 from typing import Any
 
@@ -13,10 +10,9 @@ from cases import axes_of, vec
 from scipy.spatial.transform import Rotation
 
 from dem.body.placement import place_layer
-from dem.engine.demand import contact_law_of, motor_law_of
+from dem.engine.demand import motor_law_of
 from dem.engine.yade.engine import YadeEngine
 from dem.engine.yade.kind import hinge_law
-from dem.engine.yade.stable_step import hinged_stable_time_step
 from dem.scene.scene import Scene
 from validation.access import bodies_of as bodies
 from validation.bench import Targets, add, drive, scene_of
@@ -204,23 +200,14 @@ def reloaded(data: dict[str, Any], *, angle: float, spin: Any, folder: str) -> d
     engine.load(engine.save(Path(folder)), Path(folder))
     loaded = (engine.motors._hinges.angles(), engine.motors._hinges.gaps(), engine.motors._hinges.torques())
     engine.motors.actuate(np.full((1, 1, 2), angle), scene.fidelity.control_interval_s)
-    return {
-        "saved": saved,
-        "loaded": loaded,
-        "after": engine.motors._hinges.torques(),
-        "state": engine.state().angles,
-    }
+    return {"saved": saved, "loaded": loaded, "after": engine.motors._hinges.torques(), "state": engine.state().angles}
 
 
 # -- hinges and motors -------------------------------------------------------------------------------------------------
 
 
 def gait(
-    data: dict[str, Any],
-    *,
-    straight_in: float,
-    velocity: Any = (0, 0, 0),
-    spin: Any = (0, 0, 0),
+    data: dict[str, Any], *, straight_in: float, velocity: Any = (0, 0, 0), spin: Any = (0, 0, 0)
 ) -> dict[str, Any]:
     """A free smarticle straightens and bends back; conserved sums every millisecond."""
     scene, engine = floating(data, velocity=velocity, spin=spin)
@@ -267,38 +254,7 @@ def sweep(data: dict[str, Any], *, corners: list[tuple[float, float]], speed: fl
             touching += own_contacts(engine)
             gap = max(gap, engine.motors.gaps().max())
             reached.append(engine.state().angles[0])
-    return {
-        "touching": touching,
-        "angles": np.degrees(reached),
-        "gap": gap / scene.sphere_diameter,
-    }
-
-
-def stack(data: dict[str, Any], *, layers: int, times_stable: float, settle: float, watch: float) -> dict[str, Any]:
-    """Articulated smarticles lying flat on each other, let go from a slight height; largest speed of a link."""
-    scene = scene_of(data)
-    law, particle = contact_law_of(scene), scene.particle
-    dt = times_stable * hinged_stable_time_step(particle, law, hinge_law(scene))
-    interval = dt * max(1, round(scene.fidelity.control_interval_s / dt))
-    engine = build(scene, dt=dt)
-    thick = np.ptp(particle.centres[:, 2]) + 2 * particle.radius
-    for k in range(layers):
-        add(engine, (0, 0, (k + 0.5) * thick + (k + 1) * 2e-5))
-    engine.motors.articulate()
-    begun, fastest, gap = engine.state().angles, 0.0, 0.0
-    for time in drive(engine, scene, settle + watch, lambda _: begun, interval=interval):
-        gap = max(gap, engine.motors.gaps().max())
-        if not gap < thick:
-            return {"fastest": math.inf, "gap": math.inf, "z": np.full(layers, math.nan), "thick": thick, "dt": dt}
-        if time > settle:
-            fastest = max(fastest, float(np.linalg.norm(engine.state().link_velocities, axis=2).max()))
-    return {
-        "fastest": fastest,
-        "gap": gap / scene.sphere_diameter,
-        "z": engine.state().positions[:, 2],
-        "thick": thick,
-        "dt": dt,
-    }
+    return {"touching": touching, "angles": np.degrees(reached), "gap": gap / scene.sphere_diameter}
 
 
 def hold_all(engine: Any, blocked: str) -> None:

@@ -1,7 +1,5 @@
 """Hooks and the container's removal: small simulations with a known answer; see `cases.py`."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import cases
@@ -38,11 +36,7 @@ def energies(engine: YadeEngine) -> dict[str, float]:
         if contact.isReal:
             phys, depth = contact.phys, max(0.0, contact.geom.penetrationDepth)
             elastic += phys.kn * depth**2 / 2 + phys.shearForce.squaredNorm() / (2 * phys.ks)
-    return {
-        "kinetic": state.kinetic_energy,
-        "height": state.potential_energy(engine.gravity, 0.0),
-        "elastic": elastic,
-    }
+    return {"kinetic": state.kinetic_energy, "height": state.potential_energy(engine.gravity, 0.0), "elastic": elastic}
 
 
 def hang(data: dict[str, Any], *, settle: float, pull: float) -> dict[str, Any]:

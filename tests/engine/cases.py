@@ -4,8 +4,6 @@ YADE keeps one scene per process, installs handlers, and must not meet PyVista's
 returns plain numbers and arrays; the tests compare them with the answer. SI throughout.
 """
 
-from __future__ import annotations
-
 import math
 from collections import defaultdict
 from collections.abc import Callable
@@ -111,28 +109,6 @@ def pour(
         rng=np.random.default_rng(scene.seed),
     )
     engine.add(poses)
-
-
-def pile(data: dict[str, Any], *, count: int, settle: float, watch: int) -> dict[str, Any]:
-    scene = scene_of(data)
-    engine = build(scene)
-    pour(engine, scene, count)
-    engine.advance(round(settle / engine.time_step))
-    sampler = Sampler(scene.container.radius_m)
-    sampler.sample(engine, engine.state(), 0)
-    forces: list[np.ndarray] = []
-    advance_watched(engine, watch, lambda: forces.append(YadeAccess().floor_force(engine)))
-    state = engine.state()
-    balance = sampler.sample(engine, state, 0)["container_force_N"]
-    return {
-        "forces": np.array(forces),
-        "balance": balance,
-        "weight": count * scene.smarticle.boxes.mass * scene.gravity_m_per_s2,
-        "speed": np.linalg.norm(state.velocities, axis=1).max(),
-        "unbalanced": engine.unbalanced_force(),
-        "touches": engine.touches(),
-        "contacts": engine.neighbours(),
-    }
 
 
 def shake(data: dict[str, Any], *, periods: float, delay: int) -> dict[str, Any]:

@@ -1,7 +1,5 @@
 """Chains in a plane: small simulations with a known answer; see `cases.py`."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """YADE in a process of its own: one worker runs all cases of `cases.py`, so that it is loaded once."""
 
-from __future__ import annotations
-
 import multiprocessing
 import os
 from collections.abc import Callable, Iterator

@@ -1,7 +1,5 @@
 """A Slurm of one node on this machine: own folders, own ports, own processes, all gone when the test ends."""
 
-from __future__ import annotations
-
 import getpass
 import os
 import shutil

@@ -1,7 +1,5 @@
 """Articulated smarticles: what splitting and welding keep, what hinges survive, and how motors meet loads."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from pathlib import Path
@@ -151,20 +149,6 @@ def test_links_of_one_smarticle_never_touch(
     assert sweep["angles"].max(axis=0) == pytest.approx([106.5, 106.5], abs=1.6)
     assert sweep["angles"].min(axis=0) == pytest.approx([-16.5, -16.5], abs=1.6)
     assert sweep["gap"] < 0.01
-
-
-# -- the stable time step ----------------------------------------------------------------------------------------------
-
-
-def test_stack_is_quiet_below_the_stable_step(simulate: Simulate, data: SceneData) -> None:
-    changes = shape(0.4, "standard")
-    case = articulated_cases.stack
-    stack = simulate(case, data(changes), layers=6, times_stable=0.9, settle=0.35, watch=0.02)
-    expected = (np.arange(6) + 0.5) * stack["thick"]
-    assert stack["z"] == pytest.approx(expected, abs=0.2 * stack["thick"])  # still stacked: this is what is tested
-    # They chatter at some mm/s where the step is too large.
-    assert stack["fastest"] < 1e-4
-    assert stack["gap"] < 0.01
 
 
 # -- checkpoints -------------------------------------------------------------------------------------------------------

@@ -1,7 +1,5 @@
 """Hooks and the container's wall: forces, work, and a removal that leaves no contact and adds no energy."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -81,10 +79,7 @@ def test_the_energy_ledger_closes_while_a_mould_is_lifted(
     tiers = [{"radius_m": 0.018, "height_m": 0.006}, {"radius_m": 0.0125, "height_m": 0.15}]
     data = scene_data({"count": 20, "container": {"tiers": tiers}})
     data["recording"] = {"series_interval_s": 0.002, "dissipation_interval_s": 3e-4}
-    data["phases"] = [
-        {"type": "deposit"},
-        {"type": "remove-container", "duration_s": 0.25, "speed_m_per_s": 0.3},
-    ]
+    data["phases"] = [{"type": "deposit"}, {"type": "remove-container", "duration_s": 0.25, "speed_m_per_s": 0.3}]
     answer = simulate(cases.run, data, str(tmp_path / "run"))
     assert answer["error"] is None, answer
     found = series(tmp_path / "run")

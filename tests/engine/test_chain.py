@@ -1,7 +1,5 @@
 """Chains in a plane: servos hold at their limit, strings and walls account for all momentum, checkpoints keep both."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any

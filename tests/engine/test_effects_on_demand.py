@@ -4,8 +4,6 @@ What exists is read from YADE's own lists and from the files of the run, and is 
 declares.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any

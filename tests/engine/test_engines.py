@@ -1,7 +1,5 @@
 """Engines beside each other: piles handed over, LAMMPS against YADE, pairs in contact."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path

@@ -1,7 +1,5 @@
 """What the engine wrote is what `postprocess` reads: frames, series and measures have the engine's own numbers."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

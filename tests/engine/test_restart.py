@@ -1,7 +1,5 @@
 """Runs that are killed or stopped, and resumed: the bits of the run that was never stopped."""
 
-from __future__ import annotations
-
 import json
 import re
 import shutil

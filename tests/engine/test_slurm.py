@@ -1,7 +1,5 @@
 """Sweeps through a real Slurm, started here: a run fails, one meets the time limit and goes on with its bits."""
 
-from __future__ import annotations
-
 import json
 import os
 import signal
@@ -144,3 +142,26 @@ def test_a_sweep_of_six_with_a_failure_and_a_time_limit(
     wait_until(lambda: states(smarticles, out) == expected, lambda: str(states(smarticles, out)))
     assert differing(results(out / "runs" / "b"), before) == []
     assert (out / "runs" / "fails.stopped-2" / "failed.json").exists()
+
+
+def test_a_rejected_job_is_reported_and_nothing_is_lost(
+    slurm: SlurmHere, smarticles: Callable[..., str], tmp_path: Path
+) -> None:
+    for name, text in (("scene.yaml.j2", SCENE), ("sweep.yaml", SWEEP.replace("relax_s: 0.5", "relax_s: 0.1"))):
+        (tmp_path / name).write_text(text)
+    (tmp_path / "here.toml").write_text(
+        CLUSTER.replace("[partitions.only]", "[partitions.only]\n").replace("only", "absent")
+    )
+    words = ["sweep", tmp_path / "sweep.yaml", "--out", tmp_path / "out", "--submit", "slurm", "--cluster"]
+    command = [sys.executable, "-m", "smarticles", *words, tmp_path / "here.toml"]
+    done = slurm.ask(*map(str, command))
+    assert done.returncode == 1
+    assert "sbatch rejects it: " in done.stderr
+    assert "invalid partition specified: absent" in done.stderr
+    assert json.loads((tmp_path / "out/jobs/001/job.json").read_text()).get("job_id") is None
+    (tmp_path / "here.toml").write_text(CLUSTER)
+    said = smarticles(
+        "resume", tmp_path / "out", "--submit", "slurm", "--cluster", tmp_path / "here.toml", "--memory", "900"
+    )
+    assert "6 of 6 runs, 1 tasks of 6 runs" in said
+    assert set(states(smarticles, tmp_path / "out").values()) <= {"queued", "running", "done", "failed"}

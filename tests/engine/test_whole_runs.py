@@ -1,7 +1,5 @@
 """Whole runs: what a run directory contains after a good end, a full disk, or Ctrl-C; and that bits repeat."""
 
-from __future__ import annotations
-
 import json
 import os
 import signal

@@ -1,7 +1,5 @@
 """LAMMPS under mpirun, where it is installed."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Runs on LAMMPS: checkpoints to the bit, a rank that is killed, the command line."""
 
-from __future__ import annotations
-
 import json
 import os
 import signal

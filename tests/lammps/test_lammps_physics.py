@@ -1,7 +1,5 @@
 """LAMMPS under mpirun against known answers: free flight, rest, the law, and one rank against two."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 

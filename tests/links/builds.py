@@ -1,7 +1,5 @@
 """Small simulations on the links engine, built by hand. SI throughout."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

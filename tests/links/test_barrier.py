@@ -1,7 +1,5 @@
 """The barrier: smooth, linear for ordinary contacts, and never passed, whatever the speed or the load."""
 
-from __future__ import annotations
-
 import itertools
 import math
 from dataclasses import replace
@@ -110,11 +108,10 @@ def test_a_floor_bears_a_load_a_hundred_times_what_its_linear_spring_could() -> 
     assert 0.0 < lowest < radius
 
 
-@pytest.mark.parametrize("seed", [1, 2])
-def test_a_hook_pulls_without_energy_from_nowhere(tmp_path: Path, seed: int) -> None:
+def test_a_hook_pulls_without_energy_from_nowhere(tmp_path: Path) -> None:
     # Before the barrier a strung smarticle snapped through: 58 % of the hook's work, and the run ended as done.
     data = {
-        "schema_version": 1, "seed": seed, "engine": "links", "fidelity": "draft", "count": 40, "hooks": {},
+        "schema_version": 1, "seed": 1, "engine": "links", "fidelity": "draft", "count": 40, "hooks": {},
         "phases": [{"type": "deposit"}, {"type": "relax", "duration_s": 0.2}, {"type": "pull-hook"}],
         "recording": {"energy": True, "dissipation_interval_s": 0.004},
     }  # fmt: skip

@@ -6,8 +6,6 @@ number itself; on another one the last bits differ, and a pile with them. The ch
 with `pytest -m "long or not long" tests/links/test_cells_of_results.py`.
 """
 
-from __future__ import annotations
-
 import math
 import subprocess
 import sys

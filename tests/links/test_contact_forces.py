@@ -1,7 +1,5 @@
 """Forces at contacts as they are told, against those that the next step moves smarticles with."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from pathlib import Path
 

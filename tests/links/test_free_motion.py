@@ -1,7 +1,5 @@
 """Motion without contacts: what has to be conserved is."""
 
-from __future__ import annotations
-
 import math
 
 import builds

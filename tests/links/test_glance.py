@@ -1,7 +1,5 @@
 """All extremes in one call: the same that a look at each smarticle finds, and nothing where one must look closely."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Two links: nearest points against brute force; forces as derivatives of one smooth energy."""
 
-from __future__ import annotations
-
 import math
 
 import builds

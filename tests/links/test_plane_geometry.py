@@ -1,7 +1,5 @@
 """The closed formulas of three hinged links against sums over the links themselves."""
 
-from __future__ import annotations
-
 import math
 
 import builds

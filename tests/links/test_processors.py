@@ -1,7 +1,5 @@
 """The bits of a run do not depend on the processor: BLAS kernels and SIMD paths of NumPy and Numba are varied."""
 
-from __future__ import annotations
-
 import os
 import subprocess
 import sys

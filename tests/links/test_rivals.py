@@ -1,10 +1,7 @@
 """Engines of the bench beside the rivals: each adapter on a known answer; skipped where an engine is not installed."""
 
-from __future__ import annotations
-
 import importlib
 import math
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -93,26 +90,6 @@ def flight(times: Array) -> tuple[Array, float]:
     return np.where((times > leaves) & (times < lands), above(times), 0.0), lands
 
 
-def thickness(given: Task, shape: str) -> float:
-    """How high the centre of one that lies flat is [m]."""
-    particle = given.scene.particle
-    return particle.boxes.thickness_normal / 2 if shape == "boxes" else particle.radius
-
-
-@pytest.mark.parametrize("engine", CHOSEN)
-def test_a_smarticle_lies_on_the_floor_and_goes_with_it(engine: str, tmp_path: Path) -> None:
-    # At half of gravity the floor never leaves it, and moves by 0.28 mm.
-    given, found = simulated(engine, tmp_path, activity=SHAKE, seconds=0.03, gamma=0.5)
-    heights = found.positions[:, 0, :, 2]
-    assert len(heights) == 2 + 30
-    assert heights == pytest.approx(thickness(given, setting_of(engine).shape), abs=1.5e-5)
-    # As it was put down: not turned, at its place.
-    assert np.abs(found.frames - given.state.link_rotations).max() < 0.02
-    assert found.positions[0, 0, :, :2] == pytest.approx(given.state.link_positions[0, :, :2], abs=2e-5)
-    assert found.processor_s > 0
-    assert found.version.lower().startswith(("links", "lammps", "mujoco", "pybullet", "rapier"))
-
-
 @pytest.mark.parametrize("engine", CHOSEN)
 def test_a_smarticle_is_thrown_as_far_as_theory_says(engine: str, tmp_path: Path) -> None:
     _, found = simulated(engine, tmp_path, activity=SHAKE, seconds=0.03)
@@ -123,15 +100,3 @@ def test_a_smarticle_is_thrown_as_far_as_theory_says(engine: str, tmp_path: Path
     assert lands > 0.02
     flying = times < lands - SAMPLE
     assert np.abs(heights[2:] - heights[1] - expected)[flying].max() < 0.05 * expected.max()
-
-
-def test_what_is_missing_is_reported_in_one_line_and_left_out(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    absent = {**ENGINES, "bullet": replace(ENGINES["bullet"], needs="no_such_package")}
-    monkeypatch.setattr(bench, "ENGINES", absent)
-    monkeypatch.setattr("sys.argv", ["rivals", "--engines", "bullet", "--out", str(tmp_path / "out")])
-    assert bench.main() == 1
-    printed = capsys.readouterr()
-    assert printed.out.splitlines() == ["Bullet: left out, no_such_package is not installed (make rivals)"]
-    assert printed.err == "nothing was run\n"

@@ -1,7 +1,5 @@
 """The scenes that `smarticles init` writes run, in small, and do what they say."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

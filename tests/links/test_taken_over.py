@@ -1,7 +1,5 @@
 """A pile poured on links goes on on links: nearly as if nothing had been, and always with the same bits."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

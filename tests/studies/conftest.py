@@ -1,7 +1,5 @@
 """What all tests of studies share: figures that are left out, and an eye on every figure that is not."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 

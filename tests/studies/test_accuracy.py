@@ -1,7 +1,5 @@
 """The study of accuracy: verdicts from made-up numbers, published tables, and an analysis of made-up runs."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -159,11 +157,7 @@ ORIGIN = {"note": "knobs time-step of scene.yaml", "command": "smarticles accura
 
 
 def run(**changes: Any) -> SyntheticRun:
-    keys: dict[str, Any] = {
-        "phases": ("deposit", "relax", "shake", "relax"),
-        "shake_time": 2.0,
-        "frames_per_phase": 2,
-    }
+    keys: dict[str, Any] = {"phases": ("deposit", "relax", "shake", "relax"), "shake_time": 2.0, "frames_per_phase": 2}
     return SyntheticRun(**{**keys, **changes})
 
 

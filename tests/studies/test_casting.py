@@ -1,7 +1,5 @@
 """The study of casting: piles that were laid by hand into a mould."""
 
-from __future__ import annotations
-
 import math
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """The study of the chain: runs with a known force, strain and width, and its findings on trials made to order."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

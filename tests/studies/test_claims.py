@@ -1,7 +1,5 @@
 """The list of claims: what it takes from the studies, what it makes of two protocols, and the one that is shipped."""
 
-from __future__ import annotations
-
 import csv
 import json
 from collections import defaultdict

@@ -1,7 +1,5 @@
 """The study of collapse: columns whose collapse time is known, laws that hold and that do not, and bounds."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Collection, Mapping, Sequence
 

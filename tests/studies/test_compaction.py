@@ -1,7 +1,5 @@
 """The study of long shaking: laws that are known come out again, and nothing is said of noise."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from types import SimpleNamespace
 from typing import Any

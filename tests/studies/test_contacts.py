@@ -1,7 +1,5 @@
 """The study of contacts: effects that were put into a factorial, and verdicts for data that deserve them."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from itertools import product
 from pathlib import Path

@@ -1,7 +1,5 @@
 """The study of engines: runs whose packing is made up, equal, 8 % apart, or scattered."""
 
-from __future__ import annotations
-
 import math
 from pathlib import Path
 

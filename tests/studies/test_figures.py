@@ -3,8 +3,6 @@
 Every figure that any test of a study draws is checked, see `conftest.checked_figures`.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from pathlib import Path
 

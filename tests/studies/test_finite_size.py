@@ -1,7 +1,5 @@
 """The study of finite size: what is measured of a pile, and answers to laws and thresholds that were put in."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 
@@ -11,19 +9,8 @@ from synthetic.shapes import RADIUS, W
 
 from dem.record.run import Run, open_run
 from postprocess.measures.table import summarise_run
-from studies.finite_size import (
-    AFTER,
-    BEFORE,
-    MOVING,
-    crossings,
-    measure,
-    phi,
-    share,
-    spans,
-)
-from studies.finite_size import (
-    RADIUS as RADIUS_OVER_W,
-)
+from studies.finite_size import AFTER, BEFORE, MOVING, crossings, measure, phi, share, spans
+from studies.finite_size import RADIUS as RADIUS_OVER_W
 
 
 def write(folder: Path, *, ratio: float = 0.7, count: int = 12, seed: int = 1, **more: Any) -> Path:

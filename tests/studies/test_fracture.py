@@ -1,7 +1,5 @@
 """The study of fracture: runs with known forces, and its findings on samples made to order."""
 
-from __future__ import annotations
-
 import math
 from pathlib import Path
 from typing import Any

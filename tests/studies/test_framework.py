@@ -1,7 +1,5 @@
 """The recipe that all studies share, by a study that measures next to nothing."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import replace
 from pathlib import Path

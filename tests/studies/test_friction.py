@@ -1,7 +1,5 @@
 """The study of friction: curves that cross Gravish's values, and each finding from data that deserve each verdict."""
 
-from __future__ import annotations
-
 import json
 import math
 from pathlib import Path

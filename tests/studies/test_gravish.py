@@ -1,20 +1,15 @@
 """The study of Gravish's packing: each finding from tables that deserve each verdict, and runs of known packing."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
-from pathlib import Path
 
 import numpy as np
 import pandas as pd
 import pytest
-from synthetic import SyntheticRun, write_run
 
 from postprocess.statistics.points import ASPECT, SEED
 from studies.framework.shaken import phi, read_gravish
 from studies.gravish import STUDY, deviations, steps
 
-ORIGIN = {"note": "the full study as shipped", "command": "smarticles study gravish --out gravish"}
 SPREAD = {1: -0.002, 2: 0.0, 3: 0.002}
 
 
@@ -48,17 +43,3 @@ def test_a_fall_is_monotone_unless_a_step_clearly_rises() -> None:
     assert verdict("phi-0-falls", {**clear, 0.5: (0.10, 0.14), 0.6: (0.12, 0.12)}) == "not found"
     assert verdict("phi-0-falls", {0.4: (0.14, 0.16), 0.5: (0.139, 0.14)}) == "not resolved"  # flat
     assert verdict("phi-0-falls", clear, {1: 0.0}) == "not resolved"  # one seed
-
-
-def test_runs_have_the_packing_put_in(tmp_path: Path) -> None:
-    keys = {"phases": ("deposit", "relax", "shake", "relax"), "shake_time": 1.0, "frames_per_phase": 2}
-    runs = [
-        write_run(tmp_path / f"{seed}", SyntheticRun(**keys, seed=seed, packing=(0.1, 0.1, 0.12, 0.13)))
-        for seed in (1, 2)
-    ]
-    report = STUDY.analyse(runs, tmp_path / "out", **ORIGIN)
-    row = report.tables["points"].iloc[0]
-    assert [row[phi(stage)] for stage in ("phi_0", "phi_f", "phi_f relaxed")] == pytest.approx(
-        [0.1, 0.12, 0.13], rel=5e-3
-    )
-    assert {"phi.png", "crossings.png", "phi_time.png", "deviations.csv", "steps.csv"} <= set(report.files)

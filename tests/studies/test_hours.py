@@ -1,15 +1,12 @@
 """Hours of studies: planned ones are those of the sweep, taken ones those of finished runs alone."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 
 import pytest
 from synthetic import SyntheticRun, write_run
 
-from dem.errors import InputError
-from studies.hours import ALL, DONE, ENGINE, EXPECTED, OVER, PLANNED, RUNS, STUDY, TAKEN, hours, main
+from studies.hours import ALL, DONE, ENGINE, EXPECTED, OVER, PLANNED, RUNS, STUDY, TAKEN, hours
 from templates.sweep.expand import expand
 from templates.sweep.folder import create_folder
 from templates.sweep.sweep_file import load_sweep
@@ -64,15 +61,3 @@ def test_hours_are_those_planned_and_those_that_finished_runs_took(studies: Path
     assert (yade[PLANNED], yade[EXPECTED], yade[TAKEN]) == pytest.approx((2.0, 1.0, 2.0))
     assert (links[OVER], yade[OVER]) == pytest.approx((0.5, 2.0))
     assert (every[RUNS], every[DONE], every[TAKEN]) == pytest.approx((4, 2, 2.005))
-
-
-def test_what_holds_no_study_is_rejected(studies: Path, tmp_path: Path) -> None:
-    with pytest.raises(InputError, match="no such directory"):
-        hours(tmp_path / "none")
-    with pytest.raises(InputError, match="none of its folders is the folder of a sweep"):
-        hours(studies / "beside")
-    with pytest.raises(InputError, match=r"beside: holds neither a run \(run.json\) nor a sweep"):
-        hours(studies, ["beside"])
-    with pytest.raises(SystemExit) as ended:
-        main([str(tmp_path / "none")])
-    assert ended.value.code == 2

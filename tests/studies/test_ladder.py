@@ -1,7 +1,5 @@
 """The ladder of accuracy: its rungs, what is left out, and the sweep that it becomes."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest
@@ -10,14 +8,7 @@ from dem.errors import InputError
 from dem.scene.reading import load_scene, scene_hash
 from dem.scene.scene import Scene
 from dem.setting.fidelity import FIDELITIES, fidelities
-from studies.accuracy import (
-    BASE,
-    Ladder,
-    affordable,
-    build_ladder,
-    ladder_sweep,
-    parse_seeds,
-)
+from studies.accuracy import BASE, Ladder, affordable, build_ladder, ladder_sweep, parse_seeds
 from templates.sweep.expand import expand
 
 SCENE = """\

@@ -1,7 +1,5 @@
 """The study of the landscape: runs with known forces and works, tables with a known order of measures, known costs."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from pathlib import Path

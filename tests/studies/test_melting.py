@@ -1,7 +1,5 @@
 """The study of melting: piles that were laid by hand and lost a known part of themselves."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Every study against its published tables: points, verdicts and numbers follow from the stored table of runs."""
 
-from __future__ import annotations
-
 import io
 import re
 from functools import cache, partial
@@ -121,19 +119,6 @@ def test_scenes_of_the_table_are_those_of_the_sweep(table: str) -> None:
     known = {point.name: point.scene_sha256 for point in points if point.name in runs}
     assert known
     assert known == runs[list(known)].to_dict()
-
-
-@pytest.mark.parametrize("table", SCRIPTS)
-def test_ids_quantities_and_columns_are_declared_once(table: str) -> None:
-    study = study_of(table)
-    for names in (
-        [finding.id for finding in study.findings],
-        [finding.says for finding in study.findings],
-        [quantity.column for quantity in study.quantities],
-        [figure.name for figure in study.figures],
-    ):
-        assert len(set(names)) == len(names)
-    assert all(quantity.meaning for quantity in study.quantities)
 
 
 @pytest.mark.parametrize("table", [name for name in SCRIPTS if not STUDIES[name].variants])

@@ -1,7 +1,5 @@
 """The studies of sensitivity: run directories with known packing fractions."""
 
-from __future__ import annotations
-
 import math
 from pathlib import Path
 from typing import Any
@@ -9,7 +7,6 @@ from typing import Any
 import pytest
 from synthetic import SyntheticRun, write_run
 
-from dem.errors import InputError
 from studies.framework.runs import DEFINITION
 from studies.sensitivity import STUDY
 
@@ -50,13 +47,3 @@ def test_means_and_changes_are_those_put_in(tmp_path: Path) -> None:
     assert "two-rows -10.4 ± " in report.judged[1].ours
     assert {"sensitivity.png", "summary.csv"} <= set(report.files)
     assert len(report.missing) == 1
-
-
-def test_runs_of_other_names_or_aspect_ratios_are_rejected(tmp_path: Path) -> None:
-    good = write(tmp_path / "draft_seed1")
-    renamed = write(tmp_path / "draft_seed2")
-    report = STUDY.analyse([good, renamed], tmp_path / "out", **ORIGIN)
-    assert "must be named VARIANT_seed1; give the run its name back" in report.missing[0].cause
-    other = write(tmp_path / "pitch-0.5_seed1", aspect_ratio=1.0)
-    with pytest.raises(InputError, match=r"runs of different aspect ratio \[-\] must not be averaged"):
-        STUDY.analyse([good, other], tmp_path / "out", **ORIGIN)

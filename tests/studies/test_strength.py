@@ -1,7 +1,5 @@
 """The study of strength: runs with known forces and piles that come off in part; its findings and shipped points."""
 
-from __future__ import annotations
-
 import math
 from pathlib import Path
 from typing import Any

@@ -1,20 +1,14 @@
 """The shipped sweeps: they expand on either engine, and variants differ in what they say alone."""
 
-from __future__ import annotations
-
 import subprocess
 import sys
-from collections.abc import Mapping
 from functools import cache
-from typing import Any
 
 import pytest
 from sweeps import of_one_seed
 
 from dem.phases.shake import Shake
-from dem.setting.fidelity import FIDELITIES, Fidelity
-from smarticles.commands.study import differences
-from studies.registry import STUDIES, shipped
+from studies.registry import STUDIES
 from templates.sweep.expand import Point, expand
 from templates.sweep.sweep_file import load_sweep, on_engine
 
@@ -72,53 +66,6 @@ def test_a_study_by_the_papers_code_differs_in_the_protocol_alone(name: str) -> 
             else:
                 assert phase == twin
         assert one.scene.seed_for("poses") == other.scene.seed_for("poses")
-
-
-@pytest.mark.parametrize(
-    ("study", "choices"),
-    [
-        ("sensitivity", {"draft": 0, "diameter-1.27mm": 1, "friction-0.6": 2}),  # friction of smarticles and of walls
-        ("sensitivity-section", {"draft": 0, "pitch-0.5": 1, "two-rows": 2}),  # rows and pitch
-    ],
-)
-def test_variants_differ_from_the_draft_in_their_choice_alone(study: str, choices: dict[str, int]) -> None:
-    found = points_of(study)
-    # The file writes the draft out: the two must stay the same.
-    assert found[0].scene.fidelity == Fidelity(base="draft", **FIDELITIES["draft"])
-    for point in found:
-        variant = str(point.values["variant"])
-        twin = next(p for p in found if p.values["variant"] == "draft" and p.scene.seed == point.scene.seed)
-        here, there = (flat(p.scene.model_dump()) for p in (point, twin))
-        changed = {key for key in here if here[key] != there[key]}
-        assert len(changed) == choices.get(variant, 1), (variant, changed)
-        assert all(key.startswith(("fidelity.", "contact.")) for key in changed)
-
-
-def flat(data: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
-    found: dict[str, Any] = {}
-    for key, value in data.items():
-        found |= flat(value, f"{prefix}{key}.") if isinstance(value, Mapping) else {f"{prefix}{key}": value}
-    return found
-
-
-def test_the_quick_variant_says_how_it_differs() -> None:
-    full = points_of("gravish")
-    assert differences(full, full) == []
-    lines = differences(points_of("gravish", quick=True), full)
-    assert lines[0] == "18 runs instead of 73"
-    assert "l_over_w: only 0.4, 0.5, 0.7, 0.9, 1.0 of 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0, 1.1" in lines
-    assert "shake_s: 1.5 instead of 20.0" in lines
-    # Columns that follow from l/w, and what is the same, are left out.
-    assert not any(line.startswith(("layers:", "engine:", "title:")) for line in lines)
-
-
-@pytest.mark.parametrize("name", STUDIES)
-def test_a_study_is_what_the_registry_calls_it(name: str) -> None:
-    script = STUDIES[name]
-    assert script.load().name == name
-    assert script.about
-    variables = expand(of_one_seed(load_sweep(script.sweep_file())))[0].values
-    assert set(script.load().pictured) <= set(variables)
 
 
 def test_the_registry_of_studies_loads_nothing_large() -> None:

@@ -1,7 +1,5 @@
 """Run directories without a simulation: random smarticles in a cylinder, packed to order."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field

@@ -1,7 +1,5 @@
 """Run directories of columns that collapse: a given share of the smarticles leaves, and all of them sink."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from pathlib import Path
 

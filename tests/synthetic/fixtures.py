@@ -1,7 +1,5 @@
 """Fixtures of tests that read run directories: smarticles and small runs, in the files of `dem.record`."""
 
-from __future__ import annotations
-
 import json
 
 import meshio

@@ -1,7 +1,5 @@
 """Forces at contacts made to order, beside the frames of a run."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from pathlib import Path
 

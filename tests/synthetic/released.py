@@ -1,7 +1,5 @@
 """Run directories whose wall was taken away, with piles laid by hand before and after."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 
@@ -41,12 +39,7 @@ def write_released(
     """A run of four frames per phase; the pile is `before` in the rest, and `after` from half of the removal on."""
     phases = ("deposit", *ACTIVITY[procedure], "relax", "remove-container")
     run = SyntheticRun(
-        phases=phases,
-        seed=seed,
-        count=len(before),
-        aspect_ratio=aspect_ratio,
-        frames_per_phase=FRAMES,
-        series=False,
+        phases=phases, seed=seed, count=len(before), aspect_ratio=aspect_ratio, frames_per_phase=FRAMES, series=False
     )
     write_run(directory, run)
     start = sum(run.durations[kind] for kind in phases[:-1])

@@ -1,7 +1,5 @@
 """Smarticles as vertices: tip, hinge, hinge, tip."""
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation

@@ -1,7 +1,5 @@
 """With the project's dependencies alone a scene is run, swept and measured; other commands name what they need."""
 
-from __future__ import annotations
-
 import json
 import os
 import subprocess
@@ -50,7 +48,6 @@ def place(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("core")
     (folder / "sitecustomize.py").write_text(BLOCKER)
     (folder / "scene.yaml.j2").write_text(SCENE)
-    (folder / "scene.yaml").write_text(SCENE.replace("{{ seed }}", "1"))
     (folder / "sweep.yaml").write_text(SWEEP)
     return folder
 
@@ -62,12 +59,12 @@ def call(place: Path, *words: str) -> subprocess.CompletedProcess[str]:
 
 
 def test_run_sweep_and_measure_need_no_extra(place: Path) -> None:
+    # A sweep starts `smarticles run` in interpreters that block the extras as well.
     for words in (
-        ["run", "scene.yaml", "--out", "a"],
         ["sweep", "sweep.yaml", "--out", "many", "--submit", "local"],
-        ["compare", "a", "many/runs/seed1"],
+        ["compare", "many/runs/seed1", "many/runs/seed2"],
         ["status", "many"],
-        ["measure", "a", "--profile", "rings.csv"],
+        ["measure", "many/runs/seed1", "--profile", "rings.csv"],
         ["--completion", "bash"],
     ):
         done = call(place, *words)

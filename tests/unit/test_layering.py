@@ -1,7 +1,5 @@
 """Imports between packages: the contracts of `.importlinter`, and what those cannot express."""
 
-from __future__ import annotations
-
 import subprocess
 import sys
 from configparser import ConfigParser
@@ -29,24 +27,14 @@ def contracts() -> list[str]:
 @pytest.mark.parametrize("contract", contracts())
 def test_contract(contract: str, capsys: pytest.CaptureFixture[str]) -> None:
     status = lint_imports(
-        config_filename=str(ROOT / ".importlinter"),
-        limit_to_contracts=(contract,),
-        no_cache=True,
-        no_logo=True,
+        config_filename=str(ROOT / ".importlinter"), limit_to_contracts=(contract,), no_cache=True, no_logo=True
     )
     assert status == EXIT_STATUS_SUCCESS, capsys.readouterr().out
 
 
-def test_packages_are_those_of_this_checkout() -> None:
-    assert {Path(sys.modules[name].__path__[0]) for name in PACKAGES if name in sys.modules} <= {
-        ROOT / name for name in PACKAGES
-    }
-    assert len(MODULES) > 100
-
-
-@pytest.mark.parametrize("package", PACKAGES)
-def test_importing_everything_loads_neither_yade_nor_two_vtks(package: str) -> None:
-    names = [name for name in MODULES if name.split(".")[0] == package]
+@pytest.mark.parametrize("packages", [["dem"], ["postprocess"], ["smarticles", "studies", "templates"]])
+def test_importing_everything_loads_neither_yade_nor_two_vtks(packages: list[str]) -> None:
+    names = [name for name in MODULES if name.split(".")[0] in packages]
     code = (
         "import importlib, sys\n"
         f"for name in {names!r}: importlib.import_module(name)\n"
@@ -56,10 +44,10 @@ def test_importing_everything_loads_neither_yade_nor_two_vtks(package: str) -> N
     answer = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=False)
     assert answer.returncode == 0, answer.stderr
     loaded = set(answer.stdout.split())
-    assert package in loaded
+    assert loaded >= set(packages)
     assert "yade" not in loaded
     # Pictures are drawn by modules of `postprocess`, and what imports them does so when it draws.
-    if package != "postprocess":
+    if packages != ["postprocess"]:
         assert not loaded & {"pyvista", "vtkmodules", "vtk"}
-    if package == "dem":
+    if packages == ["dem"]:
         assert not loaded & set(PACKAGES) - {"dem"}

@@ -1,7 +1,5 @@
 """A wheel of this checkout, installed elsewhere: five packages with their data, and commands that work from it."""
 
-from __future__ import annotations
-
 import json
 import os
 import shutil
@@ -93,7 +91,7 @@ def test_every_file_of_the_packages_is_in_the_wheel(wheel: Path, sources: list[s
 def test_a_study_is_analysed_from_the_wheel(smarticles: Callable[..., str], tmp_path: Path) -> None:
     out = tmp_path / "study"
     folder = make_folder(shipped("gravish").sweep_file(quick=True), out, "test")
-    for entry in folder.entries:
+    for entry in [one for one in folder.entries if not one.again and one.values["l_over_w"] == 0.7]:
         shake = SyntheticRun(
             aspect_ratio=entry.values["l_over_w"], seed=entry.values["seed"], count=6, frames_per_phase=1
         )

@@ -1,7 +1,5 @@
 """How a chain is laid out, and when it has come apart."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from scenes import chain

@@ -1,7 +1,5 @@
 """Poses from vertices: what a pose makes of a shape gives the pose back."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from numpy.typing import NDArray

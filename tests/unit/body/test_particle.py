@@ -1,7 +1,5 @@
 """Volume, mass and inertia of the boxes against independent ways to get them; the layout of the spheres."""
 
-from __future__ import annotations
-
 import itertools
 import math
 
@@ -162,12 +160,7 @@ def smallest_gap(particle: Particle, first: int, second: int) -> float:
     return float(np.linalg.norm(a[:, None] - b[None], axis=-1).min() / particle.chain.diameter)
 
 
-@given(
-    ratio=st.floats(0.2, 2),
-    a1=st.floats(-15, 105),
-    a2=st.floats(-15, 105),
-    layout=st.sampled_from(LAYOUTS[:3]),
-)
+@given(ratio=st.floats(0.2, 2), a1=st.floats(-15, 105), a2=st.floats(-15, 105), layout=st.sampled_from(LAYOUTS[:3]))
 def test_barbs_never_overlap_the_middle_link_while_they_turn(
     ratio: float, a1: float, a2: float, layout: dict[str, float]
 ) -> None:

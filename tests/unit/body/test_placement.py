@@ -1,7 +1,5 @@
 """Poses of a layer: apart from each other, from what is there and from the wall; and truly random."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from scenes import make_particle

@@ -1,7 +1,5 @@
 """All smarticles at one instant, against clouds of mass points that know nothing of rigid bodies."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """A middle link thicker in the plane than the barbs: boxes, spheres and a chain laid out of them, by known answers."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

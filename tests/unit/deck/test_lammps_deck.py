@@ -1,7 +1,5 @@
 """A scene as a deck of LAMMPS: what is in it, what is rejected, and what the distribution's LAMMPS makes of it."""
 
-from __future__ import annotations
-
 import math
 import re
 import shutil

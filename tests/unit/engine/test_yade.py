@@ -1,7 +1,5 @@
 """YADE as an engine, without running it: the stable step, dissipation of contacts, a machine without YADE."""
 
-from __future__ import annotations
-
 import math
 import sys
 from pathlib import Path
@@ -142,11 +140,7 @@ def bounce(damping: float, step: float) -> tuple[float, float]:
             viscous = -damping * speed
             speed += max(KN * overlap + viscous, 0.0) / MASS * step
             said += contact(
-                before=(0, 0, before),
-                after=(0, 0, speed),
-                overlap=overlap,
-                viscous=viscous,
-                damping=(damping, 0.0),
+                before=(0, 0, before), after=(0, 0, speed), overlap=overlap, viscous=viscous, damping=(damping, 0.0)
             ).dissipated(step)
         height += speed * step
         if speed > 0 and height > 1e-4:

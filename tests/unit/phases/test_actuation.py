@@ -1,7 +1,5 @@
 """Actuated phases: presets, which smarticles move, where they begin, target angles over time."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from typing import Any

@@ -1,7 +1,5 @@
 """A motion that a smarticle cannot do is rejected with one line: what, where, the value with its unit, the way out."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from typing import Any

@@ -1,7 +1,5 @@
 """Scenes with hooks, a wall that is removed, or a mould of tiers: their defaults."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The pull of a hook against a spring: when it stops, and how long it then stays."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import pytest

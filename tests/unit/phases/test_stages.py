@@ -1,7 +1,5 @@
 """Each phase while it runs, against an engine in memory: its calls of the engine, and how long it takes."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable
 from typing import Any

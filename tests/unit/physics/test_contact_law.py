@@ -1,7 +1,5 @@
 """Damping from restitution, a scene's numbers in its contact law, and strings."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

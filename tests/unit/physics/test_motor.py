@@ -1,7 +1,5 @@
 """The motors' arithmetic: laws on paper, work against exact integrals, memory bit for bit."""
 
-from __future__ import annotations
-
 import json
 import math
 from dataclasses import replace

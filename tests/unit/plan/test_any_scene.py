@@ -4,8 +4,6 @@ Scenes are the shipped ones with any value in any place, keys dropped, added and
 tests/unit/plan/test_any_scene.py` tries so many of each kind instead of a few hundred.
 """
 
-from __future__ import annotations
-
 import gc
 import json
 import math

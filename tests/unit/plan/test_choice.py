@@ -1,7 +1,5 @@
 """The fidelity chosen from a measured table: by error, by hours, by both, and what is said where none will do."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 

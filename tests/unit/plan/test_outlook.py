@@ -1,7 +1,5 @@
 """A plan: which effects a scene calls for, warnings, costs on the links engine."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import asdict
 from typing import Any

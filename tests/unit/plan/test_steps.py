@@ -1,7 +1,5 @@
 """Time steps: from what is stable, into intervals; walls, hooks and strings move by a small part of a sphere in one."""
 
-from __future__ import annotations
-
 import math
 import re
 from typing import Any

@@ -1,7 +1,5 @@
 """The examples of docstrings run, and give what they say; `runs/pile` is a made-up run."""
 
-from __future__ import annotations
-
 import doctest
 import importlib
 import importlib.util

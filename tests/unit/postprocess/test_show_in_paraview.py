@@ -10,13 +10,9 @@ import numpy as np
 import pytest
 from PIL import Image
 from synthetic import RADIUS, SyntheticRun, write_run
-from synthetic.forces import pressed
 
-from dem.record.forces import force_mesh
-from dem.record.frames import FrameWriter, read_frames
-from dem.record.names import FORCE
+from dem.record.frames import read_frames
 from postprocess.export import export_run
-from postprocess.geometry.links import centres_of_mass
 
 PVPYTHON = os.environ.get("PVPYTHON") or shutil.which("pvpython")
 DRAWS = bool(os.environ.get("DISPLAY") or os.environ.get("PVPYTHON"))
@@ -39,16 +35,6 @@ cut = simple.FindSource("wall, cut open")
 if cut is not None:
     cut.UpdatePipeline()
     scene["cut"] = list(cut.GetDataInformation().GetBounds())
-if simple.FindSource("forces") is not None:
-    scene["forces"] = list(simple.GetDisplayProperties(simple.FindSource("forces")).ColorArrayName)
-    scene["largest force"] = simple.GetColorTransferFunction("normal_force_N").RGBPoints[-4]
-scene["points"] = {}
-for (name, _), proxy in simple.GetSources().items():
-    counts = []
-    for time in boxes.TimestepValues:
-        proxy.UpdatePipeline(time)
-        counts.append(proxy.GetDataInformation().GetNumberOfPoints())
-    scene["points"][name] = counts
 names = {proxy.SMProxy: name for (name, _), proxy in simple.GetSources().items()}
 view = simple.GetActiveView()
 inputs = [part.Input.SMProxy for part in view.Representations if part.Visibility and hasattr(part, "Input")]
@@ -114,30 +100,3 @@ def test_boxes_by_crossings_wall_cut_open_time_running(tmp_path, pvpython):
     coloured = [int((np.ptp(picture, axis=2) > 40).sum()) for picture in pictures]
     assert min(coloured) > 3000
     assert all((one != other).any() for one, other in itertools.pairwise(pictures))
-
-
-def test_forces_are_lines_by_their_size_and_a_wall_that_is_taken_away_is_gone(tmp_path, pvpython):
-    made = SyntheticRun(count=12, frames_per_phase=1, phases=("relax", "remove-container"), packing=(0.05, 0.05))
-    run = write_run(tmp_path / "run", made)
-    (run / "scene.yaml").write_text(json.dumps({"phases": [{"type": kind} for kind in made.phases]}))
-    # None at first: what reads the collection finds no force before there is one.
-    writer = FrameWriter(run, FORCE)
-    for found, frame in zip([pressed([], []), pressed([(0, 1), (2, 3)], [2.0, 1.0])], read_frames(run), strict=True):
-        mesh = force_mesh(found, centres_of_mass(frame.vertices), time=frame.time, phase=frame.phase)
-        writer.write(mesh, frame.time)
-    folder = export_run(
-        run, to="vtp", every_frame=True, wanted=["forces", "crossings"], unwanted=["local_packing_fraction"]
-    )
-    scene = shown(pvpython, folder, tmp_path, "--film", tmp_path / "film")
-    assert [count > 0 for count in scene["points"]["wall, cut open"]] == [True, False]
-    assert [count > 0 for count in scene["points"]["forces"]] == [False, True]
-    # The lines themselves, not a shape about them whose size could be wrong.
-    assert "forces" in scene["shown"]
-    assert scene["forces"] == ["CELLS", "normal_force_N"]
-    assert scene["largest force"] == pytest.approx(2.0)
-    red = [
-        int(((picture[..., 0] > 90) & (picture[..., 1:].max(axis=2) < 70)).sum())
-        for picture in map(pixels, sorted((tmp_path / "film").glob("*.png")))
-    ]
-    # Some darker pixels are boxes seen through each other.
-    assert red[1] - red[0] > 100

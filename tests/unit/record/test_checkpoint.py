@@ -1,7 +1,5 @@
 """A checkpoint is plain data and an engine's own bytes; one without an engine name is read."""
 
-from __future__ import annotations
-
 import io
 import json
 import zipfile

@@ -1,16 +1,19 @@
 """Files appear whole or not at all, also on a disk that fills up."""
 
-from __future__ import annotations
-
 import errno
 import os
+import subprocess
+import sys
+from collections.abc import Callable
 from pathlib import Path
 
+import h5py
 import pytest
 
 from dem.errors import RunError
 from dem.record.files import write_text, write_whole
 
+ROOT = Path(__file__).resolve().parents[3]
 FULL = (
     "cannot be written (No space left on device); free space or choose another --out; "
     "everything written before is whole"
@@ -72,3 +75,36 @@ def test_folder_is_made_but_not_a_whole_path(tmp_path: Path) -> None:
     assert (tmp_path / "new" / "a.txt").read_text() == "x"
     with pytest.raises(RunError, match=r"gone/far/a\.txt: cannot be written, its folder is gone"):
         write_text(tmp_path / "gone" / "far" / "a.txt", "x")
+
+
+LONG_SERIES = """
+import sys
+from pathlib import Path
+import numpy as np
+from dem.errors import RunError
+from dem.record.columns import COLUMNS
+from dem.record.series import SeriesWriter
+
+def write(length):
+    writer = SeriesWriter(Path(sys.argv[1]), COLUMNS, {"seed": 1})
+    for _ in range(length):
+        writer.add({name: np.zeros(3) if name == "container_force_N" else 0.0 for name in COLUMNS})
+    writer.write()
+
+write(10)
+try:
+    write(5000)
+except RunError as error:
+    print(error)
+"""
+
+
+def test_series_on_a_really_full_disk(mount_disk: Callable[[str], Path]) -> None:
+    disk = mount_disk("64k")
+    # In a process of its own: where HDF5 cannot flush a file, it takes the process with it.
+    command = [sys.executable, "-c", LONG_SERIES, str(disk)]
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, timeout=300, check=False)
+    assert (done.returncode, done.stdout, done.stderr) == (0, f"{disk}/series.h5: {FULL}\n", "")
+    with h5py.File(disk / "series.h5") as file:
+        assert len(file["time_s"]) == 10
+    assert [path.name for path in disk.iterdir()] == ["series.h5"]

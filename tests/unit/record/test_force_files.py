@@ -1,7 +1,5 @@
 """Forces at contacts: points made into contacts, and the file that docs/reference/files.md promises, read by VTK."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -1,7 +1,5 @@
 """A frame on disk is what docs/reference/files.md promises, read back with meshio and with plain XML."""
 
-from __future__ import annotations
-
 import math
 from pathlib import Path
 from typing import Any

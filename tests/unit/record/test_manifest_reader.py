@@ -38,13 +38,9 @@ def test_what_manifests_of_older_versions_lack(run):
     ("changes", "message"),
     [
         ({"seed": None}, "seed: Field required;"),
-        ({"seed": True}, "seed: .* got true"),
-        ({"count": 0}, "count: .* greater than 0, got 0"),
         ({"solid_volume_m3": float("nan")}, "solid_volume_m3: .* finite number, got nan"),
-        ({"time_step_s": "1"}, "time_step_s: .* got '1'"),
         ({"name": 3}, "name: .* string, got 3"),
         ({"format": 2}, "format: .* 1, got 2"),
-        ({"phases": 3}, "phases: .* got 3"),
         ({"phases": [{"index": 1, "type": "relax"}]}, "numbered"),
     ],
 )

@@ -1,7 +1,5 @@
 """Progress of a run, on the terminal and for other processes."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

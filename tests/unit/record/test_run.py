@@ -1,7 +1,5 @@
 """`Run`: what a run directory holds, read when asked for."""
 
-from __future__ import annotations
-
 import fcntl
 import json
 from pathlib import Path

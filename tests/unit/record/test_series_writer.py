@@ -1,7 +1,5 @@
 """Time series on disk: units on every dataset, one length, replaced whole."""
 
-from __future__ import annotations
-
 import math
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """What is due at a sample: rows, frames, spheres, and checks of the watchdog; from an engine in memory."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Sequence
 from pathlib import Path

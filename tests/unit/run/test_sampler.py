@@ -1,7 +1,5 @@
 """Rows of the series: what the engine says, and forces that are means over all steps, from an engine in memory."""
 
-from __future__ import annotations
-
 import json
 import math
 from dataclasses import replace

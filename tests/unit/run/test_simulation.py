@@ -1,7 +1,5 @@
 """Whole runs on an engine in memory: what dem does is the same whichever engine computes."""
 
-from __future__ import annotations
-
 import json
 import os
 import signal

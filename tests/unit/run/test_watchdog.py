@@ -1,7 +1,5 @@
 """Each reason for which the watchdog stops a run, with its literal text; and a healthy state that passes."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

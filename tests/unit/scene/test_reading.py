@@ -1,7 +1,5 @@
 """Files and overrides that are no scene, and errors; see `test_bad_scenes.py`."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """What a scene file says is what the scene is: defaults, overrides, round trips, the hash, the schema."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Callable
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Stiffness from loads and speeds: raised where a name leaves it open, rejected where it is given too soft."""
 
-from __future__ import annotations
-
 import math
 import re
 from typing import Any

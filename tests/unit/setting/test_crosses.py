@@ -1,7 +1,5 @@
 """Crosses as smarticles that are poured see them."""
 
-from __future__ import annotations
-
 import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st

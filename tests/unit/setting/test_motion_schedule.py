@@ -1,7 +1,5 @@
 """Motions against hand-computed angles, and their extremes and speeds against dense sampling."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

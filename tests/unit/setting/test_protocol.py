@@ -1,7 +1,5 @@
 """What a protocol fills in, and what stands against it."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import pytest

@@ -1,7 +1,5 @@
 """A sweep to expand, and the types of the boundaries."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from pathlib import Path
 from typing import NamedTuple

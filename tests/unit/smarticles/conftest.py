@@ -1,7 +1,5 @@
 """Run directories to measure, a sweep to expand, and the command to call."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

@@ -1,7 +1,5 @@
 """compare: what differs between two runs or two sweeps."""
 
-from __future__ import annotations
-
 import csv
 import json
 import math
@@ -92,16 +90,3 @@ def test_sweeps_are_compared_run_by_run_and_group_by_group(
     assert "identical bits: 1 of 2 runs that both have" in lines
     assert any(line.startswith("6 shake φ 0.1200 0.1400 0.0200") for line in lines)
     assert any(line.startswith("5 shake φ 0.1300 0.1300 0.0000") for line in lines)
-
-
-def test_a_run_is_not_compared_with_a_sweep_nor_with_nothing(
-    tmp_path: Path, sweep_file: Path, write_run: WriteRun, smarticles: Smarticles
-) -> None:
-    run = write_run(tmp_path / "a")
-    smarticles("sweep", sweep_file, "--out", tmp_path / "s")
-    said = smarticles("compare", run, tmp_path / "s")
-    assert (said.status, said.err) == (
-        2,
-        f"smarticles: error: {run} is a run and {tmp_path / 's'} a sweep; give two of a kind\n",
-    )
-    assert "is neither a run directory nor that of a sweep" in smarticles("compare", run, tmp_path).err

@@ -1,8 +1,5 @@
 """--completion: the script completes words in a real bash."""
 
-from __future__ import annotations
-
-import shutil
 import subprocess
 from pathlib import Path
 
@@ -35,11 +32,3 @@ def test_words_are_completed(words: str, meant: str, tmp_path: Path, smarticles:
     ask = ASK.format(script=script, words=words)
     said = subprocess.run(["bash", "-c", ask], cwd=tmp_path, capture_output=True, text=True, check=True)
     assert (said.stdout.split(), said.stderr) == ([meant], "")
-
-
-def test_the_script_for_zsh_is_one(smarticles: Smarticles) -> None:
-    said = smarticles("--completion", "zsh")
-    assert said.out.startswith("#compdef smarticles\n")
-    if shutil.which("zsh") is None:
-        pytest.skip("zsh is not installed here, so its script is not tried")
-    assert subprocess.run(["zsh", "-n"], input=said.out, text=True, check=False).returncode == 0

@@ -1,7 +1,5 @@
 """init: scenes to begin with, each valid, planned without a warning, and never over another file."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

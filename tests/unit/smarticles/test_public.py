@@ -1,7 +1,5 @@
 """`import smarticles`: what it offers, and that nothing is loaded before it is used."""
 
-from __future__ import annotations
-
 import subprocess
 import sys
 from pathlib import Path
@@ -10,8 +8,7 @@ import pytest
 from command_cases import WriteRun
 
 import smarticles
-from dem.errors import InputError, RunError
-from dem.scene.reading import parse_scene
+from dem.errors import InputError
 from dem.setting.fidelity import fidelities
 from smarticles.public import write_sweep
 from smarticles.sweeps import make_folder
@@ -38,14 +35,6 @@ def test_every_name_is_there() -> None:
     assert set(smarticles.__all__) == set(dir(smarticles))
     assert all(getattr(smarticles, name) is not None for name in smarticles.__all__)
     assert smarticles.measures.packing_fraction.__module__ == "postprocess.measures.packing"
-
-
-def test_a_directory_that_holds_something_else_is_left_alone(tmp_path: Path) -> None:
-    scene = parse_scene({"schema_version": 1, "seed": 1, "count": 1, "phases": [{"type": "deposit"}]}, source="here")
-    (tmp_path / "mine.txt").write_text("mine")
-    with pytest.raises((InputError, RunError), match=r"yade|--out "):
-        smarticles.run(scene, tmp_path)
-    assert [path.name for path in tmp_path.iterdir()] == ["mine.txt"]
 
 
 def test_a_table_of_a_run_has_a_row_per_phase_or_frame(write_run: WriteRun, tmp_path: Path) -> None:

@@ -1,7 +1,5 @@
 """--ranks: processes of engine: lammps, on this machine and on a cluster; rejected where it has no meaning."""
 
-from __future__ import annotations
-
 import os
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """The page of a report in a browser: no errors, no requests, nothing cut off on a phone, dark where that is wanted."""
 
-from __future__ import annotations
-
 import shutil
 from collections.abc import Iterator
 from pathlib import Path

@@ -1,7 +1,5 @@
 """measure and render: run directories in, tables and pictures out."""
 
-from __future__ import annotations
-
 import csv
 import json
 from pathlib import Path
@@ -67,17 +65,6 @@ def test_measure_has_the_variables_of_a_sweep_and_means_by_them(
     assert "standard error over runs" in said.out
 
 
-def test_measure_rejects_groups_that_are_none(tmp_path: Path, write_run: WriteRun, smarticles: Smarticles) -> None:
-    run = write_run(tmp_path / "a")
-    said = smarticles("measure", run, "--by", "seeed")
-    assert (said.status, said.err) == (
-        2,
-        "smarticles: error: --by seeed: 'seeed' is no column of these runs; did you mean 'seed'?\n",
-    )
-    assert "leave --frames out" in smarticles("measure", run, "--by", "seed", "--frames").err
-    assert "names no column" in smarticles("measure", run, "--by", ",").err
-
-
 def test_a_frame_that_is_cut_off_has_a_way_out_that_works(
     tmp_path: Path, write_run: WriteRun, smarticles: Smarticles
 ) -> None:
@@ -140,12 +127,9 @@ def test_render_draws_a_film_of_a_part_in_fixed_colours(
     ("words", "message"),
     [
         (("--fps", "10"), "--fps 10: a picture shows one time; use --time, or write a film: --output film.gif"),
-        (("--from", "1"), "--from 1: a picture shows one time"),
         (("--smarticle", "1", "--output", "a.gif"), "--smarticle 1: is drawn alone, in a picture; leave it out"),
-        (("--time", "1", "--output", "film.gif"), "--time 1: a film shows all times; "),
         (("--output", "film.avi"), "'.avi' is no kind of file that is drawn here; end the name in .png for a picture"),
         (("--clim", "5:1"), "must be LOW:HIGH, two numbers in order, or run: got '5:1'"),
-        (("--clim", "all"), "must be LOW:HIGH, two numbers in order, or run: got 'all'"),
         (("--size", "12y3"), "must be a number of pixels from 1, or two as in 1280x720: got '12y3'"),
     ],
 )

@@ -1,7 +1,5 @@
 """sweep, status and resume with a queue: rejections before anything is written, dry runs, states."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 
@@ -36,10 +34,7 @@ def queue(monkeypatch: pytest.MonkeyPatch) -> list[str]:
     [
         (["--cluster", "exmple-large"], "--cluster exmple-large: is not known; did you mean 'example-large'?"),
         ([], "--cluster: is missing; known: example-apptainer, example-large, local-slurm"),
-        ([*LARGE, "--time", "3-0"], "--time 3-0: partition shared of example-large allows 2-00:00:00"),
-        ([*LARGE, "--partition", "sharde"], "did you mean 'shared'?"),
         ([*LARGE, "--runs-per-task", "65"], "--runs-per-task 65: partition shared of example-large has 64 cores"),
-        ([*LARGE, "--memory", "900000"], "1 × 900000 MiB are more than the 250000 MiB"),
     ],
 )
 def test_what_a_cluster_cannot_give_is_rejected_before_anything_is_written(

@@ -1,7 +1,5 @@
 """status --watch: checks again until nothing goes on."""
 
-from __future__ import annotations
-
 import fcntl
 from pathlib import Path
 from typing import TextIO

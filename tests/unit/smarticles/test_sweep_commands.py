@@ -1,7 +1,5 @@
 """sweep, status, resume, study: from the command line to the directory."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 
@@ -10,9 +8,7 @@ from command_cases import Smarticles, WriteRun
 from synthetic import write_ended
 
 from studies.registry import shipped
-from templates.sweep.expand import expand
 from templates.sweep.folder import open_folder
-from templates.sweep.sweep_file import load_sweep
 
 
 def finish(directory: Path) -> None:
@@ -91,54 +87,6 @@ def test_a_failing_run_is_status_1_with_its_cause(sweep_file: Path, tmp_path: Pa
     assert (out / "logs" / "n5.txt").read_text(encoding="utf-8").startswith("smarticles: error: ")
 
 
-@pytest.fixture
-def finished_study(tmp_path: Path, write_run: WriteRun, smarticles: Smarticles) -> Path:
-    """The quick study with made-up finished runs, all but one."""
-    out = tmp_path / "study"
-    points = expand(load_sweep(shipped("gravish").sweep_file(quick=True)))
-    smarticles("sweep", shipped("gravish").sweep_file(quick=True), "--out", out)
-    for point in points[:-1]:
-        run = write_run(
-            out / "runs" / point.name,
-            aspect_ratio=point.values["l_over_w"],
-            seed=point.values["seed"],
-            count=6,
-            frames_per_phase=2,
-        )
-        manifest = json.loads((run / "run.json").read_text(encoding="utf-8"))
-        manifest |= {"scene_sha256": point.scene_sha256, "engine": point.scene.engine}
-        (run / "run.json").write_text(json.dumps(manifest), encoding="utf-8")
-    # What remains fails before YADE is needed.
-    (out / "scenes" / f"{points[-1].name}.yaml").write_text("count: []")
-    return out
-
-
-def test_a_study_is_analysed_drawn_and_says_what_is_missing(finished_study: Path, smarticles: Smarticles) -> None:
-    said = smarticles("study", "gravish", "--quick", "--out", finished_study)
-    assert said.status == 1
-    lines = said.out.splitlines()
-    assert lines[0].startswith("not the full study: 18 runs instead of 73; ")
-    assert "shake_s: 1.5 instead of 20.0" in lines[0]
-    assert lines[2].split()[:4] == ["links", "0.4", "20", "3"]
-    assert "FOUND: φ_f is above φ_0 at every l/w" in lines
-    results = finished_study / "results"
-    figures = [line.removeprefix("figure: ") for line in lines if line.startswith("figure: ")]
-    assert figures
-    assert all(Path(figure).is_file() for figure in figures)
-    assert lines[-1] == f"picture of lw0.70_links_seed1: {results / 'run.png'}"
-    assert (results / "run.png").is_file()
-    assert "1 of 18 runs are missing: lw1.00_yade_seed1: " in said.err.splitlines()[-1]
-    missing = (results / "missing.csv").read_text(encoding="utf-8")
-    assert "lw1.00_yade_seed1" in missing
-
-
-def test_a_study_without_a_finished_run_has_nothing_to_analyse(tmp_path: Path, smarticles: Smarticles) -> None:
-    said = smarticles("study", "gravish", "--quick", "--analyse", "--out", tmp_path / "out")
-    assert said.status == 2
-    assert "is finished; leave --analyse out to start them" in said.err
-    assert not (tmp_path / "out" / "results").exists()
-
-
 @pytest.mark.parametrize(
     ("words", "message"),
     [
@@ -147,9 +95,7 @@ def test_a_study_without_a_finished_run_has_nothing_to_analyse(tmp_path: Path, s
             "sensitivity --fidelity reference",
             "--fidelity reference: study sensitivity sets the fidelity of its runs itself; leave --fidelity out",
         ),
-        ("sensitivity --fidelity fine", "--fidelity fine: is not known; known: draft, standard, reference"),
         ("engines --engine links", "--engine links: study engines cannot be run on it ("),
-        ("chain --quick --fidelity reference", "--fidelity reference: study chain cannot be run at it ("),
     ],
 )
 def test_what_a_study_does_not_have_is_rejected(

@@ -1,7 +1,5 @@
 """Small sweeps in a temporary directory."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

@@ -1,7 +1,5 @@
 """A small sweep, and the types of the boundaries that write it."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Clusters as data, and requests that one cannot give."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest
@@ -50,16 +48,13 @@ def test_shipped_clusters_are_valid(name: str) -> None:
     ("old", "new", "message"),
     [
         ("max_array_size", "max_aray_size", "^[^ ]*: unknown key 'max_aray_size'; did you mean 'max_array_size'?"),
-        ("max_time", "maxtime", "partitions.long: unknown key 'maxtime'; did you mean 'max_time'?"),
         ('name = "mine"', "", "name: missing"),
         ('"1-00:00:00"', '"a day"', "'a day' is not a time; write D-HH:MM:SS"),
         ('= "long"', '= "logn"', "default_partition: there is no 'logn'; did you mean 'long'?"),
         ('name = "mine"', 'name = "my cluster"', "name: 'my cluster' would need quoting in a job script; use letters"),
         ('name = "mine"', 'name = "m"\nmodules = ["a; rm -rf /"]', "modules.0: .*rm -rf"),
         ('name = "mine"', 'name = "m"\noptions = ["--x\\n#SBATCH --y"]', "options.0: "),
-        ("= 16", '= "16"', "partitions.long.cores_per_node: '16' is no whole number from 1"),
         ("schema_version = 1", "schema_version = ", "not valid TOML: .*line 1"),
-        ('"slurm"', '"pbs"', "scheduler: 'pbs' is not known; use 'slurm'"),
     ],
 )
 def test_bad_cluster_files_are_input_errors(old: str, new: str, message: str, tmp_path: Path) -> None:
@@ -112,12 +107,10 @@ def test_time_is_what_is_expected_with_a_margin(cluster: Cluster) -> None:
     ("wishes", "message"),
     [
         ({"time": "1-00:01:00"}, "--time 1-00:01:00: partition long of mine allows 1-00:00:00"),
-        ({"time": "00:31:00", "partition": "short"}, "partition short of mine allows 00:30:00"),
         ({"time": "soon"}, "--time: 'soon' is not a time"),
         ({"time": "2"}, "--time 2: runs are asked to stop 120 s before the end"),
         ({"runs_per_task": 17}, "--runs-per-task 17: partition long of mine has 16 cores"),
         ({"runs_per_task": 16, "memory_mib": 2001}, "16 × 2001 MiB are more than the 32000 MiB"),
-        ({"memory_mib": 40000}, "--runs-per-task 1: 1 × 40000 MiB are more than"),
         ({"ranks": 4, "runs_per_task": 2}, "--runs-per-task 2: a run on 4 ranks is alone in its task"),
         ({"partition": "lng"}, "--partition lng: cluster mine has no such partition; did you mean 'long'?"),
     ],

@@ -1,7 +1,5 @@
 """Sweep files: what they may say, and the points they give."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest
@@ -32,12 +30,7 @@ points: {points_text}
 def test_grid_is_crossed_with_the_seeds(write_sweep: WriteSweep) -> None:
     found = points(SWEEP, write_sweep)
     assert [point.name for point in found] == ["n10_seed1", "n10_seed2", "n20_seed1", "n20_seed2"]
-    assert [(point.scene.count, point.scene.seed) for point in found] == [
-        (10, 1),
-        (10, 2),
-        (20, 1),
-        (20, 2),
-    ]
+    assert [(point.scene.count, point.scene.seed) for point in found] == [(10, 1), (10, 2), (20, 1), (20, 2)]
     assert len({point.scene_sha256 for point in found}) == 4
 
 
@@ -93,12 +86,7 @@ def test_on_one_engine_nothing_comes_again(write_sweep: WriteSweep) -> None:
     [
         ("seed: [2]", "sead: [2]", r"again.only.sead: no such variable; did you mean 'seed'\?"),
         ("seed: [2]", "seed: [3]", "again.only.seed: no point has 3; there are 1, 2"),
-        (
-            "constants: {engine: yade,",
-            "constants: {enigne: yade,",
-            "'enigne' is none of the constants",
-        ),
-        ("constants: {engine: yade, share: 0.5}, ", "", "again.constants: missing"),
+        ("constants: {engine: yade,", "constants: {enigne: yade,", "'enigne' is none of the constants"),
         ("only:", "olny:", r"again: unknown key 'olny'; did you mean 'only'\?"),
     ],
 )
@@ -133,8 +121,6 @@ def test_some_points_have_more_seeds_after_those_of_all(write_sweep: WriteSweep,
         ("only: {count: [30, 10]}", "only: {cuont: [30]}", r"repeats.more.only.cuont: no such variable; did you mean"),
         ("only: {count: [30, 10]}", "only: {count: [31]}", "repeats.more.only.count: no point has 31; there are 10,"),
         ("seeds: [7, 3]", "seeds: [7, 2]", "more.seeds: 2 is one of `seeds` already"),
-        ("seeds: [7, 3]", "seeds: [7, 7]", "a seed is given twice"),
-        (", only: {count: [30, 10]}", "", "repeats.more.only: missing"),
     ],
 )
 def test_more_seeds_must_be_of_known_points(write_sweep: WriteSweep, old: str, new: str, message: str) -> None:
@@ -144,8 +130,7 @@ def test_more_seeds_must_be_of_known_points(write_sweep: WriteSweep, old: str, n
 
 def test_table_rows_are_points_and_derived_values_follow(write_sweep: WriteSweep) -> None:
     text = sweep_with(
-        "{table: {file: counts.csv}}",
-        more="derived: {half: n / 2, count: half | int, fixed: 3}\nrepeats: {seeds: [1]}",
+        "{table: {file: counts.csv}}", more="derived: {half: n / 2, count: half | int, fixed: 3}\nrepeats: {seeds: [1]}"
     )
     found = points(text, write_sweep, counts_csv=COUNTS)
     assert [point.scene.count for point in found] == [247, 135, 96]
@@ -162,8 +147,7 @@ def test_table_rows_are_points_and_derived_values_follow(write_sweep: WriteSweep
 
 def test_table_keeps_only_the_wanted_rows(write_sweep: WriteSweep) -> None:
     text = sweep_with(
-        "{table: {file: counts.csv, only: {l_over_w: [1.0, 0.4]}}}",
-        more="derived: {count: n}\nrepeats: {seeds: [1]}",
+        "{table: {file: counts.csv, only: {l_over_w: [1.0, 0.4]}}}", more="derived: {count: n}\nrepeats: {seeds: [1]}"
     )
     found = points(text, write_sweep, counts_csv=COUNTS)
     assert [point.values["l_over_w"] for point in found] == [0.4, 1.0]
@@ -171,9 +155,7 @@ def test_table_keeps_only_the_wanted_rows(write_sweep: WriteSweep) -> None:
 
 def test_sources_are_crossed_and_the_later_varies_faster(write_sweep: WriteSweep) -> None:
     text = sweep_with(
-        "{grid: {count: [1, 2]}, list: [{a: 1}, {a: 2}]}",
-        run_name="{{ a }}{{ count }}",
-        more="constants: {seed_: 5}",
+        "{grid: {count: [1, 2]}, list: [{a: 1}, {a: 2}]}", run_name="{{ a }}{{ count }}", more="constants: {seed_: 5}"
     )
     scene = SCENE.replace("seed }}", "seed_ }}").replace("name: test", "name: t{{ a }}")
     found = points(text, write_sweep, scene=scene)
@@ -187,20 +169,16 @@ def test_sources_are_crossed_and_the_later_varies_faster(write_sweep: WriteSweep
         ("", "a sweep file holds keys such as template and points: got null"),
         ("a: [", "line 1, column 5: not valid YAML"),
         (SWEEP.replace("run_name", "runname"), r"unknown key 'runname'; did you mean 'run_name'?"),
-        (SWEEP.replace("schema_version: 1", "schema_version: 2"), "schema_version: 2 is not known; use 1"),
         (SWEEP.replace("name: test\n", ""), "name: missing; it has no default, see `smarticles sweep --help`"),
         (SWEEP + "derived: {half: [1]}\n", r"derived.half: \[1\] is neither an expression nor a number; write it"),
         (SWEEP.replace("{count: [10, 20]}", "{count: []}"), "grid: count has no values"),
-        (SWEEP.replace("[1, 2]}", "[]}"), "repeats.seeds: an empty list; give at least 1 item"),
         (SWEEP.replace("[1, 2]", "[1, 1]"), r"a seed is given twice: got \[1, 1\]"),
         (SWEEP.replace("[10, 20]", "[10, .nan]"), "nan is not a finite number"),
         (SWEEP.replace("{count:", "{co-unt:"), "'co-unt' cannot name a variable"),
-        (SWEEP.replace("{count:", "{seed:"), "'seed' cannot name a variable"),
         (sweep_with("{}"), "no points: give at least one of table, list, zip, grid"),
         (sweep_with("{zip: {a: [1], b: [1, 2]}}"), "zip: lists of unequal length"),
         (sweep_with("{list: [{a: 1}, {b: 1}]}"), "every point needs the same variables"),
         (SWEEP.replace("scene.yaml.j2", "absent.j2"), "absent.j2: cannot read the scene template"),
-        (sweep_with("{table: {file: absent.csv}}"), "absent.csv: cannot read the table"),
         (
             sweep_with("{table: {file: counts.csv, only: {l_over: [1]}}}"),
             "points.table.only.l_over: no such column; did you mean 'l_over_w'?",
@@ -210,18 +188,11 @@ def test_sources_are_crossed_and_the_later_varies_faster(write_sweep: WriteSweep
             "no row of .*counts.csv has 0.5; there are 0.4, 0.7, 1.0",
         ),
         (sweep_with("{table: {file: ragged.csv}}"), r"ragged.csv, row 3: expected 2 filled cells"),
-        (sweep_with("{table: {file: empty.csv}}"), "empty.csv: the table has no rows"),
         (sweep_with("{table: {file: header.csv}}"), "line 1: column 'l/w' cannot be a variable"),
     ],
 )
 def test_bad_sweep_files_are_input_errors(text: str, message: str, write_sweep: WriteSweep) -> None:
-    file = write_sweep(
-        text,
-        counts_csv=COUNTS,
-        ragged_csv="a,b\n1,2\n3\n",
-        empty_csv="a,b\n",
-        header_csv="l/w,n\n1,2\n",
-    )
+    file = write_sweep(text, counts_csv=COUNTS, ragged_csv="a,b\n1,2\n3\n", header_csv="l/w,n\n1,2\n")
     with pytest.raises(InputError, match=message) as caught:
         load_sweep(file)
     assert "\n" not in str(caught.value)
@@ -245,16 +216,9 @@ def test_bad_sweep_files_are_input_errors(text: str, message: str, write_sweep: 
         ("[10, 20]", "[10, 20, 10]", "points: n10_seed1 is given twice with equal values; remove one of the two"),
         ("[10, 20]", "[10, 10.0]", "n10_seed1 and n10.0_seed1 are the same scene although count 10 and 10.0"),
         ("n{{ count }}_", "../{{ count }}", "gives '../10seed1', which cannot be a directory"),
-        ("n{{ count }}_", "n {{ count }}", "gives 'n 10seed1', which cannot be a directory"),
-        (
-            "repeats:",
-            "derived: {count: 3}\nrepeats:",
-            "'count' is set in both points.grid and derived",
-        ),
-        ("repeats:", "constants: {count: 3}\nrepeats:", "'count' is set in both constants and"),
+        ("repeats:", "derived: {count: 3}\nrepeats:", "'count' is set in both points.grid and derived"),
         ("repeats:", "derived: {x: contu}\nrepeats:", "derived.x = 'contu': 'contu' is undefined"),
         ("[10, 20]", "[10, -20]", r"scene.yaml.j2, rendered for run n-20_seed1: count: .*-20"),
-        ("[10, 20]", "[10, '20: x']", r"cannot be a directory"),
     ],
 )
 def test_bad_points_are_input_errors(old: str, new: str, message: str, write_sweep: WriteSweep) -> None:

@@ -1,7 +1,5 @@
 """The local runner, with a fake run in place of the simulation."""
 
-from __future__ import annotations
-
 import os
 import sys
 from collections.abc import Callable, Sequence

@@ -1,7 +1,5 @@
 """What a person sees of many runs."""
 
-from __future__ import annotations
-
 import io
 
 from rich.console import Console

@@ -1,7 +1,5 @@
 """Templates: values keep their type, cannot break out, and a misspelt name is an error."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import pytest

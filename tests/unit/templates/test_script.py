@@ -3,8 +3,6 @@
 Renew the golden files after a wanted change, and read the difference:  RENEW_GOLDEN=1 make unit; git diff tests/golden
 """
 
-from __future__ import annotations
-
 import os
 import shutil
 import signal

@@ -1,7 +1,5 @@
 """What is in the queue, what is to be submitted, and what Slurm answers."""
 
-from __future__ import annotations
-
 import json
 import subprocess
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Force chains, on forces whose answer is on paper; and on what a run has recorded."""
 
-from __future__ import annotations
-
 import math
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """What motors did, from samples far apart: known sums, and which frames are samples."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from types import SimpleNamespace
 

@@ -68,13 +68,7 @@ def test_every_definition_names_itself_and_finds_the_lattice_density(pile):
 def test_voxels_fill_exactly_the_union_of_one_smarticles_boxes(shape, rotation):
     turn = Rotation.from_rotvec(rotation).as_matrix()
     region = Region(radius=2.0, bottom=-2.0, top=2.0)
-    value = solid_fraction(
-        [shape(1.0, 0.7) @ turn.T],
-        region,
-        thickness_normal=T1,
-        thickness_in_plane=T2,
-        pitch=T2 / 5,
-    )
+    value = solid_fraction([shape(1.0, 0.7) @ turn.T], region, thickness_normal=T1, thickness_in_plane=T2, pitch=T2 / 5)
     assert value * region.volume == pytest.approx(UNION, rel=0.01)
 
 

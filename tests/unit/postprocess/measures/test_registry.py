@@ -1,7 +1,5 @@
 """A measure is one file with one registration: tables have its columns, and nothing else names it."""
 
-from __future__ import annotations
-
 import sys
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """What is read off a strain test, on curves whose maxima, drops and slopes are known."""
 
-from __future__ import annotations
-
 import math
 from pathlib import Path
 

@@ -66,10 +66,8 @@ def test_frames_at_odd_times_are_shown_nearest_to_theirs():
     ("wrong", "message"),
     [
         ({"start": 3.0, "end": 2.0}, r"must begin before it ends, within 0 s to 10 s.*: got 3 s to 2 s"),
-        ({"end": 12.0}, r"within 0 s to 10 s, the run's frames: got 0 s to 12 s"),
         ({"start": float("nan")}, r"got nan s to 10 s"),
         ({"every": 0.01}, r"every must be 0\.1 s or more, the time between the run's frames: got 0\.01 s"),
-        ({"every": 20.0}, r"every 20 s leaves one picture between 0 s and 10 s"),
         ({"rate": 0.0}, r"fps must be above 0 and up to 100 pictures per second: got 0"),
     ],
 )
@@ -98,12 +96,6 @@ def test_film_moves_and_lasts_as_long_as_its_speed_says(run, tmp_path, suffix, u
     assert sum(times) == pytest.approx(600, abs=unit / 2)
     assert all(time % unit == 0 for time in times)
     assert list(tmp_path.iterdir()) == [path]
-
-
-def test_film_needs_two_frames(tmp_path):
-    run = write_run(tmp_path / "a", SyntheticRun(frames_per_phase=1, phases=("relax",), packing=(0.1,)))
-    with pytest.raises(InputError, match="a film needs at least 2 frames: got 1"):
-        render_film(run, tmp_path / "a.gif", size=SIZE)
 
 
 def test_mp4_without_an_encoder_is_rejected_before_drawing(run, tmp_path, monkeypatch):

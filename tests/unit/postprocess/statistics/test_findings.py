@@ -1,7 +1,5 @@
 """Verdicts on effects, and how many runs those would take that are not resolved."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

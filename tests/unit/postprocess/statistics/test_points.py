@@ -1,7 +1,5 @@
 """Means over seeds as columns and as cells, pairs of runs, and what must not be averaged."""
 
-from __future__ import annotations
-
 import math
 
 import pandas as pd

@@ -1,7 +1,5 @@
 """Rank correlations and slopes within strata, and intervals by drawing blocks: known answers."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The law in the size of piles: a law that made the values comes out again, and another one is rejected."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np
