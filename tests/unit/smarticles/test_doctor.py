@@ -17,7 +17,7 @@ Answers = dict[str, tuple[bool, str]]
 def answers(monkeypatch: pytest.MonkeyPatch) -> Answers:
     """Answers of the processes that try a part, by script; a version where a test gives none."""
     answers: Answers = {}
-    monkeypatch.setattr(doctor, "_ask", lambda script: answers.get(script, (True, "1.2")))
+    monkeypatch.setattr(doctor, "_run_script", lambda script: answers.get(script, (True, "1.2")))
     monkeypatch.setattr(shutil, "which", lambda command: None)
     return answers
 
@@ -51,7 +51,7 @@ def test_what_fails_has_a_way_out(
 
 
 def test_every_failure_names_a_way_out(answers: Answers, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(doctor, "_ask", lambda script: (False, "ImportError: gone"))
+    monkeypatch.setattr(doctor, "_run_script", lambda script: (False, "ImportError: gone"))
     monkeypatch.setattr(doctor, "_LEAST_GIB", 1e6)
     found = list(doctor.checks())
     assert {check.name for check in found if check.ok} == {"python", "cores"}
@@ -77,16 +77,16 @@ def test_disk_is_tried_and_left_clean(tmp_path: Path) -> None:
     ],
 )
 def test_child_process(script: str, answer: tuple[bool, str]) -> None:
-    assert doctor._ask(script) == answer
+    assert doctor._run_script(script) == answer
 
 
 def test_child_process_that_hangs(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(doctor, "_TIMEOUT_S", 0.2)
-    assert doctor._ask("import time; time.sleep(60)") == (False, "no answer within 0.2 s")
+    assert doctor._run_script("import time; time.sleep(60)") == (False, "no answer within 0.2 s")
 
 
 @pytest.mark.parametrize("script", [doctor._LINKS, doctor._PYVISTA])
 def test_the_scripts_work_here(script: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.delenv("DISPLAY", raising=False)
-    ok, found = doctor._ask(script)
+    ok, found = doctor._run_script(script)
     assert ok, found
