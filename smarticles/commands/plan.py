@@ -82,7 +82,8 @@ def _chosen(scene: Scene, arguments: argparse.Namespace) -> Choice | None:
     if arguments.max_error is None and arguments.max_hours is None:
         for option, value in (("--table", arguments.table), ("--of", arguments.of)):
             if value is not None:
-                raise InputError(f"{option}: needs --max-error or --max-hours; add one of them")
+                text = ",".join(value) if option == "--of" else value
+                raise InputError(f"{option} {text}: needs --max-error or --max-hours; add one of them")
         return None
     of = PACKING if arguments.of is None else arguments.of
     for name in of:

@@ -148,7 +148,7 @@ def test_more_seeds_and_knobs_are_added_in_the_directory(
         ("accuracy", "accuracy: --out DIR is missing; give a directory, or --dry-run to only show the ladder"),
         ("plan --max-error 0", "argument --max-error: must be a number above 0: got '0'"),
         ("plan --max-hours inf", "argument --max-hours: must be a number above 0: got 'inf'"),
-        ("plan --table x.csv", "--table x.csv: is for --max-error or --max-hours; give one of them"),
+        ("plan --table x.csv", "--table x.csv: needs --max-error or --max-hours; add one of them"),
         ("plan --max-error 0.03 --table {base}", "has no column 'knob', so it is no table of work and precision"),
         ("plan --max-error 0.03 --table absent.csv", "absent.csv: cannot be read (No such file or directory)"),
     ],

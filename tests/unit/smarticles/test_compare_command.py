@@ -30,7 +30,7 @@ def test_a_run_equals_its_copy_until_that_loses_its_series(
     assert {"scene: no difference", "versions: no difference", "measures: no difference"} <= {*said.out.splitlines()}
     (tmp_path / "b" / "series.h5").unlink()
     said = smarticles("compare", run, tmp_path / "b")
-    assert "identical bits: no, one has more samples, columns or frames, 16 of 16 frames are the same" in said.out
+    assert "identical bits: no, one run has more samples, columns or frames, 16 of 16 frames are equal" in said.out
 
 
 def test_what_differs_is_listed_key_by_key(tmp_path: Path, write_run: WriteRun, smarticles: Smarticles) -> None:
@@ -102,6 +102,6 @@ def test_a_run_is_not_compared_with_a_sweep_nor_with_nothing(
     said = smarticles("compare", run, tmp_path / "s")
     assert (said.status, said.err) == (
         2,
-        f"smarticles: error: {run} is a run and {tmp_path / 's'} a sweep; give two of a kind\n",
+        f"smarticles: error: {run} is a run and {tmp_path / 's'} a sweep; give two runs or two sweeps\n",
     )
-    assert "is neither a run directory nor that of a sweep" in smarticles("compare", run, tmp_path).err
+    assert "is neither a run nor a sweep" in smarticles("compare", run, tmp_path).err
