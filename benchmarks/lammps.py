@@ -1,9 +1,10 @@
-"""LAMMPS beside the other engines, and its ranks beside each other: `python -m benchmarks.lammps agree | ranks`.
+"""Compare LAMMPS with the other engines, and one rank with two: `python -m benchmarks.lammps agree | ranks`.
 
-`agree` pours piles on links, and has each engine take them over, rest and shake: φ at rest, φ and ⟨N⟩ while shaken.
-`ranks` puts smarticles into a wide container, lets them come down, saves them, and times the same steps from there on
-one rank and on two, again and again: of every stretch of steps the least time counts, as near to an idle machine as a
-shared one allows. Two ranks need both cores to be free at once.
+`agree` pours piles on links. Each engine takes them over, lets them rest, and shakes them. The table has φ at rest, and
+φ and ⟨N⟩ during shaking.
+
+`ranks` lets smarticles fall into a wide container, saves the engine, and repeats the next steps on one and two ranks.
+The smallest wall time of each interval of steps is used, which approximates an idle machine.
 """
 
 from __future__ import annotations
@@ -32,18 +33,18 @@ from dem.scene.reading import parse_scene
 from postprocess import link_crossings, read_frames, read_series
 
 ENGINES = ("yade", "links", "lammps")
-STRETCH, STRETCHES = 10, 8  # steps, and how many such
+STEPS, INTERVALS = 10, 8  # steps per timed interval, number of intervals
 
 
 def scene_data(engine: str, seed: int, count: int, fidelity: str, *phases: dict[str, Any]) -> dict[str, Any]:
-    """Return the data of a pile of the paper's smarticles, l/w = 0.7."""
+    """Return the keys of a scene with the paper's smarticles, l/w = 0.7."""
     keys = {"name": "lammps", "engine": engine, "fidelity": fidelity, "seed": seed, "count": count}
     recording = {"frame_interval_s": 0.04, "checkpoint_interval_s": None}
     return {"schema_version": 1, **keys, "phases": list(phases), "recording": recording}
 
 
 def measured(run: Path) -> dict[str, float]:
-    """Average at rest and over the second half of the shaking."""
+    """Return the mean φ at the end of the rest, and the means of φ and ⟨N⟩ over the second half of the shaking."""
     planned, series = Run(run).phases, read_series(run)
     times, phases, phi = series["time_s"], series["phase"], series["packing_fraction"]
     rest = phi[(phases == 1) & (times > (planned[1].end_s or 0.0) - 0.1)]
@@ -58,7 +59,7 @@ def measured(run: Path) -> dict[str, float]:
 
 
 def agree(folder: Path, given: argparse.Namespace) -> None:
-    """Give the same poses to every engine."""
+    """Compute rest and shaking of equal piles on every engine; write and print the table `agree.csv`."""
     rows, rest = [], {"type": "relax", "duration_s": 0.2}
     for seed, engine in product(given.seeds, ENGINES):
         pour = f"pour-{seed}"
@@ -80,7 +81,7 @@ def agree(folder: Path, given: argparse.Namespace) -> None:
 
 
 def pile(count: int, fidelity: str, fall: float) -> tuple[dict[str, Any], Saved]:
-    """Let smarticles come down for a time [s], and save them."""
+    """Let smarticles fall for a time `fall` [s]; return the keys of the scene and the saved engine."""
     widening = (count / PAPER_COUNT) ** 0.5
     data = scene_data("lammps", 1, count, fidelity, {"type": "deposit"}, {"type": "shake", "duration_s": 1.0})
     data["container"] = {"radius_m": PAPER_RADIUS * widening, "height_m": 0.4}
@@ -103,7 +104,15 @@ def pile(count: int, fidelity: str, fall: float) -> tuple[dict[str, Any], Saved]
 
 
 def ranks(folder: Path, counts: list[int], repeats: int, fidelity: str, fall: float) -> None:
-    """Find the least wall times of the same steps on one rank and on two."""
+    """Time equal steps on one and two ranks; write the smallest wall times to `ranks.csv`.
+
+    Args:
+        folder: for the table.
+        counts: numbers of smarticles.
+        repeats: number of measurements.
+        fidelity: name of the fidelity.
+        fall: time for the fall of the smarticles [s].
+    """
     rows = []
     for count in counts:
         data, saved = pile(count, fidelity, fall)
@@ -116,13 +125,13 @@ def ranks(folder: Path, counts: list[int], repeats: int, fidelity: str, fall: fl
             engine.boundaries.shake(amplitude=5.5e-4, frequency=30.0)
             engine.advance(1)
             took = []
-            for _ in range(STRETCHES):
+            for _ in range(INTERVALS):
                 begun = time.monotonic()
-                engine.advance(STRETCH)
+                engine.advance(STEPS)
                 took.append(time.monotonic() - begun)
             engine.child.close()
             least[number] = np.minimum(least.get(number, np.inf), took)
-        steps = STRETCH * STRETCHES
+        steps = STEPS * INTERVALS
         one, two = (1e6 * least[number].sum() / steps / count for number in (1, 2))
         rows.append(
             {"N": count, "one rank [us per step and smarticle]": one, "two ranks": two, "faster [-]": one / two}
@@ -132,15 +141,15 @@ def ranks(folder: Path, counts: list[int], repeats: int, fidelity: str, fall: fl
 
 
 def main() -> None:
-    """Measure, and print tables."""
+    """Run the measurement named on the command line."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.lammps", description=__doc__)
     parser.add_argument("what", choices=("agree", "ranks"))
     parser.add_argument("--seeds", type=int, nargs="+", default=[1, 2, 3, 4, 5, 6], help="one pile each (agree)")
     parser.add_argument("--count", type=int, default=60, help="smarticles of a pile (agree)")
     parser.add_argument("--shake", type=float, default=1.0, help="length of the shaking [s] (agree)")
     parser.add_argument("--counts", type=int, nargs="+", default=[500, 1000, 5000], help="smarticles (ranks)")
-    parser.add_argument("--repeats", type=int, default=5, help="times that the same steps are timed (ranks)")
-    parser.add_argument("--fall", type=float, default=0.25, help="time to come down [s] (ranks)")
+    parser.add_argument("--repeats", type=int, default=5, help="number of measurements (ranks)")
+    parser.add_argument("--fall", type=float, default=0.25, help="time for the fall of the smarticles [s] (ranks)")
     parser.add_argument("--fidelity", default="standard", help="draft, standard, reference")
     parser.add_argument("--out", type=Path, default=None, help="folder for runs and tables (default: a new one)")
     given = parser.parse_args()

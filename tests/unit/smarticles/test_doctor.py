@@ -35,7 +35,11 @@ def test_a_machine_without_slurm_is_fit_for_runs(answers: Answers, smarticles: S
     ("broken", "status", "lines"),
     [
         (["_YADE"], 0, ["yade            no    gone", "scenes with `engine: links` run without it"]),
-        (["_YADE", "_LINKS"], 1, ["yade            FAILS gone", "links           no    gone", "runs need these, which fail: yade\n"]),
+        (
+            ["_YADE", "_LINKS"],
+            1,
+            ["yade            FAILS gone", "links           no    gone", "runs need these, which fail: yade\n"],
+        ),
         (["_PYVISTA"], 0, ["pyvista         no    gone", "only pictures need it", "pip install 'smarticles[viz]'"]),
         (["_LAMMPS"], 0, ["lammps          no    gone", "only scenes with `engine: lammps` need it"]),
     ],

@@ -141,7 +141,10 @@ def test_render_draws_a_film_of_a_part_in_fixed_colours(
     [
         (("--fps", "10"), "--fps 10: a picture shows one time; use --time, or write a film: --output film.gif"),
         (("--from", "1"), "--from 1: a picture shows one time"),
-        (("--smarticle", "1", "--output", "a.gif"), "--smarticle 1: a single smarticle is drawn in pictures only; leave it out"),
+        (
+            ("--smarticle", "1", "--output", "a.gif"),
+            "--smarticle 1: a single smarticle is drawn in pictures only; leave it out",
+        ),
         (("--time", "1", "--output", "film.gif"), "--time 1: a film shows all times; "),
         (("--output", "film.avi"), "'.avi' is no supported format; end the name in .png for a picture"),
         (("--clim", "5:1"), "must be LOW:HIGH, two numbers in order, or run: got '5:1'"),
