@@ -190,7 +190,7 @@ def columns(header: Sequence[str], rows: Sequence[Sequence[object]]) -> str:
 
     Columns of numbers are aligned to the right; NaN and None become dashes.
     """
-    cells = [[_text(value) for value in row] for row in rows]
+    cells = [[format_cell(value) for value in row] for row in rows]
     widths = [max(map(len, column)) for column in zip(header, *cells, strict=True)]
     numbers = [
         bool(rows) and all(isinstance(row[k], int | float | Cell | None) for row in rows) for k in range(len(header))
@@ -204,7 +204,8 @@ def columns(header: Sequence[str], rows: Sequence[Sequence[object]]) -> str:
     )
 
 
-def _text(value: object) -> str:
+def format_cell(value: object) -> str:
+    """Format a value of a table: numbers with four digits, None and NaN as a dash."""
     if value is None or (isinstance(value, float) and math.isnan(value)):
         return "-"
     return f"{value:.4g}" if isinstance(value, float) else str(value)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import base64
-import math
 import re
 from collections.abc import Iterable, Sequence
 from importlib.metadata import PackageNotFoundError, version
@@ -14,6 +13,7 @@ import jinja2
 from markupsafe import Markup
 
 from dem.errors import InputError
+from smarticles.command_line import format_cell
 
 MAX_ROWS = 200  #: Rows shown of a table; further rows are counted only
 
@@ -99,13 +99,6 @@ def turntable(caption: str, alt: str, views: Sequence[str]) -> Markup:
     """
     angles = [round(360 * number / len(views)) for number in range(len(views))]
     return Markup(_blocks.turntable(caption, alt, list(zip(views, angles, strict=True))))
-
-
-def format_cell(value: Any) -> str:
-    """Format a value of a table: numbers with four digits, None and NaN as a dash."""
-    if value is None or (isinstance(value, float) and math.isnan(value)):
-        return "-"
-    return f"{value:.4g}" if isinstance(value, float) else str(value)
 
 
 def all_numbers(cells: Sequence[str]) -> bool:

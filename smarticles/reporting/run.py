@@ -24,9 +24,10 @@ from dem.scene.reading import load_scene
 from dem.setting.fidelity import fidelities
 from postprocess.measures.registry import shown_quantities
 from postprocess.statistics.points import marked, told_number
+from smarticles.command_line import format_cell
 from smarticles.measuring import has_frames, measured
 from smarticles.reporting.charts import against_time
-from smarticles.reporting.page import data_url, embedded, figure, format_cell, listing, page, table, turntable, words
+from smarticles.reporting.page import data_url, embedded, figure, listing, page, table, turntable, words
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -17,9 +17,10 @@ from dem.record.run import Run
 from dem.scene.reading import load_scene
 from postprocess.measures.registry import shown_quantities
 from postprocess.statistics.points import marked
+from smarticles.command_line import format_cell
 from smarticles.measuring import follows, grouped, has_frames, measured, values_in
 from smarticles.reporting.charts import against_variable
-from smarticles.reporting.page import Section, embedded, figure, format_cell, listing, page, table, words
+from smarticles.reporting.page import Section, embedded, figure, listing, page, table, words
 from smarticles.reporting.run import (
     accuracy_blocks,
     effect_blocks,
