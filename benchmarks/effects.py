@@ -25,7 +25,7 @@ MEASURED = 1  # index of the compared phase; phase 0 is the pour
 
 
 def pairs(seconds: float, hinged_step: float) -> list[tuple[str, str, Changes, Changes]]:
-    """Return the effects: name, cause of the cost, and the keys of the scenes without and with the effect.
+    """Return name, cause of the cost, and changed keys of the scenes without and with the effect, for each effect.
 
     Args:
         seconds: duration of the compared phase [s].
@@ -77,7 +77,7 @@ def pairs(seconds: float, hinged_step: float) -> list[tuple[str, str, Changes, C
 
 
 def scene_data(changes: Changes, *, count: int, seed: int) -> Changes:
-    """Return the keys of a scene: a pile of the paper's smarticles (l/w = 0.7, draft) with changed keys."""
+    """Return a scene as a dictionary: a pile of the paper's smarticles (l/w = 0.7, draft), with changed keys."""
     data: Changes = {"schema_version": 1, "seed": seed, "count": count, "fidelity": "draft", **changes}
     recording = {"checkpoint_interval_s": None, **changes.get("recording", {})}
     phases = [{"type": "deposit"}, *changes["phases"]]

@@ -37,7 +37,7 @@ STEPS, INTERVALS = 10, 8  # steps per timed interval, number of intervals
 
 
 def scene_data(engine: str, seed: int, count: int, fidelity: str, *phases: dict[str, Any]) -> dict[str, Any]:
-    """Return the keys of a scene with the paper's smarticles, l/w = 0.7."""
+    """Return a scene as a dictionary, with the paper's smarticles, l/w = 0.7."""
     keys = {"name": "lammps", "engine": engine, "fidelity": fidelity, "seed": seed, "count": count}
     recording = {"frame_interval_s": 0.04, "checkpoint_interval_s": None}
     return {"schema_version": 1, **keys, "phases": list(phases), "recording": recording}
@@ -81,7 +81,7 @@ def agree(folder: Path, given: argparse.Namespace) -> None:
 
 
 def pile(count: int, fidelity: str, fall: float) -> tuple[dict[str, Any], Saved]:
-    """Let smarticles fall for a time `fall` [s]; return the keys of the scene and the saved engine."""
+    """Let smarticles fall for a time `fall` [s]; return the scene as a dictionary, and the saved engine."""
     widening = (count / PAPER_COUNT) ** 0.5
     data = scene_data("lammps", 1, count, fidelity, {"type": "deposit"}, {"type": "shake", "duration_s": 1.0})
     data["container"] = {"radius_m": PAPER_RADIUS * widening, "height_m": 0.4}

@@ -20,7 +20,7 @@ PAPER_COUNT, PAPER_RADIUS, PAPER_PER_LAYER = 270, 0.0234, 10
 def pile(
     count: int, *phases: dict[str, Any], seed: int = 1, per_layer: int | None = None, **keys: Any
 ) -> dict[str, Any]:
-    """Return the keys of a scene with a pile as high as the paper's pile of 270.
+    """Return a scene as a dictionary, with a pile as high as the paper's pile of 270.
 
     Args:
         count: number of smarticles.

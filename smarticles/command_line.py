@@ -35,7 +35,7 @@ class Parser(argparse.ArgumentParser):
         raise InputError(f"{message}; see `{self.prog} --help`")
 
     def reject_unknown(self, words: Sequence[str]) -> NoReturn:
-        """Raise InputError for the first of the words that the command does not accept."""
+        """Raise InputError for the first of several unknown arguments."""
         word = words[0].partition("=")[0]
         if not word.startswith("-"):
             self.error(f"one argument too many: {words[0]!r}")

@@ -72,7 +72,7 @@ class _Access:
         return engine
 
     def motors_of(self, scene: Scene) -> dict[str, Any]:
-        """Return the arguments for motors of the engine's constructor."""
+        """Return the keyword arguments with which the engine's constructor gets the motors of a scene."""
         raise NotImplementedError
 
     def build_hinged(self, scene: Scene, *, gravity: float, dt: float | None = None) -> Engine:
@@ -83,7 +83,7 @@ class _Access:
 
 
 def _bar(length: float, thickness: float, radius: float, kind: type[Particle] = Particle) -> Particle:
-    """Return a bar without barbs and of the ball's mass; all lengths in [m]."""
+    """Return a smarticle without barbs, with the mass of the ball; all lengths in [m]."""
     boxes = Boxes(
         middle_length=length,
         barb_length=0.0,
@@ -95,7 +95,7 @@ def _bar(length: float, thickness: float, radius: float, kind: type[Particle] = 
 
 
 def _spoilt_place(engine: Engine, what: str, place: Iterable[float]) -> tuple[float, float, float]:
-    """Return the invalid position [m] of a body at `place` [m], for a kind of damage `what`."""
+    """Return the position [m] to which `LinksAccess.spoil` moves a body from `place` (3,) [m]."""
     (x, y, z), reach, radius = place, engine.particle.reach, engine.particle.radius
     return {
         "position": (x, y, math.nan),
@@ -205,7 +205,7 @@ class LinksAccess(_Access):
         return boxes.to_body(np.concatenate(found))
 
     def pin_stiffness(self, scene: Scene) -> float:
-        """Return the stiffness of a hinge against a gap [N/m]; inf if a gap is impossible."""
+        """Return force over gap of a hinge [N/m]; inf if hinges cannot open."""
         return math.inf
 
     def push(self, engine: Engine, k: int, velocity: ArrayLike = (0, 0, 0), spin: ArrayLike = (0, 0, 0)) -> None:
@@ -280,7 +280,7 @@ class LinksAccess(_Access):
         return np.array(readings.torques[0])
 
     def spoil(self, engine: Engine, what: str) -> None:
-        """Corrupt the state of the second smarticle, or of its last link; `what`: a key of `hard.broken.SPOILT`."""
+        """Set an invalid state for the second smarticle, or its last link; `what`: a key of `hard.broken.SPOILT`."""
         bodies = _links(engine)._world.bodies
         if what == "velocity":
             bodies.velocity[1, 1] = math.nan
@@ -292,7 +292,7 @@ class LinksAccess(_Access):
             bodies.position[1] = _spoilt_place(engine, what, bodies.position[1])
 
     def heat(self, engine: Engine, share: float) -> None:
-        """Replace the damping of all dashpots by a driving force of the fraction `share` [1] of the damping."""
+        """Multiply the damping coefficients of all normal dashpots by −`share`, so that dashpots supply energy."""
         world = _links(engine)._world
         world.laws = tuple(law._replace(damping=-share * law.damping, shear_damping=0.0) for law in world.laws)
 

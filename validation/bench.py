@@ -42,18 +42,18 @@ Targets = Callable[[float], ArrayLike]  # time [s] -> angles of all barbs [rad]
 
 
 def scene_of(data: Mapping[str, Any]) -> Scene:
-    """Return the scene with the keys of a scene file."""
+    """Check a scene given as a dictionary, and return it."""
     return parse_scene(data, source="case")
 
 
 def scene_data(access: EngineAccess, *phases: Mapping[str, Any], per_layer: int = 6, **keys: Any) -> dict[str, Any]:
-    """Return the keys of a scene: a deposit and the given phases; by default six smarticles and fidelity draft."""
+    """Return a scene as a dictionary: a deposit, then the given phases; by default six smarticles, fidelity draft."""
     given = {"schema_version": 1, "engine": access.name, "name": "hard", "seed": 1, "count": 6, "fidelity": "draft"}
     return {**given, "phases": [{"type": "deposit", "per_layer": per_layer}, *phases], **keys}
 
 
 def scene(access: EngineAccess, *phases: Mapping[str, Any], **keys: Any) -> Scene:
-    """Return a scene of one smarticle: a deposit and the given phases, by default a relax phase."""
+    """Return a scene of one smarticle: a deposit, then the given phases, by default a relax phase."""
     return scene_of(scene_data(access, *(phases or (RELAX,)), count=1, **keys))
 
 
@@ -81,7 +81,7 @@ def law_of(scene: Scene) -> ContactLaw:
 def ball_law(
     *, restitution: float = 1.0, friction: float = 0.0, tangential: float = 0.82, dashpot: float = 0.9
 ) -> ContactLaw:
-    """Return the contact law of a scene with a ball, whose dashpots give `restitution` at the mass of the ball.
+    """Return a contact law for the ball, with dashpots that give the restitution at its mass.
 
     Args:
         restitution: coefficient of restitution [1].
@@ -159,7 +159,7 @@ def watched(data: dict[str, Any], out: Path | str, *, dt: float | None = None) -
     """Build scene, engine and recorder with watchdog as a run does.
 
     Args:
-        data: keys of the scene.
+        data: scene as a dictionary.
         out: run directory.
         dt: time step [s], which may exceed the stable step; None: the time step of the scene.
     """

@@ -49,7 +49,7 @@ def yade() -> Iterator[ProcessPoolExecutor]:
 
 @pytest.fixture
 def call(request: pytest.FixtureRequest) -> Callable[..., Any]:
-    """Return a function that calls a function in the process of an engine: another one for YADE, this one for links."""
+    """Return `run(engine, function, ...)`, which calls a function in this process (links) or in the process of YADE."""
 
     def run(engine: str, function: Callable[..., Any], /, *arguments: Any, **options: Any) -> Any:
         if engine == "links":
@@ -61,7 +61,7 @@ def call(request: pytest.FixtureRequest) -> Callable[..., Any]:
 
 @pytest.fixture
 def call_alone() -> Callable[..., Any]:
-    """Return a function that calls a function in a new process."""
+    """Return `run(function, ...)`, which calls a function in a new process."""
 
     def run(function: Callable[..., Any], /, *arguments: Any, **options: Any) -> Any:
         with ProcessPoolExecutor(1, mp_context=multiprocessing.get_context("spawn")) as pool:
@@ -71,7 +71,7 @@ def call_alone() -> Callable[..., Any]:
 
 
 class Tables:
-    """Tables of a folder, written after each test; folder None: nothing is written."""
+    """CSV and Markdown tables in a folder, updated after each test; with folder None nothing is written."""
 
     def __init__(self, folder: Path | None) -> None:
         self.folder = folder
@@ -93,7 +93,7 @@ class Tables:
         write_text(path.with_suffix(".md"), "\n".join(f"| {line} |" for line in lines) + "\n")
 
     def skip_recorded(self, engine: str, name: str, **keys: Any) -> None:
-        """Skip the test if the table has rows with these values and none of them failed."""
+        """Skip the test if the table has rows with the values `keys` by column, and none of them failed."""
         table = self.read(engine, name)
         if table is not None and all(key in table for key in keys):
             matches = [table[key].astype(str) == str(value) for key, value in keys.items()]

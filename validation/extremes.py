@@ -35,7 +35,7 @@ SECONDS = 0.3  # duration of the phase after the pour
 
 
 def draw_scene(number: int, engine: str = "links") -> dict[str, Any]:
-    """Return the keys of a random scene; `number` is the seed of the draw and of the scene."""
+    """Return a random scene as a dictionary; `number` is the seed of the draw and of the scene."""
     rng = np.random.default_rng([28, number])
 
     def span(low: float, high: float) -> float:

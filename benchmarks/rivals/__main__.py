@@ -52,7 +52,7 @@ SAME, TENTH = "links at this overlap are cheaper by [1]", "links at a tenth of i
 
 
 def data_of(count: int, seed: int, *phases: dict[str, Any], **keys: Any) -> dict[str, Any]:
-    """Return the keys of a scene, with a container wide enough for a straight smarticle."""
+    """Return a scene as a dictionary, with a container wide enough for a straight smarticle."""
     data = pile(count, *phases, seed=seed, per_layer=PAPER_PER_LAYER, **keys)
     data["container"]["radius_m"] = max(data["container"]["radius_m"], 0.012)
     return data
@@ -61,7 +61,7 @@ def data_of(count: int, seed: int, *phases: dict[str, Any], **keys: Any) -> dict
 def scene_of(
     setting: Setting, activity: str, poured: Path, *, count: int, seed: int, seconds: float, sample: float
 ) -> dict[str, Any]:
-    """Return the keys of the scene of a setting: take-over, rest and activity.
+    """Return the scene of a setting as a dictionary: take-over, rest and activity.
 
     Args:
         setting: engine and its parameters.

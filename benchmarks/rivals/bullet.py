@@ -18,7 +18,7 @@ SCALE = 100.0
 
 
 def simulate(task: Task, knobs: Knobs) -> Outcome:
-    """Simulate a task; knobs: `time_step` [s], solver `iterations`, `recovery` (share of overlap undone per step)."""
+    """Simulate a task. Knobs: `time_step` [s], solver `iterations`, `recovery` (share of overlap undone per step)."""
     return simulated(task, InBullet(task, **knobs))
 
 

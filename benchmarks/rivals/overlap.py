@@ -25,7 +25,7 @@ PARALLEL = 1e-9  # squared sine below which two edges count as parallel
 
 @dataclass(frozen=True, eq=False)
 class Bars:
-    """B boxes."""
+    """Boxes, B in number."""
 
     centres: Array  #: (B, 3) [m]
     frames: Array  #: Axes as columns, (B, 3, 3)
@@ -56,7 +56,7 @@ class Bars:
 
 @dataclass(frozen=True, eq=False)
 class Swept:
-    """S swept segments, or spheres."""
+    """Segments swept by a sphere, S in number; spheres are segments of length zero."""
 
     starts: Array  #: (S, 3) [m]
     ends: Array  #: (S, 3) [m]

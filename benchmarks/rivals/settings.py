@@ -30,7 +30,7 @@ class Setting:
 
     @property
     def key(self) -> str:
-        """Name for files."""
+        """Name of the setting in file names."""
         return re.sub(r"[^0-9a-z.-]+", "_", f"{self.engine}-{self.name}".lower())
 
 

@@ -1,4 +1,4 @@
-"""Commands `run` and `resume`: compute a scene; continue a run or a sweep."""
+"""Command `run` computes a scene; command `resume` continues a run or a sweep."""
 
 from __future__ import annotations
 

@@ -36,7 +36,7 @@ PLACES = ("over the wall", "through the wall", "under the floor")
 
 
 def spoil(access: EngineAccess, out: Path, *, what: str, articulated: bool, steps: int) -> list[Check]:
-    """Corrupt the second of three smarticles on the floor; the next check of the watchdog must report it."""
+    """Set an invalid state for the second of three smarticles on the floor; the watchdog must report it."""
     scene, engine, recorder = watched(scene_data(access, shape_change(), count=3), out)
     # A few diameters apart, so that no smarticle falls on another.
     for k in range(3):
@@ -126,7 +126,7 @@ def soft(access: EngineAccess, out: Path, *, stiffness: float) -> list[Check]:
 
 
 def _too_long(scene: Scene, factor: float) -> float:
-    """Return a time step [s] of about `factor` stable steps, which divides the control period."""
+    """Return a time step [s] of about `factor` times the stable step that divides the control period."""
     control = scene.fidelity.control_interval_s
     step: float = control / max(1, math.floor(control / (factor * stable_step(scene))))
     return step
@@ -150,7 +150,7 @@ def wrong_step(access: EngineAccess, out: Path, *, factor: float, count: int, se
 
 @hard("spoilt: late in a run", {})
 def late(access: EngineAccess, out: Path) -> list[Check]:
-    """Corrupt a run after 0.55 s: message and `failed.json` must name the last checkpoint before."""
+    """Give a smarticle a speed of 100 m/s at 0.55 s; message and `failed.json` must name the last checkpoint."""
     relax, recording = {"type": "relax", "duration_s": 0.4}, {"checkpoint_interval_s": 0.1}
 
     def throw(engine: Engine) -> None:

@@ -56,7 +56,7 @@ def rods(access: EngineAccess, out: Path, *, count: int, radius: float) -> list[
 
 @hard("N = 1", {})
 def one(access: EngineAccess, out: Path) -> list[Check]:
-    """Pour, actuate and weld one smarticle."""
+    """Run a scene with a single smarticle: pour, actuate, rest."""
     run = whole(scene_data(access, swing(0.1), RELAX, count=1), out)
     checks = run.sound() + run.weight_on_floor(0.02)
     if run.error is None:
@@ -101,7 +101,7 @@ def friction(access: EngineAccess, out: Path, *, value: float, count: int) -> li
 
 
 def _with_step(data: dict[str, Any], share: float) -> tuple[dict[str, Any], float, float]:
-    """Set the time step of a scene to a fraction of the stable step; return keys, step [s] and stable step [s]."""
+    """Set the time step of a scene to `share` times the stable step; return scene, step [s] and stable step [s]."""
     stable = stable_step(scene_of(data))
     return {**data, "fidelity": {"base": "draft", "time_step_s": share * stable}}, share * stable, stable
 
@@ -176,7 +176,7 @@ def strong_motors(access: EngineAccess, out: Path, *, count: int) -> list[Check]
 
 
 def _jammed(run: Watched) -> list[Check]:
-    """Check that barbs move but cannot straighten, and that torques stay limited."""
+    """Return checks that barbs move but cannot straighten, and that torques stay limited."""
     if run.error is not None:
         return []
     assert run.scene is not None
@@ -192,7 +192,7 @@ def _jammed(run: Watched) -> list[Check]:
 
 @hard("no room to straighten", {"count": 5, "seconds": 0.4}, {"count": 20, "seconds": 1.5})
 def no_room(access: EngineAccess, out: Path, *, count: int, seconds: float) -> list[Check]:
-    """Straighten smarticles (l/w = 0.7) in a container 5 % wider than allowed at least, too narrow to straighten."""
+    """Straighten smarticles (l/w = 0.7) in a container of 1.05 times the smallest allowed radius."""
     data = scene_data(access, shape_change(seconds, hold=0.05), RELAX, count=count, per_layer=1)
     reach, message = scene_of(data).particle.reach, None
     try:

@@ -30,7 +30,7 @@ SAME, STATE = "same bits", "killed in"
 
 
 def scene_to_kill(engine: str, seed: int) -> dict[str, Any]:
-    """Return the keys of a scene with pour, rest, shake and swing, and a checkpoint every few hundred steps."""
+    """Return a scene as a dictionary: pour, rest, shake, swing, and a checkpoint every few hundred steps."""
     recording = {"checkpoint_interval_s": CHECKPOINT_S, "frame_interval_s": CHECKPOINT_S / 2}
     phases = ({"type": "relax", "duration_s": 0.05}, {"type": "shake", "duration_s": 0.2}, swing(0.2))
     return scene_data(engine_access(engine), *phases, count=12, per_layer=4, seed=seed, recording=recording)
@@ -77,7 +77,7 @@ def kill_after(process: subprocess.Popen[bytes], seconds: float, what: str) -> b
 
 
 def results(out: Path) -> dict[str, bytes]:
-    """Return the contents of series, frames and collections of a run, by relative file name."""
+    """Return the bytes of the series, frames and collections of a run, by file name relative to `out`."""
     files = [out / "series.h5", *out.glob("*.pvd"), *(out / "frames").iterdir()]
     return {str(path.relative_to(out)): path.read_bytes() for path in files}
 

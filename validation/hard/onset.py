@@ -51,13 +51,13 @@ class Setting:
 
     @property
     def name(self) -> str:
-        """Name in tables."""
+        """Name of the configuration in tables."""
         kind = "articulated" if self.articulated else "welded"
         where = f", {self.keys}" if self.keys else ""
         return f"{kind} {self.placed}{where}, l/w = {self.ratio:g}, {self.fidelity}"
 
     def data(self, access: EngineAccess) -> dict[str, Any]:
-        """Return the keys of a scene with this configuration; only the engine of the scene is used."""
+        """Return a scene as a dictionary, from which the engine for this configuration is built."""
         phases = [shape_change()] if self.articulated else []
         smarticle = {"aspect_ratio": self.ratio}
         data = scene_data(access, *phases, count=self.count, fidelity=self.fidelity, smarticle=smarticle)

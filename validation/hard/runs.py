@@ -35,7 +35,7 @@ class Noting(Watchdog):
         self.nearest[limit] = max(self.nearest.get(limit, 0.0), float(share))
 
     def content(self, extremes: Extremes, **options: Any) -> bool:
-        """Return False, so that every check examines all contacts."""
+        """Return False, so that the watchdog examines all contacts at every check."""
         return False
 
     def check(self, state: State, **options: Any) -> None:
@@ -80,7 +80,7 @@ class Watched:
         return None if self.error is None else self.error[1]
 
     def during(self, phase: int) -> np.ndarray:
-        """Return a mask of the samples of a phase, (n,) bool."""
+        """Return a mask that selects the samples of a phase from the series, (n,) bool."""
         mask: np.ndarray = self.series["phase"] == phase
         return mask
 
@@ -113,7 +113,7 @@ class Watched:
         return checks
 
     def weight_on_floor(self, error: float) -> list[Check]:
-        """Check that the force on the container at the end is the weight, within a relative error [1]."""
+        """Return a check that the force on the container at the end equals the weight, within a relative error [1]."""
         if self.error is not None:
             return []
         force = float(self.series["container_force_N"][-5:, 2].mean())
@@ -131,7 +131,7 @@ def whole(
     """Run a scene and return the outcome.
 
     Args:
-        data: keys of the scene.
+        data: scene as a dictionary.
         out: run directory.
         note: use the watchdog `Noting`.
         steps: returns the time step of each phase [s].

@@ -54,7 +54,7 @@ def drop(access: EngineAccess, out: Path, *, articulated: bool, time: float) -> 
 
 @hard("articulated smarticles land", {"time": 0.2})
 def landing(access: EngineAccess, out: Path, *, time: float) -> list[Check]:
-    """Drop articulated smarticles on each other; torques reach ten times τ_max, and the watchdog must not report."""
+    """Drop articulated smarticles on each other. Torques reach 10 τ_max; the watchdog must not stop the run."""
     scene, engine, recorder = watched(scene_data(access, shape_change(), count=4), out)
     limits = recorder.watchdog
     noting = Noting(cylinder=limits.cylinder, speed=limits.speed, gap=limits.gap, energy=limits.energy)
@@ -126,7 +126,7 @@ def overlap(access: EngineAccess, out: Path, *, time: float) -> list[Check]:
 
 @hard("deep overlap, thrown out", {"time": 0.1})
 def thrown_by_overlap(access: EngineAccess, out: Path, *, time: float) -> list[Check]:
-    """Start with two overlapping smarticles in a low container; the watchdog ignores the overlap itself."""
+    """Start with two overlapping smarticles, without the check of overlaps; one is thrown over the wall."""
     scene, engine, recorder = watched(scene_data(access, count=2), out)
     recorder.watchdog.depth = math.inf
     add(engine, (0, 0, 0.03), TILTED)
@@ -188,7 +188,7 @@ def thrown_out(access: EngineAccess, out: Path, *, count: int, seconds: float) -
 def mass_ratio(
     access: EngineAccess, out: Path, *, heavy_above: bool, stiffness: float, time: float, ratio: float = 1e4
 ) -> list[Check]:
-    """Increase the weight of one of two stacked smarticles by a factor `ratio`.
+    """Multiply the weight of the upper or the lower of two stacked smarticles by `ratio`.
 
     Contacts with the stiffness of draft cannot carry the weight, which the watchdog must report. Contacts stiffer by
     the factor `ratio` must carry it.

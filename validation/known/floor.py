@@ -307,7 +307,7 @@ def _thrown(access: EngineAccess, one: Scene, dt: float) -> tuple[float, float]:
 
 
 def _sunk(access: EngineAccess, one: Scene, dt: float, *, time: float) -> float:
-    """Return the static sinkage of the centre of mass of a smarticle lying flat [m], at a time [s]."""
+    """Simulate a smarticle lying flat for a `time` [s]; return the depth by which its centre of mass has sunk [m]."""
     engine = access.build(one.particle, law_of(one), dt=dt, gravity=G)
     add(engine, (0, 0, lying(one)))
     engine.advance(round(time / dt))
@@ -315,7 +315,7 @@ def _sunk(access: EngineAccess, one: Scene, dt: float, *, time: float) -> float:
 
 
 def _sunk_theory(points: Array, *, stiffness: float, weight: float) -> float:
-    """Return the static sinkage of a weight [N] at the origin, on springs [N/m] at points (n, 2) [m]."""
+    """Return the depth by which a weight [N] at the origin sinks on springs [N/m] at points (n, 2) [m]."""
     lift = np.stack([np.ones(len(points)), points[:, 1], -points[:, 0]], axis=1)
     return float(np.linalg.solve(stiffness * lift.T @ lift, [weight, 0.0, 0.0])[0])
 

@@ -135,7 +135,7 @@ def pair_rebound(access: EngineAccess, restitution: float = 0.5) -> list[Answer]
     f"spring and dashpot at the bar's mass; {DASHPOT}, integrated",
 )
 def bar_rebound(access: EngineAccess, restitution: float = 0.5, *, resized: bool = False) -> list[Answer]:
-    """Throw an upright bar at the floor with the contact law of a scene, so that the force acts through its centre.
+    """Throw an upright bar at the floor with the contact law of a scene. The force passes through its centre.
 
     With `resized` the dashpot is adapted to the mass of the bar, so that the nominal restitution is reached.
     """
@@ -312,7 +312,7 @@ SPREAD = 8e-5  # m
 
 
 def _spread(law: ContactLaw, number: int) -> tuple[ContactLaw, float]:
-    """Return a law with stiffnesses increased by up to 10 %, and an initial gap [m], for sample `number`."""
+    """Return a contact law with stiffnesses increased by up to 10 %, and an initial gap [m], for sample `number`."""
     factor = 1 + 0.1 * (0.569840 * number % 1)
     springs = {key: factor * getattr(law, key) for key in ("normal_stiffness", "tangential_stiffness")}
     return dataclasses.replace(law, **springs), 1e-4 + SPREAD * (0.754878 * number % 1)

@@ -26,7 +26,7 @@ BAND = 0.3  # largest deviation of an observed order [1]; rejects 1.5, halfway b
 
 
 def failed(answers: list[Answer]) -> list[Answer]:
-    """Return the answers that are not within their tolerance; there must be answers."""
+    """Return the answers outside of their tolerance; AssertionError if there are no answers."""
     assert answers
     return [answer for answer in answers if not answer.good]
 
