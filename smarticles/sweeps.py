@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 
 def make_folder(file: Path, out: Path, command: str) -> Folder:
-    """Expand a sweep file into a directory; return the directory, which may contain this sweep already.
+    """Write the scenes of a sweep file to a directory, which may contain this sweep already; return the directory.
 
     Args:
         file: sweep file.
@@ -61,7 +61,7 @@ def folder_of(sweep: Sweep, points: Sequence[Point], out: Path, command: str, *,
 
 
 def expected_wall_s(scene: Scene) -> float:
-    """Return the expected wall time of a scene on one core [s]; costs were measured on one type of machine."""
+    """Return the expected wall time of a scene [s] on one core of the machine that costs were measured on."""
     from dem.plan.outlook import plan  # noqa: PLC0415
 
     return plan(scene).wall_s
@@ -98,7 +98,7 @@ def compute(folder: Folder, *, jobs: int | None, command: str) -> list[Outcome]:
 
 
 def raise_failures(folder: Folder, outcomes: Sequence[Outcome]) -> None:
-    """Raise RunError if runs have no result; the message lists them with their causes."""
+    """Raise RunError if any outcome is not a finished run; the message lists these runs and the causes."""
     failed = [outcome for outcome in outcomes if outcome.missing]
     if failed:
         causes = "; ".join(f"{outcome.name}: {outcome.cause}" for outcome in failed)
@@ -168,7 +168,7 @@ def is_for_cluster(arguments: argparse.Namespace, *, allow_ranks: bool = False) 
 
 
 def draft_of(path: Path, name: str, entries: Sequence[Entry], arguments: argparse.Namespace) -> Draft:
-    """Render the job script of some runs by the options of a command, see `templates.slurm.submission.draft`."""
+    """Render the job of some runs from the options of a command line, see `templates.slurm.submission.draft`."""
     from templates.slurm.cluster import shipped_clusters  # noqa: PLC0415
     from templates.slurm.job import Wishes  # noqa: PLC0415
     from templates.slurm.submission import draft, submissions  # noqa: PLC0415

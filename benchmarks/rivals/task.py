@@ -103,7 +103,7 @@ class Task:
         return self.scene.cylinder.radius * outwards, -outwards
 
     def slabs(self, scale: float) -> Iterator[tuple[Array, Rotation, Array]]:
-        """Yield a box for the floor and for each wall: centre, rotation, half side lengths; all lengths times `scale`."""
+        """Yield boxes for floor and walls: centre, rotation and half side lengths; all lengths times `scale`."""
         thick, radius, height = 2.0, scale * self.scene.cylinder.radius, scale * 0.2
         yield np.array([0.0, 0.0, -thick / 2]), Rotation.identity(), np.array([3 * radius, 3 * radius, thick / 2])
         for point, inward in zip(*self.walls(), strict=True):

@@ -93,7 +93,7 @@ def _bits(bits: Mapping[str, Any]) -> str:
 
 
 def _measures(found: Sequence[Mapping[str, Any]]) -> str:
-    """Return a table of the quantities of short tables, with one block of rows per phase."""
+    """Return a table of the main quantities, with one block of rows per phase."""
     from postprocess.measures.registry import shown_quantities  # noqa: PLC0415
 
     formats = {quantity.header: shown for quantity, shown in shown_quantities()}
@@ -166,7 +166,7 @@ def _made_by(run: Run) -> dict[str, Any]:
 
 
 def _compare_sweeps(one: Folder, other: Folder) -> dict[str, Any]:
-    """Return the parts of `compare` that differ between runs and sweeps."""
+    """Return scene, versions, only, bits and measures of the result of `compare` for two sweeps."""
     from templates.sweep.sweep_file import SEED  # noqa: PLC0415
 
     first, second = ({entry.name: run for entry, run in zip(f.entries, f.runs(), strict=True)} for f in (one, other))
@@ -193,7 +193,7 @@ def _listed(values: Mapping[str, Sequence[Any]]) -> dict[str, Any]:
 
 
 def _versions(runs: Iterable[Run]) -> dict[str, Any]:
-    """Return the versions that computed the started runs of a sweep."""
+    """Return engine and package versions of the runs of a sweep that have started."""
     found: dict[str, dict[Any, None]] = {}
     for run in runs:
         for name, value in _made_by(run).items() if (run.path / MANIFEST).is_file() else ():

@@ -120,7 +120,7 @@ def _groups(arguments: argparse.Namespace) -> Sequence[str]:
 
 
 def _shown(table: pd.DataFrame, *, per_frame: bool) -> list[_Column]:
-    """Return the columns of the printed table: those of short tables which have a value in at least one row."""
+    """Return the main columns of the table that have a value in at least one row."""
     from postprocess.measures.registry import shown_quantities  # noqa: PLC0415
     from postprocess.statistics.points import marked  # noqa: PLC0415
 

@@ -58,7 +58,7 @@ def page(title: str, about: str, lead: Iterable[tuple[str, str]], sections: Iter
 
 
 def words(*lines: str, tone: str = "plain") -> Markup:
-    """Return one paragraph per line; `tone` is "plain", "note" or "warning"."""
+    """Return paragraphs, one for each of the lines; `tone` is "plain", "note" or "warning"."""
     return Markup(_blocks.words(lines, tone))
 
 
