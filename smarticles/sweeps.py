@@ -168,7 +168,7 @@ def is_for_cluster(arguments: argparse.Namespace, *, allow_ranks: bool = False) 
 
 
 def draft_of(path: Path, name: str, entries: Sequence[Entry], arguments: argparse.Namespace) -> Draft:
-    """Render the job of some runs from the options of a command line, see `templates.slurm.submission.draft`."""
+    """Render the job of some runs by the cluster options of a command, see `templates.slurm.submission.draft`."""
     from templates.slurm.cluster import shipped_clusters  # noqa: PLC0415
     from templates.slurm.job import Wishes  # noqa: PLC0415
     from templates.slurm.submission import draft, submissions  # noqa: PLC0415

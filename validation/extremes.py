@@ -130,8 +130,8 @@ def segments(vertices: Array) -> Array:
 def surface(vertices: Array, thickness: float) -> tuple[Array, Array]:
     """Return points on the axes of all links, and the radius of the material around each point.
 
-    The radius is 0 at the ends of an axis and half a thickness from half a thickness inwards. So the volume is inside
-    of links with square ends and of links with round ends.
+    Points are the ends of each axis, with radius 0, and the points thickness/2 from the ends, with radius thickness/2.
+    These spheres are inside of a link, whether its ends are square or round.
 
     Args:
         vertices: (N, 4, 3) [m].

@@ -137,7 +137,12 @@ class World:
         raise NotImplementedError
 
     def step(self, gravity: float, time_s: float) -> None:
-        """Take one step with a gravity [m/s²]; the step ends at a time since the start of the activity [s]."""
+        """Take one step.
+
+        Args:
+            gravity: downward gravity during the step [m/s²].
+            time_s: time at the end of the step, since the start of the activity [s].
+        """
         raise NotImplementedError
 
     def begin(self) -> None:

@@ -117,7 +117,7 @@ def compare(one: Path, other: Path) -> dict[str, Any]:
     Returns:
         kind: "run" or "sweep".
         identical: whether A and B have equal runs whose series and frames agree bit by bit.
-        scene: `Differences` of the scenes, with dots for nested keys; for sweeps of constants and variables.
+        scene: `Differences` of the scenes, with dots for nested keys; for sweeps, of constants and variables.
         versions: `Differences` of engine, package versions and number of threads.
         only: names of runs that only A or only B has; empty for runs.
         bits: results of `compare_bits` by the runs' names; one entry for two runs.

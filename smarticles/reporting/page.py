@@ -102,7 +102,7 @@ def turntable(caption: str, alt: str, views: Sequence[str]) -> Markup:
 
 
 def all_numbers(cells: Sequence[str]) -> bool:
-    """Return whether all cells are numbers, which may have errors and percent signs, or dashes."""
+    """Return whether every cell is a dash or a number, with or without error and percent sign."""
     return bool(cells) and all(_NUMBER.fullmatch(cell.strip()) for cell in cells)
 
 

@@ -88,7 +88,7 @@ def many(access: EngineAccess, out: Path, *, count: int, per_layer: int, radius:
 @hard("friction 0", {"value": 0.0, "count": 6}, {"count": 100})
 @hard("friction 5", {"value": 5.0, "count": 6}, {"count": 100})
 def friction(access: EngineAccess, out: Path, *, value: float, count: int) -> list[Check]:
-    """Pour with friction coefficients 0 and 5."""
+    """Pour with the friction coefficient `value` at all contacts."""
     contact = {"friction_smarticle": value, "friction_wall": value}
     data = scene_data(access, RELAX, count=count, contact=contact)
     data["phases"][0]["settle"] = {"timeout_s": 2}

@@ -122,8 +122,9 @@ def slide(access: EngineAccess, *, aspect_ratio: float = 0.7, friction: float = 
 def roll_errors(access: EngineAccess, steps: Sequence[float], *, phases: int = 5) -> list[float]:
     """Return the errors of the displacement of a ball that slides and then rolls, after 0.1 s [m].
 
-    The reference has a 4 times smaller step than the smallest. The tangential dashpot is off: on YADE it is not limited
-    by friction until the tangential spring reaches Coulomb's limit, which only steps of a few µs resolve.
+    The reference is a simulation with a quarter of the smallest time step. The tangential dashpot is off. On YADE its
+    force is not limited by friction for the first few µs of a contact, so that results would depend on whether a time
+    step is shorter than this.
     """
     law, time = ball_law(restitution=0.5, friction=FRICTION, dashpot=0.0), 0.1024
     slowed = FRICTION * G
