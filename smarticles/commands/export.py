@@ -14,7 +14,7 @@ _LAMMPS = "lammps"
 
 # Kept here because `postprocess.export`, which has this table too, is slow to import; a test compares both.
 _FIELDS = """\
-  smarticle_id [-]                     number of the smarticle, constant over all frames
+  smarticle_id [-]                     number of the smarticle, constant in all frames
   link [-]                             0 barb 1, 1 middle link, 2 barb 2
   speed_m_per_s [m/s]                  speed of the smarticle's centre of mass
   height_m [m]                         height of the smarticle's centre of mass above the floor
