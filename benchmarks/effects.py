@@ -1,8 +1,9 @@
-"""Measure what each effect costs: `python -m benchmarks.effects`.
+"""Measure the cost of each effect: `python -m benchmarks.effects`.
 
-Pairs of runs, without an effect and with it, alternating, so that a busy machine weighs on both. Compared is the
-processor time of one phase, which leaves out loading, pouring and waiting. The table gives the median of the share over
-pairs with the spread of the middle half; the first row, the same scene against itself, shows the noise.
+Each effect is measured by pairs of runs, without and with the effect, in alternating order, so that other load on the
+machine affects both. The processor times of one phase are compared, without loading, pouring and waiting. The table
+has the median over pairs of the relative cost, and its quartiles. The first row compares a scene with itself and shows
+the noise.
 """
 
 from __future__ import annotations
@@ -20,13 +21,15 @@ from dem.scene.reading import parse_scene
 
 Changes = dict[str, Any]
 HOLD: Changes = {"type": "actuate", "barbs": {"type": "hold"}}
-MEASURED = 1  # index of the phase that is compared; phase 0 pours
+MEASURED = 1  # index of the compared phase; phase 0 is the pour
 
 
 def pairs(seconds: float, hinged_step: float) -> list[tuple[str, str, Changes, Changes]]:
-    """Return effect, cause of the cost, and the changes to a pile without and with it.
+    """Return name, cause of the cost, and changed keys of the scenes without and with the effect, for each effect.
 
-    The phase that is compared takes `seconds`; `hinged_step` is the time step of that scene with hinges [s].
+    Args:
+        seconds: duration of the compared phase [s].
+        hinged_step: time step of a scene with hinges [s].
     """
     rest = {"type": "relax", "duration_s": seconds}
     still = {"type": "shake", "duration_s": seconds, "peak_acceleration_g": 0}
@@ -74,7 +77,7 @@ def pairs(seconds: float, hinged_step: float) -> list[tuple[str, str, Changes, C
 
 
 def scene_data(changes: Changes, *, count: int, seed: int) -> Changes:
-    """Return the data of a pile of the paper's smarticles, l/w = 0.7, draft, with the changes of a pair."""
+    """Return a scene as a dictionary: a pile of the paper's smarticles (l/w = 0.7, draft), with changed keys."""
     data: Changes = {"schema_version": 1, "seed": seed, "count": count, "fidelity": "draft", **changes}
     recording = {"checkpoint_interval_s": None, **changes.get("recording", {})}
     phases = [{"type": "deposit"}, *changes["phases"]]
@@ -82,7 +85,7 @@ def scene_data(changes: Changes, *, count: int, seed: int) -> Changes:
 
 
 def row(effect: str, cause: str, costs: list[tuple[float, float]]) -> dict[str, Any]:
-    """Return a row of the table: median over pairs, and the middle half of them."""
+    """Return a row of the table: median and quartiles over pairs of costs without and with the effect [s/s]."""
     shares = [100 * (after / before - 1) for before, after in costs]
     low, _, high = statistics.quantiles(shares, n=4, method="inclusive") if len(shares) > 1 else [shares[0]] * 3
     return {
@@ -97,11 +100,11 @@ def row(effect: str, cause: str, costs: list[tuple[float, float]]) -> dict[str, 
 
 
 def main() -> None:
-    """Run all pairs and print the table."""
+    """Run all pairs of scenes, write and print the table."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.effects", description=__doc__)
     parser.add_argument("--count", type=int, default=60, help="number of smarticles")
-    parser.add_argument("--seconds", type=float, default=0.4, help="simulated time that is compared [s]")
-    parser.add_argument("--pairs", type=int, default=5, help="how often each pair is run, each time with another seed")
+    parser.add_argument("--seconds", type=float, default=0.4, help="duration of the compared phase [s]")
+    parser.add_argument("--pairs", type=int, default=5, help="number of pairs per effect, each with another seed")
     parser.add_argument("--only", nargs="+", help="effects to measure (default: all)")
     parser.add_argument("--out", type=Path, help="folder for runs and table (default: a new one)")
     given = parser.parse_args()
@@ -109,11 +112,11 @@ def main() -> None:
     hinged = parse_scene(scene_data({"phases": [{**HOLD, "duration_s": 0.1}]}, count=1, seed=1), source="benchmarks")
     chosen = [pair for pair in pairs(given.seconds, time_step(hinged)) if not given.only or pair[0] in given.only]
     measured: list[list[tuple[float, float]]] = [[] for _ in chosen]
-    # Every pair once, then every pair again: what the machine does meanwhile does not fall on one effect.
+    # Repeats are the outer loop, so that a temporary load of the machine does not affect one effect alone.
     for repeat in range(given.pairs):
         for k, (effect, _, *variants) in enumerate(chosen):
             costs = [0.0, 0.0]
-            # Alternating: what comes second finds the caches warm.
+            # In alternating order, since the second run of a pair profits from warm caches.
             for which in (0, 1) if repeat % 2 else (1, 0):
                 name = f"{k:02d}-{repeat}-{('without', 'with')[which]}"
                 run_child(folder, name, scene_data(variants[which], count=given.count, seed=1 + repeat))

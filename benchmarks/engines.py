@@ -1,9 +1,9 @@
-"""Compare what each activity costs on both engines, from 50 to 20 000 smarticles: `python -m benchmarks.engines`.
+"""Compare the cost of each activity on links and YADE, from 50 to 20 000 smarticles: `python -m benchmarks.engines`.
 
-The same scene at every N, in a cylinder that is widened so that the pile is as high as the paper's of 270; every run is
-a process of its own on one thread, engines alternate. Processor time of the activity alone is compared, with everything
-that a run records. `engines.csv` has a row per run; a later call with the same `--out` goes on. A run that would go
-beyond the time allowed, by what the one before it took, is left out and reported.
+The radius of the container grows with N, so that all piles are as high as the paper's pile of 270. Every run is a
+process on one thread. The processor time of the activity alone is compared, recording included. `engines.csv` has one
+row per run; a later call with the same `--out` continues the table. A run that is expected to exceed the allowed wall
+time is skipped and reported.
 """
 
 from __future__ import annotations
@@ -22,14 +22,19 @@ from benchmarks.runs import folder_of, phase_cost, pile, run_child
 ENGINES = ("links", "yade")
 COUNTS = (50, 100, 270, 1000, 3000, 10_000, 20_000)
 ACTIVITIES: dict[str, dict[str, Any]] = {"shake": {}, "internal-oscillation": {"theta_deg": 10.0}}
-SECONDS = 0.4  # of an activity
-REPEATS_UP_TO, REPEATS = 270, 3  # smarticles, seeds
+SECONDS = 0.4  # duration of an activity [s]
+REPEATS_UP_TO, REPEATS = 270, 3  # piles of up to 270 smarticles are run with 3 seeds
 COST, PER_STEP = "processor time per simulated time [s/s]", "per step and smarticle [us]"
 MEMORY, WHOLE = "peak memory [MiB]", "whole run [s]"
 
 
 def measured(folder: Path, run: dict[str, Any]) -> dict[str, Any]:
-    """Run once; return the row of the table, which begins with what was run."""
+    """Run a scene; return a row of the table.
+
+    Args:
+        folder: for run directories.
+        run: engine, activity, fidelity, count and seed, the first columns of the row.
+    """
     engine, activity, fidelity, count, seed = run.values()
     name = f"{engine}-{activity}-{fidelity}-{count}-{seed}"
     acting = {"type": activity, "duration_s": SECONDS, **ACTIVITIES[activity]}
@@ -43,13 +48,13 @@ def measured(folder: Path, run: dict[str, Any]) -> dict[str, Any]:
 
 
 def main() -> None:
-    """Run what is missing, and print one table: medians of both engines side by side."""
+    """Compute the missing runs, and print the medians of both engines side by side."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.engines", description=__doc__)
     parser.add_argument("--counts", type=int, nargs="+", default=COUNTS, help="numbers of smarticles")
     parser.add_argument("--activities", nargs="+", choices=ACTIVITIES, default=ACTIVITIES, help="(default: both)")
     parser.add_argument("--fidelity", default="standard", help="(default: %(default)s)")
     parser.add_argument("--hours", type=float, default=1.0, help="wall time allowed [h] (default: %(default)s)")
-    parser.add_argument("--out", type=Path, help="folder for runs and engines.csv; goes on if it exists")
+    parser.add_argument("--out", type=Path, help="folder for runs and engines.csv; continued if it exists")
     given = parser.parse_args()
     folder, begun = folder_of("engines", given.out), time.monotonic()
     path = folder / "engines.csv"
@@ -62,7 +67,7 @@ def main() -> None:
             before = [row for row in rows if (row["engine"], row["activity"]) == (engine, activity)]
             guess = before[-1][WHOLE] * max(1.0, count / before[-1]["N [-]"]) if before else 0.0
             if time.monotonic() - begun + guess > 3600 * given.hours:
-                print(f"left out for want of time: {run}, about {guess:.0f} s; go on with --out {folder}")
+                print(f"skipped, not enough time: {run}, about {guess:.0f} s; continue with --out {folder}")
                 continue
             rows.append(measured(folder, run))
             pd.DataFrame(rows).to_csv(path, index=False)

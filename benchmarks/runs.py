@@ -1,4 +1,4 @@
-"""Run scenes in processes of their own: what every benchmark of the simulator times."""
+"""Run scenes in separate processes for benchmarks, and read their costs."""
 
 from __future__ import annotations
 
@@ -13,14 +13,22 @@ from typing import Any
 
 from dem.scene.reading import dump_scene, parse_scene
 
-# The pile of the paper's l/w = 0.7 run; other N keep its height.
+# The paper's pile of l/w = 0.7; piles with other N have the height of this pile.
 PAPER_COUNT, PAPER_RADIUS, PAPER_PER_LAYER = 270, 0.0234, 10
 
 
 def pile(
     count: int, *phases: dict[str, Any], seed: int = 1, per_layer: int | None = None, **keys: Any
 ) -> dict[str, Any]:
-    """Return the data of a scene: a pile as high as the paper's of 270, then some phases."""
+    """Return a scene as a dictionary, with a pile as high as the paper's pile of 270.
+
+    Args:
+        count: number of smarticles.
+        phases: phases after the pour.
+        seed: of the scene.
+        per_layer: smarticles per layer of the pour; None: in proportion to the area of the floor.
+        keys: further keys of the scene.
+    """
     widening = (count / PAPER_COUNT) ** 0.5
     per_layer = per_layer or max(PAPER_PER_LAYER, round(PAPER_PER_LAYER * widening**2))
     return {
@@ -34,10 +42,10 @@ def pile(
 
 
 def run_child(folder: Path, name: str, data: dict[str, Any]) -> resource.struct_rusage:
-    """Run a scene into `folder/name` on one thread; ends the benchmark if it fails.
+    """Run a scene on one thread into `folder/name`; exit the benchmark if the run fails.
 
     Returns:
-        What the process used, loading of YADE included.
+        Processor time and memory of the process.
     """
     path = folder / f"{name}.yaml"
     path.write_text(dump_scene(parse_scene(data, source="benchmarks")), encoding="utf-8")
@@ -50,14 +58,14 @@ def run_child(folder: Path, name: str, data: dict[str, Any]) -> resource.struct_
 
 
 def phase_cost(run: Path, phase: int = -1) -> float:
-    """Return the processor seconds per simulated second of a phase of a finished run."""
+    """Return the processor time per simulated time of a phase of a finished run [s/s]."""
     timed = json.loads((run / "done.json").read_text())["phases"][phase]
     cost: float = timed["cpu_s"] / (timed["end_s"] - timed["start_s"])
     return cost
 
 
 def folder_of(name: str, out: Path | None) -> Path:
-    """Make the folder of a benchmark, a new one unless it is named."""
+    """Create and return the folder of a benchmark: `out`, or by default `out/NAME-DATE`."""
     folder = out or Path("out") / f"{name}-{datetime.now(UTC).strftime('%Y%m%d-%H%M%S')}"
     folder.mkdir(parents=True, exist_ok=True)
     return folder

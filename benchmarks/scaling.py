@@ -1,8 +1,8 @@
-"""Measure the cost of a step per smarticle on links as piles grow at equal height: `python -m benchmarks.scaling`.
+"""Measure the cost per step and smarticle on links for growing piles of equal height: `python -m benchmarks.scaling`.
 
-Piles are poured once, into `OUT/pours`, in cylinders as wide as the height of the paper's pile of 270 asks for. Each is
-then shaken at Γ = 2 for a period, in processes of their own, again and again: the trajectory is the same bit for bit,
-so that of each stretch of four steps the least time counts. That is as near to an idle machine as a shared one allows.
+Piles are poured once, into `OUT/pours`. Each pile is then shaken at Γ = 2 for one period, several times in separate
+processes. All repetitions compute equal bits, so that the smallest time of each interval of four steps is used, which
+approximates an idle machine.
 """
 
 from __future__ import annotations
@@ -30,15 +30,20 @@ from dem.record.run import open_run
 from dem.scene.reading import dump_scene, load_scene, parse_scene, scene_hash
 
 COUNTS = (50, 100, 270, 1000, 2000, 5000, 10_000, 20_000)
-STRETCHES, LENGTH = 80, 4  # stretches, and their steps: a period of 30 Hz
-AMPLITUDE, FREQUENCY = 0.552e-3, 30.0  # m, Hz: Γ = 2, the paper's shaking
+INTERVALS, STEPS = 80, 4  # timed intervals, and steps per interval: one period at 30 Hz
+AMPLITUDE, FREQUENCY = 0.552e-3, 30.0  # shaking of the paper [m, Hz], Γ = 2
 WALL, PROCESSOR = "wall time per step and smarticle [us]", "processor time per step and smarticle [us]"
 
 
-def stretches(run: Path) -> dict[str, Any]:
-    """Time the stretches of the pile of a run's last checkpoint."""
+def time_intervals(run: Path) -> dict[str, Any]:
+    """Load the last checkpoint of a run and time the shaking of its pile.
+
+    Returns:
+        Wall times and processor times of all intervals [s] under "wall" and "processor", mean number of contacts per
+        smarticle, and peak memory [MiB].
+    """
     scene, made_by = load_scene(run / "scene.yaml"), open_run(run).manifest.versions["links"]
-    # An engine has a shaker only where the scene calls for one, and the pour does not.
+    # The scene needs a phase that shakes, or the engine is built without a moving container.
     content = yaml.safe_load(dump_scene(scene))
     content["phases"].append({"type": "shake", "duration_s": 1.0, "frequency_hz": FREQUENCY})
     shaken = parse_scene(content, source=str(run))
@@ -49,9 +54,9 @@ def stretches(run: Path) -> dict[str, Any]:
     engine.boundaries.shake(amplitude=AMPLITUDE, frequency=FREQUENCY)
     engine.advance(30)
     wall, processor = [], []
-    for _ in range(STRETCHES):
+    for _ in range(INTERVALS):
         begun, spent = time.perf_counter(), time.process_time()
-        engine.advance(LENGTH)
+        engine.advance(STEPS)
         wall.append(time.perf_counter() - begun)
         processor.append(time.process_time() - spent)
     return {
@@ -63,27 +68,29 @@ def stretches(run: Path) -> dict[str, Any]:
 
 
 def row_of(run: Path, count: int, repeats: int) -> dict[str, Any]:
-    """Time one trajectory again and again; return a row of the table, of every stretch the least time."""
-    command = [sys.executable, "-m", "benchmarks.scaling", "--stretches", str(run)]
+    """Repeat the timing of a pile in separate processes; return a row of the table with the smallest times."""
+    command = [sys.executable, "-m", "benchmarks.scaling", "--time-pile", str(run)]
     found = [
         json.loads(subprocess.run(command, stdout=subprocess.PIPE, text=True, check=True).stdout)
         for _ in range(repeats)
     ]
-    each = 1e6 / (LENGTH * STRETCHES * count)
-    wall, processor = (each * np.min([one.pop(kind) for one in found], axis=0).sum() for kind in ("wall", "processor"))
+    each = 1e6 / (STEPS * INTERVALS * count)
+    wall, processor = (
+        each * np.min([timing.pop(kind) for timing in found], axis=0).sum() for kind in ("wall", "processor")
+    )
     return {"N [-]": count, WALL: wall, PROCESSOR: processor, **found[-1]}
 
 
 def main() -> None:
-    """Pour what is not there, time, and write the table."""
+    """Pour the missing piles, time all piles, and write the table."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.scaling", description=__doc__)
     parser.add_argument("--counts", type=int, nargs="+", default=COUNTS, help="numbers of smarticles")
-    parser.add_argument("--repeats", type=int, default=10, help="of each trajectory (default: %(default)s)")
+    parser.add_argument("--repeats", type=int, default=10, help="number of timings per pile (default: %(default)s)")
     parser.add_argument("--out", type=Path, default=Path("out/scaling"), help="folder for pours and table")
-    parser.add_argument("--stretches", type=Path, metavar="RUN", help="only time this pile once, JSON to stdout")
+    parser.add_argument("--time-pile", type=Path, metavar="RUN", help="time this pile once and print JSON")
     given = parser.parse_args()
-    if given.stretches:
-        print(json.dumps(stretches(given.stretches)))
+    if given.time_pile:
+        print(json.dumps(time_intervals(given.time_pile)))
         return
     pours, rows = given.out / "pours", []
     pours.mkdir(parents=True, exist_ok=True)

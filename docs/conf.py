@@ -1,4 +1,4 @@
-"""Settings of the documentation, for Sphinx. All that a page loads lies beside it: nothing is asked of a network."""
+"""Sphinx configuration. Pages load local files only and need no network."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon", "made"
 exclude_patterns = ["made"]
 myst_enable_extensions = ["amsmath", "colon_fence", "deflist", "dollarmath"]
 myst_heading_anchors = 3
-# MathML is what browsers know themselves; MathJax would be a megabyte from elsewhere.
+# Browsers render MathML themselves; MathJax would be a large script from another server.
 html_math_renderer = "mathml"
 
 autodoc_member_order = "bysource"
@@ -28,7 +28,7 @@ autodoc_preserve_defaults = True
 napoleon_google_docstring = True
 napoleon_numpy_docstring = False
 napoleon_use_ivar = True
-napoleon_attr_annotations = False  # docstrings say types, with shapes
+napoleon_attr_annotations = False  # docstrings of attributes contain types and shapes
 napoleon_custom_sections = [("Source", "notes_style"), ("Sources", "notes_style")]
 
 html_theme = "furo"

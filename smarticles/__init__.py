@@ -1,4 +1,4 @@
-"""Smarticles: names for users. Nothing is loaded before it is used.
+"""Public names of the package. A module is imported when one of its names is first used.
 
     import smarticles
 
@@ -48,10 +48,10 @@ _MODULES = {
     "Scene": "dem.scene.scene",
     "load_scene": "dem.scene.reading",
 }
-"""Modules of names that are not in `smarticles.public`."""
+"""Modules of the names that `smarticles.public` does not define."""
 
 
-if not TYPE_CHECKING:  # so that a type checker knows no other names
+if not TYPE_CHECKING:  # hidden from type checkers, which would accept any name
 
     def __getattr__(name: str) -> object:
         if name == "measures":

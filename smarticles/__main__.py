@@ -1,4 +1,4 @@
-"""`python -m smarticles` is `smarticles`."""
+"""Run the console command: `python -m smarticles`."""
 
 import sys
 

@@ -1,4 +1,4 @@
-"""What commands share: argparse with one-line errors, common options, and aligned columns."""
+"""Parse command lines with one-line errors; define common options; format tables and JSON."""
 
 from __future__ import annotations
 
@@ -14,18 +14,18 @@ from typing import Any, NoReturn, TypeVar
 from dem.engine import ENGINES
 from dem.errors import InputError, nearest
 
-Handler = Callable[[argparse.Namespace], int]  #: Does the work of a subcommand; returns the exit status
+Handler = Callable[[argparse.Namespace], int]  #: Function that runs a subcommand and returns the exit status
 
 
 class Parser(argparse.ArgumentParser):
-    """Raises InputError, with the nearest known word, instead of printing its usage first."""
+    """Argument parser that raises InputError with the nearest known word instead of printing its usage."""
 
     def __init__(self, **options: Any) -> None:
         options.setdefault("formatter_class", argparse.RawDescriptionHelpFormatter)
         super().__init__(allow_abbrev=False, **options)
 
     def error(self, message: str) -> NoReturn:
-        """Reject the command line."""
+        """Raise InputError with a message of argparse in this project's wording."""
         invalid = re.search(r"invalid choice: '(.*?)' \(choose from (.*)\)", message)
         if invalid:
             known = re.findall(r"[\w-]+", invalid[2])
@@ -35,7 +35,7 @@ class Parser(argparse.ArgumentParser):
         raise InputError(f"{message}; see `{self.prog} --help`")
 
     def reject_unknown(self, words: Sequence[str]) -> NoReturn:
-        """Reject arguments that the command does not have."""
+        """Raise InputError for the first of several unknown arguments."""
         word = words[0].partition("=")[0]
         if not word.startswith("-"):
             self.error(f"one argument too many: {words[0]!r}")
@@ -44,14 +44,22 @@ class Parser(argparse.ArgumentParser):
 
 
 class Commands:
-    """The subcommands of the console command."""
+    """Subcommands of `smarticles`, with their parsers by name."""
 
     def __init__(self, parser: Parser) -> None:
         self._subparsers = parser.add_subparsers(dest="command", metavar="COMMAND")
         self.parsers: dict[str, Parser] = {}
 
     def add(self, name: str, handler: Handler, *, summary: str, text: str, examples: str) -> Parser:
-        """Add a subcommand: a line for the list of commands; text and examples for its own help."""
+        """Add a subcommand and return its parser.
+
+        Args:
+            name: word on the command line.
+            handler: runs the subcommand.
+            summary: one line for the list of commands.
+            text: description for `--help` of the subcommand.
+            examples: example command lines for `--help` of the subcommand.
+        """
         parser: Parser = self._subparsers.add_parser(
             name,
             help=summary,
@@ -59,7 +67,7 @@ class Commands:
             epilog=f"examples:\n{examples.rstrip()}",
         )
         parser.set_defaults(handler=handler)
-        add_shared(parser, "--debug", default=argparse.SUPPRESS)
+        add_options(parser, "--debug", default=argparse.SUPPRESS)
         self.parsers[name] = parser
         return parser
 
@@ -70,7 +78,13 @@ Read = TypeVar("Read")
 
 
 def reader(convert: Callable[[str], Read], what: str, valid: Callable[[Read], bool]) -> Callable[[str], Read]:
-    """Return the reader of an argument, which rejects what cannot be converted or is not valid."""
+    """Return a `type` for argparse that converts and checks an argument.
+
+    Args:
+        convert: converts the text; a ValueError means that the text is invalid.
+        what: description of valid values, for the error message.
+        valid: returns whether a converted value is allowed.
+    """
 
     def read(text: str) -> Read:
         with suppress(ValueError):
@@ -85,69 +99,74 @@ positive_number = reader(float, "a number above 0", lambda number: 0 < number < 
 positive_int = reader(int, "a whole number from 1", lambda number: number >= 1)
 
 
+def names(text: str) -> tuple[str, ...]:
+    """Split a comma-separated argument into its names."""
+    return tuple(name.strip() for name in text.split(",") if name.strip())
+
+
 # -- options that several commands have --------------------------------------------------------------------------------
 
+_ENGINES_HELP = "yade (sphere chains on YADE), links (swept links) or lammps (sphere chains on several processes)"
 
-_SHARED: Mapping[str, Mapping[str, Any]] = {
+_OPTIONS: Mapping[str, Mapping[str, Any]] = {
+    "directory": {"type": Path, "metavar": "DIR", "help": "run directory"},
+    "scene": {"type": Path, "metavar": "SCENE.yaml", "help": "scene file"},
+    "--analyse": {"action": "store_true", "help": "start no run; analyse the finished runs"},
+    "--color-by": {"metavar": "FIELD"},
     "--debug": {"action": "store_true", "help": "show the traceback of an error"},
+    "--dry-run": {"action": "store_true"},
+    "--engine": {"choices": ENGINES, "help": f"replace the engine that the scene names: {_ENGINES_HELP}"},
+    "--jobs": {"type": positive_int, "metavar": "N", "help": "number of simultaneous runs; default: one per core"},
     "--json": {"action": "store_true", "help": "print JSON, for programs"},
-    "--overwrite": {"action": "store_true", "help": "replace a file that exists"},
-    "--jobs": {"type": positive_int, "metavar": "N", "help": "runs at once; default: one per core"},
+    "--out": {"type": Path, "metavar": "DIR"},
+    "--output": {"type": Path, "metavar": "FILE"},
+    "--overwrite": {"action": "store_true", "help": "replace an existing file"},
+    "--ranks": {
+        "type": positive_int,
+        "metavar": "N",
+        "help": "MPI processes of engine lammps, one core each; default: 1, with resume the number at the start",
+    },
+    "--set": {
+        "action": "append",
+        "default": [],
+        "metavar": "KEY=VALUE",
+        "help": "change one key of the scene, e.g. phases.1.duration_s=2; may be repeated",
+    },
+    "--submit": {
+        "choices": ("none", "local", "slurm"),
+        "help": "none: write the files only; local: compute on this machine, one run per core; slurm: submit a job",
+    },
+    "--table": {"type": Path, "metavar": "FILE.csv"},
+    "--threads": {"type": positive_int, "metavar": "N"},
+    "--time": {"type": float, "metavar": "S", "help": "simulated time [s]; the nearest frame is used; default: last"},
 }
+"""Names of arguments and options that several commands have, with their settings for argparse."""
 
 
-def add_shared(parser: Parser, *options: str, **settings: Any) -> None:
-    """Add options that several commands have, by their names."""
+def add_options(parser: argparse._ActionsContainer, *options: str, **settings: Any) -> None:
+    """Add arguments of `_OPTIONS` by name; `settings` of argparse replace those of the table."""
     for option in options:
-        parser.add_argument(option, **_SHARED[option], **settings)
-
-
-def add_scene(parser: Parser, what: str) -> None:
-    """Add the scene, --set and --engine; `what` is what --engine sets, for the help."""
-    parser.add_argument("scene", type=Path, metavar="SCENE.yaml", help="scene file")
-    parser.add_argument(
-        "--set",
-        action="append",
-        default=[],
-        metavar="KEY=VALUE",
-        help="change one key of the scene, e.g. phases.1.duration_s=2; may be repeated",
-    )
-    add_engine(parser, what)
-
-
-def add_engine(parser: Parser, what: str) -> None:
-    """Add --engine; `what` is what it sets, for the help."""
-    parser.add_argument(
-        "--engine",
-        choices=ENGINES,
-        help=f"{what}: yade, sphere chains on YADE, links, swept links, or lammps, sphere chains on several processes",
-    )
-
-
-def add_ranks(parser: argparse._ActionsContainer, default: str) -> None:
-    """Add --ranks; `default` for the help."""
-    parser.add_argument(
-        "--ranks",
-        type=positive_int,
-        metavar="N",
-        help=f"processes of engine: lammps, under mpirun, one core each; default: {default}",
-    )
+        parser.add_argument(option, **{**_OPTIONS[option], **settings})
 
 
 def scene_settings(arguments: argparse.Namespace) -> list[str]:
-    """Return --set and --engine as `KEY=VALUE`."""
+    """Return --set and --engine as a list of `KEY=VALUE`.
+
+    Raises:
+        InputError: --engine and --set name different engines.
+    """
     settings: list[str] = list(arguments.set)
     if arguments.engine is None:
         return settings
     for setting in settings:
         key, _, value = setting.partition("=")
         if key.strip() == "engine" and value.strip() != arguments.engine:
-            raise InputError(f"--engine {arguments.engine}: --set {setting} says another one; leave one of them out")
+            raise InputError(f"--engine {arguments.engine}: --set {setting} names another engine; omit one of them")
     return [*settings, f"engine={arguments.engine}"]
 
 
 def reject_existing(option: str, path: Path | None, *, overwrite: bool) -> None:
-    """Reject an output that exists, before the work and not after it."""
+    """Raise InputError if an output file exists and may not be replaced; called before the computation."""
     if path is not None and path.exists() and not overwrite:
         raise InputError(f"{option} {path}: exists; choose another name or give --overwrite")
 
@@ -156,19 +175,22 @@ def reject_existing(option: str, path: Path | None, *, overwrite: bool) -> None:
 
 
 class Cell(str):
-    """A number that is formatted already; aligned as numbers are."""
+    """Formatted number; `columns` aligns it to the right."""
 
     __slots__ = ()
 
     @classmethod
     def of(cls, value: float, form: str, factor: float = 1.0) -> Cell:
-        """Format a number times a factor; a dash where it is not finite."""
+        """Format `factor * value`; return a dash if the value is not finite."""
         return cls(f"{factor * value:{form}}" if math.isfinite(value) else "-")
 
 
 def columns(header: Sequence[str], rows: Sequence[Sequence[object]]) -> str:
-    """Return a table of aligned columns; numbers to the right, NaN and None as a dash; nothing is cut to a width."""
-    cells = [[_text(value) for value in row] for row in rows]
+    """Return a table with aligned columns, of unlimited width.
+
+    Columns of numbers are aligned to the right; NaN and None become dashes.
+    """
+    cells = [[format_cell(value) for value in row] for row in rows]
     widths = [max(map(len, column)) for column in zip(header, *cells, strict=True)]
     numbers = [
         bool(rows) and all(isinstance(row[k], int | float | Cell | None) for row in rows) for k in range(len(header))
@@ -182,14 +204,15 @@ def columns(header: Sequence[str], rows: Sequence[Sequence[object]]) -> str:
     )
 
 
-def _text(value: object) -> str:
+def format_cell(value: object) -> str:
+    """Format a value of a table: numbers with four digits, None and NaN as a dash."""
     if value is None or (isinstance(value, float) and math.isnan(value)):
         return "-"
     return f"{value:.4g}" if isinstance(value, float) else str(value)
 
 
 def as_json(value: Any) -> str:
-    """Return indented JSON; numbers that are not finite become null, since JSON has none."""
+    """Return indented JSON; NaN and infinite numbers become null, since JSON cannot represent them."""
     return json.dumps(_finite(value), indent=2, ensure_ascii=False, default=str)
 
 

@@ -1,7 +1,7 @@
-"""The console command `smarticles`: command line in, exit status out.
+"""Console command `smarticles`.
 
-Exit status: 0 done; 1 the run failed; 2 bad input or usage; 75 stopped at a checkpoint as SIGUSR1 asked, to be
-continued; 130 stopped by Ctrl-C.
+Exit status: 0 done; 1 the run failed; 2 bad input or usage; 75 stopped at a checkpoint after SIGUSR1, to be continued;
+130 stopped by Ctrl-C; 141 the reader of the output closed the pipe.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from types import FrameType
 from typing import Any
 
 from dem.errors import InputError, RunError
-from smarticles.command_line import Commands, Parser, add_shared
+from smarticles.command_line import Commands, Parser, add_options
 from smarticles.commands import (
     accuracy,
     compare,
@@ -42,7 +42,7 @@ COMMANDS = (
     *(scene_files.add, run.add, plan.add, doctor.add, measure.add, compare.add, render.add, view.add, export.add),
     *(report.add, sweep.add, status.add, run.add_resume, study.add, accuracy.add),
 )
-"""In the order of `smarticles --help`; a new command is a module of `smarticles.commands` and a word here."""
+"""Functions that add the commands, in the order of `smarticles --help`; add a new command here."""
 
 FAILED, BAD_INPUT, STOPPED, BROKEN_PIPE = 1, 2, 130, 141
 
@@ -50,28 +50,29 @@ _SHELLS = ("bash", "zsh")
 _SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
 _DESCRIPTION = """\
-Discrete-element simulation of smarticles: U-shaped particles, poured, shaken, measured.
+Discrete-element simulation of smarticles, U-shaped particles of three links.
 
-A scene (YAML) is run into a run directory; measures, tables and pictures come from its files."""
+A scene (YAML) describes a simulation. `run` records the simulation in a run directory; the other commands
+measure, draw and compare run directories."""
 
 _EPILOG = """\
 first steps:
-  smarticles doctor                        what is installed, and does it work
+  smarticles doctor                        test the installation
   smarticles study gravish --quick --out demo
-                                           pour, shake, measure, compare with Gravish: minutes
-  smarticles init                          scene.yaml, small and commented
-  smarticles plan scene.yaml               what a run would do and cost
-  smarticles run scene.yaml --out run1     do it
+                                           pour, shake, measure, compare with Gravish (minutes)
+  smarticles init                          write a small commented scene.yaml
+  smarticles plan scene.yaml               print phases, effects, expected wall time
+  smarticles run scene.yaml --out run1     compute
 
-completion of commands and options: eval "$(smarticles --completion bash)" in ~/.bashrc; for zsh put
-what --completion zsh prints into a file _smarticles in a folder of $fpath
+completion of commands and options: add eval "$(smarticles --completion bash)" to ~/.bashrc; for zsh,
+write the output of --completion zsh to a file _smarticles in a folder of $fpath
 
 exit status: 0 done; 1 the run failed; 2 bad input or usage; 75 stopped at a checkpoint by SIGUSR1,
 to be continued; 130 stopped by Ctrl-C"""
 
 
 def build_parser() -> tuple[Parser, Commands]:
-    """Return the parser of the whole command, and its subcommands."""
+    """Return the parser of `smarticles`, and its subcommands."""
     from importlib.metadata import PackageNotFoundError, version  # noqa: PLC0415  (slow to import)
 
     try:
@@ -85,9 +86,9 @@ def build_parser() -> tuple[Parser, Commands]:
         choices=_SHELLS,
         action=_PrintCompletion,
         metavar="SHELL",
-        help=f"print the completion script of a shell ({', '.join(_SHELLS)}) and end",
+        help=f"print the completion script of a shell ({', '.join(_SHELLS)}) and exit",
     )
-    add_shared(parser, "--debug")
+    add_options(parser, "--debug")
     commands = Commands(parser)
     for add in COMMANDS:
         add(commands)
@@ -95,16 +96,16 @@ def build_parser() -> tuple[Parser, Commands]:
 
 
 class _PrintCompletion(argparse.Action):
-    """Prints the completion script of a shell; arguments that are paths complete to files, or to directories."""
+    """Print the completion script of a shell; arguments of type Path complete to files or directories."""
 
     def __call__(
         self, parser: argparse.ArgumentParser, namespace: argparse.Namespace, values: Any, option: str | None = None
     ) -> None:
-        import shtab  # noqa: PLC0415  (the only place that needs it)
+        import shtab  # noqa: PLC0415  (needed here alone)
 
         parsers = [parser]
-        for one in parsers:
-            for action in one._actions:
+        for current in parsers:
+            for action in current._actions:
                 if isinstance(action, argparse._SubParsersAction):
                     parsers += action.choices.values()
                 elif action.type is Path:
@@ -115,13 +116,18 @@ class _PrintCompletion(argparse.Action):
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run the command with some arguments, by default those of this process, and return the exit status."""
+    """Run `smarticles` with the given arguments, by default those of this process; return the exit status."""
     words = list(sys.argv[1:] if argv is None else argv)
     return guarded(lambda: _dispatch(words), debug="--debug" in words)
 
 
 def guarded(action: Callable[[], int], *, debug: bool = False) -> int:
-    """Return the exit status of an action; every way in which it can end becomes one line and a status here."""
+    """Run an action and return the exit status; print exceptions and signals as one line on stderr.
+
+    Args:
+        action: returns an exit status.
+        debug: print the traceback of an exception too.
+    """
     try:
         with orderly_stop():
             status = action()
@@ -130,19 +136,20 @@ def guarded(action: Callable[[], int], *, debug: bool = False) -> int:
     except SystemExit as error:  # argparse, after --help and --version
         return error.code if isinstance(error.code, int) else 0
     except BrokenPipeError:
-        # The reader of our output, such as `head`, has ended: nothing more may be flushed to it.
+        # The reader of the output, such as `head`, has ended; flushing at exit would fail again.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return BROKEN_PIPE
     except KeyboardInterrupt as error:
-        _complain(f"stopped; {str(error) or 'what was written is whole'}", error, debug)
+        _complain(f"stopped; {str(error) or 'all written files are complete'}", error, debug)
         return STOPPED
-    except Exception as error:  # nothing passes without a message
+    except Exception as error:  # reported as an internal error
         text, status = _explain(error)
         _complain(f"error: {text}", error, debug)
         return status
 
 
 def _dispatch(words: list[str]) -> int:
+    """Parse the command line, run the handler of its subcommand, and return the exit status."""
     parser, commands = build_parser()
     arguments, unknown = parser.parse_known_args(words)
     if arguments.command is None:
@@ -181,15 +188,15 @@ def _stop(_number: int, _frame: FrameType | None) -> None:
     raise KeyboardInterrupt
 
 
-def _pass_over(_number: int, _frame: FrameType | None) -> None:
-    """Ignore a signal here only: unlike SIG_IGN, started processes do not inherit this."""
+def _ignore(_number: int, _frame: FrameType | None) -> None:
+    """Ignore a signal in this process; unlike SIG_IGN, this handler is not inherited by child processes."""
 
 
 @contextmanager
 def orderly_stop() -> Iterator[None]:
-    """Turn signals that end the process into KeyboardInterrupt, so that a run closes its files.
+    """Raise KeyboardInterrupt at SIGINT, SIGTERM and SIGHUP, so that a run closes its files.
 
-    Signals that the process ignores, by nohup or by a shell's `&`, stay ignored.
+    Signals that the process ignores already, because of `nohup` or `&` in a shell, stay ignored.
     """
     if threading.current_thread() is not threading.main_thread():
         yield
@@ -197,7 +204,7 @@ def orderly_stop() -> Iterator[None]:
     before = {number: signal.getsignal(number) for number in _SIGNALS}
     try:
         for number, handler in before.items():
-            signal.signal(number, _pass_over if handler is signal.SIG_IGN else _stop)
+            signal.signal(number, _ignore if handler is signal.SIG_IGN else _stop)
         yield
     finally:
         for number, handler in before.items():

@@ -1,4 +1,4 @@
-"""Measures of runs and sweeps as one table, with what a sweep varied as columns."""
+"""Tables of the measures of runs and sweeps, with the variables of a sweep as columns."""
 
 from __future__ import annotations
 
@@ -19,18 +19,22 @@ if TYPE_CHECKING:
     from postprocess.measures.table import Costly
     from templates.sweep.folder import Folder
 
-_WORTH_PROCESSES = 6  #: Runs from which on starting processes saves time: each loads its libraries anew
+_MIN_RUNS_FOR_PROCESSES = 6  #: With fewer runs, loading the libraries in each process takes longer than it saves
 
-PHASE = ("phase", "phase type")  #: Columns that identify a phase of a run
+PHASE = ("phase", "phase type")  #: Columns that identify a phase within a run
 
 
 def has_frames(directory: Path) -> bool:
-    """Return whether a run directory holds a frame."""
+    """Return whether a run directory contains frames."""
     return (directory / collection(FRAME)).is_file()
 
 
 def sources(directories: Sequence[Path]) -> dict[Path, Mapping[str, Any]]:
-    """Return runs, and of each sweep its runs with frames, with what their sweeps varied.
+    """Find the runs to measure in directories of runs and sweeps.
+
+    Returns:
+        Values of the sweep's variables by run directory, empty for runs without a sweep. Runs of a sweep that have no
+        frames are left out.
 
     Raises:
         InputError: a sweep has no run with frames yet.
@@ -43,16 +47,16 @@ def sources(directories: Sequence[Path]) -> dict[Path, Mapping[str, Any]]:
             found[directory] = {}
             continue
         folder = open_folder(directory)
-        begun = {run: entry.values for entry in folder.entries if has_frames(run := folder.run(entry))}
-        if not begun:
+        with_frames = {run: entry.values for entry in folder.entries if has_frames(run := folder.run(entry))}
+        if not with_frames:
             msg = f"{directory}: no run of this sweep has frames yet; start them with: smarticles resume {directory}"
             raise InputError(msg)
-        found |= begun
+        found |= with_frames
     return found
 
 
 def values_in(folder: Folder) -> dict[str, list[Any]]:
-    """Return the variables and constants of a sweep with the values of each, in the order of the sweep."""
+    """Return the distinct values of each variable and constant of a sweep, in the order of the sweep."""
     found: dict[str, list[Any]] = {}
     for entry in folder.entries:
         for name, value in entry.values.items():
@@ -63,7 +67,7 @@ def values_in(folder: Folder) -> dict[str, list[Any]]:
 
 
 def follows(name: str, other: str, points: Iterable[Mapping[str, object]]) -> bool:
-    """Return whether a variable is determined by another one, as the columns of a table are by its first."""
+    """Return whether the variable `name` is a function of the variable `other` at these points."""
     seen: dict[str, object] = {}
     return all(seen.setdefault(str(point.get(other)), point.get(name)) == point.get(name) for point in points)
 
@@ -71,16 +75,18 @@ def follows(name: str, other: str, points: Iterable[Mapping[str, object]]) -> bo
 def measured(
     directories: Sequence[Path], *, frames: bool = False, costly: Costly = "phase-end", jobs: int = 1
 ) -> pd.DataFrame:
-    """Return measures of runs and sweeps, one row per run and phase, with what a sweep varies beside the run.
+    """Measure runs and sweeps.
 
     Args:
-        costly: when to take the costly packing fractions, see `postprocess.measure_run`.
-        jobs: runs that are measured at once, each in a process of its own; more than one only in programs from which
-            processes may be started: not in a script without a guarded main.
+        directories: directories of runs and sweeps.
+        frames: return one row per frame instead of one row per run and phase.
+        costly: when to compute the costly packing fractions, see `postprocess.measure_run`.
+        jobs: number of processes. More than 1 needs `if __name__ == "__main__":` in the calling script, since the
+            processes import it.
 
     Returns:
-        A table with units in its columns. A variable of a sweep that has the name of another column and not its
-        values is called "NAME (swept)".
+        A table with units in the column names. Variables of a sweep are columns after the first one. A variable is
+        called "NAME (swept)" if a measured column NAME has other values.
 
     Raises:
         InputError: a sweep has no run with frames yet, or a file is missing or damaged.
@@ -89,17 +95,17 @@ def measured(
 
     found = sources(directories)
     take = partial(_table, frames=frames, costly=costly)
-    if jobs == 1 or len(found) < _WORTH_PROCESSES:
+    if jobs == 1 or len(found) < _MIN_RUNS_FOR_PROCESSES:
         tables = list(map(take, found, found.values()))
     else:
-        # Anew, not forked: VTK and matplotlib may have threads here.
+        # Spawned, since a forked process would not have the threads of VTK and matplotlib.
         with ProcessPoolExecutor(jobs, mp_context=get_context("spawn")) as pool:
             tables = list(pool.map(take, found, found.values()))
     return pd.concat(tables, ignore_index=True)
 
 
 def _table(directory: Path, values: Mapping[str, Any], *, frames: bool, costly: Costly) -> pd.DataFrame:
-    """Return the table of one run, with the variables of its sweep after the first column."""
+    """Return the measures of one run, with the variables of its sweep after the first column."""
     from dem.record.run import Run  # noqa: PLC0415
     from postprocess.measures.table import measure_run, summarise_run  # noqa: PLC0415
 
@@ -107,7 +113,7 @@ def _table(directory: Path, values: Mapping[str, Any], *, frames: bool, costly: 
     for place, (name, value) in enumerate(values.items(), start=1):
         column = name
         if name in table.columns and (table[name] == value).all():
-            table = table.drop(columns=name)  # inserted at another place
+            table = table.drop(columns=name)  # inserted again below
         elif name in table.columns:
             column = f"{name} (swept)"
         cell = value if isinstance(value, str | int | float | bool) else json.dumps(value, ensure_ascii=False)
@@ -116,10 +122,13 @@ def _table(directory: Path, values: Mapping[str, Any], *, frames: bool, costly: 
 
 
 def grouped(table: pd.DataFrame, by: Sequence[str]) -> pd.DataFrame:
-    """Return means of `measured` over runs, one row per group and phase.
+    """Average a table of `measured` over runs with equal values in the columns `by`.
+
+    Returns:
+        One row per group and phase: means, and standard errors over runs.
 
     Raises:
-        InputError: there is no such column.
+        InputError: a column does not exist.
     """
     from postprocess.statistics.points import means_by  # noqa: PLC0415
 

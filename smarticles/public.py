@@ -1,4 +1,4 @@
-"""The Python API beside names that live elsewhere: run a scene, read a run, compute a sweep."""
+"""Python API: run and read scenes and sweeps, and measure them."""
 
 from __future__ import annotations
 
@@ -30,18 +30,18 @@ from templates.sweep.sweep_file import SEED
 
 @dataclass(frozen=True)
 class SweepDirectory(Sequence[Run]):
-    """The runs of a sweep in its order, and tables of all of them."""
+    """Directory of a sweep: a sequence of its runs, and tables of their measures."""
 
-    folder: Folder
+    folder: Folder  #: Manifest and entries of the sweep
 
     @property
     def path(self) -> Path:
-        """The sweep's directory."""
+        """Path of the directory."""
         return self.folder.path
 
     @cached_property
     def values(self) -> pd.DataFrame:
-        """Variables and constants of the sweep: one row per run, by the runs' names."""
+        """Values of the sweep's variables and constants: one row per run, indexed by the runs' names."""
         entries = self.folder.entries
         return pd.DataFrame([dict(entry.values) for entry in entries], index=[entry.name for entry in entries])
 
@@ -58,15 +58,18 @@ class SweepDirectory(Sequence[Run]):
         return self.folder.runs()[index]
 
     def table(self, *, by: str | Sequence[str] | None = None, frames: bool = False) -> pd.DataFrame:
-        """Return all measures of the runs that have begun, with what the sweep varies as columns.
+        """Return the measures of all runs that have frames, with the sweep's variables as columns.
 
         Args:
-            by: columns, such as variables of the sweep, whose values make a group: then one row per group and phase,
-                means over its runs with "… SE […]", the standard error from run to run.
-            frames: one row per frame; else one per run and phase.
+            by: columns, such as variables of the sweep. The result is then averaged over runs with equal values in
+                these columns; columns "… SE […]" have the standard errors over runs.
+            frames: return one row per frame; cannot be combined with `by`.
+
+        Returns:
+            One row per run and phase, per group and phase with `by`, or per frame. Column names contain the units.
 
         Raises:
-            InputError: no run has frames yet, there is no such column, or groups of frames are asked for.
+            InputError: no run has frames yet, a column does not exist, or `by` and `frames` are combined.
         """
         if by is not None and frames:
             raise InputError("by: averages over phases of runs; leave frames out")
@@ -77,17 +80,22 @@ class SweepDirectory(Sequence[Run]):
 def run(
     scene: Scene | Path | str, out: Path | str, *, threads: int = 1, ranks: int | None = None, resume: bool = False
 ) -> Run:
-    """Run a scene into a run directory, as `smarticles run` does, in a process of its own.
+    """Run a scene in a new process, as `smarticles run` does.
 
-    Of its own, because YADE and PyVista must not be loaded in one process.
+    A new process is needed because YADE and PyVista must not be loaded in one process.
 
     Args:
-        out: the run directory; must not exist or be empty, or with `resume` hold an unfinished run of this scene.
-        threads: of the engine; only one gives the same bits again.
-        resume: go on from the last checkpoint.
+        scene: scene, or path of a scene file.
+        out: run directory. It must be absent or empty; with `resume` it may hold an unfinished run of this scene.
+        threads: number of threads of YADE. Results are reproducible bit by bit with one thread only.
+        ranks: number of MPI processes of LAMMPS; None: 1, or with `resume` the number at the start.
+        resume: continue an unfinished run from its last checkpoint.
+
+    Returns:
+        The finished run.
 
     Raises:
-        InputError: the scene is not valid, or `out` holds something else.
+        InputError: the scene is not valid, or `out` contains other files.
         RunError: the run failed or was stopped.
     """
     with tempfile.TemporaryDirectory(prefix="smarticles-") as scratch:
@@ -100,38 +108,43 @@ def run(
             words, env=environment(), stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True, check=False
         )
     if done.returncode:
-        said = done.stderr.strip().splitlines() or [f"exit status {done.returncode}, without a word"]
-        text = said[-1].removeprefix("smarticles: ").removeprefix("error: ")
+        lines = done.stderr.strip().splitlines() or [f"exit status {done.returncode}, without a message"]
+        text = lines[-1].removeprefix("smarticles: ").removeprefix("error: ")
         raise InputError(text) if done.returncode == BAD_INPUT else RunError(text)
     return Run(Path(out))
 
 
 def read(directory: Path | str) -> Run:
-    """Open a run directory, finished or not.
+    """Open the run directory of a finished or unfinished run.
 
     Raises:
-        InputError: it is none.
+        InputError: the directory is not a run directory.
     """
     return open_run(directory)
 
 
 def measure(run: Run | Path | str, *, frames: bool = False) -> pd.DataFrame:
-    """Return all measures of a run as a table, units in its column names, as `smarticles measure` does.
+    """Return the measures of a run as a table, as `smarticles measure` does.
 
     Args:
-        frames: one row per frame; else one per phase, means over its last frames with their standard errors.
+        run: run, or its directory.
+        frames: return one row per frame.
+
+    Returns:
+        One row per phase, with means over its last frames and their standard errors, or one row per frame. Column
+        names contain the units.
 
     Raises:
-        InputError: it is no run, or has no frames yet.
+        InputError: the directory is not a run directory, or the run has no frames yet.
     """
     return measured([run.path if isinstance(run, Run) else Path(run)], frames=frames)
 
 
 def read_sweep(directory: Path | str) -> SweepDirectory:
-    """Open a sweep's or a study's directory, its runs done or not.
+    """Open the directory of a sweep or a study, whose runs need not be finished.
 
     Raises:
-        InputError: it is none.
+        InputError: the directory is not the directory of a sweep.
     """
     return SweepDirectory(open_folder(Path(directory)))
 
@@ -143,25 +156,28 @@ def sweep(
     vary: Mapping[str, Sequence[Any]] | None = None,
     jobs: int | None = None,
 ) -> SweepDirectory:
-    """Run many scenes into one directory on this machine, or what is missing of them.
+    """Compute the missing runs of a sweep on this machine.
 
     Args:
-        what: a sweep file; or, with `vary`, a scene or the file of one.
-        out: the sweep's directory; taken up where it holds this sweep already.
-        vary: keys of the scene, dots for nesting, and the values that each takes: every combination is run. The last
-            word of a key is the variable's name: {"smarticle.aspect_ratio": [0.4, 0.7], "seed": [1, 2, 3]} gives
-            columns `aspect_ratio` and `seed`.
-        jobs: runs at once; by default one per core.
+        what: path of a sweep file; with `vary` a scene or the path of a scene file.
+        out: directory of the sweep; may hold an unfinished part of this sweep.
+        vary: values by key of the scene, with dots for nested keys. All combinations are run. The last word of a key is
+            the name of the variable: {"smarticle.aspect_ratio": [0.4, 0.7], "seed": [1, 2, 3]} has the variables
+            `aspect_ratio` and `seed`.
+        jobs: number of simultaneous runs; None: one per core.
+
+    Returns:
+        The finished sweep.
 
     Raises:
-        InputError: a scene or the sweep is not valid, or the directory holds something else.
+        InputError: a scene or the sweep is not valid, or the directory contains other files.
         RunError: a run failed.
     """
     with tempfile.TemporaryDirectory(prefix="smarticles-") as scratch:
         if vary is None and isinstance(what, Scene):
             raise InputError("vary: is missing; give the keys of the scene that change, e.g. vary={'seed': [1, 2, 3]}")
         file = write_sweep(what, vary, Path(scratch)) if vary is not None else Path(str(what))
-        # The scenes of a sweep without a file are in its directory, and `resume` needs no more.
+        # Without a sweep file, `resume` continues from the scenes in the directory.
         words = ["sweep", str(file), "--out", str(out), "--submit", "local"] if vary is None else ["resume", str(out)]
         again = shlex.join(["smarticles", *words])
         folder = make_folder(file, Path(out), again)
@@ -169,25 +185,32 @@ def sweep(
     return SweepDirectory(folder)
 
 
-# -- a scene and the keys of it that vary, as the sweep file and template that they stand for --------------------------
+# -- sweep file and template for `vary` ------------------------------------------------------------------------------
 
 
 def write_sweep(scene: Scene | Path | str, vary: Mapping[str, Sequence[Any]], folder: Path) -> Path:
-    """Write `sweep.yaml` and `scene.yaml.j2` for all combinations of `vary`; return the former.
+    """Write the sweep file `sweep.yaml` and its template `scene.yaml.j2` for all combinations of `vary`.
+
+    Args:
+        scene: scene, or path of a scene file.
+        vary: values by key of the scene, see `sweep`.
+        folder: existing folder for both files.
+
+    Returns:
+        The path of the sweep file.
 
     Raises:
-        InputError: the scene cannot be read, has no such place or holds marks of a template, or there is nothing to
-            vary.
+        InputError: the scene cannot be read or contains template syntax, a key does not exist, or `vary` is empty.
     """
     if not vary:
         raise InputError("vary: is empty; give a key of the scene and its values, e.g. {'seed': [1, 2, 3]}")
-    data = _plain(scene) if isinstance(scene, Scene) else _read(Path(scene))
+    data = _explicit_keys(scene) if isinstance(scene, Scene) else _read_scene_file(Path(scene))
     text = yaml.safe_dump(data, sort_keys=False, allow_unicode=True)
     for mark in ("{{", "{%", "{#"):
         if mark in text:
             name = "scene" if isinstance(scene, Scene) else scene
-            raise InputError(f"{name}: holds {mark!r}, which a template would take for its own; write it without")
-    # The last word of a key names its variable, or all of its words where another key ends alike.
+            raise InputError(f"{name}: contains {mark!r}, which is template syntax; remove it")
+    # A variable is named by the last word of its key, or by all words if two keys end alike.
     last = [key.rpartition(".")[2] for key in vary]
     names = {
         key: word if last.count(word) == 1 and not word.isdigit() else key.replace(".", "_")
@@ -213,8 +236,8 @@ def write_sweep(scene: Scene | Path | str, vary: Mapping[str, Sequence[Any]], fo
     return file
 
 
-def _plain(scene: Scene) -> dict[str, Any]:
-    """Return the keys that were set, without those which follow from others and may follow differently in a run."""
+def _explicit_keys(scene: Scene) -> dict[str, Any]:
+    """Return the keys that were set explicitly; derived keys are left out, since they depend on the varied keys."""
     data = scene.model_dump(mode="json", exclude_unset=True)
     if "fidelity" in data:
         named = fidelities(scene.engine)[scene.fidelity.base]
@@ -223,7 +246,8 @@ def _plain(scene: Scene) -> dict[str, Any]:
     return {"schema_version": SCHEMA_VERSION, **data}
 
 
-def _read(path: Path) -> dict[str, Any]:
+def _read_scene_file(path: Path) -> dict[str, Any]:
+    """Return the content of a scene file, with absolute paths of runs to take over."""
     try:
         data = load_yaml(path.read_text(encoding="utf-8"))
     except (OSError, ValueError, yaml.YAMLError) as error:
@@ -232,7 +256,7 @@ def _read(path: Path) -> dict[str, Any]:
     if not isinstance(data, dict):
         raise InputError(f"{path}: a scene is a mapping of keys to values, got {type(data).__name__}")
     for phase in data["phases"] if isinstance(data.get("phases"), list) else ():
-        # Relative to the scene file; the template lies elsewhere.
+        # `run` is relative to the scene file, and the template is in another folder.
         if isinstance(phase, dict) and isinstance(phase.get("run"), str):
             phase["run"] = str((path.parent / phase["run"]).resolve())
     return data

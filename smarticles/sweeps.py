@@ -1,4 +1,4 @@
-"""Directories of sweeps as commands take them: made or taken up, computed here, or given to a batch system."""
+"""Create or continue directories of sweeps; compute their runs on this machine or submit them to Slurm."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING
 
 from dem.errors import InputError, RunError
-from smarticles.command_line import Parser, add_ranks, positive_int
+from smarticles.command_line import Parser, add_options, positive_int
 
 if TYPE_CHECKING:
     from dem.scene.scene import Scene
@@ -24,7 +24,16 @@ if TYPE_CHECKING:
 
 
 def make_folder(file: Path, out: Path, command: str) -> Folder:
-    """Expand a sweep file into its directory, or take up the directory that holds it already."""
+    """Write the scenes of a sweep file to a directory, which may contain this sweep already; return the directory.
+
+    Args:
+        file: sweep file.
+        out: directory of the sweep.
+        command: command line to record in the manifest.
+
+    Raises:
+        InputError: the sweep is not valid, or the directory contains something else.
+    """
     from templates.sweep.expand import expand  # noqa: PLC0415
 
     sweep = changed_sweep(file)
@@ -32,7 +41,7 @@ def make_folder(file: Path, out: Path, command: str) -> Folder:
 
 
 def changed_sweep(file: Path, constants: Mapping[str, str] = MappingProxyType({}), engine: str | None = None) -> Sweep:
-    """Read a sweep file; replace some of its constants, and the engine of all its runs."""
+    """Read a sweep file, and replace some constants and, if given, the engine of all runs."""
     from templates.sweep.sweep_file import load_sweep, on_engine, with_constants  # noqa: PLC0415
 
     sweep = with_constants(load_sweep(file), constants)
@@ -40,10 +49,10 @@ def changed_sweep(file: Path, constants: Mapping[str, str] = MappingProxyType({}
 
 
 def folder_of(sweep: Sweep, points: Sequence[Point], out: Path, command: str, *, extend: bool = False) -> Folder:
-    """Make or take up the directory of an expanded sweep, see `templates.sweep.folder.create_folder`."""
+    """Create or open the directory of an expanded sweep, see `templates.sweep.folder.create_folder`."""
     from templates.sweep.folder import create_folder  # noqa: PLC0415
 
-    # Versions of what expands a sweep; each run records those of what computes it.
+    # Versions of the packages that expand a sweep; each run records the versions of its engine.
     packages = ("smarticles", "jinja2", "pydantic", "pyyaml")
     versions = {"python": platform.python_version(), **{name: version(name) for name in packages}}
     return create_folder(
@@ -52,7 +61,7 @@ def folder_of(sweep: Sweep, points: Sequence[Point], out: Path, command: str, *,
 
 
 def expected_wall_s(scene: Scene) -> float:
-    """Return the expected wall time of a scene [s], on a machine like the one the costs were measured on."""
+    """Return the expected wall time of a scene [s] on one core of the machine that costs were measured on."""
     from dem.plan.outlook import plan  # noqa: PLC0415
 
     return plan(scene).wall_s
@@ -62,11 +71,19 @@ def expected_wall_s(scene: Scene) -> float:
 
 
 def compute(folder: Folder, *, jobs: int | None, command: str) -> list[Outcome]:
-    """Run what a sweep is missing, `jobs` runs at once; `command` goes on after Ctrl-C.
+    """Compute the missing runs of a sweep on this machine.
+
+    Args:
+        folder: directory of the sweep.
+        jobs: number of simultaneous runs; None: one per core.
+        command: command line that continues the sweep, for the message after Ctrl-C.
+
+    Returns:
+        One outcome per run.
 
     Raises:
-        InputError: runs of the sweep are in a queue.
-        KeyboardInterrupt: Ctrl-C; the message says how to go on.
+        InputError: runs of the sweep are in Slurm's queue.
+        KeyboardInterrupt: Ctrl-C was pressed; the message contains `command`.
     """
     from rich.console import Console  # noqa: PLC0415
 
@@ -77,11 +94,11 @@ def compute(folder: Folder, *, jobs: int | None, command: str) -> list[Outcome]:
     try:
         return run_folder(folder, Display(Console(stderr=True)), slots=jobs)
     except KeyboardInterrupt:
-        raise KeyboardInterrupt(f"finished runs are kept; go on with: {command}") from None
+        raise KeyboardInterrupt(f"finished runs are kept; continue with: {command}") from None
 
 
 def raise_failures(folder: Folder, outcomes: Sequence[Outcome]) -> None:
-    """Raise if runs are missing."""
+    """Raise RunError if any outcome is not a finished run; the message lists these runs and the causes."""
     failed = [outcome for outcome in outcomes if outcome.missing]
     if failed:
         causes = "; ".join(f"{outcome.name}: {outcome.cause}" for outcome in failed)
@@ -92,7 +109,7 @@ def raise_failures(folder: Folder, outcomes: Sequence[Outcome]) -> None:
 
 
 def complete_here(folder: Folder, arguments: argparse.Namespace) -> int:
-    """Run what a sweep is missing, for a command with --jobs, and print what comes next."""
+    """Compute the missing runs of a sweep on this machine, and print the next command; return the exit status."""
     raise_failures(folder, compute(folder, jobs=arguments.jobs, command=arguments.command_line))
     print(f"{folder.path}: all {len(folder.entries)} runs are done; next: smarticles measure {folder.path}")
     return 0
@@ -101,39 +118,41 @@ def complete_here(folder: Folder, arguments: argparse.Namespace) -> int:
 # -- on a cluster ------------------------------------------------------------------------------------------------------
 
 CLUSTER_HELP = """
-With --submit slurm the runs become one array job: each task computes several runs at once, one core
-each, and gets a signal before its time limit; its runs then end at a checkpoint and the task
-queues itself again. --submit none with --cluster writes the same scripts, for sbatch by hand. A
-cluster is known by name or described in a TOML file of yours; what it cannot give is rejected before
-anything is written."""
+With --submit slurm the runs become one array job. Each task computes several runs at once, one core
+each. Before the time limit Slurm sends a signal; the runs then stop at a checkpoint, and the task
+queues itself again. --submit none with --cluster writes the job script without submitting it. A
+cluster is a name that the program knows, or a TOML file. A request that exceeds the limits of the
+cluster is rejected before anything is written."""
 
 _OPTIONS = ("cluster", "partition", "account", "time", "runs_per_task", "memory", "ranks")
 
 
 def add_cluster_options(parser: Parser) -> None:
-    """Add --cluster and what can be asked of one."""
-    group = parser.add_argument_group("for a cluster")
-    group.add_argument("--cluster", metavar="NAME|FILE.toml", help="the cluster; needed for --submit slurm")
+    """Add --cluster and the options for the resources of its jobs."""
+    group = parser.add_argument_group("options for clusters")
+    group.add_argument(
+        "--cluster", metavar="NAME|FILE.toml", help="name or description of the cluster; needed for --submit slurm"
+    )
     group.add_argument("--partition", metavar="NAME", help="default: the cluster's default partition")
-    group.add_argument("--account", metavar="NAME", help="default: that of the cluster's file")
-    group.add_argument(
-        "--time", metavar="D-HH:MM:SS", help="wall time of a task; default: three times what is expected"
+    group.add_argument("--account", metavar="NAME", help="default: the account in the cluster's file")
+    add_options(
+        group, "--time", type=str, metavar="D-HH:MM:SS", help="wall time of a task; default: 3 times the expected time"
     )
-    group.add_argument(
-        "--runs-per-task",
-        type=positive_int,
-        metavar="K",
-        help="runs side by side in one task, one core each; default: a full node",
-    )
+    runs_help = "simultaneous runs of one task, one core each; default: all cores of a node"
+    group.add_argument("--runs-per-task", type=positive_int, metavar="K", help=runs_help)
     group.add_argument("--memory", type=positive_int, metavar="MIB", help="memory per run [MiB]; default: 1024")
-    add_ranks(group, "1, or what a run to be resumed began with")
+    add_options(group, "--ranks")
 
 
-def wants_queue(arguments: argparse.Namespace, *, one_run: bool = False) -> bool:
-    """Return whether the runs are for a cluster; one run may have ranks here too.
+def is_for_cluster(arguments: argparse.Namespace, *, allow_ranks: bool = False) -> bool:
+    """Return whether the options request a job on a cluster.
+
+    Args:
+        arguments: parsed command line with --submit and the options of `add_cluster_options`.
+        allow_ranks: accept --ranks without a cluster, for a single run on this machine.
 
     Raises:
-        InputError: an option for a cluster is given although they are not, or there is no Slurm here to submit to.
+        InputError: an option for clusters is given without a cluster, or Slurm is not installed here.
     """
     from templates.slurm.submission import require_sbatch  # noqa: PLC0415
 
@@ -142,25 +161,25 @@ def wants_queue(arguments: argparse.Namespace, *, one_run: bool = False) -> bool
             require_sbatch()
         return True
     for name in _OPTIONS:
-        if getattr(arguments, name) is not None and not (one_run and name == "ranks"):
+        if getattr(arguments, name) is not None and not (allow_ranks and name == "ranks"):
             option = f"--{name.replace('_', '-')}"
             raise InputError(f"{option}: is for a cluster; give --submit slurm, or --submit none with --cluster NAME")
     return False
 
 
 def draft_of(path: Path, name: str, entries: Sequence[Entry], arguments: argparse.Namespace) -> Draft:
-    """Render a submission of some runs as a command asks for it, see `templates.slurm.submission.draft`."""
+    """Render the job of some runs by the cluster options of a command, see `templates.slurm.submission.draft`."""
     from templates.slurm.cluster import shipped_clusters  # noqa: PLC0415
     from templates.slurm.job import Wishes  # noqa: PLC0415
     from templates.slurm.submission import draft, submissions  # noqa: PLC0415
 
     reference = arguments.cluster
     if reference is None:
-        before = submissions(path)
-        if not before:
-            msg = f"--cluster: is missing; known: {', '.join(shipped_clusters())}; or a file of your own, FILE.toml"
+        earlier = submissions(path)
+        if not earlier:
+            msg = f"--cluster: is missing; known: {', '.join(shipped_clusters())}; or a file FILE.toml"
             raise InputError(msg)
-        reference = before[-1].cluster
+        reference = earlier[-1].cluster
     wishes = Wishes(
         partition=arguments.partition,
         account=arguments.account,
@@ -173,28 +192,31 @@ def draft_of(path: Path, name: str, entries: Sequence[Entry], arguments: argpars
 
 
 def enqueue(folder: Folder, arguments: argparse.Namespace) -> int:
-    """Write, and submit if asked to, what a sweep is missing and no queue holds.
+    """Write a job for the missing runs of a sweep that are not in the queue, and submit the job with --submit slurm.
+
+    Returns:
+        The exit status, 0.
 
     Raises:
-        InputError: unknown cluster, a request beyond its limits, or another process works on the sweep.
-        RunError: the queue cannot be asked or rejects the job.
+        InputError: unknown cluster, a request beyond its limits, or another process computes the sweep.
+        RunError: Slurm does not answer or rejects the job.
     """
     from templates.slurm.submission import submissions, submit, tasks_of_runs, to_submit, write  # noqa: PLC0415
 
-    place = shlex.quote(str(folder.path))
+    quoted = shlex.quote(str(folder.path))
     with folder.lock():
         entries = to_submit(folder, tasks_of_runs(submissions(folder.path)))
         if not entries:
             done = sum(folder.is_done(entry) for entry in folder.entries)
-            rest = len(folder.entries) - done
-            print(f"{folder.path}: nothing to submit: {done} runs are done, {rest} in the queue")
+            queued = len(folder.entries) - done
+            print(f"{folder.path}: nothing to submit: {done} runs are done, {queued} in the queue")
             return 0
         draft = draft_of(folder.path, folder.name, entries, arguments)
         written = write(folder, draft)
         what = f"{len(entries)} of {len(folder.entries)} runs, {draft.request.to_text()}"
         if arguments.submit == "none":
-            print(f"{written}: {what}; submit them: cd {place} && sbatch {draft.submission.script}")
+            print(f"{written}: {what}; submit them: cd {quoted} && sbatch {draft.submission.script}")
             return 0
         submission = submit(folder, draft)
-    print(f"{folder.path}: job {submission.job_id}: {what}; follow it: smarticles status {place}")
+    print(f"{folder.path}: job {submission.job_id}: {what}; check it with: smarticles status {quoted}")
     return 0

@@ -1,6 +1,10 @@
-"""Validation against theory and on hard cases; pytest suites beside the installed packages.
+"""Validation against theory and on difficult cases, as pytest suites; not part of the installed packages.
 
-`known`: simulations whose answer is on paper, and convergence orders. `hard`: cases that must end well, or with an
-error that names the cause; kills and resumes; onset of instability. `extremes`: random extreme scenes, and a checker
-that shares no code with the engines. `access`: an engine's internals. `--results DIR` writes the measured tables.
+- `known`: simulations with analytic or independently integrated answers, and convergence orders.
+- `hard`: difficult scenes, which must finish or stop with an error that names the cause; runs that are killed and
+  resumed; time steps at which instability begins.
+- `extremes`: random extreme scenes, and a checker that shares no code with the engines.
+- `access`: test access to the internals of engines.
+
+`--results DIR` writes the measured tables.
 """

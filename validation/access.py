@@ -1,7 +1,7 @@
-"""Test access to the engines' internals: what a case needs beyond a run, such as pushing or holding a body.
+"""Test access to the internals of engines, for example to set velocities or to hold a body.
 
-Velocities belong to the half step before the positions (leapfrog) on both engines: a body that is to have v at t = 0
-under an acceleration a is pushed to v − a dt/2.
+Both engines use the leapfrog scheme, whose velocities belong to the half step before the positions. For a velocity v at
+t = 0 under an acceleration a, set the velocity v − a dt/2.
 """
 
 from __future__ import annotations
@@ -37,13 +37,13 @@ Array = NDArray[np.float64]
 
 ENGINES = ("yade", "links")
 
-# The ball of all cases: steel. The stiffness is that of the fidelities `standard` and `reference`.
+# Steel ball of all cases; contact stiffness of the fidelities `standard` and `reference`.
 BALL_RADIUS, BALL_MASS = 2e-3, 2.6e-4  # m, kg
 STIFFNESS = 500.0  # N/m
 
 
 class _Access:
-    """What both engines share; no state, so that it can be sent to another process."""
+    """Test access that both engines share; without state, so that it can be sent to another process."""
 
     engine: ClassVar[type[Any]]
 
@@ -57,25 +57,34 @@ class _Access:
         height: float = 0.2,
         **motors: Any,
     ) -> Engine:
-        """Build an engine with a floor at z = 0 and a wall far away."""
+        """Build an engine with a floor at z = 0 and a wall of radius 0.5 m, which no body reaches.
+
+        Args:
+            particle: geometry of all smarticles.
+            law: contact law.
+            dt: time step [s].
+            gravity: [m/s²].
+            height: of the wall [m].
+            motors: arguments of the engine for motors, see `motors_of`.
+        """
         cylinder = Cylinder(radius=0.5, height=height, facets=16)
         keys = {"particle": particle, "cylinder": cylinder, "law": law, "gravity": gravity, "time_step": dt}
         engine: Engine = self.engine(**keys, shaken=False, **motors)
         return engine
 
     def motors_of(self, scene: Scene) -> dict[str, Any]:
-        """Return the arguments of the engine for the motors of a scene."""
+        """Return the keyword arguments with which the engine's constructor gets the motors of a scene."""
         raise NotImplementedError
 
     def build_hinged(self, scene: Scene, *, gravity: float, dt: float | None = None) -> Engine:
-        """Build the engine for articulated smarticles of a scene, by default at its time step."""
+        """Build an engine for articulated smarticles of a scene; `dt` [s] is by default the scene's time step."""
         law, dt = contact_law_of(scene), dt or time_step(scene)
         height, motors = scene.cylinder.height, self.motors_of(scene)
         return self.build(scene.particle, law, dt=dt, gravity=gravity, height=height, **motors)
 
 
 def _bar(length: float, thickness: float, radius: float, kind: type[Particle] = Particle) -> Particle:
-    """Return a box without barbs, of the ball's mass [m]."""
+    """Return a smarticle without barbs, with the mass of the ball; all lengths in [m]."""
     boxes = Boxes(
         middle_length=length,
         barb_length=0.0,
@@ -87,7 +96,7 @@ def _bar(length: float, thickness: float, radius: float, kind: type[Particle] = 
 
 
 def _spoilt_place(engine: Engine, what: str, place: Iterable[float]) -> tuple[float, float, float]:
-    """Return where a spoilt body at (x, y, z) is put [m]."""
+    """Return the position [m] to which `LinksAccess.spoil` moves a body from `place` (3,) [m]."""
     (x, y, z), reach, radius = place, engine.particle.reach, engine.particle.radius
     return {
         "position": (x, y, math.nan),
@@ -101,23 +110,23 @@ def _spoilt_place(engine: Engine, what: str, place: Iterable[float]) -> tuple[fl
 
 # -- links -------------------------------------------------------------------------------------------------------------
 
-HEAVY = 1e9  # a held middle link weighs this many times as much
-# Transverse moments of inertia of the stub that stands for a ball: so large, about 3000 m r², that it does not turn
-# while it touches the floor, or its end would not stay its lowest point.
+HEAVY = 1e9  # factor by which `hold` increases the mass of the middle link
+# The stub that represents a ball has large transverse moments of inertia, about 3000 m r², so that it does not turn
+# during a contact and its end remains the lowest point.
 STUB_THICKNESS = 200 * BALL_RADIUS
-POINTS = 400  # that stand for a link
+POINTS = 400  # spheres that represent a link in `swept`
 
 
 class Pushed(LinksEngine):
-    """The links engine under forces that no run has."""
+    """Links engine with additional external forces on links."""
 
     def __init__(self, **keys: Any) -> None:
         super().__init__(**keys)
-        self.forces: dict[tuple[int, int], Array] = {}  #: On the centre of a link, by smarticle and link [N]
-        self.grown = (0.0, 0.0)  #: When forces begin to grow, and how long they do [s]
+        self.forces: dict[tuple[int, int], Array] = {}  #: Force [N] on the centre of a link, by (smarticle, link)
+        self.grown = (0.0, 0.0)  #: Start and duration of the linear rise of all forces [s]
 
     def advance(self, steps: int) -> None:
-        """Advance; forces are applied step by step."""
+        """Advance by a number of steps, and apply the forces before each step."""
         if not self.forces:
             super().advance(steps)
             return
@@ -126,6 +135,7 @@ class Pushed(LinksEngine):
             super().advance(1)
 
     def _kick(self) -> None:
+        """Add the impulse of the forces over one time step to the momenta."""
         world, dt = self._world, self.time_step
         bodies, shape, motors = world.posed(), world.shape, world.motors
         share = shape.barb_mass / shape.mass
@@ -134,7 +144,7 @@ class Pushed(LinksEngine):
         for (k, link), full in self.forces.items():
             force = part * full
             row, axes = bodies.plane[k], bodies.axes[k]
-            # About the centre of mass, in the middle link's axes.
+            # Centre of the link relative to the centre of mass, in the axes of the middle link.
             centre = np.array([*((row[2:4], -row[0:2], row[4:6])[link]), 0.0])
             local = axes.T @ force
             bodies.velocity[k] += dt * force / shape.mass
@@ -156,28 +166,28 @@ class LinksAccess(_Access):
     name = "links"
     engine = Pushed
     ball_turn = Rotation.from_euler("y", -90, degrees=True)
-    """How `ball` is held so that one point is lowest, and meets another one end to end along z."""
+    """Rotation of `ball` with which a single point is lowest, and two balls along z touch at their ends."""
     arm_share = 0.5
-    """Where in an overlap with the floor its force acts [1]: 0 at the surface of the body, 1 at the floor."""
-    spring_shafts: ClassVar[dict[str, Any]] = {"law": "slip"}  # shafts of motors that halt are rigid
-    """Keys of `motor` in a scene file whose motors have springs for shafts."""
+    """Point of action of the floor's force within the overlap [1]: 0 at the surface of the body, 1 at the floor."""
+    spring_shafts: ClassVar[dict[str, Any]] = {"law": "slip"}  # with law `halt` shafts are rigid
+    """Keys of `motor` in a scene with which shafts are springs."""
 
     def motors_of(self, scene: Scene) -> dict[str, Any]:
         return {"motor_law": motor_law_of(scene)}
 
     def ball(self) -> Particle:
-        """Return what meets the floor like a ball of BALL_MASS, at the lever BALL_RADIUS, at `ball_turn`."""
-        # Links are no balls; an upright stub meets things with its round end.
+        """Return a particle that, rotated by `ball_turn`, hits the floor like a ball of BALL_RADIUS and BALL_MASS."""
+        # The engine has no balls: an upright stub touches the floor with its round end.
         return _bar(2 * BALL_RADIUS, STUB_THICKNESS, BALL_RADIUS / 2)
 
     def roller(self) -> Particle:
-        """Return what rolls along y like a solid ball of BALL_RADIUS and BALL_MASS, not turned."""
-        # A bar that lies across its way, with the ball's moment about its axis, I = m t²/6.
+        """Return a particle that, without rotation, rolls along y like a solid ball of BALL_RADIUS and BALL_MASS."""
+        # A bar across the direction of motion, with the moment of the ball about its axis, I = m t²/6.
         return _bar(5 * BALL_RADIUS, BALL_RADIUS * math.sqrt(12 / 5), BALL_RADIUS)
 
     def ends(self, particle: Particle) -> Array:
-        """Return centres of all spheres that the floor may touch, (n, 3) [m], body frame."""
-        # Ends of links, hinges once.
+        """Return the centres of the spheres that can touch the floor, (n, 3) [m], body frame."""
+        # Ends of links; each hinge once.
         shape, boxes = shape_of(particle), particle.boxes
         places = [np.array([side * shape.end, 0.0, 0.0]) for side in (-1, 1)]
         for link, side in ((0, -1), (2, 1)):
@@ -186,7 +196,7 @@ class LinksAccess(_Access):
         return boxes.to_body(np.array([place + np.array([0.0, 0.0, z]) for place in places for z in shape.offsets]))
 
     def swept(self, particle: Particle) -> Array:
-        """Return centres of spheres that stand for the whole smarticle, (n, 3) [m], body frame."""
+        """Return the centres of spheres that cover the smarticle, (n, 3) [m], body frame."""
         shape, boxes, found = shape_of(particle), particle.boxes, []
         starts = {0: -shape.half, 1: -shape.end, 2: shape.half}
         for link in shape.kinds:
@@ -196,11 +206,11 @@ class LinksAccess(_Access):
         return boxes.to_body(np.concatenate(found))
 
     def pin_stiffness(self, scene: Scene) -> float:
-        """Return the stiffness of a hinge against parting [N/m]; inf where it cannot part."""
+        """Return force over gap of a hinge [N/m]; inf if hinges cannot open."""
         return math.inf
 
     def push(self, engine: Engine, k: int, velocity: ArrayLike = (0, 0, 0), spin: ArrayLike = (0, 0, 0)) -> None:
-        """Give a welded smarticle a velocity [m/s] and a spin [rad/s]."""
+        """Set the velocity [m/s] and the angular velocity [rad/s] of a welded smarticle, (3,) each."""
         bodies = _links(engine)._world.posed()
         row, axes = bodies.plane[k], bodies.axes[k]
         inertia = np.array([[row[14], row[17], 0.0], [row[17], row[15], 0.0], [0.0, 0.0, row[16]]])
@@ -208,13 +218,13 @@ class LinksAccess(_Access):
         bodies.momentum[k] = axes @ inertia @ axes.T @ np.asarray(spin, float)
 
     def force(self, engine: Engine, k: int, link: int, force: ArrayLike) -> None:
-        """Let a force [N] act on the centre of a link from now on."""
+        """Apply a constant force (3,) [N] to the centre of a link from the next step on."""
         assert isinstance(engine, Pushed)
         engine.forces[k, link] = np.asarray(force, float)
 
     def hold(self, engine: Engine) -> None:
-        """Hold the middle link of smarticle 0, articulated and at rest, where it is."""
-        # It becomes too heavy to move, and a force bears its weight.
+        """Fix the middle link of smarticle 0, which must be articulated and at rest."""
+        # The link becomes too heavy to move, and an external force carries its weight.
         own = _links(engine)
         world, shape = own._world, own._world.shape
         middle = own.state().link_positions[0, 1].copy()
@@ -228,9 +238,12 @@ class LinksAccess(_Access):
             self.force(own, 0, 1, (0.0, 0.0, world.shape.mass * own.gravity))
 
     def swing(self, engine: Engine, links: Iterable[tuple[float, float, float]]) -> None:
-        """Set the links of smarticle 0, articulated and not turned, in motion in their plane, as the hinges allow.
+        """Set velocities in the plane for smarticle 0, which must be articulated and unrotated.
 
-        Velocities along x and y [m/s] and spin about z [rad/s] are those of barb 1, middle link, barb 2.
+        Args:
+            engine: the engine.
+            links: velocity along x and y [m/s] and angular velocity about z [rad/s] of barb 1, middle link and barb 2;
+                they must be consistent with the hinges.
         """
         world = _links(engine)._world
         motors, (first, middle, second) = world.motors, np.array(list(links))
@@ -245,19 +258,19 @@ class LinksAccess(_Access):
         motors.momentum[0] = row[18:20] * middle[2] + np.array([[row[20], row[21]], [row[21], row[20]]]) @ rates
 
     def burden(self, engine: Engine, k: int, ratio: float, *, rise: float) -> None:
-        """Make a smarticle `ratio` times as heavy; where its inertia stays, the weight grows within `rise` [s]."""
-        # All smarticles share one mass, so that the weight alone becomes larger.
+        """Multiply the weight of smarticle `k` by `ratio`; on links the weight grows within the time `rise` [s]."""
+        # All smarticles on links have one mass, so that an external force is added.
         own = _links(engine)
         if not isinstance(own, Pushed):
             own.__class__ = Pushed  # a run's engine, built by its kind
         assert isinstance(own, Pushed)
-        # A force on the middle link would turn it: each link gets its own.
+        # One force per link: a force on the middle link alone would turn the smarticle.
         weights = -(ratio - 1) * own.gravity * own.particle.boxes.link_masses
         own.forces = {(k, link): np.array([0.0, 0.0, weights[link]]) for link in range(3)}
         own.grown = own.time, rise
 
     def floor_force(self, engine: Engine) -> Array:
-        """Return the force of the smarticles on floor and wall in the last step, (3,) [N]."""
+        """Return the force of all smarticles on floor and wall in the last step, (3,) [N]."""
         force = _links(engine)._world.ground.force
         return np.asarray(force[FLOOR] + force[WALL])
 
@@ -268,7 +281,7 @@ class LinksAccess(_Access):
         return np.array(readings.torques[0])
 
     def spoil(self, engine: Engine, what: str) -> None:
-        """Spoil the second smarticle, or its last link: see `validation.hard.broken`."""
+        """Set an invalid state for the second smarticle, or its last link; `what`: a key of `hard.broken.SPOILT`."""
         bodies = _links(engine)._world.bodies
         if what == "velocity":
             bodies.velocity[1, 1] = math.nan
@@ -280,7 +293,7 @@ class LinksAccess(_Access):
             bodies.position[1] = _spoilt_place(engine, what, bodies.position[1])
 
     def heat(self, engine: Engine, share: float) -> None:
-        """Let all dashpots drive by a share [1] of what they damped."""
+        """Multiply the damping coefficients of all normal dashpots by −`share`, so that dashpots supply energy."""
         world = _links(engine)._world
         world.laws = tuple(law._replace(damping=-share * law.damping, shear_damping=0.0) for law in world.laws)
 
@@ -295,10 +308,10 @@ def _links(engine: Engine) -> LinksEngine:
 
 @dataclass(frozen=True)
 class Ball(Particle):
-    """A particle of one sphere."""
+    """Particle of one sphere."""
 
     def __post_init__(self) -> None:
-        """Check nothing: no link exists that the sphere must fit."""
+        """Skip the checks of `Particle`, which compare spheres with links."""
 
     @cached_property
     def _layout(self) -> tuple[Array, NDArray[np.int64]]:
@@ -306,7 +319,7 @@ class Ball(Particle):
 
 
 class YadeAccess(_Access):
-    """Test access to YADE, through its bodies; `LinksAccess` describes the methods."""
+    """Test access to YADE, through its bodies; `LinksAccess` documents the methods."""
 
     name = "yade"
     engine = YadeEngine
@@ -341,9 +354,9 @@ class YadeAccess(_Access):
         state = own.state()
         rotation = state.link_rotations[k, 1] @ state.boxes.link_rotations[1].T
         clump.vel, clump.angVel = vector(*v), vector(*w)
-        # What YADE integrates.
+        # YADE integrates the angular momentum.
         clump.angMom = vector(*(rotation @ np.diag(own.particle.boxes.inertia) @ rotation.T @ w))
-        # What contact laws read in the first step.
+        # Contact laws read the velocities of the spheres in the first step.
         for sphere in own._assembly._spheres[k]:
             member = bodies[sphere].state
             member.vel = vector(*(v + np.cross(w, np.array(member.pos) - np.array(clump.pos))))
@@ -402,7 +415,7 @@ def _yade(engine: Engine) -> YadeEngine:
 
 
 def bodies_of(engine: Engine) -> list[Any]:
-    """Return the states of YADE's rigid bodies: one per smarticle, or three."""
+    """Return the states of YADE's rigid bodies: one per welded smarticle, three per articulated one."""
     own = _yade(engine)
     return [own._omega.bodies[body].state for body in own._assembly.bodies]
 
@@ -411,5 +424,5 @@ EngineAccess = LinksAccess | YadeAccess
 
 
 def engine_access(engine: str) -> EngineAccess:
-    """Return test access to an engine, by its name."""
+    """Return the test access to an engine, by the engine's name."""
     return YadeAccess() if engine == "yade" else LinksAccess()

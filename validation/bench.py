@@ -1,7 +1,4 @@
-"""Scenes of few smarticles, engines as a run builds them, and what all cases share.
-
-SI throughout. Only `validation.access` reaches behind the engine's interface.
-"""
+"""Scenes, contact laws, engines and watchdogs for validation cases. All quantities are in SI units."""
 
 from __future__ import annotations
 
@@ -36,55 +33,62 @@ TILTED = Rotation.from_rotvec([0.4, 0.2, -0.7])
 UPRIGHT = Rotation.from_euler("y", -90, degrees=True)  # turns the body's x axis to the vertical
 
 RELAX = {"type": "relax", "duration_s": 0.05}
-REST = {"type": "relax", "duration_s": 0.3}  # long enough for what was moved just before to stand or fall
+REST = {"type": "relax", "duration_s": 0.3}  # long enough for a pile to come to rest after motion
 
-Targets = Callable[[float], ArrayLike]
+Targets = Callable[[float], ArrayLike]  # time [s] -> angles of all barbs [rad]
 
 
 # -- scenes ------------------------------------------------------------------------------------------------------------
 
 
 def scene_of(data: Mapping[str, Any]) -> Scene:
-    """Return a scene from plain data."""
+    """Check a scene given as a dictionary, and return it."""
     return parse_scene(data, source="case")
 
 
 def scene_data(access: EngineAccess, *phases: Mapping[str, Any], per_layer: int = 6, **keys: Any) -> dict[str, Any]:
-    """Return plain data of a scene that begins with a pour; by default six smarticles, draft."""
+    """Return a scene as a dictionary: a deposit, then the given phases; by default six smarticles, fidelity draft."""
     given = {"schema_version": 1, "engine": access.name, "name": "hard", "seed": 1, "count": 6, "fidelity": "draft"}
     return {**given, "phases": [{"type": "deposit", "per_layer": per_layer}, *phases], **keys}
 
 
 def scene(access: EngineAccess, *phases: Mapping[str, Any], **keys: Any) -> Scene:
-    """Return a scene of one smarticle, which rests after its pour unless other phases are given."""
+    """Return a scene of one smarticle: a deposit, then the given phases, by default a relax phase."""
     return scene_of(scene_data(access, *(phases or (RELAX,)), count=1, **keys))
 
 
 def shape_change(seconds: float = 1.5, hold: float = 0.0) -> dict[str, Any]:
-    """Return a phase that straightens within `seconds` [s], stays so, and bends back within as many."""
+    """Return a phase that straightens the barbs in `seconds` [s], waits `hold` [s], and bends them back."""
     return {"type": "shape-change", "opening_s": seconds, "straight_hold_s": hold, "closing_s": seconds}
 
 
 def turn(degrees: float, seconds: float) -> dict[str, Any]:
-    """Return a phase that turns both barbs to an angle [deg] within a time [s]."""
+    """Return a phase that turns both barbs to an angle `degrees` [deg] within `seconds` [s]."""
     return {"type": "actuate", "barbs": {"type": "ramp", "to_deg": degrees, "duration_s": seconds}}
 
 
 def swing(seconds: float) -> dict[str, Any]:
-    """Return a phase that swings both barbs by 10° to either side of 80°."""
+    """Return a phase that swings both barbs between 70° and 90° for `seconds` [s]."""
     barbs = {"type": "triangle", "centre_deg": 80, "amplitude_deg": 10, "speed_rad_per_s": 5}
     return {"type": "actuate", "barbs": barbs, "duration_s": seconds}
 
 
 def law_of(scene: Scene) -> ContactLaw:
-    """Return the contact law of a scene, which all engines share."""
+    """Return the contact law of a scene."""
     return contact_law(scene.particle, scene.contact, scene.fidelity.stiffness_N_per_m)
 
 
 def ball_law(
     *, restitution: float = 1.0, friction: float = 0.0, tangential: float = 0.82, dashpot: float = 0.9
 ) -> ContactLaw:
-    """Return the contact law that a scene would have, its dashpots sized for the ball's own mass."""
+    """Return a contact law for the ball, with dashpots that give the restitution at its mass.
+
+    Args:
+        restitution: coefficient of restitution [1].
+        friction: of smarticles and wall [1].
+        tangential: tangential over normal stiffness [1].
+        dashpot: tangential over normal damping [1].
+    """
     critical = 2 * damping_ratio(restitution) * math.sqrt(STIFFNESS * BALL_MASS)
     return ContactLaw(
         normal_stiffness=STIFFNESS,
@@ -101,18 +105,18 @@ def ball_law(
 
 
 def add(engine: Engine, position: ArrayLike, rotation: Rotation = FLAT) -> None:
-    """Add a body at rest."""
+    """Add one body at rest at a position (3,) [m]."""
     engine.add(Poses(np.array([position], dtype=float), (rotation,)))
 
 
 def body_rotations(state: State) -> Array:
-    """Return rotations of welded smarticles from body frame to laboratory frame, (N, 3, 3)."""
+    """Return the rotations of welded smarticles from body frame to laboratory frame, (N, 3, 3)."""
     rotations: Array = state.link_rotations[:, 1] @ state.boxes.link_rotations[1].T
     return rotations
 
 
 def advance_watched(engine: Engine, steps: int, each: Callable[[], None]) -> None:
-    """Advance, and call `each` after each step."""
+    """Advance by a number of steps, and call `each` after every step."""
     for _ in range(steps):
         engine.advance(1)
         each()
@@ -127,9 +131,18 @@ def drive(
     each: Callable[[], None] | None = None,
     interval: float | None = None,
 ) -> Iterator[float]:
-    """Let the motors follow `targets(t)` [rad] from now on; yield the time since then after each control period.
+    """Actuate the motors for a time, and yield after each control period.
 
-    `each` is called after each step; `interval` is the control period [s] where it is not the scene's.
+    Args:
+        engine: the engine.
+        scene: supplies the default control period.
+        duration: [s].
+        targets: angles of all barbs [rad] at a time since the start [s].
+        each: function to call after every step.
+        interval: control period [s]; None: the control period of the scene.
+
+    Yields:
+        Time since the start [s].
     """
     interval = interval or scene.fidelity.control_interval_s
     steps = round(interval / engine.time_step)
@@ -143,7 +156,13 @@ def drive(
 
 
 def watched(data: dict[str, Any], out: Path | str, *, dt: float | None = None) -> tuple[Scene, Engine, Recorder]:
-    """Build engine and recorder, watchdog included, as a run does; `dt` [s] may be above the stable step."""
+    """Build scene, engine and recorder with watchdog as a run does.
+
+    Args:
+        data: scene as a dictionary.
+        out: run directory.
+        dt: time step [s], which may exceed the stable step; None: the time step of the scene.
+    """
     scene = scene_of(data)
     Path(out).mkdir(parents=True, exist_ok=True)
     engine = engine_kind(scene.engine).build(scene, time_step(scene) if dt is None else dt)
@@ -152,7 +171,7 @@ def watched(data: dict[str, Any], out: Path | str, *, dt: float | None = None) -
 
 
 def watchdog_error(engine: Engine, recorder: Recorder) -> str | None:
-    """Return the error of the recorder's next check, contacts included; None: it has none."""
+    """Let the recorder check the engine, contacts included; return the message of the error, or None."""
     recorder.watch_every = 1
     try:
         recorder.record(engine, 0)
@@ -162,16 +181,16 @@ def watchdog_error(engine: Engine, recorder: Recorder) -> str | None:
 
 
 def energy(engine: Engine) -> float:
-    """Return kinetic and potential energy, and that of the springs of all contacts [J]."""
+    """Return the sum of kinetic, potential and elastic contact energy [J]."""
     state = engine.state()
     return state.kinetic_energy + state.potential_energy(engine.gravity, 0.0) + engine.ledger.elastic()[0]
 
 
 def fastest(engine: Engine) -> float:
-    """Return the speed of the fastest link [m/s]."""
+    """Return the largest speed of a link [m/s]."""
     return float(np.linalg.norm(engine.state().link_velocities, axis=-1).max())
 
 
 def lying(scene: Scene) -> float:
-    """Return the height of the centre of mass of a smarticle that lies flat on the floor [m]."""
+    """Return the height of the centre of mass of a smarticle lying flat on the floor [m]."""
     return float(scene.particle.radius - scene.particle.centres[:, 2].min())

@@ -1,4 +1,7 @@
-"""Register cases: known answers, ladders over the time step, hard cases; and what they return."""
+"""Registries of validation cases, and the results that cases return.
+
+Known answers compare a simulation with theory, ladders measure errors over the time step, hard cases check limits.
+"""
 
 from __future__ import annotations
 
@@ -20,63 +23,63 @@ LEAPFROG = "leapfrog is of second order"
 
 @dataclass(frozen=True)
 class Answer:
-    """One quantity, measured and in theory."""
+    """Measured value of one quantity, compared with theory."""
 
     what: str  #: Quantity and unit, as in `speed [m/s]`
-    theory: float  #: The answer on paper [unit]
-    measured: float  #: What the engine gave [unit]
-    tolerance: float  #: Largest error that passes, relative to the scale [1]
-    reason: str = ""  #: Of the tolerance
-    scale: float = 0.0  #: What the error is relative to [unit]; 0: the theory itself
+    theory: float  #: Value by theory [unit]
+    measured: float  #: Value in the simulation [unit]
+    tolerance: float  #: Largest allowed error, relative to the scale [1]
+    reason: str = ""  #: Reason for the tolerance
+    scale: float = 0.0  #: Unit of the relative error [unit]; 0: the value by theory
 
     @property
     def error(self) -> float:
-        """(measured − theory) / scale [1]."""
+        """Relative error (measured − theory) / scale [1]."""
         return float((self.measured - self.theory) / (self.scale or abs(self.theory)))
 
     @property
     def good(self) -> bool:
-        """Whether the error is within the tolerance; a NaN is not."""
+        """Whether the error is within the tolerance; False for NaN."""
         return abs(self.error) <= self.tolerance
 
 
 @dataclass(frozen=True)
 class Check:
-    """One thing checked: what (with the unit of the number), number or text, limit in words, whether it is kept."""
+    """Result of one check."""
 
-    what: str
-    measured: str
-    limit: str
-    good: bool
+    what: str  #: Quantity and unit
+    measured: str  #: Measured value or message
+    limit: str  #: Limit as text
+    good: bool  #: Whether the limit is met
 
 
 def below(what: str, measured: float, limit: float) -> Check:
-    """Check that a number is below a limit; a NaN is not."""
+    """Check that a value is below a limit; NaN fails."""
     return Check(what, f"{measured:.4g}", f"< {limit:.4g}", bool(measured < limit))
 
 
 def above(what: str, measured: float, limit: float) -> Check:
-    """Check that a number is above a limit."""
+    """Check that a value is above a limit; NaN fails."""
     return Check(what, f"{measured:.4g}", f"> {limit:.4g}", bool(measured > limit))
 
 
 def near(what: str, measured: float, expected: float, error: float) -> Check:
-    """Check that a number is the expected one, within an error."""
+    """Check that a value differs from the expected value by at most `error`; NaN fails."""
     return Check(what, f"{measured:.5g}", f"{expected:.5g} ± {error:.2g}", bool(abs(measured - expected) <= error))
 
 
 def nothing(what: str, text: str | None) -> Check:
-    """Check that there is no error."""
+    """Check that there is no error message."""
     return Check(what, text or "nothing", "nothing", text is None)
 
 
 def says(text: str | None, *parts: str) -> Check:
-    """Check that an error contains some words."""
+    """Check that an error message exists and contains all `parts`."""
     good = text is not None and all(part in text for part in parts)
     return Check("the error", text or "nothing", " … ".join(parts), good)
 
 
-# Parameters of `test_known_answer`, `test_order_is_the_schemes` and `test_hard_case`, in the order of the arguments.
+# Registered cases: parameter sets of `test_known_answer`, `test_order_is_the_schemes` and `test_hard_case`.
 CASES: list[ParameterSet] = []
 LADDERS: list[ParameterSet] = []
 HARD: list[ParameterSet] = []
@@ -95,9 +98,14 @@ def _register(
 def case(
     name: str, about: str, theory: str, *, absent: Mapping[str, str] | None = None, **options: Any
 ) -> Callable[[Function], Function]:
-    """Register a function as a known answer: it simulates with the access that it is given, and returns answers.
+    """Register a function `(access, **options) -> list[Answer]` as a case with a known answer.
 
-    `absent` says why it has no meaning, by engine; other keywords are the function's.
+    Args:
+        name: unique name.
+        about: description of the simulation.
+        theory: formula or source of the answer.
+        absent: reasons why the case does not apply to an engine, by engine.
+        options: keyword arguments of the function.
     """
     return _register(CASES, name, options, about, theory, absent or {})
 
@@ -113,11 +121,17 @@ def ladder(  # noqa: PLR0917 # a row of a table
     phases: int | None = None,
     **options: Any,
 ) -> Callable[[Function], Function]:
-    """Register a function as a ladder: it returns the error of a trajectory at each of some time steps.
+    """Register a function `(access, steps, **options) -> list[float]` that returns an error for each time step.
 
-    Its size is that of the motion, in the unit of the quantity, its steps go from coarse to fine [s], its scheme has
-    the order in this motion [1] and the reason, of all engines or by engine. `phases` of the onset within a step are
-    those of the quick form (None: the function has no such option); other keywords are the function's.
+    Args:
+        name: unique name.
+        about: description of the motion.
+        quantity: quantity whose error is returned, with its unit.
+        size: size of the motion, in this unit.
+        steps: time steps [s], in decreasing order.
+        scheme: expected order of convergence [1] and its reason, for all engines or by engine.
+        phases: argument `phases` of the function in the short form of the test; None: the function has no `phases`.
+        options: other keyword arguments of the function.
     """
     by_engine = scheme if isinstance(scheme, dict) else dict.fromkeys(ENGINES, scheme)
     return _register(LADDERS, name, options, about, quantity, size, steps, by_engine, phases)
@@ -129,9 +143,12 @@ def hard(
     long: Mapping[str, Any] | None = None,
     absent: Mapping[str, str] | None = None,
 ) -> Callable[[Function], Function]:
-    """Register a function as a hard case: it simulates with an access and in a folder, and returns checks.
+    """Register a function `(access, folder, **options) -> list[Check]` as a hard case.
 
-    `short` are its options in continuous integration (None: the long form only), `long` what differs in the long form;
-    `absent` says why it has no meaning, by engine.
+    Args:
+        name: unique name.
+        short: keyword arguments in continuous integration; None: the case has a long form only.
+        long: keyword arguments that differ in the long form.
+        absent: reasons why the case does not apply to an engine, by engine.
     """
     return _register(HARD, name, {}, short, long or {}, absent or {})

@@ -1,4 +1,4 @@
-"""Run engines in processes of their own, and write the tables that `--results DIR` asks for."""
+"""Fixtures: run engines in separate processes, and write tables with `--results DIR`."""
 
 from __future__ import annotations
 
@@ -18,15 +18,15 @@ from dem.record.files import write_text
 from dem.run.run import _git_revision
 
 ON = [pytest.param("yade", marks=pytest.mark.engine), "links"]
-TIMEOUT = 3600  # s of wall time, for machines that are busy with long simulations
+TIMEOUT = 3600  # wall time [s]; large, since the machine may be busy with other simulations
 
-os.environ["OMP_NUM_THREADS"] = "1"  # bits depend on the number of threads on YADE
+os.environ["OMP_NUM_THREADS"] = "1"  # YADE's bits depend on the number of threads
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
-    """Add `--results DIR`."""
+    """Add the option `--results DIR` to pytest."""
     parser.addoption(
-        "--results", type=Path, metavar="DIR", help="write the measured tables into DIR/ENGINE, continue those there"
+        "--results", type=Path, metavar="DIR", help="write the measured tables into DIR/ENGINE; skip recorded cases"
     )
 
 
@@ -36,7 +36,7 @@ def _version(engine: str) -> str:
 
 @pytest.fixture(scope="session")
 def yade() -> Iterator[ProcessPoolExecutor]:
-    """Start one process that has loaded YADE, which cannot share one with Matplotlib."""
+    """Start a process for YADE, which cannot share a process with Matplotlib; skip the test without YADE."""
     pool = ProcessPoolExecutor(1, mp_context=multiprocessing.get_context("spawn"))
     try:
         pool.submit(_version, "yade").result(TIMEOUT)
@@ -49,7 +49,7 @@ def yade() -> Iterator[ProcessPoolExecutor]:
 
 @pytest.fixture
 def call(request: pytest.FixtureRequest) -> Callable[..., Any]:
-    """Call a function in the process of an engine: YADE has its own, links run in this one."""
+    """Return `run(engine, function, ...)`, which calls a function in this process (links) or in the process of YADE."""
 
     def run(engine: str, function: Callable[..., Any], /, *arguments: Any, **options: Any) -> Any:
         if engine == "links":
@@ -61,7 +61,7 @@ def call(request: pytest.FixtureRequest) -> Callable[..., Any]:
 
 @pytest.fixture
 def call_alone() -> Callable[..., Any]:
-    """Call a function in a fresh process."""
+    """Return `run(function, ...)`, which calls a function in a new process."""
 
     def run(function: Callable[..., Any], /, *arguments: Any, **options: Any) -> Any:
         with ProcessPoolExecutor(1, mp_context=multiprocessing.get_context("spawn")) as pool:
@@ -71,19 +71,19 @@ def call_alone() -> Callable[..., Any]:
 
 
 class Tables:
-    """Tables of a folder, each rewritten as a whole after each test; None: nothing is written."""
+    """CSV and Markdown tables in a folder, updated after each test; with folder None nothing is written."""
 
     def __init__(self, folder: Path | None) -> None:
         self.folder = folder
 
     def write(self, engine: str, name: str, rows: Sequence[dict[str, Any]], keys: Sequence[str]) -> None:
-        """Write rows into DIR/ENGINE/NAME.csv and .md, in place of those with the same keys."""
+        """Write rows to DIR/ENGINE/NAME.csv and .md; they replace rows with equal values in the columns `keys`."""
         if self.folder is None or not rows:
             return
         new, old = pd.DataFrame(rows).assign(commit=_git_revision()), self.read(engine, name)
         if old is not None:
-            mark = pd.MultiIndex.from_frame(new[list(keys)].astype(str))
-            kept = old[~pd.MultiIndex.from_frame(old[list(keys)].astype(str)).isin(mark)]
+            replaced = pd.MultiIndex.from_frame(new[list(keys)].astype(str))
+            kept = old[~pd.MultiIndex.from_frame(old[list(keys)].astype(str)).isin(replaced)]
             new = pd.concat([kept, new], ignore_index=True) if len(kept) else new
         (self.folder / engine).mkdir(parents=True, exist_ok=True)
         path = self.folder / engine / f"{name}.csv"
@@ -93,21 +93,22 @@ class Tables:
         write_text(path.with_suffix(".md"), "\n".join(f"| {line} |" for line in lines) + "\n")
 
     def skip_recorded(self, engine: str, name: str, **keys: Any) -> None:
-        """Skip the test if its rows are in the table."""
+        """Skip the test if the table has rows with the values `keys` by column, and none of them failed."""
         table = self.read(engine, name)
         if table is not None and all(key in table for key in keys):
-            same = pd.concat([table[key].astype(str) == str(value) for key, value in keys.items()], axis=1).all(axis=1)
-            bad = "verdict" in table and (table.loc[same, "verdict"] == "BAD").any()
-            if same.any() and not bad:
+            matches = [table[key].astype(str) == str(value) for key, value in keys.items()]
+            rows = pd.concat(matches, axis=1).all(axis=1)
+            failed = "verdict" in table and (table.loc[rows, "verdict"] == "BAD").any()
+            if rows.any() and not failed:
                 pytest.skip("recorded already")
 
     def read(self, engine: str, name: str) -> pd.DataFrame | None:
-        """Return a table as it is in the folder; None: there is none."""
+        """Return a recorded table, or None if it does not exist."""
         path = None if self.folder is None else self.folder / engine / f"{name}.csv"
         return pd.read_csv(path, keep_default_na=False) if path is not None and path.exists() else None
 
 
 @pytest.fixture(scope="session")
 def tables(request: pytest.FixtureRequest) -> Tables:
-    """Return the tables of `--results DIR`."""
+    """Return the tables in the folder given by `--results DIR`."""
     return Tables(request.config.getoption("--results"))

@@ -1,8 +1,8 @@
 """Run random extreme scenes and check them: `python -m validation.extremes --count 300 --jobs 2 --out DIR`.
 
-Each scene is planned, run and checked; DIR gets `extremes.csv`, and a scene file and a run directory each. A scene
-whose row is there already is not run again. The checker reads frames and series with NumPy alone and shares no code
-with the engines.
+Each scene is planned, run and checked. DIR gets the table `extremes.csv`, a scene file per scene, and the run
+directories of scenes that fail the check. Scenes with a row in the table are not run again. The checker uses NumPy
+alone and shares no code with the engines.
 """
 
 from __future__ import annotations
@@ -31,11 +31,11 @@ Array = NDArray[np.float64]
 
 # -- scenes ------------------------------------------------------------------------------------------------------------
 
-SECONDS = 0.3  # of each phase after the pour
+SECONDS = 0.3  # duration of the phase after the pour
 
 
 def draw_scene(number: int, engine: str = "links") -> dict[str, Any]:
-    """Draw plain data of a scene; equal numbers, which are also the seeds, give equal scenes."""
+    """Return a random scene as a dictionary; `number` is the seed of the draw and of the scene."""
     rng = np.random.default_rng([28, number])
 
     def span(low: float, high: float) -> float:
@@ -116,22 +116,29 @@ def draw_scene(number: int, engine: str = "links") -> dict[str, Any]:
 
 # -- the checker -------------------------------------------------------------------------------------------------------
 
-DEPTH = 0.1  # of a link's thickness: how far a point may be outside the container or below the floor
-ENERGY = 0.01  # of the energy put in: how much more there may be
-INSIDE = 1e-3  # of a segment's length: a crossing is at least so far from both ends
+DEPTH = 0.1  # largest penetration of floor or wall, over the thickness of a link
+ENERGY = 0.01  # largest excess of energy, over the supplied energy
+INSIDE = 1e-3  # least distance of a crossing from the ends of a segment, over the length of the segment
 
 
 def segments(vertices: Array) -> Array:
-    """Return ends (3N, 2, 3) of the axes of all links of vertices (N, 4, 3) [m]."""
+    """Return the ends (3N, 2, 3) [m] of the axes of all links, from vertices (N, 4, 3) [m]."""
     found: Array = np.stack([vertices[:, :-1], vertices[:, 1:]], axis=2).reshape(-1, 2, 3)
     return found
 
 
 def surface(vertices: Array, thickness: float) -> tuple[Array, Array]:
-    """Return points (M, 3) of the axes of vertices (N, 4, 3), and radii (M,) of the material about each [m].
+    """Return points on the axes of all links, and the radius of the material around each point.
 
-    A link ends at its tip, where there is nothing beyond the axis; half a thickness from there on it is a thickness
-    wide. So neither a square nor a rounded end is taken for more than it is.
+    Points are the ends of each axis, with radius 0, and the points thickness/2 from the ends, with radius thickness/2.
+    These spheres are inside of a link, whether its ends are square or round.
+
+    Args:
+        vertices: (N, 4, 3) [m].
+        thickness: of a link [m].
+
+    Returns:
+        Points (M, 3) [m] and radii (M,) [m].
     """
     ends = segments(vertices)
     along = ends[:, 1] - ends[:, 0]
@@ -144,13 +151,20 @@ def surface(vertices: Array, thickness: float) -> tuple[Array, Array]:
 
 
 def crossings(before: Array, after: Array) -> list[tuple[int, int]]:
-    """Find axes of different smarticles that pass through each other between vertices (N, 4, 3) of two frames [m].
+    """Find links of different smarticles whose axes passed through each other between two frames.
 
-    Vertices move along straight lines. While two axes pass through each other the volume that their four ends span
-    changes its sign, and both axes' common point is inside of both. Gives pairs of links, numbered along `segments`.
+    Vertices are assumed to move along straight lines. When two axes pass through each other, the volume of the
+    tetrahedron of their four ends changes sign, and the common point lies within both axes.
+
+    Args:
+        before: vertices of the first frame, (N, 4, 3) [m].
+        after: vertices of the second frame, (N, 4, 3) [m].
+
+    Returns:
+        Pairs of links, with the indices of `segments`.
     """
     one, two = segments(before), segments(after)
-    # A link without length, of l/w = 0, has no axis to cross.
+    # Links without length (l/w = 0) cannot cross.
     long = np.minimum(np.ptp(one, axis=1), np.ptp(two, axis=1)).max(axis=-1) > 0
     low = np.minimum(one, two).min(axis=1)
     high = np.maximum(one, two).max(axis=1)
@@ -196,10 +210,10 @@ def crossings(before: Array, after: Array) -> list[tuple[int, int]]:
 
 
 def check_run(path: Path, scene: Mapping[str, Any]) -> dict[str, Any]:
-    """Check one finished run of a scene of `draw_scene`.
+    """Check the finished run of a scene of `draw_scene`.
 
     Returns:
-        What was measured, and under "wrong" what is not as it must be, "" if nothing.
+        Measured values by quantity, and a description of all failed checks under "wrong", empty if all passed.
     """
     thickness = min(scene["smarticle"]["thickness_normal_m"], scene["smarticle"]["thickness_in_plane_m"])
     radius, wall = scene["container"]["radius_m"], scene["container"]["height_m"]
@@ -246,10 +260,14 @@ def check_run(path: Path, scene: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def energy_errors(path: Path) -> tuple[float, float]:
-    """Return the largest excess of energy over what was put in [1], and of the residual over what was dissipated [1].
+    """Return the relative errors of the energy in the series of a run.
 
-    `added_energy_J` has the height and speed that smarticles are poured with; works are those of motors and container.
-    NaN is passed on.
+    The supplied energy is `added_energy_J`, from the heights and speeds of poured smarticles, plus the work of motors
+    and container.
+
+    Returns:
+        Largest excess of the stored energy over the supplied energy [1], and largest residual of the ledger over the
+        dissipated energy [1]; NaN if the series contains NaN.
     """
     with h5py.File(path / "series.h5") as file:
         series = {name: np.asarray(dataset[()], dtype=float) for name, dataset in file.items()}
@@ -282,7 +300,14 @@ RIGHT, REJECTED, STOPPED, WRONG, LATE = "right", "rejected by plan", "stopped wi
 
 
 def run_one(number: int, out: Path, tree: Path, limit: float) -> dict[str, Any]:
-    """Plan, run and check one scene by the `smarticles` of a source tree, each within a limit of wall time [s]."""
+    """Plan, run and check one scene; return its row of the table.
+
+    Args:
+        number: number of the scene.
+        out: folder for scene file and run directory.
+        tree: source tree whose `smarticles` is used.
+        limit: largest wall time of `plan` and of `run` [s].
+    """
     scene, path, run = draw_scene(number), out / f"{number:04d}.yaml", out / f"{number:04d}"
     path.write_text(yaml.safe_dump(scene, sort_keys=False), encoding="utf-8")
     shutil.rmtree(run, ignore_errors=True)
@@ -315,14 +340,18 @@ def run_one(number: int, out: Path, tree: Path, limit: float) -> dict[str, Any]:
 
 
 def main() -> int:
-    """Run all scenes; the exit status is 1 if one is wrong."""
+    """Run all scenes; return the exit status, 1 if a scene failed."""
     parser = argparse.ArgumentParser(prog="python -m validation.extremes", description=__doc__)
-    parser.add_argument("--count", type=int, default=300, help="scenes (default: %(default)s)")
+    parser.add_argument("--count", type=int, default=300, help="number of scenes (default: %(default)s)")
     parser.add_argument("--first", type=int, default=0, help="number of the first scene (default: %(default)s)")
-    parser.add_argument("--jobs", type=int, default=1, help="runs at a time (default: %(default)s)")
-    parser.add_argument("--limit", type=float, default=300, help="wall time of a run [s] (default: %(default)s)")
-    parser.add_argument("--tree", type=Path, default=Path.cwd(), help="source tree to run (default: this one)")
-    parser.add_argument("--out", type=Path, required=True, help="folder of table, scenes and runs that are wrong")
+    parser.add_argument("--jobs", type=int, default=1, help="simultaneous runs (default: %(default)s)")
+    parser.add_argument(
+        "--limit", type=float, default=300, help="largest wall time of a run [s] (default: %(default)s)"
+    )
+    parser.add_argument(
+        "--tree", type=Path, default=Path.cwd(), help="source tree to run (default: the working directory)"
+    )
+    parser.add_argument("--out", type=Path, required=True, help="folder for table, scenes and failed runs")
     arguments = parser.parse_args()
     out = arguments.out.resolve()
     out.mkdir(parents=True, exist_ok=True)

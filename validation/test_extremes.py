@@ -1,4 +1,4 @@
-"""The checker finds crossings and rejects the null answer; scenes are drawn alike."""
+"""Tests of the checker in `validation.extremes` and of its random scenes."""
 
 from __future__ import annotations
 

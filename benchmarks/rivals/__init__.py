@@ -1,1 +1,1 @@
-"""Our engines beside others: cost against overlap, from equal poses, in one run."""
+"""Compare cost and overlap of our engines and others, starting from equal poses."""

@@ -1,9 +1,10 @@
 """Compare our engines with others: `python -m benchmarks.rivals`.
 
-A pile per seed is poured once, on links; every engine gets its poses, lets them rest, and shakes them at Γ = 2 and
-30 Hz, or swings the barbs by 10° where it has motors. Every simulation is a process of its own on one thread. Timed is
-the activity alone, by processor time. Rows go to `rivals.csv` as they come, where a later call with the same `--out`
-goes on; medians over seeds go to `rivals_medians.csv` and a figure. What is not installed is left out.
+One pile per seed is poured on links. Every engine starts from the poses of this pile, lets it rest, and shakes it at
+Γ = 2 and 30 Hz, or swings the barbs by 10° if it has motors. Every simulation is a separate process on one thread. The
+processor time of the activity is measured. `rivals.csv` has one row per simulation; a later call with the same `--out`
+continues the table. Medians over seeds are written to `rivals_medians.csv` and drawn. Engines that are not installed
+are skipped.
 """
 
 from __future__ import annotations
@@ -38,10 +39,10 @@ from postprocess import packing_fraction
 
 Array = NDArray[np.float64]
 
-SAMPLE = 0.01  # s between two samples of the poses; at 30 Hz three in a period of the shaking
-REST = 0.3  # s before the activity
-# A round bar as thick as the section's diagonal: only corners at the barbs' tips reach out of it, so that the pile
-# overlaps in no engine by much, whatever its shapes. Thinner ones settle a little before anything is measured.
+SAMPLE = 0.01  # time between two samples of the poses [s]; three per period at 30 Hz
+REST = 0.3  # rest before the activity [s]
+# The piles are poured with round bars as thick as the diagonal of the section, so that the shapes of no engine overlap
+# much at the start. Engines with thinner shapes let the pile settle during the rest.
 POUR = {"engine": "links", "fidelity": {"base": "standard", "diameter_m": 1.37e-3}}
 KEYS = ["activity", "engine", "setting"]
 COST, STEP, MEMORY = "cost [s/s]", "dt [s]", "peak memory [MiB]"
@@ -51,7 +52,7 @@ SAME, TENTH = "links at this overlap are cheaper by [1]", "links at a tenth of i
 
 
 def data_of(count: int, seed: int, *phases: dict[str, Any], **keys: Any) -> dict[str, Any]:
-    """Return the data of a scene; small piles stay wide enough for a straight smarticle."""
+    """Return a scene as a dictionary, with a container wide enough for a straight smarticle."""
     data = pile(count, *phases, seed=seed, per_layer=PAPER_PER_LAYER, **keys)
     data["container"]["radius_m"] = max(data["container"]["radius_m"], 0.012)
     return data
@@ -60,7 +61,17 @@ def data_of(count: int, seed: int, *phases: dict[str, Any], **keys: Any) -> dict
 def scene_of(
     setting: Setting, activity: str, poured: Path, *, count: int, seed: int, seconds: float, sample: float
 ) -> dict[str, Any]:
-    """Return the scene of a setting: take over, rest, act."""
+    """Return the scene of a setting as a dictionary: take-over, rest and activity.
+
+    Args:
+        setting: engine and its parameters.
+        activity: type of the last phase.
+        poured: run directory of the poured pile.
+        count: number of smarticles.
+        seed: of the scene.
+        seconds: duration of the activity [s].
+        sample: time between two frames [s].
+    """
     recording = {"frame_interval_s": sample, "series_interval_s": sample, "checkpoint_interval_s": None}
     data = {**data_of(count, seed, recording=recording), "engine": "links", **setting.scene}
     data["phases"] = [
@@ -72,42 +83,56 @@ def scene_of(
 
 
 def perform(task: Path) -> None:
-    """Simulate a task in this process: YADE and PyVista never meet in one, and peak memory is that of one engine."""
-    asked = json.loads(task.read_text(encoding="utf-8"))
-    module = importlib.import_module(f"benchmarks.rivals.{ENGINES[asked['engine']].module}")
-    scene = parse_scene(asked["scene"], source=str(task))
-    outcome = module.simulate(Task(scene, task.parent, asked["sample_s"]), asked["knobs"])
+    """Simulate a task file in this process, and write poses and costs next to the file.
+
+    A separate process is needed because YADE and PyVista must not be loaded together, and to measure memory.
+    """
+    content = json.loads(task.read_text(encoding="utf-8"))
+    module = importlib.import_module(f"benchmarks.rivals.{ENGINES[content['engine']].module}")
+    scene = parse_scene(content["scene"], source=str(task))
+    outcome = module.simulate(Task(scene, task.parent, content["sample_s"]), content["knobs"])
     np.savez(task.with_suffix(".npz"), positions=outcome.positions, frames=outcome.frames)
     used = [resource.getrusage(who).ru_maxrss for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)]
-    # A program that was started has the engine; this process, what feeds it.
+    # Memory of the child process, if the engine is a separate program.
     row = {"processor_s": outcome.processor_s, STEP: outcome.time_step, MEMORY: (used[1] or used[0]) / 1024}
     row["version"] = outcome.version
     task.with_suffix(".row.json").write_text(json.dumps(row), encoding="utf-8")
 
 
 def run(folder: Path, setting: Setting, activity: str, seed: int, given: argparse.Namespace) -> Any:
-    """Simulate in a process of its own and measure; return a row of the table; CalledProcessError where it failed."""
+    """Simulate a setting in a separate process and measure the result; return a row of the table.
+
+    Raises:
+        CalledProcessError: the simulation failed.
+    """
     count, seconds, poured = given.count, given.seconds, folder / f"pile-{given.count}-{seed}"
     if not (poured / "done.json").exists():
         run_child(folder, poured.name, data_of(count, seed, {"type": "relax", "duration_s": 0.3}, **POUR))
-    place = folder / f"{setting.key}-{activity}-{count}-{seed}"
-    place.mkdir(exist_ok=True)
+    directory = folder / f"{setting.key}-{activity}-{count}-{seed}"
+    directory.mkdir(exist_ok=True)
     scene = scene_of(setting, activity, poured, count=count, seed=seed, seconds=seconds, sample=SAMPLE)
-    task = place / "task.json"
-    asked = {"engine": setting.engine, "knobs": dict(setting.knobs), "scene": scene, "sample_s": SAMPLE}
-    task.write_text(json.dumps(asked), encoding="utf-8")
+    task = directory / "task.json"
+    content = {"engine": setting.engine, "knobs": dict(setting.knobs), "scene": scene, "sample_s": SAMPLE}
+    task.write_text(json.dumps(content), encoding="utf-8")
     one_thread = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "RAYON_NUM_THREADS"), "1")
     command = [sys.executable, "-m", "benchmarks.rivals", "--task", str(task)]
     subprocess.run(command, check=True, env={**os.environ, **one_thread})
     row = json.loads(task.with_suffix(".row.json").read_text(encoding="utf-8"))
     with np.load(task.with_suffix(".npz")) as poses:
-        found = measured(parse_scene(scene, source=str(place)), setting.shape, poses["positions"], poses["frames"])
+        found = measured(parse_scene(scene, source=str(directory)), setting.shape, poses["positions"], poses["frames"])
     cost = row.pop("processor_s") / seconds
     return {"N [1]": count, "activity [s]": seconds, COST: cost, **found, **row}
 
 
 def measured(scene: Scene, shape: str, positions: Array, frames: Array) -> dict[str, float]:
-    """Measure overlaps and packing of a simulation, see `benchmarks.rivals.task.Outcome`."""
+    """Measure overlaps and packing fractions of a simulation.
+
+    Args:
+        scene: simulated scene.
+        shape: shape that the engine uses, see `benchmarks.rivals.overlap.solid_of`.
+        positions: see `benchmarks.rivals.task.Outcome`.
+        frames: see `benchmarks.rivals.task.Outcome`.
+    """
     before, rested, *acting = zip(positions, frames, strict=True)
     depths = np.array(
         [[deepest(solid_of(kind, scene.particle, *pose)) for kind in (shape, "boxes")] for pose in acting]
@@ -130,7 +155,7 @@ def measured(scene: Scene, shape: str, positions: Array, frames: Array) -> dict[
 
 
 def planned(engines: Sequence[str], given: argparse.Namespace) -> Iterator[tuple[Setting, dict[str, Any]]]:
-    """Yield each setting, with the columns that identify a run."""
+    """Yield each simulation: its setting, and the columns that identify its row."""
     for seed, setting in product(given.seeds, SETTINGS):
         if setting.engine in engines and not (setting.costly and seed != given.seeds[0]):
             for activity in filter(given.activities.__contains__, setting.activities):
@@ -139,7 +164,10 @@ def planned(engines: Sequence[str], given: argparse.Namespace) -> Iterator[tuple
 
 
 def medians(rows: pd.DataFrame) -> pd.DataFrame:
-    """Return one line per activity, engine and setting, and what links cost at its overlap and at a tenth of it."""
+    """Return medians over seeds per activity, engine and setting, and the cost relative to links.
+
+    The last columns divide the cost by the lowest cost of links at the same or smaller overlap, and at a tenth of it.
+    """
     columns = [COST, STEP, DEPTH, MEAN_DEPTH, BOX_DEPTH, PHI_REST, PHI_END, SINKING, MEMORY]
     groups = rows.groupby(KEYS, sort=False)
     table = groups[columns].median().assign(**{"seeds [1]": groups["seed"].nunique()}).reset_index()
@@ -153,7 +181,7 @@ def medians(rows: pd.DataFrame) -> pd.DataFrame:
 
 
 def draw(path: Path, table: pd.DataFrame) -> None:
-    """Draw cost against overlap, a panel per activity."""
+    """Draw cost against overlap, with one panel per activity."""
     activities = list(table["activity"].unique())
     figure = Figure(figsize=(4.0 * len(activities), 4.0), layout="constrained")
     panels = figure.subplots(1, len(activities), sharey=True, squeeze=False)[0]
@@ -166,15 +194,19 @@ def draw(path: Path, table: pd.DataFrame) -> None:
 
 
 def main() -> int:
-    """Run all; write the tables, the figure and the origin."""
+    """Run all simulations; write tables, figure and origin; return the exit status."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.rivals", description=__doc__)
     parser.add_argument("--engines", nargs="+", choices=ENGINES, default=list(ENGINES), help="(default: all)")
     parser.add_argument("--activities", nargs="+", choices=ACTIVITIES, default=list(ACTIVITIES))
     parser.add_argument("--count", type=int, default=270, help="smarticles (default: %(default)s)")
-    parser.add_argument("--seconds", type=float, default=0.4, help="of the activity [s] (default: %(default)s)")
-    parser.add_argument("--seeds", type=int, nargs="+", default=[1, 2, 3], help="piles; what is costly has the first")
-    parser.add_argument("--out", type=Path, help="folder (default: a new one); goes on if it exists")
-    parser.add_argument("--task", type=Path, help="only simulate this task, in this process")
+    parser.add_argument(
+        "--seconds", type=float, default=0.4, help="duration of the activity [s] (default: %(default)s)"
+    )
+    parser.add_argument(
+        "--seeds", type=int, nargs="+", default=[1, 2, 3], help="seeds of the piles; slow settings use the first only"
+    )
+    parser.add_argument("--out", type=Path, help="folder (default: a new one); continued if it exists")
+    parser.add_argument("--task", type=Path, help="simulate this task file in this process")
     given = parser.parse_args()
     if given.task:
         perform(given.task)

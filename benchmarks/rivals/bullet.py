@@ -1,4 +1,4 @@
-"""Bullet (PyBullet): rigid boxes, lengths a hundred times as large, for its tolerances."""
+"""Bullet (PyBullet) with rigid boxes; lengths are multiplied by 100 to suit its tolerances."""
 
 from __future__ import annotations
 
@@ -13,21 +13,21 @@ from scipy.spatial.transform import Rotation
 from benchmarks.rivals.overlap import halves_of
 from benchmarks.rivals.task import Array, Knobs, Outcome, Task, World, rigid_links, simulated
 
-# Lengths there over lengths here. Times and densities stay, so that gravity grows as lengths do, and masses as volumes.
+# Factor of all lengths. Times and densities are unchanged, so that gravity grows by the factor, masses by its cube.
 SCALE = 100.0
 
 
 def simulate(task: Task, knobs: Knobs) -> Outcome:
-    """Simulate with `time_step` [s], solver `iterations`, and `recovery`, the share of overlap undone per step."""
+    """Simulate a task. Knobs: `time_step` [s], solver `iterations`, `recovery` (share of overlap undone per step)."""
     return simulated(task, InBullet(task, **knobs))
 
 
 class InBullet(World):
-    """A world of compounds of three boxes each."""
+    """Simulation of rigid bodies of three boxes each."""
 
     def __init__(self, task: Task, *, time_step: float, iterations: int, recovery: float) -> None:
         super().__init__(task, time_step, f"pybullet {version('pybullet')}")
-        # A client of its own: without one, calls go to the first world of the process.
+        # Each simulation needs its own client; otherwise calls address the first simulation of the process.
         library, clients = (importlib.import_module(name) for name in ("pybullet", "pybullet_utils.bullet_client"))
         bullet = self._bullet = clients.BulletClient(connection_mode=library.DIRECT)
         bullet.setPhysicsEngineParameter(
@@ -38,7 +38,7 @@ class InBullet(World):
             contactBreakingThreshold=0.02,
             deterministicOverlappingPairs=1,
         )
-        # Bullet multiplies the friction of both that touch.
+        # Bullet multiplies the friction coefficients of two touching bodies.
         surface = {"lateralFriction": math.sqrt(task.scene.contact.friction_smarticle), "restitution": 0.0}
         for centre, turn, halves in task.slabs(SCALE):
             slab = bullet.createCollisionShape(bullet.GEOM_BOX, halfExtents=halves.tolist())
@@ -68,18 +68,15 @@ class InBullet(World):
         return body
 
     def kick(self, speed: float) -> None:
-        """Add a vertical velocity [m/s] to all smarticles."""
         for body in self._bodies:
             velocity, spin = self._bullet.getBaseVelocity(body)
             self._bullet.resetBaseVelocity(body, [*velocity[:2], velocity[2] + SCALE * speed], spin)
 
     def step(self, gravity: float, time_s: float) -> None:
-        """Take one step at a gravity [m/s²]."""
         self._bullet.setGravity(0.0, 0.0, -SCALE * gravity)
         self._bullet.stepSimulation()
 
     def links(self) -> tuple[Array, Array]:
-        """Return centres and axes of the links."""
         poses: list[Any] = [self._bullet.getBasePositionAndOrientation(body) for body in self._bodies]
         turns = Rotation.from_quat([turn for _, turn in poses]).as_matrix()
         return rigid_links(self.task.boxes, np.array([position for position, _ in poses]) / SCALE, turns)

@@ -1,4 +1,4 @@
-"""LAMMPS (Debian's `lmp`), on the deck that `smarticles export --to lammps` writes: rigid bodies of spheres."""
+"""LAMMPS (Debian's `lmp`) with the deck of `smarticles export --to lammps`: rigid bodies of spheres."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ SHARE = re.compile(r"^(\S+)% CPU use", re.MULTILINE)
 
 
 def simulate(task: Task, knobs: Knobs) -> Outcome:
-    """Simulate; knobs are those of the scene already. The deck's last run is the activity."""
+    """Simulate a task; there are no knobs outside of the scene. The last run of the deck is the activity."""
     folder, scene = Path(task.folder) / "deck", task.scene
     write_deck(scene, folder)
     subprocess.run([shutil.which("lmp") or "lmp", "-in", DECK], cwd=folder, check=True, stdout=subprocess.DEVNULL)
@@ -28,13 +28,13 @@ def simulate(task: Task, knobs: Knobs) -> Outcome:
     times, places, turns = _dumped(folder / DUMP, task)
     dt = min(time_steps(scene))
     activity = round(task.activity_s / task.sample_s)
-    begun = len(times) - activity - 1
+    start = len(times) - activity - 1
     links = [rigid_links(task.boxes, place, turn) for place, turn in zip(places, turns, strict=True)]
-    rested = begun - round(CREEP / task.sample_s)
-    # Seen from the container, whose floor has moved.
-    floors = [np.array([0.0, 0.0, task.floor(time - times[begun])]) for time in times]
-    shaken = [(links[k][0] - floors[k], links[k][1]) for k in range(begun + 1, len(times))]
-    positions, frames = (np.array(each) for each in zip(links[rested], links[begun], *shaken, strict=True))
+    rested = start - round(CREEP / task.sample_s)
+    # Positions relative to the floor, which moves.
+    floors = [np.array([0.0, 0.0, task.floor(time - times[start])]) for time in times]
+    shaken = [(links[k][0] - floors[k], links[k][1]) for k in range(start + 1, len(times))]
+    positions, frames = (np.array(each) for each in zip(links[rested], links[start], *shaken, strict=True))
     return Outcome(
         time_step=dt,
         processor_s=float(LOOP.findall(log)[ACTIVITY]) * float(SHARE.findall(log)[ACTIVITY]) / 100,
@@ -45,18 +45,18 @@ def simulate(task: Task, knobs: Knobs) -> Outcome:
 
 
 def _dumped(path: Path, task: Task) -> tuple[Array, Array, Array]:
-    """Read (F,) times [s], (F, N, 3) centres of mass [m], (F, N, 3, 3) rotations, body frame to laboratory frame."""
+    """Read a dump: times (F,) [s], centres of mass (F, N, 3) [m], rotations body to laboratory frame (F, N, 3, 3)."""
     times, rows = zip(*_blocks(path), strict=True)
     table = np.array(rows)
     quaternions = Rotation.from_quat(table[:, :, [8, 9, 10, 7]].reshape(-1, 4)).as_matrix()
     turned = quaternions.reshape(*table.shape[:2], 3, 3)
-    # LAMMPS chooses principal axes of its own; the first frame shows how they lie in ours.
+    # LAMMPS chooses the principal axes; the first frame gives their orientation in the body frame of this project.
     own = np.swapaxes(turned[0], 1, 2) @ task.turns
     return np.array(times) * min(time_steps(task.scene)), table[:, :, 1:4], turned @ own
 
 
 def _blocks(path: Path) -> Iterator[tuple[int, Array]]:
-    """Yield step and rows, sorted by number, of each time."""
+    """Yield the step and the rows, sorted by number of the smarticle, of each frame in a dump."""
     text = path.read_text(encoding="utf-8")
     for block in text.split("ITEM: TIMESTEP\n")[1:]:
         lines = block.splitlines()

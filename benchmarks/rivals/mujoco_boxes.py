@@ -1,4 +1,4 @@
-"""MuJoCo: boxes of the true size, welded or hinged with position servos of limited torque."""
+"""MuJoCo with boxes of the true size, welded, or hinged with position servos of limited torque."""
 
 from __future__ import annotations
 
@@ -12,17 +12,17 @@ from scipy.spatial.transform import Rotation
 from benchmarks.rivals.overlap import halves_of
 from benchmarks.rivals.task import Array, Knobs, Outcome, Task, World, simulated
 
-MIDDLE = 1  # the link that carries the two others
-SERVO = 0.02  # rad behind its target at which a servo has its full torque
+MIDDLE = 1  # index of the middle link
+SERVO = 0.02  # deviation from the target at which a servo reaches its torque limit [rad]
 
 
 def simulate(task: Task, knobs: Knobs) -> Outcome:
-    """Simulate with `time_step` [s], `solver`, `iterations`, `cone` and `solref` of contacts, named as there."""
+    """Simulate a task; knobs: `time_step` [s], `solver`, `iterations`, `cone`, `solref` (names of MuJoCo)."""
     return simulated(task, InMujoco(task, **knobs))
 
 
 class InMujoco(World):
-    """A model of free bodies, each with its barbs welded on or hinged to it."""
+    """Simulation of free bodies whose barbs are welded or hinged."""
 
     def __init__(
         self, task: Task, *, time_step: float, solver: str, iterations: int, cone: str, solref: Sequence[float]
@@ -40,14 +40,15 @@ class InMujoco(World):
         spec.memory = 2**30
         friction = [task.scene.contact.friction_smarticle, 0.0, 0.0]
         self._surface = {"friction": friction, "solref": list(solref), "condim": 3}
-        self._around(spec)
+        self._add_container(spec)
         for k in range(task.scene.count):
-            self._smarticle(spec, k)
+            self._add_smarticle(spec, k)
         self._model = spec.compile()
         self._data = mujoco.MjData(self._model)
         mujoco.mj_forward(self._model, self._data)
 
-    def _around(self, spec: Any) -> None:
+    def _add_container(self, spec: Any) -> None:
+        """Add floor and walls as planes."""
         plane = self._mujoco.mjtGeom.mjGEOM_PLANE
         spec.worldbody.add_geom(type=plane, size=[1, 1, 1], **self._surface)
         for point, inward in zip(*self.task.walls(), strict=True):
@@ -55,7 +56,8 @@ class InMujoco(World):
             frame = np.column_stack([side, np.cross(inward, side), inward])
             spec.worldbody.add_geom(type=plane, size=[1, 1, 1], pos=point, quat=_quaternion(frame), **self._surface)
 
-    def _smarticle(self, spec: Any, k: int) -> None:
+    def _add_smarticle(self, spec: Any, k: int) -> None:
+        """Add smarticle `k` with its links and, if it actuates, hinges and servos."""
         task, boxes, joint = self.task, self.task.boxes, self._mujoco.mjtJoint
         if not self._hinged:
             body = spec.worldbody.add_body(
@@ -74,7 +76,7 @@ class InMujoco(World):
             own = frames[MIDDLE].T @ frames[barb]
             place = frames[MIDDLE].T @ (places[barb] - places[MIDDLE])
             body = middle.add_body(pos=place, quat=_quaternion(own), **self._inertial(barb))
-            # Angles grow about the normal on barb 2, against it on barb 1.
+            # A positive angle turns barb 2 about the normal, and barb 1 in the opposite sense.
             axis = [0.0, 0.0, 1.0 if barb else -1.0]
             hinge = body.add_joint(
                 name=f"hinge {k} {barb}", type=joint.mjJNT_HINGE, axis=axis, pos=[-boxes.barb_length / 2, 0.0, 0.0]
@@ -97,7 +99,7 @@ class InMujoco(World):
         body.add_geom(type=geom, size=sides, pos=centre, quat=_quaternion(frame), mass=0.0, **self._surface)
 
     def _servo(self, spec: Any, hinge: str, barb: int) -> None:
-        """Add a servo that is critically damped for the barb alone."""
+        """Add a position servo that is critically damped for the barb alone."""
         limit, boxes = float(self.task.scene.torque_limit), self.task.boxes
         inertia = boxes.link_inertias[barb][2] + boxes.link_masses[barb] * (boxes.barb_length / 2) ** 2
         gain = limit / SERVO
@@ -107,13 +109,13 @@ class InMujoco(World):
         servo.set_to_position(kp=gain, kv=2 * float(np.sqrt(gain * inertia)))
 
     def kick(self, speed: float) -> None:
-        """Add a vertical velocity [m/s] to all smarticles that are welded."""
+        """Add a vertical velocity [m/s] to all smarticles if they are welded."""
         free = self._model.jnt_dofadr[self._model.jnt_type == self._mujoco.mjtJoint.mjJNT_FREE]
         if not self._hinged:
             self._data.qvel[free + 2] += speed
 
     def step(self, gravity: float, time_s: float) -> None:
-        """Take one step at a gravity [m/s²], or with the motors' targets at a time [s]."""
+        """Take one step: welded smarticles with `gravity` [m/s²], hinged ones with the targets at `time_s` [s]."""
         if not self._hinged:
             self._model.opt.gravity[2] = -gravity
         elif time_s:
@@ -121,8 +123,7 @@ class InMujoco(World):
         self._mujoco.mj_step(self._model, self._data)
 
     def links(self) -> tuple[Array, Array]:
-        """Return centres and axes of the links."""
-        # Geoms come by threes, after floor and walls; where hinged, the middle link first.
+        # The last geoms are three per smarticle, starting with the middle link if hinged.
         count = 3 * self.task.scene.count
         self._mujoco.mj_kinematics(self._model, self._data)
         places = self._data.geom_xpos[-count:].reshape(-1, 3, 3)

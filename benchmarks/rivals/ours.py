@@ -1,4 +1,4 @@
-"""Our own engines, links and YADE, step by step through the interface that a run uses."""
+"""The engines links and YADE, through the interface that runs use."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ from dem.plan.steps import time_steps
 
 
 def simulate(task: Task, knobs: Knobs) -> Outcome:
-    """Simulate; knobs are those of the scene already."""
+    """Simulate a task; there are no knobs outside of the scene."""
     return simulated(task, OnEngine(task))
 
 
 class OnEngine(World):
-    """A scene on the engine that it names; the pile that is taken over has settled."""
+    """Simulation on the engine of the scene, after the pile has been taken over."""
 
     def __init__(self, task: Task) -> None:
         self._steps = time_steps(task.scene)
@@ -31,17 +31,17 @@ class OnEngine(World):
         self._enter(REST)
 
     def begin(self) -> None:
-        """Begin the activity."""
         self._enter(ACTIVITY)
 
     def _enter(self, index: int) -> None:
+        """Begin a phase of the scene with its time step."""
         self._stage = self.task.scene.phases[index].begin(self.task.scene, index)
         self.engine.set_time_step(self._steps[index])
         self.time_step = self.engine.time_step
         self._due = self.engine.steps
 
     def advance(self, seconds: float) -> None:
-        """Advance by a time [s], from one update of the phase to the next."""
+        """Advance by a time [s]; the phase acts on the engine whenever its next update is due."""
         until = self.engine.steps + round(seconds / self.time_step)
         while self.engine.steps < until:
             if self.engine.steps >= self._due:
@@ -50,6 +50,5 @@ class OnEngine(World):
             self.engine.advance(min(until, self._due) - self.engine.steps)
 
     def links(self) -> tuple[Array, Array]:
-        """Return centres and axes of the links."""
         state = self.engine.state()
         return state.link_positions - np.array([0.0, 0.0, self.engine.boundaries.floor]), state.link_rotations

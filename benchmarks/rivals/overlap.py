@@ -1,7 +1,7 @@
-"""How deep smarticles overlap, from poses alone: one measure for all engines, whatever their shapes.
+"""Overlaps between smarticles, computed from poses for the shapes of each engine.
 
-Boxes are taken as deep in each other as the shortest push that parts them is long, swept segments (and spheres, which
-are segments of no length) as far as their axes are nearer than a diameter. Links of one smarticle are left out.
+The overlap of two boxes is the shortest displacement that separates them. The overlap of two swept segments, or of
+spheres as segments of length zero, is the diameter less the distance of the axes. Links of one smarticle are ignored.
 """
 
 from __future__ import annotations
@@ -20,24 +20,24 @@ from postprocess.measures.contacts import segment_distances
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
 
-PARALLEL = 1e-9  # squared sine of an angle below which two edges have no common normal of their own
+PARALLEL = 1e-9  # squared sine below which two edges count as parallel
 
 
 @dataclass(frozen=True, eq=False)
 class Bars:
-    """Boxes: (B, 3) centres [m], (B, 3, 3) axes as columns, (B, 3) half lengths [m], (B,) numbers of smarticles."""
+    """Boxes, B in number."""
 
-    centres: Array
-    frames: Array
-    halves: Array
-    owners: Indices
+    centres: Array  #: (B, 3) [m]
+    frames: Array  #: Axes as columns, (B, 3, 3)
+    halves: Array  #: Half lengths of the sides, (B, 3) [m]
+    owners: Indices  #: Indices of smarticles, (B,)
 
     def candidates(self) -> Indices:
-        """Find (P, 2) pairs of parts that may overlap."""
+        """Return the pairs (P, 2) that may overlap."""
         return _near(self.centres, np.linalg.norm(self.halves, axis=1))
 
     def depths(self, pairs: Indices) -> Array:
-        """Compute (P,) least overlaps [m] over the fifteen axes that may separate convex boxes."""
+        """Compute the overlaps of pairs (P, 2) of boxes, (P,) [m], by the separating-axis theorem for 15 axes."""
         one, other = pairs.T
         between = self.centres[other] - self.centres[one]
         frames = np.concatenate([self.frames[one], self.frames[other]], axis=2)
@@ -56,34 +56,34 @@ class Bars:
 
 @dataclass(frozen=True, eq=False)
 class Swept:
-    """Segments swept by a sphere: (S, 3) starts and ends [m], radius [m], (S,) numbers of smarticles."""
+    """Segments swept by a sphere, S in number; spheres are segments of length zero."""
 
-    starts: Array
-    ends: Array
-    radius: float
-    owners: Indices
+    starts: Array  #: (S, 3) [m]
+    ends: Array  #: (S, 3) [m]
+    radius: float  #: [m]
+    owners: Indices  #: Indices of smarticles, (S,)
 
     def candidates(self) -> Indices:
-        """Find (P, 2) pairs of parts that may overlap."""
+        """Return the pairs (P, 2) that may overlap."""
         reaches = np.linalg.norm(self.ends - self.starts, axis=1) / 2 + self.radius
         return _near((self.starts + self.ends) / 2, reaches)
 
     def depths(self, pairs: Indices) -> Array:
-        """Compute (P,) overlaps of pairs of parts [m]; not positive where they are apart."""
+        """Compute the overlaps of pairs (P, 2) of segments, (P,) [m]; negative for separate segments."""
         one, other = pairs.T
         ends = self.starts[one], self.ends[one], self.starts[other], self.ends[other]
         return 2 * self.radius - segment_distances(*ends)
 
 
 def deepest(solid: Bars | Swept) -> float:
-    """Compute the deepest overlap of two parts of different smarticles [m]; 0 where there is none."""
+    """Return the largest overlap between different smarticles [m], 0 without any overlap."""
     pairs = solid.candidates()
     pairs = pairs[solid.owners[pairs[:, 0]] != solid.owners[pairs[:, 1]]]
     return max(0.0, float(solid.depths(pairs).max())) if len(pairs) else 0.0
 
 
 def _near(centres: Array, reaches: Array) -> Indices:
-    """Find (P, 2) pairs whose spheres about their centres meet."""
+    """Return the pairs (P, 2) whose bounding spheres overlap."""
     pairs = cKDTree(centres).query_pairs(2 * float(reaches.max()), output_type="ndarray").astype(np.int64)
     one, other = pairs.T
     meet = np.linalg.norm(centres[one] - centres[other], axis=1) < reaches[one] + reaches[other]
@@ -92,9 +92,13 @@ def _near(centres: Array, reaches: Array) -> Indices:
 
 
 def solid_of(shape: str, particle: Particle, positions: Array, frames: Array) -> Bars | Swept:
-    """Return what an engine keeps apart: boxes, strands of links, or spheres of YADE and LAMMPS.
+    """Return the shapes that an engine uses for contacts.
 
-    Positions are (N, 3, 3), the centres of the links [m]; frames (N, 3, 3, 3), their axes as columns [1].
+    Args:
+        shape: "boxes", "strands" (engine links) or "spheres" (YADE and LAMMPS).
+        particle: geometry of a smarticle.
+        positions: centres of the links, (N, 3, 3) [m].
+        frames: axes of the links as columns, (N, 3, 3, 3).
     """
     if shape == "boxes":
         return _boxes(particle, positions, frames)
@@ -102,7 +106,7 @@ def solid_of(shape: str, particle: Particle, positions: Array, frames: Array) ->
 
 
 def halves_of(boxes: Boxes) -> Array:
-    """Compute (3, 3) halves of the sides of the links, along the axes of their frames [m]."""
+    """Return half the side lengths of each link along the axes of its frame, (3, 3) [m]."""
     sections = np.tile([boxes.thickness_in_plane, boxes.thickness_normal], (LINKS, 1))
     return np.column_stack([boxes.lengths, sections]) / 2
 
@@ -114,7 +118,7 @@ def _boxes(particle: Particle, positions: Array, frames: Array) -> Bars:
 
 
 def _strands(particle: Particle, positions: Array, frames: Array) -> Swept:
-    """As `dem.engine.links.shape` describes them: barbs begin at the hinge and end a radius before the tip."""
+    """Return the strands of `dem.engine.links.shape`: barbs begin at the hinge and end a radius before the tip."""
     shape = shape_of(particle)
     spans = {0: (-shape.arm, shape.tip - shape.arm), 1: (-shape.end, shape.end), 2: (-shape.arm, shape.tip - shape.arm)}
     ends: tuple[list[Array], list[Array]] = ([], [])

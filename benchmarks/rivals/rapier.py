@@ -1,4 +1,4 @@
-"""Rapier: rigid boxes in single precision; lengths a hundred times as large."""
+"""Rapier with rigid boxes in single precision; lengths are multiplied by 100."""
 
 from __future__ import annotations
 
@@ -12,17 +12,17 @@ from scipy.spatial.transform import Rotation
 from benchmarks.rivals.overlap import halves_of
 from benchmarks.rivals.task import Array, Knobs, Outcome, Task, World, rigid_links, simulated
 
-# Lengths there over lengths here. Times and densities stay, so that gravity grows as lengths do, and masses as volumes.
+# Factor of all lengths. Times and densities are unchanged, so that gravity grows by the factor, masses by its cube.
 SCALE = 100.0
 
 
 def simulate(task: Task, knobs: Knobs) -> Outcome:
-    """Simulate with `time_step` [s], solver `iterations`, and `frequency` [Hz] and `damping` of contacts."""
+    """Simulate a task; knobs: `time_step` [s], solver `iterations`, `frequency` [Hz] and `damping` of contacts."""
     return simulated(task, InRapier(task, **knobs))
 
 
 class InRapier(World):
-    """A world of bodies with three colliders each."""
+    """Simulation of rigid bodies with three colliders each."""
 
     def __init__(self, task: Task, *, time_step: float, iterations: int, frequency: float, damping: float) -> None:
         super().__init__(task, time_step, f"rapier3d {version('rapier3d')}")
@@ -31,7 +31,7 @@ class InRapier(World):
         self._world.set_num_threads(1)
         chosen = self._world.integration_parameters
         chosen.dt, chosen.num_solver_iterations = time_step, iterations
-        # Shipped: 30 Hz and 5 (60 Hz against what is fixed), which lets smarticles sink through each other.
+        # The defaults, 30 Hz and 5 (60 Hz for fixed bodies), let smarticles sink through each other.
         chosen.contact_softness = rapier.SpringCoefficients(frequency, damping)
         chosen.static_contact_softness = rapier.SpringCoefficients(2 * frequency, damping)
         for slab in task.slabs(SCALE):
@@ -52,7 +52,7 @@ class InRapier(World):
 
     def _collider(self, centre: Array, turn: Rotation, halves: Array) -> Any:
         box = self._rapier.Collider.cuboid(*halves.tolist()).position(self._pose(centre, turn))
-        # Two that touch: the mean of their friction.
+        # Rapier averages the friction coefficients of two touching bodies.
         return box.friction(self.task.scene.contact.friction_smarticle).restitution(0.0)
 
     def _pose(self, position: Array, turn: Rotation) -> Any:
@@ -60,19 +60,16 @@ class InRapier(World):
         return self._rapier.Isometry3(place, self._rapier.Rotation3.from_scaled_axis(turn.as_rotvec().tolist()))
 
     def kick(self, speed: float) -> None:
-        """Add a vertical velocity [m/s] to all smarticles."""
         for handle in self._handles:
             body = self._world.rigid_bodies[handle]
             velocity = body.linvel
             body.linvel = (velocity.x, velocity.y, velocity.z + SCALE * speed)
 
     def step(self, gravity: float, time_s: float) -> None:
-        """Take one step at a gravity [m/s²]."""
         self._world.gravity = (0.0, 0.0, -SCALE * gravity)
         self._world.step()
 
     def links(self) -> tuple[Array, Array]:
-        """Return centres and axes of the links."""
         bodies = [self._world.rigid_bodies[handle] for handle in self._handles]
         places = np.array([[body.translation.x, body.translation.y, body.translation.z] for body in bodies])
         turns = [[body.rotation.i, body.rotation.j, body.rotation.k, body.rotation.w] for body in bodies]

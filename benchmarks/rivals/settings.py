@@ -1,4 +1,4 @@
-"""Which engines there are, and the settings that each is tried at."""
+"""The compared engines, and the settings of each."""
 
 from __future__ import annotations
 
@@ -18,34 +18,34 @@ ACTIVITIES: Mapping[str, Mapping[str, Any]] = {
 
 @dataclass(frozen=True)
 class Setting:
-    """One row of the table."""
+    """One setting of an engine, a row of the table."""
 
     engine: str  #: A key of `ENGINES`
-    name: str  #: Of the setting
-    shape: str = "boxes"  #: What it keeps apart, see `benchmarks.rivals.overlap`
-    activities: Sequence[str] = (SHAKE,)  #: That it can do
-    scene: Mapping[str, Any] = field(default_factory=dict)  #: Keys of the scene that differ
-    knobs: Mapping[str, Any] = field(default_factory=dict)  #: That are not of the scene
-    costly: bool = False  #: Whether one seed must do
+    name: str  #: Name of the setting in tables
+    shape: str = "boxes"  #: Shape for contacts, see `benchmarks.rivals.overlap.solid_of`
+    activities: Sequence[str] = (SHAKE,)  #: Activities that the engine supports
+    scene: Mapping[str, Any] = field(default_factory=dict)  #: Changed keys of the scene
+    knobs: Mapping[str, Any] = field(default_factory=dict)  #: Parameters of the engine that a scene does not have
+    costly: bool = False  #: Simulate the first seed only
 
     @property
     def key(self) -> str:
-        """Name of files."""
+        """Name of the setting in file names."""
         return re.sub(r"[^0-9a-z.-]+", "_", f"{self.engine}-{self.name}".lower())
 
 
 @dataclass(frozen=True)
 class Rival:
-    """An engine: title in tables, module, and the Python package or, of a Debian package, the program that it needs."""
+    """A compared engine."""
 
-    title: str
-    module: str
-    needs: str
-    package: str = ""
+    title: str  #: Name in tables
+    module: str  #: Module of `benchmarks.rivals` that simulates a task
+    needs: str  #: Required Python package, or program of a Debian package
+    package: str = ""  #: Debian package; empty for Python packages
 
     @property
     def missing(self) -> str | None:
-        """What is missing, and the way out; None: nothing."""
+        """Message about the missing package and its installation; None if nothing is missing."""
         found = shutil.which(self.needs) if self.package else importlib.util.find_spec(self.needs)
         way = f"apt-get install {self.package}" if self.package else "make rivals"
         return None if found else f"{self.title}: left out, {self.needs} is not installed ({way})"
@@ -70,7 +70,7 @@ def _links(name: str, fidelity: Any, *, costly: bool = False) -> Setting:
 
 
 def _mujoco(name: str, time_step: float, contact: float) -> Setting:
-    """A contact's time constant is 0.02 s as shipped, and 2 dt at least."""
+    """Return a setting of MuJoCo; `contact`: time constant of contacts [s], default 0.02, at least 2 dt."""
     solver = {"time_step": time_step, "solver": "CG", "iterations": 50, "cone": "pyramidal"}
     return Setting("mujoco", name, activities=BOTH, knobs={**solver, "solref": [contact, 1.0]}, costly=True)
 
@@ -85,8 +85,8 @@ def _rapier(name: str, time_step: float, frequency: float, damping: float) -> Se
     return Setting("rapier", name, knobs=knobs)
 
 
-# The named fidelities, and links at ever stiffer contacts: what less overlap costs. Others as shipped or as tried
-# first; and better: chosen on piles of 60 and 270 for little overlap at little cost.
+# Our engines: the named fidelities, and links with stiffer contacts. Other engines: default settings, and settings with
+# small overlap at low cost, chosen with piles of 60 and 270.
 SETTINGS: Sequence[Setting] = (
     *(_links(name, name) for name in NAMES),
     *(

@@ -1,4 +1,4 @@
-"""The task that every engine gets, and the outcome that it returns."""
+"""The task of every engine, its outcome, and the base class of simulations."""
 
 from __future__ import annotations
 
@@ -24,22 +24,22 @@ from dem.scene.scene import Scene
 Array = NDArray[np.float64]
 Knobs = Mapping[str, Any]
 
-REST, ACTIVITY = 1, 2  # phases of the scene, after the take-over
-FACETS = 32  # flat walls of engines that have no cylinder to be in; they touch it from outside
-CREEP = 0.1  # s at the end of the rest in which it is measured whether the pile still sinks
+REST, ACTIVITY = 1, 2  # indices of the phases after the take-over
+FACETS = 32  # number of flat walls, tangent to the cylinder, for engines without hollow cylinders
+CREEP = 0.1  # time at the end of the rest in which sinking is measured [s]
 
 
 @dataclass(frozen=True, eq=False)
 class Task:
-    """A scene of three phases, take-over, relax and an activity."""
+    """Scene of three phases: take-over, relax and an activity."""
 
     scene: Scene
-    folder: Path  #: Where an engine may leave files
+    folder: Path  #: Folder for files of the engine
     sample_s: float  #: Time between two samples of the poses [s]
 
     @cached_property
     def state(self) -> State:
-        """The smarticles at the beginning, at rest."""
+        """State of the smarticles at the start, at rest."""
         first = self.scene.phases[0]
         assert isinstance(first, TakeOver)
         poses = poses_of(self.scene, first.taken)
@@ -48,37 +48,37 @@ class Task:
 
     @property
     def turns(self) -> Array:
-        """(N, 3, 3) body frame to laboratory frame at the beginning."""
+        """Rotations from body frame to laboratory frame at the start, (N, 3, 3)."""
         turns: Array = self.state.link_rotations[:, 1] @ self.boxes.link_rotations[1].T
         return turns
 
     @property
     def boxes(self) -> Boxes:
-        """One smarticle."""
+        """Geometry and mass of a smarticle."""
         return self.scene.particle.boxes
 
     @property
     def rest_s(self) -> float:
-        """How long the pile rests [s]."""
+        """Duration of the rest [s]."""
         return float(self.scene.phases[REST].known_duration or 0.0)
 
     @property
     def activity_s(self) -> float:
-        """How long the activity takes [s]."""
+        """Duration of the activity [s]."""
         return float(self.scene.phases[ACTIVITY].known_duration or 0.0)
 
     @property
     def actuates(self) -> bool:
-        """Whether motors act."""
+        """Whether the activity moves barbs."""
         return self.scene.phases[ACTIVITY].actuates
 
     @cached_property
     def gait(self) -> Drive:
-        """Targets of the motors."""
+        """Target angles of the barbs over time."""
         return drive(self.scene, ACTIVITY)
 
     def floor(self, time_s: float) -> float:
-        """Compute the height of the container's floor [m] at a time after the activity began."""
+        """Return the height of the floor [m] at a time since the start of the activity [s]."""
         phase = self.scene.phases[ACTIVITY]
         if not isinstance(phase, Shake):
             return 0.0
@@ -86,24 +86,24 @@ class Task:
         return phase.amplitude(self.scene.gravity_m_per_s2) * math.sin(omega * time_s)
 
     def gravity(self, time_s: float) -> float:
-        """Compute gravity in the container's frame [m/s²], downwards, at a time after the activity began."""
+        """Return the downward gravity in the container's frame [m/s²] at a time since the start of the activity [s]."""
         phase = self.scene.phases[ACTIVITY]
         omega = 2 * math.pi * phase.frequency_hz if isinstance(phase, Shake) else 0.0
         return self.scene.gravity_m_per_s2 - omega**2 * self.floor(time_s)
 
     @property
     def kick(self) -> float:
-        """Velocity that the container jumps to as the activity begins [m/s]; seen from it, all have the opposite."""
+        """Velocity of the container just after the start of the activity [m/s]."""
         return float(self.scene.phases[ACTIVITY].peak_speed(self.scene.gravity_m_per_s2))
 
     def walls(self) -> tuple[Array, Array]:
-        """Place flat walls: (FACETS, 3) points [m] and unit normals into the container."""
+        """Return the flat walls: points (FACETS, 3) [m], and unit normals into the container (FACETS, 3)."""
         angles = 2 * math.pi * np.arange(FACETS) / FACETS
         outwards = np.column_stack([np.cos(angles), np.sin(angles), np.zeros(FACETS)])
         return self.scene.cylinder.radius * outwards, -outwards
 
     def slabs(self, scale: float) -> Iterator[tuple[Array, Rotation, Array]]:
-        """Place floor and walls as boxes: centre, rotation and halves of the sides, times a scale [m]."""
+        """Yield boxes for floor and walls: centre, rotation and half side lengths; all lengths times `scale`."""
         thick, radius, height = 2.0, scale * self.scene.cylinder.radius, scale * 0.2
         yield np.array([0.0, 0.0, -thick / 2]), Rotation.identity(), np.array([3 * radius, 3 * radius, thick / 2])
         for point, inward in zip(*self.walls(), strict=True):
@@ -114,19 +114,19 @@ class Task:
 
 @dataclass(frozen=True, eq=False)
 class Outcome:
-    """What a simulation gave."""
+    """Result of a simulation with N smarticles and F samples during the activity."""
 
-    time_step: float  #: Dt of the activity [s]
-    processor_s: float  #: Processor time that the activity took
-    #: (2 + F, N, 3, 3) centres of the links, seen from the container [m]: `CREEP` before the end of the rest, at its
-    #: end, and at each sample during the activity
+    time_step: float  #: Time step of the activity [s]
+    processor_s: float  #: Processor time of the activity [s]
+    #: Centres of the links relative to the container, (2 + F, N, 3, 3) [m]: `CREEP` before the end of the rest, at the
+    #: end of the rest, and at each sample during the activity
     positions: Array
-    frames: Array  #: (2 + F, N, 3, 3, 3) their axes as columns
-    version: str  #: Of the engine
+    frames: Array  #: Axes of the links as columns, (2 + F, N, 3, 3, 3)
+    version: str  #: Version of the engine
 
 
 class World:
-    """A simulation in the container's frame, advanced from sample to sample; a rival has `kick`, `step` and `links`."""
+    """Base class of simulations in the frame of the container; subclasses define `kick`, `step` and `links`."""
 
     def __init__(self, task: Task, time_step: float, version: str) -> None:
         self.task, self.time_step, self.version = task, time_step, version
@@ -137,20 +137,25 @@ class World:
         raise NotImplementedError
 
     def step(self, gravity: float, time_s: float) -> None:
-        """Take one step at a gravity [m/s²], which ends at a time after the activity began [s]."""
+        """Take one step.
+
+        Args:
+            gravity: downward gravity during the step [m/s²].
+            time_s: time at the end of the step, since the start of the activity [s].
+        """
         raise NotImplementedError
 
     def begin(self) -> None:
-        """Begin the activity."""
+        """Begin the activity: relative to the container, all smarticles get the opposite of its velocity."""
         self._since = 0.0
         self.kick(-self.task.kick)
 
     def links(self) -> tuple[Array, Array]:
-        """Return (N, 3, 3) centres of the links [m] and (N, 3, 3, 3) their axes as columns."""
+        """Return the centres of the links (N, 3, 3) [m], and their axes as columns (N, 3, 3, 3)."""
         raise NotImplementedError
 
     def advance(self, seconds: float) -> None:
-        """Advance by a time [s]; gravity is that of the middle of a step."""
+        """Advance by a time [s]; each step uses the gravity at the middle of the step."""
         for _ in range(round(seconds / self.time_step)):
             if self._since is None:
                 self.step(self.task.scene.gravity_m_per_s2, 0.0)
@@ -160,7 +165,7 @@ class World:
 
 
 def simulated(task: Task, simulation: World) -> Outcome:
-    """Rest and act; only the steps of the activity are timed."""
+    """Simulate rest and activity of a task; the processor time of the activity is measured."""
     if task.rest_s > CREEP:
         simulation.advance(task.rest_s - CREEP)
     samples, spent = [simulation.links()], 0.0
@@ -177,7 +182,13 @@ def simulated(task: Task, simulation: World) -> Outcome:
 
 
 def rigid_links(boxes: Boxes, positions: Array, turns: Array) -> tuple[Array, Array]:
-    """Place links of smarticles that are one body each, from (N, 3) centres of mass [m] and (N, 3, 3) rotations."""
+    """Return centres (N, 3, 3) [m] and axes (N, 3, 3, 3) of the links of rigid smarticles.
+
+    Args:
+        boxes: geometry of a smarticle.
+        positions: centres of mass, (N, 3) [m].
+        turns: rotations from body frame to laboratory frame, (N, 3, 3).
+    """
     still = np.zeros_like(positions)
     state = State.rigid(boxes, positions, turns, still, still)
     return state.link_positions, state.link_rotations

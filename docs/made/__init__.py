@@ -1,6 +1,6 @@
-"""Extension of Sphinx: tables made from the code when the site is built, and equations as MathML.
+"""Sphinx extension: generate tables from the code, and render equations as MathML.
 
-A page has a line `<!-- made here: NAME -->`; it is replaced by the Markdown that the function of that name returns.
+A line `<!-- made here: NAME -->` of a page is replaced by the Markdown table NAME of `MADE`.
 """
 
 from __future__ import annotations
@@ -36,13 +36,13 @@ MADE: Mapping[str, Callable[[], str]] = MappingProxyType(
         "series columns": tables.series_columns,
     }
 )
-"""Name of a table: function that writes it."""
+"""Functions that return Markdown tables, by the names of the tables."""
 
 _PLACE = re.compile(r"^<!-- made here: (.+?) -->$", re.MULTILINE)
 
 
 def filled(text: str) -> str:
-    """Return a page with its tables."""
+    """Return the Markdown of a page with all tables inserted."""
     return _PLACE.sub(lambda place: MADE[place[1]](), text)
 
 
@@ -51,7 +51,7 @@ def _fill(_app: Sphinx, _name: str, source: list[str]) -> None:
 
 
 def _plain(_app: Sphinx, _what: str, _name: str, _of: object, _options: object, lines: list[str]) -> None:
-    """Escape |x| in docstrings, which would be a substitution of reStructuredText."""
+    """Escape | in docstrings, since |x| is a substitution in reStructuredText."""
     lines[:] = [line if line.lstrip().startswith((">>>", "...")) else line.replace("|", "\\|") for line in lines]
 
 
@@ -68,21 +68,21 @@ def _mathml(node: nodes.math | nodes.math_block, *, block: bool) -> str:
 
 
 def show_inline(translator: HTML5Translator, node: nodes.math) -> None:
-    """Write an equation within a line, by docutils' own translator from LaTeX."""
+    """Render an inline equation as MathML with the LaTeX translator of docutils."""
     translator.body.append(_mathml(node, block=False))
     raise nodes.SkipNode
 
 
 def show_block(translator: HTML5Translator, node: nodes.math_block) -> None:
-    """Write an equation on lines of its own."""
+    """Render a display equation as MathML."""
     translator.body.append(f'<div class="math">{_mathml(node, block=True)}</div>\n')
     raise nodes.SkipNode
 
 
 def setup(app: Sphinx) -> dict[str, Any]:
-    """Register the extension."""
+    """Register the extension with Sphinx."""
     app.connect("source-read", _fill)
     app.connect("autodoc-process-docstring", _plain)
     app.add_html_math_renderer("mathml", inline_renderers=(show_inline, None), block_renderers=(show_block, None))
-    # The tables depend on the code, which Sphinx does not watch: `make docs` builds every page anew.
+    # Sphinx does not notice changes of the code behind tables, so `make docs` rebuilds every page.
     return {"parallel_read_safe": True, "parallel_write_safe": True}

@@ -1,4 +1,4 @@
-"""The keys of a scene, from its JSON schema: type, unit, range, default and meaning of each."""
+"""Tables of the keys of a scene from its JSON schema: type, unit, range, default and meaning."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _HEAD = ("key", "type", "unit", "range", "default", "meaning")
 
 
 def scene_keys() -> str:
-    """Return one table for the scene itself, and one for every mapping and kind of phase and motion in it."""
+    """Return Markdown tables of the keys of the scene, and of every phase, motion and other mapping."""
     from dem.scene.reading import json_schema  # noqa: PLC0415
 
     schema = json_schema()
@@ -42,12 +42,12 @@ def _name(reference: str) -> str:
 
 def _part(name: str, definition: Schema) -> str:
     kind = definition["properties"].get("type", {}).get("const")
-    said = " ".join(definition.get("description", "").split())
-    return f"({anchor(name)})=\n### {kind or name}\n\n{said}\n\n{_table(definition)}"
+    about = " ".join(definition.get("description", "").split())
+    return f"({anchor(name)})=\n### {kind or name}\n\n{about}\n\n{_table(definition)}"
 
 
 def anchor(name: str) -> str:
-    """Return the anchor of a definition of the schema."""
+    """Return the anchor of a definition of the schema on its page."""
     return f"scene-{name.lower()}"
 
 
@@ -62,11 +62,11 @@ def _table(definition: Schema) -> str:
         shown = "" if unit is None or unit[1] == "1" else cell(unit[1])
         default = "**needed**" if key in required else _default(entry)
         rows.append((code(key), _type(entry), shown, _range(entry), default, cell(_UNIT.sub("", meaning, count=1))))
-    return table(_HEAD, rows) if rows else "It has no keys besides its `type`.\n"
+    return table(_HEAD, rows) if rows else "It has no keys except `type`.\n"
 
 
 def _options(entry: Schema) -> Iterator[Schema]:
-    """What may stand there, without null."""
+    """Yield the alternatives of an entry, without null."""
     for option in entry.get("anyOf", [entry]):
         if option.get("type") != "null":
             yield option

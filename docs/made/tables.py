@@ -1,4 +1,4 @@
-"""Tables in Markdown: recorded data, fields and measures with their units, commands, results."""
+"""Markdown tables of recorded data, fields, measures, commands and results."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from postprocess.report.tables import table_lines
 
 RESULTS = Path(__file__).resolve().parents[2] / "results"
 _WIDTH = "100"
-"""Columns of the help, whatever the terminal of the build."""
+"""Width of the printed help [characters], independent of the terminal."""
 
 _SETS = (
     ("In every scene", "COLUMNS"),
@@ -27,27 +27,31 @@ _SETS = (
 
 
 def cell(text: str) -> str:
-    """Text as it may stand in a cell: one line, and nothing in it that would end the cell or begin HTML."""
+    """Return a text as the content of a Markdown cell: one line, with | and < escaped."""
     return " ".join(text.split()).replace("|", "\\|").replace("<", "&lt;")
 
 
 def code(text: str) -> str:
-    """A name as the code has it."""
+    """Return a name as inline code; empty for an empty name."""
     return f"`{text}`" if text else ""
 
 
 def table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
-    """Return a table; cells are escaped already where they are data."""
+    """Return a Markdown table; the caller escapes the cells."""
     return "\n".join(table_lines(head, rows)) + "\n"
 
 
 def _described(columns: Mapping[str, Any], what: str) -> str:
     rows = [(code(name), cell(one.unit), cell(one.description)) for name, one in columns.items()]
-    return table((what, "unit", "what"), rows)
+    return table((what, "unit", "meaning"), rows)
 
 
 def series_columns() -> str:
-    """Return the datasets of `series.h5`, set by set."""
+    """Return tables of the datasets of `series.h5`, grouped by the scenes that record them.
+
+    Raises:
+        LookupError: a dataset is in no group.
+    """
     from dem.record import columns  # noqa: PLC0415
 
     sets = {title: getattr(columns, name) for title, name in _SETS}
@@ -58,7 +62,7 @@ def series_columns() -> str:
 
 
 def frame_fields() -> str:
-    """Return the cell data of a frame, one value per link."""
+    """Return tables of the cell data of a frame, which have one value per link."""
     from dem.record.columns import FIELDS, MOTOR_FIELDS  # noqa: PLC0415
 
     sets = {"In every scene": FIELDS, "In scenes that actuate": MOTOR_FIELDS}
@@ -66,50 +70,50 @@ def frame_fields() -> str:
 
 
 def force_fields() -> str:
-    """Return the cell data of a file of forces, one value per contact."""
+    """Return a table of the cell data of a force file, which have one value per contact."""
     from dem.record.columns import FORCE_FIELDS  # noqa: PLC0415
 
     return _described(FORCE_FIELDS, "field")
 
 
 def export_fields() -> str:
-    """Return the fields of exported bodies."""
+    """Return a table of the fields of exported bodies."""
     from postprocess.bodies.fields import FIELDS  # noqa: PLC0415
 
-    rows = [(code(field.name), cell(field.unit), f"each {field.of}", cell(field.meaning)) for field in FIELDS]
-    return table(("field", "unit", "of", "what"), rows)
+    rows = [(code(field.name), cell(field.unit), field.of, cell(field.meaning)) for field in FIELDS]
+    return table(("field", "unit", "per", "meaning"), rows)
 
 
 def measure_columns() -> str:
-    """Return the columns of the measures, one part per module, which says what they are."""
+    """Return a section per module of measures: its docstring, and a table of its columns."""
     from postprocess.measures.registry import FrameMeasure, registered  # noqa: PLC0415
 
     parts: dict[str, list[tuple[str, str, str]]] = {}
     for measure in registered():
         module = measure.take.func.__module__ if isinstance(measure.take, partial) else measure.take.__module__
         if isinstance(measure, FrameMeasure):
-            of = "the last frame of each phase" if measure.costly else "each frame"
+            evaluated = "last frame of each phase" if measure.costly else "each frame"
         else:
-            of = "each phase " + ", ".join(code(name) for name in measure.phases)
-        rows = [(code(quantity.header), cell(measure.name), of) for quantity in measure.quantities]
+            evaluated = "phases " + ", ".join(code(name) for name in measure.phases)
+        rows = [(code(quantity.header), cell(measure.name), evaluated) for quantity in measure.quantities]
         parts.setdefault(module, []).extend(rows)
     texts = []
     for module, rows in parts.items():
-        said = (import_module(module).__doc__ or "").strip()
-        head = ("column", "measure", "taken of")
-        texts.append(f"### {module.rpartition('.')[2]}\n\n{said}\n\n{table(head, rows)}")
+        about = (import_module(module).__doc__ or "").strip()
+        head = ("column", "measure", "evaluated for")
+        texts.append(f"### {module.rpartition('.')[2]}\n\n{about}\n\n{table(head, rows)}")
     return "\n".join(texts)
 
 
 def packing_definitions() -> str:
-    """Return the definitions of the packing fraction."""
+    """Return a table of the definitions of the packing fraction."""
     from postprocess.measures.packing import DEFINITIONS  # noqa: PLC0415
 
-    return table(("definition", "what it is"), [(code(name), cell(text)) for name, text in DEFINITIONS.items()])
+    return table(("name", "definition"), [(code(name), cell(text)) for name, text in DEFINITIONS.items()])
 
 
 def command_list() -> str:
-    """Return every command in a line, linked to its help."""
+    """Return a table of all commands, with links to their help."""
     from smarticles.main import build_parser  # noqa: PLC0415
 
     _, commands = build_parser()
@@ -117,11 +121,11 @@ def command_list() -> str:
     for name, parser in commands.parsers.items():
         summary = (parser.description or "").partition("\n")[0].rstrip(".")
         rows.append((f"[{code(name)}](#command-{name})", cell(summary)))
-    return table(("command", "what it does"), rows)
+    return table(("command", "purpose"), rows)
 
 
 def command_help() -> str:
-    """Return the output of `--help`, of `smarticles` and of every command."""
+    """Return sections with the output of `--help` for `smarticles` and every command."""
     os.environ["COLUMNS"] = _WIDTH
     os.environ["NO_COLOR"] = "1"
     from smarticles.main import build_parser  # noqa: PLC0415
@@ -133,10 +137,10 @@ def command_help() -> str:
 
 
 def finding(readme: Path) -> tuple[str, str]:
-    """Return title and finding of a README: its heading, and the line quoted under it.
+    """Return the heading and the finding of a README, its first two lines.
 
     Raises:
-        LookupError: it does not begin with both.
+        LookupError: the file does not begin with a heading and a quoted line.
     """
     lines = [line for line in readme.read_text(encoding="utf-8").splitlines() if line.strip()]
     if not (len(lines) > 1 and lines[0].startswith("# ") and lines[1].startswith("> ")):
@@ -146,9 +150,9 @@ def finding(readme: Path) -> tuple[str, str]:
 
 
 def results_index() -> str:
-    """Return every folder of results with its finding."""
+    """Return a table of all folders of results with their findings."""
     rows = []
     for readme in sorted(RESULTS.glob("*/README.md")):
-        _, said = finding(readme)
-        rows.append((code(f"results/{readme.parent.name}"), said.replace("|", "\\|")))
-    return table(("folder", "what was found"), rows)
+        _, text = finding(readme)
+        rows.append((code(f"results/{readme.parent.name}"), text.replace("|", "\\|")))
+    return table(("folder", "finding"), rows)

@@ -1,4 +1,4 @@
-"""accuracy: what accuracy costs in time, measured on variants of one scene."""
+"""Command `accuracy`: measure error against wall time for variants of one scene."""
 
 from __future__ import annotations
 
@@ -6,11 +6,10 @@ import argparse
 import sys
 from collections.abc import Mapping
 from functools import partial
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 from dem.errors import InputError
-from smarticles.command_line import Commands, add_scene, add_shared, columns, positive_number, scene_settings
+from smarticles.command_line import Commands, add_options, columns, positive_number, scene_settings
 from smarticles.commands.study import compute_and_analyse
 from smarticles.sweeps import expected_wall_s, folder_of
 
@@ -19,61 +18,58 @@ if TYPE_CHECKING:
 
 
 def add(commands: Commands) -> None:
-    """Add the command."""
+    """Add `accuracy` to the command line."""
     accuracy = commands.add(
         "accuracy",
         run_accuracy,
-        summary="what accuracy costs in time: one scene at several settings of each knob",
+        summary="measure error against wall time: one scene at several settings of each knob",
         text="""
-Makes variants of a scene, each with one knob turned, several seeds each, runs them and prints errors
-against wall time. Knobs:
+Runs variants of a scene, the *ladder*. Each variant changes one knob, and is run with several seeds.
+The output compares errors with wall times. Knobs:
 
-  time-step    time step over the stable one: 0.9, 0.45, 0.225
-  stiffness    of contacts: ×1, ×2, ×4; the time step follows. On links 125 to 4000 N/m
-  section      spheres that stand for it: pitch 1.3, 1.0, 0.5, and two rows; finer yet for a scene of two rows.
-               On links one, two and three strands
-  restitution  0.2, 0.5, 0.7, 0.9: a property of the material, so a sensitivity and no accuracy
+  time-step    time step over the stable time step: 0.9, 0.45, 0.225
+  stiffness    contact stiffness: ×1, ×2, ×4, with the time step that it requires; on links 125 to 4000 N/m
+  section      spheres that represent the section of a link: pitch 1.3, 1.0, 0.5, and two rows; on links one,
+               two and three strands
+  restitution  0.2, 0.5, 0.7, 0.9; a property of the material, so this is a sensitivity, not an error
   control      time between two control updates of the motors: 4e-4, 2e-4, 1e-4 s; scenes that actuate
   hinge        stiffness of the hinges' pins: ×1, ×2, ×4; scenes that actuate, on YADE alone
-  fidelity     draft, standard, reference; on links also what is finer yet, converged
-  engine       the named fidelities of both engines, against converged on links; only if named in --knobs
+  fidelity     draft, standard, reference; on links also converged, which is finer
+  engine       the named fidelities of links and YADE against converged on links; only if named in --knobs
 
-The scene itself is a setting of every knob and runs once. The reference of a knob is its finest
-setting with finished runs. An error within the scatter between seeds is not resolved, which is not
-the same as none: more seeds narrow it, and the same command with more --seeds runs only these.
+The unchanged scene is one setting of every knob and is run once. The reference of a knob is its finest
+setting with finished runs. An error smaller than the scatter between seeds is reported as not resolved;
+more seeds reduce the scatter. If the command is repeated with more --seeds, only the new runs start.
 
-DIR gets the runs, and results/ with table, figure and advice; its work_precision.csv is what
-`smarticles plan --max-error --table` reads. Ctrl-C stops; the same command again goes on.
-`smarticles status DIR` shows how far it is.""",
+DIR gets the runs, and DIR/results a table, a figure and advice. `smarticles plan --max-error --table`
+reads the table work_precision.csv. Ctrl-C stops; repeat the command to continue. `smarticles status DIR`
+prints the progress.""",
         examples="""\
   smarticles accuracy scene.yaml --out ladder --dry-run
   smarticles accuracy scene.yaml --out ladder
   smarticles accuracy scene.yaml --out ladder --knobs fidelity --seeds 1,2,3,4,5
-  smarticles accuracy scene.yaml --out ladder --max-run-hours 1     leave out what takes longer
-  smarticles accuracy scene.yaml --out ladder --analyse             what the finished runs say so far
+  smarticles accuracy scene.yaml --out ladder --max-run-hours 1     omit slower settings
+  smarticles accuracy scene.yaml --out ladder --analyse             analyse the finished runs
 """,
     )
-    add_scene(accuracy, "run the whole ladder on this engine instead of what the scene says")
-    accuracy.add_argument("--out", type=Path, metavar="DIR", help="directory of the ladder")
+    add_options(accuracy, "scene", "--set", "--engine")
+    add_options(accuracy, "--out", help="directory of the ladder")
     accuracy.add_argument(
-        "--seeds", metavar="1,2,…", help="seeds of each setting, also as 1-20; default: 1,2,3, and 1-20 on links"
+        "--seeds", metavar="1,2,…", help="seeds of each setting, e.g. 1,2,5 or 1-20; default: 1,2,3, on links 1-20"
     )
-    accuracy.add_argument("--knobs", metavar="NAME,…", help="knobs to turn; default: all that the scene calls for")
+    accuracy.add_argument("--knobs", metavar="NAME,…", help="knobs to change; default: all that affect the scene")
     accuracy.add_argument(
         "--max-run-hours",
         type=positive_number,
         metavar="H",
-        help="leave out settings whose run is expected to take longer [h]; default: none",
+        help="omit settings with a longer expected wall time of one run [h]; default: no limit",
     )
-    accuracy.add_argument(
-        "--dry-run", action="store_true", help="show the ladder and its expected hours, write nothing"
-    )
-    accuracy.add_argument("--analyse", action="store_true", help="start no run, analyse those that are finished")
-    add_shared(accuracy, "--jobs")
+    add_options(accuracy, "--dry-run", help="print the ladder and its expected wall time; write nothing")
+    add_options(accuracy, "--analyse", "--jobs")
 
 
 def run_accuracy(arguments: argparse.Namespace) -> int:
-    """Show a ladder; run and analyse it."""
+    """Print a ladder, compute its missing runs, and analyse the finished runs; return the exit status."""
     from dem.scene.reading import load_scene  # noqa: PLC0415
     from studies.accuracy import (  # noqa: PLC0415
         BASE,
@@ -91,7 +87,7 @@ def run_accuracy(arguments: argparse.Namespace) -> int:
     knobs = None if arguments.knobs is None else parse_knobs(arguments.knobs)
     scene = load_scene(arguments.scene, scene_settings(arguments))
     ladder = build_ladder(scene, source=str(arguments.scene), knobs=knobs)
-    expected_s = {setting: expected_wall_s(one) for setting, one in ladder.scenes.items()}
+    expected_s = {setting: expected_wall_s(variant) for setting, variant in ladder.scenes.items()}
     if arguments.max_run_hours is not None:
         ladder = affordable(ladder, expected_s, 3600 * arguments.max_run_hours)
     seeds = seeds or default_seeds(scene)
@@ -101,7 +97,7 @@ def run_accuracy(arguments: argparse.Namespace) -> int:
         raise InputError("accuracy: --out DIR is missing; give a directory, or --dry-run to only show the ladder")
     print(_listing(ladder, expected_s, len(seeds), arguments.jobs), flush=True)
     if len(seeds) < 2:
-        warning = "one seed has no scatter, so nothing can be resolved; give --seeds 1,2,3"
+        warning = "the scatter is unknown with one seed, so that no error can be resolved; give --seeds 1,2,3"
         print(f"smarticles: warning: {warning}", file=sys.stderr)
     if arguments.dry_run:
         return 0
@@ -117,7 +113,7 @@ def run_accuracy(arguments: argparse.Namespace) -> int:
 
 
 def _listing(ladder: Ladder, expected_s: Mapping[str, float], seeds: int, jobs: int | None) -> str:
-    """Return the ladder as a table, and the wall time that it is expected to take."""
+    """Return the ladder as a table, with its expected wall time [s per run, h in total]."""
     from dem.engine.cores import usable_cores  # noqa: PLC0415
     from dem.plan.outlook import plan  # noqa: PLC0415
 
@@ -125,10 +121,10 @@ def _listing(ladder: Ladder, expected_s: Mapping[str, float], seeds: int, jobs: 
     rows = []
     for rung in ladder.rungs:
         planned = plan(ladder.scenes[rung.setting])
-        own = "reference" if references[rung.knob] == rung else ""
+        note = "reference" if references[rung.knob] == rung else ""
         section = f"{planned.strands} strands" if planned.strands else f"{planned.spheres_per_smarticle} spheres"
         shape = [planned.time_step_s, section]
-        rows.append([rung.knob, rung.label, rung.setting, own, *shape, round(expected_s[rung.setting])])
+        rows.append([rung.knob, rung.label, rung.setting, note, *shape, round(expected_s[rung.setting])])
     header = ["knob", "value", "setting", "", "time step s", "section", "expected wall s"]
     runs = seeds * len(ladder.settings)
     hours = seeds * sum(expected_s[setting] for setting in ladder.settings) / 3600

@@ -1,4 +1,4 @@
-"""compare: what differs between two runs or two sweeps, in scene, versions, measures and bits."""
+"""Command `compare`: compare scenes, versions, measures and bits of two runs or two sweeps."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from dem.errors import InputError
 from dem.record.names import MANIFEST, OF_SWEEP
-from smarticles.command_line import Cell, Commands, add_shared, as_json, columns, reject_existing
+from smarticles.command_line import Cell, Commands, add_options, as_json, columns, reject_existing
 from smarticles.measuring import PHASE, grouped, has_frames, measured, values_in
 
 if TYPE_CHECKING:
@@ -21,36 +21,35 @@ if TYPE_CHECKING:
     from dem.record.run import Run
     from templates.sweep.folder import Folder
 
-Differences = dict[str, tuple[Any, Any]]  #: Values of A and B by key; None where one of them has no such key
+Differences = dict[str, tuple[Any, Any]]  #: Values of A and B by key; None stands for a missing key
 
 _NUMBERS = ("A", "B", "B - A", "SE of B - A")
 
 
 def add(commands: Commands) -> None:
-    """Add the command."""
+    """Add `compare` to the command line."""
     compare = commands.add(
         "compare",
         compare_two,
-        summary="two runs or two sweeps: what differs in scene, versions, measures and bits",
+        summary="compare two runs or two sweeps: scene, versions, measures and bits",
         text="""
-Shows which keys of the scene and which versions differ, whether series and frames are the same bit for
-bit, and sets the measures of each phase beside each other. Of sweeps runs of one name are compared
-bit by bit, and measures as means over the runs of each group of variables; SE is that of the
-difference, from those of A and B.""",
+Prints the keys of the scene and the versions that differ, the measures of each phase, and whether series
+and frames agree bit by bit. Two sweeps are compared run by run: bits for runs with equal names, and
+means of measures for runs with equal variables. SE is the standard error of B - A.""",
         examples="""\
   smarticles compare runs/a runs/b
   smarticles compare friction friction-links --table differences.csv
   smarticles compare runs/a runs/b --json
 """,
     )
-    compare.add_argument("a", type=Path, metavar="A", help="a run or a sweep")
-    compare.add_argument("b", type=Path, metavar="B", help="another one of the same kind")
-    compare.add_argument("--table", type=Path, metavar="FILE.csv", help="write all measures as CSV")
-    add_shared(compare, "--overwrite", "--json")
+    compare.add_argument("a", type=Path, metavar="A", help="directory of a run or a sweep")
+    compare.add_argument("b", type=Path, metavar="B", help="second directory of this kind")
+    add_options(compare, "--table", help="write all measures as CSV")
+    add_options(compare, "--overwrite", "--json")
 
 
 def compare_two(arguments: argparse.Namespace) -> int:
-    """Print or write what differs."""
+    """Print the differences, or write them to files; return the exit status."""
     import pandas as pd  # noqa: PLC0415
 
     from postprocess.report.tables import write_table  # noqa: PLC0415
@@ -66,8 +65,8 @@ def compare_two(arguments: argparse.Namespace) -> int:
     print(f"A  {arguments.a}\nB  {arguments.b}\n")
     for what in ("scene", "versions"):
         rows = [[key, *("-" if value is None else str(value) for value in pair)] for key, pair in found[what].items()]
-        print(columns([what, "A", "B"], rows) if rows else f"{what}: the same", end="\n\n")
-    print("measures: the same" if found["identical"] else _measures(found["measures"]), end="\n\n")
+        print(columns([what, "A", "B"], rows) if rows else f"{what}: no difference", end="\n\n")
+    print("measures: no difference" if found["identical"] else _measures(found["measures"]), end="\n\n")
     for name, runs in found["only"].items():
         if runs:
             print(f"only in {name}: {', '.join(runs)}")
@@ -75,64 +74,66 @@ def compare_two(arguments: argparse.Namespace) -> int:
     if found["kind"] == "run":
         print("identical bits:", *map(_bits, bits.values()))
     else:
-        same = sum(one["identical"] for one in bits.values())
-        print(f"identical bits: {same} of {len(bits)} runs that both have")
-        print(*(f"  {name}: {_bits(one)}\n" for name, one in bits.items() if not one["identical"]), sep="", end="")
+        equal = sum(run["identical"] for run in bits.values())
+        print(f"identical bits: {equal} of {len(bits)} runs that both sweeps have")
+        print(*(f"  {name}: {_bits(run)}\n" for name, run in bits.items() if not run["identical"]), sep="", end="")
     if output is not None:
         print(f"{output}: {len(found['measures'])} rows")
     return 0
 
 
 def _bits(bits: Mapping[str, Any]) -> str:
+    """Return a result of `compare_bits` as text."""
     if bits["identical"]:
         return f"yes, {'all of the series' if bits['series'] else 'no series to compare'} and {bits['frames']} frames"
     parts = [] if bits["differs_at"] is None else [f"the series differ from t = {bits['differs_at']:g} s on"]
-    parts += [] if bits["same_count"] else ["one has more samples, columns or frames"]
-    parts.append(f"{bits['frames']} of {bits['compared']} frames are the same")
+    parts += [] if bits["same_count"] else ["one run has more samples, columns or frames"]
+    parts.append(f"{bits['frames']} of {bits['compared']} frames are equal")
     return f"no, {', '.join(parts)}"
 
 
 def _measures(found: Sequence[Mapping[str, Any]]) -> str:
-    """Return the quantities that short tables have, in their order, place by place."""
+    """Return a table of the main quantities, with one block of rows per phase."""
     from postprocess.measures.registry import shown_quantities  # noqa: PLC0415
 
-    shown = {quantity.header: one for quantity, one in shown_quantities()}
+    formats = {quantity.header: shown for quantity, shown in shown_quantities()}
     keys = [key for key in (found or [{}])[0] if key not in ("phase", "quantity", *_NUMBERS)]
     cells = []
     for _, rows in groupby(found, key=lambda row: [row[key] for key in ("phase", *keys)]):
-        place = {row["quantity"]: row for row in rows}
-        for name, one in shown.items():
-            if name in place:
-                numbers = [Cell.of(place[name][number], one.form, one.factor) for number in _NUMBERS]
-                cells.append([*(place[name][key] for key in keys), one.heading, *numbers])
+        by_quantity = {row["quantity"]: row for row in rows}
+        for name, shown in formats.items():
+            if name in by_quantity:
+                row = by_quantity[name]
+                numbers = [Cell.of(row[number], shown.form, shown.factor) for number in _NUMBERS]
+                cells.append([*(row[key] for key in keys), shown.heading, *numbers])
     if not cells:
-        return "no phase of both has been measured"
+        return "measures: no phase has frames in both"
     return columns([*keys, "measure", "A", "B", "B - A", "± SE"], cells)
 
 
 def compare(one: Path, other: Path) -> dict[str, Any]:
-    """Compare two runs, or two sweeps.
+    """Compare two run directories A and B, or two directories of sweeps.
 
     Returns:
         kind: "run" or "sweep".
-        identical: whether everything compared is the same, bit for bit, and nothing was left out.
-        scene: `Differences` of the scenes, dots for nesting; of sweeps, of their constants and variables.
-        versions: `Differences` of what computed them.
-        only: runs that one sweep alone has, by its letter; empty of runs.
-        bits: by the runs' names, see `same_bits`; of two runs one entry.
-        measures: one row per phase, or group and phase, and quantity: A, B, B - A, and its standard error.
+        identical: whether A and B have equal runs whose series and frames agree bit by bit.
+        scene: `Differences` of the scenes, with dots for nested keys; for sweeps, of constants and variables.
+        versions: `Differences` of engine, package versions and number of threads.
+        only: names of runs that only A or only B has; empty for runs.
+        bits: results of `compare_bits` by the runs' names; one entry for two runs.
+        measures: rows with phase, quantity, A, B, B - A, and the standard error of B - A; for sweeps also variables.
 
     Raises:
-        InputError: one is a run and the other a sweep, or they are neither.
+        InputError: A is a run and B a sweep or vice versa, or a directory is neither.
     """
     from dem.record.run import open_run  # noqa: PLC0415
     from templates.sweep.folder import open_folder  # noqa: PLC0415
 
     kinds = [_kind(path) for path in (one, other)]
     if kinds[0] != kinds[1]:
-        raise InputError(f"{one} is a {kinds[0]} and {other} a {kinds[1]}; give two of a kind")
+        raise InputError(f"{one} is a {kinds[0]} and {other} a {kinds[1]}; give two runs or two sweeps")
     if kinds[0] == "sweep":
-        found = _sweeps(open_folder(one), open_folder(other))
+        found = _compare_sweeps(open_folder(one), open_folder(other))
     else:
         first, second = open_run(one), open_run(other)
         tables = [measured([path]) if has_frames(path) else None for path in (one, other)]
@@ -140,29 +141,32 @@ def compare(one: Path, other: Path) -> dict[str, Any]:
             "scene": differences(first.scene, second.scene),
             "versions": differences(_made_by(first), _made_by(second)),
             "only": {},
-            "bits": {first.manifest.name: same_bits(first, second)},
-            "measures": _beside(*tables, keys=PHASE),
+            "bits": {first.manifest.name: compare_bits(first, second)},
+            "measures": _pair_up(*tables, keys=PHASE),
         }
     bits = found["bits"].values()
-    identical = bool(bits) and not any(found["only"].values()) and all(one["identical"] for one in bits)
+    identical = bool(bits) and not any(found["only"].values()) and all(run["identical"] for run in bits)
     return {"kind": kinds[0], "identical": identical, **found}
 
 
 def _kind(path: Path) -> str:
+    """Return whether a directory is a "run" or a "sweep"."""
     if (path / OF_SWEEP).is_file():
         return "sweep"
     if (path / MANIFEST).is_file():
         return "run"
-    msg = f"{path}: is neither a run directory nor that of a sweep; give what `smarticles run` or `sweep` made"
+    msg = f"{path}: is neither a run nor a sweep; give a directory that `smarticles run` or `sweep` wrote"
     raise InputError(msg)
 
 
 def _made_by(run: Run) -> dict[str, Any]:
-    made = run.manifest
-    return {"engine": made.engine, **made.versions, "threads": made.threads, "status": run.status.state}
+    """Return engine, versions, threads and status of a run."""
+    manifest = run.manifest
+    return {"engine": manifest.engine, **manifest.versions, "threads": manifest.threads, "status": run.status.state}
 
 
-def _sweeps(one: Folder, other: Folder) -> dict[str, Any]:
+def _compare_sweeps(one: Folder, other: Folder) -> dict[str, Any]:
+    """Return scene, versions, only, bits and measures of the result of `compare` for two sweeps."""
     from templates.sweep.sweep_file import SEED  # noqa: PLC0415
 
     first, second = ({entry.name: run for entry, run in zip(f.entries, f.runs(), strict=True)} for f in (one, other))
@@ -178,17 +182,18 @@ def _sweeps(one: Folder, other: Folder) -> dict[str, Any]:
             "A": [name for name in first if name not in second],
             "B": [name for name in second if name not in first],
         },
-        "bits": {name: same_bits(first[name], second[name]) for name in begun},
-        "measures": _beside(*tables, keys=keys),
+        "bits": {name: compare_bits(first[name], second[name]) for name in begun},
+        "measures": _pair_up(*tables, keys=keys),
     }
 
 
 def _listed(values: Mapping[str, Sequence[Any]]) -> dict[str, Any]:
+    """Return each single value as it is, and several values as one text."""
     return {name: some[0] if len(some) == 1 else ", ".join(map(str, some)) for name, some in values.items()}
 
 
 def _versions(runs: Iterable[Run]) -> dict[str, Any]:
-    """Return the versions of all runs of a sweep that have begun."""
+    """Return engine and package versions of the runs of a sweep that have started."""
     found: dict[str, dict[Any, None]] = {}
     for run in runs:
         for name, value in _made_by(run).items() if (run.path / MANIFEST).is_file() else ():
@@ -197,12 +202,13 @@ def _versions(runs: Iterable[Run]) -> dict[str, Any]:
 
 
 def differences(one: Mapping[str, Any], other: Mapping[str, Any]) -> Differences:
-    """Return the keys whose values differ, nested ones with dots."""
+    """Return the keys whose values differ, with dots for nested keys."""
     first, second = _flat(one), _flat(other)
     return {key: (first.get(key), second.get(key)) for key in first | second if first.get(key) != second.get(key)}
 
 
 def _flat(value: Any, place: str = "") -> dict[str, Any]:
+    """Return all leaves of nested mappings and lists, by keys with dots that begin with `place`."""
     if isinstance(value, list) and any(isinstance(item, Mapping | list) for item in value):
         value = {str(index): item for index, item in enumerate(value)}
     if not isinstance(value, Mapping):
@@ -214,14 +220,15 @@ def _flat(value: Any, place: str = "") -> dict[str, Any]:
     }
 
 
-def same_bits(one: Run, other: Run) -> dict[str, Any]:
-    """Compare two runs bit for bit: the columns of the series, not its file, which names the scene; files of frames.
+def compare_bits(one: Run, other: Run) -> dict[str, Any]:
+    """Compare columns of the series and files of the frames of two runs bit by bit.
 
     Returns:
-        series: whether all columns that both have are the same; None where one has no series.
-        differs_at: simulated time of the first sample that differs [s]; None where none does.
-        frames, compared: frames that are the same, and that both have.
-        same_count: whether both have the same numbers of frames, samples and columns.
+        series: whether all common columns are equal; None if a run has no series.
+        differs_at: simulated time of the first different sample [s]; None if all samples are equal.
+        frames: number of equal frames.
+        compared: number of frames that both runs have.
+        same_count: whether the runs have equal numbers of frames, samples and columns.
         identical: whether nothing differs.
     """
     import numpy as np  # noqa: PLC0415
@@ -251,8 +258,8 @@ def same_bits(one: Run, other: Run) -> dict[str, Any]:
     return {**found, "same_count": alike, "identical": identical}
 
 
-def _beside(one: pd.DataFrame | None, other: pd.DataFrame | None, *, keys: Sequence[str]) -> list[dict[str, Any]]:
-    """Return quantities of two tables beside each other, one row per place and quantity."""
+def _pair_up(one: pd.DataFrame | None, other: pd.DataFrame | None, *, keys: Sequence[str]) -> list[dict[str, Any]]:
+    """Return the quantities of tables A and B, one row per combination of `keys` and quantity."""
     from postprocess.statistics.points import marked  # noqa: PLC0415
 
     def records(table: pd.DataFrame | None) -> dict[str, dict[Any, Any]]:
@@ -260,9 +267,9 @@ def _beside(one: pd.DataFrame | None, other: pd.DataFrame | None, *, keys: Seque
         return {json.dumps([row[key] for key in keys], default=str): row for row in rows}
 
     rows = []
-    twins = records(other)
+    second = records(other)
     for place, row in records(one).items():
-        twin = twins.get(place, {})
+        twin = second.get(place, {})
         for name, value in row.items():
             quantity = name.endswith("]") and " SE [" not in name and name not in keys and name in twin
             if not quantity or not isinstance(value, int | float):

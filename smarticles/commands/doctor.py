@@ -1,7 +1,6 @@
-"""doctor: which parts of the software are installed and work.
+"""Command `doctor`: test which parts of the software are installed and work.
 
-YADE, PyVista and the other packages are tried in processes of their own, so that not even a crash of theirs ends the
-command.
+YADE, PyVista and the other packages are tested in separate processes, so that a crash does not end the command.
 """
 
 from __future__ import annotations
@@ -19,20 +18,20 @@ from collections.abc import Iterator
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
-from smarticles.command_line import Commands, add_shared
+from smarticles.command_line import Commands, add_options
 
 EXTRAS = {
     **dict.fromkeys(("matplotlib", "PIL", "pyvista", "vtk", "vtkmodules", "imageio_ffmpeg"), "viz"),
     **dict.fromkeys(("trame", "trame_vtk", "trame_client", "trame_server", "aiohttp", "wslink"), "view"),
     "trimesh": "export",
 }
-"""Extra of the project that brings a module; modules that are not listed come with the project itself."""
+"""Extra of the project that installs a module; other modules come with the project itself."""
 
-LAMMPS_TRIED = "29 Sep 2021 - Update 2"  # Debian 12's
+LAMMPS_TESTED = "29 Sep 2021 - Update 2"  # Debian 12's
 _TIMEOUT_S = 120
-_LEAST_GIB = 1.0  # of memory and of disk, for one run
+_LEAST_GIB = 1.0  # memory and disk space that one run needs
 
-# Each prints what it found, or ends with what is wrong.
+# Each script prints version and result, or exits with a message about the failure.
 _YADE = """
 import sys
 from dem.engine.yade.library import import_yade
@@ -63,15 +62,15 @@ import sys
 from dem.engine.lammps.child import Child, lammps_version
 version = lammps_version()
 child = Child(1)
-child.send("print obeyed file obeyed")
-obeyed = (child.scratch / "obeyed").exists()
+child.send("print executed file executed")
+executed = (child.scratch / "executed").exists()
 child.close()
-if not obeyed:
-    sys.exit(f"{{version}} does not carry out a command")
-tried = {LAMMPS_TRIED!r}
-print(f"{{version}}, under mpirun" + ("" if version == tried else f"; the engine was tried with {{tried}}"))
+if not executed:
+    sys.exit(f"{{version}} does not execute a command")
+tested = {LAMMPS_TESTED!r}
+print(f"{{version}}, under mpirun" + ("" if version == tested else f"; the engine was tested with {{tested}}"))
 """
-# A sphere before a plain background: an empty picture has no contrast.
+# Draws a sphere; an empty picture would have no contrast.
 _PYVISTA = """
 import sys, pyvista
 plotter = pyvista.Plotter(off_screen=True, window_size=(64, 64))
@@ -93,30 +92,30 @@ _OPTIONAL = {**{name: name for name in ("matplotlib", "trimesh", "trame", "aioht
 
 @dataclass(frozen=True, kw_only=True)
 class Check:
-    """What was found about one part: version and place, or why it fails and what to do then."""
+    """Result of the test of one part of the software."""
 
     name: str
-    ok: bool
-    needed: bool
-    found: str
-    way_out: str = ""
+    ok: bool  #: Whether the part works
+    needed: bool  #: Whether a run needs the part
+    found: str  #: Version and location, or the cause of the failure
+    way_out: str = ""  #: What to do about a failure
 
 
 def add(commands: Commands) -> None:
-    """Add the command."""
+    """Add `doctor` to the command line."""
     doctor = commands.add(
         "doctor",
         examine,
-        summary="what of YADE, PyVista, Slurm … is installed and works",
+        summary="test which of YADE, LAMMPS, PyVista, Slurm … are installed and work",
         text="""
-Tries each part instead of only looking for it. Exit status 1 if something that a run needs fails,
-with the way out.""",
+Each part is used once, not just searched for. The exit status is 1 if a part that every run needs
+fails; the output then says what to do.""",
         examples="""\
   smarticles doctor
   smarticles doctor --json
 """,
     )
-    add_shared(doctor, "--json")
+    add_options(doctor, "--json")
 
 
 def way_to_install(module: str) -> str:
@@ -127,7 +126,7 @@ def way_to_install(module: str) -> str:
 
 
 def examine(arguments: argparse.Namespace) -> int:
-    """Print what is installed and works; return 0 if everything that a run needs works, otherwise 1."""
+    """Print all checks; return 0 if every part that a run needs works, otherwise 1."""
     found = []
     for check in checks():
         found.append(check)
@@ -140,23 +139,29 @@ def examine(arguments: argparse.Namespace) -> int:
     if arguments.json:
         print(json.dumps({"ok": not failed, "checks": [asdict(check) for check in found]}, indent=2))
     else:
-        print(f"a run needs what fails here: {', '.join(failed)}" if failed else "everything that a run needs works")
+        print(f"runs need these, which fail: {', '.join(failed)}" if failed else "everything that a run needs works")
     return 1 if failed else 0
 
 
 def checks() -> Iterator[Check]:
-    """Yield all checks, one after the other; they take a few seconds."""
+    """Yield the results of all checks one by one; all together take a few seconds."""
     yield Check(name="python", ok=True, needed=True, found=f"{platform.python_version()}, {sys.executable}")
-    links = _check("links", *_ask(_LINKS), f"only scenes with `engine: links` need it; {way_to_install('numba')}")
-    # One engine is enough; only scenes that name the other one need that.
+    links = _check(
+        "links", *_run_script(_LINKS), f"only scenes with `engine: links` need it; {way_to_install('numba')}"
+    )
+    # YADE is optional if the links engine works.
     way_out = "`make setup` installs it, see environment.md; scenes with `engine: links` run without it"
-    yield _check("yade", *_ask(_YADE), way_out, needed=not links.ok)
+    yield _check("yade", *_run_script(_YADE), way_out, needed=not links.ok)
     yield links
-    yield _check("lammps", *_ask(_LAMMPS), "only scenes with `engine: lammps` need it; `make setup-mpi` installs it")
+    yield _check(
+        "lammps", *_run_script(_LAMMPS), "only scenes with `engine: lammps` need it; `make setup-mpi` installs it"
+    )
     for module, name in {**_NEEDED, **_OPTIONAL}.items():
         version = f"import {module}, importlib.metadata; print(importlib.metadata.version({name!r}))"
-        yield _check(name, *_ask(version), way_to_install(module), needed=module in _NEEDED)
-    yield _check("pyvista", *_ask(_PYVISTA), f"only pictures need it; {way_to_install('pyvista')}; see environment.md")
+        yield _check(name, *_run_script(version), way_to_install(module), needed=module in _NEEDED)
+    yield _check(
+        "pyvista", *_run_script(_PYVISTA), f"only pictures need it; {way_to_install('pyvista')}; see environment.md"
+    )
     yield _check("slurm", *slurm(), "only `sweep --submit slurm` needs it; use `--submit local` on this machine")
     cores = f"{len(os.sched_getaffinity(0))} usable of {os.cpu_count()}"
     yield Check(name="cores", ok=True, needed=True, found=cores)
@@ -170,12 +175,12 @@ def _check(name: str, ok: bool, found: str, way_out: str, *, needed: bool = Fals
 
 
 def slurm() -> tuple[bool, str]:
-    """Return whether Slurm's controller answers, and Slurm's version."""
+    """Return whether Slurm's controller answers, and a text with Slurm's version."""
     if shutil.which("sbatch") is None or shutil.which("scontrol") is None:
         return False, "no sbatch"
     version = "sbatch is installed"
     try:
-        # Without a slurm.conf even --version fails: Slurm is installed, but not set up.
+        # Without a slurm.conf, `sbatch --version` fails although Slurm is installed.
         version = _output("sbatch", "--version")
         _output("scontrol", "ping")
     except (OSError, subprocess.SubprocessError):
@@ -184,7 +189,7 @@ def slurm() -> tuple[bool, str]:
 
 
 def memory() -> tuple[bool, str]:
-    """Return whether enough memory is available for one run, and how much."""
+    """Return whether the available memory suffices for one run, and a text with the amount."""
     lines = (line.split() for line in Path("/proc/meminfo").read_text("ascii").splitlines())
     gib = {words[0].rstrip(":"): int(words[1]) / 2**20 for words in lines}
     found = f"{gib['MemAvailable']:.1f} GiB available of {gib['MemTotal']:.1f} GiB"
@@ -192,22 +197,22 @@ def memory() -> tuple[bool, str]:
 
 
 def disk(folder: Path) -> tuple[bool, str]:
-    """Return whether a run directory can be written in a folder, and the space that is free."""
+    """Return whether a folder can hold a run directory, and a text with the free space."""
     free = shutil.disk_usage(folder).free / 2**30
     found = f"{free:.1f} GiB free in {folder}"
     try:
-        # As every file of a run is written: beside, then renamed.
+        # Files of a run are written under a temporary name and renamed.
         with tempfile.TemporaryDirectory(dir=folder, prefix=".doctor-") as scratch:
             written = Path(scratch, "written")
-            written.write_text("whole", "ascii")
+            written.write_text("content", "ascii")
             written.replace(Path(scratch, "renamed"))
     except OSError as error:
         return False, f"{found}, cannot be written: {error.strerror}"
     return free >= _LEAST_GIB, found
 
 
-def _ask(script: str) -> tuple[bool, str]:
-    """Run a script in a process of its own; return whether it worked, and the last line of its output or errors."""
+def _run_script(script: str) -> tuple[bool, str]:
+    """Run a Python script in a new process; return whether it succeeded, and the last line of its output."""
     try:
         child = subprocess.run(
             [sys.executable, "-c", script],
@@ -228,4 +233,5 @@ def _ask(script: str) -> tuple[bool, str]:
 
 
 def _output(*command: str) -> str:
+    """Return the output of a command; CalledProcessError if it fails."""
     return subprocess.run(command, check=True, capture_output=True, encoding="utf-8", timeout=10).stdout.strip()

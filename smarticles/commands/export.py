@@ -1,4 +1,4 @@
-"""export: true bodies of a run as files for other programs; a scene as input of another simulator."""
+"""Command `export`: write the bodies of a run for other programs, or a scene for LAMMPS."""
 
 from __future__ import annotations
 
@@ -7,86 +7,82 @@ import sys
 from pathlib import Path
 
 from dem.errors import InputError
-from smarticles.command_line import Commands
+from smarticles.command_line import Commands, add_options, names
 
 _FORMATS = ("vtp", "stl", "obj", "gltf", "glb")
 _LAMMPS = "lammps"
 
-# One line each; tests hold this table against `postprocess.export`, which is slow to import.
+# Kept here because `postprocess.export`, which has this table too, is slow to import; a test compares both.
 _FIELDS = """\
   smarticle_id [-]                     number of the smarticle, constant in all frames
   link [-]                             0 barb 1, 1 middle link, 2 barb 2
-  speed_m_per_s [m/s]                  of the centre of mass
-  height_m [m]                         of the centre of mass above the floor
-  velocity_m_per_s [m/s]               vector, of the link's centre
-  angular_velocity_rad_per_s [rad/s]   vector, of the link
-  contacts [-]                         other smarticles that it touches
-  crossings [-]                        links of others through its plane; their mean is ⟨N⟩
-  contact_cluster [-]                  number of its cluster by contact, 0 the largest
-  entanglement_cluster [-]             the same by entanglement
-  local_packing_fraction [-]           its volume over that of its Voronoi cell; takes most of the time
-  normal_force_N [N]                   sum of the normal forces at its contacts; this and the next where recorded
-  force_chain [-]                      number of its cluster by forces above the mean
-  angle_rad [rad]                      of a barb; this and the next of scenes that actuate
-  motor_torque_N_m [N m]               of the motor at the barb's hinge
-  motor_work_J [J]                     of that motor since the start
-  halted [-]                           1 where that motor is halted"""
+  speed_m_per_s [m/s]                  speed of the smarticle's centre of mass
+  height_m [m]                         height of the smarticle's centre of mass above the floor
+  velocity_m_per_s [m/s]               velocity vector of the link's centre
+  angular_velocity_rad_per_s [rad/s]   angular velocity vector of the link
+  contacts [-]                         number of other smarticles in contact with the smarticle
+  crossings [-]                        number of links of others through the smarticle's plane; mean: ⟨N⟩
+  contact_cluster [-]                  number of the cluster of touching smarticles, 0 the largest
+  entanglement_cluster [-]             number of the cluster of entangled smarticles, 0 the largest
+  local_packing_fraction [-]           volume of the smarticle over its Voronoi cell; slow to compute
+runs with recording.contact_forces:
+  normal_force_N [N]                   sum of the normal forces at the smarticle's contacts
+  force_chain [-]                      number of the cluster joined by forces above the mean, 0 the largest
+scenes that actuate:
+  angle_rad [rad]                      angle of the barb
+  motor_torque_N_m [N m]               torque of the motor at the barb's hinge
+  motor_work_J [J]                     work of that motor since the start
+  halted [-]                           1 if that motor is halted"""
 
 
 def add(commands: Commands) -> None:
-    """Add the command."""
+    """Add `export` to the command line."""
     export = commands.add(
         "export",
         export_run,
-        summary="write bodies of a run for ParaView, Blender, printers; a scene for LAMMPS",
+        summary="write the bodies of a run for ParaView, Blender or 3D printers, or a scene for LAMMPS",
         text=f"""
-Boxes of all links, wall, tiers, floor, hooks and strings where they are at a time, in metres.
-vtp: a folder for ParaView, all fields below in it; open it with `paraview --script=show_in_paraview.py`
-there, or open the .pvd files. gltf, glb: y upwards, colours by one field, every field that has a value
-everywhere as an attribute; Blender opens it. obj: colours. stl: shape alone. A file that exists is
-never replaced.
+Writes the boxes of all links, and wall, tiers, floor, hooks and strings at one time, in metres.
+Existing files are never replaced. Formats:
 
-lammps takes a scene file that begins with take-over, and writes a folder with a commented input deck: its
-poses at rest, contact law, time step, and phases relax, shake and remove-container (at once). What cannot be
-carried over is rejected by name.
+  vtp        folder for ParaView with all fields below; run `paraview --script=show_in_paraview.py`
+             in the folder, or open the .pvd files
+  gltf, glb  coloured by one field, y upwards, for example for Blender; fields without NaN become attributes
+  obj        shape and colours
+  stl        shape alone
+  lammps     folder with a commented input deck. DIR must be a scene file whose first phase is take-over.
+             The deck has the poses at rest, the contact law, the time step, and the phases relax, shake
+             and remove-container (at once). Other features of a scene are rejected by name.
 
-bodies: smarticles, wall, floor, hooks, strings; crossings with --with crossings: a point and a
-direction where a link passes through another smarticle's plane; forces with --with forces: lines through
-the contacts of a run that records their forces (recording.contact_forces).
+Bodies: smarticles, wall, floor, hooks, strings. --with crossings adds a point and a direction where a
+link passes through another smarticle's plane. --with forces adds lines through the contacts, for runs
+with recording.contact_forces.
 
-fields, of each box:
+Fields of each box:
 {_FIELDS}""",
         examples="""\
   smarticles export runs/a --to glb                        last frame, runs/a/export.glb
   smarticles export runs/a --to vtp --all --with crossings   runs/a/export-vtp, for ParaView
   smarticles export runs/a --to stl --time 1.5 --without wall,floor --output pile.stl
-  smarticles export on.yaml --to lammps                    on-lammps/in.lammps and what it reads
+  smarticles export on.yaml --to lammps                    on-lammps/in.lammps and its data files
 """,
     )
-    export.add_argument("directory", type=Path, metavar="DIR", help="run directory; for lammps a scene file")
+    add_options(export, "directory", help="run directory; for lammps a scene file")
     export.add_argument("--to", required=True, metavar="FORMAT", help=", ".join((*_FORMATS, _LAMMPS)))
+    default = "default: DIR/export.FORMAT or DIR/export-FORMAT; for lammps SCENE-lammps next to the scene"
+    add_options(export, "--output", metavar="PATH", help=default)
+    add_options(export, "--time")
+    export.add_argument("--all", action="store_true", help="export all frames, into a folder of numbered files")
+    export.add_argument("--with", dest="wanted", type=names, default=(), metavar="BODY,…", help="crossings, forces")
     export.add_argument(
-        "--output",
-        type=Path,
-        metavar="PATH",
-        help="default: DIR/export.FORMAT or DIR/export-FORMAT; for lammps SCENE-lammps beside the scene",
+        "--without", dest="unwanted", type=names, default=(), metavar="NAME,…", help="bodies or fields to leave out"
     )
-    export.add_argument("--time", type=float, metavar="S", help="simulated time [s], nearest frame; default: end")
-    export.add_argument("--all", action="store_true", help="all frames: a folder of numbered files")
-    export.add_argument("--with", dest="wanted", type=_names, default=(), metavar="WHAT,…", help="crossings, forces")
-    export.add_argument(
-        "--without", dest="unwanted", type=_names, default=(), metavar="WHAT,…", help="bodies or fields to leave out"
-    )
-    export.add_argument(
-        "--color-by", metavar="FIELD", help="of obj, gltf and glb; default: crossings, in a plane smarticle_id"
-    )
-
-
-def _names(text: str) -> tuple[str, ...]:
-    return tuple(word.strip() for word in text.split(",") if word.strip())
+    colours = "field for the colours of obj, gltf and glb; default: crossings, or smarticle_id for motion in a plane"
+    add_options(export, "--color-by", help=colours)
 
 
 def _export_scene(arguments: argparse.Namespace) -> int:
+    """Write the input deck of a scene for LAMMPS."""
     from dem.deck import DECK, write_deck  # noqa: PLC0415
     from smarticles.commands.run import read_scene  # noqa: PLC0415
 
@@ -99,26 +95,28 @@ def _export_scene(arguments: argparse.Namespace) -> int:
         ("--color-by", arguments.color_by),
     ):
         if value is not None:
-            raise InputError(f"{name}: is of frames of a run, and --to {_LAMMPS} writes a scene; leave it out")
+            raise InputError(
+                f"{name}: selects from the frames of a run, and --to {_LAMMPS} writes a scene; leave it out"
+            )
     folder: Path = arguments.output or scene.with_name(f"{scene.stem}-{_LAMMPS}")
     try:
         write_deck(read_scene(scene, ()), folder)
     except InputError as error:
         msg = str(error) if str(error).startswith((f"{scene}: ", "--output")) else f"{scene}: {error}"
         raise InputError(msg) from None
-    print(f"{folder}: run it there: lmp -in {DECK}")
+    print(f"{folder}: written; run in this folder: lmp -in {DECK}")
     return 0
 
 
 def export_run(arguments: argparse.Namespace) -> int:
-    """Export a run, or a scene for LAMMPS."""
+    """Export a run, or a scene for LAMMPS; return the exit status."""
     if arguments.to == _LAMMPS:
         return _export_scene(arguments)
     from postprocess import export  # noqa: PLC0415  (imports PyVista)
 
-    def show_progress(done: int, number: int) -> None:
-        if sys.stderr.isatty() and number > 1:
-            print(f"\rframe {done} of {number}", end="\n" if done == number else "", file=sys.stderr, flush=True)
+    def show_progress(done: int, count: int) -> None:
+        if sys.stderr.isatty() and count > 1:
+            print(f"\rframe {done} of {count}", end="\n" if done == count else "", file=sys.stderr, flush=True)
 
     written = export.export_run(
         arguments.directory,

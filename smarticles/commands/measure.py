@@ -1,4 +1,4 @@
-"""measure: tables of measures of runs."""
+"""Command `measure`: print or write tables of the measures of runs."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from textwrap import wrap
 from typing import TYPE_CHECKING
 
 from dem.errors import InputError
-from smarticles.command_line import Cell, Commands, add_shared, as_json, columns, reject_existing
+from smarticles.command_line import Cell, Commands, add_options, as_json, columns, names, reject_existing
 from smarticles.measuring import grouped, measured, sources
 
 if TYPE_CHECKING:
@@ -19,9 +19,9 @@ if TYPE_CHECKING:
 _RUNS = "runs [-]"
 _COMPARED = "second-highest-com"
 _WIDTH = 100  # characters of a terminal
-_Column = tuple[str, str, str, float]  #: Heading, column of the table, format, factor to the unit of the heading
+_Column = tuple[str, str, str, float]  #: Heading, column of the full table, number format, unit conversion factor
 _ALWAYS = (("phase", "phase type", "", 1.0), ("t [s]", "time [s]", ".2f", 1.0))
-# Of single frames only: their means over the last ones have no meaning.
+# Shown with --frames only, since their means over several frames have no meaning.
 _PER_FRAME = (
     ("F [N]", "pulled string force x [N]", ".3f", 1.0),
     ("length [mm]", "chain length [m]", ".1f", 1e3),
@@ -30,44 +30,41 @@ _PER_FRAME = (
 
 
 def add(commands: Commands) -> None:
-    """Add the command."""
+    """Add `measure` to the command line."""
     measure = commands.add(
         "measure",
         measure_runs,
-        summary="packing fraction, crossings, heights, contacts of runs",
+        summary="measure packing fraction, crossings, heights and contacts of runs",
         text="""
-Reads VTK frames and HDF5 series of runs that are done, failed or still going on. One row per phase,
-averaged over its last frames, with standard errors (SE). φ is given by several definitions, each
-named in its column. A phase that pulls a hook or strains a chain has its forces. Of a sweep's
-directory, all runs that have frames are measured, and what the sweep varies stands in columns of
-its own in CSV and JSON. --by averages over the runs that are alike in a variable, such as seeds.""",
+Reads the frames (VTK) and series (HDF5) of finished, failed and running simulations. The table has one
+row per phase: means over the last frames of the phase, with standard errors (SE). The packing
+fraction φ is given by several definitions; the column names the definition. Phases that pull a hook
+or strain a chain have columns for forces. If DIR is a sweep, all its runs with frames are measured,
+and CSV and JSON have a column for each variable of the sweep. --by averages over all runs that have
+equal values in some columns, for example over seeds.""",
         examples="""\
   smarticles measure runs/a
   smarticles measure runs/a runs/b --table phases.csv
   smarticles measure runs/a --frames --table frames.csv     one row per frame
   smarticles measure runs/a --json
-  smarticles measure friction --table runs.csv              of a sweep: its variables are columns
+  smarticles measure friction --table runs.csv              a sweep: one column per variable
   smarticles measure friction --by friction                 means ± SE over the runs of each value
   smarticles measure runs/a --profile profile.csv           φ(r, z) at the end of each phase
 """,
     )
     measure.add_argument("directories", nargs="+", type=Path, metavar="DIR", help="runs or sweeps")
-    measure.add_argument("--table", type=Path, metavar="FILE.csv", help="write all columns as CSV")
-    measure.add_argument("--frames", action="store_true", help="one row per frame, not per phase")
+    add_options(measure, "--table", help="write all columns as CSV")
+    measure.add_argument("--frames", action="store_true", help="one row per frame instead of one per phase")
     measure.add_argument(
-        "--by", metavar="NAME,…", help="means over the runs that have the same values of these columns, with their SE"
+        "--by", type=names, metavar="NAME,…", help="means and SE over runs with equal values in these columns"
     )
-    measure.add_argument(
-        "--profile",
-        type=Path,
-        metavar="FILE.csv",
-        help="write φ(r, z), rings and layers at the end of each phase, as CSV",
-    )
-    add_shared(measure, "--overwrite", "--json")
+    profile_help = "write φ(r, z) at the end of each phase, in rings and layers of the container, as CSV"
+    measure.add_argument("--profile", type=Path, metavar="FILE.csv", help=profile_help)
+    add_options(measure, "--overwrite", "--json")
 
 
 def measure_runs(arguments: argparse.Namespace) -> int:
-    """Print or write measures."""
+    """Print the measures of runs or write them to files; return the exit status."""
     import pandas as pd  # noqa: PLC0415
 
     from dem.record.run import Run, open_run  # noqa: PLC0415
@@ -89,7 +86,7 @@ def measure_runs(arguments: argparse.Namespace) -> int:
         try:
             table = grouped(table, by)
         except InputError as error:
-            raise InputError(f"--by {arguments.by}: {error}") from None
+            raise InputError(f"--by {','.join(by)}: {error}") from None
     if output is not None:
         write_table(table, output, overwrite=arguments.overwrite)
     if profile is not None:
@@ -110,20 +107,20 @@ def measure_runs(arguments: argparse.Namespace) -> int:
     return 0
 
 
-def _groups(arguments: argparse.Namespace) -> list[str]:
-    """Return the columns that --by names."""
+def _groups(arguments: argparse.Namespace) -> Sequence[str]:
+    """Return the columns named by --by; empty without --by."""
     if arguments.by is None:
-        return []
-    names = [name.strip() for name in arguments.by.split(",") if name.strip()]
-    if not names:
-        raise InputError(f"--by {arguments.by!r}: names no column; e.g. --by seed, or a variable of the sweep")
+        return ()
+    by: Sequence[str] = arguments.by
+    if not by:
+        raise InputError("--by: names no column; e.g. --by seed, or a variable of the sweep")
     if arguments.frames:
-        raise InputError(f"--by {arguments.by}: averages over phases of runs; leave --frames out")
-    return names
+        raise InputError(f"--by {','.join(by)}: averages over phases of runs; leave --frames out")
+    return by
 
 
 def _shown(table: pd.DataFrame, *, per_frame: bool) -> list[_Column]:
-    """Return the columns of short tables that have a value in any row."""
+    """Return the main columns of the table that have a value in at least one row."""
     from postprocess.measures.registry import shown_quantities  # noqa: PLC0415
     from postprocess.statistics.points import marked  # noqa: PLC0415
 
@@ -137,7 +134,7 @@ def _shown(table: pd.DataFrame, *, per_frame: bool) -> list[_Column]:
 
 
 def _text(table: pd.DataFrame, by: Sequence[str], shown: Sequence[_Column]) -> str:
-    """Return the columns to be shown: of each group, or one block per run under its name."""
+    """Return the printed table: one row per group with `by`, otherwise one block of rows per run below its name."""
     named = [*by, _RUNS] if by else []
     rows = [
         [
@@ -161,31 +158,33 @@ def _text(table: pd.DataFrame, by: Sequence[str], shown: Sequence[_Column]) -> s
 
 
 def _notes(table: pd.DataFrame) -> list[str]:
-    """Return warnings about values that could be taken for a result."""
+    """Return notes on forces of hooks that must not be read as results."""
     notes = []
     for row in table.to_dict("records") if "hook work [J]" in table.columns else ():
         where = f"{row['run']}: phase {row['phase']} ({row['phase type']})"
         if row["hook work [J]"] == 0 and row["hook peak force over n W_s [-]"] == 0:
             notes.append(
-                f"{where}: nothing touched the hook while it was raised, its force is 0 N throughout; lower "
+                f"{where}: nothing touched the hook while it was raised, so its force is 0 N; lower "
                 "hooks.upper_height_m or raise count"
             )
         if row["hook held fast [-]"] == 1:
-            way = 1e3 * row["hook raised at the end [m]"]
-            notes.append(f"{where}: force_limit_N stopped the hook after {way:.3g} mm, so the peak is a lower bound")
+            height_mm = 1e3 * row["hook raised at the end [m]"]
+            notes.append(
+                f"{where}: force_limit_N stopped the hook after {height_mm:.3g} mm; the peak force is a lower bound"
+            )
     return notes
 
 
 def _legend(shown: Container[str], *, per_frame: bool, by: Sequence[str]) -> str:
-    """Return the meaning of the columns that are shown, and the frames or runs that they are means over."""
+    """Return the legend of the printed columns, and the frames or runs that the means are taken over."""
     from postprocess.measures.packing import COSTLY_DEFINITIONS, DEFINITIONS  # noqa: PLC0415
     from postprocess.measures.pull import WINDOW  # noqa: PLC0415
     from postprocess.measures.strain import FRACTURE, PEAK, QUANTITIES, WIDENING, YIELD  # noqa: PLC0415
     from postprocess.measures.table import LAST_FRAMES  # noqa: PLC0415
 
-    averaged = f"means over the last {LAST_FRAMES} frames of each phase, SE: their standard error"
+    averaged = f"means over the last {LAST_FRAMES} frames of each phase; SE: standard error of the mean"
     if by:
-        averaged = f"means over runs of their means over the last {LAST_FRAMES} frames, SE: standard error over runs"
+        averaged = f"means over runs and over the last {LAST_FRAMES} frames of each; SE: standard error over runs"
     lines = ["one row per frame" if per_frame else averaged]
     if f"phi {_COMPARED} [-]" in shown:
         costly = " and ".join(name for name in DEFINITIONS if name in COSTLY_DEFINITIONS)
@@ -196,15 +195,18 @@ def _legend(shown: Container[str], *, per_frame: bool, by: Sequence[str]) -> str
         ]
     if "crossings mean [-]" in shown:
         lines.append(
-            "⟨N⟩: links of others through a smarticle's plane; z: height of the centre of mass above the floor"
+            "⟨N⟩: mean number of links of others through a smarticle's plane; z: height of the centre of mass "
+            "above the floor"
         )
     if "hook work [J]" in shown:
         lines.append(
-            f"peak F/nW: largest mean over {WINDOW:g} s of the force on the hook that is raised, over the weight of "
+            f"peak F/nW: largest running mean ({WINDOW:g} s) of the force on the raised hook, divided by the weight of "
             "all smarticles; hook work: ∫ F dz over the whole pull"
         )
     if PEAK in shown:
-        lines.append(f"peak F: {QUANTITIES[PEAK]}; strain: of the distance along x between the strings' ties")
+        lines.append(
+            f"peak F: {QUANTITIES[PEAK]}; strain: of the distance along x between the points where the strings are tied"
+        )
         lines += [f"at yield: {QUANTITIES[YIELD]}"] if YIELD in shown else []
         lines += [f"at fracture: {QUANTITIES[FRACTURE]}"] if FRACTURE in shown else []
         lines.append(f"widening: {QUANTITIES[WIDENING]}")

@@ -1,14 +1,13 @@
-"""plan: what a run would do and cost."""
+"""Command `plan`: print what a run would compute and cost."""
 
 from __future__ import annotations
 
 import argparse
 from dataclasses import asdict
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 from dem.errors import InputError
-from smarticles.command_line import Commands, add_scene, add_shared, as_json, positive_number, scene_settings
+from smarticles.command_line import Commands, add_options, as_json, names, positive_number, scene_settings
 from smarticles.commands.run import read_scene
 
 if TYPE_CHECKING:
@@ -17,18 +16,19 @@ if TYPE_CHECKING:
 
 
 def add(commands: Commands) -> None:
-    """Add the command."""
+    """Add `plan` to the command line."""
     plan = commands.add(
         "plan",
         plan_scene,
-        summary="what a run would do and cost; simulates nothing",
+        summary="print what a run would compute and cost; nothing is simulated",
         text="""
-Shows the phases, what acts in each and why, time step, spheres and the expected wall time.
+Prints the phases, the effects of each phase with their reasons, the time step, the number of spheres
+and the expected wall time.
 
-With --max-error, --max-hours or both, engine and fidelity are chosen instead of the scene's own: the
-cheapest whose measured error of the packing fractions φ_0 and φ_f (or of what --of says) is within the
-one, or the most exact within the other; with --engine, of that engine. What was measured stands in a
-table that `smarticles accuracy SCENE --knobs engine` writes.""",
+--max-error and --max-hours choose engine and fidelity. With --max-error, the cheapest choice is taken
+whose measured error of the packing fractions φ_0 and φ_f (or of the quantities of --of) is below the
+limit; with --max-hours alone, the most accurate choice within the wall time. --engine restricts the
+choice to one engine. Errors are read from a table of `smarticles accuracy SCENE --knobs engine`.""",
         examples="""\
   smarticles plan scene.yaml
   smarticles plan scene.yaml --set fidelity=reference
@@ -38,7 +38,7 @@ table that `smarticles accuracy SCENE --knobs engine` writes.""",
   smarticles plan scene.yaml --max-hours 4
 """,
     )
-    add_scene(plan, "plan it on this engine instead of what the scene says")
+    add_options(plan, "scene", "--set", "--engine")
     plan.add_argument(
         "--max-error",
         type=positive_number,
@@ -47,18 +47,19 @@ table that `smarticles accuracy SCENE --knobs engine` writes.""",
     )
     plan.add_argument(
         "--of",
+        type=names,
         metavar="NAME,…",
-        help="what --max-error is of: phi_0, phi_f, crossings (⟨N⟩); default: phi_0,phi_f",
+        help="quantities that --max-error limits: phi_0, phi_f, crossings (⟨N⟩); default: phi_0,phi_f",
     )
-    plan.add_argument("--max-hours", type=positive_number, metavar="H", help="wall time of the run on one core [h]")
     plan.add_argument(
-        "--table", type=Path, metavar="FILE.csv", help="measured errors; default: those that ship, if any do"
+        "--max-hours", type=positive_number, metavar="H", help="largest wall time of the run on one core [h]"
     )
-    add_shared(plan, "--json")
+    add_options(plan, "--table", help="table of measured errors; default: the table that ships")
+    add_options(plan, "--json")
 
 
 def plan_scene(arguments: argparse.Namespace) -> int:
-    """Print the plan of a scene."""
+    """Print the plan of a scene; return the exit status."""
     from dem.plan.outlook import plan  # noqa: PLC0415
 
     scene = read_scene(arguments.scene, scene_settings(arguments))
@@ -75,18 +76,19 @@ def plan_scene(arguments: argparse.Namespace) -> int:
 
 
 def _chosen(scene: Scene, arguments: argparse.Namespace) -> Choice | None:
-    """Return the fidelity that --max-error and --max-hours ask for; None without them."""
+    """Return engine and fidelity within --max-error and --max-hours; None without these options."""
     from dem.plan.choice import PACKING, QUANTITIES, choose, read_table  # noqa: PLC0415
 
     if arguments.max_error is None and arguments.max_hours is None:
         for option, value in (("--table", arguments.table), ("--of", arguments.of)):
             if value is not None:
-                raise InputError(f"{option} {value}: is for --max-error or --max-hours; give one of them")
+                text = ",".join(value) if option == "--of" else value
+                raise InputError(f"{option} {text}: needs --max-error or --max-hours; add one of them")
         return None
-    of = PACKING if arguments.of is None else tuple(word.strip() for word in arguments.of.split(","))
-    for word in of:
-        if word not in QUANTITIES:
-            raise InputError(f"--of {arguments.of}: {word!r} is not measured; known: {', '.join(QUANTITIES)}")
+    of = PACKING if arguments.of is None else arguments.of
+    for name in of:
+        if name not in QUANTITIES:
+            raise InputError(f"--of {','.join(of)}: {name!r} is not measured; known: {', '.join(QUANTITIES)}")
     return choose(
         scene,
         read_table(arguments.table, of=of, engine=arguments.engine),

@@ -1,4 +1,4 @@
-"""report: one page of everything about a run, a sweep or a study."""
+"""Command `report`: write one HTML page about a run, a sweep or a study."""
 
 from __future__ import annotations
 
@@ -7,44 +7,49 @@ from pathlib import Path
 
 from dem.errors import InputError
 from dem.record.names import MANIFEST, OF_SWEEP
-from smarticles.command_line import Commands, add_shared
+from smarticles.command_line import Commands, add_options, reject_existing
 
 
 def add(commands: Commands) -> None:
-    """Add the command."""
+    """Add `report` to the command line."""
     report = commands.add(
         "report",
         write_report,
-        summary="one HTML page of a run, a sweep or a study",
+        summary="write one HTML page about a run, a sweep or a study",
         text="""
-Scene, effects and why, settings and their measured accuracy, measures, figures, the final state, which can
-be turned, comparison with the paper and with Gravish where a study has one, warnings of the logs, and how to
-repeat it. The file holds all that it shows: it can be sent, kept, and opened without a network.""",
+The page has the scene, the effects with the reasons for each, the fidelity and its measured accuracy,
+measures, figures, views of the final state from all sides, the comparison of a study with published
+results, warnings from the logs, and the commands that repeat the work. The file contains all pictures
+and needs no network.""",
         examples="""\
   smarticles report runs/a                                  runs/a/report.html
-  smarticles report friction --output friction.html         of a sweep
-  smarticles report gravish                                 of a study, with its findings
-  smarticles report results/gravish --output gravish.html   of the results of a study alone
+  smarticles report friction --output friction.html         a sweep
+  smarticles report gravish                                 a study, with its findings
+  smarticles report results/gravish --output gravish.html   the results of a study, without its runs
 """,
     )
-    report.add_argument("directory", type=Path, metavar="DIR", help="of a run, a sweep, a study, or a study's results")
-    report.add_argument("--output", type=Path, metavar="FILE.html", help="default: DIR/report.html")
+    add_options(report, "directory", help="directory of a run, a sweep, a study, or the results of a study")
+    add_options(report, "--output", metavar="FILE.html", help="default: DIR/report.html")
     report.add_argument(
-        "--accuracy", type=Path, metavar="FILE.csv", help="measured errors of fidelities; default: those that ship"
+        "--accuracy", type=Path, metavar="FILE.csv", help="table of measured errors; default: the table that ships"
     )
-    add_shared(report, "--jobs", "--overwrite")
+    add_options(report, "--jobs", "--overwrite")
 
 
 def write_report(arguments: argparse.Namespace) -> int:
-    """Write the page."""
-    from postprocess.report.figures import reject_existing, whole_file  # noqa: PLC0415
+    """Write the HTML page and print its name and size; return the exit status.
+
+    Raises:
+        InputError: wrong name of the output, unreadable table of errors, or an unknown kind of directory.
+    """
+    from postprocess.report.figures import whole_file  # noqa: PLC0415
 
     directory: Path = arguments.directory
     output: Path = arguments.output or directory / "report.html"
     if output.suffix != ".html":
-        raise InputError(f"--output {output}: a report is HTML; let its name end in .html")
-    # Before a minute of measuring, not after it.
-    reject_existing(output, overwrite=arguments.overwrite)
+        raise InputError(f"--output {output}: a report is HTML; use a name that ends in .html")
+    # Checked before the measures are computed, which can take a minute.
+    reject_existing("--output", output, overwrite=arguments.overwrite)
     if arguments.output is not None and not output.parent.is_dir():
         msg = f"--output {output}: the folder {output.parent} does not exist; make it, or choose another one"
         raise InputError(msg)
@@ -63,7 +68,7 @@ def write_report(arguments: argparse.Namespace) -> int:
 
 
 def _page(directory: Path, accuracy: Path | None, jobs: int | None) -> str:
-    """Return the page of a run, a sweep, a study, or the results of a study."""
+    """Return the HTML page of a run, a sweep, a study, or the results of a study."""
     from dem.engine.cores import usable_cores  # noqa: PLC0415
     from smarticles.reporting.run import run_page  # noqa: PLC0415  (pandas, matplotlib, PyVista)
     from smarticles.reporting.sweep import PROVENANCE, results_page, sweep_page  # noqa: PLC0415
@@ -75,5 +80,7 @@ def _page(directory: Path, accuracy: Path | None, jobs: int | None) -> str:
         return run_page(directory, accuracy)
     if (directory / PROVENANCE).is_file():
         return results_page(directory)
-    msg = f"{directory}: is no run, sweep or study, nor the results of one; give what `smarticles run` or `sweep` made"
+    msg = (
+        f"{directory}: is no run, sweep or study, nor the results of a study; give a directory that `smarticles` wrote"
+    )
     raise InputError(msg)

@@ -1,4 +1,4 @@
-"""init and schema: a commented scene to begin with, and all keys that a scene may have."""
+"""Commands `init` and `schema`: write a commented example scene; print the JSON schema of scenes."""
 
 from __future__ import annotations
 
@@ -8,17 +8,17 @@ import shlex
 from pathlib import Path
 
 from dem.errors import InputError
-from smarticles.command_line import Commands
+from smarticles.command_line import Commands, add_options
 from smarticles.starters import KINDS, about, starter
 
 
 def add(commands: Commands) -> None:
-    """Add `init` and `schema`."""
+    """Add `init` and `schema` to the command line."""
     init = commands.add(
         "init",
         write_scene,
-        summary="write a commented scene to begin with",
-        text="Small scenes, seconds each, with a word on every key worth changing. Nothing is overwritten.\n\n"
+        summary="write a commented example scene",
+        text="Each scene takes seconds to compute, and explains the keys. An existing file is never replaced.\n\n"
         + "\n".join(f"  {kind:<10}{about(kind)}" for kind in KINDS),
         examples="""\
   smarticles init                                 scene.yaml: pour, rest, shake
@@ -28,16 +28,14 @@ def add(commands: Commands) -> None:
     init.add_argument(
         "kind", nargs="?", choices=KINDS, default=KINDS[0], metavar="KIND", help=f"{', '.join(KINDS)}; default: shaken"
     )
-    init.add_argument(
-        "--output", type=Path, default=Path("scene.yaml"), metavar="FILE.yaml", help="default: scene.yaml"
-    )
+    add_options(init, "--output", default=Path("scene.yaml"), metavar="FILE.yaml", help="default: scene.yaml")
     commands.add(
         "schema",
         print_schema,
         summary="print the JSON schema of scene files",
         text="""
-Every key with its unit, default and meaning. Editors use it to complete and check scenes: put
-`# yaml-language-server: $schema=scene.schema.json` on the first line of a scene.""",
+The schema has every key with unit, default and meaning. Editors complete and check a scene with it if
+the first line of the scene is `# yaml-language-server: $schema=scene.schema.json`.""",
         examples="""\
   smarticles schema > scene.schema.json
 """,
@@ -45,10 +43,14 @@ Every key with its unit, default and meaning. Editors use it to complete and che
 
 
 def write_scene(arguments: argparse.Namespace) -> int:
-    """`smarticles init`."""
+    """Write an example scene to a new file; return the exit status.
+
+    Raises:
+        InputError: the file exists, or its folder does not.
+    """
     output: Path = arguments.output
     try:
-        # "x": never over a file that exists, nor through a link.
+        # Mode "x" fails for existing files and links.
         with output.open("x", encoding="utf-8") as file:
             file.write(starter(arguments.kind))
     except FileExistsError:
@@ -56,14 +58,14 @@ def write_scene(arguments: argparse.Namespace) -> int:
     except FileNotFoundError:
         msg = f"--output {output}: the folder {output.parent} does not exist; make it, or choose another one"
         raise InputError(msg) from None
-    place, run = shlex.quote(str(output)), shlex.quote(f"runs/{output.stem}")
+    scene, run = shlex.quote(str(output)), shlex.quote(f"runs/{output.stem}")
     print(f"{output}: {about(arguments.kind)}")
-    print(f"next: smarticles plan {place}, smarticles run {place} --out {run}")
+    print(f"next: smarticles plan {scene}, smarticles run {scene} --out {run}")
     return 0
 
 
 def print_schema(_: argparse.Namespace) -> int:
-    """`smarticles schema`."""
+    """Print the JSON schema of scenes; return the exit status."""
     from dem.scene.reading import json_schema  # noqa: PLC0415
 
     print(json.dumps(json_schema(), indent=2, ensure_ascii=False))

@@ -1,4 +1,4 @@
-"""status: which runs are done, running, failed, missing."""
+"""Command `status`: print the state of each run of a sweep, a study or a single run."""
 
 from __future__ import annotations
 
@@ -12,133 +12,155 @@ from typing import TYPE_CHECKING, Any
 
 from dem.errors import InputError
 from dem.record.names import MANIFEST, OF_SWEEP
-from smarticles.command_line import Commands, add_shared, as_json, columns, positive_number
+from smarticles.command_line import Commands, add_options, as_json, columns, positive_number
 
 if TYPE_CHECKING:
     from templates.sweep.folder import RunStatus
 
-_EVERY_S = 2.0
+_CHECK_INTERVAL_S = 2.0
+_ENDED_EARLY = ("failed", "interrupted", "stopped")  # states of runs that ended before they were done
 
 
 def add(commands: Commands) -> None:
-    """Add the command."""
+    """Add `status` to the command line."""
     status = commands.add(
         "status",
         show_status,
-        summary="what is done, running, failed, missing",
+        summary="print which runs are done, running, failed or missing",
         text="""
-From the run directories, and from Slurm's queue if the sweep was submitted. A run is `interrupted` when it was asked to
-stop, `stopped` when it was killed, `queued` when a task of the queue is going to compute it. `simulated s` is how far a
-run came, `checkpoint s` from where it would go on.""",
+Reads the run directories, and Slurm's queue if the sweep was submitted to it. States of a run:
+
+  done         finished
+  running      a process computes it
+  queued       a task in Slurm's queue will compute it
+  interrupted  it received Ctrl-C or a signal, and closed its files
+  stopped      its process was killed
+  failed       it ended with an error
+  missing      it has not started
+
+`simulated s` is the simulated time reached [s]. `checkpoint s` is the simulated time of the last checkpoint, from
+which `smarticles resume` continues.""",
         examples="""\
   smarticles status friction
   smarticles status friction/runs/mu0.2_seed1
-  smarticles status friction --watch               again and again, until nothing runs
+  smarticles status friction --watch               repeat until all runs have ended
   smarticles status friction --watch --every 60
   smarticles status friction --json | jq .counts
 """,
     )
-    status.add_argument("directory", type=Path, metavar="DIR", help="of a sweep, a study or a run")
+    add_options(status, "directory", help="directory of a sweep, a study or a run")
     status.add_argument(
         "--watch",
         action="store_true",
-        help="check again and again until nothing runs or waits in a queue; Ctrl-C ends it, and no run",
+        help="repeat until no run is running or queued; Ctrl-C ends the command, not the runs",
     )
     status.add_argument(
-        "--every", type=positive_number, metavar="S", help="with --watch: seconds between checks; default: 2"
+        "--every", type=positive_number, metavar="S", help="with --watch: time between two checks [s]; default: 2"
     )
-    add_shared(status, "--json")
+    add_options(status, "--json")
 
 
 def show_status(arguments: argparse.Namespace) -> int:
-    """Print the state of a directory, once or again and again."""
+    """Print the states of the runs in a directory, once or repeatedly; return the exit status.
+
+    Raises:
+        InputError: options contradict each other, or the directory holds neither a run nor a sweep.
+    """
     directory: Path = arguments.directory
     if arguments.json and arguments.watch:
-        raise InputError("--watch: is for a person; leave it out with --json")
+        raise InputError("--watch: cannot be combined with --json; leave it out with --json")
     if arguments.every is not None and not arguments.watch:
-        raise InputError(f"--every {arguments.every:g}: is how often --watch checks; add --watch")
+        raise InputError(f"--every {arguments.every:g}: sets the time between two checks of --watch; add --watch")
     if arguments.watch:
-        _watch(directory, arguments.every or _EVERY_S)
+        _watch(directory, arguments.every or _CHECK_INTERVAL_S)
     elif arguments.json:
-        state = _state(directory)
-        runs = [run.to_dict() for run in state.runs]
-        content = {"name": state.name, "counts": state.counts, "queue": state.queue, "runs": runs}
+        status = _read_status(directory)
+        runs = [run.to_dict() for run in status.runs]
+        content = {"name": status.name, "counts": status.counts, "queue": status.queue, "runs": runs}
         print(as_json({"directory": str(directory), **content}))
     else:
-        print(_state(directory))
+        print(_read_status(directory))
     return 0
 
 
 @dataclass(frozen=True)
-class _State:
-    """A directory at one moment."""
+class _Status:
+    """States of all runs of a directory at one time."""
 
-    name: str
+    name: str  #: Of the sweep, or of the run directory
     runs: Sequence[RunStatus]
-    queue: dict[str, Any] | None = None
+    queue: dict[str, Any] | None = None  #: Jobs, error and task counts of Slurm's queue; None: never submitted
 
     @property
     def counts(self) -> dict[str, int]:
+        """Number of runs by state."""
         return dict(Counter(run.state for run in self.runs))
 
     @property
-    def goes_on(self) -> bool:
+    def active(self) -> bool:
+        """Whether any run is running or queued."""
         return any(run.state in ("running", "queued") for run in self.runs)
 
     def __str__(self) -> str:
         lines = [_table(self.runs)]
         if self.queue is not None and self.queue["error"]:
-            lines.append(f"{self.queue['error']}; the states are those of the run directories alone")
-        counted = ", ".join(f"{n} {state}" for state, n in self.counts.items())
-        return "\n".join([*lines, f"{self.name}: {len(self.runs)} runs, {counted}"])
+            lines.append(f"{self.queue['error']}; the states above come from the run directories alone")
+        counts = ", ".join(f"{count} {state}" for state, count in self.counts.items())
+        return "\n".join([*lines, f"{self.name}: {len(self.runs)} runs, {counts}"])
 
 
-def _state(directory: Path) -> _State:
+def _read_status(directory: Path) -> _Status:
     from templates.slurm.submission import QueueError, merged, submissions, tasks_of_runs  # noqa: PLC0415
     from templates.sweep.folder import open_folder, run_status  # noqa: PLC0415
 
     if (directory / MANIFEST).is_file() and not (directory / OF_SWEEP).exists():
-        return _State(directory.name, [run_status(directory)])
+        return _Status(directory.name, [run_status(directory)])
     folder = open_folder(directory)
     runs, submitted = folder.status(), submissions(directory)
     if not submitted:
-        return _State(folder.name, runs)
-    queue: dict[str, Any] = {"jobs": [one.job_id for one in submitted if one.job_id is not None], "error": None}
+        return _Status(folder.name, runs)
+    queue: dict[str, Any] = {
+        "jobs": [submission.job_id for submission in submitted if submission.job_id is not None],
+        "error": None,
+    }
     try:
         tasks = tasks_of_runs(submitted)
     except QueueError as error:
-        return _State(folder.name, runs, {**queue, "error": str(error), "tasks": {}})
+        return _Status(folder.name, runs, {**queue, "error": str(error), "tasks": {}})
     states = Counter({task.label: task.slurm_state for task in tasks.values()}.values())
     runs = [merged(run, tasks.get(run.name)) for run in runs]
-    return _State(folder.name, runs, {**queue, "tasks": dict(sorted(states.items()))})
+    return _Status(folder.name, runs, {**queue, "tasks": dict(sorted(states.items()))})
 
 
-def _watch(directory: Path, every: float) -> None:
-    """Check until nothing goes on; a terminal shows the newest state, a pipe those that differ."""
+def _watch(directory: Path, interval: float) -> None:
+    """Print the status every `interval` [s] until no run is active.
+
+    A terminal shows the newest status in place. Other output, such as a pipe, gets a new table after each change.
+    """
     from rich.console import Console  # noqa: PLC0415
     from rich.live import Live  # noqa: PLC0415
     from rich.text import Text  # noqa: PLC0415
 
     console = Console(soft_wrap=True)
-    # Text, not markup: names of runs are data. What does not fit is cut while it is live, and whole at the end.
+    # `Text`, since names of runs may contain rich's markup. A long table is cut to the terminal until the last update.
     live = Live(console=console, auto_refresh=False, vertical_overflow="ellipsis") if console.is_terminal else None
     printed = ""
     try:
         if live:
             live.start()
         while True:
-            state = _state(directory)
-            text = str(state)
+            status = _read_status(directory)
+            text = str(status)
             if live:
                 live.update(Text(text), refresh=True)
             elif text != printed:
                 print(text, flush=True)
             printed = text
-            if not state.goes_on:
+            if not status.active:
                 return
-            time.sleep(every)
+            time.sleep(interval)
     except KeyboardInterrupt:
-        return  # the way in which a watch ends; the runs are other processes
+        return  # Ctrl-C ends the command alone; the runs are other processes
     finally:
         if live:
             live.vertical_overflow = "visible"
@@ -146,19 +168,19 @@ def _watch(directory: Path, every: float) -> None:
 
 
 def _table(runs: Sequence[RunStatus]) -> str:
-    early = any(run.state in ("failed", "interrupted", "stopped") for run in runs)
-    queued = any(run.job for run in runs)
-    header = ["run", "state", *(["job"] if queued else []), "phase", "simulated s"]
-    header += [*(["checkpoint s"] if early else []), "wall s", "cause"]
+    """Return a table with one row per run; the columns `job` and `checkpoint s` appear where any run needs them."""
+    any_ended_early = any(run.state in _ENDED_EARLY for run in runs)
+    any_job = any(run.job for run in runs)
+    header = ["run", "state", *(["job"] if any_job else []), "phase", "simulated s"]
+    header += [*(["checkpoint s"] if any_ended_early else []), "wall s", "cause"]
     rows = [
         [
             run.name,
             run.state,
-            *([run.job or ""] if queued else []),
+            *([run.job or ""] if any_job else []),
             run.phase or "",
             run.time_s,
-            # What was computed after it is computed again.
-            *([run.checkpoint_s if run.state in ("failed", "interrupted", "stopped") else None] if early else []),
+            *([run.checkpoint_s if run.state in _ENDED_EARLY else None] if any_ended_early else []),
             run.wall_s,
             run.cause or "",
         ]

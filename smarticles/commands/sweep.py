@@ -1,4 +1,4 @@
-"""sweep: many scenes from one template."""
+"""Command `sweep`: write many scenes from one template, and run them."""
 
 from __future__ import annotations
 
@@ -10,84 +10,77 @@ from typing import TYPE_CHECKING
 from dem.errors import InputError
 from dem.record.names import OF_SWEEP
 from smarticles import sweeps
-from smarticles.command_line import Commands, add_engine, add_shared, columns, positive_int
+from smarticles.command_line import Commands, add_options, columns, positive_int
 
 if TYPE_CHECKING:
     from templates.slurm.submission import Draft
     from templates.sweep.expand import Point
 
 _FILE_HELP = """
-A sweep file makes many scenes from one template:
+A sweep file describes many scenes by one template and lists of values:
 
   schema_version: 1
   name: friction
   template: scene.yaml.j2             # a scene with {{ variables }}, beside this file
   run_name: "mu{{ friction }}_seed{{ seed }}"
-  constants: {count: 100}             # the same in every run
-  points:                             # any of these; several are crossed with each other
+  constants: {count: 100}             # values shared by all runs
+  points:                             # one or several of these; several are combined by their product
     grid: {friction: [0.2, 0.4]}      # every combination
-    zip: {a: [1, 2], b: [3, 4]}       # first with first, second with second
-    list: [{c: 1}, {c: 2}]            # written out
+    zip: {a: [1, 2], b: [3, 4]}       # two points: a=1 with b=3, a=2 with b=4
+    list: [{c: 1}, {c: 2}]            # explicit points
     table: {file: counts.csv, only: {l_over_w: [0.4, 0.7]}}   # rows of a CSV file
   derived: {half: "(count / 2) | round | int"}
-  repeats: {seeds: [1, 2, 3]}         # each point once per seed; the variable is `seed`
-                                      # more: {seeds: [4], only: {friction: [0.2]}} gives some points more
+  repeats: {seeds: [1, 2, 3]}         # one run per point and seed; the variable is `seed`
+                                      # more: {seeds: [4], only: {friction: [0.2]}} adds seeds to some points
   again: {constants: {engine: yade}, only: {friction: [0.2], seed: [1]}}
-                                      # some of these runs once more, last, with other constants
+                                      # repeats some runs at the end, with other constants
 
-The same command again takes up where it stopped, see `smarticles resume --help`."""
+Repeat the command to continue an unfinished sweep, see `smarticles resume --help`."""
 
 
 def add(commands: Commands) -> None:
-    """Add the command."""
+    """Add `sweep` to the command line."""
     sweep = commands.add(
         "sweep",
         run_sweep,
-        summary="make run directories from a template, and start the runs if asked to",
+        summary="write the scenes of a sweep, and run them with --submit",
         text=_FILE_HELP + "\n" + sweeps.CLUSTER_HELP,
         examples="""\
   smarticles sweep friction.yaml --dry-run
-  smarticles sweep friction.yaml --out friction               write the scenes, start nothing
+  smarticles sweep friction.yaml --out friction               write the scenes only
   smarticles sweep friction.yaml --out friction --submit local
   smarticles sweep friction.yaml --out friction --submit slurm --cluster example-large --time 12:00:00
   smarticles sweep friction.yaml --out friction --submit slurm --cluster my-cluster.toml --dry-run
 """,
     )
     sweep.add_argument("sweep", type=Path, metavar="SWEEP.yaml", help="sweep file")
-    sweep.add_argument("--out", type=Path, metavar="DIR", help="directory of the sweep")
-    sweep.add_argument(
-        "--submit",
-        choices=("none", "local", "slurm"),
-        default="none",
-        help="none: only write (default); local: run on this machine, one run per core; slurm: as a job on a cluster",
-    )
-    sweep.add_argument("--dry-run", action="store_true", help="list the runs and show the job script, write nothing")
-    sweep.add_argument(
-        "--max-points", type=positive_int, metavar="N", help="reject a sweep of more runs; default: 10000"
-    )
-    add_engine(sweep, "all runs on this engine: its constant `engine` is set to it")
-    add_shared(sweep, "--jobs")
+    add_options(sweep, "--out", help="directory of the sweep")
+    add_options(sweep, "--submit", default="none")
+    add_options(sweep, "--dry-run", help="print the runs and the job script; write nothing")
+    sweep.add_argument("--max-points", type=positive_int, metavar="N", help="largest number of runs; default: 10000")
+    add_options(sweep, "--engine", help="compute all runs on this engine (sets the constant `engine`)")
+    add_options(sweep, "--jobs")
     sweeps.add_cluster_options(sweep)
 
 
 def run_sweep(arguments: argparse.Namespace) -> int:
-    """Expand a sweep; list, write, run or submit its runs."""
+    """Expand a sweep file; print, write, compute or submit its runs; return the exit status."""
     from templates.sweep.expand import MAX_POINTS, expand  # noqa: PLC0415
 
     sweep = sweeps.changed_sweep(arguments.sweep, engine=arguments.engine)
     points = expand(sweep, max_points=arguments.max_points or MAX_POINTS)
-    queue = sweeps.wants_queue(arguments)
-    # Rendered before anything is written, so that a request which is rejected leaves nothing behind.
-    draft = _draft(sweep.content.name, points, arguments) if queue else None
+    for_cluster = sweeps.is_for_cluster(arguments)
+    # Rendered before anything is written, so that a rejected request leaves no files.
+    draft = _draft(sweep.content.name, points, arguments) if for_cluster else None
     if arguments.dry_run:
         print(_listing(points))
         if draft is not None:
-            place = f"jobs/{draft.submission.number}"
-            print(f"{draft.request.to_text()}\n\n--- {place}/runs.txt\n{draft.run_list}")
-            print(f"--- {place}/array.sh\n{draft.script}")
+            job = f"jobs/{draft.submission.number}"
+            print(f"{draft.request.to_text()}\n\n--- {job}/runs.txt\n{draft.run_list}")
+            print(f"--- {job}/array.sh\n{draft.script}")
         return 0
-    folder = sweeps.folder_of(sweep, points, _place(arguments), arguments.command_line)
-    if queue:
+    folder = sweeps.folder_of(sweep, points, _required_out(arguments), arguments.command_line)
+    if for_cluster:
         return sweeps.enqueue(folder, arguments)
     if arguments.submit == "none":
         print(f"{folder.path}: {len(points)} runs written; start them: smarticles resume {folder.path}")
@@ -95,7 +88,7 @@ def run_sweep(arguments: argparse.Namespace) -> int:
     return sweeps.complete_here(folder, arguments)
 
 
-def _place(arguments: argparse.Namespace) -> Path:
+def _required_out(arguments: argparse.Namespace) -> Path:
     out: Path | None = arguments.out
     if out is None:
         raise InputError("sweep: --out DIR is missing; give a directory, or --dry-run to only list the runs")
@@ -103,24 +96,25 @@ def _place(arguments: argparse.Namespace) -> Path:
 
 
 def _draft(name: str, points: Sequence[Point], arguments: argparse.Namespace) -> Draft:
-    """Render the submission of all runs of a new sweep, or of what is missing of one that is there."""
+    """Render the submission of all runs of a new sweep, or of the missing runs of an existing sweep."""
     from templates.slurm.submission import submissions, tasks_of_runs, to_submit  # noqa: PLC0415
     from templates.sweep.folder import entry_of, open_folder  # noqa: PLC0415
 
-    out = _place(arguments)
-    if arguments.ranks and (others := {point.scene.engine for point in points} - {"lammps"}):
+    out = _required_out(arguments)
+    if arguments.ranks and (serial := {point.scene.engine for point in points} - {"lammps"}):
         raise InputError(
-            f"--ranks {arguments.ranks}: engine: {', '.join(sorted(others))} is one process; leave it out, or give "
+            f"--ranks {arguments.ranks}: engine: {', '.join(sorted(serial))} is one process; leave it out, or give "
             "--engine lammps"
         )
     entries = [entry_of(point, sweeps.expected_wall_s(point.scene)) for point in points]
     if (out / OF_SWEEP).exists():
-        # Where nothing is missing, the limits are checked for all runs.
+        # If no run is missing, the request of all runs is checked against the limits of the cluster.
         entries = to_submit(open_folder(out), tasks_of_runs(submissions(out))) or entries
     return sweeps.draft_of(out, name, entries, arguments)
 
 
 def _listing(points: Sequence[Point]) -> str:
+    """Return a table of the runs with their variables and expected wall times [s]."""
     from templates.local import duration  # noqa: PLC0415
 
     expected = [sweeps.expected_wall_s(point.scene) for point in points]

@@ -1,4 +1,4 @@
-"""One HTML page of a run, a sweep or a study, which `smarticles report` writes.
+"""HTML pages of runs, sweeps and studies for `smarticles report`.
 
-`page` makes HTML and knows nothing of smarticles; `charts` draws; `run` and `sweep` decide what stands on a page.
+Modules: `page` renders HTML, `charts` draws figures, `run` and `sweep` choose the content.
 """

@@ -1,4 +1,4 @@
-"""Charts of a report: SVG as an address that holds the picture itself."""
+"""Charts of a report, as SVG pictures in data URLs."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from postprocess.report.figures import BLACK, BLUE, GREY, ORANGE, new_figure, style
-from smarticles.reporting.page import address
+from smarticles.reporting.page import data_url
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -19,17 +19,18 @@ if TYPE_CHECKING:
     from dem.arrays import Array
 
 _BAND = "#f0f1f2"
-_MOST_POINTS = 400
-Groups = Mapping[str, tuple[Sequence[object], Sequence[float], Sequence[float]]]
+_MAX_POINTS = 400
+Groups = Mapping[str, tuple[Sequence[object], Sequence[float], Sequence[float]]]  #: x, means, errors by curve name
 
 
 def against_time(times: Array, values: Array, label: str, phases: Sequence[tuple[float, float, str]]) -> str:
-    """Return a chart of a quantity against time.
+    """Draw a quantity against time; return the chart as a data URL.
 
     Args:
         times: (n,) [s].
         values: (n,) in the unit of the label.
-        phases: start, end [s] and type of each phase.
+        label: label of the vertical axis, with unit.
+        phases: start [s], end [s] and type of each phase.
     """
     with style():
         figure, axes = _axes("time [s]", label)
@@ -47,27 +48,33 @@ def against_time(times: Array, values: Array, label: str, phases: Sequence[tuple
 
 
 def against_variable(variable: str, label: str, groups: Groups) -> str:
-    """Return a chart of x, means and errors of each curve, by its name; NaN for an unknown error."""
+    """Draw means with error bars against a variable; return the chart as a data URL.
+
+    Args:
+        variable: label of the horizontal axis.
+        label: label of the vertical axis, with unit.
+        groups: x, means and standard errors of each curve; an error may be NaN.
+    """
     values = [x for xs, _, _ in groups.values() for x in xs]
     numeric = all(isinstance(x, int | float) for x in values)
     names = list(dict.fromkeys(map(str, values)))
-    place: Callable[[Any], float] = float if numeric else (lambda x: float(names.index(str(x))))
-    places = np.unique([place(x) for x in values])
-    apart = np.diff(places).min() if len(places) > 1 else 1.0
+    position: Callable[[Any], float] = float if numeric else (lambda x: float(names.index(str(x))))
+    positions = np.unique([position(x) for x in values])
+    spacing = np.diff(positions).min() if len(positions) > 1 else 1.0
     with style():
         figure, axes = _axes(variable, label)
-        looks = zip(groups.items(), cycle((BLUE, ORANGE, BLACK, GREY)), cycle("osD^v"), strict=False)
-        for number, ((name, (xs, means, errors)), colour, marker) in enumerate(looks):
-            # A little beside each other, so that error bars do not hide each other.
-            aside = 0.06 * apart * (number - (len(groups) - 1) / 2)
+        styled = zip(groups.items(), cycle((BLUE, ORANGE, BLACK, GREY)), cycle("osD^v"), strict=False)
+        for number, ((name, (xs, means, errors)), colour, marker) in enumerate(styled):
+            # Curves are shifted sideways, so that error bars do not cover each other.
+            shift = 0.06 * spacing * (number - (len(groups) - 1) / 2)
             axes.errorbar(
-                [place(x) + aside for x in xs], means, np.asarray(errors, dtype=float), color=colour, label=name,
+                [position(x) + shift for x in xs], means, np.asarray(errors, dtype=float), color=colour, label=name,
                 marker=marker, linestyle="-" if numeric else "none", linewidth=0.9,
             )  # fmt: skip
         if not numeric:
             axes.set_xticks(range(len(names)), names, parse_math=False)
         if len(groups) > 1:
-            # Above, where it hides nothing.
+            # Above the axes, where the legend covers no data.
             legend = axes.legend(loc="lower left", bbox_to_anchor=(0, 1), ncols=2, borderaxespad=0.2)
             for text in legend.get_texts():
                 text.set_parse_math(False)
@@ -75,13 +82,21 @@ def against_variable(variable: str, label: str, groups: Groups) -> str:
 
 
 def thinned(times: Array, values: Array) -> tuple[Array, Array]:
-    """Return at most some hundred points of a curve: the least and the largest of each stretch, NaN left out."""
-    known = np.isfinite(values)
-    times, values = times[known], values[known]
-    if len(times) <= _MOST_POINTS:
+    """Reduce a curve to at most 400 points: the smallest and the largest value of each interval, without NaN.
+
+    Args:
+        times: (n,) [s].
+        values: (n,).
+
+    Returns:
+        Times and values, (m,) each.
+    """
+    finite = np.isfinite(values)
+    times, values = times[finite], values[finite]
+    if len(times) <= _MAX_POINTS:
         return times, values
-    stretches = np.array_split(np.arange(len(times)), _MOST_POINTS // 2)
-    kept = np.unique([index for s in stretches for index in (s[values[s].argmin()], s[values[s].argmax()])])
+    intervals = np.array_split(np.arange(len(times)), _MAX_POINTS // 2)
+    kept = np.unique([index for s in intervals for index in (s[values[s].argmin()], s[values[s].argmax()])])
     return times[kept], values[kept]
 
 
@@ -96,6 +111,7 @@ def _axes(x: str, y: str) -> tuple[Figure, Axes]:
 
 
 def _svg(figure: Figure) -> str:
+    """Return a figure as SVG in a data URL."""
     with io.BytesIO() as file:
         figure.savefig(file, format="svg", metadata={"Date": None})
-        return address(file.getvalue(), "image/svg+xml")
+        return data_url(file.getvalue(), "image/svg+xml")

@@ -1,9 +1,8 @@
-"""HTML of a report: one file that asks for nothing from outside and runs no script."""
+"""HTML of a report: one file without scripts and without links to other files."""
 
 from __future__ import annotations
 
 import base64
-import math
 import re
 from collections.abc import Iterable, Sequence
 from importlib.metadata import PackageNotFoundError, version
@@ -14,15 +13,16 @@ import jinja2
 from markupsafe import Markup
 
 from dem.errors import InputError
+from smarticles.command_line import format_cell
 
-MOST_ROWS = 200  #: Of a table on a page
+MAX_ROWS = 200  #: Rows shown of a table; further rows are counted only
 
-Section = tuple[str, Sequence[Markup]]  #: Title and blocks; a section without blocks is left out
+Section = tuple[str, Sequence[Markup]]  #: Title and blocks
 
 _MIMES = {".png": "image/png", ".svg": "image/svg+xml", ".webp": "image/webp"}
 _NUMBER = re.compile(r"[+−-]?[\d.]+(e[+-]?\d+)?( ± [\d.e+-]+)?( %)?|[-–]?")
 
-# Every text of a run is data, and escaped.
+# autoescape: texts of a run may contain HTML.
 _environment = jinja2.Environment(
     loader=jinja2.FileSystemLoader(Path(__file__).parent),
     autoescape=True,
@@ -35,12 +35,14 @@ _blocks: Any = _environment.get_template("blocks.html.j2").module
 
 
 def page(title: str, about: str, lead: Iterable[tuple[str, str]], sections: Iterable[Section], source: Path) -> str:
-    """Return a whole page.
+    """Return an HTML page.
 
     Args:
-        about: what it is of: "run", "sweep", "study", "results of a study".
-        lead: the most important facts, label and value.
-        source: the directory that it is made from.
+        title: heading.
+        about: kind of directory: "run", "sweep", "study" or "results of a study".
+        lead: label and value of the most important facts.
+        sections: titles and blocks; a section without blocks is left out.
+        source: directory that the page describes.
     """
     try:
         made = f"smarticles {version('smarticles')}"
@@ -56,66 +58,66 @@ def page(title: str, about: str, lead: Iterable[tuple[str, str]], sections: Iter
 
 
 def words(*lines: str, tone: str = "plain") -> Markup:
-    """Return paragraphs; `tone` is "plain", "note" or "warning"."""
+    """Return paragraphs, one for each of the lines; `tone` is "plain", "note" or "warning"."""
     return Markup(_blocks.words(lines, tone))
 
 
 def table(caption: str, header: Sequence[Any], rows: Iterable[Sequence[Any]], *, folded: bool = False) -> Markup:
-    """Return a table; a folded one shows its caption until it is opened."""
-    cells = [[word(value) for value in row] for row in rows]
-    numeric = [numbers([row[k] for row in cells]) for k in range(len(header))]
-    left_out = max(len(cells) - MOST_ROWS, 0)
-    return Markup(_blocks.table(caption, header, cells[:MOST_ROWS], numeric, left_out, folded))
+    """Return a table of at most `MAX_ROWS` rows; `folded`: show only the caption until a click."""
+    cells = [[format_cell(value) for value in row] for row in rows]
+    numeric = [all_numbers([row[k] for row in cells]) for k in range(len(header))]
+    left_out = max(len(cells) - MAX_ROWS, 0)
+    return Markup(_blocks.table(caption, header, cells[:MAX_ROWS], numeric, left_out, folded))
 
 
 def listing(caption: str, text: str, *, folded: bool = False) -> Markup:
-    """Return a text as it stands, such as a scene."""
+    """Return preformatted text, such as a scene file; `folded`: show only the caption until a click."""
     return Markup(_blocks.listing(caption, text, folded))
 
 
 def figure(caption: str, alt: str, picture: str, kind: str) -> Markup:
-    """Return a picture.
+    """Return a picture with caption.
 
     Args:
-        alt: what it shows.
-        kind: "chart", of which the colours are turned round on a dark page; "card", on a light ground; "card wide".
+        caption: text below the picture.
+        alt: description for readers who cannot see the picture.
+        picture: data URL of the picture.
+        kind: "chart" (colours are inverted on a dark page), "card" (light background) or "card wide".
     """
     return Markup(_blocks.figure(caption, alt, picture, kind))
 
 
 def turntable(caption: str, alt: str, views: Sequence[str]) -> Markup:
-    """Return `views` from equal angles, data addresses, turned by pointer, finger or arrow keys.
+    """Return a picture that the reader turns by pointer, touch or arrow keys.
 
-    It is a group of radio buttons, one per picture, so that the page needs no script.
+    The HTML is a group of radio buttons, one per view, so that the page needs no script.
+
+    Args:
+        caption: text below the picture.
+        alt: description for readers who cannot see the picture.
+        views: data URLs of pictures from equally spaced angles.
     """
     angles = [round(360 * number / len(views)) for number in range(len(views))]
     return Markup(_blocks.turntable(caption, alt, list(zip(views, angles, strict=True))))
 
 
-def word(value: Any) -> str:
-    """Return a value as a cell: four digits of a number, a dash for none."""
-    if value is None or (isinstance(value, float) and math.isnan(value)):
-        return "-"
-    return f"{value:.4g}" if isinstance(value, float) else str(value)
-
-
-def numbers(cells: Sequence[str]) -> bool:
-    """Return whether a column holds numbers, with errors or percent signs, and dashes."""
+def all_numbers(cells: Sequence[str]) -> bool:
+    """Return whether every cell is a dash or a number, with or without error and percent sign."""
     return bool(cells) and all(_NUMBER.fullmatch(cell.strip()) for cell in cells)
 
 
 def embedded(path: Path) -> str:
-    """Return a picture file as an address that holds it.
+    """Return a picture file as a data URL.
 
     Raises:
-        InputError: it is no picture, or cannot be read.
+        InputError: unknown suffix, or the file cannot be read.
     """
     try:
-        return address(path.read_bytes(), _MIMES[path.suffix])
+        return data_url(path.read_bytes(), _MIMES[path.suffix])
     except (KeyError, OSError) as error:
         raise InputError(f"{path}: cannot be put into a report ({error}); use {', '.join(_MIMES)}") from None
 
 
-def address(content: bytes, mime: str) -> str:
-    """Return an address that holds its content."""
+def data_url(content: bytes, mime: str) -> str:
+    """Return a data URL with the content of a file."""
     return f"data:{mime};base64,{base64.b64encode(content).decode()}"

@@ -1,4 +1,4 @@
-"""Page of a run, and the parts that it shares with the page of a sweep."""
+"""Page of a run, and blocks that pages of runs and sweeps share."""
 
 from __future__ import annotations
 
@@ -24,16 +24,17 @@ from dem.scene.reading import load_scene
 from dem.setting.fidelity import fidelities
 from postprocess.measures.registry import shown_quantities
 from postprocess.statistics.points import format_with_error, marked
+from smarticles.command_line import format_cell
 from smarticles.measuring import has_frames, measured
 from smarticles.reporting.charts import against_time
-from smarticles.reporting.page import address, embedded, figure, listing, page, table, turntable, word, words
+from smarticles.reporting.page import data_url, embedded, figure, listing, page, table, turntable, words
 
 if TYPE_CHECKING:
     import pandas as pd
 
     from dem.scene.scene import Scene
 
-# Drawn against time, where a run has it: column, factor and unit that it is shown in, and component of a vector.
+# Series drawn against time if recorded: column, unit conversion factor, unit, component of a vector.
 _CURVES = (
     ("packing_fraction", 1.0, "-", None),
     ("com_height_m", 1e3, "mm", None),
@@ -43,26 +44,26 @@ _CURVES = (
     ("motor_work_J", 1e6, "µJ", None),
     ("outside_count", 1.0, "-", None),
 )
-_MOST_WARNINGS = 30
+_MAX_WARNINGS = 30
 
 
 def run_page(directory: Path, accuracy: Path | None) -> str:
-    """Return the page of a run, done or not."""
+    """Return the HTML page of a finished or unfinished run; `accuracy`: table of measured errors (None: shipped)."""
     directory = directory.resolve()
     run, scene = open_run(directory), None
-    why_not = ""
+    scene_error = ""
     try:
         scene = load_scene(directory / SCENE)
     except InputError as error:
-        why_not = f"This version cannot read the scene of this run: {error}"
-    made, status = run.manifest, run.status
+        scene_error = f"This version cannot read the scene of this run: {error}"
+    manifest, status = run.manifest, run.status
     lead = [
         ("status", status.state),
-        ("smarticles", str(made.count)),
-        ("l/w", f"{made.aspect_ratio:g}"),
-        ("engine", made.engine),
-        ("fidelity", made.fidelity),
-        ("seed", str(made.seed)),
+        ("smarticles", str(manifest.count)),
+        ("l/w", f"{manifest.aspect_ratio:g}"),
+        ("engine", manifest.engine),
+        ("fidelity", manifest.fidelity),
+        ("seed", str(manifest.seed)),
         *([("simulated", f"{status.time_s:.3g} s")] if status.time_s is not None else []),
         *([("computed in", f"{status.wall_s:.3g} s")] if status.wall_s is not None else []),
     ]
@@ -70,16 +71,17 @@ def run_page(directory: Path, accuracy: Path | None) -> str:
         ("Result", [*_ending(run), *_measures(directory)]),
         ("Final state", picture_blocks(directory)),
         ("Against time", _curves(run)),
-        ("Scene", scene_blocks(directory, scene, why_not)),
+        ("Scene", scene_blocks(directory, scene, scene_error)),
         ("Effects", effect_blocks([] if scene is None else [scene])),
         ("Settings and their accuracy", accuracy_blocks(scene, accuracy)),
         ("Warnings", warning_blocks({"": directory})),
         ("How to repeat it", _repeat(run)),
     )
-    return page(made.name, "run", lead, sections, directory)
+    return page(manifest.name, "run", lead, sections, directory)
 
 
 def _ending(run: Run) -> list[Markup]:
+    """Return a warning if the run is not done."""
     if run.status.state == "done":
         return []
     ending = {"failed": "failed", "interrupted": "was interrupted"}.get(run.status.state, "has not finished")
@@ -89,15 +91,21 @@ def _ending(run: Run) -> list[Markup]:
 
 def _measures(directory: Path) -> list[Markup]:
     if not has_frames(directory):
-        return [words("No frame has been recorded, so nothing is measured.", tone="note")]
+        return [words("No frame has been recorded, so that there are no measures.", tone="note")]
     found = measured([directory])
-    caption = "Means over the last 20 frames of each phase ± their standard error; voxel and voronoi at its last frame"
+    caption = "Means over the last 20 frames of each phase ± standard error; voxel and voronoi: last frame only"
     whole = found.drop(columns=["run", "scene_sha256"])
     return [short_table(found, ["phase type"], caption), frame_table(whole, "All measures of each phase")]
 
 
 def short_table(found: pd.DataFrame, named: Sequence[str], caption: str) -> Markup:
-    """Return the quantities of short tables, as `mean ± SE`, from `measured` or `grouped`."""
+    """Return a table of the main quantities as `mean ± SE`.
+
+    Args:
+        found: table of `measured` or `grouped`.
+        named: columns that identify a row.
+        caption: caption of the table.
+    """
     present = found.columns[found.notna().any()]
     wanted = [(quantity.header, shown) for quantity, shown in shown_quantities() if quantity.header in present]
     rows = [
@@ -114,14 +122,20 @@ def short_table(found: pd.DataFrame, named: Sequence[str], caption: str) -> Mark
 
 
 def frame_table(found: pd.DataFrame, caption: str) -> Markup:
-    """Return all columns, folded."""
+    """Return a data frame as a folded table with all columns."""
     return table(caption, list(found.columns), found.itertuples(index=False, name=None), folded=True)
 
 
 def picture_blocks(directory: Path, *, name: str = "", turn: bool = True) -> list[Markup]:
-    """Return a picture of a run's last frame, and one to turn, with its name; or why not."""
+    """Return pictures of the last frame of a run, or a note with the reason why there are none.
+
+    Args:
+        directory: run directory.
+        name: name of the run in captions; empty on the page of a single run.
+        turn: add views from all sides.
+    """
     from postprocess.pictures.render import render_run  # noqa: PLC0415  (imports PyVista)
-    from postprocess.pictures.render import turntable as from_all_around  # noqa: PLC0415
+    from postprocess.pictures.render import turntable as draw_views  # noqa: PLC0415
 
     if not has_frames(directory):
         return []
@@ -130,25 +144,26 @@ def picture_blocks(directory: Path, *, name: str = "", turn: bool = True) -> lis
     with tempfile.TemporaryDirectory(prefix="smarticles-") as scratch:
         try:
             still = embedded(render_run(directory, output=Path(scratch, "still.png"), size=(900, 900)))
-            for image in from_all_around(directory) if turn else ():
+            for image in draw_views(directory) if turn else ():
                 content = io.BytesIO()
                 image.save(content, "WEBP", quality=80, method=4)
-                views.append(address(content.getvalue(), "image/webp"))
+                views.append(data_url(content.getvalue(), "image/webp"))
         except (InputError, RunError) as error:
             return [words(f"No picture: {error}", tone="note")]
     moment = run.phases[-1].type if run.status.state == "done" else "its last frame"
-    made = run.manifest
-    shows = f"The {made.count} smarticles of {made.name} at the end of {moment}, drawn as their true boxes"
-    caption = f"Run {name}" if name else f"{shows}. Another view or time: smarticles render."
+    manifest = run.manifest
+    shows = f"The {manifest.count} smarticles of {manifest.name} at the end of {moment}, drawn as boxes"
+    caption = f"Run {name}" if name else f"{shows}. For other views or times use smarticles render."
     blocks = [figure(caption, shows, still, "card")]
     if views:
-        around = f"The last frame of {made.name} from all around"
-        how = "Move the pointer across it, tap on it, or use the arrow keys: it turns."
-        blocks.append(turntable(f"{f'Run {name} from all around' if name else around}. {how}", around, views))
+        around = f"The last frame of {manifest.name} from all sides"
+        how = "Move the pointer across the picture, tap, or use the arrow keys to turn it."
+        blocks.append(turntable(f"{f'Run {name} from all sides' if name else around}. {how}", around, views))
     return blocks
 
 
 def _curves(run: Run) -> list[Markup]:
+    """Return charts of the recorded series against time, without series that are zero throughout."""
     if not run.has_series:
         return []
     series = run.series
@@ -173,9 +188,15 @@ def _curves(run: Run) -> list[Markup]:
     return blocks
 
 
-def scene_blocks(directory: Path, scene: Scene | None, why_not: str) -> list[Markup]:
-    """Return the phases as they are planned, and the scene file in a directory."""
-    blocks = [words(why_not, tone="warning")] if scene is None else []
+def scene_blocks(directory: Path, scene: Scene | None, scene_error: str) -> list[Markup]:
+    """Return the planned phases, the warnings of the plan, and the scene file.
+
+    Args:
+        directory: folder that contains the scene file.
+        scene: the scene; None if it cannot be read.
+        scene_error: message if the scene cannot be read.
+    """
+    blocks = [words(scene_error, tone="warning")] if scene is None else []
     if scene is not None:
         planned = plan(scene)
         rows = [
@@ -186,60 +207,66 @@ def scene_blocks(directory: Path, scene: Scene | None, why_not: str) -> list[Mar
             ]
             for phase in planned.phases
         ]  # fmt: skip
-        blocks.append(table("What happens", ["phase", "type", "duration [s]", "time step [s]"], rows))
+        blocks.append(table("Phases", ["phase", "type", "duration [s]", "time step [s]"], rows))
         blocks += [words(f"Warning of the plan: {warning}", tone="warning") for warning in planned.warnings]
     file = directory / SCENE
     if file.is_file():
         text = file.read_text(encoding="utf-8", errors="replace")
-        blocks.append(listing("The scene, every default written out", text, folded=True))
+        blocks.append(listing("The scene with all defaults", text, folded=True))
     return blocks
 
 
 def effect_blocks(scenes: Sequence[Scene]) -> list[Markup]:
-    """Return the effects that scenes call for: in how many each is on, and why in the first where it is."""
+    """Return a table of effects: the number of scenes that need each effect, and the reason in the first such scene."""
     rows = []
-    for same in zip(*map(decide, scenes), strict=True):
-        on = [effect for effect in same if effect.on]
-        effect = (on or same)[0]
-        state = f"{len(on)} of {len(same)}" if len(same) > 1 else "on" if on else "off"
+    for decisions in zip(*map(decide, scenes), strict=True):
+        on = [effect for effect in decisions if effect.on]
+        effect = (on or decisions)[0]
+        state = f"{len(on)} of {len(decisions)}" if len(decisions) > 1 else "on" if on else "off"
         rows.append([effect.name, state, effect.why, effect.adds.to_text()])
-    caption = "What acts and why; an effect that is off costs nothing"
-    return [table(caption, ["effect", "on in scenes", "why", "what it adds"], rows)] if rows else []
+    caption = "Effects and the reasons for each; an effect that is off is not computed"
+    return [table(caption, ["effect", "on in scenes", "reason", "added computation"], rows)] if rows else []
 
 
 def accuracy_blocks(scene: Scene | None, path: Path | None) -> list[Markup]:
     """Return the knobs of a scene's fidelity, and the measured errors of the named fidelities.
 
     Args:
-        scene: None where it cannot be read.
-        path: table of `smarticles accuracy`; None: the one that ships.
+        scene: the scene; None if it cannot be read.
+        path: table of measured errors by `smarticles accuracy`; None: the table that ships.
     """
     if scene is None:
         return []
     base = scene.fidelity.base
     named = fidelities(scene.engine)[base]
     knobs = scene.fidelity.model_dump(exclude={"base"})
-    caption = f"Fidelity {base} on {scene.engine}, knob by knob"
+    caption = f"Knobs of fidelity {base} on {scene.engine}"
     rows = [[knob, value, named.get(knob)] for knob, value in knobs.items()]
-    blocks = [table(caption, ["knob", "here", f"{base} by name"], rows)]
+    blocks = [table(caption, ["knob", "this scene", base], rows)]
     try:
         known = read_table(path, of=tuple(QUANTITIES))
     except InputError as error:
-        return [*blocks, words(f"How large its errors are is not known here: {error}", tone="note")]
-    here = [one for one in known.fidelities if (one.engine, one.fidelity) == (scene.engine, base)]
+        return [*blocks, words(f"The errors of this fidelity are unknown: {error}", tone="note")]
+    here = [entry for entry in known.fidelities if (entry.engine, entry.fidelity) == (scene.engine, base)]
     caption = (
         f"Relative errors of named fidelities, measured with {known.count} smarticles of l/w = {known.aspect_ratio:g}, "
         f"{known.activity}, against {known.reference}; ± is the half-width of the 95 % interval over seeds"
     )
     rows = [
-        [one.engine, one.fidelity, str(one.seeds), *map(_percent, one.errors), "this one" if one in here else ""]
-        for one in known.fidelities
+        [
+            entry.engine,
+            entry.fidelity,
+            str(entry.seeds),
+            *map(_percent, entry.errors),
+            "this run" if entry in here else "",
+        ]
+        for entry in known.fidelities
     ]
     notes = [] if here else [f"Fidelity {base} on {scene.engine} is not among those measured."]
     changed = [knob for knob, value in knobs.items() if knob in named and value != named[knob]]
     if changed:
         notes.append(f"This scene changes {', '.join(changed)}, which the table does not cover.")
-    notes.append("These errors were measured on that pile; another pile, activity or quantity may err by more.")
+    notes.append("The errors were measured on one pile; other piles, activities and quantities may have larger errors.")
     header = ["engine", "fidelity", "seeds", *QUANTITIES.values(), ""]
     return [*blocks, table(caption, header, rows), words(*notes, tone="note")]
 
@@ -249,7 +276,11 @@ def _percent(error: Error) -> str:
 
 
 def warning_blocks(directories: Mapping[str, Path]) -> list[Markup]:
-    """Return warnings and errors of logs, each once; by the runs' names, empty for one run alone."""
+    """Return a table of the distinct warnings and errors in the logs of runs.
+
+    Args:
+        directories: run directories by name; the name is empty on the page of a single run.
+    """
     found: dict[str, Counter[str]] = {}
     for name, directory in directories.items():
         log = directory / LOG
@@ -258,36 +289,37 @@ def warning_blocks(directories: Mapping[str, Path]) -> list[Markup]:
             if match:
                 found.setdefault(f"{match[1].lower()}: {match[2]}", Counter())[name] += 1
     if not found:
-        return [words("None in the logs.", tone="note")]
+        return [words("The logs contain no warnings.", tone="note")]
     rows = [
         [text, ", ".join(filter(None, (f"{name} {n} ×".strip() if n > 1 else name for name, n in counts.items())))]
-        for text, counts in list(found.items())[:_MOST_WARNINGS]
+        for text, counts in list(found.items())[:_MAX_WARNINGS]
     ]
-    more = f", the first {_MOST_WARNINGS}; {len(found) - len(rows)} more" if len(found) > len(rows) else ""
-    return [table(f"Warnings of the logs{more}", ["warning", "where"], rows)]
+    more = f", the first {_MAX_WARNINGS}; {len(found) - len(rows)} more" if len(found) > len(rows) else ""
+    return [table(f"Warnings of the logs{more}", ["warning", "runs"], rows)]
 
 
 def provenance_table(facts: Sequence[Sequence[Any]], versions: Mapping[str, str]) -> Markup:
-    """Return what made a run or sweep, facts first, then versions."""
+    """Return a table of facts about the origin of a run or sweep, followed by versions."""
     rows = [*facts, *([f"version of {name}", version] for name, version in versions.items())]
-    return table("What made it", ["what", "value"], rows)
+    return table("Origin", ["fact", "value"], rows)
 
 
 def _repeat(run: Run) -> list[Markup]:
-    made = run.manifest
-    # From the folder that the directory is in: its place on this machine is private.
+    """Return the commands that repeat a run, and the versions that computed it."""
+    manifest = run.manifest
+    # Paths are relative to the parent folder, since a report may be sent to others.
     here, there = shlex.quote(run.path.name), shlex.quote(f"{run.path.name}-again")
     again = f"smarticles run {here}/{SCENE} --out {there}\nsmarticles compare {here} {there}"
-    same = "One thread gives the same bits with the same versions; smarticles compare shows whether it did."
+    reproducible = "On one thread, equal versions give equal bits; smarticles compare checks it."
     facts = [
-        ["scene hash (SHA-256)", made.scene_sha256],
-        ["seed", str(made.seed)],
-        ["started", made.started],
-        ["threads", word(made.threads)],
+        ["scene hash (SHA-256)", manifest.scene_sha256],
+        ["seed", str(manifest.seed)],
+        ["started", manifest.started],
+        ["threads", format_cell(manifest.threads)],
     ]
     return [
-        listing("The command of this run", made.command),
-        listing("The same once more", again),
-        words(same if made.threads == 1 else "Several threads: the same numbers only within rounding."),
-        provenance_table(facts, made.versions),
+        listing("The command of this run", manifest.command),
+        listing("Commands that repeat and compare the run", again),
+        words(reproducible if manifest.threads == 1 else "Results on several threads differ in the last bits."),
+        provenance_table(facts, manifest.versions),
     ]

@@ -1,4 +1,4 @@
-"""Pages of a sweep, of a study, and of a study's results alone."""
+"""Pages of sweeps, studies, and results of studies."""
 
 from __future__ import annotations
 
@@ -17,9 +17,10 @@ from dem.record.run import Run
 from dem.scene.reading import load_scene
 from postprocess.measures.registry import shown_quantities
 from postprocess.statistics.points import marked
+from smarticles.command_line import format_cell
 from smarticles.measuring import follows, grouped, has_frames, measured, values_in
 from smarticles.reporting.charts import against_variable
-from smarticles.reporting.page import Section, embedded, figure, listing, page, table, word, words
+from smarticles.reporting.page import Section, embedded, figure, listing, page, table, words
 from smarticles.reporting.run import (
     accuracy_blocks,
     effect_blocks,
@@ -39,17 +40,22 @@ if TYPE_CHECKING:
 
     from dem.scene.scene import Scene
 
-PROVENANCE = "provenance.json"  #: The file by which results of a study are known
+PROVENANCE = "provenance.json"  #: File in every folder of results
 
-# Verdicts, and comparisons with published data; other tables are folded.
-_JUDGED = {"findings": "The paper's findings, one by one", "verdicts": "What was asked, and the answers"}
-_COMPARED = {"deviations": "Ours beside Gravish's points"}
-_MOST_STILLS, _MOST_CURVES = 4, 5
-_DRAWN = 4  # quantities that are drawn against each variable
+# Captions of the tables that are shown unfolded.
+_JUDGED = {"findings": "The paper's findings, one by one", "verdicts": "Questions and verdicts"}
+_COMPARED = {"deviations": "Deviations from Gravish's points"}
+_MAX_STILLS, _MAX_CURVES, _MAX_CHARTS = 4, 5, 4
 
 
 def sweep_page(folder: Folder, accuracy: Path | None, *, jobs: int) -> str:
-    """Return the page of a sweep, or of a study with what its analysis found."""
+    """Return the HTML page of a sweep or a study.
+
+    Args:
+        folder: directory of the sweep.
+        accuracy: table of measured errors; None: the table that ships.
+        jobs: number of processes that measure the runs.
+    """
     states = folder.status()
     study = folder.name.removesuffix("-quick")
     results = folder.path / "results"
@@ -58,22 +64,22 @@ def sweep_page(folder: Folder, accuracy: Path | None, *, jobs: int) -> str:
     scenes = _scenes(folder)
     first = next(iter(scenes), None)
     scene = scenes[first] if first else None
-    why_not = "This version cannot read the scenes of this sweep."
-    state = _missing(states)
+    scene_error = "This version cannot read the scenes of this sweep."
+    state = _unfinished(states)
     if study in STUDIES and not analysed:
         quick = " --quick" if folder.name.endswith("-quick") else ""
         command = f"smarticles study {study}{quick} --out {shlex.quote(folder.path.resolve().name)} --analyse"
-        state.append(words(f"The study has not been analysed; its findings come with: {command}", tone="note"))
+        state.append(words(f"The study has not been analysed yet; analyse it with: {command}", tone="note"))
     sections = (
         ("State", state),
         *(_result_sections(results) if analysed else _measured(folder, varied, jobs=jobs)),
         ("Final states", _pictures(folder)),
-        ("What varies", [table("Variables and constants", ["name", "values", "how many"], _variables(varied))]),
+        ("Variables", [table("Variables and constants", ["name", "values", "number of values"], _variables(varied))]),
         (
             "Scene",
             [
-                *([words(f"Of run {first}; the others differ in what varies.")] if first else []),
-                *scene_blocks(folder.scene(folder.entries[0]).parent, scene, why_not),
+                *([words(f"The scene of run {first}; other runs differ in the variables.")] if first else []),
+                *scene_blocks(folder.scene(folder.entries[0]).parent, scene, scene_error),
                 *(listing(name, text, folded=True) for name, text in folder.manifest.files.items()),
             ],
         ),
@@ -84,14 +90,14 @@ def sweep_page(folder: Folder, accuracy: Path | None, *, jobs: int) -> str:
     )
     lead = [
         ("runs", str(len(states))),
-        *((state, str(number)) for state, number in Counter(one.state for one in states).items()),
-        ("varies", ", ".join(name for name, values in varied.items() if len(values) > 1) or "nothing"),
+        *((state, str(number)) for state, number in Counter(run.state for run in states).items()),
+        ("variables", ", ".join(name for name, values in varied.items() if len(values) > 1) or "none"),
     ]
     return page(folder.name, "study" if study in STUDIES else "sweep", lead, sections, folder.path)
 
 
 def results_page(folder: Path) -> str:
-    """Return the page of a folder of results alone, without its runs."""
+    """Return the HTML page of a folder of results of a study, without the runs."""
     origin = _provenance(folder)
     study = str(origin.get("study", folder.name))
     used, missing = (str(len(origin.get(key, []))) for key in ("runs", "missing"))
@@ -100,18 +106,19 @@ def results_page(folder: Path) -> str:
     return page(f"{study}: results", "results of a study", lead, sections, folder)
 
 
-def _missing(states: Sequence[RunStatus]) -> list[Markup]:
-    rows = [[one.name, one.state, one.phase, one.time_s, one.cause] for one in states if one.state != "done"]
+def _unfinished(states: Sequence[RunStatus]) -> list[Markup]:
+    """Return a table of the runs that are not done."""
+    rows = [[run.name, run.state, run.phase, run.time_s, run.cause] for run in states if run.state != "done"]
     header = ["run", "state", "phase", "simulated [s]", "cause"]
     return [table(f"Runs that are not done: {len(rows)}", header, rows)] if rows else []
 
 
 def _variables(varied: Mapping[str, Sequence[Any]]) -> list[list[str]]:
-    return [[name, ", ".join(map(word, values)), str(len(values))] for name, values in varied.items()]
+    return [[name, ", ".join(map(format_cell, values)), str(len(values))] for name, values in varied.items()]
 
 
 def _scenes(folder: Folder) -> dict[str, Scene]:
-    """Scenes by the runs' names, of those that this version reads."""
+    """Return the scenes that this version can read, by the names of the runs."""
     found = {}
     for entry in folder.entries:
         try:
@@ -125,11 +132,11 @@ def _scenes(folder: Folder) -> dict[str, Scene]:
 
 
 def _measured(folder: Folder, varied: Mapping[str, Sequence[Any]], *, jobs: int) -> list[Section]:
-    """Means by what varies, and figures of them."""
+    """Return the sections with tables and charts of means over runs with equal variables."""
     if not any(has_frames(folder.run(entry)) for entry in folder.entries):
         return [("Result", [words("No run has frames yet.", tone="note")])]
     runs = measured([folder.path], costly="never", jobs=jobs)
-    # Variables that do not follow from one before, as a count does from l/w.
+    # Variables that are a function of another one, as the count may be of l/w, do not define groups.
     by: list[str] = []
     for name, values in varied.items():
         rows = [entry.values for entry in folder.entries]
@@ -139,47 +146,47 @@ def _measured(folder: Folder, varied: Mapping[str, Sequence[Any]], *, jobs: int)
     means = grouped(runs, by)
     final = means[means["phase"] == means["phase"].max()]
     kind = str(final["phase type"].iloc[0])
-    caption = f"Means over runs ± standard error from run to run, phase {final['phase'].iloc[0]} ({kind})"
+    caption = f"Means over runs ± standard error, phase {final['phase'].iloc[0]} ({kind})"
     tables = [
         short_table(final, [*by, "runs [-]"], caption),
         frame_table(means, "All phases and measures, means over runs"),
-        frame_table(runs.drop(columns=["scene_sha256"]), "All runs one by one"),
+        frame_table(runs.drop(columns=["scene_sha256"]), "All runs"),
     ]
     return [("Result", tables), ("Figures", _figures(final, by, varied, kind))]
 
 
 def _figures(final: pd.DataFrame, by: Sequence[str], varied: Mapping[str, Sequence[Any]], kind: str) -> list[Markup]:
-    """Each quantity against the variable with the most values, a curve for each value of another one."""
+    """Return charts against the variable with the most values, with one curve per value of a second variable."""
     if not by:
         return []
-    across, *others = sorted(by, key=lambda name: -len(varied[name]))
-    parted = next((name for name in others if len(varied[name]) <= _MOST_CURVES), None)
-    if len(others) > (parted is not None):
-        return []  # points of several other variables would lie on one line
+    x_name, *others = sorted(by, key=lambda name: -len(varied[name]))
+    curve_name = next((name for name in others if len(varied[name]) <= _MAX_CURVES), None)
+    if len(others) > (curve_name is not None):
+        return []  # a curve would mix the values of further variables
     blocks: list[Markup] = []
     for quantity, shown in shown_quantities():
         if quantity.header not in final or final[quantity.header].nunique() < 2:
             continue
         groups = {}
-        for value, group in [("all", final)] if parted is None else final.groupby(parted, sort=False):
-            rows = group.sort_values(across)
+        for value, group in [("all", final)] if curve_name is None else final.groupby(curve_name, sort=False):
+            rows = group.sort_values(x_name)
             means, errors = (shown.factor * rows[n] for n in (quantity.header, marked(quantity.header, "SE")))
-            name = "all" if parted is None else f"{parted} = {value}"
-            groups[name] = (rows[across].tolist(), means.tolist(), errors.tolist())
+            name = "all" if curve_name is None else f"{curve_name} = {value}"
+            groups[name] = (rows[x_name].tolist(), means.tolist(), errors.tolist())
         heading = shown.heading if "[" in shown.heading else f"{shown.heading} [-]"
         values = final[quantity.header] * shown.factor
-        alt = f"{quantity.label} against {across}, from {values.min():.3g} to {values.max():.3g}"
-        caption = f"{heading}: {quantity.label} against {across}, means over runs ± standard error, phase {kind}."
-        blocks.append(figure(caption, alt, against_variable(across, heading, groups), "chart"))
-    return blocks[:_DRAWN]
+        alt = f"{quantity.label} against {x_name}, from {values.min():.3g} to {values.max():.3g}"
+        caption = f"{heading}: {quantity.label} against {x_name}, means over runs ± standard error, phase {kind}."
+        blocks.append(figure(caption, alt, against_variable(x_name, heading, groups), "chart"))
+    return blocks[:_MAX_CHARTS]
 
 
 def _pictures(folder: Folder) -> list[Markup]:
-    """A few finished runs of one seed, spread over the sweep, and the last of them from all around."""
+    """Return pictures of finished runs with one seed, evenly chosen from the sweep, and views of the last one."""
     done = [entry for entry in folder.entries if folder.is_done(entry)]
-    alike = [entry for entry in done if entry.values.get(SEED) == done[0].values.get(SEED)]
-    count = min(_MOST_STILLS, len(alike))
-    chosen = [alike[round(k * (len(alike) - 1) / max(count - 1, 1))] for k in range(count)]
+    one_seed = [entry for entry in done if entry.values.get(SEED) == done[0].values.get(SEED)]
+    count = min(_MAX_STILLS, len(one_seed))
+    chosen = [one_seed[round(k * (len(one_seed) - 1) / max(count - 1, 1))] for k in range(count)]
     return [
         block
         for entry in chosen
@@ -188,6 +195,7 @@ def _pictures(folder: Folder) -> list[Markup]:
 
 
 def _repeat(folder: Folder) -> list[Markup]:
+    """Return the commands that repeat a sweep, its versions, and the hashes of its scenes."""
     manifest = folder.manifest
     used: Counter[str] = Counter()
     for entry in folder.entries:
@@ -195,16 +203,16 @@ def _repeat(folder: Folder) -> list[Markup]:
             versions = Run(folder.run(entry)).manifest.versions
         except InputError:
             continue
-        used[", ".join(f"{name} {one}" for name, one in versions.items())] += 1
-    runs = [[f"made {count} of {len(folder.entries)} runs", made] for made, count in used.items()]
+        used[", ".join(f"{name} {number}" for name, number in versions.items())] += 1
+    runs = [[f"versions of {count} of {len(folder.entries)} runs", text] for text, count in used.items()]
     header = ["run", *folder.entries[0].values, "scene hash (SHA-256)"]
-    points = [[one.name, *map(str, one.values.values()), one.scene_sha256] for one in folder.entries]
+    points = [[entry.name, *map(str, entry.values.values()), entry.scene_sha256] for entry in folder.entries]
     again = f"smarticles resume {shlex.quote(folder.path.resolve().name)}"
     return [
-        listing("The command that made it", manifest.command),
-        listing("What computes the runs that are missing", again),
-        provenance_table([["made", manifest.created], *runs], manifest.versions),
-        table("All runs, what varies, and the hashes of their scenes", header, points, folded=True),
+        listing("The command of this sweep", manifest.command),
+        listing("The command that computes the missing runs", again),
+        provenance_table([["created", manifest.created], *runs], manifest.versions),
+        table("All runs with variables and hashes of the scenes", header, points, folded=True),
     ]
 
 
@@ -212,6 +220,11 @@ def _repeat(folder: Folder) -> list[Markup]:
 
 
 def _provenance(folder: Path) -> dict[str, Any]:
+    """Read the file that describes the origin of results.
+
+    Raises:
+        InputError: the file cannot be read.
+    """
     try:
         origin = json.loads((folder / PROVENANCE).read_text(encoding="utf-8"))
         if not isinstance(origin, dict):
@@ -223,7 +236,7 @@ def _provenance(folder: Path) -> dict[str, Any]:
 
 
 def _result_sections(folder: Path) -> list[Section]:
-    """Verdicts, comparisons, figures and tables."""
+    """Return the sections of results: findings, comparison with published data, figures and tables."""
     origin = _provenance(folder)
     tables = {file.stem: rows for file in sorted(folder.glob("*.csv")) if (rows := _csv(file))}
 
@@ -246,16 +259,16 @@ def _result_sections(folder: Path) -> list[Section]:
 
 
 def _origin(folder: Path) -> list[Markup]:
-    """Where the numbers of a study come from."""
+    """Return the references of results and the runs that they are computed from."""
     origin = _provenance(folder)
     header = ["name", "seed", "engine", "fidelity", "scene_sha256", "command"]
     rows = [[run.get(name) for name in header] for run in origin.get("runs", []) if isinstance(run, dict)]
-    used = [table(f"The {len(rows)} runs used", header, rows, folded=True)] if rows else []
+    used = [table(f"The {len(rows)} analysed runs", header, rows, folded=True)] if rows else []
     return [words(*map(str, origin.get("footer", []))), *used]
 
 
 def _csv(file: Path) -> tuple[list[str], list[list[str]]] | None:
-    """Header and rows of a table, without the lines with # at its end that give its origin; None of an empty one."""
+    """Return header and rows of a CSV file without the comment lines at its end; None if the file is empty."""
     lines = file.read_text(encoding="utf-8", errors="replace").splitlines(keepends=True)
     while lines and lines[-1].startswith("#"):
         lines.pop()

@@ -1,4 +1,4 @@
-"""Commented scenes to begin with, one file per kind; `smarticles init` writes them."""
+"""Commented example scenes, one file per kind, which `smarticles init` writes."""
 
 from __future__ import annotations
 
@@ -7,16 +7,20 @@ from pathlib import Path
 from dem.errors import InputError, nearest
 
 KINDS = ("shaken", "actuated", "hook", "melting", "casting", "collapse", "chain")
-"""In the order of the help; the first one is the default."""
+"""Kinds in the order of the help; the first is the default."""
 
 
 def starter(kind: str) -> str:
-    """Return the text of a scene."""
+    """Return the YAML text of the example scene of a kind.
+
+    Raises:
+        InputError: unknown kind.
+    """
     if kind not in KINDS:
         raise InputError(f"{kind!r} is no kind of scene; {nearest(kind, KINDS)}")
     return Path(__file__).with_name(f"{kind}.yaml").read_text(encoding="utf-8")
 
 
 def about(kind: str) -> str:
-    """Return what a scene does, in one line."""
+    """Return a description of the example scene of a kind in one line."""
     return starter(kind).partition("\n")[0].removeprefix("# ")

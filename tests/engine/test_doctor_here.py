@@ -4,6 +4,6 @@ from smarticles.commands import doctor
 
 
 def test_yade_computes() -> None:
-    ok, found = doctor._ask(doctor._YADE)
+    ok, found = doctor._run_script(doctor._YADE)
     assert ok, found
     assert found.endswith("a sphere falls")

@@ -8,7 +8,7 @@ import pytest
 from sweeps import of_one_seed
 
 from dem.phases.shake import Shake
-from studies.registry import STUDIES
+from studies.registry import STUDIES, shipped
 from templates.sweep.expand import Point, expand
 from templates.sweep.sweep_file import load_sweep, on_engine
 

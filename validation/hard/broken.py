@@ -1,4 +1,4 @@
-"""Simulations broken on purpose: the watchdog reports it, and which smarticles are concerned."""
+"""Corrupted simulations: the watchdog must report the error and the affected smarticles."""
 
 from __future__ import annotations
 
@@ -31,42 +31,42 @@ SPOILT = {
     "overlap": "2 smarticle(s) (0, 1): contacts more than",
 }
 
-LONG_CONTROL = 1e-3  # s; steps of links are as long as the control period of draft
+LONG_CONTROL = 1e-3  # control period [s] that allows time steps above the stable one on links
 PLACES = ("over the wall", "through the wall", "under the floor")
 
 
 def spoil(access: EngineAccess, out: Path, *, what: str, articulated: bool, steps: int) -> list[Check]:
-    """Lay three smarticles on the floor; then spoil the second one, which the next check must report."""
-    described, engine, recorder = watched(scene_data(access, shape_change(), count=3), out)
-    # A few diameters apart, so that none falls on another.
+    """Set an invalid state for the second of three smarticles on the floor; the watchdog must report it."""
+    scene, engine, recorder = watched(scene_data(access, shape_change(), count=3), out)
+    # A few diameters apart, so that no smarticle falls on another.
     for k in range(3):
-        add(engine, (0, 0, lying(described) + 1e-5 + 3 * k * described.particle.radius))
+        add(engine, (0, 0, lying(scene) + 1e-5 + 3 * k * scene.particle.radius))
     engine.advance(10)
     if articulated:
         engine.motors.articulate()
     before = watchdog_error(engine, recorder)
     access.spoil(engine, what)
-    rigid = access.pin_stiffness(described) == math.inf
+    rigid = access.pin_stiffness(scene) == math.inf
     try:
-        # Nothing of it has to come along with the next steps where hinges cannot part.
+        # With rigid hinges, no further step is needed to move the other links of the smarticle.
         engine.advance(0 if articulated and rigid and what in PLACES else steps)
-        said = watchdog_error(engine, recorder)
+        message = watchdog_error(engine, recorder)
     except RunError as error:
-        said = str(error)
-    # One link that is put out of the container tears its hinge first.
+        message = str(error)
+    # A link moved out of the container first exceeds the largest gap of its hinge.
     torn = articulated and not rigid and what in PLACES
     expected = "1 smarticle(s) (1): " if torn else SPOILT[what]
     if what == "overlap" and rigid:
-        # On links they have pushed each other apart by the next check; then their energy shows it.
+        # On links the two have separated before the next check, which then reports their energy.
         expected = " smarticle(s) (0, 1"
-    return [nothing("the check before reports", before), says(said, expected)]
+    return [nothing("the check before reports", before), says(message, expected)]
 
 
 for _what in SPOILT:
     for _hinged in (False, True):
         if (_what, _hinged) in {("hinge", False), ("overlap", True)}:
-            continue  # a weld has no hinge to tear; one link put elsewhere tears its hinge first
-        # A hinge's nodes come along with the next step, and its bond is checked in the one after.
+            continue  # welded smarticles have no hinges; a link moved alone exceeds the gap of its hinge first
+        # The nodes of a hinge move in the next step, and its bond is checked in the step after.
         _steps = 3 if _what == "overlap" else 2 if _hinged and _what in (*PLACES, "hinge") else 0
         _size = {"what": _what, "articulated": _hinged, "steps": _steps}
         _absent = {"links": "hinges cannot part, there is none to tear"} if _what == "hinge" else {}
@@ -77,10 +77,10 @@ for _what in SPOILT:
 
 
 def _resting(access: EngineAccess, out: Path, count: int) -> tuple[Engine, Recorder]:
-    """Return smarticles in a low stack that has come to rest, and a recorder that has checked it."""
-    described, engine, recorder = watched(scene_data(access, count=count), out)
+    """Let a stack of smarticles come to rest; return the engine, and the recorder that checked it."""
+    scene, engine, recorder = watched(scene_data(access, count=count), out)
     for k in range(count):
-        add(engine, (0, 0, lying(described) * (2 * k + 1) + 1e-5))
+        add(engine, (0, 0, lying(scene) * (2 * k + 1) + 1e-5))
     for _ in range(10):
         engine.advance(round(0.02 / engine.time_step))
         assert watchdog_error(engine, recorder) is None
@@ -89,24 +89,24 @@ def _resting(access: EngineAccess, out: Path, count: int) -> tuple[Engine, Recor
 
 @hard("spoilt: pile that is heated", {"count": 4, "share": 0.3})
 def heated(access: EngineAccess, out: Path, *, count: int, share: float) -> list[Check]:
-    """Make the dashpots of all contacts of a pile at rest drive instead: energy grows out of nothing."""
+    """Reverse the damping of all contacts of a pile at rest, so that its energy grows."""
     engine, recorder = _resting(access, out, count)
     access.heat(engine, share)
     access.push(engine, count - 1, velocity=(0, 0, 1e-3))
-    said, fast, begun = None, 0.0, engine.time
-    while not said and engine.time < begun + 5.0:
+    message, fast, start = None, 0.0, engine.time
+    while not message and engine.time < start + 5.0:
         engine.advance(round(recorder.interval / engine.time_step))
         fast = fastest(engine)
-        said = watchdog_error(engine, recorder)
+        message = watchdog_error(engine, recorder)
     return [
-        says(said, "an energy that has risen by", "more than gravity, motors and springs explain", "lower fidelity"),
+        says(message, "an energy that has risen by", "more than gravity, motors and springs explain", "lower fidelity"),
         below("greatest speed then, over the limit of speed [1]", fast / recorder.watchdog.speed, 0.5),
     ]
 
 
 @hard("spoilt: pile that is kicked", {"count": 4, "speed": 0.3})
 def kicked(access: EngineAccess, out: Path, *, count: int, speed: float) -> list[Check]:
-    """Make a whole pile at rest suddenly move upwards, far below the limit of speed."""
+    """Give a pile at rest an upward velocity far below the largest allowed speed."""
     engine, recorder = _resting(access, out, count)
     for k in range(count):
         access.push(engine, k, velocity=(0, 0, speed))
@@ -118,24 +118,25 @@ def kicked(access: EngineAccess, out: Path, *, count: int, speed: float) -> list
 
 @hard("spoilt: contacts too soft", {"stiffness": 0.5})
 def soft(access: EngineAccess, out: Path, *, stiffness: float) -> list[Check]:
-    """Ask for contacts so soft that the floor does not hold what falls on it: links rejects them, YADE stops."""
+    """Run with contacts too soft to stop falling smarticles: links rejects the scene, YADE stops the run."""
     run = whole(scene_data(access, RELAX, fidelity={"base": "draft", "stiffness_N_per_m": stiffness}), out)
     if access.name == "links":
         return [says(run.text, "fidelity.stiffness_N_per_m: at 0.5 N/m", "use about", "N/m")]
     return [says(run.text, "at t = ", "raise fidelity.stiffness_N_per_m")]
 
 
-def _too_long(described: Scene, factor: float) -> float:
-    control = described.fidelity.control_interval_s
-    step: float = control / max(1, math.floor(control / (factor * stable_step(described))))
+def _too_long(scene: Scene, factor: float) -> float:
+    """Return a time step [s] of about `factor` times the stable step that divides the control period."""
+    control = scene.fidelity.control_interval_s
+    step: float = control / max(1, math.floor(control / (factor * stable_step(scene))))
     return step
 
 
 @hard("spoilt: time step 2 of the stable one", {"factor": 2.0, "count": 6, "seconds": 0.3}, {"count": 40})
-# Welded smarticles chatter and never settle, which takes as long as the pour may wait.
+# A long case: welded smarticles chatter and never settle, so that the pour waits until its time limit.
 @hard("spoilt: time step 4 of the stable one", None, {"factor": 4.0, "count": 6, "seconds": 0.3})
 def wrong_step(access: EngineAccess, out: Path, *, factor: float, count: int, seconds: float) -> list[Check]:
-    """Run at a step above the stable one, past the check: the run fails, and names its last checkpoint."""
+    """Run at a time step above the stable one; the run must fail with a message that names its last checkpoint."""
     fidelity = "draft" if access.name == "yade" else {"base": "draft", "control_interval_s": LONG_CONTROL}
     recording = {"checkpoint_interval_s": 0.02}
     data = scene_data(access, swing(seconds), count=count, fidelity=fidelity, recording=recording)
@@ -149,7 +150,7 @@ def wrong_step(access: EngineAccess, out: Path, *, factor: float, count: int, se
 
 @hard("spoilt: late in a run", {})
 def late(access: EngineAccess, out: Path) -> list[Check]:
-    """Break a run after a while: the error has the time of the checkpoint before, and the file too."""
+    """Give a smarticle a speed of 100 m/s at 0.55 s; message and `failed.json` must name the last checkpoint."""
     relax, recording = {"type": "relax", "duration_s": 0.4}, {"checkpoint_interval_s": 0.1}
 
     def throw(engine: Engine) -> None:
@@ -165,9 +166,9 @@ def late(access: EngineAccess, out: Path) -> list[Check]:
 
 
 def cost(access: EngineAccess, out: Path, *, fidelity: str, count: int, activity: str, seconds: float) -> list[Check]:
-    """Measure what the checks of the watchdog take of the processor time of a whole run.
+    """Measure the share of the watchdog in the processor time of a run.
 
-    Compiled code is loaded once in a run, however long that is: of a share of a short one it would be most.
+    The first check is measured separately, since it loads compiled code and would dominate the share of a short run.
     """
     phases: dict[str, dict[str, Any]] = {
         "at rest": {"type": "relax"},

@@ -1,4 +1,4 @@
-"""Scenes at the edge of what may be asked for: shapes, counts, friction, time steps, motors, room, hooks."""
+"""Scenes with extreme shapes, counts, friction, time steps, motors, containers and hooks."""
 
 from __future__ import annotations
 
@@ -28,16 +28,16 @@ from validation.bench import (
 from validation.cases import Check, above, below, hard, near, nothing, says
 from validation.hard.runs import Watched, whole
 
-TORQUE_LIMIT = 1.607e-5  # N m, the paper's
+TORQUE_LIMIT = 1.607e-5  # τ_max of the paper [N m]
 
 
 # -- shapes, counts, friction ------------------------------------------------------------------------------------------
 
 
 def barbs(access: EngineAccess, out: Path, *, ratio: float, count: int) -> list[Check]:
-    """Pour smarticles with the shortest barbs, none, and the longest."""
+    """Pour smarticles without barbs, with the shortest barbs, and with the longest barbs."""
     run = whole(scene_data(access, RELAX, count=count, smarticle={"aspect_ratio": ratio}), out)
-    # Rods roll.
+    # A large final speed is allowed, since rods roll.
     return run.sound(rest=0.05) + run.weight_on_floor(0.02)
 
 
@@ -47,7 +47,7 @@ for _ratio in (0.0, 0.05, 2.0):
 
 @hard("rods that may roll", {"count": 40, "radius": 0.0117})
 def rods(access: EngineAccess, out: Path, *, count: int, radius: float) -> list[Check]:
-    """Pour bars without barbs, little inertia about themselves, into a narrow container."""
+    """Pour rods, which have a small moment of inertia about their axis, into a narrow container."""
     data = scene_data(access, RELAX, count=count, smarticle={"aspect_ratio": 0}, container={"radius_m": radius})
     data["phases"][0]["settle"] = {"timeout_s": 1}
     run = whole(data, out)
@@ -56,7 +56,7 @@ def rods(access: EngineAccess, out: Path, *, count: int, radius: float) -> list[
 
 @hard("N = 1", {})
 def one(access: EngineAccess, out: Path) -> list[Check]:
-    """Pour, actuate and weld one smarticle."""
+    """Run a scene with a single smarticle: pour, actuate, rest."""
     run = whole(scene_data(access, swing(0.1), RELAX, count=1), out)
     checks = run.sound() + run.weight_on_floor(0.02)
     if run.error is None:
@@ -71,7 +71,7 @@ def one(access: EngineAccess, out: Path) -> list[Check]:
 
 @hard("checkpoint at the last step", {})
 def checkpoint_last(access: EngineAccess, out: Path) -> list[Check]:
-    """End a run at the step of a checkpoint: what was just loaded has no contacts yet that a check could read."""
+    """End a run at a checkpoint: the reloaded engine has no contacts yet when the last check reads them."""
     recording = {"series_interval_s": 0.01, "frame_interval_s": 0.04, "checkpoint_interval_s": 0.01}
     run = whole(scene_data(access, RELAX, count=2, recording=recording), out)
     return run.sound() + run.weight_on_floor(0.02)
@@ -79,7 +79,7 @@ def checkpoint_last(access: EngineAccess, out: Path) -> list[Check]:
 
 @hard("N = 2000", None, {"count": 2000, "per_layer": 500, "radius": 0.15})
 def many(access: EngineAccess, out: Path, *, count: int, per_layer: int, radius: float) -> list[Check]:
-    """Pour very many into a wide container."""
+    """Pour 2000 smarticles into a wide container."""
     data = scene_data(access, RELAX, count=count, per_layer=per_layer, container={"radius_m": radius})
     run = whole(data, out)
     return run.sound(rest=0.1) + run.weight_on_floor(0.02)
@@ -88,12 +88,12 @@ def many(access: EngineAccess, out: Path, *, count: int, per_layer: int, radius:
 @hard("friction 0", {"value": 0.0, "count": 6}, {"count": 100})
 @hard("friction 5", {"value": 5.0, "count": 6}, {"count": 100})
 def friction(access: EngineAccess, out: Path, *, value: float, count: int) -> list[Check]:
-    """Pour with no friction, and with plenty."""
+    """Pour with the friction coefficient `value` at all contacts."""
     contact = {"friction_smarticle": value, "friction_wall": value}
     data = scene_data(access, RELAX, count=count, contact=contact)
     data["phases"][0]["settle"] = {"timeout_s": 2}
     run = whole(data, out)
-    # Without friction what slides goes on sliding, at the speed of a fall from 0.1 mm.
+    # Without friction, sliding does not end; 0.05 m/s is the speed after a fall of 0.1 mm.
     return run.sound(rest=0.05 if not value else 0.02) + run.weight_on_floor(0.05)
 
 
@@ -101,7 +101,7 @@ def friction(access: EngineAccess, out: Path, *, value: float, count: int) -> li
 
 
 def _with_step(data: dict[str, Any], share: float) -> tuple[dict[str, Any], float, float]:
-    """Return the scene with its time step set to a share of the stable one, the step [s], and the stable one [s]."""
+    """Set the time step of a scene to `share` times the stable step; return scene, step [s] and stable step [s]."""
     stable = stable_step(scene_of(data))
     return {**data, "fidelity": {"base": "draft", "time_step_s": share * stable}}, share * stable, stable
 
@@ -109,23 +109,23 @@ def _with_step(data: dict[str, Any], share: float) -> tuple[dict[str, Any], floa
 @hard("time step 0.5 of the stable one", {"share": 0.5, "count": 4}, {"count": 40})
 @hard("time step 0.9 of the stable one", {"share": 0.9, "count": 4}, {"count": 40})
 def step_below(access: EngineAccess, out: Path, *, share: float, count: int) -> list[Check]:
-    """Set a time step by hand, below the stable one."""
-    data, asked, _ = _with_step(scene_data(access, swing(0.04), REST, count=count), share)
+    """Run with an explicit time step below the stable one."""
+    data, requested, _ = _with_step(scene_data(access, swing(0.04), REST, count=count), share)
     run = whole(data, out)
-    assert run.scene is not None  # draft, and a step that is allowed
-    # Shorter, but for rounding, by as much as makes it a whole fraction of the control period.
-    fraction = run.scene.fidelity.control_interval_s / asked
-    expected = fraction / math.ceil(fraction - 1e-9)
-    return [*run.sound(), near("step taken over the step asked [1]", time_step(run.scene) / asked, expected, 1e-6)]
+    assert run.scene is not None  # the scene is valid
+    # The step is shortened until the control period is a multiple of it.
+    steps = run.scene.fidelity.control_interval_s / requested
+    expected = steps / math.ceil(steps - 1e-9)
+    return [*run.sound(), near("step taken over the step asked [1]", time_step(run.scene) / requested, expected, 1e-6)]
 
 
 @hard("time step 1.1 of the stable one", {"share": 1.1})
 @hard("time step 2 of the stable one", {"share": 2.0})
 def step_above(access: EngineAccess, out: Path, *, share: float) -> list[Check]:
-    """Set a time step by hand, above the stable one."""
-    data, asked, stable = _with_step(scene_data(access, shape_change()), share)
+    """Run with an explicit time step above the stable one, which must be rejected."""
+    data, requested, stable = _with_step(scene_data(access, shape_change()), share)
     run = whole(data, out)
-    above_stable = f"fidelity.time_step_s: {asked:g} s is above the stable step {stable:.4g} s"
+    above_stable = f"fidelity.time_step_s: {requested:g} s is above the stable step {stable:.4g} s"
     made = Check("run directory", "made" if out.exists() else "none", "none", not out.exists())
     return [says(run.text, above_stable, "use at most"), made]
 
@@ -135,7 +135,7 @@ def step_above(access: EngineAccess, out: Path, *, share: float) -> list[Check]:
 
 @hard("τ_max = 0", {})
 def no_torque(access: EngineAccess, out: Path) -> list[Check]:
-    """Ask for motors without torque."""
+    """Run with a torque limit of zero, which must be rejected."""
     run = whole(scene_data(access, turn(40, 0.3), motor={"torque_limit_N_m": 0.0}), out)
     return [says(run.text, "motor.torque_limit_N_m", "0.0 N m", "at least 1e-15 N m")]
 
@@ -144,7 +144,7 @@ def no_torque(access: EngineAccess, out: Path) -> list[Check]:
 @hard("τ_max / 1000, stall", {"law": "stall", "count": 6}, {"count": 40})
 @hard("τ_max / 1000, slip", {"law": "slip", "count": 6}, {"count": 40})
 def weak_motors(access: EngineAccess, out: Path, *, law: str, count: int) -> list[Check]:
-    """Drive barbs by motors that cannot lift them."""
+    """Actuate with a torque limit too small to lift the barbs."""
     limit = TORQUE_LIMIT / 1000
     motor = {"law": law, "torque_limit_N_m": limit}
     run = whole(scene_data(access, turn(40, 0.3), RELAX, count=count, motor=motor), out)
@@ -164,7 +164,7 @@ def weak_motors(access: EngineAccess, out: Path, *, law: str, count: int) -> lis
 
 @hard("τ_max · 100", {"count": 6}, {"count": 40})
 def strong_motors(access: EngineAccess, out: Path, *, count: int) -> list[Check]:
-    """Drive barbs by motors that nothing stops."""
+    """Actuate with a torque limit that no load reaches."""
     motor = {"torque_limit_N_m": 100 * TORQUE_LIMIT}
     run = whole(scene_data(access, turn(40, 0.3), REST, count=count, motor=motor), out)
     checks = run.sound()
@@ -176,6 +176,7 @@ def strong_motors(access: EngineAccess, out: Path, *, count: int) -> list[Check]
 
 
 def _jammed(run: Watched) -> list[Check]:
+    """Return checks that barbs move but cannot straighten, and that torques stay limited."""
     if run.error is not None:
         return []
     assert run.scene is not None
@@ -191,20 +192,20 @@ def _jammed(run: Watched) -> list[Check]:
 
 @hard("no room to straighten", {"count": 5, "seconds": 0.4}, {"count": 20, "seconds": 1.5})
 def no_room(access: EngineAccess, out: Path, *, count: int, seconds: float) -> list[Check]:
-    """Straighten smarticles of l/w = 0.7 in a container 5 % wider than the least, half as wide as needed."""
+    """Straighten smarticles (l/w = 0.7) in a container of 1.05 times the smallest allowed radius."""
     data = scene_data(access, shape_change(seconds, hold=0.05), RELAX, count=count, per_layer=1)
-    reach, said = scene_of(data).particle.reach, None
+    reach, message = scene_of(data).particle.reach, None
     try:
         scene_of({**data, "container": {"radius_m": 0.999 * reach}})
     except InputError as error:
-        said = str(error)
+        message = str(error)
     run = whole({**data, "container": {"radius_m": reach * 1.05}}, out)
-    return [says(said, f"use at least {reach:.4g} m"), *run.sound(), *_jammed(run)]
+    return [says(message, f"use at least {reach:.4g} m"), *run.sound(), *_jammed(run)]
 
 
 @hard("container of radius 0.7 w", {"count": 5, "seconds": 0.4}, {"count": 20, "seconds": 1.5})
 def jammed(access: EngineAccess, out: Path, *, count: int, seconds: float) -> list[Check]:
-    """Straighten l/w = 0.4 in a container of radius 0.7 w, too narrow for a straight one, 0.9 w to either side."""
+    """Straighten smarticles (l/w = 0.4, half length 0.9 w when straight) in a container of radius 0.7 w."""
     change, smarticle = shape_change(seconds, hold=0.05), {"aspect_ratio": 0.4}
     data = scene_data(access, change, RELAX, count=count, per_layer=1, smarticle=smarticle)
     data["container"] = {"radius_m": 0.7 * scene_of(data).smarticle.middle_length_m}
@@ -220,9 +221,9 @@ def jammed(access: EngineAccess, out: Path, *, count: int, seconds: float) -> li
 def hook(
     access: EngineAccess, out: Path, *, count: int, distance: float, speed: float, change: float, rest: float
 ) -> list[Check]:
-    """Draw the upper hook out of a pile after its smarticles changed their shape around it."""
+    """Pull the upper hook out of a pile after a shape change around the hook."""
     hooks = {"lower_height_m": 2e-3, "upper_height_m": 4e-3}
-    # The time that it stays up: what hangs on it comes to rest.
+    # The phase is longer than the motion, so that hanging smarticles come to rest.
     pull = {"type": "pull-hook", "distance_m": distance, "speed_m_per_s": speed, "duration_s": distance / speed + rest}
     run = whole(scene_data(access, shape_change(change), pull, count=count, hooks=hooks), out)
     checks = run.sound(rest=None)
@@ -241,16 +242,16 @@ def hook(
 
 @hard("internal oscillation", {"seconds": 3.0}, {"seconds": 60.0})
 def oscillation(access: EngineAccess, out: Path, *, seconds: float, count: int = 3) -> list[Check]:
-    """Let smarticles on the floor of a container swing their barbs by 5° at 8 Hz."""
-    described, engine, recorder = watched(scene_data(access, shape_change(), count=count), out)
-    particle, boxes = described.particle, described.smarticle.boxes
+    """Swing the barbs of smarticles on the floor by 5° at 8 Hz."""
+    scene, engine, recorder = watched(scene_data(access, shape_change(), count=count), out)
+    particle, boxes = scene.particle, scene.smarticle.boxes
     for k in range(count):
-        height = 3 * particle.reach * (k + 0.5) / 2 + lying(described)
+        height = 3 * particle.reach * (k + 0.5) / 2 + lying(scene)
         add(engine, (0, 0, height), Rotation.from_euler("zx", [1.1 * k, 0.2 * k]))
     engine.advance(round(0.15 / engine.time_step))
     engine.motors.articulate()
-    interval, centre = described.fidelity.control_interval_s, np.radians(described.smarticle.angles_deg)
-    rows, said = [], None
+    interval, centre = scene.fidelity.control_interval_s, np.radians(scene.smarticle.angles_deg)
+    rows, message = [], None
     for n in range(1, round(seconds / interval) + 1):
         angle = math.radians(5) * math.sin(2 * math.pi * 8 * n * interval)
         engine.motors.actuate(np.tile(centre + angle, (1, count, 1)), interval)
@@ -259,22 +260,22 @@ def oscillation(access: EngineAccess, out: Path, *, seconds: float, count: int =
             state = engine.state()
             height = state.potential_energy(engine.gravity, 0.0)
             rows.append((n * interval, state.kinetic_energy, height, engine.motors.gaps().max()))
-        if n % 500 == 0 and (said := watchdog_error(engine, recorder)):
+        if n % 500 == 0 and (message := watchdog_error(engine, recorder)):
             break
     time, kinetic, height, gap = np.array(rows).T
-    gap /= described.sphere_diameter
+    gap /= scene.sphere_diameter
     tips = boxes.mass * (math.radians(5) * 2 * math.pi * 8 * boxes.barb_length) ** 2
     scale, fall = count * tips / 2, count * boxes.mass * engine.gravity * particle.reach
-    middle, late = (time > seconds / 3) & (time <= 2 * seconds / 3), time > 2 * seconds / 3
-    most, thirds = kinetic.max(), kinetic[late].mean() / kinetic[middle].mean()
-    gain, trend = height[late].max() - height[time < seconds / 6].max(), abs(np.polyfit(time, gap, 1)[0])
+    second, third = (time > seconds / 3) & (time <= 2 * seconds / 3), time > 2 * seconds / 3
+    most, ratio = kinetic.max(), kinetic[third].mean() / kinetic[second].mean()
+    gain, trend = height[third].max() - height[time < seconds / 6].max(), abs(np.polyfit(time, gap, 1)[0])
     return [
-        nothing("the watchdog reports", said),
+        nothing("the watchdog reports", message),
         above("largest kinetic energy over that of swinging barbs [1]", most / scale, 0.05),
         below("largest kinetic energy over that of swinging barbs and a fall [1]", most / (5 * scale + fall), 1.0),
-        below("kinetic energy of the last third over that of the second [1]", thirds, 2.0),
+        below("kinetic energy of the last third over that of the second [1]", ratio, 2.0),
         below("gain of height over a fall [1]", gain / fall, 0.5),
         below("largest joint gap [d]", gap.max(), 0.01),
-        # No trend that would reach the limit in ten times as long.
+        # The gap must not reach its limit in a run ten times as long.
         below("trend of the joint gap [d] in ten times as long", trend * 10 * seconds, 0.01),
     ]

@@ -1,7 +1,7 @@
-"""Kill runs at random moments and resume them: they give the bits of the run that was never killed.
+"""Kill runs at random times, resume them, and compare them bit by bit with an uninterrupted run.
 
-SIGKILL meets a run after a random share of the processor time that the whole run took, loading and closing included.
-Processor time does not depend on how busy the machine is.
+SIGKILL is sent after a random fraction of the processor time of the uninterrupted run, from start to exit of the
+process. Processor time, unlike wall time, does not depend on the load of the machine.
 """
 
 from __future__ import annotations
@@ -23,30 +23,34 @@ from dem.record.files import write_text
 from validation.access import engine_access
 from validation.bench import scene_data, swing
 
-EVERY_S = 0.04  # of simulated time between checkpoints of a run from its pour on; of frames, half as much
-LONGER = 1.1  # moments are drawn from the whole run's processor time and a little more, to meet the end as well
-LEAST_FILES = 20  # to compare nothing with nothing proves nothing
+CHECKPOINT_S = 0.04  # simulated time between checkpoints [s]; frames are twice as frequent
+LONGER = 1.1  # kills are drawn up to 1.1 times the processor time of the run, so that its last moments are included
+LEAST_FILES = 20  # fewer files would make the comparison meaningless
 SAME, STATE = "same bits", "killed in"
 
 
 def scene_to_kill(engine: str, seed: int) -> dict[str, Any]:
-    """Return a scene: pour, rest, shake, swing, with a checkpoint every few hundred steps."""
-    recording = {"checkpoint_interval_s": EVERY_S, "frame_interval_s": EVERY_S / 2}
+    """Return a scene as a dictionary: pour, rest, shake, swing, and a checkpoint every few hundred steps."""
+    recording = {"checkpoint_interval_s": CHECKPOINT_S, "frame_interval_s": CHECKPOINT_S / 2}
     phases = ({"type": "relax", "duration_s": 0.05}, {"type": "shake", "duration_s": 0.2}, swing(0.2))
     return scene_data(engine_access(engine), *phases, count=12, per_layer=4, seed=seed, recording=recording)
 
 
 def start(path: Path, out: Path) -> subprocess.Popen[bytes]:
-    """Start a run of a scene in a process of its own, or resume it."""
+    """Start a process that runs a scene file, or resumes an existing run."""
     command = [sys.executable, "-m", "smarticles", "run", str(path), "--out", str(out)]
     if (out / "run.json").exists():
         command.append("--resume")
-    with out.with_suffix(".txt").open("ab") as said:
-        return subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=said)
+    with out.with_suffix(".txt").open("ab") as errors:
+        return subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=errors)
 
 
 def finish(process: subprocess.Popen[bytes], what: str) -> float:
-    """Wait for the end of a process; return the processor time that it took [s]."""
+    """Wait until a process has ended; return its processor time [s].
+
+    Raises:
+        RunError: the process failed; the message begins with `what`.
+    """
     _, status, usage = os.wait4(process.pid, 0)
     process.returncode = os.waitstatus_to_exitcode(status)
     if process.returncode not in {0, -signal.SIGKILL}:
@@ -55,14 +59,14 @@ def finish(process: subprocess.Popen[bytes], what: str) -> float:
 
 
 def kill_after(process: subprocess.Popen[bytes], seconds: float, what: str) -> bool:
-    """Kill a process once it has taken so much processor time; return whether it was still at work."""
+    """Kill a process after `seconds` [s] of processor time; return False if the process ended before."""
     ticks = os.sysconf("SC_CLK_TCK")
     while True:
         try:
             spent = Path(f"/proc/{process.pid}/stat").read_text(encoding="ascii").rpartition(")")[2].split()
         except FileNotFoundError:
             break
-        if spent[0] == "Z":  # it has ended
+        if spent[0] == "Z":  # the process has ended
             break
         if (int(spent[11]) + int(spent[12])) / ticks >= seconds:
             process.kill()
@@ -73,13 +77,26 @@ def kill_after(process: subprocess.Popen[bytes], seconds: float, what: str) -> b
 
 
 def results(out: Path) -> dict[str, bytes]:
-    """Read what a run leaves: series, frames and their lists, by name."""
+    """Return the bytes of the series, frames and collections of a run, by file name relative to `out`."""
     files = [out / "series.h5", *out.glob("*.pvd"), *(out / "frames").iterdir()]
     return {str(path.relative_to(out)): path.read_bytes() for path in files}
 
 
 def row_of(whole: Path, out: Path, *, seconds: float, killed: str) -> dict[str, Any]:
-    """Compare a run that was killed and has ended since with the whole one; return a row of the table."""
+    """Compare a killed and resumed run with the uninterrupted run.
+
+    Args:
+        whole: directory of the uninterrupted run.
+        out: directory of the resumed run.
+        seconds: processor time before the kill [s].
+        killed: phase in which the run was killed.
+
+    Returns:
+        A row of the table.
+
+    Raises:
+        RunError: too few files to compare.
+    """
     log = (out / "log.txt").read_text(encoding="utf-8")
     from_where = re.search(r"resumed from (?:the checkpoint of t = ([\d.]+) s|the start)", log)
     one, other = results(whole), results(out)
@@ -97,7 +114,7 @@ def row_of(whole: Path, out: Path, *, seconds: float, killed: str) -> dict[str, 
 
 
 def _phase_of(out: Path) -> str:
-    """Return the phase of a run, by its log; before the first: start."""
+    """Return the last phase in the log of a run, or "start" before the first phase."""
     log = out / "log.txt"
     begun = re.findall(r"phase \d+ (\S+) (begins|ended)", log.read_text(encoding="utf-8")) if log.exists() else []
     if not begun:
@@ -107,22 +124,35 @@ def _phase_of(out: Path) -> str:
 
 
 def kills(engine: str, number: int, folder: Path, *, seed: int) -> list[dict[str, Any]]:
-    """Kill runs of one scene at random moments, and compare each with the whole one; return rows of the table."""
+    """Kill runs of one scene at random times, and compare each with the uninterrupted run.
+
+    Args:
+        engine: name of the engine.
+        number: number of kills.
+        folder: for run directories; those of equal runs are removed.
+        seed: of the scene and of the random times.
+
+    Returns:
+        One row of the table per kill.
+
+    Raises:
+        RunError: a run failed, or two uninterrupted runs differ.
+    """
     rng, path, whole = random.Random(1000 * seed + 1), folder / f"{seed}.yaml", folder / f"whole-{seed}"
     write_text(path, json.dumps(scene_to_kill(engine, seed)))
-    # Twice: the first compiles what is not in the cache yet.
+    # Two runs: the first may compile code, which would distort the processor time.
     finish(start(path, whole), str(whole))
     again = folder / f"again-{seed}"
-    took = finish(start(path, again), str(again))
+    duration = finish(start(path, again), str(again))
     if results(whole) != results(again):
         raise RunError(f"{folder}: one scene run twice does not give the same bits; no kill was needed")
     rows: list[dict[str, Any]] = []
     while len(rows) < number:
-        seconds, out = rng.uniform(0.0, LONGER * took), folder / f"killed-{seed}-{len(rows)}"
+        seconds, out = rng.uniform(0.0, LONGER * duration), folder / f"killed-{seed}-{len(rows)}"
         what = f"{out}, killed after {seconds:.2f} s of processor time"
-        met = kill_after(start(path, out), seconds, what)
+        was_killed = kill_after(start(path, out), seconds, what)
         killed = _phase_of(out)
-        if met:
+        if was_killed:
             finish(start(path, out), what)
             row = row_of(whole, out, seconds=seconds, killed=killed)
             rows.append({"engine": engine, "threads": 1, "seed": seed, "kill": len(rows) + 1, **row})

@@ -1,9 +1,8 @@
-"""Find where steps above the stable one begin to chatter and to blow up.
+"""Find the time steps above which smarticles chatter and simulations blow up.
 
-A scene rejects such steps, so engines are set up by hand. The same few smarticles are let go at steps from one half to
-four times the stable one of `dem.physics.stability`. *Chatter*: what should be at rest is not. *Blow-up*: energy comes
-from nowhere, or the engine ends in numbers that are none. Every scene is run with several seeds, which move where and
-how high smarticles begin.
+Scenes reject time steps above the stable step, so the engines are built directly. A few smarticles are released at
+time steps from 0.5 to 4 times the stable step. *Chatter*: smarticles that should be at rest move. *Blow-up*: the energy
+grows without supply, or positions become NaN. Each setting is run with several seeds, which vary the initial poses.
 """
 
 from __future__ import annotations
@@ -27,11 +26,11 @@ from validation.access import EngineAccess, engine_access
 from validation.bench import lying, scene_data, scene_of, shape_change, watched
 
 FACTORS = (0.5, 0.9, 1.0, 1.1, 1.2, 1.35, 1.5, 1.75, 2.0, 2.5, 3.0, 4.0)
-SETTLE, WATCH = 0.25, 0.05  # s
-# m/s, root mean square. A stack at rest has 1e-6 at most; what still rolls or topples at half the stable step is not
-# at rest, and shows nothing of chatter.
+SETTLE, WATCH = 0.25, 0.05  # time to come to rest, then time of measurement [s]
+# Limits of the root-mean-square speed [m/s]. A stack at rest has at most 1e-6. A stack with more than QUIET at half the
+# stable step still rolls or topples, and is not evaluated for chatter.
 QUIET, CHATTER = 1e-4, 1e-3
-BLOW_UP = 1.0  # energy from nowhere over that of lifting all smarticles by one sphere diameter
+BLOW_UP = 1.0  # limit of the excess energy over the energy that lifts all smarticles by a sphere diameter
 FACTOR, SPEED, RISE = (
     "factor [1]",
     "speed at rest, root mean square [m/s]",
@@ -41,24 +40,24 @@ FACTOR, SPEED, RISE = (
 
 @dataclass(frozen=True)
 class Setting:
-    """What is let go."""
+    """Initial configuration of smarticles."""
 
-    placed: str  #: "stack": flat, all alike; "crossed": flat, every other one turned; "pile": at random
-    ratio: float = 0.7  #: L/w
+    placed: str  #: "stack": flat, aligned; "crossed": flat, every second one rotated by 90°; "pile": random
+    ratio: float = 0.7  #: Aspect ratio l/w
     fidelity: str = "draft"  #: Draft, standard or reference
     keys: str = ""  #: Further keys of the scene
-    count: int = 6  #: Smarticles
-    articulated: bool = False  #: Hinged links, their motors holding, or welded
+    count: int = 6  #: Number of smarticles
+    articulated: bool = False  #: Hinged links with holding motors; False: welded
 
     @property
     def name(self) -> str:
-        """Name in tables."""
+        """Name of the configuration in tables."""
         kind = "articulated" if self.articulated else "welded"
         where = f", {self.keys}" if self.keys else ""
         return f"{kind} {self.placed}{where}, l/w = {self.ratio:g}, {self.fidelity}"
 
     def data(self, access: EngineAccess) -> dict[str, Any]:
-        """Return plain data of the scene; nothing of it is run but its engine."""
+        """Return a scene as a dictionary, from which the engine for this configuration is built."""
         phases = [shape_change()] if self.articulated else []
         smarticle = {"aspect_ratio": self.ratio}
         data = scene_data(access, *phases, count=self.count, fidelity=self.fidelity, smarticle=smarticle)
@@ -86,9 +85,9 @@ SETTINGS: Mapping[str, Setting] = {
 }
 
 
-def poses(setting: Setting, described: Scene, seed: int) -> Poses:
-    """Return where smarticles begin."""
-    rng, particle = np.random.default_rng(seed), described.particle
+def poses(setting: Setting, scene: Scene, seed: int) -> Poses:
+    """Return the initial poses of all smarticles."""
+    rng, particle = np.random.default_rng(seed), scene.particle
     if setting.placed == "pile":
         narrow, reach = setting.keys == "at the wall", particle.reach
         layers = setting.count if narrow else 1
@@ -96,18 +95,18 @@ def poses(setting: Setting, described: Scene, seed: int) -> Poses:
             place_layer(
                 particle,
                 count=setting.count // layers,
-                radius=described.cylinder.inner_radius,
+                radius=scene.cylinder.inner_radius,
                 bottom=1e-4 + 2 * reach * k,
-                height=2 * reach if narrow else 2 * described.smarticle.middle_length_m,
+                height=2 * reach if narrow else 2 * scene.smarticle.middle_length_m,
                 obstacles=np.empty((0, 3)),
                 rng=rng,
             )
             for k in range(layers)
         ]
         return Poses(np.concatenate([p.positions for p in placed]), tuple(r for p in placed for r in p.rotations))
-    hooks = described.hooks
+    hooks = scene.hooks
     bottom = 0.0 if hooks is None else hooks.upper_height_m + hooks.side_m / 2
-    heights = bottom + lying(described) * (2 * np.arange(setting.count) + 1)
+    heights = bottom + lying(scene) * (2 * np.arange(setting.count) + 1)
     heights += np.cumsum(rng.uniform(1e-5, 4e-5, setting.count))
     turns = rng.uniform(-0.01, 0.01, setting.count)
     if setting.placed == "crossed":
@@ -117,19 +116,19 @@ def poses(setting: Setting, described: Scene, seed: int) -> Poses:
 
 
 def let_go(access: EngineAccess, setting: Setting, seed: int, factor: float) -> dict[str, Any]:
-    """Let smarticles go at a factor of the stable step; return a row of the table."""
+    """Release smarticles at `factor` times the stable step; return a row of the table."""
     data = setting.data(access)
     stable = stable_step(scene_of(data))
     with tempfile.TemporaryDirectory() as scratch:
-        described, engine, _ = watched(data, scratch, dt=factor * stable)
-    engine.add(poses(setting, described, seed))
+        scene, engine, _ = watched(data, scratch, dt=factor * stable)
+    engine.add(poses(setting, scene, seed))
     if setting.articulated:
         engine.motors.articulate()
-    mass = setting.count * described.smarticle.boxes.mass
-    lift = mass * engine.gravity * described.sphere_diameter
+    mass = setting.count * scene.smarticle.boxes.mass
+    lift = mass * engine.gravity * scene.sphere_diameter
     squares, lowest, rise = [], math.inf, 0.0
     try:
-        for time, kinetic, total in _energies(engine, described):
+        for time, kinetic, total in _energies(engine, scene):
             lowest = min(lowest, total)
             rise = max(rise, (total - lowest) / lift)
             if time > SETTLE:
@@ -148,10 +147,10 @@ def let_go(access: EngineAccess, setting: Setting, seed: int, factor: float) -> 
     }
 
 
-def _energies(engine: Engine, described: Scene) -> Iterator[tuple[float, float, float]]:
-    """Advance by about a millisecond each time; yield time [s], kinetic and all energy but the motors' [J]."""
+def _energies(engine: Engine, scene: Scene) -> Iterator[tuple[float, float, float]]:
+    """Advance in intervals of about 1 ms; yield time [s], kinetic energy, and total energy less motor work [J]."""
     dt = engine.time_step
-    interval = dt * max(1, round(described.fidelity.control_interval_s / dt))
+    interval = dt * max(1, round(scene.fidelity.control_interval_s / dt))
     held, updates = engine.state().angles, max(1, round(1e-3 / interval))
     while engine.time < SETTLE + WATCH:
         for _ in range(updates):
@@ -164,7 +163,7 @@ def _energies(engine: Engine, described: Scene) -> Iterator[tuple[float, float, 
 
 
 def climb(engine: str, name: str, seed: int) -> list[dict[str, Any]]:
-    """Run all factors of a scene and seed, up to the second that blows up."""
+    """Run a setting with one seed at increasing time steps, until the second blow-up; return rows of the table."""
     rows: list[dict[str, Any]] = []
     for factor in FACTORS:
         rows.append(let_go(engine_access(engine), SETTINGS[name], seed, factor))
@@ -174,10 +173,14 @@ def climb(engine: str, name: str, seed: int) -> list[dict[str, Any]]:
 
 
 def onset(name: str, runs: pd.DataFrame) -> dict[str, Any]:
-    """Return the lowest factors of a scene that chatter and that blow up, least and most over its seeds.
+    """Return the smallest factors at which a setting chatters and blows up: minimum and maximum over seeds.
 
-    inf: none did; NaN: what is not at rest at half the stable step cannot show it. Neither can smarticles that lie
-    across each other or at random, which are still rocking now and then at every step.
+    A factor is inf if no run chattered or blew up. Chatter is NaN for smarticles that are not at rest at half the
+    stable step, and for crossed or random smarticles, which may rock at any time step.
+
+    Args:
+        name: key of `SETTINGS`.
+        runs: rows of `climb` for this setting.
     """
     factor, speed, rise = (pd.to_numeric(runs[column], errors="coerce") for column in (FACTOR, SPEED, RISE))
     small, blown = factor <= 0.9, rise > BLOW_UP

@@ -1,4 +1,4 @@
-"""Run a scene under a watchdog that notes how near it came to its limits; series and end of the run."""
+"""Run scenes under a watchdog that records the largest fraction of each limit."""
 
 from __future__ import annotations
 
@@ -27,30 +27,30 @@ from validation.cases import Check, below, near
 
 @dataclass(kw_only=True)
 class Noting(Watchdog):
-    """A watchdog that notes how near smarticles came to its limits."""
+    """Watchdog that records the largest fraction of each limit."""
 
-    nearest: dict[str, float] = field(default_factory=dict)  #: Largest share of each limit
+    nearest: dict[str, float] = field(default_factory=dict)  #: Largest fraction of each limit [1]
 
     def _note(self, limit: str, share: float) -> None:
         self.nearest[limit] = max(self.nearest.get(limit, 0.0), float(share))
 
     def content(self, extremes: Extremes, **options: Any) -> bool:
-        """Return False: every check is a close one."""
+        """Return False, so that the watchdog examines all contacts at every check."""
         return False
 
     def check(self, state: State, **options: Any) -> None:
-        """Note gaps, then check."""
+        """Record the largest gap of a hinge, then check."""
         if (gaps := options.get("gaps")) is not None:
             self._note("gap", gaps.max(initial=0.0) / self.gap)
         super().check(state, **options)
 
     def check_depths(self, overlaps: Overlaps, **options: Any) -> None:
-        """Note the depth, then check."""
+        """Record the deepest contact, then check."""
         self._note("depth", overlaps.deepest / self.depth)
         super().check_depths(overlaps, **options)
 
     def check_energy(self, state: State, *, energy: float, **options: Any) -> None:
-        """Note the rise of energy, then check."""
+        """Record the excess of energy, then check."""
         if np.isfinite(energy - self._ceiling):
             self._note("energy", (energy - self._ceiling) / self.energy)
         super().check_energy(state, energy=energy, **options)
@@ -58,15 +58,15 @@ class Noting(Watchdog):
 
 @dataclass
 class Watched:
-    """A run that has ended."""
+    """Outcome of a run that has ended."""
 
-    scene: Scene | None  #: What was run; None: it is not valid
-    error: tuple[str, str] | None = None  #: Kind and text of the error that it ended in; None: it was done
-    series: dict[str, np.ndarray] = field(default_factory=dict)  #: By name
-    #: Largest share of each limit of the watchdog that was reached
+    scene: Scene | None  #: The scene; None if the scene is not valid
+    error: tuple[str, str] | None = None  #: Class and message of the error; None if the run is done
+    series: dict[str, np.ndarray] = field(default_factory=dict)  #: Recorded series by name
+    #: Largest fraction of each limit of the watchdog [1]
     nearest: dict[str, float] = field(default_factory=dict)
-    cost: float = 0.0  #: Share of the processor time that the watchdog took, but for its first check [1]
-    first_check: float = 0.0  #: Processor time of that, in which compiled code is loaded [s]
+    cost: float = 0.0  #: Share of the watchdog in the processor time, without its first check [1]
+    first_check: float = 0.0  #: Processor time of the first check, which loads compiled code [s]
 
     @property
     def weight(self) -> float:
@@ -76,22 +76,27 @@ class Watched:
 
     @property
     def text(self) -> str | None:
-        """Text of the error."""
+        """Message of the error; None if the run is done."""
         return None if self.error is None else self.error[1]
 
     def during(self, phase: int) -> np.ndarray:
-        """Return which samples belong to a phase."""
-        during: np.ndarray = self.series["phase"] == phase
-        return during
+        """Return a mask that selects the samples of a phase from the series, (n,) bool."""
+        mask: np.ndarray = self.series["phase"] == phase
+        return mask
 
     def sound(self, *, rest: float | None = 0.02, depth: float = 0.5) -> list[Check]:
-        """Check what holds of every run that ended well; `rest`: largest speed at the end [m/s]."""
+        """Return the checks of every successful run.
+
+        Args:
+            rest: largest allowed speed at the end [m/s]; None: not checked.
+            depth: largest allowed overlap, over the sphere diameter [1].
+        """
         checks = [Check("ends", "done" if self.error is None else ": ".join(self.error), "done", self.error is None)]
         if self.error is not None:
             return checks
         assert self.scene is not None
         names = ("kinetic_energy_J", "com_height_m", "max_speed_m_per_s", "container_force_N")
-        # Nothing is there at the first sample.
+        # The first sample has no smarticles, and NaN.
         broken = sum(int((~np.isfinite(self.series[name][1:])).sum()) for name in names)
         height, half = float(self.series["com_height_m"][-1]), self.scene.cylinder.height / 2
         rise = self.nearest.get("energy", 0.0)
@@ -108,7 +113,7 @@ class Watched:
         return checks
 
     def weight_on_floor(self, error: float) -> list[Check]:
-        """Check that the container carries the weight at the end."""
+        """Return a check that the force on the container at the end equals the weight, within a relative error [1]."""
         if self.error is not None:
             return []
         force = float(self.series["container_force_N"][-5:, 2].mean())
@@ -123,13 +128,17 @@ def whole(
     steps: Callable[[Scene], Sequence[float]] = time_steps,
     spoil: Callable[[Engine], None] | None = None,
 ) -> Watched:
-    """Run plain data of a scene into a run directory, with time steps by phase [s].
+    """Run a scene and return the outcome.
 
-    With `note` the watchdog checks closely every time and notes how near its limits are; `spoil` is done to the engine
-    before each record.
+    Args:
+        data: scene as a dictionary.
+        out: run directory.
+        note: use the watchdog `Noting`.
+        steps: returns the time step of each phase [s].
+        spoil: function that changes the engine before each record.
     """
     nearest: dict[str, float] = {}
-    checks: list[float] = []  # processor time of each of the watchdog's [s]
+    checks: list[float] = []  # processor time of each check of the watchdog [s]
 
     def recorder(scene: Scene, out: Path, progress: ProgressWriter) -> Recorder:
         made = build.build_recorder(scene, out, progress)
@@ -169,6 +178,6 @@ def whole(
 
 
 def timed(run: Callable[..., list[Check]], *arguments: Any, **options: Any) -> tuple[list[Check], float]:
-    """Return the checks of a case and the wall time that they took [s]."""
+    """Run a case; return its checks and its wall time [s]."""
     begun = time.monotonic()
     return run(*arguments, **options), time.monotonic() - begun

@@ -1,4 +1,4 @@
-"""Hard cases end well, or with an error that names the cause; kills keep every bit; where instability begins."""
+"""Tests of hard cases, of killed and resumed runs, and of the onset of instability."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ assert all((broken, edges, violence))  # imported to register their cases
 Call = Callable[..., Any]
 
 
-@pytest.mark.filterwarnings("ignore")  # of scenes that ask for trouble
+@pytest.mark.filterwarnings("ignore")  # extreme scenes may warn
 @pytest.mark.parametrize("engine", ON)
 @pytest.mark.parametrize("size", ["short", pytest.param("long", marks=pytest.mark.long)])
 @pytest.mark.parametrize(("name", "run", "short", "long", "absent"), HARD)
@@ -47,7 +47,7 @@ def test_hard_case(
     tables.skip_recorded(engine, "cases", case=name, form=size)
     options = {**(short or {}), **(long if size == "long" else {})}
     arguments = (timed, run, engine_access(engine), tmp_path / "run")
-    # The long form measures memory and time, and runs alone in a fresh process.
+    # The long form measures memory and time, and therefore runs in a new process.
     checks, wall = call_alone(*arguments, **options) if size == "long" else call(engine, *arguments, **options)
     rows = [
         {
@@ -87,5 +87,5 @@ def test_stable_step_is_below_the_onset(call_alone: Call, tables: Tables, name: 
     recorded = tables.read(engine, "onset_runs")
     found = onset(name, pd.DataFrame(rows) if recorded is None else recorded[recorded["scene"] == name])
     tables.write(engine, "onset", [found], ["scene"])
-    # The named fidelities use 0.9 of the stable step: blow-up begins above it.
+    # The named fidelities use 0.9 of the stable step, which must be below the onset of blow-up.
     assert found["blow-up from, least [1]"] > 0.9

@@ -1,4 +1,4 @@
-"""Impacts, overlaps, violent shaking, masses far apart."""
+"""Fast impacts, deep overlaps, strong shaking, large mass ratios."""
 
 from __future__ import annotations
 
@@ -18,17 +18,17 @@ from validation.hard.runs import Noting, whole
 @hard("drop at 10 m/s, welded", {"articulated": False, "time": 0.1}, {"time": 0.45})
 @hard("drop at 10 m/s, articulated", {"articulated": True, "time": 0.1}, {"time": 0.45})
 def drop(access: EngineAccess, out: Path, *, articulated: bool, time: float) -> list[Check]:
-    """Let a smarticle hit the floor at 10 m/s."""
+    """Throw a smarticle at the floor at 10 m/s."""
     speed = 10.0
-    described, engine, recorder = watched(scene_data(access, shape_change(), count=1), out)
+    scene, engine, recorder = watched(scene_data(access, shape_change(), count=1), out)
     add(engine, (0, 0, 0.02), TILTED)
     access.push(engine, 0, velocity=(0, 0, -speed))
     if articulated:
         engine.motors.articulate()
     held = engine.state().angles
-    said = watchdog_error(engine, recorder)
+    message = watchdog_error(engine, recorder)
     energies, lows, gaps = [energy(engine)], [math.inf], [0.0]
-    interval = described.fidelity.control_interval_s
+    interval = scene.fidelity.control_interval_s
     for _ in range(round(time / interval)):
         if articulated:
             engine.motors.actuate(held[None], interval)
@@ -36,12 +36,12 @@ def drop(access: EngineAccess, out: Path, *, articulated: bool, time: float) -> 
         energies.append(energy(engine))
         lows.append(engine.state().positions[0, 2])
         gaps.append(engine.motors.gaps().max())
-    d, particle = described.sphere_diameter, described.particle
+    d, particle = scene.sphere_diameter, scene.particle
     most, end = (max(energies) - max(0.0, engine.motors.work)) / energies[0], energies[-1] / energies[0]
-    # As deep as if one spring took it all.
-    depth = speed * math.sqrt(particle.boxes.mass / described.fidelity.stiffness_N_per_m)
+    # Depth at which a single spring holds the whole kinetic energy.
+    depth = speed * math.sqrt(particle.boxes.mass / scene.fidelity.stiffness_N_per_m)
     return [
-        says(said, "1 smarticle(s) (0): a speed above", "fastest 10 m/s"),
+        says(message, "1 smarticle(s) (0): a speed above", "fastest 10 m/s"),
         below("highest energy over that of the impact [1]", most, 1.001),
         below("energy at the end over that of the impact [1]", end, 0.7),
         above("lowest centre of mass [m]", min(lows), -depth),
@@ -54,23 +54,23 @@ def drop(access: EngineAccess, out: Path, *, articulated: bool, time: float) -> 
 
 @hard("articulated smarticles land", {"time": 0.2})
 def landing(access: EngineAccess, out: Path, *, time: float) -> list[Check]:
-    """Drop articulated smarticles in a heap, their motors taking ten times τ_max for a moment: no false alarm."""
-    described, engine, recorder = watched(scene_data(access, shape_change(), count=4), out)
+    """Drop articulated smarticles on each other. Torques reach 10 τ_max; the watchdog must not stop the run."""
+    scene, engine, recorder = watched(scene_data(access, shape_change(), count=4), out)
     limits = recorder.watchdog
     noting = Noting(cylinder=limits.cylinder, speed=limits.speed, gap=limits.gap, energy=limits.energy)
     recorder.watchdog = noting
     for k in range(4):
         add(engine, (0, 0, 0.01 + 0.01 * k), Rotation.random(random_state=k))
     engine.motors.articulate()
-    held, interval, said, hardest = engine.state().angles, described.fidelity.control_interval_s, None, 0.0
-    while not said and engine.time < time:
+    held, interval, message, hardest = engine.state().angles, scene.fidelity.control_interval_s, None, 0.0
+    while not message and engine.time < time:
         engine.motors.actuate(held[None], interval)
         engine.advance(round(interval / engine.time_step))
-        assert engine.motors.readings is not None  # articulated smarticles have them
-        hardest = max(hardest, float(np.abs(engine.motors.readings.torques).max()) / described.torque_limit)
-        said = watchdog_error(engine, recorder)
+        assert engine.motors.readings is not None  # set for articulated smarticles
+        hardest = max(hardest, float(np.abs(engine.motors.readings.torques).max()) / scene.torque_limit)
+        message = watchdog_error(engine, recorder)
     return [
-        nothing("the watchdog reports", said),
+        nothing("the watchdog reports", message),
         above("largest torque over τ_max [1]", hardest, 3.0),
         below("energy from nowhere over the watchdog's limit [1]", noting.nearest["energy"], 0.25),
     ]
@@ -78,42 +78,44 @@ def landing(access: EngineAccess, out: Path, *, time: float) -> list[Check]:
 
 @hard("tip through the floor", {"speed": 2.0})
 def tip(access: EngineAccess, out: Path, *, speed: float) -> list[Check]:
-    """Throw a barb's tip so fast that a sphere's centre passes the floor, from where on YADE's floor pushes less.
+    """Throw the tip of a barb at the floor so fast that on YADE the centre of a sphere passes through the floor.
 
-    On links the barrier holds it.
+    Below that depth YADE's contact force decreases. On links the barrier stops the tip above the floor.
     """
-    described, engine, recorder = watched(scene_data(access, count=1), out)
+    scene, engine, recorder = watched(scene_data(access, count=1), out)
     add(engine, (0, 0, 0.02), Rotation.random(random_state=1))
     access.push(engine, 0, velocity=(0, 0, -speed))
-    said, first, lowest = None, energy(engine), math.inf
-    while not said and engine.time < 0.05:
+    message, first, lowest = None, energy(engine), math.inf
+    while not message and engine.time < 0.05:
         engine.advance(2)
-        lowest = min(lowest, float(engine.state().spheres(described.particle)[..., 2].min()))
-        said = watchdog_error(engine, recorder)
+        lowest = min(lowest, float(engine.state().spheres(scene.particle)[..., 2].min()))
+        message = watchdog_error(engine, recorder)
     left = "1 smarticle(s) (0): left through the wall or the floor; raise fidelity.stiffness_N_per_m"
     return [
-        above("lowest point of an axis [m]", lowest, 0.0) if access.name == "links" else says(said, left),
+        above("lowest point of an axis [m]", lowest, 0.0) if access.name == "links" else says(message, left),
         below("energy before over that of the start [1]", energy(engine) / first, 1.001),
     ]
 
 
 @hard("deep overlap", {"time": 0.1}, {"time": 0.5})
 def overlap(access: EngineAccess, out: Path, *, time: float) -> list[Check]:
-    """Begin with two smarticles 0.4 diameters apart, overlapping over their whole length, in a high container."""
-    described, engine, recorder = watched(scene_data(access, count=2, container={"height_m": 1.0}), out)
-    d, start = described.sphere_diameter, 0.03
+    """Start with two parallel smarticles 0.4 diameters apart, which overlap over their whole length."""
+    scene, engine, recorder = watched(scene_data(access, count=2, container={"height_m": 1.0}), out)
+    d, start = scene.sphere_diameter, 0.03
     add(engine, (0, 0, start), TILTED)
     add(engine, (0, 0, start + 0.4 * d), TILTED)
     engine.advance(1)
-    said = watchdog_error(engine, recorder)
+    message = watchdog_error(engine, recorder)
     energies = [energy(engine)]
     for _ in range(round(time / 1e-3)):
         engine.advance(round(1e-3 / engine.time_step))
         energies.append(energy(engine))
-    spheres = engine.state().spheres(described.particle)
+    spheres = engine.state().spheres(scene.particle)
     apart = np.linalg.norm(spheres[0][:, None] - spheres[1][None], axis=-1).min()
-    # The barrier of links bears an overlap that chains of spheres may slip through.
-    seen = [] if access.name == "links" else [says(said, "2 smarticle(s) (0, 1): contacts more", "through each other")]
+    # On links the barrier separates them; chains of spheres may pass through each other, which must be reported.
+    seen = (
+        [] if access.name == "links" else [says(message, "2 smarticle(s) (0, 1): contacts more", "through each other")]
+    )
     return [
         *seen,
         below("highest energy over that of the start [1]", max(energies) / energies[0], 1.01),
@@ -124,30 +126,30 @@ def overlap(access: EngineAccess, out: Path, *, time: float) -> list[Check]:
 
 @hard("deep overlap, thrown out", {"time": 0.1})
 def thrown_by_overlap(access: EngineAccess, out: Path, *, time: float) -> list[Check]:
-    """Begin with that overlap in a container of the usual height, with a watchdog blind for the overlap itself."""
-    described, engine, recorder = watched(scene_data(access, count=2), out)
+    """Start with two overlapping smarticles, without the check of overlaps; one is thrown over the wall."""
+    scene, engine, recorder = watched(scene_data(access, count=2), out)
     recorder.watchdog.depth = math.inf
     add(engine, (0, 0, 0.03), TILTED)
-    add(engine, (0, 0, 0.03 + 0.4 * described.sphere_diameter), TILTED)
-    said = None
-    while not said and engine.time < time:
+    add(engine, (0, 0, 0.03 + 0.4 * scene.sphere_diameter), TILTED)
+    message = None
+    while not message and engine.time < time:
         engine.advance(round(1e-3 / engine.time_step))
-        said = watchdog_error(engine, recorder)
-    return [says(said, "1 smarticle(s) (1): thrown out over the wall of")]
+        message = watchdog_error(engine, recorder)
+    return [says(message, "1 smarticle(s) (1): thrown out over the wall of")]
 
 
 @hard("same place", {"time": 0.02})
 def same_place(access: EngineAccess, out: Path, *, time: float) -> list[Check]:
-    """Begin with two smarticles in the very same place, where a contact has no direction."""
+    """Start with two smarticles at equal positions, where the direction of the contact force is undefined."""
     _, engine, recorder = watched(scene_data(access, count=2), out)
     for _ in range(2):
         add(engine, (0, 0, 0.03), TILTED)
     try:
         engine.advance(round(time / engine.time_step))
-        said = watchdog_error(engine, recorder)
+        message = watchdog_error(engine, recorder)
     except RunError as error:
-        said = str(error)
-    return [says(said, "2 smarticle(s) (0, 1)")]
+        message = str(error)
+    return [says(message, "2 smarticle(s) (0, 1)")]
 
 
 @hard(
@@ -175,9 +177,9 @@ def shaken(access: EngineAccess, out: Path, *, count: int, seconds: float, rest:
 
 @hard("thrown out of the container", {"count": 6, "seconds": 0.5}, {"count": 60})
 def thrown_out(access: EngineAccess, out: Path, *, count: int, seconds: float) -> list[Check]:
-    """Shake at Γ = 30 in a container that is too low for it."""
+    """Shake at Γ = 30 in a low container, until smarticles are thrown out."""
     shake = {"type": "shake", "duration_s": seconds, "frequency_hz": 20, "peak_acceleration_g": 30}
-    # A pile that is struck this fast passes through itself where contacts are as few and soft as those of whole links.
+    # On links, stiffer contacts are needed so that smarticles do not pass through each other.
     fidelity = "draft" if access.name == "yade" else {"base": "draft", "stiffness_N_per_m": 5000}
     run = whole(scene_data(access, shake, count=count, fidelity=fidelity, container={"height_m": 0.045}), out)
     return [says(run.text, "at t = ", "thrown out over the wall of 0.045 m; raise container.height_m or shake less")]
@@ -186,36 +188,37 @@ def thrown_out(access: EngineAccess, out: Path, *, count: int, seconds: float) -
 def mass_ratio(
     access: EngineAccess, out: Path, *, heavy_above: bool, stiffness: float, time: float, ratio: float = 1e4
 ) -> list[Check]:
-    """Make one of two smarticles that lie on each other heavier; by hand, since a scene has one density for all.
+    """Multiply the weight of the upper or the lower of two stacked smarticles by `ratio`.
 
-    The contacts of draft cannot carry it, which the watchdog must report; contacts stiffer by the same ratio must.
+    Contacts with the stiffness of draft cannot carry the weight, which the watchdog must report. Contacts stiffer by
+    the factor `ratio` must carry it.
     """
     carries = stiffness > 250 * ratio / 10
     data = scene_data(access, count=2, fidelity={"base": "draft", "stiffness_N_per_m": stiffness})
-    described, engine, recorder = watched(data, out)
-    flat, d, centres = lying(described), described.sphere_diameter, access.ends(described.particle)
-    # Springs along a U give way more under its centre of mass, which is not their middle, than side by side.
+    scene, engine, recorder = watched(data, out)
+    flat, d, centres = lying(scene), scene.sphere_diameter, access.ends(scene.particle)
+    # The centre of mass is not in the middle of the contact springs, so that the smarticle also tilts.
     middle = centres[:, 1].mean()
     softness = (1 / len(centres) + middle**2 / ((centres[:, 1] - middle) ** 2).sum()) / stiffness
-    weight = described.smarticle.boxes.mass * described.gravity_m_per_s2
+    weight = scene.smarticle.boxes.mass * scene.gravity_m_per_s2
     sunk = [(ratio + 1) * weight * softness, (ratio if heavy_above else 1) * weight * softness]
     add(engine, (0, 0, flat - sunk[0] * carries))
     add(engine, (0, 0, 3 * flat - sum(sunk) * carries))
     if access.name == "links":
-        recorder.watchdog.energy = math.inf  # a load added through test access: its work is in no ledger
+        recorder.watchdog.energy = math.inf  # the ledger does not include the work of the added load
     access.burden(engine, int(heavy_above), ratio, rise=0.0 if carries else time)
-    said, begun, heights = None, engine.time, []
-    while not said and engine.time < begun + time:
+    message, start_time, heights = None, engine.time, []
+    while not message and engine.time < start_time + time:
         engine.advance(round(recorder.interval / engine.time_step) // 20)
-        said = watchdog_error(engine, recorder)
+        message = watchdog_error(engine, recorder)
         heights.append(engine.state().positions[:, 2])
     if not carries:
-        return [says(said, "at t = ", "raise fidelity.stiffness_N_per_m")]
-    # The heavy one tilts to and fro, undamped on this scale: the mean, within a tenth.
+        return [says(message, "at t = ", "raise fidelity.stiffness_N_per_m")]
+    # The heavy smarticle oscillates with little damping: compare the mean, within 10 %.
     low, high = np.mean(heights, axis=0)
     floor, other = (depth / d * 1e6 for depth in sunk)
     return [
-        nothing("the watchdog reports", said),
+        nothing("the watchdog reports", message),
         below("speed at the end [m/s]", fastest(engine), 0.01),
         near("depth of the lower one in the floor [1e-6 d]", 1e6 * (flat - low) / d, floor, floor / 10),
         near("depth of one in the other [1e-6 d]", 1e6 * (2 * flat - high + low) / d, other, other / 10),

@@ -1,4 +1,4 @@
-"""On the floor: sliding, rolling, standing on each other, falling flat."""
+"""Known answers on the floor: sliding, rolling, stacks, flat impacts."""
 
 from __future__ import annotations
 
@@ -24,14 +24,14 @@ FRICTION = 0.4
 
 
 def lowest(access: EngineAccess, particle: Particle) -> Array:
-    """Return where a body that lies flat touches the floor, from its centre of mass, (n, 2) [m]."""
+    """Return the contact points of a body lying flat, relative to its centre of mass, (n, 2) [m]."""
     ends = access.ends(particle)
     found: Array = ends[ends[:, 2] < ends[:, 2].min() + 1e-9, :2]
     return found
 
 
 def resting(access: EngineAccess, particle: Particle, law: ContactLaw, *, dt: float, speed: float) -> Engine:
-    """Lay a body on the floor, as deep as its weight presses it, pushed along y at a speed [m/s]."""
+    """Place a body on the floor at its static overlap, with a velocity `speed` along y [m/s]."""
     engine = access.build(particle, law, dt=dt, gravity=G)
     sunk = particle.boxes.mass * G / (len(lowest(access, particle)) * law.normal_stiffness)
     add(engine, (0, -0.03, particle.radius - float(particle.centres[:, 2].min()) - sunk))
@@ -43,29 +43,29 @@ def resting(access: EngineAccess, particle: Particle, law: ContactLaw, *, dt: fl
 
 
 def roll(access: EngineAccess, particle: Particle, law: ContactLaw, *, speed: float, dt: float) -> list[Answer]:
-    """Throw a round body along the floor: friction slows it and makes it spin until it rolls."""
+    """Throw a round body along the floor at `speed` [m/s]; friction makes the body spin until it rolls."""
     friction, mass, inertia = law.wall_friction, particle.boxes.mass, particle.boxes.inertia[0]
     lever = particle.radius - access.arm_share * mass * G / (len(lowest(access, particle)) * law.normal_stiffness)
     rolling = speed / (1 + inertia / (mass * lever**2))
-    begins = (speed - rolling) / (friction * G)
+    rolls_at = (speed - rolling) / (friction * G)
     engine = resting(access, particle, law, dt=dt, speed=speed)
     rows = []
     for _ in range(400):
-        engine.advance(max(1, round(2 * begins / 400 / dt)))
+        engine.advance(max(1, round(2 * rolls_at / 400 / dt)))
         state = engine.state()
         along = state.velocities[0, 1]
         rows.append((engine.time, along, along + state.link_spins[0, 1, 0] * lever))
     time, speeds, slip = np.array(rows).T
-    sliding, late = time < 0.9 * begins, time > 1.3 * begins
-    # Slip falls along a straight line while the body slides: where that meets zero, rolling begins.
-    line = np.polyfit(time[sliding], slip[sliding], 1)
-    slowed, slips = -np.polyfit(time[sliding], speeds[sliding], 1)[0], np.abs(slip[late]).max()
+    slides, rolls = time < 0.9 * rolls_at, time > 1.3 * rolls_at
+    # While the body slides, the slip decreases linearly; rolling begins at the zero of this line.
+    line = np.polyfit(time[slides], slip[slides], 1)
+    slowed, slips = -np.polyfit(time[slides], speeds[slides], 1)[0], np.abs(slip[rolls]).max()
     winding = "Coulomb's force from the first step on: rounding, and what the winding of the spring takes"
     unwinding = "the tangential spring unwinds where sliding ends, and dies away"
     return [
         Answer("deceleration while it slides [m/s²]", friction * G, slowed, 1e-4, winding),
-        Answer("time when rolling begins [s]", begins, -line[1] / line[0], 1e-4, winding),
-        Answer("speed when it rolls [m/s]", rolling, speeds[late].mean(), 1e-4, unwinding),
+        Answer("time when rolling begins [s]", rolls_at, -line[1] / line[0], 1e-4, winding),
+        Answer("speed when it rolls [m/s]", rolling, speeds[rolls].mean(), 1e-4, unwinding),
         Answer("slip when it rolls [m/s]", 0.0, slips, 1e-4, unwinding, scale=speed),
     ]
 
@@ -120,19 +120,20 @@ def slide(access: EngineAccess, *, aspect_ratio: float = 0.7, friction: float = 
     phases=2,
 )
 def roll_errors(access: EngineAccess, steps: Sequence[float], *, phases: int = 5) -> list[float]:
-    """Return the error of the way of a ball that slides and then rolls, after 0.1 s [m], against a 4 times finer step.
+    """Return the errors of the displacement of a ball that slides and then rolls, after 0.1 s [m].
 
-    Without the tangential dashpot, which YADE does not hold to Coulomb's limit while the spring is being wound up: that
-    acts only at steps that resolve the winding, a few µs.
+    The reference is a simulation with a quarter of the smallest time step. The tangential dashpot is off. On YADE its
+    force is not limited by friction for the first few µs of a contact, so that results would depend on whether a time
+    step is shorter than this.
     """
     law, time = ball_law(restitution=0.5, friction=FRICTION, dashpot=0.0), 0.1024
     slowed = FRICTION * G
-    spun = slowed * BALL_MASS * BALL_RADIUS / float(access.roller().boxes.inertia[0])
+    spin_rate = slowed * BALL_MASS * BALL_RADIUS / float(access.roller().boxes.inertia[0])
 
     def way(dt: float, number: int) -> Array:
         speed = 1 + 0.1 * (0.618034 * number % 1)
         engine = resting(access, access.roller(), law, dt=dt, speed=speed)
-        access.push(engine, 0, velocity=(0, speed + slowed * dt / 2, 0), spin=(spun * dt / 2, 0, 0))
+        access.push(engine, 0, velocity=(0, speed + slowed * dt / 2, 0), spin=(spin_rate * dt / 2, 0, 0))
         engine.advance(round(time / dt))
         return np.asarray(engine.state().positions[0])
 
@@ -149,7 +150,15 @@ def roll_errors(access: EngineAccess, steps: Sequence[float], *, phases: int = 5
 def two_high(
     access: EngineAccess, law: ContactLaw, *, dt: float, velocities: Sequence[float] = (0.0, 0.0), sunk: bool
 ) -> Engine:
-    """Stack two balls on the floor, let go as deep as they will be pressed, or just touching."""
+    """Stack two balls on the floor, at their static overlaps if `sunk`, otherwise just touching.
+
+    Args:
+        access: test access to the engine.
+        law: contact law.
+        dt: time step [s].
+        velocities: upward velocities of lower and upper ball [m/s].
+        sunk: start at the static overlaps.
+    """
     press = BALL_MASS * G / STIFFNESS * sunk
     engine = access.build(access.ball(), law, dt=dt, gravity=G)
     add(engine, (0, 0, BALL_RADIUS - 2 * press), access.ball_turn)
@@ -182,7 +191,7 @@ def stack_at_rest(access: EngineAccess) -> list[Answer]:
     (2, LEAPFROG),
 )
 def stack_errors(access: EngineAccess, steps: Sequence[float]) -> list[float]:
-    """Return the errors of both heights above where they rest, against a chain of two masses [m]."""
+    """Return the errors of both heights relative to rest, against theory for a chain of two masses [m]."""
     shape = STIFFNESS * np.array([[2.0, -1.0], [-1.0, 1.0]])
     squares, modes = eigh(shape, BALL_MASS * np.eye(2))
     thrown, time = np.array([2e-3, -1e-3]), 0.02048  # m/s, s; overlaps stay above zero
@@ -190,7 +199,7 @@ def stack_errors(access: EngineAccess, steps: Sequence[float]) -> list[float]:
     exact = modes @ (share * np.sin(frequencies * time) / frequencies)
     errors = []
     for dt in steps:
-        # Forces balance at rest, so half a step before t = 0 velocities are equal to first order; not to second.
+        # Velocities half a step before t = 0, to second order.
         before = modes @ (share * np.cos(frequencies * dt / 2))
         engine = two_high(access, ball_law(), dt=dt, velocities=before, sunk=True)
         rest = engine.state().positions[:, 2]
@@ -200,11 +209,11 @@ def stack_errors(access: EngineAccess, steps: Sequence[float]) -> list[float]:
 
 
 SETTLED = 0.4  # s
-REASON = "what is left of the vibration after 0.4 s"
+REASON = "residual vibration after 0.4 s"
 
 
 def _level(found: ContactForces, level: int, each: int) -> Array:
-    """Return the forces on a level of `each` bodies from below, (contacts, 3) [N]."""
+    """Return the forces from below on a level of a stack with `each` bodies per level, (contacts, 3) [N]."""
     bodies = found.smarticles // each
     if level:
         upwards: Array = -found.forces[(bodies == (level - 1, level)).all(axis=1)]
@@ -214,7 +223,14 @@ def _level(found: ContactForces, level: int, each: int) -> Array:
 
 
 def _answers(engine: Engine, levels: int, each: int, *, contacts: int | None) -> list[Answer]:
-    """Return what the contacts below each level carry; of `contacts` alike each its share."""
+    """Return the forces from below on all levels, compared with the weight above.
+
+    Args:
+        engine: engine with the stack at rest.
+        levels: number of levels.
+        each: bodies per level.
+        contacts: number of equivalent contacts below a level, which share the weight equally; None: not equivalent.
+    """
     found = engine.contact_forces()
     weight = each * engine.particle.boxes.mass * G
     answers = []
@@ -267,18 +283,18 @@ def flat_smarticles(access: EngineAccess, *, levels: int = 4) -> list[Answer]:
 
 # -- flat impacts ------------------------------------------------------------------------------------------------------
 
-# A clump that meets the floor with n spheres is n times stiffer, and damped by n dashpots that were sized for one.
+# A body that touches the floor with n spheres has n springs and n dashpots, each sized for a single contact.
 
-ROW = "a smarticle meets the floor with a whole row of spheres"
-SPRINGS = "n springs and dashpots side by side, that never pull; integrated with the tilt"
+ROW = "a smarticle hits the floor with a row of spheres"
+SPRINGS = "n parallel springs and dashpots that never pull; integrated with tilt"
 
 THROWN = 0.1  # m/s
 ROWS_AND_PITCHES = tuple((rows, pitch) for rows in (1, 2) for pitch in (1.3, 1.0, 0.5, 0.25))
-STRANDS = ((1, 0.0), (2, 0.0))  # of whole links, which have no pitch
+STRANDS = ((1, 0.0), (2, 0.0))  # on links, which have no pitch
 
 
 def _thrown(access: EngineAccess, one: Scene, dt: float) -> tuple[float, float]:
-    """Return the restitution [1] and time in contact [s] of a flat throw."""
+    """Throw a smarticle flat at the floor; return its restitution [1] and contact time [s]."""
     engine = access.build(one.particle, law_of(one), dt=dt)
     add(engine, (0, 0, lying(one) + 3.3 * THROWN * dt))
     access.push(engine, 0, velocity=(0, 0, -THROWN))
@@ -292,7 +308,7 @@ def _thrown(access: EngineAccess, one: Scene, dt: float) -> tuple[float, float]:
 
 
 def _sunk(access: EngineAccess, one: Scene, dt: float, *, time: float) -> float:
-    """Return how deep the centre of mass of a smarticle that lies flat has sunk [m]."""
+    """Simulate a smarticle lying flat for a `time` [s]; return the depth by which its centre of mass has sunk [m]."""
     engine = access.build(one.particle, law_of(one), dt=dt, gravity=G)
     add(engine, (0, 0, lying(one)))
     engine.advance(round(time / dt))
@@ -300,13 +316,13 @@ def _sunk(access: EngineAccess, one: Scene, dt: float, *, time: float) -> float:
 
 
 def _sunk_theory(points: Array, *, stiffness: float, weight: float) -> float:
-    """Return how deep it sinks on springs under points (n, 2) [m], of which it is not above the middle."""
+    """Return the depth by which a weight [N] at the origin sinks on springs [N/m] at points (n, 2) [m]."""
     lift = np.stack([np.ones(len(points)), points[:, 1], -points[:, 0]], axis=1)
     return float(np.linalg.solve(stiffness * lift.T @ lift, [weight, 0.0, 0.0])[0])
 
 
 def flat_impact(access: EngineAccess, *, rows: int, pitch: float, restitution: float = 0.7) -> dict[str, float]:
-    """Throw a smarticle flat at the floor, and lay it there; a row of the table `clumps`."""
+    """Throw a smarticle flat at the floor, and let another rest there; return a row of the table `clumps`."""
     fidelity = {"base": "standard", "rows": rows} | ({"pitch": pitch} if pitch else {})
     one = scene(access, fidelity=fidelity, contact={"restitution": restitution})
     law, boxes, points = law_of(one), one.smarticle.boxes, lowest(access, one.particle)
@@ -318,22 +334,21 @@ def flat_impact(access: EngineAccess, *, rows: int, pitch: float, restitution: f
     measured, contact = _thrown(access, one, period / 800)
     return {
         "rows": rows,
-        "pitch": pitch,  # over the spheres' diameter; 0 where links are whole
+        "pitch": pitch,  # over the sphere diameter; 0 on links
         "spheres": len(one.particle.centres),
         "contacts": count,  # spheres that touch the floor
-        "nominal": restitution,  # restitution that the scene asks for [1]
-        # Restitution on all springs and dashpots side by side without tilting [1]; with tilting it is the root of
-        # energy after over energy before.
+        "nominal": restitution,  # `contact.restitution` of the scene [1]
+        # Restitution of parallel springs and dashpots without tilt [1]. With tilt, the restitution is the root of the
+        # ratio of energies after and before.
         "parallel": restitution_of(count * damping / (2 * math.sqrt(count * stiffness * mass))),
         "theory": math.sqrt(energy),
         "measured": measured,
-        "at_scene_step": _thrown(access, one, time_step(one))[0],  # a scene has few steps in a flat contact
+        "at_scene_step": _thrown(access, one, time_step(one))[0],  # few time steps per contact
         "theory_contact": lasts,  # from first touch to the end of the last contact [s]
         "measured_contact": contact,
-        # Of one sphere of a tip, at the typical effective mass, elastic [s].
+        # Duration of an elastic contact of one sphere at the typical effective mass [s].
         "single_contact": math.pi * math.sqrt(typical_effective_mass(one.particle) / stiffness),
-        # Depth of the centre of mass under the own weight [m], once the vibration has died away: a damping time is a
-        # fraction of a period.
+        # Static sinkage of the centre of mass under its own weight [m], after the vibration has decayed.
         "theory_sunk": _sunk_theory(points, stiffness=stiffness, weight=mass * G),
         "measured_sunk": _sunk(access, one, period / 60, time=40 * period),
         "step": time_step(one),  # [s]
@@ -356,6 +371,6 @@ def flat_checks(access: EngineAccess, *, rows: int, pitch: float) -> list[Answer
 
 
 def flat_impacts(access: EngineAccess) -> list[dict[str, float]]:
-    """Return rows over the number of points that touch: of spheres, or of strands where links are whole."""
+    """Return rows of the table `clumps` for several numbers of contact points: spheres on YADE, strands on links."""
     settings = ROWS_AND_PITCHES if access.name == "yade" else STRANDS
     return [flat_impact(access, rows=rows, pitch=pitch) for rows, pitch in settings]

@@ -1,4 +1,4 @@
-"""Without contact: fall and spin."""
+"""Known answers without contact: free fall and free rotation."""
 
 from __future__ import annotations
 
@@ -17,16 +17,23 @@ MIDPOINT = "the implicit midpoint rule: second order"
 TURNS = "YADE's exactAsphericalRot takes the frame of the step's beginning for its middle: first order"
 EULER = "Euler's equations, integrated to 1e-12"
 
-SPIN = np.array([20.0, 35.0, -15.0])  # rad/s; along no axis of the U, whose three moments differ
-ABOUT_MIDDLE = np.array([10.0, 40.0, 5.0])  # rad/s in the body frame: mostly about the axis of the middle moment
+SPIN = np.array([20.0, 35.0, -15.0])  # [rad/s], about no principal axis of the U
+ABOUT_MIDDLE = np.array([10.0, 40.0, 5.0])  # [rad/s], body frame; mainly about the axis of the intermediate moment
 
 
 def fall(access: EngineAccess, dt: float, *, time: float, throw: float, centred: bool) -> tuple[Array, float, float]:
-    """Throw a smarticle upwards.
+    """Throw a smarticle upwards without rotation.
+
+    Args:
+        access: test access to the engine.
+        dt: time step [s].
+        time: duration of the flight [s].
+        throw: initial upward velocity [m/s].
+        centred: correct the velocity for the half step between velocities and positions.
 
     Returns:
-        (3,) way of the centre of mass [m], its last velocity upwards [m/s], half a step before the end, and the angle
-        that it has turned [rad].
+        Displacement of the centre of mass (3,) [m], upward velocity half a step before the end [m/s], and angle of
+        rotation [rad].
     """
     one = scene(access)
     engine = access.build(one.particle, law_of(one), dt=dt, gravity=G)
@@ -65,7 +72,17 @@ def fall_errors(access: EngineAccess, steps: Sequence[float]) -> list[float]:
 
 
 def spin_rotations(access: EngineAccess, dt: float, *, spin: Array, times: Array) -> tuple[Rotation, Array]:
-    """Let a smarticle spin freely; return its rotations, and the mean spins in the step before (n, 3) [rad/s]."""
+    """Simulate a freely rotating smarticle.
+
+    Args:
+        access: test access to the engine.
+        dt: time step [s].
+        spin: initial angular velocity, (3,) [rad/s].
+        times: times of output, (n,) [s].
+
+    Returns:
+        n rotations, and mean angular velocities in the step before each, (n, 3) [rad/s].
+    """
     one = scene(access)
     engine = access.build(one.particle, law_of(one), dt=dt)
     add(engine, (0, 0, 0.1), TILTED)
@@ -96,7 +113,7 @@ def torque_free_spin(access: EngineAccess) -> list[Answer]:
     for dt in (coarse, coarse / 2):
         rotations, spins = spin_rotations(access, dt, spin=SPIN, times=times)
         misfits.append((rotations * exact.inv()).as_rotvec())
-        # The spin is that of the middle of the step: so is the frame it is seen in.
+        # Angular velocities belong to the middle of a step, so the body frame of that time is used.
         middle = Rotation.from_rotvec(-spins * dt / 2) * rotations
         body = middle.inv().apply(spins)
         energies.append(float((inertia * body[-1] ** 2).sum() / 2))
@@ -147,19 +164,19 @@ def spin_errors(access: EngineAccess, steps: Sequence[float], *, spin: Array, ti
     return [float((spin_rotations(access, dt, spin=spin, times=times)[0] * exact).magnitude()[0]) for dt in steps]
 
 
-FLIPS = np.linspace(2e-3, 0.5, 250)  # s; when a U about its middle axis is measured
+FLIPS = np.linspace(2e-3, 0.5, 250)  # times of output for `flips` [s]
 
 
 def _between_flips(access: EngineAccess, rotations: Rotation) -> float:
-    """Return the time between the first two flips [s]."""
-    # Angular momentum stands still, so its part along the body's y axis shows how the body turns under it.
+    """Return the time between the first two flips, from rotations at the times FLIPS [s]."""
+    # The angular momentum is constant; its component along the body's y axis changes sign at each flip.
     momentum = TILTED.apply(scene(access).smarticle.boxes.inertia * ABOUT_MIDDLE)
     roots = CubicSpline(FLIPS, rotations.inv().apply(momentum)[:, 1]).roots(extrapolate=False)
     return float(roots[1] - roots[0])
 
 
 def _flip_times(access: EngineAccess, steps: Sequence[float]) -> tuple[list[float], float]:
-    """Return the times between the first two flips [s] at time steps [s], and in theory."""
+    """Return the times between the first two flips for several time steps, and by theory [s]."""
     spin = TILTED.apply(ABOUT_MIDDLE)
     found = [_between_flips(access, spin_rotations(access, dt, spin=spin, times=FLIPS)[0]) for dt in steps]
     return found, _between_flips(access, _exact(access, spin, FLIPS))

@@ -1,4 +1,4 @@
-"""Hinges of articulated smarticles: what they bear, how far they give way, how barbs swing on them."""
+"""Known answers for hinges: gaps under load, sag and tilt of barbs, vibrations of barbs."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ MODE = "eigenfrequency of links, shafts and pins; √(k/I) but for the pins"
 NO_PINS = {"links": "hinges have no pins that give way: links are one body with two angles"}
 NO_TILT = {"links": "shafts do not tilt: both barbs stay in the plane of the middle link"}
 
-STRONG = 1.0  # N m; a limit that no torque here comes near
+STRONG = 1.0  # torque limit that no motor reaches [N m]
 VIBRATION = "the shaft has no damping: what a window over the vibration leaves of it"
 
 
@@ -32,13 +32,21 @@ def hinged(
     angles: Sequence[float] = (90, 90),
     **motor: float | str,
 ) -> Scene:
-    """Return a scene of one smarticle whose shafts will be springs; angles in deg, `motor` as in a scene file."""
+    """Return a scene of one articulated smarticle with springs as shafts.
+
+    Args:
+        access: test access to the engine.
+        aspect_ratio: l/w [1].
+        fidelity: name of the fidelity.
+        angles: of the barbs [deg].
+        motor: keys of `motor` in a scene.
+    """
     smarticle = {"aspect_ratio": aspect_ratio, "angles_deg": list(angles)}
     return scene(access, shape_change(), fidelity=fidelity, smarticle=smarticle, motor=access.spring_shafts | motor)
 
 
 def upright(access: EngineAccess, one: Scene, *, gravity: float, dt: float | None = None) -> Engine:
-    """Hang one articulated smarticle in the vertical xz plane, its mouth downwards, the middle link held."""
+    """Build an engine with one articulated smarticle in the xz plane, open side down, middle link fixed."""
     engine = access.build_hinged(one, gravity=gravity, dt=dt)
     boxes = one.smarticle.boxes
     turned = Rotation.from_euler("x", -90, degrees=True) * Rotation.from_matrix(boxes.link_rotations[1].T)
@@ -49,7 +57,7 @@ def upright(access: EngineAccess, one: Scene, *, gravity: float, dt: float | Non
 
 
 def _barb(one: Scene) -> tuple[float, float, float]:
-    """Return mass [kg], moment of inertia about the own centre across the plane [kg m²], lever to the hinge [m]."""
+    """Return mass [kg], moment of inertia about the normal [kg m²] and distance centre to hinge [m] of a barb."""
     boxes = one.smarticle.boxes
     return float(boxes.link_masses[0]), float(boxes.link_inertias[0, 2]), boxes.barb_length / 2
 
@@ -63,7 +71,7 @@ def _barb(one: Scene) -> tuple[float, float, float]:
 def pull(
     access: EngineAccess, *, aspect_ratio: float = 0.7, fidelity: str = "standard", largest: float = 0.01
 ) -> list[Answer]:
-    """Pull a straight smarticle at both ends, along itself, by a hundred weights; the force grows, then stays."""
+    """Pull a straight smarticle at both ends with a hundred times its weight; the force grows, then is constant."""
     one, duration = hinged(access, aspect_ratio=aspect_ratio, fidelity=fidelity, angles=(0, 0)), 0.02
     engine = access.build_hinged(one, gravity=0.0)
     add(engine, (0, 0, 0.05), Rotation.from_rotvec([0.4, 0.2, -0.7]))
@@ -71,9 +79,9 @@ def pull(
     straight, along = engine.state().angles, engine.state().link_rotations[0, 1, :, 0]
     force, gaps = 100 * one.smarticle.boxes.mass * G, []
     for time in drive(engine, one, duration, lambda _: straight):
-        grown = min(1.0, 2 * time / duration) * force * along
+        pulling = min(1.0, 2 * time / duration) * force * along
         for link, sign in ((0, -1), (2, 1)):
-            access.force(engine, 0, link, sign * grown)
+            access.force(engine, 0, link, sign * pulling)
         gaps.append(engine.motors.gaps().max())
     theory, mean = force / access.pin_stiffness(one), np.mean(gaps[-20:])
     swings = "the links' masses swing on the pin for a while, by per cents"
@@ -91,7 +99,7 @@ def pull(
 )
 def droop(access: EngineAccess, *, aspect_ratio: float = 0.7, fidelity: str = "standard") -> list[Answer]:
     one = hinged(access, aspect_ratio=aspect_ratio, fidelity=fidelity, angles=(0, 0), torque_limit_N_m=STRONG)
-    # What bears a held link on links acts before the spring: (ω dt)²/4 of the sag, 2 % at the step of the scene.
+    # On links the external force acts before the spring: an error of (ω dt)²/4 of the sag, 2 % at the scene's step.
     dt = None if access.name == "yade" else one.fidelity.control_interval_s / 20
     engine = upright(access, one, gravity=G, dt=dt)
     begun = engine.state().angles
@@ -99,7 +107,7 @@ def droop(access: EngineAccess, *, aspect_ratio: float = 0.7, fidelity: str = "s
         (*access.torques(engine), *engine.motors.gaps()[0], *(engine.state().angles - begun)[0])
         for _ in drive(engine, one, 0.2, lambda _: begun)
     ]
-    # Barbs vibrate about where they hang. Hann's window takes the vibration out.
+    # Barbs vibrate about their equilibrium; a Hann window removes the vibration.
     torque, gap, sag = np.average(rows, axis=0, weights=np.hanning(len(rows))).reshape(3, 2).mean(axis=1)
     mass, _, lever = _barb(one)
     moment, expected = mass * G * lever, mass * G / access.pin_stiffness(one)
@@ -118,18 +126,18 @@ def droop(access: EngineAccess, *, aspect_ratio: float = 0.7, fidelity: str = "s
     absent=NO_TILT,
 )
 def tilt(access: EngineAccess, *, sweeps: int = 1) -> list[Answer]:
-    """Lying in the air, the middle link held, barbs sweep through 105° a number of times; then they hang out of plane.
+    """Turn the barbs of a horizontal smarticle with fixed middle link by 105°, `sweeps` times; measure their tilt.
 
-    Bonds add up their moments step by step and turn them with half of the twist: a tilt that were left to them would be
-    wrong by as much as itself after one sweep.
+    YADE's bonds accumulate moments step by step and rotate them with half of the twist. A tilt computed by bonds would
+    have an error of 100 % after one sweep.
     """
     one = hinged(access)
     engine = access.build_hinged(one, gravity=G)
     add(engine, (0, 0, 0.05))
     engine.motors.articulate()
     access.hold(engine)
-    begun, goal, each = engine.state().angles[0], math.radians(-15), 0.35
-    for _ in drive(engine, one, each * sweeps, lambda t: begun + (goal - begun) * (1 - abs(t / each % 2 - 1))):
+    start, goal, each = engine.state().angles[0], math.radians(-15), 0.35
+    for _ in drive(engine, one, each * sweeps, lambda t: start + (goal - start) * (1 - abs(t / each % 2 - 1))):
         pass
     readings, tilts = engine.motors.readings, []
     assert readings is not None  # the scene actuates
@@ -153,7 +161,7 @@ def tilt(access: EngineAccess, *, sweeps: int = 1) -> list[Answer]:
 
 
 def crossings(time: Array, value: Array) -> Array:
-    """Return the times when a value passes zero [s]."""
+    """Return the times at which a value (n,) changes sign, interpolated between times (n,) [s]."""
     (before,) = np.nonzero(np.diff(np.sign(value)))
     found: Array = time[before] - value[before] * np.diff(time)[before] / np.diff(value)[before]
     return found
@@ -187,14 +195,19 @@ def pendulum(access: EngineAccess, *, aspect_ratio: float = 0.7) -> list[Answer]
 
 
 def shaft_mode(one: Scene, pin: float, *, held: bool) -> tuple[float, Array]:
-    """Compute the vibration of barbs on their shafts, above the rigid motions and below the vibrations of the pins.
+    """Compute the vibration mode of the barbs on their shafts, between rigid motions and vibrations of the pins.
 
-    Coordinates of a U whose barbs turn alike: the middle link along itself and its turn, the barbs' turn, and how far
-    barb 1 has come off its hinge along and across the middle link (barb 2: as far along, the opposite across). Only
-    those are free that the pins and a held middle link leave.
+    The five coordinates describe a U whose barbs turn in the same sense: displacement of the middle link along its
+    axis, rotation of the middle link, rotation of the barbs, and the gap of hinge 1 along and across the middle link
+    (hinge 2: equal along, opposite across). Rigid pins and a fixed middle link remove coordinates.
+
+    Args:
+        one: scene of one smarticle.
+        pin: stiffness of a pin [N/m]; may be inf.
+        held: the middle link is fixed.
 
     Returns:
-        Angular frequency [rad/s], and its shape (5,) for a twist of 1 rad.
+        Angular frequency [rad/s], and the mode (5,) [m or rad] for a twist of 1 rad.
     """
     boxes, (mass, own, lever) = one.smarticle.boxes, _barb(one)
     along = np.array([1.0, 0.0, -lever, 1.0, 0.0])
@@ -213,7 +226,7 @@ def shaft_mode(one: Scene, pin: float, *, held: bool) -> tuple[float, Array]:
 
 
 def floating(access: EngineAccess, one: Scene, *, held: bool, dt: float | None = None) -> Engine:
-    """Let a U float in space; its barbs are pushed such that they vibrate on their shafts, by 0.01 rad."""
+    """Build an engine with a U without gravity, whose barbs vibrate on their shafts with amplitude 0.01 rad."""
     engine = access.build_hinged(one, gravity=0.0, dt=dt)
     add(engine, (0, 0, 0.05))
     engine.motors.articulate()
@@ -260,7 +273,7 @@ def shaft_vibration(access: EngineAccess, *, held: bool) -> list[Answer]:
     },
 )
 def vibration_errors(access: EngineAccess, steps: Sequence[float]) -> list[float]:
-    """Return the error of the twist of a barb that vibrates on its shaft, root mean square over 10 ms [rad]."""
+    """Return the root-mean-square errors of the angle of a vibrating barb over 10 ms [rad]."""
     one = hinged(access, torque_limit_N_m=STRONG)
 
     def path(dt: float) -> Array:

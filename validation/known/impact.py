@@ -1,4 +1,4 @@
-"""Single impacts: rebound, oblique, bars end to end, a smarticle on its tip; how errors fall with the step."""
+"""Known answers for single impacts: rebounds, oblique impacts, bars, tips of smarticles; errors over the step."""
 
 from __future__ import annotations
 
@@ -26,8 +26,8 @@ UNLIMITED = "a ball at 82°, cs/cn = 0.9: the dashpot acts without limit until t
 WINDING = f"μ(1 + e)mv + (cs s − μ cn v/2) μ cn v/(ks s − μ kn v); {OBLIQUE}, and YADE's law"
 SLIDES = f"tangential impulse μ(1 + e)mv; {OBLIQUE}"
 
-CONTACT_TIME = math.pi * math.sqrt(BALL_MASS / STIFFNESS)  # s, of an elastic ball on the floor
-RESOLVED = 400  # steps in an elastic contact
+CONTACT_TIME = math.pi * math.sqrt(BALL_MASS / STIFFNESS)  # elastic ball on the floor [s]
+RESOLVED = 400  # time steps per elastic contact
 ONSET = f"contact begins and ends within a step, 1/{RESOLVED} of its duration"
 FIRST = f"first order: the dashpot acts at once, but {ONSET}"
 COARSER = "contact begins and ends within a step, which is some 1/150 of it"
@@ -35,16 +35,16 @@ COARSER = "contact begins and ends within a step, which is some 1/150 of it"
 
 @dataclass(frozen=True)
 class Touch:
-    """What was measured from the first step with a contact force on the floor to the last."""
+    """Measurements of one contact with the floor."""
 
-    velocity: Array  #: (3,) after [m/s]
-    spin: Array  #: (3,) after [rad/s]
-    steps: int  #: With a force [1]
-    deepest: float  #: Largest overlap of the lowest point of the first sphere [m]
+    velocity: Array  #: Velocity after the contact, (3,) [m/s]
+    spin: Array  #: Angular velocity after the contact, (3,) [rad/s]
+    steps: int  #: Number of time steps with a contact force
+    deepest: float  #: Largest overlap of the first smarticle with the floor [m]
 
 
 def touch(access: EngineAccess, engine: Engine, *, most: int) -> Touch:
-    """Advance until a body has met the floor and left it again."""
+    """Advance until a body has touched and left the floor, at most `most` steps; return the measurements."""
     pressed, deepest = 0, 0.0
     for _ in range(most):
         engine.advance(1)
@@ -59,7 +59,15 @@ def touch(access: EngineAccess, engine: Engine, *, most: int) -> Touch:
 
 
 def ball_impact(access: EngineAccess, law: ContactLaw, *, speed: float, slip: float = 0.0, dt: float) -> Touch:
-    """Throw a ball at the floor at a speed downwards, and `slip` along x [m/s]; no gravity."""
+    """Throw a ball at the floor without gravity; return the measurements.
+
+    Args:
+        access: test access to the engine.
+        law: contact law.
+        speed: downward velocity [m/s].
+        slip: velocity along x [m/s].
+        dt: time step [s].
+    """
     engine = access.build(access.ball(), law, dt=dt)
     add(engine, (0, 0, BALL_RADIUS + 3.3 * speed * dt), access.ball_turn)
     access.push(engine, 0, velocity=(slip, 0, -speed))
@@ -127,9 +135,9 @@ def pair_rebound(access: EngineAccess, restitution: float = 0.5) -> list[Answer]
     f"spring and dashpot at the bar's mass; {DASHPOT}, integrated",
 )
 def bar_rebound(access: EngineAccess, restitution: float = 0.5, *, resized: bool = False) -> list[Answer]:
-    """Drop an upright bar on its end: the force passes through the centre of mass, and the law is a scene's.
+    """Throw an upright bar at the floor with the contact law of a scene. The force passes through its centre.
 
-    `resized`: its dashpot is sized for the bar's mass, so that the restitution asked for is met.
+    With `resized` the dashpot is adapted to the mass of the bar, so that the nominal restitution is reached.
     """
     one = scene(access, smarticle={"aspect_ratio": 0}, contact={"restitution": restitution})
     law, mass, speed, length = law_of(one), one.smarticle.boxes.mass, 0.5, one.smarticle.middle_length_m
@@ -176,7 +184,7 @@ def bars_rebound(access: EngineAccess, restitution: float = 0.5) -> list[Answer]
 
 
 def tip_impact(access: EngineAccess, restitution: float, turn: Sequence[float]) -> list[Answer]:
-    """Let a welded smarticle meet a smooth floor with one sphere."""
+    """Throw a welded smarticle, rotated by the vector `turn` [rad], at a smooth floor; one sphere touches."""
     one = scene(access, contact={"restitution": restitution, "friction_wall": 0})
     law, boxes, particle, speed = law_of(one), one.smarticle.boxes, one.particle, 0.02
     pose = Rotation.from_rotvec(turn)
@@ -186,7 +194,7 @@ def tip_impact(access: EngineAccess, restitution: float, turn: Sequence[float]) 
     turned = pose.apply(pose.inv().apply(lever) / boxes.inertia)
     felt = 1 / (1 / boxes.mass + lever @ turned)
     exact = dashpot_impact(stiffness=law.normal_stiffness, damping=law.wall_damping, mass=felt)
-    # One sphere alone: the next one is higher than the first one ever comes down.
+    # A single contact: the next sphere does not reach the floor.
     assert heights[1] - heights[0] > 3 * speed * exact.duration
     dt = exact.duration / RESOLVED
     engine = access.build(particle, law, dt=dt)
@@ -196,7 +204,7 @@ def tip_impact(access: EngineAccess, restitution: float, turn: Sequence[float]) 
     impulse = (1 + exact.restitution) * felt * speed
     gain, spin = impulse / boxes.mass, impulse * turned
     size = float(np.linalg.norm(spin))
-    # Seen along the spin of theory; what is across it is wrong altogether.
+    # Components parallel and perpendicular to the angular velocity by theory.
     along = found.spin @ spin / size
     across = float(np.linalg.norm(found.spin - along * spin / size))
     reason = f"{ONSET}; and the smarticle turns by some 1e-3 rad meanwhile"
@@ -233,12 +241,11 @@ FRICTION = 0.4
     steps=22,
 )
 def sliding_impact(access: EngineAccess, restitution: float, *, dashpot: float, steps: int = RESOLVED) -> list[Answer]:
-    """Throw a ball that slides as long as it touches the floor: the tangential impulse is μ times the normal one.
+    """Throw a ball that slides throughout the contact; the tangential impulse is μ times the normal impulse.
 
-    Not quite, with a tangential dashpot: YADE holds the tangential spring to Coulomb's limit, and adds the dashpot's
-    force without limit until the spring has reached it. With s and v the speeds of slip and approach that is at
-    t* = μ cn v / (ks s − μ kn v), and the impulse until then exceeds Coulomb's by (cs s − μ cn v/2) t*. A step longer
-    than t* never sees it.
+    A tangential dashpot adds to the impulse: its force is not limited by friction until the tangential spring reaches
+    Coulomb's limit. With slip speed s and approach speed v this happens at t* = μ cn v / (ks s − μ kn v). Until then
+    the impulse exceeds Coulomb's by (cs s − μ cn v/2) t*. Time steps longer than t* do not resolve this.
     """
     speed, slip, dt = 0.2, 1.5, CONTACT_TIME / steps
     law = ball_law(restitution=restitution, friction=FRICTION, dashpot=dashpot)
@@ -249,8 +256,8 @@ def sliding_impact(access: EngineAccess, restitution: float, *, dashpot: float, 
     excess = (dashpot * cn * slip - FRICTION * cn * speed / 2) * winding if winding > dt else 0.0
     coulomb = FRICTION * BALL_MASS * (1 + restitution) * speed
     impulse = coulomb + excess
-    # At the lever from the centre to the floor, which is shorter than the radius by the overlap: by its mean under the
-    # normal force, π/4 of the largest in a sine.
+    # The lever from the centre to the floor is the radius less the mean overlap, weighted by the normal force: π/4 of
+    # the largest overlap for a sine.
     lever = BALL_RADIUS - access.arm_share * math.pi / 4 * found.deepest
     reason, tolerance = "second order", 1e-4
     if restitution < 1:
@@ -272,17 +279,17 @@ def sliding_impact(access: EngineAccess, restitution: float, *, dashpot: float, 
     "a mass 2/7 m on the tangential spring for half a period; Chung and Ooi (2011)",
 )
 def sticking_impact(access: EngineAccess) -> list[Answer]:
-    """Throw a ball that never slides: the tangential spring, tuned to half a vibration, turns the slip around.
+    """Throw a ball that never slides; the tangential spring reverses the slip velocity.
 
-    The contact point moves on the mass m/(1 + m r²/I), 2/7 m of a solid ball, so with that share of kn for ks both
-    directions vibrate alike; the force stays within Coulomb's cone throughout where slip/speed < μ kn/ks.
+    The effective tangential mass at the contact is m/(1 + m r²/I), 2/7 m for a solid ball. With ks = 2/7 kn, normal and
+    tangential vibrations have one frequency. The ball sticks throughout if slip/speed < μ kn/ks.
     """
     inertia = access.ball().boxes.inertia[1]
     share = 1 / (1 + BALL_MASS * BALL_RADIUS**2 / inertia)
     speed, dt = 0.01, CONTACT_TIME / RESOLVED
     slip = min(1.0, 0.72 * FRICTION / share) * speed
     found = ball_impact(access, ball_law(friction=FRICTION, tangential=share), speed=speed, slip=slip, dt=dt)
-    # To both sides of the contact point the mass is felt at the lever, which is shorter than the radius by the overlap.
+    # The tolerance allows for the lever, which is the radius less the overlap.
     reason = "the lever is shorter than the radius by the overlap, 0.7 %, and with it the vibration slower"
     after, spin = found.velocity[0], 2 * share * BALL_MASS * slip * BALL_RADIUS / inertia
     return [
@@ -298,14 +305,14 @@ LATE = "YADE's dashpot takes the velocity of half a step before, and begins with
 LAGS = "the dashpot takes the velocity of half a step before, and begins with a jump: first order"
 WAY = 5.12e-3 * 0.2  # m
 
-# The error varies with where in a step a contact begins and where it ends. Starts are spread over some steps, and
-# stiffness by a tenth so that the one does not fix the other, both evenly (a plastic-number sequence).
+# The error depends on the positions of the start and the end of the contact within a time step. Initial gaps vary over
+# some steps, and stiffnesses by 10 %, as a low-discrepancy sequence (plastic number).
 PHASES = 16
 SPREAD = 8e-5  # m
 
 
 def _spread(law: ContactLaw, number: int) -> tuple[ContactLaw, float]:
-    """Return a law somewhat stiffer, and the gap to begin with [m]."""
+    """Return a contact law with stiffnesses increased by up to 10 %, and an initial gap [m], for sample `number`."""
     factor = 1 + 0.1 * (0.569840 * number % 1)
     springs = {key: factor * getattr(law, key) for key in ("normal_stiffness", "tangential_stiffness")}
     return dataclasses.replace(law, **springs), 1e-4 + SPREAD * (0.754878 * number % 1)
@@ -332,7 +339,7 @@ def _spread(law: ContactLaw, number: int) -> tuple[ContactLaw, float]:
     restitution=1.0,
 )
 def bounce_errors(access: EngineAccess, steps: Sequence[float], *, restitution: float, phases: int = 24) -> list[float]:
-    """Return the error of a ball's height after one bounce, root mean square over places of the onset in a step [m]."""
+    """Return the root-mean-square errors of the height of a ball after one bounce, over `phases` samples [m]."""
     speed, time, squares = 0.2, 5.12e-3, np.zeros(len(steps))
     for number in range(phases):
         law, gap = _spread(ball_law(restitution=restitution), number)
@@ -348,13 +355,13 @@ def bounce_errors(access: EngineAccess, steps: Sequence[float], *, restitution: 
 
 
 def _collided(access: EngineAccess, law: ContactLaw, dt: float, gap: float, *, tilted: bool) -> Array:
-    """Let two smarticles collide once; return their spheres, (S, 3) [m]."""
+    """Simulate a collision of two smarticles at a `gap` [m]; return the centres of all spheres, (S, 3) [m]."""
     one = scene(access)
     engine = access.build(one.particle, law, dt=dt)
     add(engine, (0, 0, 0.1))
     other = Rotation.from_rotvec([0.5, 0.2, 0.6] if tilted else [0, 0, 0.6])
     first = access.swept(one.particle)
-    # Above the first one along y, so near that the closest spheres touch after a way of a tenth of a millimetre.
+    # The second smarticle is placed above the first along y, at a distance `gap` between the closest spheres.
     apart = other.apply(first)[None] - first[:, None]
     inside = 4 * one.particle.radius**2 - apart[..., 0] ** 2 - apart[..., 2] ** 2
     lift = float((np.sqrt(np.maximum(inside, 0.0)) - apart[..., 1])[inside > 0].max())
@@ -388,15 +395,15 @@ def _collided(access: EngineAccess, law: ContactLaw, dt: float, gap: float, *, t
 def collision_errors(
     access: EngineAccess, steps: Sequence[float], *, smooth: bool, phases: int = PHASES
 ) -> list[float]:
-    """Return the error of where two smarticles are after they collided once [m]."""
+    """Return the root-mean-square errors of the positions of all spheres after a collision [m]."""
     law = law_of(scene(access))
     if access.name == "links":
-        # The tangential dashpot has no limit until its spring has reached Coulomb's, which takes as long here as one of
-        # these steps: coarser ones miss it, finer ones see it.
+        # The tangential dashpot is not limited until the spring reaches Coulomb's limit. Only the smaller of these time
+        # steps resolve this, which would change the observed order.
         law = dataclasses.replace(law, tangential_damping=0.0)
     if smooth:
         law = dataclasses.replace(law, normal_damping=0.0, wall_damping=0.0, friction=0.0)
-    # No theory: against a step eight times finer than the finest.
+    # The reference is a simulation with an eighth of the smallest time step.
     squares = np.zeros(len(steps))
     for number in range(phases):
         one, gap = _spread(law, number)

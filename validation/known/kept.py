@@ -1,4 +1,4 @@
-"""Conservation: momentum and energy of smarticles in free flight, the energy ledger of a pile, links as solids."""
+"""Conservation of momentum and energy, the energy ledger of a pile, and impenetrable links."""
 
 from __future__ import annotations
 
@@ -28,14 +28,20 @@ MOMENTA = "nothing acts from outside: momentum and angular momentum about the ce
 WORK = "work of the motors is gain of kinetic energy"
 SOLID = "links are solid, or the watchdog says that they were not"
 
-AMPLITUDE = 0.35  # rad, of gaits, within the speed of the motors
-PERIODS = 2000  # control periods in one of the gait
+AMPLITUDE = 0.35  # amplitude of the gait [rad], within the speed limit of the motors
+PERIODS = 2000  # control periods per period of the gait
 SPINS = np.array([[40.0, -30.0, 20.0], [0.0, 10.0, 30.0]])  # rad/s
 VELOCITIES = np.array([[0.1, -0.2, 0.3], [0.0, 0.1, 0.0]])  # m/s
 
 
 def free_pair(access: EngineAccess, law: str, damping: float) -> tuple[Engine, Iterator[float]]:
-    """Let two smarticles far apart spin and drift; the iterator swings their barbs about the right angle."""
+    """Build two distant smarticles that spin and drift; return the engine, and an iterator that swings their barbs.
+
+    Args:
+        access: test access to the engine.
+        law: `motor.law`.
+        damping: of the motor [N m s/rad]; 0: default.
+    """
     motor = {"law": law, "torque_limit_N_m": 1e-4} | ({"damping_N_m_s_per_rad": damping} if damping else {})
     one = scene(access, shape_change(), motor=motor)
     engine, interval = access.build_hinged(one, gravity=0.0), one.fidelity.control_interval_s
@@ -52,7 +58,7 @@ def free_pair(access: EngineAccess, law: str, damping: float) -> tuple[Engine, I
 
 
 def _own_momentum(state: State) -> Array:
-    """Return angular momenta about the own centres of mass, (2, 3) [kg m²/s]."""
+    """Return the angular momentum of each smarticle about its centre of mass, (2, 3) [kg m²/s]."""
     arms = state.link_positions - state.positions[:, None]
     velocities = state.link_velocities - state.velocities[:, None]
     own = np.einsum("nkij,nkj->nki", state.link_rotations, state.boxes.link_inertias * state._local_spins)
@@ -167,7 +173,7 @@ def ledger(access: EngineAccess, *, count: int = 100, seconds: float = 0.5) -> l
     stiffness=2e4,
 )
 def thrown_at(access: EngineAccess, *, stiffness: float, throws: int = 30) -> list[Answer]:
-    """Throw smarticles at 10 m/s and 60 rad/s at others in free space."""
+    """Throw a smarticle at another one at 10 m/s and 60 rad/s without gravity, `throws` times."""
     one = scene(access, fidelity={"base": "draft", "stiffness_N_per_m": stiffness})
     law, dt, rng = law_of(one), time_step(one), np.random.default_rng(1)
     crossed, met = 0, 0
@@ -181,9 +187,9 @@ def thrown_at(access: EngineAccess, *, stiffness: float, throws: int = 30) -> li
         before, passed = engine.state().vertices, False
         for _ in range(math.ceil(0.06 / 10 / dt)):
             engine.advance(1)
-            now = engine.state().vertices
-            passed |= bool(crossings(before, now))
-            before = now
+            after = engine.state().vertices
+            passed |= bool(crossings(before, after))
+            before = after
         crossed += passed
         met += abs(engine.state().velocities[0, 0]) > 1e-3
     return [

@@ -1,4 +1,4 @@
-"""Known answers and convergence orders on each engine that can compute them; theory stands beside each case."""
+"""Tests of known answers and orders of convergence on both engines."""
 
 from __future__ import annotations
 
@@ -22,16 +22,17 @@ assert all((free, kept))  # imported to register their cases
 
 Call = Callable[..., Any]
 
-BAND = 0.3  # an observed order is within this of the scheme's [1]: no order between first and second passes
+BAND = 0.3  # largest deviation of an observed order [1]; rejects 1.5, halfway between first and second order
 
 
 def failed(answers: list[Answer]) -> list[Answer]:
-    """Return the answers that fail; there must be answers."""
+    """Return the answers outside of their tolerance; AssertionError if there are no answers."""
     assert answers
     return [answer for answer in answers if not answer.good]
 
 
 def quantity_and_unit(what: str) -> dict[str, str]:
+    """Split `quantity [unit]` into two columns of a table."""
     name, _, unit = what.rpartition(" [")
     return {"quantity": name, "unit": unit.removesuffix("]")}
 
@@ -85,22 +86,22 @@ def test_order_is_the_schemes(
 ) -> None:
     order, why = scheme[engine]
     if size == "short":
-        steps = steps[1::2]  # the second and the last, a factor of four apart
+        steps = steps[1::2]  # two steps with a ratio of 4
     options = {"phases": phases} if size == "short" and phases else {}
     errors = call(engine, errors_at, engine_access(engine), steps, **options)
     observed = float(linregress(np.log(steps), np.log(np.abs(errors))).slope)
     if size == "long":
         parts = quantity_and_unit(quantity)
-        same = {"ladder": name, "engine": engine, "quantity": parts["quantity"]}
+        keys = {"ladder": name, "engine": engine, "quantity": parts["quantity"]}
         rows = [
-            {**same, "unit": parts["unit"], "time step [s]": step, "error [unit]": error}
+            {**keys, "unit": parts["unit"], "time step [s]": step, "error [unit]": error}
             for step, error in zip(steps, errors, strict=True)
         ]
         tables.write(engine, "trajectories", rows, ["ladder"])
-        row = {**same, "order of the scheme [1]": order, "order observed [1]": observed, "tolerance [1]": BAND}
+        row = {**keys, "order of the scheme [1]": order, "order observed [1]": observed, "tolerance [1]": BAND}
         tables.write(engine, "orders", [{**row, "about": about, "why": why}], ["ladder"])
     assert observed == pytest.approx(order, abs=BAND)
-    assert max(errors) < 0.1 * motion or size == "long"  # the motion itself is resolved
+    assert max(errors) < 0.1 * motion or size == "long"  # the time step resolves the motion
 
 
 @pytest.mark.long
@@ -108,7 +109,7 @@ def test_order_is_the_schemes(
 def test_flat_impacts_over_the_number_of_points(call: Call, tables: Tables, engine: str) -> None:
     rows = [{"engine": engine, **row} for row in call(engine, floor.flat_impacts, engine_access(engine))]
     tables.write(engine, "clumps", rows, ["engine"])
-    # n springs and dashpots side by side: the measured restitution is the integrated one, not the one asked for.
+    # The restitution of n parallel contacts differs from the nominal one of a single contact.
     assert [row["measured"] for row in rows] == pytest.approx([row["theory"] for row in rows], abs=0.02)
 
 
@@ -130,7 +131,7 @@ OTHER: list[tuple[Call, dict[str, Any], tuple[str, ...]]] = [
     ),
     (hinge.tilt, {"sweeps": 3}, YADE),
 ]
-"""Other parameters of the cases: function, options, engines."""
+"""Cases with other parameters: function, options, engines."""
 
 
 @pytest.mark.parametrize("engine", ON)

@@ -1,4 +1,4 @@
-"""Answers that have no closed form, integrated by SciPy independently of the engine."""
+"""Answers without closed form, integrated by SciPy independently of the engines."""
 
 from __future__ import annotations
 
@@ -16,10 +16,18 @@ from validation.bench import Array
 def _impact(
     *, stiffness: float, damping: float, mass: float, gravity: float, speed: float, depth: float = 0.0
 ) -> tuple[float, float, float]:
-    """Integrate m x'' = −k x − c x' − m g from first touch until the force would pull.
+    """Integrate m x'' = −k x − c x' − m g from first touch until the contact force is zero.
+
+    Args:
+        stiffness: k [N/m].
+        damping: c [N s/m].
+        mass: m [kg].
+        gravity: g [m/s²].
+        speed: downward speed at first touch [m/s].
+        depth: initial overlap [m].
 
     Returns:
-        Time in contact [s], height over first touch [m] and speed upwards [m/s] at its end.
+        Contact time [s], and height above first touch [m] and upward speed [m/s] at the end of the contact.
     """
 
     def push(y: Array) -> float:
@@ -43,39 +51,54 @@ def _impact(
 
 
 class Impact(NamedTuple):
-    """A body on a spring and dashpot that never pulls, thrown at them."""
+    """Impact of a body on a spring and a dashpot that never pull."""
 
     restitution: float  #: Speed after over speed before [1]
-    duration: float  #: From first touch until the force is zero [s]
+    duration: float  #: Contact time, from first touch until the force is zero [s]
 
 
 def dashpot_impact(*, stiffness: float, damping: float, mass: float) -> Impact:
-    """Integrate an impact without gravity, whose answer depends on no speed.
+    """Integrate an impact without gravity; restitution and duration do not depend on the speed.
 
-    Source: Schwager and Pöschel, Granular Matter 9, 465 (2007); integrated here.
+    Args:
+        stiffness: [N/m].
+        damping: [N s/m].
+        mass: effective mass [kg].
+
+    Source: Schwager and Pöschel, Granular Matter 9, 465 (2007), integrated numerically.
     """
     duration, _, velocity = _impact(stiffness=stiffness, damping=damping, mass=mass, gravity=0.0, speed=1.0)
     return Impact(velocity, duration)
 
 
 def bounced(*, gap: float, speed: float, time: float, gravity: float, **springs: float) -> float:
-    """Return the height of a body that bounced once on a spring and dashpot that never pulls, over first touch [m].
+    """Return the height above first touch [m] of a body that has bounced once on a spring and a dashpot.
 
-    At t = 0 it has a gap below [m] and falls at a speed [m/s]; at the time [s] it has bounced once. Springs: stiffness
-    [N/m], damping [N s/m] and mass [kg].
+    Args:
+        gap: height above first touch at t = 0 [m].
+        speed: downward speed at t = 0 [m/s].
+        time: time after the bounce [s].
+        gravity: [m/s²].
+        springs: stiffness [N/m], damping [N s/m] and mass [kg].
     """
-    met = (math.sqrt(speed**2 + 2 * gravity * gap) - speed) / gravity
-    # A little below first touch, so that an elastic contact does not end where it begins.
-    contact, height, velocity = _impact(**springs, gravity=gravity, speed=speed + gravity * met, depth=1e-12)
-    flight = time - met - contact
+    touch = (math.sqrt(speed**2 + 2 * gravity * gap) - speed) / gravity
+    # Starts just below first touch, so that the end of the contact is not found at its beginning.
+    contact, height, velocity = _impact(**springs, gravity=gravity, speed=speed + gravity * touch, depth=1e-12)
+    flight = time - touch - contact
     return height + velocity * flight - gravity * flight**2 / 2
 
 
 def free_rotation(*, inertia: Array, start: Rotation, spin: Array, times: Array) -> tuple[Rotation, Array]:
-    """Integrate Euler's equations of a rigid body of principal moments (3,) [kg m²] without torque.
+    """Integrate Euler's equations of a free rigid body.
 
-    At t = 0 it has a rotation, body frame to laboratory frame, and a spin (3,) in the laboratory frame [rad/s]. Returns
-    rotations at rising times (n,) above 0 [s], and angular velocities in the body frame (n, 3) [rad/s].
+    Args:
+        inertia: principal moments of inertia, (3,) [kg m²].
+        start: rotation from body frame to laboratory frame at t = 0.
+        spin: angular velocity at t = 0 in the laboratory frame, (3,) [rad/s].
+        times: increasing times above 0, (n,) [s].
+
+    Returns:
+        n rotations from body frame to laboratory frame, and angular velocities in the body frame, (n, 3) [rad/s].
     """
 
     def slope(_: float, y: Array) -> Array:
@@ -91,14 +114,19 @@ def free_rotation(*, inertia: Array, start: Rotation, spin: Array, times: Array)
 def falling_on_springs(
     points: Array, *, stiffness: float, damping: float, mass: float, inertia: NDArray[np.float64], speed: float
 ) -> tuple[Array, float]:
-    """Integrate the fall of a flat rigid body, lying flat, on springs and dashpots under its points; small tilts.
+    """Integrate the impact of a horizontal rigid body on springs and dashpots at several points, for small tilts.
 
-    Points (n, 2) are x and y of the contacts from the centre of mass [m], stiffness [N/m] and damping [N s/m] those of
-    one contact, the inertia (2,) that about x and y [kg m²]; the speed is downwards, at first touch [m/s]. Returns
-    velocity
-    upwards and spins about x and y afterwards (3,) [m/s, rad/s], and the time from the first touch to the end of the
-    last
-    contact [s].
+    Args:
+        points: x and y of the contacts relative to the centre of mass, (n, 2) [m].
+        stiffness: of one contact [N/m].
+        damping: of one contact [N s/m].
+        mass: [kg].
+        inertia: moments of inertia about x and y, (2,) [kg m²].
+        speed: downward speed at first touch [m/s].
+
+    Returns:
+        Upward velocity [m/s] and angular velocities about x and y [rad/s] after the impact, (3,), and the time from
+        first touch to the end of the last contact [s].
     """
     lift = np.stack([np.ones(len(points)), points[:, 1], -points[:, 0]], axis=1)  # heights of the points
     masses = np.array([mass, *inertia])
@@ -112,7 +140,7 @@ def falling_on_springs(
     def slope(_: float, y: Array) -> Array:
         return np.concatenate([y[3:], lift.T @ forces(y) / masses])
 
-    # Long enough for the slowest tilt; steps short against the contact, whose force jumps at first touch.
+    # Long enough for the slowest tilt; small steps, since the force jumps at first touch.
     solution = solve_ivp(slope, (0, 12 / omega), [0, 0, 0, -speed, 0, 0], max_step=0.005 / omega, rtol=1e-8, atol=1e-14)
     pressed = [bool(forces(y).any()) for y in solution.y.T]
     return solution.y[3:, -1], float(solution.t[max(k for k, on in enumerate(pressed) if on)])

@@ -129,14 +129,14 @@ def test_the_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None
         "phases: [{type: take-over, run: run}, {type: relax, duration_s: 0.1}]\n"
     )
     assert main(["export", str(file), "--to", "lammps"]) == 0
-    assert capsys.readouterr().out == f"{tmp_path / 'on-lammps'}: run it there: lmp -in in.lammps\n"
+    assert capsys.readouterr().out == f"{tmp_path / 'on-lammps'}: written; run in this folder: lmp -in in.lammps\n"
     assert {path.name for path in (tmp_path / "on-lammps").iterdir()} == {DECK, DATA, BODIES}
     assert main(["export", str(file), "--to", "lammps"]) == 2
     assert "--output" in (said := capsys.readouterr().err)
     assert "exists; choose another name" in said
     for option in (["--all"], ["--time", "1"], ["--with", "crossings"], ["--color-by", "contacts"]):
         assert main(["export", str(file), "--to", "lammps", *option]) == 2
-        assert f"{option[0]}: is of frames of a run" in capsys.readouterr().err
+        assert f"{option[0]}: selects from the frames of a run" in capsys.readouterr().err
     assert main(["export", str(tmp_path / "run"), "--to", "lammps"]) == 2
     assert main(["export", str(tmp_path / "none.yaml"), "--to", "lammps"]) == 2
     assert main(["export", str(file), "--to", "lammps", "--output", str(tmp_path / "no" / "where")]) == 2

@@ -145,7 +145,7 @@ def test_ctrl_c_ends_it_well(served, number):
         process.send_signal(number)
         _, said = process.communicate(timeout=30)
         assert process.returncode == 0
-        assert said == "close its window, or press Ctrl-C, to end\n"
+        assert said == "close the page or press Ctrl-C to end\n"
 
 
 def test_a_port_that_is_taken_is_one_line(served, capsys):

@@ -25,10 +25,10 @@ def test_a_run_equals_its_copy_until_that_loses_its_series(
     said = smarticles("compare", run, tmp_path / "b")
     assert (said.status, said.err) == (0, "")
     assert "identical bits: yes, all of the series and 16 frames" in said.out
-    assert {"scene: the same", "versions: the same", "measures: the same"} <= {*said.out.splitlines()}
+    assert {"scene: no difference", "versions: no difference", "measures: no difference"} <= {*said.out.splitlines()}
     (tmp_path / "b" / "series.h5").unlink()
     said = smarticles("compare", run, tmp_path / "b")
-    assert "identical bits: no, one has more samples, columns or frames, 16 of 16 frames are the same" in said.out
+    assert "identical bits: no, one run has more samples, columns or frames, 16 of 16 frames are equal" in said.out
 
 
 def test_what_differs_is_listed_key_by_key(tmp_path: Path, write_run: WriteRun, smarticles: Smarticles) -> None:
@@ -87,6 +87,6 @@ def test_sweeps_are_compared_run_by_run_and_group_by_group(
     said = smarticles("compare", tmp_path / "one", tmp_path / "two")
     lines = words_of(said.out)
     assert "only in B: n7" in lines
-    assert "identical bits: 1 of 2 runs that both have" in lines
+    assert "identical bits: 1 of 2 runs that both sweeps have" in lines
     assert any(line.startswith("6 shake φ 0.1200 0.1400 0.0200") for line in lines)
     assert any(line.startswith("5 shake φ 0.1300 0.1300 0.0000") for line in lines)

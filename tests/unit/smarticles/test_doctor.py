@@ -15,7 +15,7 @@ Answers = dict[str, tuple[bool, str]]
 def answers(monkeypatch: pytest.MonkeyPatch) -> Answers:
     """Answers of the processes that try a part, by script; a version where a test gives none."""
     answers: Answers = {}
-    monkeypatch.setattr(doctor, "_ask", lambda script: answers.get(script, (True, "1.2")))
+    monkeypatch.setattr(doctor, "_run_script", lambda script: answers.get(script, (True, "1.2")))
     monkeypatch.setattr(shutil, "which", lambda command: None)
     return answers
 
@@ -33,7 +33,11 @@ def test_a_machine_without_slurm_is_fit_for_runs(answers: Answers, smarticles: S
     ("broken", "status", "lines"),
     [
         (["_YADE"], 0, ["yade            no    gone", "scenes with `engine: links` run without it"]),
-        (["_YADE", "_LINKS"], 1, ["yade            FAILS gone", "links           no    gone", "fails here: yade\n"]),
+        (
+            ["_YADE", "_LINKS"],
+            1,
+            ["yade            FAILS gone", "links           no    gone", "runs need these, which fail: yade\n"],
+        ),
         (["_PYVISTA"], 0, ["pyvista         no    gone", "only pictures need it", "pip install 'smarticles[viz]'"]),
         (["_LAMMPS"], 0, ["lammps          no    gone", "only scenes with `engine: lammps` need it"]),
     ],
@@ -67,16 +71,16 @@ def test_disk_is_tried_and_left_clean(tmp_path: Path) -> None:
     ],
 )
 def test_child_process(script: str, answer: tuple[bool, str]) -> None:
-    assert doctor._ask(script) == answer
+    assert doctor._run_script(script) == answer
 
 
 def test_child_process_that_hangs(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(doctor, "_TIMEOUT_S", 0.2)
-    assert doctor._ask("import time; time.sleep(60)") == (False, "no answer within 0.2 s")
+    assert doctor._run_script("import time; time.sleep(60)") == (False, "no answer within 0.2 s")
 
 
 @pytest.mark.parametrize("script", [doctor._LINKS, doctor._PYVISTA])
 def test_the_scripts_work_here(script: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.delenv("DISPLAY", raising=False)
-    ok, found = doctor._ask(script)
+    ok, found = doctor._run_script(script)
     assert ok, found

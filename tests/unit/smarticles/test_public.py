@@ -96,7 +96,7 @@ def test_what_follows_from_a_scene_follows_anew_where_it_varies(tmp_path: Path) 
 
 
 def test_a_scene_that_a_template_would_run_is_rejected(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match=r"holds '\{\{', which a template would take for its own"):
+    with pytest.raises(InputError, match=r"contains '\{\{', which is template syntax"):
         write_sweep(scene_of(name="{{ 7 * 7 }}"), {"count": [1, 2]}, tmp_path)
 
 

@@ -88,7 +88,7 @@ def test_the_page_of_a_run_has_everything(run: Path, smarticles: Smarticles) -> 
     assert page.row("motors", "off")[2] == "no phase actuates"
     assert page.row("container motion", "on")[2].startswith("phase 2: Γ = 2")
     assert page.row("rows") == ["rows", "2", "1"]
-    assert page.row("links", "draft")[-1] == "this one"
+    assert page.row("links", "draft")[-1] == "this run"
     assert "This scene changes rows, which the table does not cover." in page.text
     assert page.row("warning: two hooks") == ["warning: two hooks", "3 ×"]
     assert page.row("seed")[1] == "1"
@@ -137,10 +137,10 @@ def test_a_scene_of_another_version_is_reported_and_no_reason_to_fail(
 def test_what_exists_is_kept_and_what_is_no_run_rejected(run: Path, tmp_path: Path, smarticles: Smarticles) -> None:
     (run / "report.html").write_text("mine")
     said = smarticles("report", run)
-    assert (said.status, "exists already" in said.err) == (2, True)
+    assert (said.status, "exists; choose another name" in said.err) == (2, True)
     assert (run / "report.html").read_text() == "mine"
     assert smarticles("report", run, "--overwrite").status == 0
-    assert "let its name end in .html" in smarticles("report", run, "--output", tmp_path / "a.pdf").err
+    assert "use a name that ends in .html" in smarticles("report", run, "--output", tmp_path / "a.pdf").err
     assert "does not exist; make it" in smarticles("report", run, "--output", tmp_path / "no" / "a.html").err
     assert "is no run, sweep or study" in smarticles("report", tmp_path, "--output", tmp_path / "a.html").err
     none = smarticles("report", run, "--output", tmp_path / "b.html", "--accuracy", tmp_path / "none.csv")

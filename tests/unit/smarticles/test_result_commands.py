@@ -127,8 +127,11 @@ def test_render_draws_a_film_of_a_part_in_fixed_colours(
     ("words", "message"),
     [
         (("--fps", "10"), "--fps 10: a picture shows one time; use --time, or write a film: --output film.gif"),
-        (("--smarticle", "1", "--output", "a.gif"), "--smarticle 1: is drawn alone, in a picture; leave it out"),
-        (("--output", "film.avi"), "'.avi' is no kind of file that is drawn here; end the name in .png for a picture"),
+        (
+            ("--smarticle", "1", "--output", "a.gif"),
+            "--smarticle 1: a single smarticle is drawn in pictures only; leave it out",
+        ),
+        (("--output", "film.avi"), "'.avi' is no supported format; end the name in .png for a picture"),
         (("--clim", "5:1"), "must be LOW:HIGH, two numbers in order, or run: got '5:1'"),
         (("--size", "12y3"), "must be a number of pixels from 1, or two as in 1280x720: got '12y3'"),
     ],

@@ -62,7 +62,7 @@ def test_threads_are_of_one_run_and_not_of_a_sweep(sweep_file: Path, tmp_path: P
     said = smarticles("resume", out, "--threads", "2")
     assert said.status == 2
     assert said.err == (
-        f"smarticles: error: --threads 2: is for one run, and {out} is a sweep, of runs of one thread; leave it out\n"
+        f"smarticles: error: --threads 2: is for a single run; {out} is a sweep, whose runs have one thread; omit it\n"
     )
 
 
@@ -95,7 +95,7 @@ def test_a_failing_run_is_status_1_with_its_cause(sweep_file: Path, tmp_path: Pa
             "sensitivity --fidelity reference",
             "--fidelity reference: study sensitivity sets the fidelity of its runs itself; leave --fidelity out",
         ),
-        ("engines --engine links", "--engine links: study engines cannot be run on it ("),
+        ("engines --engine links", "--engine links: study engines does not allow it ("),
     ],
 )
 def test_what_a_study_does_not_have_is_rejected(
