@@ -95,7 +95,7 @@ def swept_axes(vertices: Floats, diameter: float) -> Floats:
     middle link.
 
     Source:
-        `dem.engine.links.shape`; the sphere chains of `dem.body.particle` lie along these axes too.
+        `dem.engine.links.shapes`; the sphere chains of `dem.body.particle` lie along these axes too.
     """
     axes = vertices.copy()
     lengths = link_lengths(vertices)
