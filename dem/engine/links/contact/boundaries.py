@@ -45,6 +45,10 @@ SLOT, PART, DEPTH, SHARE, FACTOR, AXIS, NORMAL, ROOM, COLUMNS = 0, 1, 2, 3, 4, 5
 SURFACES = 3  # of an end of a link
 END_SLOTS = 2 * SURFACES
 
+# Overlap with a surface at which the barrier of `barrier.stretch` has grown without bound, in radii of the segment: a
+# tenth of its thickness. Ordinary loads and impacts stay in the linear quarter of it.
+ROOM_AT_SURFACE = 0.2
+
 GOLDEN = (math.sqrt(5) - 1) / 2
 SAMPLES, TURNS = 8, 32  # places along a link that are tried, and narrowings about the best: to 2e-7 of its length
 
@@ -89,7 +93,7 @@ def contacts_of_segment(
         Rows that were written.
     """
     link, shared, count = segments.line[p], segments.shared[p], 0
-    radius = link[RADIUS]
+    radius, room = link[RADIUS], ROOM_AT_SURFACE * link[RADIUS]
     for end in range(2):
         if shared & (AT_START << end):
             continue
@@ -103,11 +107,11 @@ def contacts_of_segment(
                 depth = radius - channel[0] - inward * y
                 if depth > 0.0:
                     slot = SURFACES * end + side
-                    count = _note(rows, count, slot, CHANNEL + side, depth, radius, point, (0.0, inward, 0.0))
+                    count = _note(rows, count, slot, CHANNEL + side, depth, room, point, (0.0, inward, 0.0))
         else:
             depth = radius - (z - ground.place[FLOOR])
             if depth > 0.0:
-                count = _note(rows, count, SURFACES * end, FLOOR, depth, radius, point, (0.0, 0.0, 1.0))
+                count = _note(rows, count, SURFACES * end, FLOOR, depth, room, point, (0.0, 0.0, 1.0))
             inner = ground.radii[ground.radii.shape[0] - 1] - radius
             if ground.flags[0] != 0 and x * x + y * y > inner * inner:
                 count = _contacts_with_wall(radius, ground, SURFACES * end, point, rows, count)
@@ -125,6 +129,7 @@ def contacts_of_segment(
 def _contacts_with_wall(radius: float, ground: Ground, slot: int, point: Vector, rows: Array, count: int) -> int:
     """Find the contacts of an end with wall and ceilings; the number of rows."""
     x, y, z = point
+    room = ROOM_AT_SURFACE * radius
     height, r, tiers = z - ground.place[WALL], math.sqrt(x * x + y * y), ground.radii.shape[0]
     lifted = ground.flags[1] != 0
     if height > ground.top:
@@ -142,16 +147,16 @@ def _contacts_with_wall(radius: float, ground: Ground, slot: int, point: Vector,
         if lifted and gap < 0.0:
             gap, sign = -gap, 1.0
         if gap < radius:
-            count = _note(rows, count, slot + 1, WALL, radius - gap, radius, point, (sign * ex, sign * ey, 0.0))
+            count = _note(rows, count, slot + 1, WALL, radius - gap, room, point, (sign * ex, sign * ey, 0.0))
         if tier + 1 < tiers and height > ground.bottoms[tier + 1] - radius:
             edge, above, away = 2, height - ground.bottoms[tier + 1], r - ground.radii[tier + 1]
             if away >= 0.0:
-                return _note(rows, count, slot + 2, WALL, radius + above, radius, point, (0.0, 0.0, -1.0))
+                return _note(rows, count, slot + 2, WALL, radius + above, room, point, (0.0, 0.0, -1.0))
     if edge:
         distance = math.sqrt(away * away + above * above)
         if 0.0 < distance < radius:
             normal = ex * away / distance, ey * away / distance, above / distance
-            count = _note(rows, count, slot + edge, WALL, radius - distance, radius, point, normal)
+            count = _note(rows, count, slot + edge, WALL, radius - distance, room, point, normal)
     return count
 
 
@@ -172,7 +177,7 @@ def _contacts_with_rims(link: Array, ground: Ground, rims: Rims, first: int, row
                 up, r = z_at - height, math.sqrt(x * x + y * y)
                 out, up = (r - round_) / (r * distance), up / distance
                 depth, normal = radius - distance, (out * x, out * y, up)
-                count = _note(rows, count, first + rim, WALL, depth, radius, (x, y, z_at), normal)
+                count = _note(rows, count, first + rim, WALL, depth, ROOM_AT_SURFACE * radius, (x, y, z_at), normal)
     return count
 
 
@@ -294,7 +299,7 @@ def _rub(
     stored, twist = slip[3], 0.5 * step.past * turning
     force = resist(law, damping, load, share, hardening, normal, relative, twist, step.past, slip)
     resolve(step, depth, room, closing)
-    bodies.deepest[i] = max(bodies.deepest[i], depth / room)
+    bodies.deepest[i] = max(bodies.deepest[i], depth / max(room, segments.line[p, RADIUS]))
     if ledger is not None:
         # The boundary keeps its speed: of the mean of before and after, twice its half.
         power = 0.5 * dot(force, (velocity[0], velocity[1], velocity[2] - 2 * speed))

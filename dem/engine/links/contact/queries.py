@@ -94,7 +94,7 @@ def _query_boundaries(
             contact = found.rows[k]
             found.touches[i] += 1
             found.held[i, int(contact[PART])] = True
-            found.depth[i] = max(found.depth[i], contact[DEPTH] / contact[ROOM])
+            found.depth[i] = max(found.depth[i], contact[DEPTH] / max(contact[ROOM], segments.line[p, RADIUS]))
             u, _, _ = stretch(contact[DEPTH], contact[ROOM])
             squares += u * u * contact[FACTOR]
     return 0.5 * stiffness * squares
