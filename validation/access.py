@@ -16,13 +16,14 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.spatial.transform import Rotation
 
+from dem.body.linear import applied
 from dem.body.particle import Boxes, Particle, SphereChain
 from dem.engine.demand import contact_law_of, motor_law_of
 from dem.engine.interface import Engine
 from dem.engine.links.arrays import FLOOR, WALL
 from dem.engine.links.engine import LinksEngine
 from dem.engine.links.motion.planar import lay_out
-from dem.engine.links.shape import shape_of
+from dem.engine.links.shapes import Planar, smarticle_shape
 from dem.engine.yade.construction import SMARTICLE_MATERIAL, WALL_MATERIAL
 from dem.engine.yade.engine import YadeEngine
 from dem.engine.yade.kind import hinge_law
@@ -137,8 +138,8 @@ class Pushed(LinksEngine):
     def _kick(self) -> None:
         """Add the impulse of the forces over one time step to the momenta."""
         world, dt = self._world, self.time_step
-        bodies, shape, motors = world.posed(), world.shape, world.motors
-        share = shape.barb_mass / shape.mass
+        bodies, planar, motors = world.posed(), Planar(*world.shapes.planar[0]), world.motors
+        share = planar.barb_mass / planar.mass
         begun, rise = self.grown
         part = min(1.0, (self.time - begun + dt) / rise) if rise else 1.0
         for (k, link), full in self.forces.items():
@@ -147,13 +148,13 @@ class Pushed(LinksEngine):
             # Centre of the link relative to the centre of mass, in the axes of the middle link.
             centre = np.array([*((row[2:4], -row[0:2], row[4:6])[link]), 0.0])
             local = axes.T @ force
-            bodies.velocity[k] += dt * force / shape.mass
+            bodies.velocity[k] += dt * force / planar.mass
             bodies.momentum[k] += dt * axes @ np.cross(centre, local)
             if motors is None or not world.articulated:
                 continue
             pulled = -share * np.array([row[6:8] @ local[:2], row[8:10] @ local[:2]])
             if link != 1:
-                sign, place, hinge = (-1.0, 0, -shape.half) if link == 0 else (1.0, 1, shape.half)
+                sign, place, hinge = (-1.0, 0, -planar.half) if link == 0 else (1.0, 1, planar.half)
                 arm = centre[:2] - [hinge - row[0], -row[1]]
                 pulled[place] += sign * (arm[0] * local[1] - arm[1] * local[0])
             free = LAWS[motors.law] in ("slip", "servo")
@@ -187,23 +188,16 @@ class LinksAccess(_Access):
 
     def ends(self, particle: Particle) -> Array:
         """Return the centres of the spheres that can touch the floor, (n, 3) [m], body frame."""
+        shape = smarticle_shape(particle)
+        starts, ends = shape.lines[:, :3], shape.lines[:, :3] + shape.lines[:, 3:6]
         # Ends of links; each hinge once.
-        shape, boxes = shape_of(particle), particle.boxes
-        places = [np.array([side * shape.end, 0.0, 0.0]) for side in (-1, 1)]
-        for link, side in ((0, -1), (2, 1)):
-            if link in shape.kinds:
-                places.append(np.array([side * shape.half, 0.0, 0.0]) + shape.tip * boxes.directions[link])
-        return boxes.to_body(np.array([place + np.array([0.0, 0.0, z]) for place in places for z in shape.offsets]))
+        return applied(particle.boxes.link_rotations[1], np.concatenate([starts[shape.shared == 0], ends]))
 
     def swept(self, particle: Particle) -> Array:
         """Return the centres of spheres that cover the smarticle, (n, 3) [m], body frame."""
-        shape, boxes, found = shape_of(particle), particle.boxes, []
-        starts = {0: -shape.half, 1: -shape.end, 2: shape.half}
-        for link in shape.kinds:
-            long = 2 * shape.end if link == 1 else shape.tip
-            way = np.linspace(0, long, POINTS)[:, None] * boxes.directions[link]
-            found += [way + np.array([starts[int(link)], 0.0, z]) for z in shape.offsets]
-        return boxes.to_body(np.concatenate(found))
+        lines, way = smarticle_shape(particle).lines, np.linspace(0, 1, POINTS)[:, None]
+        points = [line[:3] + way * line[3:6] for line in lines]
+        return applied(particle.boxes.link_rotations[1], np.concatenate(points))
 
     def pin_stiffness(self, scene: Scene) -> float:
         """Return force over gap of a hinge [N/m]; inf if hinges cannot open."""
@@ -226,16 +220,19 @@ class LinksAccess(_Access):
         """Fix the middle link of smarticle 0, which must be articulated and at rest."""
         # The link becomes too heavy to move, and an external force carries its weight.
         own = _links(engine)
-        world, shape = own._world, own._world.shape
+        world, planar = own._world, Planar(*own._world.shapes.planar[0])
         middle = own.state().link_positions[0, 1].copy()
-        mass, inertia = HEAVY * shape.middle_mass, HEAVY * shape.middle_inertia
-        world.shape = shape._replace(mass=2 * shape.barb_mass + mass, middle_mass=mass, middle_inertia=inertia)
-        lay_out(world.shape, float(world.bodies.alpha[0, 0]), float(world.bodies.alpha[0, 1]), world.bodies.plane[0])
+        mass, heavy = HEAVY * planar.middle_mass, ("middle_mass", "middle_xx", "middle_yy", "middle_zz")
+        planar = planar._replace(
+            mass=2 * planar.barb_mass + mass, **{name: HEAVY * getattr(planar, name) for name in heavy}
+        )
+        world.shapes.planar[0], world.shapes.mass[0] = planar, planar.mass
+        lay_out(planar, float(world.bodies.alpha[0, 0]), float(world.bodies.alpha[0, 1]), world.bodies.plane[0])
         bodies = world.posed()
         bodies.position[0] = middle + bodies.axes[0, :, :2] @ bodies.plane[0, :2]
         bodies.velocity[0] = bodies.momentum[0] = 0.0
         if own.gravity:
-            self.force(own, 0, 1, (0.0, 0.0, world.shape.mass * own.gravity))
+            self.force(own, 0, 1, (0.0, 0.0, planar.mass * own.gravity))
 
     def swing(self, engine: Engine, links: Iterable[tuple[float, float, float]]) -> None:
         """Set velocities in the plane for smarticle 0, which must be articulated and unrotated.
@@ -248,10 +245,10 @@ class LinksAccess(_Access):
         world = _links(engine)._world
         motors, (first, middle, second) = world.motors, np.array(list(links))
         assert motors is not None
-        shape, bodies, row = world.shape, world.posed(), world.bodies.plane[0]
-        masses = np.array([shape.barb_mass, shape.middle_mass, shape.barb_mass])
+        planar, bodies, row = Planar(*world.shapes.planar[0]), world.posed(), world.bodies.plane[0]
+        masses = np.array([planar.barb_mass, planar.middle_mass, planar.barb_mass])
         rates = np.array([middle[2] - first[2], second[2] - middle[2]])
-        velocity = (masses[:, None] * [first[:2], middle[:2], second[:2]]).sum(axis=0) / shape.mass
+        velocity = (masses[:, None] * [first[:2], middle[:2], second[:2]]).sum(axis=0) / planar.mass
         spin = row[16] * middle[2] + row[18:20] @ rates
         bodies.velocity[0], bodies.momentum[0] = (*velocity, 0.0), (0.0, 0.0, spin)
         bodies.rate[0] = rates

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from dem.body.particle import LINKS, Boxes, Particle
-from dem.engine.links.shape import shape_of
+from dem.engine.links.shapes import offsets_of, planar_of, smarticle_shape
 from postprocess.measures.contacts import segment_distances
 
 Array = NDArray[np.float64]
@@ -118,17 +118,18 @@ def _boxes(particle: Particle, positions: Array, frames: Array) -> Bars:
 
 
 def _strands(particle: Particle, positions: Array, frames: Array) -> Swept:
-    """Return the strands of `dem.engine.links.shape`: barbs begin at the hinge and end a radius before the tip."""
-    shape = shape_of(particle)
-    spans = {0: (-shape.arm, shape.tip - shape.arm), 1: (-shape.end, shape.end), 2: (-shape.arm, shape.tip - shape.arm)}
+    """Return the strands of `dem.engine.links.shapes`: barbs begin at the hinge and end a radius before the tip."""
+    planar = planar_of(particle)
+    barb = (-planar.arm, planar.tip - planar.arm)
+    spans = {0: barb, 1: (-planar.end, planar.end), 2: barb}
     ends: tuple[list[Array], list[Array]] = ([], [])
-    for link in shape.kinds:
-        for offset in shape.offsets:
+    for link in np.unique(smarticle_shape(particle).link):
+        for offset in offsets_of(particle):
             for kept, along in zip(ends, spans[int(link)], strict=True):
                 kept.append(positions[:, link] + along * frames[:, link, :, 0] + offset * frames[:, link, :, 2])
     starts, stops = (np.concatenate(kept) for kept in ends)
     owners = np.tile(np.arange(len(positions)), len(starts) // len(positions))
-    return Swept(starts, stops, shape.radius, owners)
+    return Swept(starts, stops, particle.radius, owners)
 
 
 def _spheres(particle: Particle, positions: Array, frames: Array) -> Swept:

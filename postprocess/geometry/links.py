@@ -96,7 +96,7 @@ def swept_axes(vertices: Floats, diameter: float) -> Floats:
     barb shorter than the radius shrinks to its hinge; without barbs the ends of the middle link move inwards.
 
     Source:
-        `dem.engine.links.shape`; the sphere chains of `dem.body.particle` lie along these axes too.
+        `dem.engine.links.shapes`; the sphere chains of `dem.body.particle` lie along these axes too.
     """
     axes = vertices.copy()
     lengths = link_lengths(vertices)

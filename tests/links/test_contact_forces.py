@@ -70,8 +70,7 @@ def test_they_are_what_moves_smarticles_and_what_boundaries_feel(tmp_path: Path,
     np.subtract.at(on_each, found.smarticles[between, 1], found.forces[between])
     felt = np.zeros((len(BOUNDARIES), 3))
     np.subtract.at(felt, found.boundaries[~between], found.forces[~between])
-    bodies = world.bodies
-    loads = bodies.shares.reshape(engine.count, 3, 6).sum(axis=1) if engine.motors.articulated else bodies.load
+    loads = world.bodies.load
     largest = np.abs(found.forces).max()
     assert largest > 0
     pulled = [0, engine.count - 1] if engine.strings.tied else []  # by what is no contact

@@ -23,7 +23,7 @@ def test_poses_are_those_of_the_particle() -> None:
         frames = np.array([turn.as_matrix() @ p.boxes.link_rotations for turn in turns])
         assert np.allclose(state.link_rotations, frames, atol=1e-14)
         # Strands are where the links are, tips pulled in by the radius.
-        start, along = made._world.bodies.segments[0, :3], made._world.bodies.segments[0, 3:]
+        start, along = made._world.segments.line[0, :3], made._world.segments.line[0, 3:6]
         assert np.allclose(start, wanted[0, 1])
         assert np.linalg.norm(start + along - wanted[0, 0]) == pytest.approx(p.radius)
 

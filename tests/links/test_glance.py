@@ -61,7 +61,7 @@ def test_it_finds_what_a_look_at_each_finds(kind: dict[str, Any], monkeypatch: p
 def test_one_that_may_have_passed_between_two_looks_is_to_be_looked_at() -> None:
     made = shaken()
     state = made.state()
-    made._world.bodies.deepest[COUNT // 2] = 1.01 * PASSES * made.particle.chain.diameter
+    made._world.bodies.deepest[COUNT // 2] = 1.01 * PASSES
     assert made.extremes(state) is None
     # It was not forgotten for that: the close look still tells who.
     assert made.overlaps(0.5 * builds.DIAMETER).deep.tolist() == [k == COUNT // 2 for k in range(COUNT)]

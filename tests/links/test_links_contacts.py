@@ -8,7 +8,9 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from dem.engine.links.arrays import Segments
 from dem.engine.links.neighbours.lists import build
+from dem.engine.links.shapes import RADIUS as RADIUS_AT
 from dem.physics.contact import damping_ratio
 from dem.setting.hooks import Cross
 from dem.setting.plane import Channel
@@ -213,23 +215,23 @@ def test_neighbours_are_complete_in_a_moving_pile(rows: int) -> None:
         pairs = world.pairs
         near = pairs.near[: pairs.counts[1]]
         listed = set(zip(pairs.first[near].tolist(), pairs.second[near].tolist(), strict=True))
-        for p, q in touching_links(world.bodies.segments, world.each, builds.DIAMETER if rows == 1 else builds.T2):
+        for p, q in touching_segments(world.segments):
             # The list was looked after before the last step: what has moved since is in its skin.
             assert (p, q) in listed
     assert pairs.counts[2] > 3
 
 
-def touching_links(segments: np.ndarray, each: int, diameter: float) -> list[tuple[int, int]]:
-    grid = np.linspace(0, 1, 41)
-    points = segments[:, None, :3] + grid[:, None] * segments[:, None, 3:]
+def touching_segments(segments: Segments) -> list[tuple[int, int]]:
+    grid, line = np.linspace(0, 1, 41), segments.line
+    points = line[:, None, :3] + grid[:, None] * line[:, None, 3:6]
     found = []
-    for p in range(len(segments)):
-        for q in range(p + 1, len(segments)):
-            if p // each != q // each:
+    for p in range(len(line)):
+        for q in range(p + 1, len(line)):
+            if segments.body[p] != segments.body[q]:
                 middle = np.linalg.norm(points[p, 20] - points[q, 20])
                 if middle < 0.013:
                     away = np.linalg.norm(points[p][:, None] - points[q][None], axis=-1).min()
-                    if away < diameter:
+                    if away < line[p, RADIUS_AT] + line[q, RADIUS_AT]:
                         found.append((p, q))
     return found
 
@@ -249,7 +251,7 @@ def test_what_contacts_remember_survives_a_new_list() -> None:
 
     before = memory()
     assert len(before) > 10
-    builds.callable_from_python(build)(world.shape, world.bodies, world.pairs, world.cells, world.skins)
+    builds.callable_from_python(build)(world.bodies, world.segments, world.pairs, world.cells, world.skins)
     assert memory() == before
 
 

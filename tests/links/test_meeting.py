@@ -25,8 +25,13 @@ def segment(rng: np.random.Generator, scale: float = 1e-2) -> np.ndarray:
     return np.concatenate([rng.normal(size=3) * scale / 3, rng.normal(size=3) * scale])
 
 
+def line(axis: np.ndarray) -> np.ndarray:
+    """A segment of diameter D as kernels have it; squares are added up in their order."""
+    return np.array([*axis[:6], 1 / sum(axis[3:6] ** 2), D / 2])
+
+
 def distance(p: np.ndarray, q: np.ndarray) -> float:
-    both = lines(p, q, 1 / (p[3:] @ p[3:]), 1 / (q[3:] @ q[3:]))
+    both = lines(line(p), line(q))
     return float(np.linalg.norm(between(both, *nearest(both))))
 
 
@@ -57,10 +62,10 @@ def test_nearest_point_to_a_circle_against_brute_force() -> None:
         assert math.hypot(math.hypot(x[0], x[1]) - 5e-3, x[2] - 1e-3) <= away.min() + 1e-8
 
 
-def look(p: np.ndarray, q: np.ndarray, bend: tuple[bool, bool]) -> tuple[float, np.ndarray, np.ndarray, int]:
+def look(p: np.ndarray, q: np.ndarray, joints: tuple[int, int]) -> tuple[float, np.ndarray, np.ndarray, int]:
     """Energy, force on the first, torque on the first about the origin, and the number of contacts."""
     out = np.zeros((ROWS, COLUMNS))
-    found = meet(p, q, D, KN, *bend, out)
+    found = meet(line(p), line(q), KN, *joints, out)
     if not found:
         return 0.0, np.zeros(3), np.zeros(3), 0
     force, torque, points = np.zeros(3), np.zeros(3), 0
@@ -92,23 +97,23 @@ def touching(rng: np.random.Generator, angle: float) -> tuple[np.ndarray, np.nda
 
 
 @pytest.mark.parametrize("angle", [0.0, 0.01, 0.05, 0.2, 1.0, math.pi / 2, 3.1])
-@pytest.mark.parametrize("bend", [(False, False), (True, False), (True, True)])
-def test_forces_are_derivatives_of_the_energy(angle: float, bend: tuple[bool, bool]) -> None:
+@pytest.mark.parametrize("joints", [(0, 0), (1, 0), (1, 1), (2, 3)])
+def test_forces_are_derivatives_of_the_energy(angle: float, joints: tuple[int, int]) -> None:
     rng = np.random.default_rng(int(100 * angle))
     step, scale = 1e-10, KN * 0.1 * D
     wrong = 0
     for _ in range(60):
         p, q = touching(rng, angle)
-        _, force, torque, _ = look(p, q, bend)
+        _, force, torque, _ = look(p, q, joints)
         slopes, turns = np.zeros(3), np.zeros(3)
         for d in range(3):
             shift = np.zeros(6)
             shift[d] = step
-            slopes[d] = -(look(p + shift, q, bend)[0] - look(p - shift, q, bend)[0]) / (2 * step)
+            slopes[d] = -(look(p + shift, q, joints)[0] - look(p - shift, q, joints)[0]) / (2 * step)
             spin = Rotation.from_rotvec(np.eye(3)[d] * 1e-8)
             turned = np.concatenate([spin.apply(p[:3]), spin.apply(p[3:])])
             back = np.concatenate([spin.inv().apply(p[:3]), spin.inv().apply(p[3:])])
-            turns[d] = -(look(turned, q, bend)[0] - look(back, q, bend)[0]) / 2e-8
+            turns[d] = -(look(turned, q, joints)[0] - look(back, q, joints)[0]) / 2e-8
         # Where a link's end has its nearest point at the other's end the energy has a corner of second order.
         good = np.allclose(force, slopes, atol=2e-4 * scale) and np.allclose(torque, turns, atol=2e-4 * scale * 10 * D)
         wrong += not good
@@ -122,7 +127,7 @@ def test_a_rod_turned_over_another_feels_no_jump_and_gains_no_energy() -> None:
     for angle in angles:
         turned = np.array([math.cos(angle), math.sin(angle), 0.0]) * 8 * D
         rod = np.concatenate([centre + np.array([0, 0, gap]) - turned / 2, turned])
-        energy, force, torque, count = look(p, rod, (False, False))
+        energy, force, torque, count = look(p, rod, (0, 0))
         energies.append(energy)
         torques.append((torque - np.cross(centre, force))[2])
         counts.append(count)
@@ -142,12 +147,12 @@ def test_a_rod_turned_over_another_feels_no_jump_and_gains_no_energy() -> None:
 def test_bars_on_each_other_have_two_contacts_and_resist_tilting() -> None:
     p = np.array([0.0, 0.0, 0.0, 8 * D, 0.0, 0.0])
     q = np.array([1 * D, 0.0, 0.98 * D, 4 * D, 0.0, 0.0])
-    energy, force, _, _ = look(p, q, (False, False))
+    energy, force, _, _ = look(p, q, (0, 0))
     assert force[2] == pytest.approx(-2 * KN * 0.02 * D)
     assert energy == pytest.approx(KN * (0.02 * D) ** 2)
     for tilt in (-1e-3, 1e-3):
         tilted = q + np.array([0, 0, tilt * -2 * D, 0, 0, tilt * 4 * D])
-        assert look(p, tilted, (False, False))[0] > energy
+        assert look(p, tilted, (0, 0))[0] > energy
 
 
 def test_a_bend_is_as_stiff_as_a_bar() -> None:
@@ -157,11 +162,11 @@ def test_a_bend_is_as_stiff_as_a_bar() -> None:
     for along in np.linspace(-0.5, 0.5, 41) * D:
         # A rod across the corner, over the end of the middle link, the hinge and the start of the barb.
         rod = np.array([-5 * D * 0.7 + along, 5 * D * 0.7 + along, D - depth, 10 * D * 0.7, -10 * D * 0.7, 0])
-        total = look(middle, rod, (False, False))[0] + look(barb, rod, (True, False))[0]
+        total = look(middle, rod, (0, 0))[0] + look(barb, rod, (1, 0))[0]
         assert total <= 0.5 * KN * depth**2 * 2.0001
         assert total >= 0.5 * KN * depth**2 * 0.9999 or abs(along) > 0.2 * D
     corner = np.array([-7 * D, 7 * D, D - depth, 14 * D, -14 * D, 0])
-    total = look(middle, corner, (False, False))[0] + look(barb, corner, (True, False))[0]
+    total = look(middle, corner, (0, 0))[0] + look(barb, corner, (1, 0))[0]
     assert total == pytest.approx(0.5 * KN * depth**2)
 
 
@@ -174,12 +179,12 @@ def test_what_is_left_out_of_a_lone_contact_is_nothing() -> None:
         # At a hinge, at an end, anywhere; so near that they touch.
         s, t = rng.choice([0.0, 1.0, rng.uniform()]), rng.choice([0.0, 1.0, rng.uniform()])
         q[:3] = p[:3] + s * p[3:] - t * q[3:] + 0.4 * D * rng.normal(size=3)
-        bends = bool(rng.integers(2)), bool(rng.integers(2))
-        rows = meet(p, q, D, KN, *bends, out)
+        joints = int(rng.integers(2)), int(rng.integers(2))
+        rows = meet(line(p), line(q), KN, *joints, out)
         if not rows:
             continue
-        both = lines(p, q, 1 / sum(p[3:] ** 2), 1 / sum(q[3:] ** 2))  # added up in the order of kernels
-        alone = meets_elsewhere(both, D * D, *bends) == 0
-        assert alone == (rows == 1 and not out[1:POINTS, 8].any()), (k, bends)
+        both = lines(line(p), line(q))
+        alone = meets_elsewhere(both, D * D, *joints) == 0
+        assert alone == (rows == 1 and not out[1:POINTS, 8].any()), (k, joints)
         kinds[alone] += 1
     assert min(kinds.values()) > 500

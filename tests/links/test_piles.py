@@ -244,7 +244,7 @@ def test_an_easing_motor_is_that_of_the_other_engine() -> None:
         plain.update(before - torque, far, 2e-4, 5e-5)
         motors.schedule[0] = motors.command[0] = made._world.bodies.alpha[0]
         made.motors.actuate((made._world.bodies.alpha + 1.0)[None], 2e-4)
-        update(made._world.shape, made._world.bodies, made._world.motors)
+        update(made._world.shapes, made._world.bodies, made._world.motors)
         np.testing.assert_allclose(made._world.bodies.rate * 2e-4, plain.commands - before, atol=1e-15)
         np.testing.assert_array_equal(motors.halted, plain.halted)
         speeds |= set(np.round(made._world.bodies.rate[0], 9))

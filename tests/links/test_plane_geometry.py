@@ -9,13 +9,13 @@ import pytest
 from dem.engine.links.arrays import PLANE
 from dem.engine.links.motion import planar
 from dem.engine.links.motion.planar import lay_out
-from dem.engine.links.shape import shape_of
+from dem.engine.links.shapes import planar_of
 
 ANGLES = [(math.pi / 2, math.pi / 2), (0.3, 1.2), (-0.2, 0.1), (1.7, 0.0)]
 lagrange_force, momenta, rates, spin_of = (
     builds.callable_from_python(part) for part in (planar.lagrange_force, planar.momenta, planar.rates, planar.spin_of)
 )
-SHAPE = shape_of(builds.particle())
+SHAPE = planar_of(builds.particle())
 
 
 def row_of(alpha1: float, alpha2: float) -> np.ndarray:

@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from dem.engine.links.shape import Shape
+from dem.engine.links.shapes import LINE, Shapes
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int32]
@@ -15,91 +15,108 @@ Indices = NDArray[np.int32]
 PLANE = 22  # numbers that describe the plane geometry of a smarticle, see `dem.engine.links.motion.planar`
 FLOOR, WALL, LOWER, UPPER, CHANNEL = range(5)  # rows of `Ground.force`; the channel has two
 BINS = 4  # of the search for neighbours, per link
-LEDGER = 12  # numbers of a row of the ledger, see `dem.engine.links.contact.pairs.enter`
-SLOTS = 3  # points at which a pair of links can touch, see `dem.engine.links.contact.meeting`
+LEDGER = 10  # numbers of a row of the ledger, see `dem.engine.links.contact.pairs.enter`
+SLOTS = 3  # points at which a pair of segments can touch, see `dem.engine.links.contact.meeting`
+# Columns of a rigid part: velocity at a point [m/s], angular velocity [rad/s], that point [m].
+VELOCITY, SPIN, ORIGIN, MOTION = 0, 3, 6, 9
 
 
 class Bodies(NamedTuple):
-    """N smarticles. The first group is their state, the rest follows from it at the beginning of every step.
+    """N bodies. The first group is their state, the rest follows from it at the beginning of every step.
 
     Velocities and momenta belong to the middle of the step before, as in all leapfrog schemes.
     """
 
     position: Array  #: (N, 3) centres of mass [m]
-    turn: Array  #: (N, 4) unit quaternions (w, x, y, z), middle link to laboratory [1]
+    turn: Array  #: (N, 4) unit quaternions (w, x, y, z), frame of the body to laboratory [1]
     velocity: Array  #: (N, 3) of the centres of mass [m/s]
     momentum: Array  #: (N, 3) angular momenta about the centres of mass, in the laboratory frame [kg m²/s]
-    alpha: Array  #: (N, 2) angles of the barbs [rad]
+    alpha: Array  #: (N, 2) angles of a smarticle's barbs [rad]
     rate: Array  #: (N, 2) their rates [rad/s]; 0 while welded
-    plane: Array  #: (N, PLANE) plane geometry, see `dem.engine.links.motion.planar.lay_out`
-    spin: Array  #: (N, 3) angular velocities of the middle links, laboratory frame [rad/s]
-    axes: Array  #: (N, 3, 3) rotation matrices, middle link to laboratory [1]
-    segments: Array  #: (N S, 6) start of each link's axis, at the hinge, and vector to its end [m]; S links and strands
-    #: (N, 6) or (3 N, 6) velocity at the centre of mass [m/s] and angular velocity [rad/s] of each rigid body: of whole
-    #: smarticles while welded, of links while articulated
-    motion: Array
+    shape: Indices  #: (N,) which kind of body each is
+    plane: Array  #: (N, PLANE) plane geometry, see `dem.engine.links.motion.planar.lay_out`; of all bodies the inertia
+    spin: Array  #: (N, 3) angular velocities of the bodies' frames, laboratory frame [rad/s]
+    axes: Array  #: (N, 3, 3) rotation matrices, frame of the body to laboratory [1]
     load: Array  #: (N, 6) force [N] and torque about the centre of mass [N m] of contacts in this step, without weight
-    shares: Array  #: (3 N, 6) the same on each link while articulated; (0, 6) while welded
-    deepest: Array  #: (N,) deepest contact since the last question, as the step after would take it [m]
+    deepest: Array  #: (N,) deepest contact since the last query, over the overlap at which axes meet [1]
+
+
+class Parts(NamedTuple):
+    """Rigid parts of bodies, R of them: three of a smarticle, of which the first is all of it while welded."""
+
+    begin: Indices  #: (N + 1,) where the parts of each body begin
+    motion: Array  #: (R, MOTION) how each part moves, see `VELOCITY`
+    load: Array  #: (R, 6) force [N] and torque about `ORIGIN` [N m] of contacts in this step
+
+
+class Segments(NamedTuple):
+    """Segments of all bodies, Q of them, and links, L of them, whose strands they are."""
+
+    line: Array  #: (Q, LINE) in the laboratory frame, see `dem.engine.links.shapes`
+    begin: Indices  #: (N + 1,) where the segments of each body begin
+    body: Indices  #: (Q,) body that each belongs to
+    part: Indices  #: (Q,) rigid part that each moves with
+    shared: NDArray[np.uint8]  #: (Q,) see `dem.engine.links.shapes.AT_START`
+    first: Indices  #: (L + 1,) where the segments of each link begin
 
 
 class Pairs(NamedTuple):
-    """Pairs of links that are near each other, P of them, in rows by the first link."""
+    """Pairs of segments that are near each other, P of them, in rows by the first one."""
 
-    first: Indices  #: (P,) the link with the lower number
+    first: Indices  #: (P,) the segment with the lower number
     second: Indices  #: (P,) the other one
     slip: Array  #: (P, SLOTS, 4) stretch of the tangential springs at each point [m], and their energy [J]
     used: NDArray[np.uint8]  #: (P,) which of the points touched in the last step, as bits
     near: Indices  #: (P,) places in this list of the pairs that are so near that they can touch soon; the tight list
     touching: Indices  #: (P,) places of the pairs that touch or did so in the last step
-    nearest: Array  #: (P, 2) where these are nearest to each other, in lengths of either link
+    nearest: Array  #: (P, 2) where these are nearest to each other, in lengths of either segment
     counts: NDArray[np.int64]  #: (4,) pairs, near pairs, times the list was built, times the tight one was
-    wide_marks: Array  #: (N S, 7) ends of all links when the list was built and their skins [m]
-    near_marks: Array  #: (N S, 7) the same for the tight list
+    wide_marks: Array  #: (Q, 7) ends of all segments when the list was built and their skins [m]
+    near_marks: Array  #: (Q, 7) the same for the tight list
     wide_centres: Array  #: (N, 3) centres of mass when the list was built [m]
     near_centres: Array  #: (N, 3) the same for the tight list [m]
-    owner: Indices  #: (N S,) smarticle that each link belongs to
-    kind: Indices  #: (N S,) which of its links it is: 0 barb 1, 1 the middle link, 2 barb 2
 
 
 class Cells(NamedTuple):
-    """What the search for neighbours needs for itself."""
+    """Arrays of the search for neighbours."""
 
-    keys: Indices  #: (N S,) bin of each link
-    order: Indices  #: (N S,) links by bin, in order within each
+    keys: Indices  #: (L,) bin of each link
+    order: Indices  #: (L,) links by bin, in order within each
     starts: Indices  #: (bins + 2,) where each bin begins in `order`, from the second number on
-    marks: Array  #: (N S, 7) as in `Pairs`
+    marks: Array  #: (Q, 7) as in `Pairs`
     centres: Array  #: (N, 3) as in `Pairs`
-    #: (6, N S) lower and upper corners of boxes about links [m], by bin; many are asked for one coordinate
+    #: (6, L) lower and upper corners of boxes about links [m], by bin; one coordinate of many is read at once
     boxes: Array
-    lines: Array  #: (N S, 8) their segments, skins [m] and inverse squared lengths [1/m²], by bin
-    close: Indices  #: (2 N S,) places in `order` of links that may be near the one that is looked at; then scratch
-    places: Indices  #: (N S,) which row of the list each link's pairs are in
-    rows: Indices  #: (N S + 2,) where the list's rows begin
-    lower: Indices  #: (P,) links with the lower numbers, as pairs are found
+    strands: Indices  #: (L + 1,) where the segments of each link begin in `lines`
+    lines: Array  #: (Q, LINE + 1) segments and their skins [m], by bin
+    numbers: Indices  #: (Q,) segment of each of these rows
+    close: Indices  #: (2 L,) places in `order` of links whose boxes overlap that of one link; then scratch
+    places: Indices  #: (Q,) which row of the list each segment's pairs are in
+    rows: Indices  #: (Q + 2,) where the list's rows begin
+    lower: Indices  #: (P,) segments with the lower numbers, as pairs are found
     upper: Indices  #: (P,) the others
     first: Indices  #: (P,) the same by rows
     second: Indices  #: (P,) the same by rows
-    slip: Array  #: (P, SLOTS, 4) what the list before remembers
-    used: NDArray[np.uint8]  #: (P,) the same
+    slip: Array  #: (P, SLOTS, 4) that of the list before
+    used: NDArray[np.uint8]  #: (P,) that of the list before
 
 
 class Law(NamedTuple):
-    """Spring, dashpot and friction of a contact: between links, or of a link and a boundary."""
+    """Spring, dashpot and friction of a contact: between bodies, or of a body and a boundary."""
 
     stiffness: float  #: kn [N/m]
     shear: float  #: ks [N/m]
-    damping: float  #: cn [N s/m]
-    shear_damping: float  #: cs [N s/m], while it sticks
+    damping: Array  #: (K, K) cn by the shapes of both bodies, (K, 1) against boundaries [N s/m]
+    shear_damping: float  #: cs over cn [1], while it sticks
     friction: float  #: Coulomb coefficient [1]
 
 
 class Kept(NamedTuple):
-    """What contacts of links with boundaries remember from step to step, see `dem.engine.links.contact.boundaries`."""
+    """Memory of contacts with boundaries, see `dem.engine.links.contact.boundaries`."""
 
-    slip: Array  #: (N S, slots, 4) stretch of the tangential springs [m], and their energy [J]
-    used: NDArray[np.uint8]  #: (N S, slots) whether a contact was there in the last step
-    contacts: NDArray[np.uint8]  #: (N S,) contacts of a link in the last step
+    slip: Array  #: (Q, slots, 4) stretch of the tangential springs [m], and their energy [J]
+    used: NDArray[np.uint8]  #: (Q, slots) whether a contact was there in the last step
+    contacts: NDArray[np.uint8]  #: (Q,) contacts of a segment in the last step
 
 
 class Ground(NamedTuple):
@@ -114,7 +131,7 @@ class Ground(NamedTuple):
     base: Array  #: (4,) heights that shaking began at [m]
     shaken: NDArray[np.int64]  #: (4,) whether a part is shaken
     wave: Array  #: (3,) amplitude [m], 2πf [rad/s] and begin [s] of the shaking
-    force: Array  #: (6, 3) of the smarticles on the parts and on a channel's lower and upper wall in the last step [N]
+    force: Array  #: (6, 3) of the bodies on the parts and on a channel's lower and upper wall in the last step [N]
     sums: Array  #: (6, 3) the same, summed over all steps [N]
 
 
@@ -123,8 +140,8 @@ class Hooks(NamedTuple):
 
     #: (2,) bars of the lower and the upper hook; the arrays have room for B, those of the one with more
     counts: NDArray[np.int64]
-    #: (2, B, 6) start of each bar's axis from the vertical axis, and vector to its end [m]; heights, which are in
-    #: `Ground.place`, are written where they are needed
+    #: (2, B, LINE) each bar's axis, from the vertical axis; heights, which are in `Ground.place`, are written where
+    #: they are needed
     bars: Array
     radius: float  #: Of the bars [m]
 
@@ -137,7 +154,7 @@ class Rims(NamedTuple):
 
 
 class Boundaries(NamedTuple):
-    """All boundaries. What a scene lacks is None, and kernels are compiled without it."""
+    """All boundaries. Where a scene has none of a sort it is None, and kernels are compiled without it."""
 
     ground: Ground  #: Floor and wall, and how all boundaries move
     channel: Any  #: (1,) half the distance of the walls that stand in for the container [m]; None for a container
@@ -146,7 +163,7 @@ class Boundaries(NamedTuple):
 
 
 class Cords(NamedTuple):
-    """Strings tied to links, k of them."""
+    """Strings tied to links of smarticles, k of them."""
 
     owner: NDArray[np.int64]  #: (k, 2) smarticle and link
     along: Array  #: (k,) place of the knot along the link's axis from the link's centre [m]
@@ -159,7 +176,7 @@ class Cords(NamedTuple):
 
 
 class Motoring(NamedTuple):
-    """Two motors on each of N smarticles."""
+    """Two motors on each of N bodies; those of rigid bodies do nothing."""
 
     law: int  #: 0 halt, 1 stall, 2 ease, 3 slip, 4 servo
     speed: float  #: ω, the greatest speed [rad/s]
@@ -191,19 +208,21 @@ class Motoring(NamedTuple):
 class System(NamedTuple):
     """One simulation, as kernels get it."""
 
-    shape: Shape  #: What all smarticles have in common
+    shapes: Shapes  #: The kinds of bodies
     law: Law  #: Of their contacts
     wall_law: Law  #: Of their contacts with boundaries
-    bodies: Bodies  #: The smarticles
-    pairs: Pairs  #: Which of their links are near each other
-    kept: Kept  #: What contacts with boundaries remember
+    bodies: Bodies  #: The bodies
+    parts: Parts  #: How their rigid parts move, and what acts on these
+    segments: Segments  #: Where their segments are
+    pairs: Pairs  #: Which segments are near each other
+    kept: Kept  #: Memory of contacts with boundaries
     boundaries: Boundaries  #: Floor, wall, hooks, channel
     gravity: float  #: g, downwards [m/s²]
     planar: bool  #: Whether all motion is confined to a horizontal plane
     skins: Array  #: See `dem.engine.links.neighbours.lists.update_lists`
     motors: Any  #: None while welded
     cords: Any  #: None where no string is tied
-    #: (n, LEDGER) forces that dissipate, see `dem.engine.links.contact.pairs.enter`; None where nothing asks
+    #: (n, LEDGER) forces that dissipate, see `dem.engine.links.contact.pairs.enter`; None where nothing reads it
     ledger: Any
 
 
@@ -212,27 +231,26 @@ class Scratch(NamedTuple):
 
     cells: Cells  #: Of the search for neighbours
     met: Array  #: (ROWS, COLUMNS) of `dem.engine.links.contact.meeting.meet`
-    contacts: Array  #: (slots, COLUMNS) of `dem.engine.links.contact.boundaries.contacts_of_link`
+    contacts: Array  #: (slots, COLUMNS) of `dem.engine.links.contact.boundaries.contacts_of_segment`
     plane: Array  #: (PLANE,) plane geometry of a smarticle
 
 
-def no_bodies(links: int) -> Bodies:
-    """Bodies without any smarticle, of S = `links` links and strands each."""
+def bodies_for(count: int) -> Bodies:
+    """Return arrays for so many bodies."""
     f = np.zeros
     return Bodies(
-        f((0, 3)), f((0, 4)), f((0, 3)), f((0, 3)), f((0, 2)), f((0, 2)), f((0, PLANE)), f((0, 3)), f((0, 3, 3)),
-        f((0, 6)), f((0, 6)), f((0, 6)), f((0, 6)), f(0),
+        f((count, 3)), f((count, 4)), f((count, 3)), f((count, 3)), f((count, 2)), f((count, 2)), f(count, np.int32),
+        f((count, PLANE)), f((count, 3)), f((count, 3, 3)), f((count, 6)), f(count),
     )  # fmt: skip
 
 
 def joined(one: Bodies, other: Bodies) -> Bodies:
-    """The smarticles of both, those of `one` first."""
-    return Bodies(*(np.concatenate(arrays) for arrays in zip(one, other, strict=True)))
+    """Return the bodies of both, those of `one` first."""
+    return Bodies(*(np.concatenate([a, b]) for a, b in zip(one, other, strict=True)))
 
 
-def pairs_for(smarticles: int, kinds: NDArray[np.int64], capacity: int) -> Pairs:
-    """An empty list with room for `capacity` pairs of links of some smarticles, whose links are of these kinds."""
-    links = smarticles * len(kinds)
+def pairs_for(bodies: int, segments: int, capacity: int) -> Pairs:
+    """Return an empty list with room for `capacity` pairs of the segments of some bodies."""
     return Pairs(
         np.zeros(capacity, np.int32),
         np.zeros(capacity, np.int32),
@@ -242,28 +260,28 @@ def pairs_for(smarticles: int, kinds: NDArray[np.int64], capacity: int) -> Pairs
         np.zeros(capacity, np.int32),
         np.zeros((capacity, 2)),
         np.zeros(4, np.int64),
-        np.zeros((links, 7)),
-        np.zeros((links, 7)),
-        np.zeros((smarticles, 3)),
-        np.zeros((smarticles, 3)),
-        np.repeat(np.arange(smarticles, dtype=np.int32), len(kinds)),
-        np.tile(kinds.astype(np.int32), smarticles),
+        np.zeros((segments, 7)),
+        np.zeros((segments, 7)),
+        np.zeros((bodies, 3)),
+        np.zeros((bodies, 3)),
     )
 
 
-def cells_for(links: int, smarticles: int, capacity: int) -> Cells:
-    """Room for a search among `links` links of some smarticles, and for so many pairs."""
+def cells_for(bodies: int, links: int, segments: int, capacity: int) -> Cells:
+    """Return room for a search among the links of some bodies, and for so many pairs."""
     return Cells(
         np.zeros(links, np.int32),
         np.zeros(links, np.int32),
         np.zeros(BINS * links + 66, np.int32),
-        np.zeros((links, 7)),
-        np.zeros((smarticles, 3)),
+        np.zeros((segments, 7)),
+        np.zeros((bodies, 3)),
         np.zeros((6, links)),
-        np.zeros((links, 8)),
+        np.zeros(links + 1, np.int32),
+        np.zeros((segments, LINE + 1)),
+        np.zeros(segments, np.int32),
         np.zeros(2 * links, np.int32),
-        np.zeros(links, np.int32),
-        np.zeros(links + 2, np.int32),
+        np.zeros(segments, np.int32),
+        np.zeros(segments + 2, np.int32),
         np.zeros(capacity, np.int32),
         np.zeros(capacity, np.int32),
         np.zeros(capacity, np.int32),

@@ -35,12 +35,12 @@ from dem.setting.plane import Channel
 
 Array = NDArray[np.float64]
 
-# Diameters; links whose axes come nearer than the rest of a diameter may have passed through each other.
+# Of a diameter; links whose axes come nearer than the rest of a diameter may have passed through each other.
 PASSES = 0.9
-# Diameters; a smarticle between two boundaries that move apart is held where a contact is deeper, far beyond the linear
-# range: nothing but the contacts can give way.
+# Of a diameter; a smarticle between two boundaries that move apart is held where a contact is deeper, far beyond the
+# linear range: nothing but the contacts can give way.
 HOLDS = 0.5
-FORMAT = "links-3"
+FORMAT = "links-4"
 
 
 class LinksEngine:
@@ -179,10 +179,10 @@ class LinksEngine:
         found, world = self._world.contacts(), self._world
         between = world.bodies.deepest.copy()
         world.bodies.deepest[:] = 0.0
-        passed = ~(between <= PASSES * self.particle.chain.diameter)
-        depths = np.where(passed, np.maximum(found.depths, between), found.depths)
-        deep = ~(depths <= limit)
+        passed = ~(between <= PASSES)
         diameter = self.particle.chain.diameter
+        depths = diameter * np.where(passed, np.maximum(found.depths, between), found.depths)
+        deep = ~(depths <= limit)
         held = self._held(found.held, ~(depths <= min(limit, HOLDS * diameter)), APART * diameter)
         deep[[one.smarticle for one in held]] = True
         return Overlaps(float(depths.max(initial=0.0)), deep, found.elastic_energy, held)
@@ -203,8 +203,7 @@ class LinksEngine:
     def extremes(self, state: State) -> Extremes | None:
         """Return the extremes; hinges do not give way."""
         found, bodies = self._world.extremes(state.link_velocities), self._world.bodies
-        diameter = self.particle.chain.diameter
-        if not (found[BETWEEN] <= PASSES * diameter and found[DEEPEST] <= HOLDS * diameter):
+        if not (found[BETWEEN] <= PASSES and found[DEEPEST] <= HOLDS):
             return None
         bodies.deepest[:] = 0.0
         return Extremes(
@@ -213,7 +212,7 @@ class LinksEngine:
             highest=found[HIGHEST],
             widest=found[WIDEST],
             gap=0.0,
-            deepest=found[DEEPEST],
+            deepest=found[DEEPEST] * self.particle.chain.diameter,
             elastic_energy=found[ELASTIC],
         )
 

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from dem.engine.interface import MotorReadings
 from dem.engine.links.arrays import Motoring
 from dem.engine.links.motion.motoring import engage, release, work_so_far
+from dem.engine.links.shapes import planar_of
 from dem.engine.links.world import World
 from dem.errors import InputError
 from dem.physics.motor import LAWS, MotorLaw
@@ -58,14 +59,14 @@ class LinksMotors:
         if world.motors is None:
             world.motors = self._made(self._law)
         world.set_articulated(True)
-        engage(world.shape, world.bodies, world.motors)
+        engage(world.shapes, world.bodies, world.motors)
         world.motors.due[1] = -1
 
     def weld(self) -> None:
         world = self._world
         if world.articulated:
             assert world.motors is not None
-            world.totals[0] += release(world.shape, world.bodies, world.motors)
+            world.totals[0] += release(world.shapes, world.bodies, world.motors)
             world.set_articulated(False)
 
     def actuate(self, targets: Array, interval: float) -> None:
@@ -99,17 +100,17 @@ class LinksMotors:
             return 0.0
         if not world.articulated:
             return float(world.motors.work.sum())
-        return float(work_so_far(world.shape, world.bodies, world.motors))
+        return float(work_so_far(world.shapes, world.bodies, world.motors))
 
     def gaps(self) -> Array:
         """Return zeros: hinges do not give way."""
         return np.zeros((self._world.count, 2))
 
     def _made(self, law: MotorLaw) -> Motoring:
-        n, shape = self._world.count, self._world.shape
+        n, planar = self._world.count, planar_of(self._world.particle)
         factors = np.ones((n, 2)) if self._strengths is None else np.asarray(self._strengths, dtype=np.float64)
         # What τ_max gives to a barb about a hinge that is held.
-        inertia = shape.barb_inertia[2] + shape.barb_mass * shape.arm**2
+        inertia = planar.barb_zz + planar.barb_mass * planar.arm**2
         return Motoring(
             law=LAWS.index(law.law),
             speed=float(law.speed_limit),

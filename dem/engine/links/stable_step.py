@@ -17,7 +17,7 @@ from dem.body.linear import matrix_product, positive_definite
 from dem.body.particle import Particle
 from dem.engine.links.arrays import PLANE
 from dem.engine.links.motion.planar import lay_out
-from dem.engine.links.shape import Shape, shape_of
+from dem.engine.links.shapes import AT_END, AT_START, RADIUS, Shape, smarticle_shape
 from dem.physics.contact import ContactLaw
 
 Array = NDArray[np.float64]
@@ -29,6 +29,7 @@ AGAINST_NEIGHBOURS = 4
 SHAPES = 8  # angles that are tried where motors may turn the barbs, from straight to beyond the U
 WIDEST = math.radians(105.0)
 PRECISE = 1e-12  # of a step
+RESOLVED = 1.4  # greatest ω dt of a mode, of the 2 up to which leapfrog is stable without dashpots
 
 
 def links_stable_time_step(
@@ -39,86 +40,102 @@ def links_stable_time_step(
     free: bool = False,
     strings: Sequence[tuple[float, float]] = (),
 ) -> float:
-    """Largest stable time step [s] over the stiffest modes of a smarticle among others.
+    """Return the largest stable time step [s] over the stiffest modes of a smarticle among others.
 
     A barb's tip against another such tip, and against a boundary; a pile of smarticles that lie flat on each other,
     with contacts at all ends of all links, which move against those above and below, or roll against them; and a
     string at a tip. Prescribed rates add no stiffness, whatever the motor does; free angles make tips lighter.
 
     Args:
-        particle: one smarticle.
-        law: contact law.
         articulated: whether barbs may have other angles than those of the particle.
         free: whether angles are free: motors that slip.
         strings: stiffness [N/m] and damping [N s/m] of each.
     """
     boxes = particle.boxes
-    shapes = [boxes.angles]
+    angles = [boxes.angles]
     if articulated and boxes.barb_length > 0:
-        shapes += [(angle, angle) for angle in np.linspace(0.0, WIDEST, SHAPES)]
-    return min(
-        _step_of(shape_of(replace(particle, boxes=replace(boxes, angles=angles))), angles, law, free, strings)
-        for angles in shapes
-    )
+        angles += [(angle, angle) for angle in np.linspace(0.0, WIDEST, SHAPES)]
+    shapes = (smarticle_shape(replace(particle, boxes=replace(boxes, angles=each))) for each in angles)
+    return min(_step_of(shape, each, law, free, strings) for shape, each in zip(shapes, angles, strict=True))
 
 
 def _step_of(
     shape: Shape, angles: tuple[float, float], law: ContactLaw, free: bool, strings: Sequence[tuple[float, float]]
 ) -> float:
+    assert shape.planar is not None
+    free = free and shape.planar.barb_mass > 0
     row = np.zeros(PLANE)
-    lay_out(shape, float(angles[0]), float(angles[1]), row)
+    lay_out(shape.planar, float(angles[0]), float(angles[1]), row)
     mass = _mass(shape, row, free)
     kn, ks, cn, cw = law.normal_stiffness, law.tangential_stiffness, law.normal_damping, law.wall_damping
     cs = law.tangential_damping
-    tip = [_motion_of(shape, row, end, z, free) for end in _ends(shape, row)[:1] for z in shape.offsets]
-    every = [_motion_of(shape, row, end, z + shape.radius, free) for end in _ends(shape, row) for z in shape.offsets]
+    # Strands of a link lie one above the other along the normal: a tip's are pushed together from the side, but the
+    # highest and the lowest one alone touch the links that lie flat above and below.
+    ends, radius = _ends(shape), float(shape.lines[:, RADIUS].max())
+    highest = max(z for _, (_, _, z) in ends)
+    tip = [_motion_of(shape, row, link, (x, y, z), free) for link, (x, y, z) in ends if (link, x, y) == _tip_of(ends)]
+    flat = [end for end in ends if end[1][2] == highest]
+    top = [_motion_of(shape, row, link, (x, y, z + radius), free) for link, (x, y, z) in flat]
     tips = sum((matrix_product(push.T, push) for push in tip), np.zeros_like(mass))
-    heave = sum((matrix_product(push[2:].T, push[2:]) for push in every), np.zeros_like(mass))
-    rub = sum((matrix_product(push[:2].T, push[:2]) for push in every), np.zeros_like(mass))
-    flat = max(cn, cw / 2)
+    heave = sum((matrix_product(push[2:].T, push[2:]) for push in top), np.zeros_like(mass))
+    rub = sum((matrix_product(push[:2].T, push[:2]) for push in top), np.zeros_like(mass))
+    damping = max(cn, cw / 2)
     modes = [
         (2 * CONTACTS_AT_A_TIP * kn * tips, 2 * CONTACTS_AT_A_TIP * cn * tips),
         (CONTACTS_AT_A_TIP * kn * tips, CONTACTS_AT_A_TIP * cw * tips),
-        (AGAINST_NEIGHBOURS * kn * heave, AGAINST_NEIGHBOURS * flat * heave),
-        (AGAINST_NEIGHBOURS * ks * rub, AGAINST_NEIGHBOURS * flat * cs * rub),
+        (AGAINST_NEIGHBOURS * kn * heave, AGAINST_NEIGHBOURS * damping * heave),
+        (AGAINST_NEIGHBOURS * ks * rub, AGAINST_NEIGHBOURS * damping * cs * rub),
     ]
     modes += [(stiffness * tips, damping * tips) for stiffness, damping in strings]
-    return _stable_step(mass, *(np.array(each) for each in zip(*modes, strict=True)))
+    stiffness, resisting = (np.array(each) for each in zip(*modes, strict=True))
+    # Without dashpots the longest stable step would resolve a contact by three steps, and energy would drift.
+    return min(
+        _stable_step(mass, stiffness, resisting), RESOLVED / 2 * _stable_step(mass, stiffness, np.zeros_like(resisting))
+    )
 
 
 def _mass(shape: Shape, row: Array, free: bool) -> Array:
-    """Mass matrix: velocity, angular velocity in the middle link's axes, and rates of free angles."""
+    """Return the mass matrix: velocity, angular velocity in the middle link's axes, and rates of free angles."""
     mass = np.zeros((8, 8))
     mass[:3, :3] = shape.mass * np.eye(3)
     xx, yy, zz, xy, b1, b2, a, c = row[14:22]
     mass[3:6, 3:6] = [[xx, xy, 0.0], [xy, yy, 0.0], [0.0, 0.0, zz]]
     mass[5, 6:] = mass[6:, 5] = [b1, b2]
     mass[6:, 6:] = [[a, c], [c, a]]
-    return mass if free and shape.barb_mass > 0 else mass[:6, :6]
+    return mass if free else mass[:6, :6]
 
 
-def _ends(shape: Shape, row: Array) -> list[tuple[int, Array]]:
-    """Link and place in the plane, about the centre of mass [m], of the ends of all links, a barb's tip first."""
-    com, ends = row[:2], []
-    for kind, x, direction in ((0, -shape.half, row[10:12]), (2, shape.half, row[12:14])):
-        if kind in shape.kinds:
-            ends.append((kind, np.array([x, 0.0]) + shape.tip * direction - com))
-    return ends + [(1, np.array([x, 0.0]) - com) for x in (-shape.end, shape.end)]
+def _ends(shape: Shape) -> list[tuple[int, tuple[float, float, float]]]:
+    """Return link and place from the centre of mass [m] of all ends of segments, joints once."""
+    ends = []
+    for line, link, shared in zip(shape.lines, shape.link, shape.shared, strict=True):
+        for bit, place in ((AT_END, line[:3] + line[3:6]), (AT_START, line[:3])):
+            if not shared & bit:
+                x, y, z = (float(value) for value in place)
+                ends.append((int(link), (x, y, z)))
+    return ends
 
 
-def _motion_of(shape: Shape, row: Array, end: tuple[int, Array], z: float, free: bool) -> Array:
-    """(3, n): velocity of a point of a link from those of the smarticle."""
-    kind, (x, y) = end
+def _tip_of(ends: list[tuple[int, tuple[float, float, float]]]) -> tuple[int, float, float]:
+    """Return link and place in the plane [m] of the first tip, a barb's where there are barbs."""
+    link, (x, y, _) = ends[0]
+    return link, x, y
+
+
+def _motion_of(shape: Shape, row: Array, link: int, place: tuple[float, float, float], free: bool) -> Array:
+    """Return (3, n): velocity of a point of a link from those of the smarticle."""
+    planar, (x, y, z) = shape.planar, place
+    assert planar is not None
     motion = np.zeros((3, 8))
     motion[:, :3] = np.eye(3)
     motion[:, 3:6] = [[0, z, -y], [-z, 0, x], [y, -x, 0]]
-    share = shape.barb_mass / shape.mass
+    share = planar.barb_mass / planar.mass
     for k, barb in enumerate((0, 2)):
         motion[:2, 6 + k] = -share * row[6 + 2 * k : 8 + 2 * k]
-        if kind == barb:
-            sign, hinge = (-1.0, -shape.half) if k == 0 else (1.0, shape.half)
+        if link == barb:
+            sign, hinge = (-1.0, -planar.half) if k == 0 else (1.0, planar.half)
             motion[:2, 6 + k] += sign * np.array([-(y + row[1]), x + row[0] - hinge])
-    return motion if free and shape.barb_mass > 0 else motion[:, :6]
+    return motion if free else motion[:, :6]
 
 
 def _stable_step(mass: Array, stiffness: Array, damping: Array) -> float:

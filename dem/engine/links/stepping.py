@@ -5,17 +5,17 @@ from __future__ import annotations
 import math
 from typing import Any, NamedTuple
 
-from dem.engine.links.arrays import Array, Bodies, Ground, Scratch, System
+from dem.engine.links.arrays import Array, Bodies, Ground, Parts, Scratch, System
 from dem.engine.links.compiler import kernel, part
 from dem.engine.links.contact.barrier import FINEST, Step, ticks_for
 from dem.engine.links.contact.boundaries import push_boundaries
 from dem.engine.links.contact.cords import pull
-from dem.engine.links.contact.pairs import GAIN, OWNERS, POINT, POWER, PUSH, ROWS, push_apart, velocity_at
+from dem.engine.links.contact.pairs import GAIN, POINT, POWER, PUSH, ROWS, push_apart, velocity_at
 from dem.engine.links.motion.motoring import update
-from dem.engine.links.motion.moving import drift, kick, resolve_speeds
-from dem.engine.links.motion.poses import find_motion, find_spin, pose
+from dem.engine.links.motion.moving import drift, gather, kick, resolve_speeds
+from dem.engine.links.motion.poses import find_motions, pose
 from dem.engine.links.neighbours.lists import FULL, update_lists
-from dem.engine.links.shape import Shape
+from dem.engine.links.shapes import Shapes
 from dem.engine.links.vectors import dot, vector
 
 
@@ -45,28 +45,27 @@ def shaken_to(ground: Ground, time: float) -> None:
 
 
 @part
-def settle(shape: Shape, bodies: Bodies, motors: Any, ledger: Array, dt: float) -> float:
+def settle(shapes: Shapes, bodies: Bodies, parts: Parts, ledger: Array, motors: Any, dt: float) -> float:
     """Return the energy that the forces in the ledger dissipated [J], now that velocities after the kick are known.
 
-    A force takes from the kinetic energy what it does along the mean of the velocities before and after.
+    A force takes from the kinetic energy the work that it does along the mean of the velocities before and after.
 
     Args:
-        bodies: the smarticles; `spin` and `motion` are written.
+        bodies: `spin` is written.
+        parts: `motion` is written.
         ledger: see `dem.engine.links.contact.pairs.enter`; emptied.
-        dt: time over which they acted [s].
+        dt: time over which the forces acted [s].
     """
     total = 0.0
-    for i in range(bodies.position.shape[0]):
-        find_spin(bodies, i, motors)
-        find_motion(shape, bodies, i, motors)
+    find_motions(shapes, bodies, parts, motors)
     for n in range(1, int(ledger[0, 0]) + 1):
         row = ledger[n]
         total -= dt * row[POWER] + row[GAIN]
         place, force = vector(row, POINT), vector(row, PUSH)
         for side in range(2):
-            m, i = int(row[ROWS + side]), int(row[OWNERS + side])
+            m = int(row[ROWS + side])
             if m >= 0:
-                power = dot(force, velocity_at(bodies, i, m, place))
+                power = dot(force, velocity_at(parts, m, place))
                 total += 0.5 * dt * (power if side else -power)
     ledger[0, 0] = 0.0
     return total
@@ -87,24 +86,24 @@ def act(
     Returns:
         Its length in ticks.
     """
-    shape, bodies, boundaries = system.shape, system.bodies, system.boundaries
-    ground, need = boundaries.ground, totals[NEED : NEED + 1]
+    shapes, bodies, parts, segments = system.shapes, system.bodies, system.parts, system.segments
+    known, ground, need = system.boundaries, system.boundaries.ground, totals[NEED : NEED + 1]
     step, need[0] = Step(totals[PAST], dt, need), 1.0
-    bodies.load[:] = 0.0
+    parts.load[:] = 0.0
     ground.force[:] = 0.0
-    if motors is not None:
-        bodies.shares[:] = 0.0
-    lost = push_apart(shape, system.law, bodies, system.pairs, motors, ledger, step, scratch.met)
+    lost = push_apart(system.law, bodies, parts, segments, system.pairs, ledger, step, scratch.met)
     lost += push_boundaries(
-        shape, system.wall_law, bodies, system.kept, boundaries, motors, ledger, step, scratch.contacts, scratch.met
-    )
+        system.wall_law, bodies, parts, segments, system.kept, ground, known.channel, known.hooks, known.rims, ledger,
+        step, scratch.contacts, scratch.met,
+    )  # fmt: skip
     pulling = 0.0
     if cords is not None:
-        pulling = pull(shape, bodies, cords, motors, step)
-    resolve_speeds(shape, bodies, motors is not None, system.gravity, step)
+        pulling = pull(bodies, parts, cords, motors, step)
+    gather(bodies, parts)
+    resolve_speeds(shapes, bodies, parts, segments, system.gravity, step)
     if motors is not None and tick == 0 and motors.due[1] == 0:
         # After the forces, whose velocities are those of before, as in the kick: so that work and dissipation agree.
-        update(shape, bodies, motors)
+        update(shapes, bodies, motors)
     totals[MOST] = max(totals[MOST], need[0])
     ticks = ticks_for(need[0], tick)
     length = dt * (ticks / FINEST)
@@ -117,12 +116,12 @@ def act(
             ground.sums[k, d] += weight * ground.force[k, d]
         if k < 4:
             totals[WORK] -= ground.force[k, 2] * ground.speed[k] * acting
-    kick(shape, bodies, motors, system.gravity, system.planar, past, acting)
+    kick(shapes, bodies, parts, motors, system.gravity, system.planar, past, acting)
     if motors is not None:
         motors.elapsed[0] += acting
     if ledger is not None:
-        totals[LOST] += lost + settle(shape, bodies, motors, ledger, acting)
-    drift(shape, bodies, motors, length, scratch.plane)
+        totals[LOST] += lost + settle(shapes, bodies, parts, ledger, motors, acting)
+    drift(shapes, bodies, motors, length, scratch.plane)
     for k in range(4):
         if not ground.shaken[k]:
             ground.place[k] += ground.speed[k] * length
@@ -150,13 +149,13 @@ def advance(steps: int, clock: Clock, system: System, scratch: Scratch, totals: 
     Returns:
         Steps that were made; fewer where a list is full.
     """
-    shape, bodies, ground, dt = system.shape, system.bodies, system.boundaries.ground, clock.dt
+    ground, dt = system.boundaries.ground, clock.dt
     for made_now in range(steps):
         tick = int(totals[TICK])
         while tick < FINEST:
             shaken_to(ground, clock.begin + (clock.made + made_now + tick / FINEST) * dt)
-            pose(shape, bodies, system.motors)
-            if update_lists(shape, bodies, system.pairs, scratch.cells, system.skins) == FULL:
+            pose(system.shapes, system.bodies, system.parts, system.segments, system.motors)
+            if update_lists(system.bodies, system.segments, system.pairs, scratch.cells, system.skins) == FULL:
                 totals[TICK] = tick
                 return made_now
             tick += act(system, scratch, totals, tick, dt, system.motors, system.cords, system.ledger)

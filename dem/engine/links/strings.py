@@ -39,7 +39,7 @@ class LinksStrings:
             sums=np.zeros((count, 3)),
             knot=np.zeros((count, 3)),
         )
-        find_knots(self._world.shape, self._world.posed(), cords)
+        find_knots(self._world.posed(), cords)
         for k, speed in enumerate(speeds):
             x, y = cords.knot[k, :2]
             away = math.copysign(1.0, x)
@@ -63,7 +63,7 @@ class LinksStrings:
     @property
     def ties(self) -> Array:
         cords = self._at_work
-        find_knots(self._world.shape, self._world.posed(), cords)
+        find_knots(self._world.posed(), cords)
         return cords.knot.copy()
 
     @property

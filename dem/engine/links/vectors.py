@@ -6,6 +6,7 @@ from typing import NamedTuple, TypeAlias
 
 from dem.engine.links.arrays import Array
 from dem.engine.links.compiler import inlined
+from dem.engine.links.shapes import INVERSE, START, VECTOR
 
 Vector: TypeAlias = tuple[float, float, float]
 
@@ -91,17 +92,17 @@ class Lines(NamedTuple):
     c: float  #: v · v [m²]
     d: float  #: u · w [m²]
     e: float  #: v · w [m²]
-    inverse_a: float  #: 1/a, which links keep all their lives: divisions would take half the time [1/m²]
+    inverse_a: float  #: 1/a, kept with the segment: divisions would take half the time [1/m²]
     inverse_c: float  #: 1/c [1/m²]
 
 
 @inlined
-def lines(p: Array, q: Array, inverse_a: float, inverse_c: float) -> Lines:
-    """Return two segments (6,), start and vector to the end [m], as `Lines`."""
-    start, other, u, v = vector(p, 0), vector(q, 0), vector(p, 3), vector(q, 3)
+def lines(p: Array, q: Array) -> Lines:
+    """Return two segments (LINE,) as `Lines`."""
+    start, other, u, v = vector(p, START), vector(q, START), vector(p, VECTOR), vector(q, VECTOR)
     w = sub(start, other)
     return Lines(
-        start, other, u, v, w, dot(u, u), dot(u, v), dot(v, v), dot(u, w), dot(v, w), inverse_a, inverse_c
+        start, other, u, v, w, dot(u, u), dot(u, v), dot(v, v), dot(u, w), dot(v, w), p[INVERSE], q[INVERSE]
     )  # fmt: skip
 
 

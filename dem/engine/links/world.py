@@ -16,6 +16,7 @@ from dem.body.placement import Poses
 from dem.body.state import State
 from dem.engine.links.arrays import (
     LEDGER,
+    MOTION,
     PLANE,
     Bodies,
     Boundaries,
@@ -27,12 +28,14 @@ from dem.engine.links.arrays import (
     Law,
     Motoring,
     Pairs,
+    Parts,
     Rims,
     Scratch,
+    Segments,
     System,
+    bodies_for,
     cells_for,
     joined,
-    no_bodies,
     pairs_for,
 )
 from dem.engine.links.contact import boundaries, meeting
@@ -46,21 +49,22 @@ from dem.engine.links.contact.queries import (
     query_all,
 )
 from dem.engine.links.motion.planar import lay_out
-from dem.engine.links.motion.poses import find_links, pose
-from dem.engine.links.shape import shape_of
-from dem.engine.links.stepping import PAST, TOTALS, Clock, advance
+from dem.engine.links.motion.poses import find_links, pose_all
+from dem.engine.links.shapes import LINE, RADIUS, Shape, smarticle_shape, table_of
+from dem.engine.links.stepping import PAST, Clock, advance
 from dem.errors import reject
 from dem.physics.contact import ContactLaw
 from dem.setting.hooks import Bar
 
 Array = NDArray[np.float64]
 
-# Skins and the width of a strip of the search, in diameters. Measured on a shaken pile of 270, see `benchmarks/`.
+# Skins and the width of a strip of the search, in diameters of the thickest segment. Measured on a shaken pile of 270,
+# see `benchmarks/`.
 NEAR_SKINS, WIDE_SKINS, STRIP = (0.04, 0.15), (0.05, 2.0), 4.0
 NEAR_STEPS, WIDE_STEPS = 6, 40  # that they are to last, about
 FAR = 1e30  # m; where a link is marked that was not there when the list was built
 LISTS = ("first", "second", "slip", "used", "near")  # of pairs
-LOOKED = ("touching", "nearest")  # made anew in every step
+FRESH = ("touching", "nearest")  # of pairs, made anew in every step
 GROWTH = 1.5  # of a list that is full
 
 
@@ -68,17 +72,20 @@ GROWTH = 1.5  # of a list that is full
 class Contacts:
     """All contacts at one instant."""
 
-    #: (M, 2) smarticles that touch, the lower number first; a pair may be there more than once
+    #: (M, 2) bodies that touch, the lower number first; a pair may be there more than once
     pairs: NDArray[np.int64]
-    touches: NDArray[np.int64]  #: (N,) points of contact of each smarticle
-    depths: Array  #: (N,) deepest contact of each [m]
+    touches: NDArray[np.int64]  #: (N,) points of contact of each body
+    depths: Array  #: (N,) deepest contact of each, over the overlap at which axes, or axis and surface, meet [1]
     held: NDArray[np.bool_]  #: (N, 6) whether each touches each part of the boundaries, see `Ground`
     elastic_energy: float  #: In all springs [J]
 
 
 @dataclass
 class World:
-    """The simulation: what kernels get."""
+    """The simulation: all that kernels get.
+
+    Bodies of the first shape, which `add` pours, are smarticles; `add_bodies` adds those of all shapes.
+    """
 
     particle: Particle  #: One smarticle
     contact: ContactLaw  #: The contact law
@@ -86,6 +93,7 @@ class World:
     gravity: float  #: g, downwards [m/s²]
     planar: bool  #: Whether all motion is confined to the plane z = 0
     keep_ledger: bool  #: Whether to add up what contacts dissipate
+    more: tuple[Shape, ...] = ()  #: Shapes of other bodies than smarticles
     steps: int = 0
     time_step: float = math.nan
     motors: Motoring | None = None
@@ -99,26 +107,32 @@ class World:
     cords: Cords | None = None
 
     def __post_init__(self) -> None:
-        law = self.contact
-        self.shape = shape_of(self.particle)
+        self.kinds = (smarticle_shape(self.particle), *self.more)
+        self.shapes = table_of(self.kinds)
+        law, masses = self.contact, np.array([kind.effective_mass for kind in self.kinds])
+        # The law's dashpots are those of two smarticles and of one; damping goes with the root of the effective mass.
+        pairs = np.sqrt(2 * masses * masses[:, None] / ((masses + masses[:, None]) * masses[0]))
+        walls = np.sqrt(masses / masses[0])[:, None]
         self.laws = tuple(
-            Law(law.normal_stiffness, law.tangential_stiffness, damping, damping * law.tangential_damping, friction)
-            for damping, friction in ((law.normal_damping, law.friction), (law.wall_damping, law.wall_friction))
+            Law(law.normal_stiffness, law.tangential_stiffness, damping, law.tangential_damping, friction)
+            for damping, friction in (
+                (law.normal_damping * pairs, law.friction),
+                (law.wall_damping * walls, law.wall_friction),
+            )
         )
-        self.kinds = np.tile(self.shape.kinds, len(self.shape.offsets))
-        self.each = len(self.kinds)
-        self.bodies: Bodies = no_bodies(self.each)
-        self.pairs: Pairs = pairs_for(0, self.kinds, 256)
-        self.cells: Cells = cells_for(0, 0, 256)
+        self.bodies: Bodies = bodies_for(0)
+        self.pairs: Pairs = pairs_for(0, 0, 256)
+        self.cells: Cells = cells_for(0, 0, 0, 256)
+        self._lay_out_parts()
         self.kept = no_contacts(0, END_SLOTS)
         self.ledger: Array | None = np.zeros((256, LEDGER)) if self.keep_ledger else None
         self.meeting, self.plane = np.zeros((meeting.ROWS, meeting.COLUMNS)), np.zeros(PLANE)
-        diameter = 2 * self.shape.radius
+        diameter = 2 * float(self.shapes.lines[:, RADIUS].max())
         self.skins = diameter * np.array([*NEAR_SKINS, 0.0, *WIDE_SKINS, 0.0, STRIP])
 
     @property
     def count(self) -> int:
-        """Smarticles."""
+        """Bodies."""
         return len(self.bodies.position)
 
     @property
@@ -142,38 +156,67 @@ class World:
 
     def add(self, poses: Poses, *, speed: float = 0.0) -> None:
         """See `Engine.add`."""
-        new, boxes = len(poses.positions), self.particle.boxes
-        fresh = no_bodies(self.each)
-        rigid = 3 if self.articulated else 1
-        sizes = {"segments": new * self.each, "motion": new * rigid, "shares": 3 * new if self.articulated else 0}
-        fresh = Bodies(
-            *(
-                np.zeros((sizes.get(name, new), *array.shape[1:]), array.dtype)
-                for name, array in zip(Bodies._fields, fresh, strict=True)
-            )
-        )
-        fresh.position[:] = poses.positions
-        fresh.velocity[:, 2] = -speed
         # Poses are those of the principal axes; here the axes are the middle link's.
-        for i, rotation in enumerate(poses.rotations):
-            fresh.turn[i] = quaternion_of(matrix_product(rotation.as_matrix(), boxes.link_rotations[1]))
-        fresh.alpha[:] = boxes.angles
-        for i in range(new):
-            lay_out(self.shape, *boxes.angles, fresh.plane[i])
+        middle = self.particle.boxes.link_rotations[1]
+        turns = np.array([matrix_product(rotation.as_matrix(), middle) for rotation in poses.rotations])
+        self.add_bodies(0, poses.positions, turns.reshape(-1, 3, 3), speed=speed)
+
+    def add_bodies(self, shape: int, positions: Array, turns: Array, *, speed: float = 0.0) -> None:
+        """Add bodies of one shape.
+
+        Args:
+            shape: number of the shape: 0 the smarticle, then those of `more`.
+            positions: (n, 3) centres of mass [m].
+            turns: (n, 3, 3) rotations, frame of the body to laboratory.
+            speed: downwards [m/s].
+        """
+        kind, fresh = self.kinds[shape], bodies_for(len(positions))
+        fresh.position[:] = positions
+        fresh.velocity[:, 2] = -speed
+        fresh.shape[:] = shape
+        for i, turn in enumerate(turns):
+            fresh.turn[i] = quaternion_of(turn)
+            fresh.plane[i, 14:18] = kind.inertia
+            if kind.planar is not None:
+                fresh.alpha[i] = self.particle.boxes.angles
+                lay_out(kind.planar, *self.particle.boxes.angles, fresh.plane[i])
         self.bodies = joined(self.bodies, fresh)
+        self._lay_out_parts()
         old = self.pairs
-        self.pairs = pairs_for(self.count, self.kinds, len(old.first))._replace(
-            counts=old.counts, **{name: getattr(old, name) for name in (*LISTS, *LOOKED)}
+        self.pairs = pairs_for(self.count, len(self.segments.line), len(old.first))._replace(
+            counts=old.counts, **{name: getattr(old, name) for name in (*LISTS, *FRESH)}
         )
         self.forget_places()
         self._make_room_at_boundaries()
         self.make_room()
 
+    def _lay_out_parts(self) -> None:
+        """Number parts and segments of all bodies."""
+        shapes, kinds = self.bodies.shape, self.kinds
+        parts = np.array([3 if kind.planar is not None else 1 for kind in kinds])[shapes]
+        sizes = np.array([len(kind.lines) for kind in kinds])[shapes]
+        begin = np.cumsum([0, *parts]).astype(np.int32)
+        self.parts = Parts(begin, np.zeros((int(begin[-1]), MOTION)), np.zeros((int(begin[-1]), 6)))
+        body = np.repeat(np.arange(self.count, dtype=np.int32), sizes)
+        # Links of a body in the order of its segments, and a number for each in the pile.
+        own = np.concatenate([np.zeros(0, np.int64), *(kinds[k].link for k in shapes)])
+        fresh = np.append(True, (np.diff(own) != 0) | (np.diff(body) != 0)) if len(own) else np.zeros(0, np.bool_)
+        hinged = np.repeat(self.shapes.hinged[shapes], sizes)
+        self.links = (3 * body + np.where(hinged, own, 0)).astype(np.int32)  #: as records number them
+        self.segments = Segments(
+            line=np.concatenate([np.zeros((0, LINE)), *(kinds[k].lines for k in shapes)]),
+            begin=np.cumsum([0, *sizes]).astype(np.int32),
+            body=body,
+            part=(begin[body] + (hinged * own if self.articulated else 0)).astype(np.int32),
+            shared=np.concatenate([np.zeros(0, np.uint8), *(kinds[k].shared for k in shapes)]),
+            first=np.append(np.flatnonzero(fresh), len(own)).astype(np.int32),
+        )
+
     def _make_room_at_boundaries(self) -> None:
-        """Remember contacts of as many links as there are now, and as many of each as there can be."""
-        old, new = self.kept, no_contacts(self.count * self.each, slots_for(self.hooks, self.rims))
-        links, slots = old.used.shape
-        new.slip[:links, :slots], new.used[:links, :slots], new.contacts[:links] = old.slip, old.used, old.contacts
+        """Remember contacts of as many segments as there are now, and as many of each as there can be."""
+        old, new = self.kept, no_contacts(len(self.segments.line), slots_for(self.hooks, self.rims))
+        rows, slots = old.used.shape
+        new.slip[:rows, :slots], new.used[:rows, :slots], new.contacts[:rows] = old.slip, old.used, old.contacts
         self.kept = new
 
     def add_hooks(self, hooks: Sequence[Sequence[Bar]]) -> None:
@@ -181,14 +224,16 @@ class World:
         assert not self.count
         counts = np.array([len(bars) for bars in hooks])
         most = int(counts.max())
-        segments, radius = np.zeros((2, most, 6)), 0.0
+        segments, radius = np.zeros((2, most, LINE)), 0.0
         for hook, bars in enumerate(hooks):
             for k, (middle, halves) in enumerate(bars):
                 # Round, as thick as the square ones that other engines have.
                 along, radius = int(np.argmax(halves)), float(np.min(halves))
                 segments[hook, k, :2] = middle
                 segments[hook, k, along] -= halves[along] - radius
-                segments[hook, k, 3 + along] = 2 * (halves[along] - radius)
+                length = 2 * (halves[along] - radius)
+                segments[hook, k, 3 + along] = length
+                segments[hook, k, 6:] = 1 / length**2, radius
         self.hooks = Hooks(counts, segments, radius)
         self._make_room_at_boundaries()
 
@@ -212,12 +257,9 @@ class World:
         self.kept = Kept(self.kept.slip[:, :first].copy(), self.kept.used[:, :first].copy(), self.kept.contacts)
 
     def set_articulated(self, articulated: bool) -> None:
-        """Have velocities for each link, or for whole smarticles."""
+        """Have velocities for each link of a smarticle, or for whole smarticles."""
         self.articulated = articulated
-        n = self.count
-        self.bodies = self.bodies._replace(
-            motion=np.zeros((3 * n if articulated else n, 6)), shares=np.zeros((3 * n if articulated else 0, 6))
-        )
+        self._lay_out_parts()
 
     def forget_places(self) -> None:
         """Have neighbours looked for anew at the next step."""
@@ -225,17 +267,17 @@ class World:
             marks[:, :6], marks[:, 6] = FAR, 0.0
 
     def make_room(self, capacity: int = 0) -> None:
-        """Make the lists as long as so many smarticles need, or for `capacity` pairs at least."""
-        links = self.count * self.each
-        capacity = max(capacity, 12 * links + 256, len(self.pairs.first))
+        """Make the lists as long as so many bodies need, or for `capacity` pairs at least."""
+        rows, links = len(self.segments.line), len(self.segments.first) - 1
+        capacity = max(capacity, 12 * rows + 256, len(self.pairs.first))
         if capacity > len(self.pairs.first):
-            self.pairs = self.pairs._replace(**{n: longer(getattr(self.pairs, n), capacity) for n in (*LISTS, *LOOKED)})
-        if len(self.cells.order) != links or len(self.cells.first) != capacity:
-            self.cells = cells_for(links, self.count, capacity)
+            self.pairs = self.pairs._replace(**{n: longer(getattr(self.pairs, n), capacity) for n in (*LISTS, *FRESH)})
+        if len(self.cells.marks) != rows or len(self.cells.first) != capacity:
+            self.cells = cells_for(self.count, links, rows, capacity)
         if self.ledger is not None:
-            rows = 3 * capacity // 2 + 6 * links
-            if len(self.ledger) < rows:
-                self.ledger = np.zeros((rows, LEDGER))
+            entries = 3 * capacity // 2 + 6 * rows
+            if len(self.ledger) < entries:
+                self.ledger = np.zeros((entries, LEDGER))
 
     def advance(self, steps: int) -> None:
         """Make whole steps, however many calls that takes."""
@@ -258,8 +300,8 @@ class World:
         law, wall_law = self.laws
         boundaries = Boundaries(self.ground, self.channel, self.hooks, self.rims)
         return System(
-            self.shape, law, wall_law, self.bodies, self.pairs, self.kept, boundaries, self.gravity, self.planar,
-            self.skins, self.hinged, self.cords, self.ledger,
+            self.shapes, law, wall_law, self.bodies, self.parts, self.segments, self.pairs, self.kept, boundaries,
+            self.gravity, self.planar, self.skins, self.hinged, self.cords, self.ledger,
         )  # fmt: skip
 
     @property
@@ -269,12 +311,12 @@ class World:
         return Scratch(self.cells, self.meeting, rows, self.plane)
 
     def posed(self) -> Bodies:
-        """The smarticles with everything brought up to this instant that follows from their state."""
-        pose(self.shape, self.bodies, self.hinged)
+        """Return the bodies with everything brought up to this instant that follows from their state."""
+        pose_all(self.shapes, self.bodies, self.parts, self.segments, self.hinged)
         return self.bodies
 
     def state(self) -> State:
-        """Poses and velocities of all links.
+        """Return poses and velocities of all links of a pile of smarticles.
 
         Raises:
             RunError: the simulation has blown up.
@@ -290,7 +332,7 @@ class World:
         )
         places, velocities, spins = (np.empty((n, 3, 3)) for _ in range(3))
         frames = np.empty((n, 3, 3, 3))
-        find_links(bodies, self.articulated, places, frames, velocities, spins)
+        find_links(bodies, self.parts, 3 if self.articulated else 1, places, frames, velocities, spins)
         return State(boxes, places, frames, velocities, spins)
 
     def contacts(self) -> Contacts:
@@ -301,8 +343,6 @@ class World:
         self.posed()
         found = self._room()
         count, energy = query_all(self.system, found)
-        sheared = [self.pairs.slip[: self.pairs.counts[0]], self.kept.slip]
-        energy += sum(float(slip[..., 3].sum()) for slip in sheared)
         return Contacts(found.met[:count].astype(np.int64), found.touches, found.depth, found.held, energy)
 
     def _room(self) -> Found:
@@ -328,8 +368,8 @@ class World:
         system, slip, contacts = self.system, np.zeros(4), self.scratch.contacts
         return np.concatenate(
             [
-                _rows(lambda rows: forces_of_pairs(system, self.meeting, slip, rows)),
-                _rows(lambda rows: forces_of_boundaries(system, self.meeting, contacts, slip, rows)),
+                _rows(lambda rows: forces_of_pairs(system, self.links, self.meeting, slip, rows)),
+                _rows(lambda rows: forces_of_boundaries(system, self.links, self.meeting, contacts, slip, rows)),
             ]
         )
 
@@ -346,7 +386,7 @@ class World:
                     found[f"{group}.{name}"] = array
         for name in LISTS:
             found[f"pairs.{name}"] = getattr(self.pairs, name)[: near if name == "near" else pairs]
-        for name in LOOKED:
+        for name in FRESH:
             found[f"pairs.{name}"] = getattr(self.pairs, name)[:0]
         return found
 
@@ -383,13 +423,12 @@ class World:
             memory[name] for name in ("steps", "time_step", "begin", "made", "articulated")
         )
         self.totals, self.skins = arrays["totals"], arrays["fast"]
-        if len(self.totals) < TOTALS:  # written before steps could be divided
-            self.totals = np.array([*self.totals, self.time_step, 1.0, 1.0, 0.0])
         self.bodies, self.pairs = group(Bodies, "bodies"), group(Pairs, "pairs")
+        self._lay_out_parts()
         fixed: dict[str, Any] = {name: arrays[f"ground.{name}"] for name in Ground._fields if name != "top"}
         self.ground = self.ground._replace(**fixed)
         self.rims = group(Rims, "rims") if "rims.heights" in arrays else None
-        self.kept = group(Kept, "kept") if "kept.slip" in arrays else contacts_of_older(arrays, self.hooks, self.rims)
+        self.kept = group(Kept, "kept")
         self.cords = group(Cords, "cords") if "cords.anchor" in arrays else None
         self.make_room()
 
@@ -412,27 +451,9 @@ def quaternion_of(matrix: Array) -> Array:
     return unit
 
 
-def no_contacts(links: int, slots: int) -> Kept:
-    """Return what links remember that have touched no boundary."""
-    return Kept(np.zeros((links, slots, 4)), np.zeros((links, slots), np.uint8), np.zeros(links, np.uint8))
-
-
-def contacts_of_older(arrays: Mapping[str, NDArray[Any]], hooks: Hooks | None, rims: Rims | None) -> Kept:
-    """Read what contacts remember from a checkpoint with one table for ends, hooks and rims each."""
-    links = len(arrays["ends.used"])
-    kept = no_contacts(links, slots_for(hooks, rims))
-    bits = np.arange(boundaries.SURFACES, dtype=np.uint8)
-    begin = 0
-    for name, unpack in (("ends", True), ("hooks", True), ("rims", False)):
-        if f"{name}.slip" in arrays:
-            slip = arrays[f"{name}.slip"].reshape(links, -1, 4)
-            used = arrays[f"{name}.used"].reshape(links, -1)
-            stop = begin + slip.shape[1]
-            kept.slip[:, begin:stop] = slip
-            kept.used[:, begin:stop] = (used[..., None] >> bits & 1).reshape(links, -1) if unpack else used
-            begin = stop
-    kept.contacts[:] = kept.used.sum(axis=1)
-    return kept
+def no_contacts(segments: int, slots: int) -> Kept:
+    """Return the memory of segments that have touched no boundary."""
+    return Kept(np.zeros((segments, slots, 4)), np.zeros((segments, slots), np.uint8), np.zeros(segments, np.uint8))
 
 
 def longer(array: NDArray[Any], length: int) -> NDArray[Any]:

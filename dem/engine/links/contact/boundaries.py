@@ -1,11 +1,11 @@
 """Contacts of links with boundaries: floor, round wall, its edges, the walls of a channel, and hooks.
 
-`contacts_of_link` is the only place that knows their geometry. Forces, queries and recorded contacts read its rows.
+`contacts_of_segment` is the only place that knows their geometry. Forces, queries and recorded contacts read its rows.
 
-A plane, and the inside of a round wall, are met by a straight link with its ends: no other point is nearer. Hinges
-count once, as ends of the middle link. A link meets a round edge with one point. The bars of hooks are swept segments,
-as links are, and meet them as other links do; the force along a link that slides off the end of a bar is left out, less
-than a hundredth of the normal one.
+A plane, and the inside of a round wall, are met by a straight link with its ends: no other point is nearer. Joints
+count once, as ends of the first segment that has them. A link meets a round edge with one point. The bars of hooks are
+swept segments, as links are, and meet them as other links do; the force along a link that slides off the end of a bar
+is left out, less than a hundredth of the normal one.
 """
 
 from __future__ import annotations
@@ -17,15 +17,17 @@ from dem.engine.links.arrays import (
     CHANNEL,
     FLOOR,
     LOWER,
+    SPIN,
     WALL,
     Array,
     Bodies,
-    Boundaries,
     Ground,
     Hooks,
     Kept,
     Law,
+    Parts,
     Rims,
+    Segments,
 )  # fmt: skip
 from dem.engine.links.compiler import inlined, part
 from dem.engine.links.contact import meeting
@@ -33,15 +35,19 @@ from dem.engine.links.contact.barrier import Step, resolve, stretch
 from dem.engine.links.contact.law import resist, share_of_step
 from dem.engine.links.contact.meeting import POINTS, meet
 from dem.engine.links.contact.pairs import enter, push, velocity_at
-from dem.engine.links.shape import Shape
+from dem.engine.links.shapes import AT_START, RADIUS
 from dem.engine.links.vectors import Vector, add, along, dot, put, scale, sub, vector
 
-# Columns of a row that `contacts_of_link` writes: place in what contacts remember; the boundary; overlap [m]; share of
-# a whole contact [1]; energy over kn/2 u² [1]; the point on the link's axis [m]; normal, from the boundary [1]; overlap
-# at which axes meet, or an axis and a surface [m].
+# Columns of a row that `contacts_of_segment` writes: slot in the memory of contacts; the boundary; overlap [m]; share
+# of a whole contact [1]; energy over kn/2 u² [1]; the point on the link's axis [m]; normal, from the boundary [1];
+# overlap at which axes meet, or an axis and a surface [m].
 SLOT, PART, DEPTH, SHARE, FACTOR, AXIS, NORMAL, ROOM, COLUMNS = 0, 1, 2, 3, 4, 5, 8, 11, 12
 SURFACES = 3  # of an end of a link
 END_SLOTS = 2 * SURFACES
+
+# Overlap with a surface at which the barrier of `barrier.stretch` has grown without bound, in radii of the segment: a
+# tenth of its thickness. Ordinary loads and impacts stay in the linear quarter of it.
+ROOM_AT_SURFACE = 0.2
 
 GOLDEN = (math.sqrt(5) - 1) / 2
 SAMPLES, TURNS = 8, 32  # places along a link that are tried, and narrowings about the best: to 2e-7 of its length
@@ -69,30 +75,31 @@ def _note(
 
 
 @inlined
-def contacts_of_link(
-    shape: Shape, segments: Array, ground: Ground, channel: Any, hooks: Any, rims: Any, p: int, kind: int, rows: Array,
-    met: Array,
-) -> int:  # fmt: skip
-    """Find the contacts of a link with all boundaries.
+def contacts_of_segment(
+    segments: Segments, ground: Ground, channel: Any, hooks: Any, rims: Any, p: int, rows: Array, met: Array
+) -> int:
+    """Find the contacts of a segment with all boundaries.
 
     Args:
-        segments: (N S, 6) axes of the links [m].
+        segments: where all segments are.
         ground: floor and wall, and where all boundaries are.
         channel: (1,) half the distance of the walls that stand in for the container [m]; None for a container.
         hooks: None where there are none.
         rims: None where the wall has no edges that links can reach.
-        p: the link.
-        kind: 1 for a middle link; the others are barbs, whose starts are ends of the middle link.
+        p: the segment; joints at its ends are contacts of the segments that have them first.
         rows: (slots, COLUMNS) written, see `SLOT`.
 
     Returns:
         Rows that were written.
     """
-    radius, count = shape.radius, 0
-    for end in range(0 if kind == 1 else 1, 2):
-        point = vector(segments[p], 0)
+    link, shared, count = segments.line[p], segments.shared[p], 0
+    radius, room = link[RADIUS], ROOM_AT_SURFACE * link[RADIUS]
+    for end in range(2):
+        if shared & (AT_START << end):
+            continue
+        point = vector(link, 0)
         if end == 1:
-            point = add(point, vector(segments[p], 3))
+            point = add(point, vector(link, 3))
         x, y, z = point
         if channel is not None:
             for side in range(2):
@@ -100,21 +107,21 @@ def contacts_of_link(
                 depth = radius - channel[0] - inward * y
                 if depth > 0.0:
                     slot = SURFACES * end + side
-                    count = _note(rows, count, slot, CHANNEL + side, depth, radius, point, (0.0, inward, 0.0))
+                    count = _note(rows, count, slot, CHANNEL + side, depth, room, point, (0.0, inward, 0.0))
         else:
             depth = radius - (z - ground.place[FLOOR])
             if depth > 0.0:
-                count = _note(rows, count, SURFACES * end, FLOOR, depth, radius, point, (0.0, 0.0, 1.0))
+                count = _note(rows, count, SURFACES * end, FLOOR, depth, room, point, (0.0, 0.0, 1.0))
             inner = ground.radii[ground.radii.shape[0] - 1] - radius
             if ground.flags[0] != 0 and x * x + y * y > inner * inner:
                 count = _contacts_with_wall(radius, ground, SURFACES * end, point, rows, count)
     if hooks is not None:
-        count = _contacts_with_hooks(radius, segments, ground, hooks, p, rows, count, met)
+        count = _contacts_with_hooks(link, ground, hooks, rows, count, met)
     if rims is not None:
         first = END_SLOTS
         if hooks is not None:
             first += 2 * POINTS * hooks.bars.shape[1]
-        count = _contacts_with_rims(radius, segments, ground, rims, p, first, rows, count)
+        count = _contacts_with_rims(link, ground, rims, first, rows, count)
     return count
 
 
@@ -122,6 +129,7 @@ def contacts_of_link(
 def _contacts_with_wall(radius: float, ground: Ground, slot: int, point: Vector, rows: Array, count: int) -> int:
     """Find the contacts of an end with wall and ceilings; the number of rows."""
     x, y, z = point
+    room = ROOM_AT_SURFACE * radius
     height, r, tiers = z - ground.place[WALL], math.sqrt(x * x + y * y), ground.radii.shape[0]
     lifted = ground.flags[1] != 0
     if height > ground.top:
@@ -139,63 +147,59 @@ def _contacts_with_wall(radius: float, ground: Ground, slot: int, point: Vector,
         if lifted and gap < 0.0:
             gap, sign = -gap, 1.0
         if gap < radius:
-            count = _note(rows, count, slot + 1, WALL, radius - gap, radius, point, (sign * ex, sign * ey, 0.0))
+            count = _note(rows, count, slot + 1, WALL, radius - gap, room, point, (sign * ex, sign * ey, 0.0))
         if tier + 1 < tiers and height > ground.bottoms[tier + 1] - radius:
             edge, above, away = 2, height - ground.bottoms[tier + 1], r - ground.radii[tier + 1]
             if away >= 0.0:
-                return _note(rows, count, slot + 2, WALL, radius + above, radius, point, (0.0, 0.0, -1.0))
+                return _note(rows, count, slot + 2, WALL, radius + above, room, point, (0.0, 0.0, -1.0))
     if edge:
         distance = math.sqrt(away * away + above * above)
         if 0.0 < distance < radius:
             normal = ex * away / distance, ey * away / distance, above / distance
-            count = _note(rows, count, slot + edge, WALL, radius - distance, radius, point, normal)
+            count = _note(rows, count, slot + edge, WALL, radius - distance, room, point, normal)
     return count
 
 
 @inlined
-def _contacts_with_rims(
-    radius: float, segments: Array, ground: Ground, rims: Rims, p: int, first: int, rows: Array, count: int
-) -> int:
+def _contacts_with_rims(link: Array, ground: Ground, rims: Rims, first: int, rows: Array, count: int) -> int:
     """Find the contacts of a link, but for its ends, with round edges of the wall; the number of rows."""
     if ground.flags[0] == 0:
         return count
-    z, uz = segments[p, 2], segments[p, 5]
+    z, uz, radius = link[2], link[5], link[RADIUS]
     for rim in range(rims.radii.shape[0]):
         height, round_ = ground.place[WALL] + rims.heights[rim], rims.radii[rim]
         if min(z, z + uz) - radius < height < max(z, z + uz) + radius:
-            s = nearest_to_circle(segments[p], round_, height)
-            squared = _squared(segments[p], s, round_, height)
+            s = nearest_to_circle(link, round_, height)
+            squared = _squared(link, s, round_, height)
             if 0.0 < squared < radius * radius and 1e-6 < s < 1 - 1e-6:
                 distance = math.sqrt(squared)
-                x, y, z_at = along(vector(segments[p], 0), s, vector(segments[p], 3))
+                x, y, z_at = along(vector(link, 0), s, vector(link, 3))
                 up, r = z_at - height, math.sqrt(x * x + y * y)
                 out, up = (r - round_) / (r * distance), up / distance
                 depth, normal = radius - distance, (out * x, out * y, up)
-                count = _note(rows, count, first + rim, WALL, depth, radius, (x, y, z_at), normal)
+                count = _note(rows, count, first + rim, WALL, depth, ROOM_AT_SURFACE * radius, (x, y, z_at), normal)
     return count
 
 
 @inlined
-def _contacts_with_hooks(
-    radius: float, segments: Array, ground: Ground, hooks: Hooks, p: int, rows: Array, count: int, met: Array
-) -> int:
-    """Find the contacts of a link with the bars of both hooks; the number of rows."""
-    reach = radius + hooks.radius
+def _contacts_with_hooks(link: Array, ground: Ground, hooks: Hooks, rows: Array, count: int, met: Array) -> int:
+    """Find the contacts of a segment with the bars of both hooks; the number of rows."""
+    reach = link[RADIUS] + hooks.radius
     for hook in range(2):
         height = ground.place[LOWER + hook]
-        if not min(segments[p, 2], segments[p, 2] + segments[p, 5]) - reach < height:
+        if not min(link[2], link[2] + link[5]) - reach < height:
             continue
-        if not max(segments[p, 2], segments[p, 2] + segments[p, 5]) + reach > height:
+        if not max(link[2], link[2] + link[5]) + reach > height:
             continue
         for k in range(hooks.counts[hook]):
             bar = hooks.bars[hook, k]
             bar[2] = height
             apart = False
             for d in range(2):
-                least = max(min(segments[p, d], segments[p, d] + segments[p, 3 + d]), min(bar[d], bar[d] + bar[3 + d]))
-                most = min(max(segments[p, d], segments[p, d] + segments[p, 3 + d]), max(bar[d], bar[d] + bar[3 + d]))
+                least = max(min(link[d], link[d] + link[3 + d]), min(bar[d], bar[d] + bar[3 + d]))
+                most = min(max(link[d], link[d] + link[3 + d]), max(bar[d], bar[d] + bar[3 + d]))
                 apart |= least - most > reach
-            if apart or meet(segments[p], bar, reach, 1.0, False, False, met) == 0:
+            if apart or meet(link, bar, 1.0, 0, 0, met) == 0:
                 continue
             share = met[0, MET_SHARE]
             for point in range(POINTS):
@@ -216,11 +220,10 @@ def _contacts_with_hooks(
 
 @part
 def contacts_with_boundaries(
-    shape: Shape, segments: Array, ground: Ground, channel: Any, hooks: Any, rims: Any, p: int, rows: Array, met: Array
+    segments: Segments, ground: Ground, channel: Any, hooks: Any, rims: Any, p: int, rows: Array, met: Array
 ) -> int:
-    """Find the contacts of a link, compiled apart: for queries, where speed does not matter."""
-    kind = shape.kinds[p % shape.kinds.shape[0]]
-    return contacts_of_link(shape, segments, ground, channel, hooks, rims, p, kind, rows, met)
+    """Find the contacts of a segment, compiled apart: for queries, where speed does not matter."""
+    return contacts_of_segment(segments, ground, channel, hooks, rims, p, rows, met)
 
 
 # -- forces ------------------------------------------------------------------------------------------------------
@@ -228,51 +231,47 @@ def contacts_with_boundaries(
 
 @inlined
 def place_and_motion(
-    shape: Shape, bodies: Bodies, ground: Ground, i: int, row: int, contact: Array
+    radius: float, parts: Parts, ground: Ground, row: int, contact: Array
 ) -> tuple[Vector, Vector, float, float]:
-    """Return where a contact is [m], the link's velocity there [m/s], the boundary's [m/s], the link's turn [rad/s].
+    """Return where a contact is [m], the part's velocity there [m/s], the boundary's [m/s], the part's turn [rad/s].
 
     Args:
-        row: of the link in `Bodies.motion`.
+        radius: of the segment [m].
+        row: part that the segment moves with.
         contact: (COLUMNS,) see `SLOT`.
     """
     normal, part_of = vector(contact, NORMAL), int(contact[PART])
-    place = sub(vector(contact, AXIS), scale(shape.radius - 0.5 * contact[DEPTH], normal))
+    place = sub(vector(contact, AXIS), scale(radius - 0.5 * contact[DEPTH], normal))
     speed = ground.speed[part_of] if part_of < CHANNEL else 0.0
-    return place, velocity_at(bodies, i, row, place), speed, dot(vector(bodies.motion[row], 3), normal)
+    return place, velocity_at(parts, row, place), speed, dot(vector(parts.motion[row], SPIN), normal)
 
 
 @part
 def push_boundaries(
-    shape: Shape, law: Law, bodies: Bodies, kept: Kept, boundaries: Boundaries, hinged: Any, ledger: Any, step: Step,
-    rows: Array, met: Array,
+    law: Law, bodies: Bodies, parts: Parts, segments: Segments, kept: Kept, ground: Ground, channel: Any, hooks: Any,
+    rims: Any, ledger: Any, step: Step, rows: Array, met: Array,
 ) -> float:  # fmt: skip
-    """Add the forces of all boundaries on all links.
+    """Add the forces of all boundaries on all segments.
 
     Args:
         law: of contacts with boundaries.
-        bodies: the smarticles; `load` or `shares`, and `deepest` are written.
-        kept: what contacts remember; brought up to date.
-        boundaries: their `force` is written.
+        bodies: `deepest` is written.
+        parts: `load` is written.
+        kept: memory of the contacts; brought up to date.
+        ground: `force` is written.
 
     Returns:
         Energy of tangential springs whose contacts have ended [J].
     """
-    ground, segments, links, lost, link = boundaries.ground, bodies.segments, shape.kinds.shape[0], 0.0, -1
-    each = links * shape.offsets.shape[0]
-    for p in range(segments.shape[0]):
-        link = link + 1 if link + 1 < links else 0
-        kind = shape.kinds[link]
-        count = contacts_of_link(
-            shape, segments, ground, boundaries.channel, boundaries.hooks, boundaries.rims, p, kind, rows, met
-        )
+    lost = 0.0
+    for p in range(segments.line.shape[0]):
+        count = contacts_of_segment(segments, ground, channel, hooks, rims, p, rows, met)
         if count == 0 and kept.contacts[p] == 0:
             continue
-        i = p // each
         for k in range(count):
             contact = rows[k]
             slot = int(contact[SLOT])
-            _rub(shape, law, bodies, ground, hinged, ledger, step, i, kind, contact, kept.slip[p, slot])
+            _rub(law, bodies, parts, segments, p, ground, ledger, step, contact, kept.slip[p, slot])
             kept.used[p, slot] |= 2
         for slot in range(kept.used.shape[1]):
             if kept.used[p, slot] == 1:
@@ -286,30 +285,27 @@ def push_boundaries(
 
 @inlined
 def _rub(
-    shape: Shape, law: Law, bodies: Bodies, ground: Ground, hinged: Any, ledger: Any, step: Step, i: int, kind: int,
+    law: Law, bodies: Bodies, parts: Parts, segments: Segments, p: int, ground: Ground, ledger: Any, step: Step,
     contact: Array, slip: Array,
 ) -> None:  # fmt: skip
-    """Let a boundary push a link at a contact."""
-    row = i
-    if hinged is not None:
-        row = 3 * i + kind
+    """Let a boundary push a segment at a contact."""
+    i, row, damping = segments.body[p], segments.part[p], law.damping[bodies.shape[segments.body[p]], 0]
     depth, share, room, normal = contact[DEPTH], contact[SHARE], contact[ROOM], vector(contact, NORMAL)
-    place, velocity, speed, turning = place_and_motion(shape, bodies, ground, i, row, contact)
+    place, velocity, speed, turning = place_and_motion(segments.line[p, RADIUS], parts, ground, row, contact)
     relative = velocity[0], velocity[1], velocity[2] - speed
     u, slope, hardening = stretch(depth, room)
     closing = (speed - velocity[2]) * normal[2] - velocity[0] * normal[0] - velocity[1] * normal[1]
     load = law.stiffness * u * slope * share * share_of_step(depth, closing, step.past)
     stored, twist = slip[3], 0.5 * step.past * turning
-    force = resist(law, load, share, hardening, normal, relative, twist, step.past, slip)
+    force = resist(law, damping, load, share, hardening, normal, relative, twist, step.past, slip)
     resolve(step, depth, room, closing)
-    # As a share of the room, which is not that of two links.
-    bodies.deepest[i] = max(bodies.deepest[i], 2 * shape.radius * depth / room)
+    bodies.deepest[i] = max(bodies.deepest[i], depth / max(room, segments.line[p, RADIUS]))
     if ledger is not None:
         # The boundary keeps its speed: of the mean of before and after, twice its half.
         power = 0.5 * dot(force, (velocity[0], velocity[1], velocity[2] - 2 * speed))
-        enter(ledger, (row, -1), (i, -1), place, force, power, slip[3] - stored)
+        enter(ledger, (row, -1), place, force, power, slip[3] - stored)
     force = along(force, load, normal)
-    push(bodies, i, kind, hinged, place, force)
+    push(parts, row, place, force)
     part_of = int(contact[PART])
     put(ground.force[part_of], 0, sub(vector(ground.force[part_of], 0), force))
 

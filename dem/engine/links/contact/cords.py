@@ -5,42 +5,41 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from dem.engine.links.arrays import Bodies, Cords
+from dem.engine.links.arrays import Bodies, Cords, Parts
 from dem.engine.links.compiler import kernel, part
 from dem.engine.links.contact.barrier import Step
 from dem.engine.links.contact.pairs import push, velocity_at
-from dem.engine.links.shape import Shape
-from dem.engine.links.vectors import dot, put_more, scale, sub, vector
+from dem.engine.links.motion.poses import turned
+from dem.engine.links.vectors import add, dot, put, put_more, scale, sub, vector
 
 
 @part
-def find_knot(shape: Shape, bodies: Bodies, cords: Cords, k: int) -> None:
+def find_knot(bodies: Bodies, cords: Cords, k: int) -> None:
     """Write where a string is tied into `knot`; needs `plane` and `axes`."""
     i, kind = cords.owner[k, 0], cords.owner[k, 1]
-    row, axes = bodies.plane[i], bodies.axes
+    row = bodies.plane[i]
     if kind == 1:
         x, y = -row[0] + cords.along[k], -row[1]
     elif kind == 0:
         x, y = row[2] + cords.along[k] * row[10], row[3] + cords.along[k] * row[11]
     else:
         x, y = row[4] + cords.along[k] * row[12], row[5] + cords.along[k] * row[13]
-    for d in range(3):
-        cords.knot[k, d] = bodies.position[i, d] + axes[i, d, 0] * x + axes[i, d, 1] * y
+    put(cords.knot[k], 0, add(vector(bodies.position[i], 0), turned(bodies, i, x, y, 0.0)))
 
 
 @kernel
-def find_knots(shape: Shape, bodies: Bodies, cords: Cords) -> None:
+def find_knots(bodies: Bodies, cords: Cords) -> None:
     """Write where all strings are tied into `knot`; needs smarticles that are posed."""
     for k in range(cords.along.shape[0]):
-        find_knot(shape, bodies, cords, k)
+        find_knot(bodies, cords, k)
 
 
 @part
-def pull(shape: Shape, bodies: Bodies, cords: Cords, hinged: Any, step: Step) -> float:
+def pull(bodies: Bodies, parts: Parts, cords: Cords, hinged: Any, step: Step) -> float:
     """Add the forces of the strings.
 
     Args:
-        bodies: the smarticles; `load` or `shares` is written.
+        parts: `load` is written.
         cords: the strings; `sums` and `knot` are written.
 
     Returns:
@@ -48,13 +47,13 @@ def pull(shape: Shape, bodies: Bodies, cords: Cords, hinged: Any, step: Step) ->
     """
     power = 0.0
     for k in range(cords.along.shape[0]):
-        find_knot(shape, bodies, cords, k)
+        find_knot(bodies, cords, k)
         i, kind = cords.owner[k, 0], cords.owner[k, 1]
-        row = i
+        row = parts.begin[i]
         if hinged is not None:
-            row = 3 * i + kind
+            row += kind
         knot = vector(cords.knot[k], 0)
-        velocity, way = velocity_at(bodies, i, row, knot), sub(vector(cords.anchor[k], 0), knot)
+        velocity, way = velocity_at(parts, row, knot), sub(vector(cords.anchor[k], 0), knot)
         length = math.sqrt(dot(way, way))
         x, y, z = way[0] / length, way[1] / length, way[2] / length
         rate = x * (cords.speed[k] - velocity[0]) - y * velocity[1] - z * velocity[2]
@@ -62,7 +61,7 @@ def pull(shape: Shape, bodies: Bodies, cords: Cords, hinged: Any, step: Step) ->
         if stretch > 0.0:
             tension = max(0.0, cords.law[1] * stretch + cords.law[2] * rate)
         force = scale(tension, (x, y, z))
-        push(bodies, i, kind, hinged, knot, force)
+        push(parts, row, knot, force)
         put_more(cords.sums[k], 0, scale(step.past / step.whole, force))
         power += dot(force, velocity)
     return power

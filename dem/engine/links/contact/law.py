@@ -28,8 +28,8 @@ def share_of_step(depth: float, closing: float, dt: float) -> float:
 
 @inlined
 def resist(
-    law: Law, load: float, share: float, hardening: float, normal: Vector, velocity: Vector, twist: float, dt: float,
-    slip: Array,
+    law: Law, cn: float, load: float, share: float, hardening: float, normal: Vector, velocity: Vector, twist: float,
+    dt: float, slip: Array,
 ) -> Vector:  # fmt: skip
     """Return the force on the first body at a point beyond the spring's [N].
 
@@ -37,6 +37,7 @@ def resist(
     it would exceed friction it is cut to it, and the tangential dashpot is silent: as YADE's `ViscElPhys` does.
 
     Args:
+        cn: of the normal dashpot [N s/m].
         load: of the normal spring here [N], not negative.
         share: of a whole contact's springs and dashpots that acts here [1].
         hardening: of the normal dashpot, see `barrier.stretch` [1].
@@ -47,7 +48,7 @@ def resist(
         slip: (4,) stretch of the tangential spring [m], of a whole contact, and its energy [J]; brought up to date.
     """
     approach = dot(velocity, normal)
-    pressed = load - law.damping * share * hardening * approach
+    pressed = load - cn * share * hardening * approach
     pressed = max(pressed, 0.0)
     sliding = sub(velocity, scale(approach, normal))
     stretch = vector(slip, 0)
@@ -56,7 +57,7 @@ def resist(
     stiffness, limit = law.shear * share, law.friction * pressed
     length = dot(stretch, stretch)
     squared = stiffness * stiffness * length
-    damping = law.shear_damping * share
+    damping = cn * law.shear_damping * share
     # Selections rather than a branch, which nothing can predict. The root of a square is exact: below the limit the
     # ratio is 1 at least.
     ratio = limit / math.sqrt(squared)

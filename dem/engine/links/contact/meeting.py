@@ -1,4 +1,4 @@
-"""How two links push each other apart: where, and with what springs, derived from one energy.
+"""How two segments push each other apart: where, and with what springs, derived from one energy.
 
 For two swept segments with the greatest overlap δ0, at their nearest points, and overlaps δ1 and δ2 at the two ends of
 the stretch over which they lie along each other (at the end of one link and the nearest point of the other; 0 where
@@ -16,10 +16,10 @@ three pairs of points alone, and along the first link where ℓ changes:
     f0 = kn u0 u0' (1 - g x1² x2²),  f1 = kn g u1 u1' x2²,  f2 = kn g u2 u2' x1²,  x = u/u0,
     f_ℓ = kn/2 (u1 u2/u0)² g'.
 
-A barb begins at a hinge, where the middle link ends: what overlaps there would count twice. E of a barb is therefore
-less by kn/2 u_h², of the overlap of the hinge itself with the other link, which the middle link's own E has; for two
-barbs less by both hinges' and more by that of hinge against hinge. What remains goes to zero as the point of contact
-moves to the hinge, and a bend is as stiff as a bar.
+A segment that starts or ends at a joint, where another one of its body has an end already, would count the overlap
+there twice. Its E is therefore less by kn/2 u_h², of the overlap of the joint itself with the other segment, which the
+segment before has in its own E; for two joints that meet less by both and more by that of joint against joint. What
+remains goes to zero as the point of contact moves to the joint, and a bend is as stiff as a bar.
 """
 
 from __future__ import annotations
@@ -29,6 +29,7 @@ import math
 from dem.engine.links.arrays import Array
 from dem.engine.links.compiler import inlined, part
 from dem.engine.links.contact.barrier import stretch
+from dem.engine.links.shapes import AT_END, AT_START, RADIUS
 from dem.engine.links.vectors import (
     Lines,
     Vector,
@@ -46,7 +47,7 @@ from dem.engine.links.vectors import (
 )  # fmt: skip
 
 # Rows of what `meet` writes: three points that can rub, then forces without friction, each with its place.
-POINTS, BARE = 3, 6
+POINTS, BARE = 3, 10
 ENERGY = POINTS + BARE  # row whose first number is E
 ROWS = ENERGY + 1
 # Columns of a point: place [m], normal from the second link to the first [1], load of the spring [N], the part of it
@@ -58,45 +59,43 @@ FORCE = 3
 
 
 @part
-def meet(p: Array, q: Array, diameter: float, stiffness: float, bend_p: bool, bend_q: bool, out: Array) -> int:
-    """Find the points of contact of two links, and the springs there.
+def meet(p: Array, q: Array, stiffness: float, shared_p: int, shared_q: int, out: Array) -> int:
+    """Find the points of contact of two segments, and the springs there.
 
     Args:
-        p: (6,) start of the first link's axis and vector to its end [m].
-        q: (6,) start and vector of the second one [m].
-        diameter: of both, or the sum of two radii [m].
-        bend_p: whether the first link is a barb, which starts at a hinge.
-        bend_q: whether the second one is.
+        p: (LINE,) the first segment.
+        q: (LINE,) the second one.
+        shared_p: ends of the first segment that are joints of segments before it, see `shapes.AT_START`.
+        shared_q: those of the second one.
         out: (ROWS, COLUMNS) written.
 
     Returns:
-        0 where the links are apart, otherwise 1 + the number of rows with bare forces.
+        0 where the segments are apart, otherwise 1 + the number of rows with bare forces.
     """
-    u, v = vector(p, 3), vector(q, 3)
-    both = lines(p, q, 1 / dot(u, u), 1 / dot(v, v))
+    both, diameter = lines(p, q), p[RADIUS] + q[RADIUS]
     s, t = nearest(both)
     gap = between(both, s, t)
     squared = dot(gap, gap)
     if squared >= diameter * diameter:
         return 0
-    return 1 + meet_at(both, s, t, gap, math.sqrt(squared), diameter, stiffness, bend_p, bend_q, out)
+    return 1 + meet_at(both, s, t, gap, math.sqrt(squared), diameter, stiffness, shared_p, shared_q, out)
 
 
 @inlined
 def meet_at(
     both: Lines, s: float, t: float, gap: Vector, distance: float, diameter: float, stiffness: float,
-    bend_p: bool, bend_q: bool, out: Array,
+    shared_p: int, shared_q: int, out: Array,
 ) -> int:  # fmt: skip
-    """Write what `meet` does of links that touch, whose nearest points are known; the number of bare forces.
+    """Write what `meet` does of segments that touch, whose nearest points are known; the number of bare forces.
 
     Args:
-        s: of the nearest point of the first link.
+        s: of the nearest point of the first segment.
         t: of the nearest point of the second one.
         gap: from the second nearest point to the first [m].
         distance: of the two [m].
-        diameter: of both, or the sum of two radii [m].
-        bend_p: whether the first link is a barb.
-        bend_q: whether the second one is.
+        diameter: sum of both radii [m].
+        shared_p: joints of the first segment, as in `meet`.
+        shared_q: joints of the second one.
         out: (ROWS, COLUMNS) written.
     """
     deepest = diameter - distance
@@ -105,26 +104,33 @@ def meet_at(
     out[1, SHARE] = out[2, SHARE] = 0.0
     out[ENERGY, 0], out[ENERGY, 1] = 0.5 * stiffness * u * u, deepest
     bare = _lie_along(both, deepest, u, slope, diameter, stiffness, out)
-    if bend_p:
-        bare = _hinge(both, diameter, stiffness, 0.0, clamp(both.e * both.inverse_c), -1.0, bare, out)
-        if bend_q:
-            bare = _hinge(both, diameter, stiffness, 0.0, 0.0, 1.0, bare, out)
-    if bend_q:
-        bare = _hinge(both, diameter, stiffness, clamp(-both.d * both.inverse_a), 0.0, -1.0, bare, out)
+    if shared_p | shared_q:
+        for bit in range(2):
+            end = float(bit)
+            if shared_p & (AT_START << bit):
+                at = clamp((both.e + end * both.b) * both.inverse_c)
+                bare = _joint(both, diameter, stiffness, end, at, -1.0, bare, out)
+                for other in range(2):
+                    if shared_q & (AT_START << other):
+                        bare = _joint(both, diameter, stiffness, end, float(other), 1.0, bare, out)
+            if shared_q & (AT_START << bit):
+                at = clamp((end * both.b - both.d) * both.inverse_a)
+                bare = _joint(both, diameter, stiffness, at, end, -1.0, bare, out)
     return bare
 
 
 @inlined
-def meets_elsewhere(both: Lines, reach: float, bend_p: bool, bend_q: bool) -> int:
-    """Count places besides the nearest points at which `meet_at` would find forces; 0 for most links that touch.
+def meets_elsewhere(both: Lines, reach: float, shared_p: int, shared_q: int) -> int:
+    """Count places besides the nearest points at which `meet_at` may find forces; 0 for most segments that touch.
 
-    Without a branch: what links do at their ends and hinges cannot be predicted, and a branch that is mispredicted
-    takes as long as all of this. The numbers are those of `_lie_along` and `_hinge`, bit for bit.
+    Without a branch: what segments do at their ends and joints cannot be predicted, and a branch that is mispredicted
+    takes as long as all of this. The numbers are those of `_lie_along` and `_joint`, bit for bit; a joint at an end,
+    which is rare, always counts.
 
     Args:
-        reach: square of the diameter [m²].
-        bend_p: whether the first link is a barb.
-        bend_q: whether the second one is.
+        reach: square of the sum of both radii [m²].
+        shared_p: joints of the first segment, as in `meet`.
+        shared_q: joints of the second one.
     """
     b, d, e = both.b, both.d, both.e
     start, end = -d * both.inverse_a, (b - d) * both.inverse_a
@@ -137,13 +143,13 @@ def meets_elsewhere(both: Lines, reach: float, bend_p: bool, bend_q: bool) -> in
     s2, t2 = 1.0 if upper >= 1.0 else upper, of_end if upper >= 1.0 else upper_t
     first, second = _square(between(both, s1, t1)), _square(between(both, s2, t2))
     lie = (upper > 0.0) & (lower < 1.0) & (first < reach) & (second < reach)
-    # The hinge of the first link at the second one, that of the second at the first one, one hinge at the other.
+    # The start of the first segment at the second one, that of the second at the first one, one start at the other.
     of_p = _square(sub(both.w, scale(of_start, both.v)))
     of_q = _square(sub(along(both.p, clamp(start), both.u), both.q))
-    hinges = _square(both.w)
-    return (
-        int(lie) + int(bend_p & (of_p < reach)) + int(bend_q & (of_q < reach)) + int(bend_p & bend_q & (hinges < reach))
-    )
+    starts = _square(both.w)
+    start_p, start_q = (shared_p & AT_START) != 0, (shared_q & AT_START) != 0
+    joints = int(start_p & (of_p < reach)) + int(start_q & (of_q < reach)) + int(start_p & start_q & (starts < reach))
+    return int(lie) + joints + ((shared_p | shared_q) & AT_END)
 
 
 @inlined
@@ -224,10 +230,10 @@ def _lie_along(
 
 
 @inlined
-def _hinge(
+def _joint(
     both: Lines, diameter: float, stiffness: float, s: float, t: float, sign: float, bare: int, out: Array
 ) -> int:
-    """Take off (sign -1) or add the contact of a hinge with a point of the other link; the number of bare forces."""
+    """Take off (sign -1) or add the contact of a joint with a point of the other segment; the number of bare forces."""
     gap = sub(sub(along(both.p, s, both.u), both.q), scale(t, both.v))
     squared = dot(gap, gap)
     if squared >= diameter * diameter:

@@ -1,16 +1,15 @@
-"""Forces of smarticles on each other."""
+"""Forces of bodies on each other."""
 
 from __future__ import annotations
 
 import math
 from typing import Any
 
-from dem.engine.links.arrays import Array, Bodies, Law, Pairs
+from dem.engine.links.arrays import ORIGIN, SPIN, VELOCITY, Array, Bodies, Law, Pairs, Parts, Segments
 from dem.engine.links.compiler import inlined, part
 from dem.engine.links.contact.barrier import Step, resolve, stretch
 from dem.engine.links.contact.law import resist, share_of_step
 from dem.engine.links.contact.meeting import (
-    BARE,
     CARRIED,
     DISTANCE,
     FORCE,
@@ -23,9 +22,8 @@ from dem.engine.links.contact.meeting import (
     meet_at,
     meets_elsewhere,
 )
-from dem.engine.links.shape import Shape
+from dem.engine.links.shapes import RADIUS
 from dem.engine.links.vectors import (
-    Lines,
     Vector,
     add,
     along,
@@ -41,100 +39,88 @@ from dem.engine.links.vectors import (
     vector,
 )
 
-# Columns of the ledger: rows of two bodies in `Bodies.motion` and their smarticles (-1: a boundary), point of contact
-# [m], force on the first one [N], half of its power with the velocities before [W], what its spring took up [J].
-ROWS, OWNERS, POINT, PUSH, POWER, GAIN = 0, 2, 4, 7, 10, 11
-
-assert BARE >= 5  # two ends of a stretch, three pairs of hinges
+# Columns of the ledger: both parts (-1: a boundary), point of contact [m], force on the first one [N], half of its
+# power with the velocities before [W], energy that its spring took up [J].
+ROWS, POINT, PUSH, POWER, GAIN = 0, 2, 5, 8, 9
 
 
 @inlined
-def push(bodies: Bodies, i: int, kind: int, hinged: Any, place: Vector, force: Vector) -> None:
-    """Let a force act on a point of a smarticle.
+def push(parts: Parts, row: int, place: Vector, force: Vector) -> None:
+    """Let a force act on a point of a part.
 
     Args:
-        bodies: the smarticles; `load`, or `shares` while articulated, is added to.
-        kind: the link.
+        parts: `load` is added to.
+        row: the part.
         place: the point [m].
         force: on it [N].
     """
-    row = i if hinged is None else 3 * i + kind
-    load = bodies.load if hinged is None else bodies.shares
-    put_more(load[row], 0, force)
-    put_more(load[row], 3, cross(sub(place, vector(bodies.position[i], 0)), force))
+    load = parts.load[row]
+    put_more(load, 0, force)
+    put_more(load, 3, cross(sub(place, vector(parts.motion[row], ORIGIN)), force))
 
 
 @inlined
-def enter(
-    ledger: Array, rows: tuple[int, int], owners: tuple[int, int], place: Vector, force: Vector, power: float,
-    gain: float,
-) -> None:  # fmt: skip
+def enter(ledger: Array, rows: tuple[int, int], place: Vector, force: Vector, power: float, gain: float) -> None:
     """Enter a force beyond a normal spring's, whose dissipation follows once velocities after it are known.
 
     Args:
         ledger: (n, LEDGER); row 0 begins with the number of rows in use.
-        rows: of the two bodies in `Bodies.motion`; -1 for a boundary.
-        owners: the two smarticles; -1 for a boundary.
+        rows: both parts; -1 for a boundary.
         place: point of contact [m].
         force: on the first one [N].
         power: half of its power with the velocities before [W].
-        gain: what its spring took up [J].
+        gain: energy that its spring took up [J].
     """
     n = int(ledger[0, 0]) + 1
     ledger[0, 0] = n
     row = ledger[n]
-    row[0], row[1], row[2], row[3] = rows[0], rows[1], owners[0], owners[1]
-    row[4], row[5], row[6] = place
-    row[7], row[8], row[9] = force
-    row[10], row[11] = power, gain
+    row[0], row[1] = rows
+    row[2], row[3], row[4] = place
+    row[5], row[6], row[7] = force
+    row[8], row[9] = power, gain
 
 
 @inlined
-def velocity_at(bodies: Bodies, i: int, row: int, place: Vector) -> Vector:
-    """Return the velocity of a point of a rigid body of smarticle i, whose `motion` has a row [m/s]."""
-    motion = bodies.motion[row]
-    return moving(vector(motion, 0), vector(motion, 3), sub(place, vector(bodies.position[i], 0)))
+def velocity_at(parts: Parts, row: int, place: Vector) -> Vector:
+    """Return the velocity of a point of a part [m/s]."""
+    motion = parts.motion[row]
+    return moving(vector(motion, VELOCITY), vector(motion, SPIN), sub(place, vector(motion, ORIGIN)))
 
 
 @inlined
-def motion_at(
-    bodies: Bodies, owners: tuple[int, int], rows: tuple[int, int], place: Vector, normal: Vector
-) -> tuple[Vector, float]:
-    """Return the velocity of one body against another at a point [m/s], and the sum of their turns [rad/s].
+def motion_at(parts: Parts, rows: tuple[int, int], place: Vector, normal: Vector) -> tuple[Vector, float]:
+    """Return the velocity of one part against another at a point [m/s], and the sum of their turns [rad/s].
 
     Args:
-        owners: the two smarticles.
-        rows: of the two bodies in `Bodies.motion`.
+        rows: both parts.
         place: the point [m].
         normal: that turns are about [1].
     """
-    one, other = bodies.motion[rows[0]], bodies.motion[rows[1]]
-    velocity = sub(velocity_at(bodies, owners[0], rows[0], place), velocity_at(bodies, owners[1], rows[1], place))
-    return velocity, dot(add(vector(one, 3), vector(other, 3)), normal)
+    velocity = sub(velocity_at(parts, rows[0], place), velocity_at(parts, rows[1], place))
+    one, other = parts.motion[rows[0]], parts.motion[rows[1]]
+    return velocity, dot(add(vector(one, SPIN), vector(other, SPIN)), normal)
 
 
 @inlined
-def _push_both(
-    bodies: Bodies, owners: tuple[int, int], kinds: tuple[int, int], hinged: Any, place: Vector, force: Vector
-) -> None:
-    push(bodies, owners[0], kinds[0], hinged, place, force)
-    push(bodies, owners[1], kinds[1], hinged, place, scale(-1.0, force))
+def _push_both(parts: Parts, rows: tuple[int, int], place: Vector, force: Vector) -> None:
+    push(parts, rows[0], place, force)
+    push(parts, rows[1], place, scale(-1.0, force))
 
 
 @inlined
 def _rub(
-    law: Law, bodies: Bodies, owners: tuple[int, int], kinds: tuple[int, int], hinged: Any, ledger: Any, step: Step,
+    law: Law, damping: float, parts: Parts, rows: tuple[int, int], ledger: Any, step: Step,
     place: Vector, normal: Vector, depth: float, load: float, carried: float, share: float, hardening: float,
     slip: Array,
 ) -> float:  # fmt: skip
-    """Let two links push each other apart at a point; the rate at which they close [m/s].
+    """Let two segments push each other apart at a point; the rate at which they close [m/s].
 
     Args:
-        bodies: the smarticles; `load` or `shares` is written.
-        owners: the two smarticles.
-        kinds: their links.
+        damping: cn of both bodies [N s/m].
+        parts: `load` is written.
+        rows: both parts.
         place: the point [m].
-        normal: from the second link to the first [1].
+        normal: from the second segment to the first [1].
         depth: overlap [m].
         load: of the normal spring [N].
         carried: the part of it that friction and dashpot go with [N].
@@ -142,64 +128,65 @@ def _rub(
         hardening: of the dashpot [1].
         slip: (4,) of the tangential spring; brought up to date.
     """
-    rows = owners
-    if hinged is not None:
-        rows = 3 * owners[0] + kinds[0], 3 * owners[1] + kinds[1]
-    velocity, turning = motion_at(bodies, owners, rows, place, normal)
+    velocity, turning = motion_at(parts, rows, place, normal)
     closing = -dot(velocity, normal)
     acting = share_of_step(depth, closing, step.past)
     load, carried = load * acting, carried * acting
     force, stored = (0.0, 0.0, 0.0), slip[3]
     if carried > 0.0:
         twist = 0.5 * step.past * turning
-        force = resist(law, carried, share, hardening, normal, velocity, twist, step.past, slip)
+        force = resist(law, damping, carried, share, hardening, normal, velocity, twist, step.past, slip)
         if ledger is not None:
-            enter(ledger, rows, owners, place, force, 0.5 * dot(force, velocity), slip[3] - stored)
-    _push_both(bodies, owners, kinds, hinged, place, along(force, load, normal))
+            enter(ledger, rows, place, force, 0.5 * dot(force, velocity), slip[3] - stored)
+    _push_both(parts, rows, place, along(force, load, normal))
     return closing
 
 
 @part
 def push_apart(
-    shape: Shape, law: Law, bodies: Bodies, pairs: Pairs, hinged: Any, ledger: Any, step: Step, out: Array
+    law: Law, bodies: Bodies, parts: Parts, segments: Segments, pairs: Pairs, ledger: Any, step: Step, out: Array
 ) -> float:
     """Add the forces of all pairs that touch.
 
     Args:
-        bodies: the smarticles; `load` or `shares`, and `deepest` are written.
+        bodies: `deepest` is written.
+        parts: `load` is written.
         pairs: pairs that may touch; `slip` and `used` are brought up to date.
         out: (ROWS, COLUMNS) scratch.
 
     Returns:
         Energy of tangential springs whose contacts have ended [J].
     """
-    segments, diameter, inverses = bodies.segments, 2 * shape.radius, shape.inverses
-    reach = diameter * diameter
-    lost = 0.0
-    for k in range(_find_touching(shape, bodies, pairs)):
+    line, lost = segments.line, 0.0
+    for k in range(_find_touching(line, pairs)):
         pair, s, t = pairs.touching[k], pairs.nearest[k, 0], pairs.nearest[k, 1]
         p, q = pairs.first[pair], pairs.second[pair]
-        i, j, kind_p, kind_q = pairs.owner[p], pairs.owner[q], pairs.kind[p], pairs.kind[q]
-        both = lines(segments[p], segments[q], inverses[kind_p], inverses[kind_q])
+        both, diameter = lines(line[p], line[q]), line[p, RADIUS] + line[q, RADIUS]
         gap = between(both, s, t)
-        squared = dot(gap, gap)
+        squared, reach = dot(gap, gap), diameter * diameter
         if squared >= reach:
             lost += _forget(pairs, pair, 7)
             continue
-        owners, kinds, distance = (i, j), (kind_p, kind_q), math.sqrt(squared)
-        depth, used, closing = diameter - distance, 1, 0.0
-        others = meets_elsewhere(both, reach, kind_p != 1, kind_q != 1)
+        i, j, rows, distance = (
+            segments.body[p],
+            segments.body[q],
+            (segments.part[p], segments.part[q]),
+            math.sqrt(squared),
+        )
+        depth, used, closing, damping = diameter - distance, 1, 0.0, law.damping[bodies.shape[i], bodies.shape[j]]
+        shared_p, shared_q = segments.shared[p], segments.shared[q]
+        others = meets_elsewhere(both, reach, shared_p, shared_q)
         if (others == 0) & (distance < diameter):
             # Nine of ten: one point, and nothing that a branch would have to be predicted for.
             place = scale(0.5, along(add(along(both.p, s, both.u), both.q), t, both.v))
             u, slope, hardening = stretch(depth, diameter)
             load = law.stiffness * u * slope
             closing = _rub(
-                law, bodies, owners, kinds, hinged, ledger, step, place, scale(1 / distance, gap), depth, load, load,
-                1.0, hardening, pairs.slip[pair, 0],
+                law, damping, parts, rows, ledger, step, place, scale(1 / distance, gap), depth, load, load, 1.0,
+                hardening, pairs.slip[pair, 0],
             )  # fmt: skip
         else:
-            bare = meet_at(both, s, t, gap, distance, diameter, law.stiffness, kind_p != 1, kind_q != 1, out)
+            bare = meet_at(both, s, t, gap, distance, diameter, law.stiffness, shared_p, shared_q, out)
             used = 0
             for slot in range(POINTS):
                 row = out[slot]
@@ -211,38 +198,37 @@ def push_apart(
                 if carried <= 0.0:
                     lost += _forget(pairs, pair, 1 << slot)
                 rate = _rub(
-                    law, bodies, owners, kinds, hinged, ledger, step, vector(row, PLACE), vector(row, NORMAL),
+                    law, damping, parts, rows, ledger, step, vector(row, PLACE), vector(row, NORMAL),
                     diameter - row[DISTANCE], load, carried, share, row[HARDENING], pairs.slip[pair, slot],
                 )  # fmt: skip
                 closing = max(closing, rate)
             for slot in range(POINTS, POINTS + bare):
-                _push_both(bodies, owners, kinds, hinged, vector(out[slot], PLACE), vector(out[slot], FORCE))
+                _push_both(parts, rows, vector(out[slot], PLACE), vector(out[slot], FORCE))
         if pairs.used[pair] & ~used:
             lost += _forget(pairs, pair, pairs.used[pair] & ~used)
         pairs.used[pair] = used
         resolve(step, depth, diameter, closing)
-        bodies.deepest[i] = max(bodies.deepest[i], depth)
-        bodies.deepest[j] = max(bodies.deepest[j], depth)
+        filled = depth / diameter
+        bodies.deepest[i] = max(bodies.deepest[i], filled)
+        bodies.deepest[j] = max(bodies.deepest[j], filled)
     return lost
 
 
 @inlined
-def _find_touching(shape: Shape, bodies: Bodies, pairs: Pairs) -> int:
+def _find_touching(line: Array, pairs: Pairs) -> int:
     """Write which of the near pairs touch, or did so in the last step, into `touching` and `nearest`; their number.
 
     Without a branch, which would be mispredicted.
     """
-    segments, kind, inverses, diameter = bodies.segments, pairs.kind, shape.inverses, 2 * shape.radius
-    reach = diameter * diameter
     count = 0
     for k in range(pairs.counts[1]):
         pair = pairs.near[k]
         p, q = pairs.first[pair], pairs.second[pair]
-        both: Lines = lines(segments[p], segments[q], inverses[kind[p]], inverses[kind[q]])
+        both, reach = lines(line[p], line[q]), line[p, RADIUS] + line[q, RADIUS]
         s, t = nearest(both)
         gap = between(both, s, t)
         pairs.touching[count], pairs.nearest[count, 0], pairs.nearest[count, 1] = pair, s, t
-        count += (dot(gap, gap) < reach) | (pairs.used[pair] != 0)
+        count += (dot(gap, gap) < reach * reach) | (pairs.used[pair] != 0)
     return count
 
 

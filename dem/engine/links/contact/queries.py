@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 from typing import Any, NamedTuple
 
-from dem.engine.links.arrays import Array, Bodies, Boundaries, Indices, Kept, Pairs, System
+from dem.engine.links.arrays import Array, Ground, Indices, Kept, Pairs, Segments, System
 from dem.engine.links.compiler import inlined, kernel, part
 from dem.engine.links.contact import boundaries as rows_of
 from dem.engine.links.contact.barrier import stretch
@@ -30,7 +30,7 @@ from dem.engine.links.contact.meeting import (
     meet,
 )  # fmt: skip
 from dem.engine.links.contact.pairs import motion_at
-from dem.engine.links.shape import Shape
+from dem.engine.links.shapes import RADIUS
 from dem.engine.links.vectors import Vector, along, dot, put, scale, sub, vector
 
 FASTEST, LOWEST, HIGHEST, WIDEST, DEEPEST, BETWEEN, ELASTIC = range(7)  # places in what `find_extremes` writes
@@ -46,30 +46,26 @@ SLOT, PART, DEPTH, FACTOR, ROOM, AT, PARTLY = (
 
 
 class Found(NamedTuple):
-    """What a query of all contacts writes."""
+    """Results of a query of all contacts."""
 
-    met: Indices  #: (P, 2) numbers of the smarticles whose links touch, in order
-    touches: Any  #: (N,) points of contact of each smarticle; added to
-    held: Any  #: (N, 6) whether each smarticle touches each boundary
-    #: (N,) deepest contact of each smarticle [m]; at a boundary the equal share of the room in which axis and surface
-    #: meet
-    depth: Array
+    met: Indices  #: (P, 2) numbers of the bodies whose segments touch, in order
+    touches: Any  #: (N,) points of contact of each body; added to
+    held: Any  #: (N, 6) whether each body touches each boundary
+    depth: Array  #: (N,) deepest contact of each body, over the overlap at which axes, or axis and surface, meet [1]
     out: Array  #: Scratch of `meet`
-    rows: Array  #: Scratch of `contacts_of_link`
+    rows: Array  #: Scratch of `contacts_of_segment`
 
 
 @part
-def _query_pairs(shape: Shape, bodies: Bodies, pairs: Pairs, stiffness: float, found: Found) -> tuple[int, float]:
+def _query_pairs(segments: Segments, pairs: Pairs, stiffness: float, found: Found) -> tuple[int, float]:
     """Query all pairs of the wide list; rows of `met` that were written, and the energy of all normal springs [J]."""
-    links, each = shape.kinds.shape[0], shape.kinds.shape[0] * shape.offsets.shape[0]
-    diameter, count, energy, out = 2 * shape.radius, 0, 0.0, found.out
+    line, count, energy, out = segments.line, 0, 0.0, found.out
     for k in range(pairs.counts[0]):
         p, q = pairs.first[k], pairs.second[k]
-        bend_p, bend_q = shape.kinds[p % links] != 1, shape.kinds[q % links] != 1
-        if meet(bodies.segments[p], bodies.segments[q], diameter, stiffness, bend_p, bend_q, out) == 0:
+        if meet(line[p], line[q], stiffness, segments.shared[p], segments.shared[q], out) == 0:
             continue
         energy += out[ENERGY, 0]
-        i, j, points = p // each, q // each, 0
+        i, j, points = segments.body[p], segments.body[q], 0
         for slot in range(POINTS):
             if out[slot, SHARE] > 0.0 and out[slot, CARRIED] > 0.0:
                 points += 1
@@ -79,28 +75,39 @@ def _query_pairs(shape: Shape, bodies: Bodies, pairs: Pairs, stiffness: float, f
         count += 1
         for body in (i, j):
             found.touches[body] += points
-            found.depth[body] = max(found.depth[body], out[ENERGY, 1])
+            found.depth[body] = max(found.depth[body], out[ENERGY, 1] / (line[p, RADIUS] + line[q, RADIUS]))
     return count, energy
 
 
 @part
-def _query_boundaries(shape: Shape, bodies: Bodies, boundaries: Boundaries, stiffness: float, found: Found) -> float:
+def _query_boundaries(
+    segments: Segments, ground: Ground, channel: Any, hooks: Any, rims: Any, stiffness: float, found: Found
+) -> float:
     """Query all contacts with boundaries; the energy of all normal springs [J]."""
-    segments, each, squares = bodies.segments, shape.kinds.shape[0] * shape.offsets.shape[0], 0.0
-    for p in range(segments.shape[0]):
-        i = p // each
-        count = contacts_with_boundaries(
-            shape, segments, boundaries.ground, boundaries.channel, boundaries.hooks, boundaries.rims, p, found.rows,
-            found.out,
-        )  # fmt: skip
+    squares = 0.0
+    for p in range(segments.line.shape[0]):
+        i, count = (
+            segments.body[p],
+            contacts_with_boundaries(segments, ground, channel, hooks, rims, p, found.rows, found.out),
+        )
         for k in range(count):
             contact = found.rows[k]
             found.touches[i] += 1
             found.held[i, int(contact[PART])] = True
-            found.depth[i] = max(found.depth[i], 2 * shape.radius * contact[DEPTH] / contact[ROOM])
+            found.depth[i] = max(found.depth[i], contact[DEPTH] / max(contact[ROOM], segments.line[p, RADIUS]))
             u, _, _ = stretch(contact[DEPTH], contact[ROOM])
             squares += u * u * contact[FACTOR]
     return 0.5 * stiffness * squares
+
+
+@part
+def _query(system: System, found: Found) -> tuple[int, float]:
+    """Query all contacts; rows of `met` that were written, and the energy of all normal springs [J]."""
+    count, energy = _query_pairs(system.segments, system.pairs, system.law.stiffness, found)
+    known = system.boundaries
+    return count, energy + _query_boundaries(
+        system.segments, known.ground, known.channel, known.hooks, known.rims, system.wall_law.stiffness, found
+    )
 
 
 @kernel
@@ -111,11 +118,10 @@ def query_all(system: System, found: Found) -> tuple[int, float]:
         found: written.
 
     Returns:
-        Rows of `met` that were written, and the energy of all normal springs [J].
+        Rows of `met` that were written, and the energy of all springs [J].
     """
-    count, energy = _query_pairs(system.shape, system.bodies, system.pairs, system.law.stiffness, found)
-    energy += _query_boundaries(system.shape, system.bodies, system.boundaries, system.wall_law.stiffness, found)
-    return count, energy
+    count, energy = _query(system, found)
+    return count, energy + _sheared(system.pairs, system.kept)
 
 
 @kernel
@@ -126,13 +132,13 @@ def find_extremes(system: System, velocities: Array, found: Found, extremes: Arr
         velocities: (N, 3, 3) of the links' centres [m/s].
         found: scratch, with zeros as depths.
         extremes: (7,) written: largest speed of a link [m/s]; height of the lowest and of the highest end of an axis
-            [m]; distance of the farthest one from the vertical axis [m]; deepest contact now and between two queries
-            [m]; energy of all springs of contacts [J]. A speed that is no number makes the first one no number.
+            [m]; distance of the farthest one from the vertical axis [m]; deepest contact now and between two queries,
+            over the overlap at which axes meet [1]; energy of all springs of contacts [J]. A speed that is no number
+            makes the first one no number.
     """
-    bodies, pairs, kept = system.bodies, system.pairs, system.kept
-    _, energy = _query_pairs(system.shape, bodies, pairs, system.law.stiffness, found)
-    energy += _query_boundaries(system.shape, bodies, system.boundaries, system.wall_law.stiffness, found)
-    energy += _sheared(pairs, kept)
+    bodies, line = system.bodies, system.segments.line
+    _, energy = _query(system, found)
+    energy += _sheared(system.pairs, system.kept)
     fastest, total = 0.0, 0.0
     for i in range(velocities.shape[0]):
         for link in range(3):
@@ -141,10 +147,9 @@ def find_extremes(system: System, velocities: Array, found: Found, extremes: Arr
             total += square
             fastest = max(fastest, square)
     lowest, highest, widest = math.inf, -math.inf, 0.0
-    segments = bodies.segments
-    for p in range(segments.shape[0]):
+    for p in range(line.shape[0]):
         for end in range(2):
-            x, y, z = along(vector(segments[p], 0), end, vector(segments[p], 3))
+            x, y, z = along(vector(line[p], 0), end, vector(line[p], 3))
             lowest, highest, widest = min(lowest, z), max(highest, z), max(widest, x * x + y * y)
     deepest, between = 0.0, 0.0
     for i in range(found.depth.shape[0]):
@@ -209,26 +214,26 @@ def _copy(slip: Array, kept: Array) -> None:
 
 
 @kernel
-def forces_of_pairs(system: System, out: Array, slip: Array, rows: Array) -> int:
-    """Write the forces of smarticles on each other.
+def forces_of_pairs(system: System, links: Indices, out: Array, slip: Array, rows: Array) -> int:
+    """Write the forces of bodies on each other.
 
     Args:
+        links: (Q,) number that each segment's link is recorded with.
         slip: (4,) scratch.
         rows: (…, WIDTH) written.
 
     Returns:
         Rows that were written, or would have been: there may be more than there is room for.
     """
-    shape, law, bodies, pairs = system.shape, system.law, system.bodies, system.pairs
-    links, each = shape.kinds.shape[0], shape.kinds.shape[0] * shape.offsets.shape[0]
-    diameter, count = 2 * shape.radius, 0
+    law, bodies, parts, segments, pairs = system.law, system.bodies, system.parts, system.segments, system.pairs
+    line, count = segments.line, 0
     for k in range(pairs.counts[0]):
         p, q = pairs.first[k], pairs.second[k]
-        i, j, kind_p, kind_q = p // each, q // each, shape.kinds[p % links], shape.kinds[q % links]
-        met = meet(bodies.segments[p], bodies.segments[q], diameter, law.stiffness, kind_p != 1, kind_q != 1, out)
+        met = meet(line[p], line[q], law.stiffness, segments.shared[p], segments.shared[q], out)
         if met == 0:
             continue
-        first, second = 3 * i + kind_p, 3 * j + kind_q
+        i, j, moving = segments.body[p], segments.body[q], (segments.part[p], segments.part[q])
+        damping, first, second = law.damping[bodies.shape[i], bodies.shape[j]], links[p], links[q]
         for slot in range(POINTS):
             row = out[slot]
             share, load, carried = row[SHARE], row[LOAD], row[CARRIED]
@@ -236,11 +241,10 @@ def forces_of_pairs(system: System, out: Array, slip: Array, rows: Array) -> int
                 continue
             place, normal, force = vector(row, PLACE), vector(row, NORMAL), (0.0, 0.0, 0.0)
             if carried > 0.0:
-                moves = (first, second) if system.motors is not None else (i, j)
-                velocity, _ = motion_at(bodies, (i, j), moves, place, normal)
+                velocity, _ = motion_at(parts, moving, place, normal)
                 _copy(slip, pairs.slip[k, slot])
                 share = share if carried == load else share * carried / load
-                force = resist(law, carried, share, row[HARDENING], normal, velocity, 0.0, 0.0, slip)
+                force = resist(law, damping, carried, share, row[HARDENING], normal, velocity, 0.0, 0.0, slip)
             count = _write(rows, count, first, second, load, carried, place, normal, force)
         for bare in range(POINTS, POINTS + met - 1):
             # A spring's, without a normal of its own: nothing of it is friction.
@@ -252,30 +256,29 @@ def forces_of_pairs(system: System, out: Array, slip: Array, rows: Array) -> int
 
 
 @kernel
-def forces_of_boundaries(system: System, out: Array, contacts: Array, slip: Array, rows: Array) -> int:
-    """Write the forces of boundaries on smarticles; see `forces_of_pairs`.
+def forces_of_boundaries(system: System, links: Indices, out: Array, contacts: Array, slip: Array, rows: Array) -> int:
+    """Write the forces of boundaries on bodies; see `forces_of_pairs`.
 
     Args:
-        contacts: scratch of `contacts_of_link`.
+        links: (Q,) number that each segment's link is recorded with.
+        contacts: scratch of `contacts_of_segment`.
         slip: (4,) scratch.
         rows: (…, WIDTH) written.
     """
-    shape, law, bodies, boundaries = system.shape, system.wall_law, system.bodies, system.boundaries
-    segments, links, count = bodies.segments, shape.kinds.shape[0], 0
-    for p in range(segments.shape[0]):
-        i, kind = p // (links * shape.offsets.shape[0]), shape.kinds[p % links]
-        moves = 3 * i + kind if system.motors is not None else i
+    law, segments, known, count = system.wall_law, system.segments, system.boundaries, 0
+    for p in range(segments.line.shape[0]):
+        radius, damping = segments.line[p, RADIUS], law.damping[system.bodies.shape[segments.body[p]], 0]
         number = contacts_with_boundaries(
-            shape, segments, boundaries.ground, boundaries.channel, boundaries.hooks, boundaries.rims, p, contacts, out
+            segments, known.ground, known.channel, known.hooks, known.rims, p, contacts, out
         )
         for k in range(number):
             contact = contacts[k]
             share, normal = contact[PARTLY], vector(contact, AT)
-            place, velocity, speed, _ = place_and_motion(shape, bodies, boundaries.ground, i, moves, contact)
+            place, velocity, speed, _ = place_and_motion(radius, system.parts, known.ground, segments.part[p], contact)
             relative = velocity[0], velocity[1], velocity[2] - speed
             _copy(slip, system.kept.slip[p, int(contact[SLOT])])
             u, slope, hardening = stretch(contact[DEPTH], contact[ROOM])
             load = law.stiffness * u * slope * share
-            force = resist(law, load, share, hardening, normal, relative, 0.0, 0.0, slip)
-            count = _write(rows, count, 3 * i + kind, -1 - contact[PART], load, load, place, normal, force)
+            force = resist(law, damping, load, share, hardening, normal, relative, 0.0, 0.0, slip)
+            count = _write(rows, count, links[p], -1 - contact[PART], load, load, place, normal, force)
     return count

@@ -18,22 +18,23 @@ from __future__ import annotations
 
 import math
 
-from dem.engine.links.arrays import Array, Bodies, Motoring
+from dem.engine.links.arrays import Array, Bodies, Motoring, Parts
 from dem.engine.links.compiler import inlined, kernel, part
 from dem.engine.links.motion.planar import (
     inverses,
     lagrange_force,
-    lay_out,
     lay_out_at,
     lay_out_near,
     mobility,
     momenta,
+    planar_at,
     rates,
     spin_by,
     spin_of,
 )
-from dem.engine.links.motion.poses import SLIP, along_normal, turn_axes
-from dem.engine.links.shape import Shape
+from dem.engine.links.motion.poses import SLIP, along_normal, turn_axes, turned_back
+from dem.engine.links.shapes import Planar, Shapes
+from dem.engine.links.vectors import vector
 from dem.physics import motor
 
 BRAKING = 0.5  # of the greatest deceleration is used on the way to a target, so that it is not passed
@@ -42,10 +43,12 @@ ITERATIONS = 3  # of the implicit midpoint rule; each gains the factor of the tu
 
 
 @kernel
-def engage(shape: Shape, bodies: Bodies, motors: Motoring) -> None:
+def engage(shapes: Shapes, bodies: Bodies, motors: Motoring) -> None:
     """Take hold of the barbs where they are, without torque; `motors` and `rate` are written."""
     for i in range(bodies.position.shape[0]):
-        lay_out(shape, bodies.alpha[i, 0], bodies.alpha[i, 1], bodies.plane[i])
+        if not shapes.hinged[bodies.shape[i]]:
+            continue
+        lay_out_at(planar_at(shapes, bodies.shape[i]), bodies.alpha[i, 0], bodies.alpha[i, 1], bodies.plane[i])
         turn_axes(bodies, i)
         p1, p2 = momenta(bodies.plane[i], along_normal(bodies, i), 0.0, 0.0)
         motors.momentum[i, 0], motors.momentum[i, 1] = p1, p2
@@ -59,15 +62,17 @@ def engage(shape: Shape, bodies: Bodies, motors: Motoring) -> None:
 
 
 @kernel
-def release(shape: Shape, bodies: Bodies, motors: Motoring) -> float:
+def release(shapes: Shapes, bodies: Bodies, motors: Motoring) -> float:
     """Stop all barbs at once: smarticles become rigid. `rate` is written, work up to now is counted.
 
     Returns:
         Kinetic energy of the links' motion against each other [J], which is lost.
     """
     lost = 0.0
-    note(shape, bodies, motors)
+    note(shapes, bodies, motors)
     for i in range(bodies.position.shape[0]):
+        if not shapes.hinged[bodies.shape[i]]:
+            continue
         row, normal = bodies.plane[i], along_normal(bodies, i)
         p1, p2 = momenta(row, normal, bodies.rate[i, 0], bodies.rate[i, 1])
         q1, q2 = momenta(row, normal, 0.0, 0.0)
@@ -77,15 +82,17 @@ def release(shape: Shape, bodies: Bodies, motors: Motoring) -> float:
 
 
 @kernel
-def note(shape: Shape, bodies: Bodies, motors: Motoring) -> None:
+def note(shapes: Shapes, bodies: Bodies, motors: Motoring) -> None:
     """Count torque and work since the last control update; `motors` is written, poses are brought up to date."""
-    _note(bodies, motors)
+    _note(shapes, bodies, motors)
 
 
 @inlined
-def _note(bodies: Bodies, motors: Motoring) -> None:
+def _note(shapes: Shapes, bodies: Bodies, motors: Motoring) -> None:
     elapsed = motors.elapsed[0]
     for i in range(bodies.position.shape[0]):
+        if not shapes.hinged[bodies.shape[i]]:
+            continue
         row = bodies.plane[i]
         turn_axes(bodies, i)
         normal = along_normal(bodies, i)
@@ -107,10 +114,12 @@ def _note(bodies: Bodies, motors: Motoring) -> None:
 
 
 @kernel
-def work_so_far(shape: Shape, bodies: Bodies, motors: Motoring) -> float:
+def work_so_far(shapes: Shapes, bodies: Bodies, motors: Motoring) -> float:
     """Work of all motors up to now [J]; poses are brought up, nothing else is written."""
     total = 0.0
     for i in range(bodies.position.shape[0]):
+        if not shapes.hinged[bodies.shape[i]]:
+            continue
         row = bodies.plane[i]
         turn_axes(bodies, i)
         p = momenta(row, along_normal(bodies, i), bodies.rate[i, 0], bodies.rate[i, 1])
@@ -123,7 +132,7 @@ def work_so_far(shape: Shape, bodies: Bodies, motors: Motoring) -> float:
 
 
 @part
-def update(shape: Shape, bodies: Bodies, motors: Motoring) -> None:
+def update(shapes: Shapes, bodies: Bodies, motors: Motoring) -> None:
     """What the motors do in the control period that begins now, by the row of `targets` that is due.
 
     Where nobody has told what comes after the last row they go on by it.
@@ -133,8 +142,10 @@ def update(shape: Shape, bodies: Bodies, motors: Motoring) -> None:
     """
     now, interval = min(motors.due[0], motors.targets.shape[0] - 1), motors.interval
     motors.due[0], motors.due[1] = now + 1, motors.period
-    _note(bodies, motors)
+    _note(shapes, bodies, motors)
     for i in range(bodies.position.shape[0]):
+        if not shapes.hinged[bodies.shape[i]]:
+            continue
         r1, r2 = bodies.rate[i, 0], bodies.rate[i, 1]
         for k in range(2):
             target = motors.targets[now, i, k]
@@ -176,28 +187,30 @@ def _prescribed(bodies: Bodies, motors: Motoring, i: int, k: int, target: float,
 
 
 @inlined
-def contact_torques(shape: Shape, bodies: Bodies, i: int) -> tuple[float, float]:
-    """Generalised forces of contacts on the angles [N m].
+def contact_torques(planar: Planar, bodies: Bodies, parts: Parts, i: int) -> tuple[float, float]:
+    """Return the generalised forces of contacts on the angles [N m].
 
     All points of a smarticle move as an angle turns, since the centre of mass does not.
     """
-    axes, load, row = bodies.axes, bodies.load, bodies.plane[i]
-    share = shape.barb_mass / shape.mass
-    fx = axes[i, 0, 0] * load[i, 0] + axes[i, 1, 0] * load[i, 1] + axes[i, 2, 0] * load[i, 2]
-    fy = axes[i, 0, 1] * load[i, 0] + axes[i, 1, 1] * load[i, 1] + axes[i, 2, 1] * load[i, 2]
+    row, share, first = bodies.plane[i], planar.barb_mass / planar.mass, parts.begin[i]
+    fx, fy, _ = turned_back(bodies, i, vector(bodies.load[i], 0))
     return (
-        -_about_hinge(bodies, i, 0, -shape.half - row[0], -row[1]) - share * (row[6] * fx + row[7] * fy),
-        _about_hinge(bodies, i, 2, shape.half - row[0], -row[1]) - share * (row[8] * fx + row[9] * fy),
+        -_about_hinge(bodies, parts, i, first, -planar.half - row[0], -row[1]) - share * (row[6] * fx + row[7] * fy),
+        _about_hinge(bodies, parts, i, first + 2, planar.half - row[0], -row[1]) - share * (row[8] * fx + row[9] * fy),
     )
 
 
 @inlined
-def _about_hinge(bodies: Bodies, i: int, kind: int, x: float, y: float) -> float:
-    """Torque of contacts on a barb along the normal, about the hinge at (x, y) [m] from the centre of mass [N m]."""
-    axes, row = bodies.axes, bodies.shares[3 * i + kind]
-    fx = axes[i, 0, 0] * row[0] + axes[i, 1, 0] * row[1] + axes[i, 2, 0] * row[2]
-    fy = axes[i, 0, 1] * row[0] + axes[i, 1, 1] * row[1] + axes[i, 2, 1] * row[2]
-    torque = axes[i, 0, 2] * row[3] + axes[i, 1, 2] * row[4] + axes[i, 2, 2] * row[5]
+def _about_hinge(bodies: Bodies, parts: Parts, i: int, row: int, x: float, y: float) -> float:
+    """Return the torque of contacts on a barb about its hinge, along the normal [N m].
+
+    Args:
+        row: part that the barb is.
+        x: of the hinge, from the centre of mass [m].
+        y: of the hinge, from the centre of mass [m].
+    """
+    fx, fy, _ = turned_back(bodies, i, vector(parts.load[row], 0))
+    _, _, torque = turned_back(bodies, i, vector(parts.load[row], 3))
     return float(torque - (x * fy - y * fx))
 
 
@@ -237,7 +250,7 @@ def free_torques(bodies: Bodies, motors: Motoring, i: int, r1: float, r2: float,
 
 @inlined
 def middle_of_step(
-    shape: Shape, bodies: Bodies, motors: Motoring, i: int, dt: float, row: Array
+    planar: Planar, bodies: Bodies, motors: Motoring, i: int, dt: float, row: Array
 ) -> tuple[float, float, float]:
     """Let a smarticle turn and its angles change for a step, its momentum constant; the implicit midpoint rule.
 
@@ -250,16 +263,12 @@ def middle_of_step(
     Returns:
         ω at the middle of the step, in the middle link's axes [rad/s].
     """
-    axes, momentum = bodies.axes, bodies.momentum
-    m0, m1, m2 = momentum[i, 0], momentum[i, 1], momentum[i, 2]
-    l0 = axes[i, 0, 0] * m0 + axes[i, 1, 0] * m1 + axes[i, 2, 0] * m2
-    l1 = axes[i, 0, 1] * m0 + axes[i, 1, 1] * m1 + axes[i, 2, 1] * m2
-    l2 = axes[i, 0, 2] * m0 + axes[i, 1, 2] * m1 + axes[i, 2, 2] * m2
+    l0, l1, l2 = turned_back(bodies, i, vector(bodies.momentum[i], 0))
     free = motors.law >= SLIP
     r1, r2 = bodies.rate[i, 0], bodies.rate[i, 1]
     p1, p2 = motors.momentum[i, 0], motors.momentum[i, 1]
     half, x, y, z = 0.5 * dt, l0, l1, l2
-    lay_out_near(shape, half * r1, half * r2, bodies.plane[i], row)
+    lay_out_near(planar, half * r1, half * r2, bodies.plane[i], row)
     if not free:
         flat, normal = inverses(row)
         internal = row[18] * r1 + row[19] * r2
@@ -267,18 +276,18 @@ def middle_of_step(
             wx, wy, wz = spin_by(row, flat, normal, x, y, z, internal)
             x, y, z = l0 + half * (y * wz - z * wy), l1 + half * (z * wx - x * wz), l2 + half * (x * wy - y * wx)
         wx, wy, wz = spin_by(row, flat, normal, x, y, z, internal)
-        motors.impulse[i, 0] += dt * lagrange_force(shape, row, 0, wx, wy, wz, r1, r2)
-        motors.impulse[i, 1] += dt * lagrange_force(shape, row, 1, wx, wy, wz, r1, r2)
+        motors.impulse[i, 0] += dt * lagrange_force(planar, row, 0, wx, wy, wz, r1, r2)
+        motors.impulse[i, 1] += dt * lagrange_force(planar, row, 1, wx, wy, wz, r1, r2)
     else:
         g1, g2 = 0.0, 0.0
         for turn in range(ITERATIONS):
             if turn:
-                lay_out_near(shape, half * r1, half * r2, bodies.plane[i], row)
+                lay_out_near(planar, half * r1, half * r2, bodies.plane[i], row)
             r1, r2 = rates(row, z, p1 + half * g1, p2 + half * g2)
             wx, wy, wz = spin_of(row, x, y, z, row[18] * r1 + row[19] * r2)
             g1, g2 = (
-                lagrange_force(shape, row, 0, wx, wy, wz, r1, r2),
-                lagrange_force(shape, row, 1, wx, wy, wz, r1, r2),
+                lagrange_force(planar, row, 0, wx, wy, wz, r1, r2),
+                lagrange_force(planar, row, 1, wx, wy, wz, r1, r2),
             )
             x, y, z = l0 + half * (y * wz - z * wy), l1 + half * (z * wx - x * wz), l2 + half * (x * wy - y * wx)
         wx, wy, wz = spin_of(row, x, y, z, row[18] * r1 + row[19] * r2)
@@ -288,5 +297,5 @@ def middle_of_step(
     if r1 != 0.0 or r2 != 0.0:
         bodies.alpha[i, 0] += dt * r1
         bodies.alpha[i, 1] += dt * r2
-        lay_out_at(shape, bodies.alpha[i, 0], bodies.alpha[i, 1], bodies.plane[i])
+        lay_out_at(planar, bodies.alpha[i, 0], bodies.alpha[i, 1], bodies.plane[i])
     return wx, wy, wz

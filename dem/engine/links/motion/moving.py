@@ -1,6 +1,6 @@
-"""One step of the smarticles: momenta change by the forces of this instant, then everything moves.
+"""One step of the bodies: momenta change by the forces of this instant, then everything moves.
 
-Leapfrog: momenta of the middle of a step, positions of its ends. Between kicks a smarticle keeps its angular momentum
+Leapfrog: momenta of the middle of a step, positions of its ends. Between kicks a body keeps its angular momentum
 in the laboratory exactly; it turns by the implicit midpoint rule for L' = L × ω, which keeps L² and the kinetic energy
 L·I⁻¹L/2 as well, both being quadratic: free spins keep their energy for ever. The turn is Cayley's, which moves L in
 the body frame by just that rule.
@@ -11,41 +11,52 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from dem.engine.links.arrays import Array, Bodies
+from dem.engine.links.arrays import Array, Bodies, Parts, Segments
 from dem.engine.links.compiler import inlined, part
 from dem.engine.links.contact.barrier import LONGEST, STRIDE, Step
 from dem.engine.links.contact.pairs import velocity_at
 from dem.engine.links.motion.motoring import ITERATIONS, contact_torques, free_torques, middle_of_step
-from dem.engine.links.motion.planar import rates, spin_of
-from dem.engine.links.motion.poses import SLIP, along_normal
-from dem.engine.links.shape import Shape
+from dem.engine.links.motion.planar import planar_at, rates, spin_of
+from dem.engine.links.motion.poses import SLIP, along_normal, turned_back
+from dem.engine.links.shapes import Shapes
 from dem.engine.links.vectors import along, dot, vector
 
 
+@inlined
+def gather(bodies: Bodies, parts: Parts) -> None:
+    """Write the sum of the loads on each body's parts into its `load`."""
+    for i in range(bodies.position.shape[0]):
+        for d in range(6):
+            bodies.load[i, d] = 0.0
+        for row in range(parts.begin[i], parts.begin[i + 1]):
+            for d in range(6):
+                bodies.load[i, d] += parts.load[row, d]
+
+
 @part
-def kick(shape: Shape, bodies: Bodies, motors: Any, gravity: float, planar: bool, past: float, dt: float) -> None:
-    """Change momenta by the forces in `load` or `shares`, by weight and by motors.
+def kick(
+    shapes: Shapes, bodies: Bodies, parts: Parts, motors: Any, gravity: float, planar: bool, past: float, dt: float
+) -> None:
+    """Change momenta by the forces in `load`, by weight and by motors.
 
     Args:
-        bodies: the smarticles; `velocity`, `momentum` and, while articulated, `load` are written.
+        bodies: `velocity` and `momentum` are written.
+        parts: loads on barbs.
         motors: None while welded; `impulse`, and for free angles `momentum` and `work`, are written.
         past: length of the last sub-step [s].
         dt: time over which they act [s], half of the last and half of the next sub-step.
     """
-    velocity, momentum, load = bodies.velocity, bodies.momentum, bodies.load
-    share, across = dt / shape.mass, 0.0 if planar else 1.0
+    velocity, momentum, load, across = bodies.velocity, bodies.momentum, bodies.load, 0.0 if planar else 1.0
     for i in range(velocity.shape[0]):
-        if motors is not None:
-            for d in range(6):
-                load[i, d] = bodies.shares[3 * i, d] + bodies.shares[3 * i + 1, d] + bodies.shares[3 * i + 2, d]
+        share = dt / shapes.mass[bodies.shape[i]]
         velocity[i, 0] += share * load[i, 0]
         velocity[i, 1] += share * load[i, 1]
         velocity[i, 2] += across * (share * load[i, 2] - dt * gravity)
         momentum[i, 0] += across * dt * load[i, 3]
         momentum[i, 1] += across * dt * load[i, 4]
         momentum[i, 2] += dt * load[i, 5]
-        if motors is not None:
-            q1, q2 = contact_torques(shape, bodies, i)
+        if motors is not None and shapes.hinged[bodies.shape[i]]:
+            q1, q2 = contact_torques(planar_at(shapes, bodies.shape[i]), bodies, parts, i)
             if motors.law < SLIP:
                 motors.impulse[i, 0] += dt * q1
                 motors.impulse[i, 1] += dt * q2
@@ -69,52 +80,47 @@ def kick(shape: Shape, bodies: Bodies, motors: Any, gravity: float, planar: bool
 
 
 @part
-def resolve_speeds(shape: Shape, bodies: Bodies, hinged: bool, gravity: float, step: Step) -> None:
-    """Ask for sub-steps where a link would move far in a step, and enter another one too deep at once.
+def resolve_speeds(
+    shapes: Shapes, bodies: Bodies, parts: Parts, segments: Segments, gravity: float, step: Step
+) -> None:
+    """Ask for sub-steps where a segment would move far in a step, and enter another one too deep at once.
 
     Args:
-        bodies: the smarticles, with the loads of this instant.
-        hinged: whether links have velocities of their own.
+        bodies: with the loads of this instant.
         step: `need` is written.
     """
-    velocity, spin, load, limit = bodies.velocity, bodies.spin, bodies.load, LONGEST * shape.radius
-    per_force, square = step.whole / shape.mass, limit * limit / (3.0 * step.whole * step.whole)
+    velocity, spin, load = bodies.velocity, bodies.spin, bodies.load
     for i in range(velocity.shape[0]):
-        fx, fy, fz = load[i, 0], load[i, 1], load[i, 2]
-        if hinged:
-            fx = bodies.shares[3 * i, 0] + bodies.shares[3 * i + 1, 0] + bodies.shares[3 * i + 2, 0]
-            fy = bodies.shares[3 * i, 1] + bodies.shares[3 * i + 1, 1] + bodies.shares[3 * i + 2, 1]
-            fz = bodies.shares[3 * i, 2] + bodies.shares[3 * i + 1, 2] + bodies.shares[3 * i + 2, 2]
-        gain = per_force * per_force * (fx * fx + fy * fy + fz * fz)
+        k = bodies.shape[i]
+        limit, reach, per_force = LONGEST * shapes.radius[k], shapes.reach[k], step.whole / shapes.mass[k]
+        gain = per_force * per_force * (load[i, 0] ** 2 + load[i, 1] ** 2 + load[i, 2] ** 2)
         speed = velocity[i, 0] ** 2 + velocity[i, 1] ** 2 + velocity[i, 2] ** 2
-        turning = shape.reach * shape.reach * (spin[i, 0] ** 2 + spin[i, 1] ** 2 + spin[i, 2] ** 2)
+        turning = reach * reach * (spin[i, 0] ** 2 + spin[i, 1] ** 2 + spin[i, 2] ** 2)
         # A sum of three is at most the root of three times their squares: most are slow, and need no root.
-        if gain + speed + turning > square:
-            stride = step.whole * (_fastest_end(shape, bodies, i, hinged) + math.sqrt(gain) + step.whole * gravity)
+        if (gain + speed + turning) * (3.0 * step.whole * step.whole) > limit * limit:
+            stride = step.whole * (_fastest_end(parts, segments, i) + math.sqrt(gain) + step.whole * gravity)
             if stride > limit:
-                step.need[0] = max(step.need[0], stride / (STRIDE * shape.radius))
+                step.need[0] = max(step.need[0], stride / (STRIDE * shapes.radius[k]))
 
 
 @part
-def _fastest_end(shape: Shape, bodies: Bodies, i: int, hinged: bool) -> float:
-    """Greatest speed of an end of a link's axis [m/s] as the step began: a rod that rolls moves no axis by it."""
-    links, segments, most = shape.kinds.shape[0], bodies.segments, 0.0
-    each = links * shape.offsets.shape[0]
-    for p in range(each * i, each * (i + 1)):
-        row = 3 * i + shape.kinds[p % links] if hinged else i
+def _fastest_end(parts: Parts, segments: Segments, i: int) -> float:
+    """Greatest speed of an end of a segment's axis [m/s] as the step began: a rod that rolls moves no axis by it."""
+    most = 0.0
+    for p in range(segments.begin[i], segments.begin[i + 1]):
         for end in range(2):
-            place = along(vector(segments[p], 0), end, vector(segments[p], 3))
-            velocity = velocity_at(bodies, i, row, place)
+            place = along(vector(segments.line[p], 0), end, vector(segments.line[p], 3))
+            velocity = velocity_at(parts, segments.part[p], place)
             most = max(most, dot(velocity, velocity))
     return math.sqrt(most)
 
 
 @part
-def drift(shape: Shape, bodies: Bodies, motors: Any, dt: float, row: Array) -> None:
-    """Move and turn all smarticles by a step.
+def drift(shapes: Shapes, bodies: Bodies, motors: Any, dt: float, row: Array) -> None:
+    """Move and turn all bodies by a step.
 
     Args:
-        bodies: the smarticles; `position`, `turn` and, while articulated, `alpha` are written.
+        bodies: `position`, `turn` and, while articulated, `alpha` are written.
         dt: time step [s].
         row: (PLANE,) scratch.
     """
@@ -122,8 +128,8 @@ def drift(shape: Shape, bodies: Bodies, motors: Any, dt: float, row: Array) -> N
     for i in range(position.shape[0]):
         for d in range(3):
             position[i, d] += dt * velocity[i, d]
-        if motors is not None:
-            wx, wy, wz = middle_of_step(shape, bodies, motors, i, dt, row)
+        if motors is not None and shapes.hinged[bodies.shape[i]]:
+            wx, wy, wz = middle_of_step(planar_at(shapes, bodies.shape[i]), bodies, motors, i, dt, row)
         else:
             wx, wy, wz = _rigid(bodies, i, dt)
         a, b, c, d = turn[i, 0], turn[i, 1], turn[i, 2], turn[i, 3]
@@ -138,13 +144,10 @@ def drift(shape: Shape, bodies: Bodies, motors: Any, dt: float, row: Array) -> N
 
 @inlined
 def _rigid(bodies: Bodies, i: int, dt: float) -> tuple[float, float, float]:
-    """ω of a rigid smarticle at the middle of the step, in the middle link's axes [rad/s]."""
-    axes, momentum, row = bodies.axes, bodies.momentum, bodies.plane[i]
-    m0, m1, m2 = momentum[i, 0], momentum[i, 1], momentum[i, 2]
-    l0 = axes[i, 0, 0] * m0 + axes[i, 1, 0] * m1 + axes[i, 2, 0] * m2
-    l1 = axes[i, 0, 1] * m0 + axes[i, 1, 1] * m1 + axes[i, 2, 1] * m2
-    l2 = axes[i, 0, 2] * m0 + axes[i, 1, 2] * m1 + axes[i, 2, 2] * m2
-    x, y, z, half = l0, l1, l2, 0.5 * dt
+    """Return ω of a rigid body at the middle of the step, in the frame of the body [rad/s]."""
+    row, half = bodies.plane[i], 0.5 * dt
+    l0, l1, l2 = turned_back(bodies, i, vector(bodies.momentum[i], 0))
+    x, y, z = l0, l1, l2
     for _ in range(ITERATIONS):
         wx, wy, wz = spin_of(row, x, y, z, 0.0)
         x, y, z = l0 + half * (y * wz - z * wy), l1 + half * (z * wx - x * wz), l2 + half * (x * wy - y * wx)

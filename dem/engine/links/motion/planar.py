@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dem.engine.links.compiler import inlined, kernel
-from dem.engine.links.shape import Shape
+from dem.engine.links.shapes import Planar, Shapes
 
 Array = NDArray[np.float64]
 
@@ -34,8 +34,17 @@ C4, C5, C6 = -2.75573143513906633035e-07, 2.08757232129817482790e-09, -1.1359647
 SMALL = 1e-4  # rad²; up to this square of an angle the series used here are exact to the last digit
 
 
+@inlined
+def planar_at(shapes: Shapes, k: int) -> Planar:
+    """Return the planar geometry of a shape of smarticles."""
+    row = shapes.planar[k]
+    return Planar(
+        row[0], row[1], row[2], row[3], row[4], row[5], row[6], row[7], row[8], row[9], row[10], row[11], row[12]
+    )
+
+
 @kernel
-def lay_out(shape: Shape, alpha1: float, alpha2: float, row: Array) -> None:
+def lay_out(planar: Planar, alpha1: float, alpha2: float, row: Array) -> None:
     """Work out the plane geometry of one smarticle.
 
     Args:
@@ -45,15 +54,15 @@ def lay_out(shape: Shape, alpha1: float, alpha2: float, row: Array) -> None:
             centres of the barbs, u_k, the barbs' directions [m, m, 1]; inertia xx, yy, zz, xy [kg m²]; b [kg m²]; A_11
             (= A_22) and A_12 [kg m²].
     """
-    lay_out_at(shape, alpha1, alpha2, row)
+    lay_out_at(planar, alpha1, alpha2, row)
 
 
 @inlined
-def lay_out_at(shape: Shape, alpha1: float, alpha2: float, row: Array) -> None:
+def lay_out_at(planar: Planar, alpha1: float, alpha2: float, row: Array) -> None:
     """Work out the plane geometry; `lay_out` for other kernels."""
     c1, s1 = direction(alpha1)
     c2, s2 = direction(alpha2)
-    lay_out_directions(shape, c1, s1, c2, s2, row)
+    lay_out_directions(planar, c1, s1, c2, s2, row)
 
 
 @inlined
@@ -74,31 +83,36 @@ def direction(angle: float) -> tuple[float, float]:
 
 
 @inlined
-def lay_out_directions(shape: Shape, c1: float, s1: float, c2: float, s2: float, row: Array) -> None:
+def lay_out_directions(planar: Planar, c1: float, s1: float, c2: float, s2: float, row: Array) -> None:
     """See `lay_out`; the cosines and sines of the angles are given."""
-    arm, mb, mm = shape.arm, shape.barb_mass, shape.middle_mass
-    share = mb / shape.mass
-    x1, y1, x2, y2 = -shape.half - c1 * arm, s1 * arm, shape.half + c2 * arm, s2 * arm
+    arm, mb, mm = planar.arm, planar.barb_mass, planar.middle_mass
+    share = mb / planar.mass
+    x1, y1, x2, y2 = -planar.half - c1 * arm, s1 * arm, planar.half + c2 * arm, s2 * arm
     rx, ry = share * (x1 + x2), share * (y1 + y2)
     x1, y1, x2, y2 = x1 - rx, y1 - ry, x2 - rx, y2 - ry
     u1x, u1y, u2x, u2y = s1 * arm, c1 * arm, -s2 * arm, c2 * arm
-    middle, barb = shape.middle_inertia, shape.barb_inertia
-    own = barb[0] - barb[1]
+    own = planar.barb_xx - planar.barb_yy
     row[0], row[1], row[2], row[3], row[4], row[5] = rx, ry, x1, y1, x2, y2
     row[6], row[7], row[8], row[9] = u1x, u1y, u2x, u2y
     row[10], row[11], row[12], row[13] = -c1, s1, c2, s2
-    row[14] = middle[0] + mm * ry * ry + mb * (y1 * y1 + y2 * y2) + 2 * barb[1] + own * (c1 * c1 + c2 * c2)
-    row[15] = middle[1] + mm * rx * rx + mb * (x1 * x1 + x2 * x2) + 2 * barb[1] + own * (s1 * s1 + s2 * s2)
-    row[16] = middle[2] + mm * (rx * rx + ry * ry) + mb * (x1 * x1 + y1 * y1 + x2 * x2 + y2 * y2) + 2 * barb[2]
+    row[14] = (
+        planar.middle_xx + mm * ry * ry + mb * (y1 * y1 + y2 * y2) + 2 * planar.barb_yy + own * (c1 * c1 + c2 * c2)
+    )
+    row[15] = (
+        planar.middle_yy + mm * rx * rx + mb * (x1 * x1 + x2 * x2) + 2 * planar.barb_yy + own * (s1 * s1 + s2 * s2)
+    )
+    row[16] = (
+        planar.middle_zz + mm * (rx * rx + ry * ry) + mb * (x1 * x1 + y1 * y1 + x2 * x2 + y2 * y2) + 2 * planar.barb_zz
+    )
     row[17] = -mm * rx * ry - mb * (x1 * y1 + x2 * y2) + own * (c2 * s2 - c1 * s1)
-    row[18] = -barb[2] + mb * (x1 * u1y - y1 * u1x)
-    row[19] = barb[2] + mb * (x2 * u2y - y2 * u2x)
-    row[20] = barb[2] + mb * (1 - share) * arm * arm
+    row[18] = -planar.barb_zz + mb * (x1 * u1y - y1 * u1x)
+    row[19] = planar.barb_zz + mb * (x2 * u2y - y2 * u2x)
+    row[20] = planar.barb_zz + mb * (1 - share) * arm * arm
     row[21] = -share * mb * (u1x * u2x + u1y * u2y)
 
 
 @inlined
-def lay_out_near(shape: Shape, by1: float, by2: float, from_: Array, row: Array) -> None:
+def lay_out_near(planar: Planar, by1: float, by2: float, from_: Array, row: Array) -> None:
     """The same for angles that differ little from those of another row, without sines of the whole angles.
 
     Args:
@@ -114,7 +128,7 @@ def lay_out_near(shape: Shape, by1: float, by2: float, from_: Array, row: Array)
         c, s = 1 - x1 / 2 * (1 - x1 / 12 * (1 - x1 / 30)), by1 * (1 - x1 / 6 * (1 - x1 / 20))
         d, t = 1 - x2 / 2 * (1 - x2 / 12 * (1 - x2 / 30)), by2 * (1 - x2 / 6 * (1 - x2 / 20))
     c1, s1, c2, s2 = -from_[10], from_[11], from_[12], from_[13]
-    lay_out_directions(shape, c1 * c - s1 * s, s1 * c + c1 * s, c2 * d - s2 * t, s2 * d + c2 * t, row)
+    lay_out_directions(planar, c1 * c - s1 * s, s1 * c + c1 * s, c2 * d - s2 * t, s2 * d + c2 * t, row)
 
 
 @inlined
@@ -172,7 +186,7 @@ def rates(row: Array, normal: float, p1: float, p2: float) -> tuple[float, float
 
 @inlined
 def lagrange_force(
-    shape: Shape, row: Array, k: int, wx: float, wy: float, wz: float, rate1: float, rate2: float
+    planar: Planar, row: Array, k: int, wx: float, wy: float, wz: float, rate1: float, rate2: float
 ) -> float:
     """∂T/∂α_k at fixed ω and α̇ [N m]: centrifugal and Coriolis torque on a barb.
 
@@ -185,7 +199,7 @@ def lagrange_force(
         rate1: α̇_1 [rad/s].
         rate2: α̇_2 [rad/s].
     """
-    mb, own, share = shape.barb_mass, shape.barb_inertia[0] - shape.barb_inertia[1], shape.barb_mass / shape.mass
+    mb, own, share = planar.barb_mass, planar.barb_xx - planar.barb_yy, planar.barb_mass / planar.mass
     sign = -1.0 if k == 0 else 1.0
     cx, cy, ux, uy = row[2 + 2 * k], row[3 + 2 * k], row[6 + 2 * k], row[7 + 2 * k]
     dx, dy = row[10 + 2 * k], row[11 + 2 * k]
@@ -200,7 +214,7 @@ def lagrange_force(
     # u_k turns with the barb: its derivative is -arm d.
     vx, vy = row[8 - 2 * k], row[9 - 2 * k]
     mine, other = (rate1, rate2) if k == 0 else (rate2, rate1)
-    b_mine = -mb * shape.arm * (cx * dy - cy * dx)
+    b_mine = -mb * planar.arm * (cx * dy - cy * dx)
     b_other = -mb * share * (ux * vy - uy * vx)
-    a_both = share * mb * shape.arm * (dx * vx + dy * vy)
+    a_both = share * mb * planar.arm * (dx * vx + dy * vy)
     return float(force + wz * (b_mine * mine + b_other * other) + mine * other * a_both)

@@ -1,64 +1,66 @@
 """Which links are near each other: a wide list, rebuilt seldom, and a tight one inside it, which steps read.
 
-A list holds every pair whose axes are nearer than a diameter and both skins. Both lists are in an order that depends on
-the positions alone, and the memory of a contact goes with its pair.
+A list holds every pair of segments whose axes are nearer than their radii and both skins. Both lists are in an order
+that depends on the positions alone, and the memory of a contact goes with its pair.
 """
 
 from __future__ import annotations
 
-from dem.engine.links.arrays import Array, Bodies, Cells, Pairs
+from dem.engine.links.arrays import Array, Bodies, Cells, Pairs, Segments
 from dem.engine.links.compiler import inlined, part
 from dem.engine.links.neighbours.search import near_each_other, off_lines, search
 from dem.engine.links.neighbours.skins import mark, moved
-from dem.engine.links.shape import Shape
+from dem.engine.links.shapes import RADIUS
 
 GOOD, FULL = 0, 1
 NEAR_LEAST, NEAR_MOST, NEAR_TIME, WIDE_LEAST, WIDE_MOST, WIDE_TIME, STRIP = range(7)  # places in `skins`
 
 
 @part
-def update_lists(shape: Shape, bodies: Bodies, pairs: Pairs, cells: Cells, skins: Array) -> int:
+def update_lists(bodies: Bodies, segments: Segments, pairs: Pairs, cells: Cells, skins: Array) -> int:
     """Bring the lists up to date where links have moved too far; GOOD, or FULL where there is no room for all pairs.
 
     Args:
         skins: (7,) of the tight and of the wide list: thinnest and thickest skin [m], time that skins are to be good
             for [s]; then the width of a strip of the search [m].
     """
-    if not moved(bodies, pairs.near_marks, pairs.near_centres):
+    if not moved(bodies, segments, pairs.near_marks, pairs.near_centres):
         return GOOD
-    if moved(bodies, pairs.wide_marks, pairs.wide_centres) and build(shape, bodies, pairs, cells, skins) == FULL:
+    if (
+        moved(bodies, segments, pairs.wide_marks, pairs.wide_centres)
+        and build(bodies, segments, pairs, cells, skins) == FULL
+    ):
         return FULL
-    _tighten(shape, bodies, pairs, skins)
+    _tighten(bodies, segments, pairs, skins)
     return GOOD
 
 
 @part
-def _tighten(shape: Shape, bodies: Bodies, pairs: Pairs, skins: Array) -> None:
+def _tighten(bodies: Bodies, segments: Segments, pairs: Pairs, skins: Array) -> None:
     """Make the tight list from the wide one."""
-    mark(shape, bodies, pairs.near_marks, pairs.near_centres, skins[NEAR_LEAST], skins[NEAR_MOST], skins[NEAR_TIME])
+    mark(bodies, segments, pairs.near_marks, pairs.near_centres, skins[NEAR_LEAST], skins[NEAR_MOST], skins[NEAR_TIME])
     marks, first, second, used, near = pairs.near_marks, pairs.first, pairs.second, pairs.used, pairs.near
-    diameter, inverses, kind = 2 * shape.radius, shape.inverses, pairs.kind
-    count = 0
+    line, count = segments.line, 0
     # Every pair is written down, and the next one over it unless it counts: no branch, which would be mispredicted.
     for k in range(pairs.counts[0]):
         p, q = first[k], second[k]
         near[count] = k
-        count += (used[k] != 0) | (not off_lines(bodies.segments, p, q, diameter + marks[p, 6] + marks[q, 6]))
+        reach = line[p, RADIUS] + line[q, RADIUS] + marks[p, 6] + marks[q, 6]
+        count += (used[k] != 0) | (not off_lines(line, p, q, reach))
     candidates, count = count, 0
     for m in range(candidates):
         k = near[m]
         p, q = first[k], second[k]
         near[count] = k
+        reach = line[p, RADIUS] + line[q, RADIUS] + marks[p, 6] + marks[q, 6]
         # Contacts stay in the list until the step in which they end has forgotten them.
-        count += (used[k] != 0) | near_each_other(
-            bodies.segments, p, q, diameter + marks[p, 6] + marks[q, 6], inverses[kind[p]], inverses[kind[q]]
-        )
+        count += (used[k] != 0) | near_each_other(line, p, q, reach)
     pairs.counts[1] = count
     pairs.counts[3] += 1
 
 
 @part
-def build(shape: Shape, bodies: Bodies, pairs: Pairs, cells: Cells, skins: Array) -> int:
+def build(bodies: Bodies, segments: Segments, pairs: Pairs, cells: Cells, skins: Array) -> int:
     """Make the wide list anew, and carry over what contacts remember.
 
     Args:
@@ -68,9 +70,9 @@ def build(shape: Shape, bodies: Bodies, pairs: Pairs, cells: Cells, skins: Array
     Returns:
         GOOD, or FULL where there is no room for all pairs: then the list is as it was.
     """
-    mark(shape, bodies, cells.marks, cells.centres, skins[WIDE_LEAST], skins[WIDE_MOST], skins[WIDE_TIME])
+    mark(bodies, segments, cells.marks, cells.centres, skins[WIDE_LEAST], skins[WIDE_MOST], skins[WIDE_TIME])
     # The tight list is good for less than its thickest skin, which the wide one leaves room for.
-    found = search(shape, bodies, pairs, cells, 2 * (shape.radius + skins[NEAR_MOST]), skins[STRIP])
+    found = search(segments, cells, 2 * skins[NEAR_MOST], skins[STRIP])
     if found < 0:
         return FULL
     _replace(pairs, cells, found)

@@ -1,10 +1,11 @@
-"""All pairs of links that are nearer than their skins and a diameter, found anew.
+"""All pairs of segments that are nearer than their radii and skins, found anew.
 
-Every link has a box about itself, its skin and half of what a pair needs besides. Boxes are sorted into strips along y
-and, within a strip, into short bins along x, by their lower corners: all that can overlap a box are in a few runs of
-neighbours in memory, from its own bin up to that of its upper corner. What is asked of links is copied in that order.
+Every link has a box about all its segments, with their radii, their skins and half of what a pair needs besides. Boxes
+are sorted into strips along y and, within a strip, into short bins along x, by their lower corners: all that can
+overlap a box are in a few runs of neighbours in memory, from its own bin up to that of its upper corner. Segments are
+copied in that order.
 
-The list is in the order of the links' numbers; that of many links in the order of the bins, so that a step meets links
+The list is in the order of the segments' numbers; that of many in the order of the bins, so that a step meets segments
 that are near each other one after the other, since all of them do not fit into a processor's cache.
 """
 
@@ -13,21 +14,21 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from dem.engine.links.arrays import Array, Bodies, Cells, Indices, Pairs
+from dem.engine.links.arrays import Array, Cells, Indices, Segments
 from dem.engine.links.compiler import inlined, part
-from dem.engine.links.shape import Shape
+from dem.engine.links.shapes import LINE, RADIUS
 from dem.engine.links.vectors import between, cross, dot, lines, nearest, sub, vector
 
-FEW = 3000  # links; up to so many the list is in the order of their numbers
-SKIN, INVERSE = 6, 7  # places in a row of `Cells.lines`
+FEW = 3000  # segments; up to so many the list is in the order of their numbers
+SKIN = LINE  # place in a row of `Cells.lines`
 
 
 class Grid(NamedTuple):
     """The bins."""
 
-    bare: float  #: Reach of a pair without skins [m]
+    bare: float  #: Reach of a pair besides radii and skins [m]
     x: float  #: Where bins begin along x [m]
-    y: float  #: The same along y
+    y: float  #: Where strips begin along y [m]
     tallest: float  #: Extent of the largest box along y [m]
     size: float  #: Of a bin along x [m]
     width: float  #: Of a strip, along y [m]
@@ -36,43 +37,42 @@ class Grid(NamedTuple):
 
 
 @inlined
-def off_lines(segments: Array, p: int, q: int, reach: float) -> bool:
+def off_lines(line: Array, p: int, q: int, reach: float) -> bool:
     """Return whether the lines that two axes are on are farther apart than `reach` [m]; without a division."""
-    one, other = segments[p], segments[q]
+    one, other = line[p], line[q]
     normal = cross(vector(one, 3), vector(other, 3))
     across = dot(sub(vector(one, 0), vector(other, 0)), normal)
     return bool(across * across > reach * reach * dot(normal, normal))
 
 
 @inlined
-def near_each_other(segments: Array, p: int, q: int, reach: float, inverse_p: float, inverse_q: float) -> bool:
-    """Return whether two axes, of known inverse squared lengths [1/m²], are nearer than `reach` [m]."""
-    both = lines(segments[p], segments[q], inverse_p, inverse_q)
+def near_each_other(line: Array, p: int, q: int, reach: float) -> bool:
+    """Return whether two axes are nearer than `reach` [m]."""
+    both = lines(line[p], line[q])
     s, t = nearest(both)
     gap = between(both, s, t)
     return bool(dot(gap, gap) < reach * reach)
 
 
 @part
-def search(shape: Shape, bodies: Bodies, pairs: Pairs, cells: Cells, bare: float, piece: float) -> int:
-    """Write all pairs into the scratch list of `cells`, in rows by the first link.
+def search(segments: Segments, cells: Cells, bare: float, piece: float) -> int:
+    """Write all pairs into the scratch list of `cells`, in rows by the first segment.
 
     Args:
-        pairs: tells owners and kinds.
+        segments: where segments are, and which link and body they belong to.
         cells: `marks` are filled; the rest is written.
-        bare: reach of a pair without skins [m].
+        bare: reach of a pair besides radii and skins [m].
         piece: width of a strip [m].
 
     Returns:
         Their number, or -1 where there is no room.
     """
     count = cells.marks.shape[0]
-    x0, x1, y0, y1, tallest = corners(cells.marks, bare)
-    grid = grid_over(x0, x1, y0, y1, tallest, bare, piece, cells.starts.shape[0] - 2)
-    find_bins(cells, grid)
+    grid = grid_over(segments, cells, bare, piece)
+    find_bins(segments, cells, grid)
     sort_bins(cells, grid)
-    draw_boxes(shape, bodies, pairs, cells, grid)
-    number = find_pairs(pairs, cells, grid)
+    draw_boxes(segments, cells, grid)
+    number = find_pairs(segments, cells, grid)
     if number < 0:
         return -1
     for p in range(count + 2):
@@ -99,27 +99,25 @@ def _bin(offset: float, size: float, last: int) -> int:
 
 
 @inlined
-def _box(marks: Array, p: int, d: int, more: float) -> tuple[float, float]:
-    """Lower and upper bound of a link along an axis with its skin and more [m]."""
-    start, end, more = marks[p, d], marks[p, 3 + d], more + marks[p, 6]
-    return min(start, end) - more, max(start, end) + more
+def _box(segments: Segments, marks: Array, link: int, d: int, bare: float) -> tuple[float, float]:
+    """Return lower and upper bound of a link along an axis [m], with radii, skins and half the bare reach."""
+    low, high = math.inf, -math.inf
+    for p in range(segments.first[link], segments.first[link + 1]):
+        start, end, more = marks[p, d], marks[p, 3 + d], 0.5 * bare + segments.line[p, RADIUS] + marks[p, 6]
+        low, high = min(low, min(start, end) - more), max(high, max(start, end) + more)
+    return low, high
 
 
 @inlined
-def corners(marks: Array, bare: float) -> tuple[float, float, float, float, float]:
-    """Bounds along x and y of the lower corners of the boxes of all links, and the tallest along y [m]."""
+def grid_over(segments: Segments, cells: Cells, bare: float, piece: float) -> Grid:
+    """Return bins for the boxes of all links."""
     x0, y0, x1, y1, tallest = math.inf, math.inf, -math.inf, -math.inf, 0.0
-    for p in range(marks.shape[0]):
-        low, high = _box(marks, p, 0, 0.5 * bare)
+    for link in range(cells.keys.shape[0]):
+        low, high = _box(segments, cells.marks, link, 0, bare)
         x0, x1 = min(x0, low), max(x1, low)
-        low, high = _box(marks, p, 1, 0.5 * bare)
+        low, high = _box(segments, cells.marks, link, 1, bare)
         y0, y1, tallest = min(y0, low), max(y1, low), max(tallest, high - low)
-    return x0, x1, y0, y1, tallest
-
-
-@inlined
-def grid_over(x0: float, x1: float, y0: float, y1: float, tallest: float, bare: float, piece: float, room: int) -> Grid:
-    """Bins for what `corners` found; there is room for so many."""
+    room = cells.starts.shape[0] - 2
     ny = 1 + _bin(y1 - y0, piece, int(math.sqrt(room)) - 1)
     nx = 1 + _bin(x1 - x0, 0.25 * piece, room // ny - 1)
     # As wide as need be: of links that are far away, the last strips and bins have all.
@@ -127,13 +125,13 @@ def grid_over(x0: float, x1: float, y0: float, y1: float, tallest: float, bare: 
 
 
 @inlined
-def find_bins(cells: Cells, grid: Grid) -> None:
+def find_bins(segments: Segments, cells: Cells, grid: Grid) -> None:
     """Write the bins of all links into `keys`."""
-    for p in range(cells.keys.shape[0]):
-        x, _ = _box(cells.marks, p, 0, 0.5 * grid.bare)
-        y, _ = _box(cells.marks, p, 1, 0.5 * grid.bare)
+    for link in range(cells.keys.shape[0]):
+        x, _ = _box(segments, cells.marks, link, 0, grid.bare)
+        y, _ = _box(segments, cells.marks, link, 1, grid.bare)
         strip = _bin(y - grid.y, grid.width, grid.strips - 1)
-        cells.keys[p] = strip * grid.columns + _bin(x - grid.x, grid.size, grid.columns - 1)
+        cells.keys[link] = strip * grid.columns + _bin(x - grid.x, grid.size, grid.columns - 1)
 
 
 @inlined
@@ -156,17 +154,20 @@ def sort_bins(cells: Cells, grid: Grid) -> None:
 
 
 @inlined
-def draw_boxes(shape: Shape, bodies: Bodies, pairs: Pairs, cells: Cells, grid: Grid) -> None:
-    """Write what the search needs of the links, in `order`, and which rows they get."""
-    few = cells.keys.shape[0] <= FEW
+def draw_boxes(segments: Segments, cells: Cells, grid: Grid) -> None:
+    """Write boxes of links and their segments in `order`, and which rows of the list the segments get."""
+    few, n = cells.marks.shape[0] <= FEW, 0
     for m in range(cells.keys.shape[0]):
-        p = cells.order[m]
-        cells.places[p] = p if few else m
-        for d in range(6):
-            cells.lines[m, d] = bodies.segments[p, d]
-        cells.lines[m, SKIN], cells.lines[m, INVERSE] = cells.marks[p, 6], shape.inverses[pairs.kind[p]]
+        link = cells.order[m]
         for d in range(3):
-            cells.boxes[d, m], cells.boxes[3 + d, m] = _box(cells.marks, p, d, 0.5 * grid.bare)
+            cells.boxes[d, m], cells.boxes[3 + d, m] = _box(segments, cells.marks, link, d, grid.bare)
+        cells.strands[m] = n
+        for p in range(segments.first[link], segments.first[link + 1]):
+            for d in range(LINE):
+                cells.lines[n, d] = segments.line[p, d]
+            cells.lines[n, SKIN], cells.numbers[n], cells.places[p] = cells.marks[p, 6], p, p if few else n
+            n += 1
+    cells.strands[cells.keys.shape[0]] = n
 
 
 @inlined
@@ -197,11 +198,11 @@ def _boxed(
 
 
 @part
-def find_pairs(pairs: Pairs, cells: Cells, grid: Grid) -> int:
-    """Write all pairs into `lower` and `upper`.
+def find_pairs(segments: Segments, cells: Cells, grid: Grid) -> int:
+    """Write all pairs of segments of different bodies into `lower` and `upper`.
 
     Args:
-        pairs: has the owners.
+        segments: which body each segment belongs to.
         cells: sorted, and boxes drawn.
         grid: the bins.
 
@@ -209,14 +210,14 @@ def find_pairs(pairs: Pairs, cells: Cells, grid: Grid) -> int:
         Their number, or -1 where there is no room.
     """
     number, capacity = 0, cells.lower.shape[0]
-    rows, starts, keys, order, boxes = cells.lines, cells.starts, cells.keys, cells.order, cells.boxes
-    owner, close, lower, upper = pairs.owner, cells.close, cells.lower, cells.upper
+    rows, starts, keys, boxes, strands = cells.lines, cells.starts, cells.keys, cells.boxes, cells.strands
+    numbers, close, lower, upper = cells.numbers, cells.close, cells.lower, cells.upper
     nx, ny, x0, y0, size, width = grid.columns, grid.strips, grid.x, grid.y, grid.size, grid.width
     for m in range(keys.shape[0]):
-        p = order[m]
         ly, lz, hx, hy, hz = boxes[1, m], boxes[2, m], boxes[3, m], boxes[4, m], boxes[5, m]
-        own, mine, skin = owner[p], keys[p] // nx, grid.bare + rows[m, SKIN]
-        column, last = keys[p] - mine * nx, _bin(hx - x0, size, nx - 1)
+        key = keys[cells.order[m]]
+        own, mine = segments.body[numbers[strands[m]]], key // nx
+        column, last = key - mine * nx, _bin(hx - x0, size, nx - 1)
         boxed = 0
         for strip in range(_bin(ly - grid.tallest - y0, width, ny - 1), _bin(hy - y0, width, ny - 1) + 1):
             # Of two links that begin in the same bins along x, the one in the lower strip finds the other.
@@ -224,16 +225,18 @@ def find_pairs(pairs: Pairs, cells: Cells, grid: Grid) -> int:
             if strip == mine:
                 start = m + 1
             boxed = _boxed(boxes, close, boxed, start, starts[strip * nx + last + 2], ly, lz, hx, hy, hz)
-        hits = 0
-        for k in range(boxed):
-            n = close[k]
-            close[hits] = n
-            hits += not (off_lines(rows, m, n, skin + rows[n, SKIN]) | (owner[order[n]] == own))
-        if number + hits > capacity:
-            return -1
-        for k in range(hits):
-            n = close[k]
-            q = order[n]
-            lower[number], upper[number] = min(p, q), max(p, q)
-            number += near_each_other(rows, m, n, skin + rows[n, SKIN], rows[m, INVERSE], rows[n, INVERSE])
+        for a in range(strands[m], strands[m + 1]):
+            p, skin, hits = numbers[a], grid.bare + rows[a, RADIUS] + rows[a, SKIN], number
+            for k in range(boxed):
+                for b in range(strands[close[k]], strands[close[k] + 1]):
+                    if hits == capacity:
+                        return -1
+                    reach = skin + rows[b, RADIUS] + rows[b, SKIN]
+                    upper[hits] = b
+                    hits += not (off_lines(rows, a, b, reach) | (segments.body[numbers[b]] == own))
+            for k in range(number, hits):
+                b = upper[k]
+                q = numbers[b]
+                lower[number], upper[number] = min(p, q), max(p, q)
+                number += near_each_other(rows, a, b, skin + rows[b, RADIUS] + rows[b, SKIN])
     return number

@@ -1,0 +1,169 @@
+"""Bodies as this engine sees them: tables of segments, each swept by a sphere, with masses and inertias.
+
+A flat link is swept along several parallel segments, its strands. That is the limit of the sphere chains of
+`dem.body.particle` as their pitch goes to zero: same section, same tips. A smarticle is the shape whose barbs turn
+about two hinges; all other shapes are rigid.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dem.body.bars import Bars
+from dem.body.particle import Particle
+from dem.physics.contact import typical_effective_mass
+
+Array = NDArray[np.float64]
+
+# Columns of a segment: start of its axis and vector to its end [m], inverse squared length [1/m²], radius [m].
+START, VECTOR, INVERSE, RADIUS, LINE = 0, 3, 6, 7, 8
+AT_START, AT_END = 1, 2  # bits: the segment starts, or ends, where another segment of the body has an end already
+
+
+class Planar(NamedTuple):
+    """Three hinged links in a plane. Lengths in m, masses in kg, inertias in kg m²."""
+
+    mass: float  #: Of a smarticle
+    middle_mass: float  #: Of the middle link
+    barb_mass: float  #: Of one barb
+    half: float  #: Half the length of the middle link: the hinges are this far from its centre
+    arm: float  #: Half the length of a barb: its centre of mass is this far from the hinge
+    end: float  #: How far the middle link's axis reaches from its centre: the hinges, but for a bar without barbs
+    tip: float  #: How far a barb's axis reaches from the hinge: its tip less the radius
+    middle_xx: float  #: Inertia of the middle link about its centre, along it
+    middle_yy: float  #: in the plane, across it
+    middle_zz: float  #: along the normal
+    barb_xx: float  #: Inertia of a barb about its centre, along it
+    barb_yy: float  #: in the plane, across it
+    barb_zz: float  #: along the normal
+
+
+@dataclass(frozen=True, kw_only=True)
+class Shape:
+    """One kind of body, in its own frame about its centre of mass.
+
+    The frame of a smarticle is that of its middle link, that of a rigid body its principal axes.
+    """
+
+    mass: float  #: [kg]
+    inertia: Array  #: (4,) xx, yy, zz and xy [kg m²] of a rigid body; that of a smarticle follows from its angles
+    lines: Array  #: (M, LINE) segments, strands of a link one after the other, see `START`
+    link: NDArray[np.int64]  #: (M,) link that each segment belongs to; of a smarticle 0 barb 1, 1 middle link, 2 barb 2
+    shared: NDArray[np.uint8]  #: (M,) which ends of a segment are those of segments before it, see `AT_START`
+    effective_mass: float  #: Harmonic mean of the mass felt by a push on it [kg], for the dashpots
+    planar: Planar | None = None  #: Of a smarticle; None: a rigid body
+
+    @property
+    def links(self) -> int:
+        """Links."""
+        return len(np.unique(self.link))
+
+    @property
+    def reach(self) -> float:
+        """How far the axes of the links reach from the centre of mass [m], in the shape that it is poured in."""
+        starts, ends = self.lines[:, :3], self.lines[:, :3] + self.lines[:, 3:6]
+        return float(np.linalg.norm(np.concatenate([starts, ends]), axis=1).max(initial=0.0))
+
+
+class Shapes(NamedTuple):
+    """All kinds of bodies of a pile, K of them with M segments, for the kernels."""
+
+    mass: Array  #: (K,) [kg]
+    radius: Array  #: (K,) of the thinnest segment [m]
+    reach: Array  #: (K,) how far axes of links reach from the centre of mass [m]
+    hinged: NDArray[np.uint8]  #: (K,) whether barbs can turn
+    planar: Array  #: (K, 13) fields of `Planar`; zeros of rigid bodies
+    first: NDArray[np.int64]  #: (K + 1,) where each kind's segments begin
+    lines: Array  #: (M, LINE) segments in the frame of the body
+    link: NDArray[np.int64]  #: (M,) link of each segment
+
+
+def table_of(shapes: Sequence[Shape]) -> Shapes:
+    """Return the table of shapes for the kernels."""
+    return Shapes(
+        mass=np.array([shape.mass for shape in shapes]),
+        radius=np.array([shape.lines[:, RADIUS].min() for shape in shapes]),
+        reach=np.array([shape.reach for shape in shapes]),
+        hinged=np.array([shape.planar is not None for shape in shapes], dtype=np.uint8),
+        planar=np.array([shape.planar or np.zeros(len(Planar._fields)) for shape in shapes]),
+        first=np.cumsum([0, *(len(shape.lines) for shape in shapes)]),
+        lines=np.concatenate([shape.lines for shape in shapes]),
+        link=np.concatenate([shape.link for shape in shapes]),
+    )
+
+
+def planar_of(particle: Particle) -> Planar:
+    """Return the planar geometry of a smarticle.
+
+    Sources: tips pulled in by the radius, hinges inside the middle link: as spheres are put in `dem.body.particle`.
+    """
+    boxes, radius = particle.boxes, particle.radius
+    length, barb = boxes.middle_length, boxes.barb_length
+    return Planar(
+        boxes.mass, float(boxes.link_masses[1]), float(boxes.link_masses[0]), length / 2, barb / 2,
+        length / 2 if barb > 0 else length / 2 - radius, max(0.0, barb - radius),
+        *(float(moment) for link in (1, 0) for moment in boxes.link_inertias[link]),
+    )  # fmt: skip
+
+
+def smarticle_shape(particle: Particle) -> Shape:
+    """Return the shape of a smarticle, with its barbs at the angles that it is poured with."""
+    boxes, planar, strands = particle.boxes, planar_of(particle), offsets_of(particle)
+    directions, (x, y, _) = boxes.directions, boxes.plain_centre_of_mass
+    axes = [(1, -planar.end, 2 * planar.end)]
+    if boxes.barb_length > particle.radius:  # the tip of a shorter one is inside the sphere at the hinge
+        axes = [(0, -planar.half, planar.tip), *axes, (2, planar.half, planar.tip)]
+    rows = [[start - x, -y, z, *(extent * directions[link])] for link, start, extent in axes for z in strands]
+    links = np.repeat([link for link, _, _ in axes], len(strands))
+    return Shape(
+        mass=boxes.mass,
+        inertia=np.zeros(4),  # it follows from the angles
+        lines=_lines(np.array(rows), particle.radius),
+        link=links,
+        # Barbs start at hinges, where the middle link ends.
+        shared=np.where(links == 1, 0, AT_START).astype(np.uint8),
+        effective_mass=typical_effective_mass(particle),
+        planar=planar,
+    )
+
+
+def offsets_of(particle: Particle) -> Array:
+    """Return offsets (S,) of a link's strands along its normal [m]; the outermost ones reach its edges."""
+    reach = (particle.boxes.thickness_normal - particle.chain.diameter) / 2
+    return np.zeros(1) if particle.chain.rows == 1 else np.linspace(-reach, reach, particle.chain.rows)
+
+
+def rigid_shape(bars: Bars, rows: int = 1) -> Shape:
+    """Return the shape of a rigid body of flat bars.
+
+    Args:
+        rows: strands of each bar; one is as thick as the section's mean width, more are as thick as the bar is in
+            the plane.
+    """
+    radius = bars.radius(rows)
+    reach = 0.0 if rows == 1 else bars.thickness_normal / 2 - radius
+    starts, ends = bars.axes(radius)
+    # (bars, rows, 3): strands along each bar's normal.
+    offsets = np.linspace(-reach, reach, rows)[:, None] * bars.normals[:, None, :]
+    lines = np.concatenate([starts[:, None] + offsets, np.repeat((ends - starts)[:, None], rows, axis=1)], axis=-1)
+    xx, yy, zz = bars.inertia
+    return Shape(
+        mass=bars.mass,
+        inertia=np.array([xx, yy, zz, 0.0]),
+        lines=_lines(lines.reshape(-1, 6), radius),
+        link=np.repeat(np.arange(len(starts)), rows),
+        shared=np.repeat(bars.shared.astype(np.uint8), rows),
+        effective_mass=bars.effective_mass,
+    )
+
+
+def _lines(axes: Array, radius: float) -> Array:
+    """Return segments (M, LINE) of axes (M, 6) [m] and a radius [m]."""
+    squares = (axes[:, 3:6] ** 2).sum(axis=1)
+    inverses = np.divide(1.0, squares, out=np.zeros(len(axes)), where=squares > 0)
+    return np.column_stack([axes, inverses, np.full(len(axes), radius)])
