@@ -85,8 +85,8 @@ class Cells(NamedTuple):
     starts: Indices  #: (bins + 2,) where each bin begins in `order`, from the second number on
     marks: Array  #: (Q, 7) as in `Pairs`
     centres: Array  #: (N, 3) as in `Pairs`
-    #: (6, L) lower and upper corners of boxes about links [m], by bin; one coordinate of many is read at once
-    boxes: Array
+    own: Array  #: (L, 6) lower and upper corners of the box about each link [m]
+    boxes: Array  #: (6, L) the same by bin; one coordinate of many is read at once
     strands: Indices  #: (L + 1,) where the segments of each link begin in `lines`
     lines: Array  #: (Q, LINE + 1) segments and their skins [m], by bin
     numbers: Indices  #: (Q,) segment of each of these rows
@@ -275,6 +275,7 @@ def cells_for(bodies: int, links: int, segments: int, capacity: int) -> Cells:
         np.zeros(BINS * links + 66, np.int32),
         np.zeros((segments, 7)),
         np.zeros((bodies, 3)),
+        np.zeros((links, 6)),
         np.zeros((6, links)),
         np.zeros(links + 1, np.int32),
         np.zeros((segments, LINE + 1)),

@@ -341,9 +341,14 @@ class World:
         The wide list has room for what the last step has moved, but does not have smarticles that were added since.
         """
         self.posed()
-        found = self._room()
-        count, energy = query_all(self.system, found)
+        found, count, energy = self._query()
         return Contacts(found.met[:count].astype(np.int64), found.touches, found.depth, found.held, energy)
+
+    def _query(self) -> tuple[Found, int, float]:
+        found, (law, wall_law) = self._room(), self.laws
+        known = Boundaries(self.ground, self.channel, self.hooks, self.rims)
+        count, energy = query_all(self.segments, self.pairs, self.kept, known, law.stiffness, wall_law.stiffness, found)
+        return found, count, energy
 
     def _room(self) -> Found:
         n = self.count
@@ -358,20 +363,30 @@ class World:
         Args:
             velocities: (N, 3, 3) of the links' centres, from that state [m/s].
         """
-        found = np.empty(7)
-        find_extremes(self.system, velocities, self._room(), found)
+        found, (query, _, energy) = np.empty(7), self._query()
+        find_extremes(self.bodies, self.segments, query.depth, velocities, energy, found)
         return [float(value) for value in found]
 
     def forces(self) -> Array:
         """Return the forces at all points of contact, (P, WIDTH) as `queries` has the columns."""
         self.posed()
-        system, slip, contacts = self.system, np.zeros(4), self.scratch.contacts
+        slip, contacts, (law, wall_law) = np.zeros(4), self.scratch.contacts, self.laws
+        bodies, parts, segments, known = self.bodies, self.parts, self.segments, self.system.boundaries
         return np.concatenate(
             [
-                _rows(lambda rows: forces_of_pairs(system, self.links, self.meeting, slip, rows)),
-                _rows(lambda rows: forces_of_boundaries(system, self.links, self.meeting, contacts, slip, rows)),
+                _rows(
+                    lambda rows: forces_of_pairs(
+                        law, bodies, parts, segments, self.pairs, self.links, self.meeting, slip, rows
+                    )
+                ),
+                _rows(
+                    lambda rows: forces_of_boundaries(
+                        wall_law, bodies, parts, segments, self.kept, known, self.links, self.meeting, contacts, slip,
+                        rows,
+                    )
+                ),
             ]
-        )
+        )  # fmt: skip
 
     # -- checkpoints -------------------------------------------------------------------------------------------
 

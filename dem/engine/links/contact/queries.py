@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 from typing import Any, NamedTuple
 
-from dem.engine.links.arrays import Array, Ground, Indices, Kept, Pairs, Segments, System
+from dem.engine.links.arrays import Array, Bodies, Boundaries, Ground, Indices, Kept, Law, Pairs, Parts, Segments
 from dem.engine.links.compiler import inlined, kernel, part
 from dem.engine.links.contact import boundaries as rows_of
 from dem.engine.links.contact.barrier import stretch
@@ -100,45 +100,44 @@ def _query_boundaries(
     return 0.5 * stiffness * squares
 
 
-@part
-def _query(system: System, found: Found) -> tuple[int, float]:
-    """Query all contacts; rows of `met` that were written, and the energy of all normal springs [J]."""
-    count, energy = _query_pairs(system.segments, system.pairs, system.law.stiffness, found)
-    known = system.boundaries
-    return count, energy + _query_boundaries(
-        system.segments, known.ground, known.channel, known.hooks, known.rims, system.wall_law.stiffness, found
-    )
-
-
 @kernel
-def query_all(system: System, found: Found) -> tuple[int, float]:
+def query_all(
+    segments: Segments, pairs: Pairs, kept: Kept, boundaries: Boundaries, stiffness: float, wall_stiffness: float,
+    found: Found,
+) -> tuple[int, float]:  # fmt: skip
     """Query all contacts.
 
     Args:
-        found: written.
+        stiffness: of contacts between bodies [N/m].
+        wall_stiffness: of contacts with boundaries [N/m].
+        found: written; depths and counts are zero.
 
     Returns:
         Rows of `met` that were written, and the energy of all springs [J].
     """
-    count, energy = _query(system, found)
-    return count, energy + _sheared(system.pairs, system.kept)
+    count, energy = _query_pairs(segments, pairs, stiffness, found)
+    energy += _query_boundaries(
+        segments, boundaries.ground, boundaries.channel, boundaries.hooks, boundaries.rims, wall_stiffness, found
+    )
+    return count, energy + _sheared(pairs, kept)
 
 
 @kernel
-def find_extremes(system: System, velocities: Array, found: Found, extremes: Array) -> None:
-    """Find the extremes of all smarticles in one call, which is what a watchdog needs as long as nothing is wrong.
+def find_extremes(
+    bodies: Bodies, segments: Segments, depths: Array, velocities: Array, energy: float, extremes: Array
+) -> None:
+    """Find the extremes of all bodies in one call: enough for a watchdog as long as all is well.
 
     Args:
+        depths: (N,) see `Found.depth`.
         velocities: (N, 3, 3) of the links' centres [m/s].
-        found: scratch, with zeros as depths.
+        energy: of all springs of contacts [J].
         extremes: (7,) written: largest speed of a link [m/s]; height of the lowest and of the highest end of an axis
             [m]; distance of the farthest one from the vertical axis [m]; deepest contact now and between two queries,
             over the overlap at which axes meet [1]; energy of all springs of contacts [J]. A speed that is no number
             makes the first one no number.
     """
-    bodies, line = system.bodies, system.segments.line
-    _, energy = _query(system, found)
-    energy += _sheared(system.pairs, system.kept)
+    line = segments.line
     fastest, total = 0.0, 0.0
     for i in range(velocities.shape[0]):
         for link in range(3):
@@ -149,11 +148,11 @@ def find_extremes(system: System, velocities: Array, found: Found, extremes: Arr
     lowest, highest, widest = math.inf, -math.inf, 0.0
     for p in range(line.shape[0]):
         for end in range(2):
-            x, y, z = along(vector(line[p], 0), end, vector(line[p], 3))
+            x, y, z = along(vector(line[p], 0), float(end), vector(line[p], 3))
             lowest, highest, widest = min(lowest, z), max(highest, z), max(widest, x * x + y * y)
     deepest, between = 0.0, 0.0
-    for i in range(found.depth.shape[0]):
-        deepest = max(deepest, found.depth[i])
+    for i in range(depths.shape[0]):
+        deepest = max(deepest, depths[i])
         # One that is no number must not be lost in the comparison.
         between = bodies.deepest[i] if not bodies.deepest[i] <= between else between
         total += bodies.deepest[i]
@@ -214,7 +213,10 @@ def _copy(slip: Array, kept: Array) -> None:
 
 
 @kernel
-def forces_of_pairs(system: System, links: Indices, out: Array, slip: Array, rows: Array) -> int:
+def forces_of_pairs(
+    law: Law, bodies: Bodies, parts: Parts, segments: Segments, pairs: Pairs, links: Indices, out: Array, slip: Array,
+    rows: Array,
+) -> int:  # fmt: skip
     """Write the forces of bodies on each other.
 
     Args:
@@ -225,7 +227,6 @@ def forces_of_pairs(system: System, links: Indices, out: Array, slip: Array, row
     Returns:
         Rows that were written, or would have been: there may be more than there is room for.
     """
-    law, bodies, parts, segments, pairs = system.law, system.bodies, system.parts, system.segments, system.pairs
     line, count = segments.line, 0
     for k in range(pairs.counts[0]):
         p, q = pairs.first[k], pairs.second[k]
@@ -256,7 +257,10 @@ def forces_of_pairs(system: System, links: Indices, out: Array, slip: Array, row
 
 
 @kernel
-def forces_of_boundaries(system: System, links: Indices, out: Array, contacts: Array, slip: Array, rows: Array) -> int:
+def forces_of_boundaries(
+    law: Law, bodies: Bodies, parts: Parts, segments: Segments, kept: Kept, known: Boundaries, links: Indices,
+    out: Array, contacts: Array, slip: Array, rows: Array,
+) -> int:  # fmt: skip
     """Write the forces of boundaries on bodies; see `forces_of_pairs`.
 
     Args:
@@ -265,18 +269,18 @@ def forces_of_boundaries(system: System, links: Indices, out: Array, contacts: A
         slip: (4,) scratch.
         rows: (…, WIDTH) written.
     """
-    law, segments, known, count = system.wall_law, system.segments, system.boundaries, 0
+    count = 0
     for p in range(segments.line.shape[0]):
-        radius, damping = segments.line[p, RADIUS], law.damping[system.bodies.shape[segments.body[p]], 0]
+        radius, damping = segments.line[p, RADIUS], law.damping[bodies.shape[segments.body[p]], 0]
         number = contacts_with_boundaries(
             segments, known.ground, known.channel, known.hooks, known.rims, p, contacts, out
         )
         for k in range(number):
             contact = contacts[k]
             share, normal = contact[PARTLY], vector(contact, AT)
-            place, velocity, speed, _ = place_and_motion(radius, system.parts, known.ground, segments.part[p], contact)
+            place, velocity, speed, _ = place_and_motion(radius, parts, known.ground, segments.part[p], contact)
             relative = velocity[0], velocity[1], velocity[2] - speed
-            _copy(slip, system.kept.slip[p, int(contact[SLOT])])
+            _copy(slip, kept.slip[p, int(contact[SLOT])])
             u, slope, hardening = stretch(contact[DEPTH], contact[ROOM])
             load = law.stiffness * u * slope * share
             force = resist(law, damping, load, share, hardening, normal, relative, 0.0, 0.0, slip)

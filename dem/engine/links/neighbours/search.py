@@ -68,10 +68,10 @@ def search(segments: Segments, cells: Cells, bare: float, piece: float) -> int:
         Their number, or -1 where there is no room.
     """
     count = cells.marks.shape[0]
-    grid = grid_over(segments, cells, bare, piece)
-    find_bins(segments, cells, grid)
+    find_boxes(segments, cells, bare)
+    grid = grid_over(cells, bare, piece)
     sort_bins(cells, grid)
-    draw_boxes(segments, cells, grid)
+    copy_by_bin(segments, cells)
     number = find_pairs(segments, cells, grid)
     if number < 0:
         return -1
@@ -99,24 +99,27 @@ def _bin(offset: float, size: float, last: int) -> int:
 
 
 @inlined
-def _box(segments: Segments, marks: Array, link: int, d: int, bare: float) -> tuple[float, float]:
-    """Return lower and upper bound of a link along an axis [m], with radii, skins and half the bare reach."""
-    low, high = math.inf, -math.inf
-    for p in range(segments.first[link], segments.first[link + 1]):
-        start, end, more = marks[p, d], marks[p, 3 + d], 0.5 * bare + segments.line[p, RADIUS] + marks[p, 6]
-        low, high = min(low, min(start, end) - more), max(high, max(start, end) + more)
-    return low, high
+def find_boxes(segments: Segments, cells: Cells, bare: float) -> None:
+    """Write the boxes of all links, with radii, skins and half the bare reach, into `own`."""
+    for link in range(cells.keys.shape[0]):
+        box = cells.own[link]
+        for d in range(3):
+            box[d], box[3 + d] = math.inf, -math.inf
+        for p in range(segments.first[link], segments.first[link + 1]):
+            mark, more = cells.marks[p], 0.5 * bare + segments.line[p, RADIUS] + cells.marks[p, 6]
+            for d in range(3):
+                box[d] = min(box[d], min(mark[d], mark[3 + d]) - more)
+                box[3 + d] = max(box[3 + d], max(mark[d], mark[3 + d]) + more)
 
 
 @inlined
-def grid_over(segments: Segments, cells: Cells, bare: float, piece: float) -> Grid:
+def grid_over(cells: Cells, bare: float, piece: float) -> Grid:
     """Return bins for the boxes of all links."""
     x0, y0, x1, y1, tallest = math.inf, math.inf, -math.inf, -math.inf, 0.0
     for link in range(cells.keys.shape[0]):
-        low, high = _box(segments, cells.marks, link, 0, bare)
-        x0, x1 = min(x0, low), max(x1, low)
-        low, high = _box(segments, cells.marks, link, 1, bare)
-        y0, y1, tallest = min(y0, low), max(y1, low), max(tallest, high - low)
+        box = cells.own[link]
+        x0, x1 = min(x0, box[0]), max(x1, box[0])
+        y0, y1, tallest = min(y0, box[1]), max(y1, box[1]), max(tallest, box[4] - box[1])
     room = cells.starts.shape[0] - 2
     ny = 1 + _bin(y1 - y0, piece, int(math.sqrt(room)) - 1)
     nx = 1 + _bin(x1 - x0, 0.25 * piece, room // ny - 1)
@@ -125,20 +128,14 @@ def grid_over(segments: Segments, cells: Cells, bare: float, piece: float) -> Gr
 
 
 @inlined
-def find_bins(segments: Segments, cells: Cells, grid: Grid) -> None:
-    """Write the bins of all links into `keys`."""
-    for link in range(cells.keys.shape[0]):
-        x, _ = _box(segments, cells.marks, link, 0, grid.bare)
-        y, _ = _box(segments, cells.marks, link, 1, grid.bare)
-        strip = _bin(y - grid.y, grid.width, grid.strips - 1)
-        cells.keys[link] = strip * grid.columns + _bin(x - grid.x, grid.size, grid.columns - 1)
-
-
-@inlined
 def sort_bins(cells: Cells, grid: Grid) -> None:
-    """Write all links into `order` bin by bin, and where each bin begins into `starts`."""
+    """Write bins of links into `keys`, links bin by bin into `order`, and where each bin begins into `starts`."""
     keys, starts, order = cells.keys, cells.starts, cells.order
     count, total = keys.shape[0], grid.columns * grid.strips
+    for link in range(count):
+        x, y = cells.own[link, 0], cells.own[link, 1]
+        strip = _bin(y - grid.y, grid.width, grid.strips - 1)
+        keys[link] = strip * grid.columns + _bin(x - grid.x, grid.size, grid.columns - 1)
     for key in range(total + 2):
         starts[key] = 0
     for p in range(count):
@@ -154,13 +151,13 @@ def sort_bins(cells: Cells, grid: Grid) -> None:
 
 
 @inlined
-def draw_boxes(segments: Segments, cells: Cells, grid: Grid) -> None:
+def copy_by_bin(segments: Segments, cells: Cells) -> None:
     """Write boxes of links and their segments in `order`, and which rows of the list the segments get."""
     few, n = cells.marks.shape[0] <= FEW, 0
     for m in range(cells.keys.shape[0]):
         link = cells.order[m]
-        for d in range(3):
-            cells.boxes[d, m], cells.boxes[3 + d, m] = _box(segments, cells.marks, link, d, grid.bare)
+        for d in range(6):
+            cells.boxes[d, m] = cells.own[link, d]
         cells.strands[m] = n
         for p in range(segments.first[link], segments.first[link + 1]):
             for d in range(LINE):
