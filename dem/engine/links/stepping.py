@@ -88,7 +88,8 @@ def act(
     """
     shapes, bodies, parts, segments = system.shapes, system.bodies, system.parts, system.segments
     known, ground, need = system.boundaries, system.boundaries.ground, totals[NEED : NEED + 1]
-    step, need[0] = Step(totals[PAST], dt, need), 1.0
+    # Sub-steps grow by no more than twice: energy is kept while they change slowly.
+    step, need[0] = Step(totals[PAST], dt, need), max(1.0, dt / (2.0 * totals[PAST]))
     parts.load[:] = 0.0
     ground.force[:] = 0.0
     lost = push_apart(system.law, bodies, parts, segments, system.pairs, ledger, step, scratch.met)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import NamedTuple, TypeAlias
 
-from dem.engine.links.arrays import Array
+from dem.engine.links.arrays import Array, Bodies
 from dem.engine.links.compiler import inlined
 from dem.engine.links.shapes import INVERSE, START, VECTOR
 
@@ -76,6 +76,28 @@ def moving(v: Vector, w: Vector, r: Vector) -> Vector:
         v[0] + w[1] * r[2] - w[2] * r[1],
         v[1] + w[2] * r[0] - w[0] * r[2],
         v[2] + w[0] * r[1] - w[1] * r[0],
+    )
+
+
+@inlined
+def turned(bodies: Bodies, i: int, x: float, y: float, z: float) -> Vector:
+    """Turn a vector from the frame of a body to the laboratory."""
+    axes = bodies.axes
+    return (
+        axes[i, 0, 0] * x + axes[i, 0, 1] * y + axes[i, 0, 2] * z,
+        axes[i, 1, 0] * x + axes[i, 1, 1] * y + axes[i, 1, 2] * z,
+        axes[i, 2, 0] * x + axes[i, 2, 1] * y + axes[i, 2, 2] * z,
+    )
+
+
+@inlined
+def turned_back(bodies: Bodies, i: int, a: Vector) -> Vector:
+    """Turn a vector from the laboratory to the frame of a body."""
+    axes = bodies.axes
+    return (
+        axes[i, 0, 0] * a[0] + axes[i, 1, 0] * a[1] + axes[i, 2, 0] * a[2],
+        axes[i, 0, 1] * a[0] + axes[i, 1, 1] * a[1] + axes[i, 2, 1] * a[2],
+        axes[i, 0, 2] * a[0] + axes[i, 1, 2] * a[1] + axes[i, 2, 2] * a[2],
     )
 
 

@@ -79,7 +79,7 @@ def _demand(depth: float, begin: float, room: float, closing: float, whole: floa
 
 @inlined
 def resolve(step: Step, depth: float, begin: float, room: float, closing: float) -> None:
-    """Ask for sub-steps where a contact leaves the linear range within a step.
+    """Ask for sub-steps where a contact leaves the linear range within a step, and until such a contact has ended.
 
     Args:
         step: `need` is written.
@@ -88,7 +88,12 @@ def resolve(step: Step, depth: float, begin: float, room: float, closing: float)
         room: overlap that no contact reaches [m].
         closing: rate at which the overlap grows [m/s].
     """
-    if depth + step.whole * max(0.0, closing) > begin:
+    after = depth + step.whole * closing
+    if step.past < step.whole and after < 0.0 < depth:
+        # It ends within the next sub-step, which is no longer than the last: `law.share_of_step` counts on that.
+        step.need[0] = max(step.need[0], step.whole / step.past)
+    # Two steps ahead, so that sub-steps are short already as the contact begins.
+    if max(depth, depth + 2.0 * step.whole * closing) > begin:
         step.need[0] = max(step.need[0], _demand(depth, begin, room, closing, step.whole))
 
 

@@ -9,8 +9,7 @@ from dem.engine.links.arrays import Bodies, Cords, Parts
 from dem.engine.links.compiler import kernel, part
 from dem.engine.links.contact.barrier import Step
 from dem.engine.links.contact.pairs import push, velocity_at
-from dem.engine.links.motion.poses import turned
-from dem.engine.links.vectors import add, dot, put, put_more, scale, sub, vector
+from dem.engine.links.vectors import add, dot, put, put_more, scale, sub, turned, vector
 
 
 @part

@@ -32,9 +32,9 @@ from dem.engine.links.motion.planar import (
     spin_by,
     spin_of,
 )
-from dem.engine.links.motion.poses import SLIP, along_normal, turn_axes, turned_back
+from dem.engine.links.motion.poses import SLIP, along_normal, turn_axes
 from dem.engine.links.shapes import Planar, Shapes
-from dem.engine.links.vectors import vector
+from dem.engine.links.vectors import turned_back, vector
 from dem.physics import motor
 
 BRAKING = 0.5  # of the greatest deceleration is used on the way to a target, so that it is not passed

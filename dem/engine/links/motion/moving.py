@@ -17,9 +17,9 @@ from dem.engine.links.contact.barrier import LONGEST, STRIDE, Step
 from dem.engine.links.contact.pairs import velocity_at
 from dem.engine.links.motion.motoring import ITERATIONS, contact_torques, free_torques, middle_of_step
 from dem.engine.links.motion.planar import planar_at, rates, spin_of
-from dem.engine.links.motion.poses import SLIP, along_normal, turned_back
+from dem.engine.links.motion.poses import SLIP, along_normal
 from dem.engine.links.shapes import Shapes
-from dem.engine.links.vectors import along, dot, vector
+from dem.engine.links.vectors import along, dot, turned_back, vector
 
 
 @inlined

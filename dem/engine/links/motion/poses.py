@@ -8,31 +8,9 @@ from dem.engine.links.arrays import ORIGIN, SPIN, VELOCITY, Array, Bodies, Parts
 from dem.engine.links.compiler import inlined, kernel, part
 from dem.engine.links.motion.planar import planar_at, rates, spin_of
 from dem.engine.links.shapes import Planar, Shapes
-from dem.engine.links.vectors import Vector, add, moving, put, put_more, scale, sub, vector
+from dem.engine.links.vectors import Vector, add, moving, put, put_more, scale, sub, turned, turned_back, vector
 
 SLIP = 3  # laws of motors from here on leave the angles free
-
-
-@inlined
-def turned(bodies: Bodies, i: int, x: float, y: float, z: float) -> Vector:
-    """Turn a vector from the frame of a body to the laboratory."""
-    axes = bodies.axes
-    return (
-        axes[i, 0, 0] * x + axes[i, 0, 1] * y + axes[i, 0, 2] * z,
-        axes[i, 1, 0] * x + axes[i, 1, 1] * y + axes[i, 1, 2] * z,
-        axes[i, 2, 0] * x + axes[i, 2, 1] * y + axes[i, 2, 2] * z,
-    )
-
-
-@inlined
-def turned_back(bodies: Bodies, i: int, a: Vector) -> Vector:
-    """Turn a vector from the laboratory to the frame of a body."""
-    axes = bodies.axes
-    return (
-        axes[i, 0, 0] * a[0] + axes[i, 1, 0] * a[1] + axes[i, 2, 0] * a[2],
-        axes[i, 0, 1] * a[0] + axes[i, 1, 1] * a[1] + axes[i, 2, 1] * a[2],
-        axes[i, 0, 2] * a[0] + axes[i, 1, 2] * a[1] + axes[i, 2, 2] * a[2],
-    )
 
 
 @inlined
