@@ -5,8 +5,6 @@ Smarticles are rigid bodies of spheres (`fix rigid/small`) with spring, dashpot 
 spring (`gran/hooke/history`), as on YADE. Keywords are those of `dem.engine.lammps.text`.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass

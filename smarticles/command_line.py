@@ -1,7 +1,5 @@
 """Parse command lines with one-line errors; define common options; format tables and JSON."""
 
-from __future__ import annotations
-
 import argparse
 import json
 import math
@@ -9,7 +7,7 @@ import re
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
-from typing import Any, NoReturn, TypeVar
+from typing import Any, NoReturn, Self, TypeVar
 
 from dem.engine import ENGINES
 from dem.errors import InputError, nearest
@@ -180,7 +178,7 @@ class Cell(str):
     __slots__ = ()
 
     @classmethod
-    def of(cls, value: float, form: str, factor: float = 1.0) -> Cell:
+    def of(cls, value: float, form: str, factor: float = 1.0) -> Self:
         """Format `factor * value`; return a dash if the value is not finite."""
         return cls(f"{factor * value:{form}}" if math.isfinite(value) else "-")
 

@@ -4,8 +4,6 @@ Exit status: 0 done; 1 the run failed; 2 bad input or usage; 75 stopped at a che
 130 stopped by Ctrl-C; 141 the reader of the output closed the pipe.
 """
 
-from __future__ import annotations
-
 import argparse
 import os
 import shlex

@@ -1,7 +1,5 @@
 """Python API: run and read scenes and sweeps, and measure them."""
 
-from __future__ import annotations
-
 import shlex
 import subprocess
 import tempfile

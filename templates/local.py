@@ -4,8 +4,6 @@ Runs with the longest expected time start first, see `Folder.in_order_of_start`.
 others. Ctrl-C stops all runs, after they have closed their files.
 """
 
-from __future__ import annotations
-
 import contextlib
 import os
 import signal

@@ -4,8 +4,6 @@
 along x, its middle at the origin. Source: Savoie et al., Soft Matter 2023, "Robophysical experiment".
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from typing import Literal

@@ -10,8 +10,6 @@ A middle link may be thicker in the plane than the barbs, like the body of a rob
 in the plane, and the barbs begin outside of them.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from functools import cached_property, lru_cache

@@ -1,7 +1,5 @@
 """Poses of smarticles: random poses without overlap, and poses fitted to recorded vertices."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """Number of cores that this process may use, and checks of threads and ranks against it."""
 
-from __future__ import annotations
-
 import os
 
 from dem.errors import InputError

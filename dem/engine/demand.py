@@ -1,7 +1,5 @@
 """The part of a scene that engines use."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from enum import Enum, auto
 from typing import Protocol

@@ -8,8 +8,6 @@ Heights, velocities and forces are in the laboratory frame. Engines sum some for
 two sums, divided by the number of steps in between, is a mean force that misses no impact.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path

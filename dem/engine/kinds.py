@@ -1,7 +1,5 @@
 """List of the engines, with facts about them that are known without a simulation."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Protocol
 

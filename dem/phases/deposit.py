@@ -1,7 +1,5 @@
 """The phase that pours smarticles, layer by layer."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator
 from typing import ClassVar, Literal

@@ -1,7 +1,5 @@
 """The phase that shakes the container."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Literal

@@ -5,8 +5,6 @@ another engine, or at another fidelity, these poses may overlap: spheres of one 
 chain, smooth links do not. Such overlaps are relaxed first, with velocities set to zero every few steps.
 """
 
-from __future__ import annotations
-
 import hashlib
 import math
 import re

@@ -1,7 +1,5 @@
 """Motors at the hinges, velocity-controlled and with a torque limit: what a control update computes."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Literal, get_args

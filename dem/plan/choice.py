@@ -5,8 +5,6 @@ measured processor times to planned wall times, by which the hours planned for a
 knob `engine` compare engines with one reference, rows of the knob `fidelity` the fidelities of one engine.
 """
 
-from __future__ import annotations
-
 import csv
 import math
 from collections.abc import Sequence

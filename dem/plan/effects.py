@@ -4,8 +4,6 @@
 lists and the files of runs.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """Plan of a run: phases, effects with reasons, engines, time steps, cost, warnings."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any, Self

@@ -8,8 +8,6 @@ reloads each checkpoint that it writes: an engine may order bodies and contacts 
 depend on the order.
 """
 
-from __future__ import annotations
-
 import io
 import json
 import os

@@ -1,7 +1,5 @@
 """JSON files of a run directory: `run.json`, `done.json`, `failed.json` and `progress.json`."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, ClassVar, Literal, Self

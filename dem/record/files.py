@@ -1,7 +1,5 @@
 """Writing of files that appear complete or not at all, and the error about a file that cannot be read."""
 
-from __future__ import annotations
-
 import contextlib
 import os
 from collections.abc import Callable, Iterator

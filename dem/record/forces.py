@@ -1,7 +1,5 @@
 """Forces at contacts at one time: a VTK file of lines, one per contact; see docs/reference/files.md."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any

@@ -3,8 +3,6 @@
 docs/reference/files.md describes the format.
 """
 
-from __future__ import annotations
-
 import contextlib
 import io
 import math

@@ -1,7 +1,5 @@
 """Packing fraction by the paper's definition, up to the second-highest centre of mass."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Progress of a running simulation, in `progress.json` and in one line on the terminal."""
 
-from __future__ import annotations
-
 import math
 import sys
 from dataclasses import dataclass, field

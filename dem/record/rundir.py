@@ -1,7 +1,5 @@
 """The lock and the log of a run directory: one process at a time writes into it."""
 
-from __future__ import annotations
-
 import fcntl
 import logging
 import os

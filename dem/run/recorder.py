@@ -1,7 +1,5 @@
 """Writing of a run's files while time advances, and checks by the watchdog."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass

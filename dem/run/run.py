@@ -1,7 +1,5 @@
 """Simulation of one scene into a run directory, and the manifest of the run."""
 
-from __future__ import annotations
-
 import contextlib
 import logging
 import os

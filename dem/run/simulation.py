@@ -1,7 +1,5 @@
 """The loop of a run: phases in order, steps from one recording to the next, and checkpoints."""
 
-from __future__ import annotations
-
 import logging
 import shutil
 import signal

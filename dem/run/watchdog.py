@@ -1,7 +1,5 @@
 """Checks that stop a run whose result would have no meaning."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """Reading scenes from files, changing them by `--set`, and writing, hashing and comparing them."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 import os

@@ -3,8 +3,6 @@
 Each limit follows from what engines can compute, or excludes runs without meaning.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator
 

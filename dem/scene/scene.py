@@ -3,8 +3,6 @@
 Its parts are in `dem.setting`, its phases in `dem.phases`; `dem.scene.rules` checks that they fit together.
 """
 
-from __future__ import annotations
-
 import hashlib
 import math
 from collections.abc import Mapping

@@ -1,7 +1,5 @@
 """Strict reader of YAML, for scenes, sweeps and templates."""
 
-from __future__ import annotations
-
 import re
 import sys
 from typing import Any

@@ -1,7 +1,5 @@
 """Knobs, the numerical parameters that trade accuracy for cost, and named sets of their values."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any, Literal
 

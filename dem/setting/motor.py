@@ -1,7 +1,5 @@
 """Motor parameters of a scene."""
 
-from __future__ import annotations
-
 from typing import Literal, Self
 
 from pydantic import Field, model_validator

@@ -1,7 +1,5 @@
 """Command `export`: write the bodies of a run for other programs, or a scene for LAMMPS."""
 
-from __future__ import annotations
-
 import argparse
 import sys
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Command `report`: write one HTML page about a run, a sweep or a study."""
 
-from __future__ import annotations
-
 import argparse
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Commands `init` and `schema`: write a commented example scene; print the JSON schema of scenes."""
 
-from __future__ import annotations
-
 import argparse
 import json
 import shlex

@@ -1,7 +1,5 @@
 """Command `view`: serve an interactive view of a run to the browser."""
 
-from __future__ import annotations
-
 import argparse
 import os
 import sys

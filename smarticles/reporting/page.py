@@ -1,7 +1,5 @@
 """HTML of a report: one file without scripts and without links to other files."""
 
-from __future__ import annotations
-
 import base64
 import re
 from collections.abc import Iterable, Sequence

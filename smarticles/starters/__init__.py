@@ -1,7 +1,5 @@
 """Commented example scenes, one file per kind, which `smarticles init` writes."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 from dem.errors import InputError, nearest

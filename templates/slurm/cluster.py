@@ -1,12 +1,10 @@
 """Read the description of a cluster from a file: partitions, limits, modules, container."""
 
-from __future__ import annotations
-
 import os
 import re
 import tomllib
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Literal, Self
 
 from pydantic import AfterValidator, Field, ValidationError, field_validator, model_validator
 
@@ -128,7 +126,7 @@ class Cluster(Strict):
     template: str | None = Field(default=None, description="Jinja2 file that extends slurm.sh.j2; beside this file")
 
     @model_validator(mode="after")
-    def _check(self) -> Cluster:
+    def _check(self) -> Self:
         if self.default_partition not in self.partitions:
             advice = nearest(self.default_partition, sorted(self.partitions))
             raise ValueError(f"default_partition: there is no {self.default_partition!r}; {advice}")

@@ -1,7 +1,5 @@
 """Plan an array job of Slurm within the limits of a cluster, and render its job script."""
 
-from __future__ import annotations
-
 import math
 import os
 import re

@@ -1,7 +1,5 @@
 """Make the points of a sweep: named and validated scenes."""
 
-from __future__ import annotations
-
 import itertools
 import math
 import re

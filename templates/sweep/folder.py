@@ -7,15 +7,13 @@ DIR/logs/NAME.txt       output of the run's process
 DIR/jobs/               submissions to a queue, see `templates.slurm.submission`
 """
 
-from __future__ import annotations
-
 import fcntl
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Any, ClassVar, Literal
+from typing import Any, ClassVar, Literal, Self
 
 from dem.errors import InputError
 from dem.record.document import Document
@@ -89,9 +87,9 @@ class Folder:
         """All runs of the sweep, in the order of its file."""
         return self.manifest.points
 
-    def only(self, entries: Sequence[Entry]) -> Folder:
+    def only(self, entries: Sequence[Entry]) -> Self:
         """Return a folder that lists only the given runs."""
-        return Folder(self.path, self.manifest.model_copy(update={"points": tuple(entries)}))
+        return replace(self, manifest=self.manifest.model_copy(update={"points": tuple(entries)}))
 
     def in_order_of_start(self, entries: Sequence[Entry]) -> list[Entry]:
         """Return runs in the order in which to start them, those with the longest expected time first.

@@ -4,8 +4,6 @@ For YAML, each `{{ … }}` becomes a placeholder in the text. The text is parsed
 then replaced by the values. A value that is alone keeps its type, and no value can change the structure of the YAML.
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Callable, Mapping
 from typing import Any, NoReturn

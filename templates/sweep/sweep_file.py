@@ -4,8 +4,6 @@
 FILE@quick applies the variant `quick`, FILE@code,quick applies `code` and then `quick`.
 """
 
-from __future__ import annotations
-
 import csv
 import io
 import math
@@ -13,7 +11,7 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, Self
 
 import yaml
 from pydantic import AfterValidator, Field, ValidationError, field_validator, model_validator
@@ -63,7 +61,7 @@ class Points(Strict):
     grid: dict[str, list[Value]] | None = Field(default=None, min_length=1)
 
     @model_validator(mode="after")
-    def _check(self) -> Points:
+    def _check(self) -> Self:
         rows, zip_, grid = self.list_ or [], self.zip_ or {}, self.grid or {}
         if not (self.table or rows or zip_ or grid):
             raise ValueError("no points: give at least one of table, list, zip, grid")
@@ -111,7 +109,7 @@ class Repeats(Strict):
     more: MoreSeeds | None = None
 
     @model_validator(mode="after")
-    def _others(self) -> Repeats:
+    def _others(self) -> Self:
         shared = [seed for seed in self.more.seeds if seed in self.seeds] if self.more else []
         if shared:
             raise ValueError(f"more.seeds: {shared[0]} is one of `seeds` already; leave it out of one of them")
@@ -142,7 +140,7 @@ class SweepFile(Strict):
     variants: dict[str, dict[str, Any]] = Field(default={}, description="merge patches of this file, by name")
 
     @model_validator(mode="after")
-    def _known(self) -> SweepFile:
+    def _known(self) -> Self:
         for name in self.again.constants if self.again else ():
             if name not in self.constants:
                 raise ValueError(f"again.constants: {name!r} is none of the constants; add it there")

@@ -1,7 +1,5 @@
 """Floor and wall on LAMMPS, whose heights are variables of LAMMPS and are computed here as well."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field

@@ -1,7 +1,5 @@
 """LAMMPS as a child process under `mpirun`: start, commands, answers, and the cause of an early end."""
 
-from __future__ import annotations
-
 import os
 import re
 import select

@@ -1,8 +1,7 @@
 """Contacts and overlaps, computed here from the positions of the spheres."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
+from typing import Self
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -24,7 +23,7 @@ class Contacts:
     fixed_depths: Array  #: (F,) overlaps of these spheres [m]
 
     @classmethod
-    def of(cls, spheres: Array, radius: float, boundaries: LammpsBoundaries) -> Contacts:
+    def of(cls, spheres: Array, radius: float, boundaries: LammpsBoundaries) -> Self:
         """Return the contacts of spheres with each other, floor and wall.
 
         Args:

@@ -1,7 +1,5 @@
 """A running simulation on LAMMPS, in a child process on one or several ranks."""
 
-from __future__ import annotations
-
 import io
 import json
 import math

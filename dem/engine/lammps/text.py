@@ -3,11 +3,10 @@
 Keywords are those of version 29 Sep 2021, update 2, which Debian 12 has.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import Self
 
 import numpy as np
 
@@ -35,7 +34,7 @@ class Moving:
     forces: Array  #: (N, 3) forces of contacts and weight [N]
 
     @classmethod
-    def none(cls) -> Moving:
+    def none(cls) -> Self:
         """Return arrays for N = 0."""
         empty = np.zeros((0, 3))
         return cls(empty, np.zeros((0, 3, 3)), empty, empty, empty, empty)

@@ -4,8 +4,6 @@ Welding and articulating conserve positions, momentum and angular momentum up to
 the kinetic energy; welding dissipates the energy of the links' relative motion.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from typing import Any
 

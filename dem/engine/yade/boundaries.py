@@ -1,7 +1,5 @@
 """Rigid boundaries in YADE: floor and wall of flat facets, hooks, or table and walls of a channel."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from itertools import pairwise

@@ -1,7 +1,5 @@
 """Materials, engines and functors that each effect needs on YADE, and their construction."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from typing import Any

@@ -3,8 +3,6 @@
 One process runs one simulation: YADE keeps its scene in a process-wide singleton.
 """
 
-from __future__ import annotations
-
 import math
 from pathlib import Path
 

@@ -6,8 +6,6 @@ sampled step stands for all steps up to the next sample. The ledger's residual i
 the integration scheme, mostly where contacts begin in the middle of a step.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """Import of the YADE that the Linux distribution ships; no other module imports `yade`."""
 
-from __future__ import annotations
-
 import contextlib
 import importlib
 import io

@@ -1,7 +1,5 @@
 """The stable time step on YADE, from masses and inertias of smarticles instead of sphere sizes."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable, Sequence
 
