@@ -63,12 +63,7 @@ class PassiveScene:
 
 
 def passive(scene: Scene) -> PassiveScene:
-    """Return a scene with its poses, for a deck.
-
-    Raises:
-        InputError: the scene has parts that LAMMPS cannot compute, all of which the message names; or its poses overlap
-            as spheres, since they are from another engine or fidelity.
-    """
+    """Return a scene with its poses, for a deck."""
     found = list(_foreign(scene))
     if found:
         raise InputError(
@@ -118,7 +113,8 @@ def write_deck(scene: Scene, folder: Path) -> None:
     """Write the deck of a scene into a folder of its own.
 
     Raises:
-        InputError: the scene has parts that LAMMPS cannot compute, or the folder exists already.
+        InputError: the scene has parts that LAMMPS cannot compute, all of which the message names; its poses overlap as
+            spheres, since they are from another engine or fidelity; or the folder exists already.
         RunError: a file cannot be written.
     """
     given = passive(scene)

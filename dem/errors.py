@@ -14,14 +14,7 @@ class RunError(RuntimeError):
 
 
 def reject(failing: Any, time: float, cause: str, way_out: str) -> None:
-    """Raise RunError if any smarticle fails a check at a simulated time [s].
-
-    Args:
-        failing: (N,) bool array, which smarticles fail.
-        time: simulated time [s].
-        cause: what is wrong with these smarticles.
-        way_out: what to do.
-    """
+    """Raise RunError about the smarticles for which `failing` (N,) is true, at a simulated time [s]."""
     if failing.any():
         ids = failing.nonzero()[0]
         shown = ", ".join(str(k) for k in ids[:5]) + (", …" if len(ids) > 5 else "")

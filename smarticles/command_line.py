@@ -49,15 +49,7 @@ class Commands:
         self.parsers: dict[str, Parser] = {}
 
     def add(self, name: str, handler: Handler, *, summary: str, text: str, examples: str) -> Parser:
-        """Add a subcommand and return its parser.
-
-        Args:
-            name: word on the command line.
-            handler: runs the subcommand.
-            summary: one line for the list of commands.
-            text: description for `--help` of the subcommand.
-            examples: example command lines for `--help` of the subcommand.
-        """
+        """Add a subcommand and return its parser; `summary` is for the list of commands, `text` for `--help`."""
         parser: Parser = self._subparsers.add_parser(
             name,
             help=summary,
@@ -148,11 +140,7 @@ def add_options(parser: argparse._ActionsContainer, *options: str, **settings: A
 
 
 def scene_settings(arguments: argparse.Namespace) -> list[str]:
-    """Return --set and --engine as a list of `KEY=VALUE`.
-
-    Raises:
-        InputError: --engine and --set name different engines.
-    """
+    """Return --set and --engine as a list of `KEY=VALUE`; raise InputError if they name different engines."""
     settings: list[str] = list(arguments.set)
     if arguments.engine is None:
         return settings

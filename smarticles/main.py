@@ -120,12 +120,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def guarded(action: Callable[[], int], *, debug: bool = False) -> int:
-    """Run an action and return the exit status; print exceptions and signals as one line on stderr.
-
-    Args:
-        action: returns an exit status.
-        debug: print the traceback of an exception too.
-    """
+    """Run an action and return the exit status; print exceptions and signals as one line on stderr."""
     try:
         with orderly_stop():
             status = action()

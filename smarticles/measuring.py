@@ -78,7 +78,6 @@ def measured(
     """Measure runs and sweeps.
 
     Args:
-        directories: directories of runs and sweeps.
         frames: return one row per frame instead of one row per run and phase.
         costly: when to compute the costly packing fractions, see `postprocess.measure_run`.
         jobs: number of processes. More than 1 needs `if __name__ == "__main__":` in the calling script, since the

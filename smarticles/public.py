@@ -187,19 +187,7 @@ def sweep(
 
 
 def write_sweep(scene: Scene | Path | str, vary: Mapping[str, Sequence[Any]], folder: Path) -> Path:
-    """Write the sweep file `sweep.yaml` and its template `scene.yaml.j2` for all combinations of `vary`.
-
-    Args:
-        scene: scene, or path of a scene file.
-        vary: values by key of the scene, see `sweep`.
-        folder: existing folder for both files.
-
-    Returns:
-        The path of the sweep file.
-
-    Raises:
-        InputError: the scene cannot be read or contains template syntax, a key does not exist, or `vary` is empty.
-    """
+    """Write `sweep.yaml` and its template `scene.yaml.j2` for all combinations of `vary`; return its path."""
     if not vary:
         raise InputError("vary: is empty; give a key of the scene and its values, e.g. {'seed': [1, 2, 3]}")
     data = _explicit_keys(scene) if isinstance(scene, Scene) else _read_scene_file(Path(scene))

@@ -174,15 +174,11 @@ def run_folder(
     its beginning; its old directory is renamed.
 
     Args:
-        folder: Directory of the sweep.
-        display: Display of the progress.
         slots: Number of runs at once; one per core if not given.
-        command: Returns the command of a run.
         poll_s: Time between updates of the display [s].
         grace_s: Time between one signal to stop and the next stronger one [s].
 
     Raises:
-        InputError: Another process already computes this sweep.
         KeyboardInterrupt: Ctrl-C was pressed; all runs were stopped.
     """
     with folder.lock() as lock, display:

@@ -36,11 +36,7 @@ def most_ranks() -> int:
 
 
 def check_ranks(wanted: int) -> None:
-    """Reject a number of ranks above the number of cores.
-
-    Raises:
-        InputError: there are fewer cores than ranks, which wait for each other at every step.
-    """
+    """Raise InputError if there are more ranks than cores, since ranks wait for each other at every step."""
     most = most_ranks()
     if wanted > most:
         raise InputError(

@@ -163,13 +163,7 @@ class Strings(Protocol):
         """Whether strings are tied to smarticles at present."""
 
     def tie(self, ties: Sequence[Tie], law: StringLaw, speeds: Sequence[float]) -> None:
-        """Tie taut strings to smarticles, with the far ends on the chain's axis.
-
-        Args:
-            ties: points at which strings are tied.
-            law: stiffness and damping of each string.
-            speeds: speeds at which the far ends move outwards along x [m/s].
-        """
+        """Tie taut strings; their far ends, on the chain's axis, move outwards along x at `speeds` [m/s]."""
 
     def untie(self) -> None:
         """Remove all strings."""
@@ -311,11 +305,7 @@ class Engine(Protocol):
     # -- checkpoints -------------------------------------------------------------------------------------------
 
     def save(self, scratch: Path) -> Saved:
-        """Return the state for `load`; after loading, the simulation continues with identical bits.
-
-        Args:
-            scratch: folder for temporary files.
-        """
+        """Return the state, from which `load` continues with identical bits; temporary files are in `scratch`."""
 
     def load(self, saved: Saved, scratch: Path) -> None:
         """Replace the state by one that `save` returned for an engine of this scene; arguments as in `save`."""

@@ -34,11 +34,7 @@ class EngineKind(Protocol):
         """Return the number of threads, or ranks, of runs that this process starts."""
 
     def stable_step(self, scene: Demand, *, articulated: bool) -> float:
-        """Return the largest stable time step [s].
-
-        Args:
-            articulated: whether barbs can turn, or have turned before.
-        """
+        """Return the largest stable time step [s]; `articulated`: whether barbs can turn, or have turned before."""
 
     def seconds_per_second(self, scene: Demand, time_step: float, activity: Activity) -> float:
         """Return an estimate of the wall time per simulated time [1] on one core, with a time step [s]."""
@@ -48,11 +44,7 @@ class EngineKind(Protocol):
 
 
 def engine_kind(name: str) -> EngineKind:
-    """Return the facts about an engine, by its name in scenes.
-
-    Raises:
-        InputError: there is no engine of that name.
-    """
+    """Return the facts about an engine by its name in scenes; raise InputError for an unknown name."""
     # Imported only when used, since each engine needs software of its own.
     if name == "yade":
         from dem.engine.yade.kind import YadeKind  # noqa: PLC0415

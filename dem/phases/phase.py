@@ -76,11 +76,7 @@ class Phase:
         yield from ()
 
     def ready(self, scene: SceneView) -> None:
-        """Check before a run begins that the source of the phase's content is present and unchanged.
-
-        Raises:
-            InputError: one line with key, value and what to do.
-        """
+        """Raise InputError before a run if the source of the phase's content is missing or has changed."""
 
     @property
     def origin(self) -> Mapping[str, Any] | None:

@@ -260,9 +260,6 @@ def pick(expected: Sequence[Measured], *, max_error: float | None, max_hours: fl
 
     Args:
         expected: fidelities with their hours, for each engine from coarse to fine.
-
-    Raises:
-        InputError: as in `choose`.
     """
     quick = [one for one in expected if max_hours is None or one.hours <= max_hours]
     if max_error is None:

@@ -130,11 +130,7 @@ def _wall_time(wall: float) -> str:
 
 
 def plan(scene: Scene) -> Plan:
-    """Return the plan of a scene.
-
-    Raises:
-        InputError: as in `time_steps`.
-    """
+    """Return the plan of a scene."""
     kind = engine_kind(scene.engine)
     steps = time_steps(scene)
     particle = scene.particle

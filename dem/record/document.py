@@ -49,11 +49,7 @@ class Document(BaseModel):
             cannot_read("manifest", path, ": ".join([".".join(place), text] if place else [text]), cls.remedy)
 
     def write(self, path: Path, *, make_folder: bool = False) -> None:
-        """Write a file, without keys that are None, and make its folder if `make_folder`.
-
-        Raises:
-            RunError: the file cannot be written.
-        """
+        """Write a file, without keys that are None, and make its folder if `make_folder`."""
         write_text(path, self.model_dump_json(indent=2, exclude_none=True) + "\n", make_folder=make_folder)
 
 

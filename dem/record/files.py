@@ -37,7 +37,6 @@ def write_whole(path: Path, write: Callable[[Path], object], *, make_folder: boo
 
     Args:
         write: function that writes the content to a temporary path.
-        make_folder: whether to make the folder of the file.
 
     Raises:
         RunError: the disk is full or the folder cannot be written; an existing file is unchanged.
@@ -65,13 +64,7 @@ def write_text(path: Path, text: str, *, make_folder: bool = True) -> None:
 
 
 def cannot_read(what: str, path: Path, cause: BaseException | str, remedy: str) -> NoReturn:
-    """Raise InputError about a file that is missing, truncated or wrong.
-
-    Args:
-        what: kind of the file, e.g. "frame".
-        cause: an error, or the cause in words.
-        remedy: what to do.
-    """
+    """Raise InputError about a file that is missing, truncated or wrong."""
     if isinstance(cause, BaseException):
         lines = str(cause).strip().splitlines()
         named = ": ".join([type(cause).__name__, *lines[:1]])

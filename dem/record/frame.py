@@ -210,7 +210,6 @@ def read_mesh(path: Path, what: str = "frame", remedy: str | None = None) -> Any
     """Return the mesh of a VTK file.
 
     Args:
-        what: kind of the file in messages.
         remedy: what to do about a damaged file; None: advice for frames.
 
     Raises:

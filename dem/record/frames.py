@@ -32,11 +32,7 @@ class FrameWriter:
     times: list[float] = field(default_factory=list)  #: Times of the frames written so far [s]
 
     def write(self, mesh: meshio.Mesh, time: float) -> None:
-        """Write one frame at a simulated time [s].
-
-        Raises:
-            RunError: the file cannot be written.
-        """
+        """Write one frame at a simulated time [s]."""
         name = names.member(self.noun, len(self.times))
         write_whole(self.folder / name, lambda path: mesh.write(path, file_format="vtu"))
         self.times.append(time)
@@ -117,9 +113,6 @@ class FrameSequence(Sequence[Frame]):
 
 def read_frames(directory: Path | str) -> FrameSequence:
     """Return the frames of a run directory, whose run may be done, failed or still running.
-
-    Raises:
-        InputError: `frames.pvd` is missing, damaged or not in time order.
 
     Example:
         >>> for frame in read_frames("runs/pile")[-2:]:

@@ -66,11 +66,7 @@ class SeriesWriter:
             self.write()
 
     def write(self) -> None:
-        """Rewrite the file with all rows.
-
-        Raises:
-            RunError: the file cannot be written.
-        """
+        """Rewrite the file with all rows."""
         write_whole(self.folder / names.SERIES, self._write, make_folder=False)
         self._written = time.monotonic()
 
@@ -139,9 +135,6 @@ class Series:
 
 def read_series(directory: Path | str) -> Series:
     """Return the time series of a run directory, whose run may be done, failed or still running.
-
-    Raises:
-        InputError: the file is missing or damaged, or lacks an attribute or dataset.
 
     Example:
         >>> series = read_series("runs/pile")

@@ -37,8 +37,6 @@ def run_scene(
 
     Args:
         out: the run directory; it must not exist, or be empty, or with `resume` hold an unfinished run of this scene.
-        command: the command line, for the manifest.
-        progress: whether to show progress on the terminal.
         resume: whether to continue from the newest undamaged checkpoint, or from the start if none was written.
         builders: functions that make the parts of the run; None: the default ones.
 
@@ -177,7 +175,6 @@ def manifest(
     Args:
         steps: time step of each phase [s].
         made_by: name and version of the engine.
-        threads: threads, or ranks, of the engine.
     """
     particle, boxes, origin = scene.particle, scene.smarticle.boxes, scene.phases[0].origin
     if origin is not None:  # a relative path stays right if both runs are moved together

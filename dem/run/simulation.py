@@ -50,12 +50,7 @@ class Simulation:
     _stop_requested: bool = False
 
     def run(self) -> tuple[Phase, ...]:
-        """Run from the present state to the end of the last phase; return the phases with their times.
-
-        Raises:
-            RunError: a phase failed.
-            StopRequestedError: SIGUSR1 came; the run can be resumed from its last checkpoint.
-        """
+        """Run from the present state to the end of the last phase; return the phases with their times."""
         before = signal.signal(signal.SIGUSR1, self._request_stop)
         try:
             if not self.engine.steps:

@@ -56,7 +56,6 @@ class Watchdog:
         """Check speeds, hinges and positions of all smarticles.
 
         Args:
-            state: poses and velocities of the smarticles.
             floor: height of the floor [m].
             time: simulated time [s].
             points: (N, P, 3) centres of the spheres, or points of the links' axes [m]; None: centres of mass. They are
@@ -105,11 +104,7 @@ class Watchdog:
         )
 
     def check_depths(self, overlaps: Overlaps, *, time: float) -> None:
-        """Check the overlaps of all contacts at a simulated time [s].
-
-        Raises:
-            RunError: a contact is deeper than `depth`.
-        """
+        """Check the overlaps of all contacts at a simulated time [s]; raise RunError beyond `depth`."""
         cause = (
             f"contacts more than {self.depth:.3g} m deep (deepest {overlaps.deepest:.3g} m), so that links pass "
             "through each other or through the container"

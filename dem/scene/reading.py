@@ -31,7 +31,6 @@ def parse_scene(data: Any, *, source: str, folder: Path | None = None) -> Scene:
     """Return the scene that plain data describe.
 
     Args:
-        data: keys and values of a scene, as read from YAML.
         source: name of the data in messages.
         folder: folder that paths of other runs are relative to; None: the working directory.
 

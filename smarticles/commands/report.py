@@ -35,11 +35,7 @@ and needs no network.""",
 
 
 def write_report(arguments: argparse.Namespace) -> int:
-    """Write the HTML page and print its name and size; return the exit status.
-
-    Raises:
-        InputError: wrong name of the output, unreadable table of errors, or an unknown kind of directory.
-    """
+    """Write the HTML page and print its name and size; return the exit status."""
     from postprocess.report.figures import whole_file  # noqa: PLC0415
 
     directory: Path = arguments.directory

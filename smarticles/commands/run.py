@@ -115,11 +115,7 @@ def resume_directory(arguments: argparse.Namespace) -> int:
 
 
 def read_scene(scene_file: Path, settings: Sequence[str]) -> Scene:
-    """Read a scene file, apply `KEY=VALUE` settings, and check the time steps.
-
-    Raises:
-        InputError: the scene or a time step is not valid; the message names the file.
-    """
+    """Read a scene file, apply `KEY=VALUE` settings, and check the time steps."""
     from dem.plan.steps import time_steps  # noqa: PLC0415
     from dem.scene.reading import load_scene  # noqa: PLC0415
 

@@ -61,11 +61,7 @@ which `smarticles resume` continues.""",
 
 
 def show_status(arguments: argparse.Namespace) -> int:
-    """Print the states of the runs in a directory, once or repeatedly; return the exit status.
-
-    Raises:
-        InputError: options contradict each other, or the directory holds neither a run nor a sweep.
-    """
+    """Print the states of the runs in a directory, once or repeatedly; return the exit status."""
     directory: Path = arguments.directory
     if arguments.json and arguments.watch:
         raise InputError("--watch: cannot be combined with --json; leave it out with --json")

@@ -51,8 +51,6 @@ def against_variable(variable: str, label: str, groups: Groups) -> str:
     """Draw means with error bars against a variable; return the chart as a data URL.
 
     Args:
-        variable: label of the horizontal axis.
-        label: label of the vertical axis, with unit.
         groups: x, means and standard errors of each curve; an error may be NaN.
     """
     values = [x for xs, _, _ in groups.values() for x in xs]
@@ -82,15 +80,7 @@ def against_variable(variable: str, label: str, groups: Groups) -> str:
 
 
 def thinned(times: Array, values: Array) -> tuple[Array, Array]:
-    """Reduce a curve to at most 400 points: the smallest and the largest value of each interval, without NaN.
-
-    Args:
-        times: (n,) [s].
-        values: (n,).
-
-    Returns:
-        Times and values, (m,) each.
-    """
+    """Reduce a curve (n,) to at most 400 points: the extremes of each interval, without NaN."""
     finite = np.isfinite(values)
     times, values = times[finite], values[finite]
     if len(times) <= _MAX_POINTS:

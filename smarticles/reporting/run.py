@@ -104,7 +104,6 @@ def short_table(found: pd.DataFrame, named: Sequence[str], caption: str) -> Mark
     Args:
         found: table of `measured` or `grouped`.
         named: columns that identify a row.
-        caption: caption of the table.
     """
     present = found.columns[found.notna().any()]
     wanted = [(quantity.header, shown) for quantity, shown in shown_quantities() if quantity.header in present]
@@ -130,7 +129,6 @@ def picture_blocks(directory: Path, *, name: str = "", turn: bool = True) -> lis
     """Return pictures of the last frame of a run, or a note with the reason why there are none.
 
     Args:
-        directory: run directory.
         name: name of the run in captions; empty on the page of a single run.
         turn: add views from all sides.
     """
@@ -189,13 +187,7 @@ def _curves(run: Run) -> list[Markup]:
 
 
 def scene_blocks(directory: Path, scene: Scene | None, scene_error: str) -> list[Markup]:
-    """Return the planned phases, the warnings of the plan, and the scene file.
-
-    Args:
-        directory: folder that contains the scene file.
-        scene: the scene; None if it cannot be read.
-        scene_error: message if the scene cannot be read.
-    """
+    """Return planned phases, warnings and the scene file; without a scene `scene_error` and the file."""
     blocks = [words(scene_error, tone="warning")] if scene is None else []
     if scene is not None:
         planned = plan(scene)
@@ -232,7 +224,6 @@ def accuracy_blocks(scene: Scene | None, path: Path | None) -> list[Markup]:
     """Return the knobs of a scene's fidelity, and the measured errors of the named fidelities.
 
     Args:
-        scene: the scene; None if it cannot be read.
         path: table of measured errors by `smarticles accuracy`; None: the table that ships.
     """
     if scene is None:
@@ -276,11 +267,7 @@ def _percent(error: Error) -> str:
 
 
 def warning_blocks(directories: Mapping[str, Path]) -> list[Markup]:
-    """Return a table of the distinct warnings and errors in the logs of runs.
-
-    Args:
-        directories: run directories by name; the name is empty on the page of a single run.
-    """
+    """Return a table of the distinct warnings and errors in the logs of runs; a single run has the name ""."""
     found: dict[str, Counter[str]] = {}
     for name, directory in directories.items():
         log = directory / LOG

@@ -49,13 +49,7 @@ _MAX_STILLS, _MAX_CURVES, _MAX_CHARTS = 4, 5, 4
 
 
 def sweep_page(folder: Folder, accuracy: Path | None, *, jobs: int) -> str:
-    """Return the HTML page of a sweep or a study.
-
-    Args:
-        folder: directory of the sweep.
-        accuracy: table of measured errors; None: the table that ships.
-        jobs: number of processes that measure the runs.
-    """
+    """Return the HTML page of a sweep or a study; `accuracy`: table of measured errors (None: shipped)."""
     states = folder.status()
     study = folder.name.removesuffix("-quick")
     results = folder.path / "results"
@@ -220,11 +214,7 @@ def _repeat(folder: Folder) -> list[Markup]:
 
 
 def _provenance(folder: Path) -> dict[str, Any]:
-    """Read the file that describes the origin of results.
-
-    Raises:
-        InputError: the file cannot be read.
-    """
+    """Read the file that describes the origin of results."""
     try:
         origin = json.loads((folder / PROVENANCE).read_text(encoding="utf-8"))
         if not isinstance(origin, dict):

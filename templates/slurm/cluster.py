@@ -133,11 +133,7 @@ class Cluster(Strict):
         return self
 
     def partition(self, name: str | None) -> tuple[str, Partition]:
-        """Return the name and the data of a partition; of the default partition if no name is given.
-
-        Raises:
-            InputError: The cluster has no partition of this name.
-        """
+        """Return name and data of a partition, None: the default one; raise InputError for an unknown name."""
         wanted = name or self.default_partition
         if wanted not in self.partitions:
             advice = nearest(wanted, sorted(self.partitions))

@@ -64,11 +64,7 @@ class Request:
 
 
 def plan_request(expected_s: Sequence[float], cluster: Cluster, wishes: Wishes) -> Request:
-    """Return the request for runs with given expected wall times [s].
-
-    Raises:
-        InputError: The request exceeds a limit of the cluster.
-    """
+    """Return the request for runs of expected wall times [s]; raise InputError beyond the cluster's limits."""
     name, partition = cluster.partition(wishes.partition)
     where = f"partition {name} of {cluster.name}"
     memory, ranks = wishes.memory_mib or MEMORY_PER_RUN_MIB, wishes.ranks or 1
@@ -169,12 +165,7 @@ def render_script(
     """Return the text of the script of an array job.
 
     Args:
-        cluster: The cluster.
-        request: The request.
-        sweep: Directory of the sweep.
         number: Name of the submission's folder in `jobs/`.
-        name: Name of the job.
-        count: Number of runs.
         command: Command that starts `smarticles`, as words.
 
     Raises:

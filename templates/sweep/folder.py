@@ -190,10 +190,6 @@ def create_folder(
 
     Args:
         path: The directory, which is absent, empty, or holds this sweep.
-        sweep: The sweep.
-        points: Its points.
-        command: Command line, for the manifest.
-        versions: Versions of the software, for the manifest.
         expected_s: Returns the expected wall time [s] of a scene.
         extend: Whether to add the missing runs to a directory that holds some of these runs and no others.
 

@@ -84,11 +84,7 @@ def evaluate(expression: str, values: Mapping[str, Value], source: str) -> Value
 
 
 def render_text(template: str, values: Mapping[str, Value], source: str) -> str:
-    """Render a template as text; `render_yaml` is for YAML.
-
-    Raises:
-        InputError: The template uses an unknown name, or fails.
-    """
+    """Render a template as text, not as YAML; raise InputError if it fails or uses an unknown name."""
     try:
         return _environment().from_string(template).render(**values)
     except _FAILURES as error:
@@ -96,11 +92,7 @@ def render_text(template: str, values: Mapping[str, Value], source: str) -> str:
 
 
 def render_yaml(template: str, values: Mapping[str, Value], source: str) -> Any:
-    """Render a template of YAML, and return its data.
-
-    Raises:
-        InputError: An unknown name, or an error of Jinja2 or YAML; the message names the line.
-    """
+    """Render a template of YAML and return its data; raise InputError that names the line of an error."""
     prefix = "value"
     while prefix in template or prefix in repr(values):
         prefix += "x"

@@ -239,11 +239,7 @@ def patched(value: Any, patch: Any) -> Any:
 
 
 def with_constants(sweep: Sweep, constants: Mapping[str, Value]) -> Sweep:
-    """Return a sweep with other values for some of its constants.
-
-    Raises:
-        InputError: The sweep has no constant of this name.
-    """
+    """Return a sweep with other values of some constants; raise InputError if one does not exist."""
     for name in constants:
         if name not in sweep.content.constants:
             msg = f"{sweep.path}: constants: there is no {name!r}; {nearest(name, sorted(sweep.content.constants))}"
@@ -280,11 +276,7 @@ def on_engine(sweep: Sweep, engine: str) -> Sweep:
 
 
 def read_text(path: Path, what: str) -> str:
-    """Return the text of a file; `what` names the kind of file in messages.
-
-    Raises:
-        InputError: The file cannot be read, or is not UTF-8 text.
-    """
+    """Return the text of a file of the kind `what`; raise InputError if it is no readable UTF-8 text."""
     try:
         return path.read_text(encoding="utf-8")
     except UnicodeDecodeError as error:
@@ -348,8 +340,6 @@ def matching(
     """Return the rows that have one of the wanted values in each variable of `only`.
 
     Args:
-        rows: Rows of a table, or points.
-        only: Wanted values by variable.
         where: Place of `only`, for messages.
         nouns: Words for a variable and for a row, for messages.
 

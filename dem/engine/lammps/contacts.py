@@ -24,12 +24,7 @@ class Contacts:
 
     @classmethod
     def of(cls, spheres: Array, radius: float, boundaries: LammpsBoundaries) -> Self:
-        """Return the contacts of spheres with each other, floor and wall.
-
-        Args:
-            spheres: (N, S, 3) centres [m].
-            radius: radius of the spheres [m].
-        """
+        """Return the contacts of spheres, centres (N, S, 3) [m], with each other, floor and wall; radius in m."""
         count, each = spheres.shape[:2]
         centres = spheres.reshape(-1, 3)
         owners = np.repeat(np.arange(count), each)

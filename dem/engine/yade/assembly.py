@@ -206,11 +206,7 @@ class Assembly:
         return before - self.state().kinetic_energy
 
     def anchor(self, smarticle: int, link: int, point: Array) -> tuple[int, Array]:
-        """Return the id of an articulated link's body, and a point (3,) in YADE's frame of this body [m].
-
-        Args:
-            point: (3,) in the link's frame [m].
-        """
+        """Return the body of an articulated link, and in its frame a point (3,) of the link's frame [m]."""
         number = LINKS * smarticle + link
         arm = self._to_body[number] * self._yade.vector(*point)
         return self._ids[number], np.array([arm[0], arm[1], arm[2]])

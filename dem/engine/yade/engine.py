@@ -49,9 +49,6 @@ class YadeEngine:
         hooks: the lower and the upper hook; None: no hooks.
         channel: table and walls instead of the container; all motion is then confined to a plane.
         strengths: (N, 2) factors on torque limit and stiffness of the motors [1]; None: 1 for all motors.
-
-    Raises:
-        RunError: YADE is not installed.
     """
 
     def __init__(
