@@ -112,14 +112,7 @@ class FrameSequence(Sequence[Frame]):
 
 
 def read_frames(directory: Path | str) -> FrameSequence:
-    """Return the frames of a run directory, whose run may be done, failed or still running.
-
-    Example:
-        >>> for frame in read_frames("runs/pile")[-2:]:
-        ...     print(frame.phase, frame.vertices.shape)
-        3 (12, 4, 3)
-        3 (12, 4, 3)
-    """
+    """Return the frames of a run directory, whose run may be done, failed or still running."""
     path = Path(directory) / names.collection(names.FRAME)
     times, files = [], []
     cause: BaseException | str | None = None

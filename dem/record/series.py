@@ -134,13 +134,7 @@ class Series:
 
 
 def read_series(directory: Path | str) -> Series:
-    """Return the time series of a run directory, whose run may be done, failed or still running.
-
-    Example:
-        >>> series = read_series("runs/pile")
-        >>> series["com_height_m"].shape == series.time.shape, series.units["com_height_m"]
-        (True, 'm')
-    """
+    """Return the time series of a run directory, whose run may be done, failed or still running."""
     path = Path(directory) / names.SERIES
     if not path.is_file():
         cannot_read("series", path, "no such file", _REMEDY)

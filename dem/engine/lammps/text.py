@@ -98,8 +98,8 @@ def contact_terms(law: ContactLaw, mass: float) -> tuple[str, str]:
     """Return the arguments of `pair_style gran/hooke/history` and of `fix wall/gran/region`.
 
     The arguments are kn and ks [N/m]; normal and tangential damping [1/s], which LAMMPS multiplies by the effective
-    mass, M/2 for two smarticles of mass M [kg] and M at a wall; the friction coefficient; 1, which switches tangential damping on; and
-    the keyword `NEVER_PULLS`.
+    mass, M/2 for two smarticles of mass M [kg] and M at a wall; the friction coefficient; 1, which switches tangential
+    damping on; and the keyword `NEVER_PULLS`.
     """
     between, wall = law.normal_damping / (mass / 2), law.wall_damping / mass
     springs, tangential = f"{law.normal_stiffness:.9g} {law.tangential_stiffness:.9g}", law.tangential_damping
