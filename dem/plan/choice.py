@@ -8,7 +8,7 @@ knob `engine` compare engines with one reference, rows of the knob `fidelity` th
 import csv
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -189,19 +189,12 @@ class Choice:
     notes: tuple[str, ...]  #: Caveats
 
     def to_dict(self) -> dict[str, Any]:
-        """Return plain data for `--json`, with null for unknown numbers."""
-
-        def known(number: float) -> float | None:
-            return None if math.isnan(number) else number
-
+        """Return plain data for `--json`."""
         return {
             "engine": self.expected.engine,
             "fidelity": self.expected.fidelity,
             "expected_hours": self.expected.hours,
-            "errors": [
-                {"of": error.of, "value": known(error.value), "band": known(error.band)}
-                for error in self.expected.errors
-            ],
+            "errors": [asdict(error) for error in self.expected.errors],
             "seeds": self.expected.seeds,
             "why": self.why,
             "notes": list(self.notes),

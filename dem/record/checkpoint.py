@@ -25,8 +25,6 @@ from dem.record.files import whole
 from dem.record.names import CHECKPOINT, CHECKPOINT_BEFORE, CHECKPOINT_FORMAT
 
 _ENGINE, _STATE, _SERIES = "engine.bin", "state.json", "series.npz"
-# Checkpoints written before engines had names: the member of the only engine, and the key of its version.
-_YADE, _YADE_MEMBER = "yade", "engine.yade"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -119,10 +117,7 @@ def _read(path: Path) -> tuple[object, Checkpoint]:
         state = json.loads(archive.read(_STATE))
         with np.load(io.BytesIO(archive.read(_SERIES))) as columns:
             series = {name: columns[name] for name in columns.files}
-        if "made_by" in state:
-            engine, made_by = archive.read(_ENGINE), (state["made_by"]["engine"], state["made_by"]["version"])
-        else:
-            engine, made_by = archive.read(_YADE_MEMBER), (_YADE, str(state.get(_YADE)))
-    scene = str(state.get("scene_sha256"))
+        engine = archive.read(_ENGINE)
+    scene, made_by = str(state.get("scene_sha256")), (state["made_by"]["engine"], state["made_by"]["version"])
     checkpoint = Checkpoint(scene_sha256=scene, made_by=made_by, state=state, series=series, engine=engine)
     return state.get("format"), checkpoint

@@ -172,7 +172,6 @@ class Progress(Document):
     """Progress of a running run, `progress.json`, at most a second old."""
 
     phase: str | None = None
-    phase_index: int | None = None
     time_s: float | None = None
     end_s: float | None = None
     phi: float | None = None

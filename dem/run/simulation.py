@@ -80,7 +80,6 @@ class Simulation:
         entry = self._performed[-1]
         duration = phase.known_duration
         self.recorder.progress.begin(
-            index=self._phase,
             phase=phase.type,
             start=entry["start_s"],
             time=self.engine.time,
