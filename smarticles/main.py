@@ -142,7 +142,6 @@ def guarded(action: Callable[[], int], *, debug: bool = False) -> int:
 
 
 def _dispatch(words: list[str]) -> int:
-    """Parse the command line, run the handler of its subcommand, and return the exit status."""
     parser, commands = build_parser()
     arguments, unknown = parser.parse_known_args(words)
     if arguments.command is None:
@@ -157,7 +156,6 @@ def _dispatch(words: list[str]) -> int:
 
 
 def _explain(error: Exception) -> tuple[str, int]:
-    """Return message and exit status of an error."""
     if isinstance(error, InputError):
         return str(error), BAD_INPUT
     if isinstance(error, RunError):

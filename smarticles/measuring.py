@@ -30,14 +30,11 @@ def has_frames(directory: Path) -> bool:
 
 
 def sources(directories: Sequence[Path]) -> dict[Path, Mapping[str, Any]]:
-    """Find the runs to measure in directories of runs and sweeps.
+    """Find the runs to measure in directories of runs and sweeps; raise InputError for a sweep without any.
 
     Returns:
         Values of the sweep's variables by run directory, empty for runs without a sweep. Runs of a sweep that have no
         frames are left out.
-
-    Raises:
-        InputError: a sweep has no run with frames yet.
     """
     from templates.sweep.folder import open_folder  # noqa: PLC0415
 
@@ -121,13 +118,10 @@ def _table(directory: Path, values: Mapping[str, Any], *, frames: bool, costly: 
 
 
 def grouped(table: pd.DataFrame, by: Sequence[str]) -> pd.DataFrame:
-    """Average a table of `measured` over runs with equal values in the columns `by`.
+    """Average a table of `measured` over runs with equal values in columns, or raise InputError.
 
     Returns:
         One row per group and phase: means, and standard errors over runs.
-
-    Raises:
-        InputError: a column does not exist.
     """
     from postprocess.statistics.points import means_by  # noqa: PLC0415
 

@@ -78,7 +78,7 @@ class SweepDirectory(Sequence[Run]):
 def run(
     scene: Scene | Path | str, out: Path | str, *, threads: int = 1, ranks: int | None = None, resume: bool = False
 ) -> Run:
-    """Run a scene in a new process, as `smarticles run` does.
+    """Run a scene in a new process, as `smarticles run` does, and return the finished run.
 
     A new process is needed because YADE and PyVista must not be loaded in one process.
 
@@ -88,9 +88,6 @@ def run(
         threads: number of threads of YADE. Results are reproducible bit by bit with one thread only.
         ranks: number of MPI processes of LAMMPS; None: 1, or with `resume` the number at the start.
         resume: continue an unfinished run from its last checkpoint.
-
-    Returns:
-        The finished run.
 
     Raises:
         InputError: the scene is not valid, or `out` contains other files.
@@ -113,11 +110,7 @@ def run(
 
 
 def read(directory: Path | str) -> Run:
-    """Open the run directory of a finished or unfinished run.
-
-    Raises:
-        InputError: the directory is not a run directory.
-    """
+    """Open the run directory of a finished or unfinished run; raise InputError if it is none."""
     return open_run(directory)
 
 
@@ -139,11 +132,7 @@ def measure(run: Run | Path | str, *, frames: bool = False) -> pd.DataFrame:
 
 
 def read_sweep(directory: Path | str) -> SweepDirectory:
-    """Open the directory of a sweep or a study, whose runs need not be finished.
-
-    Raises:
-        InputError: the directory is not the directory of a sweep.
-    """
+    """Open the directory of a sweep or a study, finished or not; raise InputError if it is none."""
     return SweepDirectory(open_folder(Path(directory)))
 
 
@@ -154,7 +143,7 @@ def sweep(
     vary: Mapping[str, Sequence[Any]] | None = None,
     jobs: int | None = None,
 ) -> SweepDirectory:
-    """Compute the missing runs of a sweep on this machine.
+    """Compute the missing runs of a sweep on this machine, and return the finished sweep.
 
     Args:
         what: path of a sweep file; with `vary` a scene or the path of a scene file.
@@ -163,9 +152,6 @@ def sweep(
             the name of the variable: {"smarticle.aspect_ratio": [0.4, 0.7], "seed": [1, 2, 3]} has the variables
             `aspect_ratio` and `seed`.
         jobs: number of simultaneous runs; None: one per core.
-
-    Returns:
-        The finished sweep.
 
     Raises:
         InputError: a scene or the sweep is not valid, or the directory contains other files.

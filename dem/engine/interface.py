@@ -252,11 +252,7 @@ class Engine(Protocol):
         """Set the length of all further steps [s]."""
 
     def advance(self, steps: int) -> None:
-        """Advance by a number of steps; none if the number is not positive.
-
-        Raises:
-            RunError: the engine stopped before the last step.
-        """
+        """Advance by a number of steps, if positive; raise RunError if the engine stops before the last one."""
 
     # -- smarticles --------------------------------------------------------------------------------------------
 
@@ -271,11 +267,7 @@ class Engine(Protocol):
         """Set all velocities of welded smarticles to zero; the kinetic energy counts as dissipated."""
 
     def state(self) -> State:
-        """Return poses and velocities of all smarticles.
-
-        Raises:
-            RunError: a position or velocity is not finite.
-        """
+        """Return poses and velocities of all smarticles; raise RunError if one is not finite."""
 
     @property
     def impulse(self) -> float:

@@ -24,11 +24,7 @@ class EngineKind(Protocol):
         """All names in `Adds.engines`, in the order in which a step runs them."""
 
     def version(self) -> str:
-        """Return the version of the software on which results depend.
-
-        Raises:
-            RunError: the engine is not installed.
-        """
+        """Return the version on which results depend; raise RunError if the engine is not installed."""
 
     def threads(self) -> int:
         """Return the number of threads, or ranks, of runs that this process starts."""

@@ -121,8 +121,6 @@ class ActuatedPhase(Phase):
 
 @dataclass(frozen=True, eq=False)
 class _Track:
-    """One motion of all barbs that follow it."""
-
     span: slice  #: The K entries of `Drive` that the motion sets
     course: Course  #: The motion from K starting angles
     shifts: Array  #: (1,) or (K,) time by which the motion is ahead at the beginning of the phase [s]

@@ -82,5 +82,4 @@ class Shake(Part, Phase):
 
 
 def _freed(scene: SceneView, index: int) -> bool:
-    """Return whether an earlier phase takes the container away."""
     return any(before.frees for before in scene.phases[:index])

@@ -71,7 +71,6 @@ def called_for(scene: Scene) -> frozenset[EffectName]:
 
 
 def _reasons(scene: Scene) -> Mapping[EffectName, tuple[bool, str]]:
-    """Return whether a scene needs each effect, and why."""
     contact, plane, gravity = scene.contact, scene.plane, scene.gravity_m_per_s2
     recording = scene.recording
     by_phases: dict[EffectName, list[str]] = {}

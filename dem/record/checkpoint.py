@@ -1,11 +1,8 @@
 """Checkpoints: all that a run needs to be resumed, in one checksummed file; the previous one is kept.
 
 The engine's state is stored as bytes in the engine's own format, with the engine's name and version. The rest is plain
-data.
-
-On one thread a resumed run gives bitwise the results of a run that was never stopped, because the running simulation
-reloads each checkpoint that it writes: an engine may order bodies and contacts anew when it loads, and sums of forces
-depend on the order.
+data. The running simulation reloads each checkpoint that it writes, since an engine may order bodies and contacts anew
+when it loads.
 """
 
 import io
@@ -39,11 +36,7 @@ class Checkpoint:
 
 
 def write_checkpoint(folder: Path, checkpoint: Checkpoint) -> None:
-    """Write a checkpoint into a run directory and flush it to the disk; the previous one is kept.
-
-    Raises:
-        RunError: the file cannot be written; older checkpoints stay.
-    """
+    """Write a checkpoint to the disk and keep the previous one; raise RunError if it cannot be written."""
     newest = folder / CHECKPOINT
     name, version = checkpoint.made_by
     head = {

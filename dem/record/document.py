@@ -31,11 +31,7 @@ class Document(BaseModel):
 
     @classmethod
     def read(cls, path: Path) -> Self:
-        """Return the content of a file.
-
-        Raises:
-            InputError: the file is missing, damaged, or lacks a key; one line with file, key and value.
-        """
+        """Return the content of a file; raise InputError if it is missing or damaged, or lacks a key."""
         try:
             return cls.model_validate_json(path.read_bytes())
         except OSError as error:

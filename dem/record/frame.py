@@ -143,11 +143,7 @@ class Frame:
 
 
 def read_frame(path: Path | str) -> Frame:
-    """Return the content of a frame file, a `.vtu` as described in docs/reference/files.md.
-
-    Raises:
-        InputError: the file is missing or damaged, or lacks cell data of frames.
-    """
+    """Return the content of a frame file, `.vtu`; raise InputError if it is missing or damaged."""
     path = Path(path)
     mesh = read_mesh(path)
 

@@ -88,11 +88,7 @@ class FrameSequence(Sequence[Frame]):
         return read_frame(self.paths[index])
 
     def nearest(self, time: float) -> int:
-        """Return the index of the frame nearest to a time [s].
-
-        Raises:
-            InputError: the time is before the first or after the last frame.
-        """
+        """Return the index of the frame nearest to a time [s]; raise InputError outside of the frames' times."""
         first, last = float(self.times[0]), float(self.times[-1])
         slack = 1e-9 * max(abs(first), abs(last), 1.0)
         if not first - slack <= time <= last + slack:

@@ -219,11 +219,7 @@ def _reject_place(path: Path) -> NoReturn:
 
 
 def open_run(path: Path | str) -> Run:
-    """Return a run directory as a `Run`, after reading its manifest.
-
-    Raises:
-        InputError: the path is no run directory.
-    """
+    """Return a run directory as a `Run`, after reading its manifest; raise InputError if it is none."""
     run = Run(Path(path))
     _ = run.manifest
     return run

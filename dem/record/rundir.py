@@ -45,7 +45,6 @@ def claimed(out: Path, *, resume: bool) -> Iterator[None]:
 
 
 def _check_content(out: Path, *, resume: bool) -> None:
-    """Make the directory if needed, and reject wrong content."""
     try:
         out.mkdir(parents=True, exist_ok=True)
         held = sorted(path.name for path in out.iterdir() if path.name != LOCK and not is_partial(path.name))

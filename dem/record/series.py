@@ -99,11 +99,7 @@ class Series:
     seed: int
 
     def __getitem__(self, name: str) -> NDArray[Any]:
-        """Return the array of one quantity.
-
-        Raises:
-            InputError: the series has no quantity of that name.
-        """
+        """Return the array of one quantity; raise InputError if the series has none of that name."""
         try:
             return self.data[name]
         except KeyError:

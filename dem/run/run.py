@@ -105,7 +105,6 @@ def _check_ready(scene: Scene) -> None:
 
 
 def _check_scene(scene: Scene, out: Path) -> None:
-    """Reject a run directory that was made from another scene."""
     recorded_hash = Run(out).manifest.scene_sha256
     if recorded_hash == scene_hash(scene):
         return

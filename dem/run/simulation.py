@@ -105,7 +105,6 @@ class Simulation:
         self.recorder.progress.warn(message)
 
     def _advance(self) -> None:
-        """Advance to the target step, recording what is due on the way."""
         engine, recorder, recording = self.engine, self.recorder, self.scene.recording
         while engine.steps < self._target:
             engine.advance(min(self._target, recorder.next_step) - engine.steps)

@@ -62,7 +62,6 @@ def write_report(arguments: argparse.Namespace) -> int:
 
 
 def _page(directory: Path, accuracy: Path | None, jobs: int | None) -> str:
-    """Return the HTML page of a run, a sweep, a study, or the results of a study."""
     from dem.engine.cores import usable_cores  # noqa: PLC0415
     from smarticles.reporting.run import run_page  # noqa: PLC0415  (pandas, matplotlib, PyVista)
     from smarticles.reporting.sweep import PROVENANCE, results_page, sweep_page  # noqa: PLC0415

@@ -130,7 +130,6 @@ def read_scene(scene_file: Path, settings: Sequence[str]) -> Scene:
 def _run(
     scene_file: Path, out: Path, arguments: argparse.Namespace, settings: Sequence[str] = (), *, resume: bool
 ) -> int:
-    """Compute or resume a scene in this process, print the outcome, and return the exit status."""
     scene = read_scene(scene_file, settings)
     _set_parallelism(scene, out, resume=resume, threads=arguments.threads, ranks=arguments.ranks)
     # Imported last: both import YADE, which takes seconds and needs the variables set above.

@@ -81,8 +81,6 @@ def show_status(arguments: argparse.Namespace) -> int:
 
 @dataclass(frozen=True)
 class _Status:
-    """States of all runs of a directory at one time."""
-
     name: str  #: Of the sweep, or of the run directory
     runs: Sequence[RunStatus]
     queue: dict[str, Any] | None = None  #: Jobs, error and task counts of Slurm's queue; None: never submitted

@@ -152,7 +152,6 @@ def _earlier(results: Path, folder: Folder, study: Study) -> Mapping[str, Measur
 
 
 def _fidelity(name: str, file: Path, fidelity: str) -> dict[str, str]:
-    """Return the constant `fidelity` of a study as set by --fidelity."""
     from dem.setting.fidelity import FIDELITIES  # noqa: PLC0415
     from templates.sweep.expand import expand  # noqa: PLC0415
     from templates.sweep.sweep_file import load_sweep, with_constants  # noqa: PLC0415

@@ -1,22 +1,17 @@
 """Charts of a report, as SVG pictures in data URLs."""
 
-from __future__ import annotations
-
 import io
 from collections.abc import Callable, Mapping, Sequence
 from itertools import cycle
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 
+from dem.arrays import Array
 from postprocess.report.figures import BLACK, BLUE, GREY, ORANGE, new_figure, style
 from smarticles.reporting.page import data_url
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
-
-    from dem.arrays import Array
 
 _BAND = "#f0f1f2"
 _MAX_POINTS = 400
@@ -101,7 +96,6 @@ def _axes(x: str, y: str) -> tuple[Figure, Axes]:
 
 
 def _svg(figure: Figure) -> str:
-    """Return a figure as SVG in a data URL."""
     with io.BytesIO() as file:
         figure.savefig(file, format="svg", metadata={"Date": None})
         return data_url(file.getvalue(), "image/svg+xml")

@@ -1,7 +1,5 @@
 """Page of a run, and blocks that pages of runs and sweeps share."""
 
-from __future__ import annotations
-
 import io
 import re
 import shlex
@@ -9,8 +7,9 @@ import tempfile
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+import pandas as pd
 from markupsafe import Markup
 
 from dem.errors import InputError, RunError
@@ -21,6 +20,7 @@ from dem.record.columns import EVERY
 from dem.record.names import LOG, SCENE
 from dem.record.run import Run, open_run
 from dem.scene.reading import load_scene
+from dem.scene.scene import Scene
 from dem.setting.fidelity import fidelities
 from postprocess.measures.registry import shown_quantities
 from postprocess.statistics.points import format_with_error, marked
@@ -28,11 +28,6 @@ from smarticles.command_line import format_cell
 from smarticles.measuring import has_frames, measured
 from smarticles.reporting.charts import against_time
 from smarticles.reporting.page import data_url, embedded, figure, listing, page, table, turntable, words
-
-if TYPE_CHECKING:
-    import pandas as pd
-
-    from dem.scene.scene import Scene
 
 # Series drawn against time if recorded: column, unit conversion factor, unit, component of a vector.
 _CURVES = (
@@ -81,7 +76,6 @@ def run_page(directory: Path, accuracy: Path | None) -> str:
 
 
 def _ending(run: Run) -> list[Markup]:
-    """Return a warning if the run is not done."""
     if run.status.state == "done":
         return []
     ending = {"failed": "failed", "interrupted": "was interrupted"}.get(run.status.state, "has not finished")
@@ -292,7 +286,6 @@ def provenance_table(facts: Sequence[Sequence[Any]], versions: Mapping[str, str]
 
 
 def _repeat(run: Run) -> list[Markup]:
-    """Return the commands that repeat a run, and the versions that computed it."""
     manifest = run.manifest
     # Paths are relative to the parent folder, since a report may be sent to others.
     here, there = shlex.quote(run.path.name), shlex.quote(f"{run.path.name}-again")

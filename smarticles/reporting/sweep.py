@@ -1,20 +1,20 @@
 """Pages of sweeps, studies, and results of studies."""
 
-from __future__ import annotations
-
 import csv
 import json
 import shlex
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+import pandas as pd
 from markupsafe import Markup
 
 from dem.errors import InputError
 from dem.record.run import Run
 from dem.scene.reading import load_scene
+from dem.scene.scene import Scene
 from postprocess.measures.registry import shown_quantities
 from postprocess.statistics.points import marked
 from smarticles.command_line import format_cell
@@ -34,11 +34,6 @@ from smarticles.reporting.run import (
 from studies.registry import STUDIES
 from templates.sweep.folder import Folder, RunStatus
 from templates.sweep.sweep_file import SEED
-
-if TYPE_CHECKING:
-    import pandas as pd
-
-    from dem.scene.scene import Scene
 
 PROVENANCE = "provenance.json"  #: File in every folder of results
 
@@ -101,7 +96,6 @@ def results_page(folder: Path) -> str:
 
 
 def _unfinished(states: Sequence[RunStatus]) -> list[Markup]:
-    """Return a table of the runs that are not done."""
     rows = [[run.name, run.state, run.phase, run.time_s, run.cause] for run in states if run.state != "done"]
     header = ["run", "state", "phase", "simulated [s]", "cause"]
     return [table(f"Runs that are not done: {len(rows)}", header, rows)] if rows else []
@@ -189,7 +183,6 @@ def _pictures(folder: Folder) -> list[Markup]:
 
 
 def _repeat(folder: Folder) -> list[Markup]:
-    """Return the commands that repeat a sweep, its versions, and the hashes of its scenes."""
     manifest = folder.manifest
     used: Counter[str] = Counter()
     for entry in folder.entries:
@@ -214,7 +207,6 @@ def _repeat(folder: Folder) -> list[Markup]:
 
 
 def _provenance(folder: Path) -> dict[str, Any]:
-    """Read the file that describes the origin of results."""
     try:
         origin = json.loads((folder / PROVENANCE).read_text(encoding="utf-8"))
         if not isinstance(origin, dict):
@@ -249,7 +241,6 @@ def _result_sections(folder: Path) -> list[Section]:
 
 
 def _origin(folder: Path) -> list[Markup]:
-    """Return the references of results and the runs that they are computed from."""
     origin = _provenance(folder)
     header = ["name", "seed", "engine", "fidelity", "scene_sha256", "command"]
     rows = [[run.get(name) for name in header] for run in origin.get("runs", []) if isinstance(run, dict)]

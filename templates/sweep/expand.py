@@ -93,7 +93,6 @@ def _rows(columns: Mapping[str, Sequence[Value]]) -> list[dict[str, Value]]:
 
 
 def _repeated(sweep: Sweep, points: Sequence[dict[str, Value]]) -> Iterator[dict[str, Value]]:
-    """Yield each point once per seed."""
     repeats = sweep.content.repeats
     if repeats is None:
         yield from points
@@ -109,7 +108,6 @@ def _repeated(sweep: Sweep, points: Sequence[dict[str, Value]]) -> Iterator[dict
 
 
 def _derived(sweep: Sweep, values: Mapping[str, Value]) -> dict[str, Value]:
-    """Return the values of a point with its derived variables."""
     values = dict(values)
     for name, expression in sweep.content.derived.items():
         where = f"{sweep.path}: derived.{name}"

@@ -253,11 +253,7 @@ def _some(what: str, names: Sequence[str], most: int = 8) -> str:
 
 
 def open_folder(path: Path) -> Folder:
-    """Open the directory of a sweep.
-
-    Raises:
-        InputError: The path is not the directory of a sweep, or its manifest is damaged.
-    """
+    """Open the directory of a sweep; raise InputError if it is none, or its manifest is damaged."""
     if (path / MANIFEST).is_file():
         return Folder(path, SweepManifest.read(path / MANIFEST))
     if (path / RUN).is_file():

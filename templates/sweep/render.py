@@ -49,7 +49,6 @@ def _line(error: BaseException) -> int | None:
 
 
 def _reject(error: Exception, where: str, values: Mapping[str, Value]) -> NoReturn:
-    """Raise an InputError about the failure of a template or an expression."""
     text = " ".join(str(error).split())
     if isinstance(error, jinja2.UndefinedError):
         name = re.match(r"'([^']+)' is undefined", text)
@@ -65,11 +64,7 @@ _FAILURES = (jinja2.TemplateError, ArithmeticError, TypeError, ValueError, Looku
 
 
 def evaluate(expression: str, values: Mapping[str, Value], source: str) -> Value:
-    """Return the value of a Jinja2 expression such as `(n / 2) | round | int`, evaluated in a sandbox.
-
-    Raises:
-        InputError: The expression uses an unknown name, fails, or has a value that is not plain data.
-    """
+    """Return the value of a Jinja2 expression such as `(n / 2) | round | int`, or raise InputError."""
     environment = _environment()
     try:
         result = environment.compile_expression(expression, undefined_to_none=False)(**values)
@@ -118,8 +113,6 @@ def render_yaml(template: str, values: Mapping[str, Value], source: str) -> Any:
 
 
 def _loader(placeholder: re.Pattern[str], held: list[Value]) -> type[StrictLoader]:
-    """Return a YAML loader that replaces placeholders by the held values."""
-
     class Loader(StrictLoader):
         pass
 

@@ -34,8 +34,6 @@ class LammpsBoundaries:
     upper_height = math.nan
     hook_sums = channel_sums = np.zeros((0, 3))
 
-    # -- where they are ----------------------------------------------------------------------------------------
-
     def _phase(self) -> float:
         steps, dt = self.clock()
         return self._omega * (steps - self._begun) * dt
@@ -74,8 +72,6 @@ class LammpsBoundaries:
     def raised(self) -> float | None:
         return 0.0 if self.enclosed else None
 
-    # -- how they move -----------------------------------------------------------------------------------------
-
     def shake(self, *, amplitude: float, frequency: float, walls: bool = True) -> None:
         self._hold()
         self._begun, self._omega = self.clock()[0], 2 * math.pi * frequency
@@ -109,8 +105,6 @@ class LammpsBoundaries:
         for name, part in self._parts.items():
             yield f"variable {name}_base equal {part.base:.17g}"
             yield f"variable {name}_amplitude equal {part.amplitude:.17g}"
-
-    # -- checkpoints -------------------------------------------------------------------------------------------
 
     @property
     def memory(self) -> dict[str, Any]:

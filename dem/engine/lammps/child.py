@@ -28,11 +28,7 @@ _OPTIONS = (*"--bind-to none --mca btl_vader_single_copy_mechanism none --mca mp
 
 
 def lammps_version() -> str:
-    """Return the version of the installed LAMMPS.
-
-    Raises:
-        RunError: LAMMPS or mpirun is not installed, or LAMMPS does not start or lacks a style of `NEEDED`.
-    """
+    """Return LAMMPS's version; raise RunError if it or mpirun is missing, does not start or lacks a style."""
     for program, what in ((LMP, "LAMMPS"), (MPIRUN, "Open MPI")):
         if shutil.which(program) is None:
             raise RunError(
@@ -114,11 +110,7 @@ class Child:
         return [child for child in children if _text(Path(f"/proc/{child}/comm")).strip() == LMP]
 
     def send(self, *commands: str) -> None:
-        """Send commands, and wait until LAMMPS has executed them.
-
-        Raises:
-            RunError: LAMMPS ended; the message gives the cause from its log, and what to do.
-        """
+        """Send commands and wait until they are executed; raise RunError with the cause if LAMMPS ends."""
         text = "\n".join(commands) + "\n" + self._answer
         assert self._process.stdin is not None
         try:
@@ -178,7 +170,6 @@ def _text(path: Path) -> str:
 
 
 def _end(process: subprocess.Popen[bytes], answers: int, scratch: Path) -> None:
-    """End a LAMMPS process and remove its files."""
     if process.poll() is None:
         process.terminate()
         try:

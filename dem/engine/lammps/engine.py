@@ -130,8 +130,6 @@ class LammpsEngine:
         self.motors, self.strings = NoMotors(), NoStrings()
         self.ledger = LammpsLedger(lambda: self.boundaries.moving, lambda: self.contacts.elastic_energy(law))
 
-    # -- commands ----------------------------------------------------------------------------------------------
-
     def _send(self, commands: Iterator[str]) -> None:
         """Send commands, after which the next run must be set up; before there is a box `_scene` yields them."""
         self._contacts = None
@@ -171,8 +169,6 @@ class LammpsEngine:
         """Yield the command that balances spheres over ranks; two have equal halves of a round pile anyway."""
         if self.child.ranks > 2:
             yield "balance 1.02 shift xy 20 1.01"
-
-    # -- time --------------------------------------------------------------------------------------------------
 
     @property
     def cpu_elsewhere(self) -> float:
@@ -231,8 +227,6 @@ class LammpsEngine:
         if len(rows) != self.count:
             raise RunError(f"LAMMPS wrote {len(rows)} of {self.count} smarticles at step {step}")
         return np.asarray(rows[np.argsort(rows[:, 0])])
-
-    # -- smarticles --------------------------------------------------------------------------------------------
 
     @property
     def count(self) -> int:
@@ -308,8 +302,6 @@ class LammpsEngine:
     def contact_forces(self) -> NoReturn:
         absent("forces at contacts")
 
-    # -- checkpoints -------------------------------------------------------------------------------------------
-
     def save(self, scratch: Path) -> Saved:
         # Saved are LAMMPS's restart files with friction springs and bodies, and the poses of this process. LAMMPS
         # orders spheres differently after reading them, so that the running simulation loads what it has saved. It does
@@ -341,11 +333,7 @@ class LammpsEngine:
         return saved
 
     def load(self, saved: Saved, scratch: Path) -> None:
-        """Replace the state by one that `save` returned for an engine of this scene.
-
-        Raises:
-            InputError: the state was saved by another engine or version, or is damaged.
-        """
+        """Replace the state; raise InputError if another engine or version saved it, or it is damaged."""
         memory = saved.memory
         if memory.get("format") != FORMAT:
             raise InputError(

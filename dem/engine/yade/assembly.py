@@ -137,8 +137,6 @@ class Assembly:
             "lower fidelity.time_step_fraction",
         )
 
-    # -- welding -----------------------------------------------------------------------------------------------
-
     def articulate(self) -> None:
         """Split every smarticle into three links that hinges join; no effect on articulated smarticles."""
         if self.hinges is not None:
@@ -228,8 +226,6 @@ class Assembly:
             # YADE stores no angular momentum of bodies that it rotates like spheres.
             return np.array([[0.0, 0.0, s.inertia[2] * s.angVel[2]] for s in self._states]).reshape(-1, 3)
         return rows_of(state.angMom for state in self._states)
-
-    # -- memory ------------------------------------------------------------------------------------------------
 
     @property
     def memory(self) -> dict[str, Any]:

@@ -59,8 +59,6 @@ class YadeBoundaries:
         self.moving = list(memory["moving"])
         self._sums = [self._yade.vector(*row) for row in memory["sums"]]
 
-    # -- where they are ----------------------------------------------------------------------------------------
-
     @property
     def floor(self) -> float:
         return float(self._floor.pos[2])
@@ -124,8 +122,6 @@ class YadeBoundaries:
         found = {floor: FLOOR, **dict(zip(walls, numbers, strict=True))}
         return found | {bar: LOWER_HOOK + k for k, bars in enumerate(self.hooks) for bar in bars}
 
-    # -- motion ------------------------------------------------------------------------------------------------
-
     def _move(self, bodies: Sequence[int], speed: float) -> None:
         for body in bodies:
             self._yade.omega.bodies[body].state.vel = self._yade.vector(0, 0, speed)
@@ -168,8 +164,6 @@ class YadeBoundaries:
         for body in self.container[:-1]:
             self._yade.omega.bodies.erase(body)
         self.container = self.container[-1:]
-
-    # -- forces ------------------------------------------------------------------------------------------------
 
     def power(self) -> float:
         """Return the power that moving boundaries exerted on smarticles in the last step [W]."""

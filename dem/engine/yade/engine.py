@@ -1,7 +1,4 @@
-"""A running simulation on YADE.
-
-One process runs one simulation: YADE keeps its scene in a process-wide singleton.
-"""
+"""A running simulation on YADE, which keeps its scene in a singleton: one simulation per process."""
 
 import math
 from pathlib import Path
@@ -101,8 +98,6 @@ class YadeEngine:
         self.boundaries.bind()
         self._assembly.bind()
 
-    # -- checkpoints -------------------------------------------------------------------------------------------
-
     def save(self, scratch: Path) -> Saved:
         # YADE orders bodies and contacts differently after loading, and sums of forces depend on the order. The running
         # simulation loads what it has saved, so that a resumed run gives identical bits.
@@ -156,8 +151,6 @@ class YadeEngine:
         self._assembly.bind()
         self._loaded = (self.steps, memory["unbalanced"])
 
-    # -- time --------------------------------------------------------------------------------------------------
-
     def set_time_step(self, time_step: float) -> None:
         """Set the length of all further steps [s].
 
@@ -194,8 +187,6 @@ class YadeEngine:
             msg = f"YADE stopped at step {self.steps} of {target} (t = {self.time:.4f} s); see its message above"
             raise RunError(msg)
         self._smarticle_seconds += steps * self.time_step * self.count
-
-    # -- smarticles --------------------------------------------------------------------------------------------
 
     @property
     def count(self) -> int:

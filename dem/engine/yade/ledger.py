@@ -72,12 +72,7 @@ class Contacts:
 
 
 class YadeLedger:
-    """`dem.engine.interface.EnergyLedger` on YADE.
-
-    Args:
-        works: whether to sum the work of moving boundaries.
-        dissipation_interval: time between samples of the dissipation [s]; None: no samples.
-    """
+    """`dem.engine.interface.EnergyLedger` on YADE; `dissipation_interval` in s, None: no samples."""
 
     def __init__(
         self,
