@@ -1,8 +1,4 @@
-"""Console command `smarticles`.
-
-Exit status: 0 done; 1 the run failed; 2 bad input or usage; 75 stopped at a checkpoint after SIGUSR1, to be continued;
-130 stopped by Ctrl-C; 141 the reader of the output closed the pipe.
-"""
+"""Console command `smarticles`; its help has the exit statuses."""
 
 import argparse
 import os
@@ -42,7 +38,7 @@ COMMANDS = (
 )
 """Functions that add the commands, in the order of `smarticles --help`; add a new command here."""
 
-FAILED, BAD_INPUT, STOPPED, BROKEN_PIPE = 1, 2, 130, 141
+FAILED, BAD_INPUT, STOPPED, BROKEN_PIPE = 1, 2, 130, 141  #: The last: the reader of the output closed the pipe
 
 _SHELLS = ("bash", "zsh")
 _SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)

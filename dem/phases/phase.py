@@ -1,8 +1,5 @@
 """Interface of phases, the stage that is a phase while it runs, and the criterion for a settled pile.
 
-A kind of phase has one file with its data (a validated part of the scene), checks, duration, effects and actions.
-`dem.phases.kinds` lists the kinds.
-
 `proceed` is called again whenever the time that it returned has passed; in between, the simulation advances and the
 recorder writes. The memory of a stage is plain data, so that a run can stop between any two steps and be resumed.
 """

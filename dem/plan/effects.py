@@ -1,8 +1,4 @@
-"""Effects of a scene: which ones it needs, why, and what each adds to a run.
-
-`dem.plan.outlook` prints the effects, `dem.run` builds a run from them, and tests compare them with an engine's own
-lists and the files of runs.
-"""
+"""Effects of a scene: which ones it needs, why, and what each adds to a run."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass

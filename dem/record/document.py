@@ -1,20 +1,12 @@
 """JSON files of a run directory: `run.json`, `done.json`, `failed.json` and `progress.json`."""
 
 from collections.abc import Mapping
+from contextlib import suppress
 from pathlib import Path
 from typing import Any, ClassVar, Literal, Self
 
-from pydantic import (
-    BaseModel,
-    ConfigDict,
-    Field,
-    NonNegativeFloat,
-    NonNegativeInt,
-    PositiveFloat,
-    PositiveInt,
-    ValidationError,
-    model_validator,
-)
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+from pydantic.types import NonNegativeFloat, NonNegativeInt, PositiveFloat, PositiveInt
 
 from dem.errors import RunError, shown
 from dem.record.files import cannot_read, write_text
@@ -158,10 +150,8 @@ class Failed(Document):
 
     def mark(self, out: Path) -> None:
         """Write `failed.json` into a run directory; errors are ignored, since the terminal has the cause too."""
-        try:
+        with suppress(RunError):
             self.write(out / FAILED)
-        except RunError:
-            return
 
 
 class Progress(Document):

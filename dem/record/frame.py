@@ -1,7 +1,4 @@
-"""Frames: VTK files of the centrelines, or of the spheres, of all smarticles at one time.
-
-docs/reference/files.md describes the format.
-"""
+"""Frames: VTK files of centrelines, or of spheres, at one time; see docs/reference/files.md."""
 
 import contextlib
 import io

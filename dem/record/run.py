@@ -134,13 +134,8 @@ class Run:
             done = Done.read(self.path / DONE)
             return Status(state="done", time_s=done.time_s, steps=done.steps, wall_s=done.wall_s, cpu_s=done.cpu_s)
         progress = self.progress
-        status = Status(
-            state="running",
-            phase=progress.phase,
-            time_s=progress.time_s,
-            wall_s=progress.wall_s,
-            checkpoint_s=progress.checkpoint_s,
-        )
+        known = progress.model_dump(include={"phase", "time_s", "wall_s", "checkpoint_s"})
+        status = Status(state="running", **known)
         if not (self.path / FAILED).exists():
             return status if in_use(self.path) else replace(status, state="stopped")
         failed = Failed.read(self.path / FAILED)

@@ -1,7 +1,4 @@
-"""The scene: validated, frozen description of one run.
-
-Its parts are in `dem.setting`, its phases in `dem.phases`; `dem.scene.rules` checks that they fit together.
-"""
+"""The scene: parts of `dem.setting` and phases of `dem.phases` that fit together by `dem.scene.rules`."""
 
 import hashlib
 import math

@@ -4,6 +4,7 @@ import argparse
 import os
 import sys
 import webbrowser
+from contextlib import suppress
 
 from smarticles.command_line import Commands, add_options, reader
 
@@ -44,8 +45,6 @@ def view_run(arguments: argparse.Namespace) -> int:
         if has_display and not arguments.no_browser:
             webbrowser.open(address)
 
-    try:
+    with suppress(KeyboardInterrupt):
         serve(arguments.directory, port=arguments.port, opened=opened)
-    except KeyboardInterrupt:
-        return 0
     return 0

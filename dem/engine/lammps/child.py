@@ -7,6 +7,7 @@ import shutil
 import subprocess
 import tempfile
 import weakref
+from contextlib import suppress
 from functools import lru_cache
 from pathlib import Path
 
@@ -178,9 +179,7 @@ def _end(process: subprocess.Popen[bytes], answers: int, scratch: Path) -> None:
             process.kill()
             process.wait()
     if process.stdin is not None:
-        try:
+        with suppress(OSError):  # LAMMPS had not read all commands
             process.stdin.close()
-        except OSError:
-            pass  # LAMMPS had not read all commands
     os.close(answers)
     shutil.rmtree(scratch, ignore_errors=True)
