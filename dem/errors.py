@@ -28,10 +28,7 @@ def shown(value: object) -> str:
         text = constants[value] if value is None or isinstance(value, bool) else repr(value)
     except ValueError:  # a whole number of thousands of digits
         text = "a number of thousands of digits"
-    return text if len(text) <= _MOST else f"{text[:_MOST]}…"
-
-
-_MOST = 60  # characters of a value that are shown
+    return text if len(text) <= 60 else f"{text[:60]}…"
 
 
 def nearest(word: str, known: Iterable[str], *, cutoff: float = 0.6) -> str:

@@ -68,13 +68,7 @@ Read = TypeVar("Read")
 
 
 def reader(convert: Callable[[str], Read], what: str, valid: Callable[[Read], bool]) -> Callable[[str], Read]:
-    """Return a `type` for argparse that converts and checks an argument.
-
-    Args:
-        convert: converts the text; a ValueError means that the text is invalid.
-        what: description of valid values, for the error message.
-        valid: returns whether a converted value is allowed.
-    """
+    """Return a `type` for argparse that converts and checks an argument; `what` describes valid values."""
 
     def read(text: str) -> Read:
         with suppress(ValueError):

@@ -118,11 +118,7 @@ def _table(directory: Path, values: Mapping[str, Any], *, frames: bool, costly: 
 
 
 def grouped(table: pd.DataFrame, by: Sequence[str]) -> pd.DataFrame:
-    """Average a table of `measured` over runs with equal values in columns, or raise InputError.
-
-    Returns:
-        One row per group and phase: means, and standard errors over runs.
-    """
+    """Average a table of `measured` over runs with equal values in `by`: means and standard errors by phase."""
     from postprocess.statistics.points import means_by  # noqa: PLC0415
 
     for name in by:

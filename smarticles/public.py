@@ -48,10 +48,8 @@ class SweepDirectory(Sequence[Run]):
 
     @overload
     def __getitem__(self, index: int) -> Run: ...
-
     @overload
     def __getitem__(self, index: slice) -> list[Run]: ...
-
     def __getitem__(self, index: int | slice) -> Run | list[Run]:
         return self.folder.runs()[index]
 

@@ -289,10 +289,7 @@ class Engine(Protocol):
         """Return the forces at all contacts, at present or in the last step, as one contact per pair of links."""
 
     def extremes(self, state: State) -> Extremes | None:
-        """Return extremes over all smarticles in the present state; None if a full check is needed.
-
-        Engines that cannot compute them faster than a full check always return None.
-        """
+        """Return extremes over all smarticles at present; None if a full check is needed or no slower."""
 
     # -- checkpoints -------------------------------------------------------------------------------------------
 

@@ -19,8 +19,7 @@ from dem.scene.reading import parse_scene
 from dem.scene.scene import Scene
 from dem.setting.fidelity import FIDELITIES, fidelities
 
-SHIPPED = Path(__file__).with_name("work_precision.csv")
-"""Default table."""
+SHIPPED = Path(__file__).with_name("work_precision.csv")  #: Default table
 
 QUANTITIES = {"phi_0": "φ_0", "phi_f": "φ_f", "crossings": "⟨N⟩"}
 """Quantities with measured errors: symbols by the names in columns and in `--of`."""
@@ -249,10 +248,7 @@ def pick(expected: Sequence[Measured], *, max_error: float | None, max_hours: fl
 
     With a limit of the error it is the cheapest fidelity within the limit. With a limit of the hours alone it is the
     most exact fidelity within the limit: the reference, or else, among the finest ones of all engines, the one with the
-    least known error.
-
-    Args:
-        expected: fidelities with their hours, for each engine from coarse to fine.
+    least known error. For each engine `expected` is ordered from coarse to fine.
     """
     quick = [one for one in expected if max_hours is None or one.hours <= max_hours]
     if max_error is None:

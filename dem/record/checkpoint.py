@@ -62,11 +62,7 @@ def write_checkpoint(folder: Path, checkpoint: Checkpoint) -> None:
 
 
 def read_checkpoint(folder: Path, *, scene_sha256: str, made_by: tuple[str, str]) -> tuple[Checkpoint, str | None]:
-    """Read the newest undamaged checkpoint of a run directory.
-
-    Args:
-        scene_sha256: hash of the scene that the checkpoint must have.
-        made_by: name and version of the engine that the checkpoint must have.
+    """Read the newest undamaged checkpoint of a run directory, made by an engine (name, version).
 
     Returns:
         The checkpoint, and a warning if the newest one is damaged and the previous one was read.

@@ -33,10 +33,7 @@ def whole(path: Path, *, before: Path | None = None, shared: bool = False) -> It
 
 
 def write_whole(path: Path, write: Callable[[Path], object], *, make_folder: bool = True) -> None:
-    """Write or replace a file, complete or not at all.
-
-    Args:
-        write: function that writes the content to a temporary path.
+    """Write or replace a file by a function of a temporary path, complete or not at all.
 
     Raises:
         RunError: the disk is full or the folder cannot be written; an existing file is unchanged.

@@ -28,7 +28,6 @@ def force_mesh(found: ContactForces, positions: Array, *, time: float, phase: in
 
     Args:
         positions: (N, 3) centres of mass of the smarticles [m].
-        time: simulated time [s].
     """
     number, between = len(found.forces), found.boundaries == NONE
     ends = np.empty((number, 2, 3))

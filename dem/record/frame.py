@@ -200,14 +200,7 @@ def read_frame(path: Path | str) -> Frame:
 
 
 def read_mesh(path: Path, what: str = "frame", remedy: str | None = None) -> Any:
-    """Return the mesh of a VTK file.
-
-    Args:
-        remedy: what to do about a damaged file; None: advice for frames.
-
-    Raises:
-        InputError: the file is missing, truncated or not VTK.
-    """
+    """Return the mesh of a VTK file; raise InputError with `remedy`, what to do (None: advice for frames)."""
     # `meshio.read` prints and exits on damaged files. The reader of the format raises any exception, or prints a
     # warning and continues, which the callers' checks of shapes find.
     noise = io.StringIO()

@@ -78,10 +78,8 @@ class FrameSequence(Sequence[Frame]):
 
     @overload
     def __getitem__(self, index: int) -> Frame: ...
-
     @overload
     def __getitem__(self, index: slice) -> FrameSequence: ...
-
     def __getitem__(self, index: int | slice) -> Frame | FrameSequence:
         if isinstance(index, slice):
             return FrameSequence(self.times[index], self.paths[index])

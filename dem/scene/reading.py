@@ -28,14 +28,11 @@ ADDED_KEYS: Mapping[str, Mapping[str, Any]] = MappingProxyType(
 
 
 def parse_scene(data: Any, *, source: str, folder: Path | None = None) -> Scene:
-    """Return the scene that plain data describe.
+    """Return the scene that plain data describe, or raise InputError in one line with file, key and value.
 
     Args:
         source: name of the data in messages.
         folder: folder that paths of other runs are relative to; None: the working directory.
-
-    Raises:
-        InputError: one line with file, key, value and the way out.
     """
     if problem := _not_a_scene(data):
         raise InputError(f"{source}: {problem}")

@@ -32,7 +32,7 @@ from smarticles.reporting.run import (
     warning_blocks,
 )
 from studies.registry import STUDIES
-from templates.sweep.folder import Folder, RunStatus
+from templates.sweep.folder import Folder
 from templates.sweep.sweep_file import SEED
 
 PROVENANCE = "provenance.json"  #: File in every folder of results
@@ -54,7 +54,10 @@ def sweep_page(folder: Folder, accuracy: Path | None, *, jobs: int) -> str:
     first = next(iter(scenes), None)
     scene = scenes[first] if first else None
     scene_error = "This version cannot read the scenes of this sweep."
-    state = _unfinished(states)
+    rows = [[run.name, run.state, run.phase, run.time_s, run.cause] for run in states if run.state != "done"]
+    header = ["run", "state", "phase", "simulated [s]", "cause"]
+    state = [table(f"Runs that are not done: {len(rows)}", header, rows)] if rows else []
+    variables = [[name, ", ".join(map(format_cell, values)), str(len(values))] for name, values in varied.items()]
     if study in STUDIES and not analysed:
         quick = " --quick" if folder.name.endswith("-quick") else ""
         command = f"smarticles study {study}{quick} --out {shlex.quote(folder.path.resolve().name)} --analyse"
@@ -63,7 +66,7 @@ def sweep_page(folder: Folder, accuracy: Path | None, *, jobs: int) -> str:
         ("State", state),
         *(_result_sections(results) if analysed else _measured(folder, varied, jobs=jobs)),
         ("Final states", _pictures(folder)),
-        ("Variables", [table("Variables and constants", ["name", "values", "number of values"], _variables(varied))]),
+        ("Variables", [table("Variables and constants", ["name", "values", "number of values"], variables)]),
         (
             "Scene",
             [
@@ -93,16 +96,6 @@ def results_page(folder: Path) -> str:
     lead = [("study", study), ("runs used", used), ("missing", missing)]
     sections = (*_result_sections(folder), ("How to repeat it", _origin(folder)))
     return page(f"{study}: results", "results of a study", lead, sections, folder)
-
-
-def _unfinished(states: Sequence[RunStatus]) -> list[Markup]:
-    rows = [[run.name, run.state, run.phase, run.time_s, run.cause] for run in states if run.state != "done"]
-    header = ["run", "state", "phase", "simulated [s]", "cause"]
-    return [table(f"Runs that are not done: {len(rows)}", header, rows)] if rows else []
-
-
-def _variables(varied: Mapping[str, Sequence[Any]]) -> list[list[str]]:
-    return [[name, ", ".join(map(format_cell, values)), str(len(values))] for name, values in varied.items()]
 
 
 def _scenes(folder: Folder) -> dict[str, Scene]:

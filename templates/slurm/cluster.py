@@ -147,11 +147,7 @@ def shipped_clusters() -> list[str]:
 
 
 def load_cluster(reference: str) -> Cluster:
-    """Read the description of a cluster by its name in this package, or from a file that ends in .toml.
-
-    Raises:
-        InputError: An unknown name, an unreadable file, an unknown key, or an invalid value.
-    """
+    """Read a cluster by its name in this package, or from a file .toml; raise InputError if invalid."""
     own = reference.endswith(".toml")
     if not own and reference not in shipped_clusters():
         advice = nearest(reference, shipped_clusters())

@@ -162,14 +162,11 @@ def job_name(sweep: str, token: str) -> str:
 def render_script(
     cluster: Cluster, request: Request, *, sweep: Path, number: str, name: str, count: int, command: Sequence[str]
 ) -> str:
-    """Return the text of the script of an array job.
+    """Return the text of the script of an array job; raise InputError if it cannot be rendered.
 
     Args:
         number: Name of the submission's folder in `jobs/`.
         command: Command that starts `smarticles`, as words.
-
-    Raises:
-        InputError: The template fails, or the path of the sweep cannot be written into a script.
     """
     folder = f"jobs/{number}"
     where = str(sweep.resolve())

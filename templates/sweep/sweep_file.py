@@ -22,6 +22,7 @@ from dem.strict import Strict, explained
 from templates.sweep.render import Value
 
 SEED = "seed"
+ENGINE = "engine"  #: The constant of a sweep that names the engine of its scenes
 _IDENTIFIER = re.compile(r"[A-Za-z_][A-Za-z0-9_]*\Z")
 _RESERVED = {SEED, "loop", "true", "false", "none", "True", "False", "None"}
 
@@ -178,11 +179,7 @@ class Sweep:
 
 
 def load_sweep(path: Path) -> Sweep:
-    """Read a sweep file with its template and table; FILE@VARIANT,VARIANT applies variants in order.
-
-    Raises:
-        InputError: A missing or malformed file, an unknown key or variant, or a value out of its range.
-    """
+    """Read FILE or FILE@VARIANT,VARIANT, a sweep with its template and table; raise InputError if invalid."""
     name, _, variants = path.name.partition("@")
     text = read_text(path.with_name(name), "sweep file")
     data = parse_yaml(text, str(path))
@@ -246,9 +243,6 @@ def with_constants(sweep: Sweep, constants: Mapping[str, Value]) -> Sweep:
             raise InputError(msg)
     content = sweep.content.model_copy(update={"constants": {**sweep.content.constants, **constants}})
     return replace(sweep, content=content)
-
-
-ENGINE = "engine"  #: The constant of a sweep that names the engine of its scenes
 
 
 def on_engine(sweep: Sweep, engine: str) -> Sweep:
@@ -337,14 +331,11 @@ def _read_table(path: Path, table: Table | None) -> tuple[list[dict[str, Value]]
 def matching(
     rows: Sequence[dict[str, Value]], only: Mapping[str, Sequence[Value]], where: str, nouns: tuple[str, str]
 ) -> list[dict[str, Value]]:
-    """Return the rows that have one of the wanted values in each variable of `only`.
+    """Return the rows with a wanted value in each variable of `only`; raise InputError if there are none.
 
     Args:
         where: Place of `only`, for messages.
         nouns: Words for a variable and for a row, for messages.
-
-    Raises:
-        InputError: A variable is unknown, no row has one of the wanted values, or no row is kept.
     """
     variable, row_ = nouns
     kept = list(rows)

@@ -14,8 +14,7 @@ from pathlib import Path
 from dem.errors import RunError
 
 LMP, MPIRUN = "lmp", "mpirun"
-NEEDED = ("rigid/small", "gran/hooke/history", "wall/gran/region", "rigid/local")
-"""Styles of LAMMPS that the engine uses."""
+NEEDED = ("rigid/small", "gran/hooke/history", "wall/gran/region", "rigid/local")  #: Styles of LAMMPS in use
 INSTALL = "install it with `make setup-mpi` or `apt-get install lammps openmpi-bin`"
 LOG, OUTPUT, ANSWERS = "log.lammps", "mpirun.txt", "answers"
 POLL_S = 0.2  # s between checks whether a child that has not answered yet is alive

@@ -30,6 +30,7 @@ from dem.setting.container import Cylinder
 
 FORMAT = "lammps-2"
 SPHERES, BODIES, RESTART, STATE = "spheres.data", "bodies.txt", "restart", "state.npz"
+FORGET_BODIES = ("undump bodies", "uncompute where", "unfix bodies")
 HEAD = 9  # lines of a dump before its rows
 
 
@@ -160,11 +161,6 @@ class LammpsEngine:
         yield f"fix bodies all rigid/small molecule infile {file} reinit no"
         yield from text.body_dump("bodies.*.dump", when="v_when")
 
-    def _forget_bodies(self) -> Iterator[str]:
-        yield "undump bodies"
-        yield "uncompute where"
-        yield "unfix bodies"
-
     def _balanced(self) -> Iterator[str]:
         """Yield the command that balances spheres over ranks; two have equal halves of a round pile anyway."""
         if self.child.ranks > 2:
@@ -245,7 +241,7 @@ class LammpsEngine:
         self._write(SPHERES, lines)
         self._write(BODIES, text.body_lines(self.particle, self._moving))
         if self._box:
-            self.child.send(*self._forget_bodies(), f"read_data {SPHERES} add merge", *self._balanced())
+            self.child.send(*FORGET_BODIES, f"read_data {SPHERES} add merge", *self._balanced())
         else:
             self.child.send(*self._scene(f"read_data {SPHERES}"), *self._balanced())
             if self.steps:
