@@ -30,7 +30,7 @@ def has_frames(directory: Path) -> bool:
 
 
 def sources(directories: Sequence[Path]) -> dict[Path, Mapping[str, Any]]:
-    """Find the runs to measure in directories of runs and sweeps; raise InputError for a sweep without any.
+    """Find the runs to measure in directories of runs and sweeps; raise InputError if a sweep has none.
 
     Returns:
         Values of the sweep's variables by run directory, empty for runs without a sweep. Runs of a sweep that have no
@@ -118,7 +118,7 @@ def _table(directory: Path, values: Mapping[str, Any], *, frames: bool, costly: 
 
 
 def grouped(table: pd.DataFrame, by: Sequence[str]) -> pd.DataFrame:
-    """Average a table of `measured` over runs with equal values in `by`: means and standard errors by phase."""
+    """Average a table of `measured` over runs of equal values in `by`: means and standard errors by phase."""
     from postprocess.statistics.points import means_by  # noqa: PLC0415
 
     for name in by:

@@ -75,7 +75,7 @@ class Chain:
         return Poses(positions, tuple(Rotation.from_rotvec([0.0, 0.0, math.pi * half]) for half in turned))
 
     def ties(self, tied_at: Literal["tip", "axis"]) -> tuple[Tie, Tie]:
-        """Return where strings are tied to the outer barbs: at their tips, or where they cross the chain's axis."""
+        """Return where strings are tied to the outer barbs: at the tips, or at the chain's axis."""
         half = self.particle.boxes.barb_length / 2
         along = half - self.particle.radius if tied_at == "tip" else self.offset / 2 - half
         last = self.count - 1

@@ -123,7 +123,7 @@ class Boxes:
 
     @cached_property
     def directions(self) -> Array:
-        """(3, 3) float64: unit vectors from hinge to tip, hinge 1 to 2, hinge to tip, in the middle link's frame."""
+        """(3, 3) float64: unit vectors hinge to tip, hinge 1 to 2, hinge to tip, in the middle link's frame."""
         a1, a2 = self.angles
         barbs = [-math.cos(a1), math.sin(a1), 0.0], [math.cos(a2), math.sin(a2), 0.0]
         return np.array([barbs[0], [1.0, 0.0, 0.0], barbs[1]])
@@ -179,7 +179,7 @@ class Boxes:
 
     @property
     def link_inertias(self) -> Array:
-        """(3, 3) float64 [kg m²]: principal moments of each link about its centre, along axes of `link_rotations`."""
+        """(3, 3) float64 [kg m²]: principal moments of links about their centres, axes as in `link_rotations`."""
         t1, length = self.thickness_normal, self.lengths
         t2_squared = np.array([t2**2 for t2 in self.thicknesses_in_plane])
         squares = np.stack([t1**2 + t2_squared, length**2 + t1**2, length**2 + t2_squared], axis=1)

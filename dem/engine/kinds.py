@@ -30,7 +30,7 @@ class EngineKind(Protocol):
         """Return the number of threads, or ranks, of runs that this process starts."""
 
     def stable_step(self, scene: Demand, *, articulated: bool) -> float:
-        """Return the largest stable time step [s]; `articulated`: whether barbs can turn, or have turned before."""
+        """Return the largest stable time step [s]; `articulated`: whether barbs can turn or have turned."""
 
     def seconds_per_second(self, scene: Demand, time_step: float, activity: Activity) -> float:
         """Return an estimate of the wall time per simulated time [1] on one core, with a time step [s]."""

@@ -256,7 +256,7 @@ def _mean_height(engine: Engine) -> float:
 
 
 def poses_of(scene: SceneView, taken: Taken) -> Poses:
-    """Return the poses of a scene's smarticles in another run's frame; raise InputError if they do not fit."""
+    """Return the poses of a scene's smarticles in a taken frame; raise InputError if they do not fit."""
     for mismatch in _mismatches(scene, taken):
         raise InputError(mismatch)
     return fitted_poses(scene.particle.boxes, taken.vertices)[0]

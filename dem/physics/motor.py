@@ -79,7 +79,7 @@ class Motors:
         self.commands: Array = angles.copy()  #: (N, 2) angles that the motors hold at present [rad]
         self.schedule: Array = angles.copy()  #: (N, 2) angles of the schedule at the last control update [rad]
         self.angles: Array = angles.copy()  #: (N, 2) actual angles at the last control update [rad]
-        self.torques: Array = np.zeros_like(angles)  #: (N, 2) torques since that update [N m]; positive ones raise the angle
+        self.torques: Array = np.zeros_like(angles)  #: (N, 2) torques since that update [N m]; above 0: angles rise
         self.halted: Flags = np.zeros(angles.shape, dtype=bool)
         """(N, 2) whether a motor wanted to advance at the last control update and did not."""
         self._begun: Array = angles.copy()

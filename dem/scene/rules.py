@@ -1,4 +1,4 @@
-"""Checks of a scene that involve several of its parts, by what engines can compute and what has a meaning."""
+"""Checks of several parts of a scene together: what engines can compute, and what has a meaning."""
 
 import math
 from collections.abc import Iterator

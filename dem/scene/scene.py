@@ -143,7 +143,7 @@ class Scene(Part):
         )
 
     def ample_height(self, hooks_top: float = 0.0) -> float:
-        """Return a height of the wall [m] with room for the loosest pile, or hooks up to `hooks_top` [m], and a layer.
+        """Return a height of the wall [m] for the loosest pile, or hooks up to `hooks_top` [m], and a layer.
 
         A loose random packing of thin bars has the packing fraction φ ≈ 2.4 d/L, with d the mean width of the section
         and L the length of all three links (Gravish's φ_0 at l/w = 0, 0.7 and 1.4). The loosest pile is assumed to have

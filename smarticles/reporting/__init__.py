@@ -1,1 +1,1 @@
-"""HTML pages for `smarticles report`: `page` renders, `charts` draws, `run` and `sweep` choose the content."""
+"""HTML pages of `smarticles report`: `page` renders, `charts` draws, `run` and `sweep` choose content."""

@@ -261,7 +261,7 @@ def _percent(error: Error) -> str:
 
 
 def warning_blocks(directories: Mapping[str, Path]) -> list[Markup]:
-    """Return a table of the distinct warnings and errors in the logs of runs; a single run has the name ""."""
+    """Return a table of the warnings and errors in the logs of runs; a single run has the name ""."""
     found: dict[str, Counter[str]] = {}
     for name, directory in directories.items():
         log = directory / LOG

@@ -64,7 +64,7 @@ class Request:
 
 
 def plan_request(expected_s: Sequence[float], cluster: Cluster, wishes: Wishes) -> Request:
-    """Return the request for runs of expected wall times [s]; raise InputError beyond the cluster's limits."""
+    """Return the request for runs of expected wall times [s]; raise InputError beyond a cluster's limits."""
     name, partition = cluster.partition(wishes.partition)
     where = f"partition {name} of {cluster.name}"
     memory, ranks = wishes.memory_mib or MEMORY_PER_RUN_MIB, wishes.ranks or 1
