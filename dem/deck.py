@@ -5,17 +5,13 @@ Smarticles are rigid bodies of spheres (`fix rigid/small`) with spring, dashpot 
 spring (`gran/hooke/history`), as on YADE. Keywords are those of `dem.engine.lammps.text`.
 """
 
-from __future__ import annotations
-
 import math
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
 from scipy.spatial import cKDTree
 
-from dem.arrays import Array
 from dem.body.state import State
 from dem.engine.demand import contact_law_of
 from dem.engine.lammps import text
@@ -25,7 +21,6 @@ from dem.phases.relax import Relax
 from dem.phases.remove_container import RemoveContainer
 from dem.phases.shake import Shake
 from dem.phases.take_over import TakeOver, poses_of
-from dem.physics.contact import ContactLaw
 from dem.plan.steps import time_steps
 from dem.record.files import write_text
 from dem.scene.reading import scene_hash
@@ -41,31 +36,8 @@ DECK, DATA, BODIES, DUMP = "in.lammps", "spheres.data", "bodies.txt", "bodies.du
 DEEPEST = 0.05
 
 
-@dataclass(frozen=True)
-class PassiveScene:
-    """A scene without motors, and its smarticles at the beginning."""
-
-    scene: Scene
-    first: TakeOver
-    phases: Sequence[PassivePhase]
-    time_step: float  #: dt [s]
-    law: ContactLaw
-    state: State  #: The smarticles, at rest
-
-    @property
-    def turns(self) -> Array:
-        """(N, 3, 3) rotations from the body frame to the laboratory frame [1]."""
-        own = self.scene.particle.boxes.link_rotations[1]
-        return np.asarray(self.state.link_rotations[:, 1] @ own.T)
-
-    @property
-    def spheres(self) -> Array:
-        """(N, S, 3) centres of the spheres [m]."""
-        return self.state.spheres(self.scene.particle)
-
-
-def passive(scene: Scene) -> PassiveScene:
-    """Return a scene with its poses, for a deck.
+def passive(scene: Scene) -> State:
+    """Return the smarticles with which a scene begins, at rest, if a deck can describe the scene.
 
     Raises:
         InputError: the scene has parts that LAMMPS cannot compute, all of which the message names; or its poses overlap
@@ -77,20 +49,13 @@ def passive(scene: Scene) -> PassiveScene:
             f"cannot be carried over to LAMMPS: {'; '.join(found)}; leave that out, or run the scene here "
             "(smarticles run)"
         )
-    first, *others = scene.phases
+    first = scene.phases[0]
     assert isinstance(first, TakeOver)  # all others were named
     first.ready(scene)
     poses = poses_of(scene, first.taken)
     turns, zero = np.array([turn.as_matrix() for turn in poses.rotations]), np.zeros_like(poses.positions)
-    given = PassiveScene(
-        scene=scene,
-        first=first,
-        phases=[first, *(phase for phase in others if isinstance(phase, Relax | Shake | RemoveContainer))],
-        time_step=min(time_steps(scene)),
-        law=contact_law_of(scene),
-        state=State.rigid(scene.particle.boxes, poses.positions, turns, zero, zero),
-    )
-    spheres = given.spheres
+    state = State.rigid(scene.particle.boxes, poses.positions, turns, zero, zero)
+    spheres = state.spheres(scene.particle)
     owners = np.repeat(np.arange(len(spheres)), spheres.shape[1])
     near = cKDTree(spheres.reshape(-1, 3))
     pairs = near.query_pairs(scene.sphere_diameter * (1 - DEEPEST), output_type="ndarray")
@@ -101,7 +66,7 @@ def passive(scene: Scene) -> PassiveScene:
             "as those of another engine or fidelity do, and would fly apart in LAMMPS; run this scene's take-over "
             "and a relax phase here (engine: yade), and take over that run"
         )
-    return given
+    return state
 
 
 def _foreign(scene: Scene) -> Iterator[str]:
@@ -120,31 +85,32 @@ def write_deck(scene: Scene, folder: Path) -> None:
     """Write the deck of a scene into a folder of its own.
 
     Raises:
-        InputError: the scene has parts that LAMMPS cannot compute, or the folder exists already.
+        InputError: as in `passive`, or the folder exists already.
         RunError: a file cannot be written.
     """
-    given = passive(scene)
+    state = passive(scene)
     if folder.exists():
         raise InputError(f"--output {folder}: exists; choose another name")
     try:
         folder.mkdir()
     except OSError as error:
         raise InputError(f"--output {folder}: cannot be made ({error.strerror}); choose another place") from None
-    spheres, state = given.spheres, given.state
-    zero = np.zeros((state.count, 3))
+    spheres, zero = state.spheres(scene.particle), np.zeros((state.count, 3))
+    turns = np.asarray(state.link_rotations[:, 1] @ scene.particle.boxes.link_rotations[1].T)
     title = f"Spheres of {len(spheres)} smarticles, {spheres.shape[1]} each: {_one_line(scene.name)}"
     contents = {
         DATA: text.sphere_lines(scene.particle, scene.cylinder, spheres, title=title),
-        BODIES: text.body_lines(scene.particle, Moving(state.positions, given.turns, zero, zero, zero, zero)),
-        DECK: _deck(given),
+        BODIES: text.body_lines(scene.particle, Moving(state.positions, turns, zero, zero, zero, zero)),
+        DECK: _deck(scene),
     }
     for name, lines in contents.items():
         write_text(folder / name, "\n".join(lines) + "\n")
 
 
-def _deck(given: PassiveScene) -> Iterator[str]:
-    scene, law, boxes = given.scene, given.law, given.scene.particle.boxes
-    d, dt, cylinder = scene.sphere_diameter, given.time_step, scene.cylinder
+def _deck(scene: Scene) -> Iterator[str]:
+    law, boxes, first = contact_law_of(scene), scene.particle.boxes, scene.phases[0]
+    assert isinstance(first, TakeOver)
+    d, dt, cylinder = scene.sphere_diameter, min(time_steps(scene)), scene.cylinder
     each = len(scene.particle.centres)
     before_box, neighbours = "\n".join(text.before_box(scene.particle)), "\n".join(text.neighbours(scene.particle))
     between, at_wall = text.contact_terms(law, boxes.mass)
@@ -154,7 +120,7 @@ def _deck(given: PassiveScene) -> Iterator[str]:
     yield f"""\
 # {_one_line(scene.name)}: {scene.count} smarticles of {each} spheres of {1e3 * d:.4g} mm
 # l/w = {scene.smarticle.aspect_ratio:g}. Made by smarticles export --to lammps, of the scene {scene_hash(scene)[:12]}.
-# Poses: frame {given.first.frame} of a run, SHA-256 {given.first.sha256}
+# Poses: frame {first.frame} of a run, SHA-256 {first.sha256}
 # Run:   lmp -in {DECK}        on n processors: mpirun -np n lmp -in {DECK}
 # Gives: {DUMP}, every {scene.recording.frame_interval_s:g} s: number from 1, centre of mass, velocity, quaternion
 #        (w, x, y, z) of each smarticle.
@@ -195,14 +161,14 @@ compute          where all rigid/local bodies mol x y z vx vy vz quatw quati qua
 dump             bodies all local {frame} {DUMP} {columns}
 dump_modify      bodies format float %.12g"""
     walled = True
-    for index, phase in enumerate(given.phases):
+    for index, phase in enumerate(scene.phases):
+        assert isinstance(phase, PassivePhase)  # all others were rejected
         yield f"\n# -- phase {index}: {phase.kind} " + "-" * 40
-        yield from _phase(given, phase, walled=walled)
+        yield from _phase(phase, dt, scene.gravity_m_per_s2, walled=walled)
         walled = walled and not isinstance(phase, RemoveContainer)
 
 
-def _phase(given: PassiveScene, phase: PassivePhase, *, walled: bool) -> Iterator[str]:
-    dt, gravity = given.time_step, given.scene.gravity_m_per_s2
+def _phase(phase: PassivePhase, dt: float, gravity: float, *, walled: bool) -> Iterator[str]:
     if isinstance(phase, TakeOver):
         hold = phase.settle.hold_s
         yield "# Springs of friction begin anew: the pile settles a little, for as long as it must be still in a run."

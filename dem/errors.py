@@ -14,14 +14,7 @@ class RunError(RuntimeError):
 
 
 def reject(failing: Any, time: float, cause: str, way_out: str) -> None:
-    """Raise RunError if any smarticle fails a check at a simulated time [s].
-
-    Args:
-        failing: (N,) bool array, which smarticles fail.
-        time: simulated time [s].
-        cause: what is wrong with these smarticles.
-        way_out: what to do.
-    """
+    """Raise RunError about the smarticles for which `failing` (N,) is true, at a simulated time [s]."""
     if failing.any():
         ids = failing.nonzero()[0]
         shown = ", ".join(str(k) for k in ids[:5]) + (", …" if len(ids) > 5 else "")
@@ -35,10 +28,7 @@ def shown(value: object) -> str:
         text = constants[value] if value is None or isinstance(value, bool) else repr(value)
     except ValueError:  # a whole number of thousands of digits
         text = "a number of thousands of digits"
-    return text if len(text) <= _MOST else f"{text[:_MOST]}…"
-
-
-_MOST = 60  # characters of a value that are shown
+    return text if len(text) <= 60 else f"{text[:60]}…"
 
 
 def nearest(word: str, known: Iterable[str], *, cutoff: float = 0.6) -> str:

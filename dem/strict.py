@@ -1,7 +1,5 @@
 """Strict models of files that users write, and one-line messages for errors in such files."""
 
-from __future__ import annotations
-
 import difflib
 import math
 import re

@@ -1,7 +1,5 @@
 """Parse command lines with one-line errors; define common options; format tables and JSON."""
 
-from __future__ import annotations
-
 import argparse
 import json
 import math
@@ -9,7 +7,7 @@ import re
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
-from typing import Any, NoReturn, TypeVar
+from typing import Any, NoReturn, Self, TypeVar
 
 from dem.engine import ENGINES
 from dem.errors import InputError, nearest
@@ -51,15 +49,7 @@ class Commands:
         self.parsers: dict[str, Parser] = {}
 
     def add(self, name: str, handler: Handler, *, summary: str, text: str, examples: str) -> Parser:
-        """Add a subcommand and return its parser.
-
-        Args:
-            name: word on the command line.
-            handler: runs the subcommand.
-            summary: one line for the list of commands.
-            text: description for `--help` of the subcommand.
-            examples: example command lines for `--help` of the subcommand.
-        """
+        """Add a subcommand and return its parser; `summary` is for the list of commands, `text` for `--help`."""
         parser: Parser = self._subparsers.add_parser(
             name,
             help=summary,
@@ -78,13 +68,7 @@ Read = TypeVar("Read")
 
 
 def reader(convert: Callable[[str], Read], what: str, valid: Callable[[Read], bool]) -> Callable[[str], Read]:
-    """Return a `type` for argparse that converts and checks an argument.
-
-    Args:
-        convert: converts the text; a ValueError means that the text is invalid.
-        what: description of valid values, for the error message.
-        valid: returns whether a converted value is allowed.
-    """
+    """Return a `type` for argparse that converts and checks an argument; `what` describes valid values."""
 
     def read(text: str) -> Read:
         with suppress(ValueError):
@@ -150,11 +134,7 @@ def add_options(parser: argparse._ActionsContainer, *options: str, **settings: A
 
 
 def scene_settings(arguments: argparse.Namespace) -> list[str]:
-    """Return --set and --engine as a list of `KEY=VALUE`.
-
-    Raises:
-        InputError: --engine and --set name different engines.
-    """
+    """Return --set and --engine as a list of `KEY=VALUE`; raise InputError if they name different engines."""
     settings: list[str] = list(arguments.set)
     if arguments.engine is None:
         return settings
@@ -180,7 +160,7 @@ class Cell(str):
     __slots__ = ()
 
     @classmethod
-    def of(cls, value: float, form: str, factor: float = 1.0) -> Cell:
+    def of(cls, value: float, form: str, factor: float = 1.0) -> Self:
         """Format `factor * value`; return a dash if the value is not finite."""
         return cls(f"{factor * value:{form}}" if math.isfinite(value) else "-")
 

@@ -1,10 +1,4 @@
-"""Console command `smarticles`.
-
-Exit status: 0 done; 1 the run failed; 2 bad input or usage; 75 stopped at a checkpoint after SIGUSR1, to be continued;
-130 stopped by Ctrl-C; 141 the reader of the output closed the pipe.
-"""
-
-from __future__ import annotations
+"""Console command `smarticles`; its help has the exit statuses."""
 
 import argparse
 import os
@@ -44,7 +38,7 @@ COMMANDS = (
 )
 """Functions that add the commands, in the order of `smarticles --help`; add a new command here."""
 
-FAILED, BAD_INPUT, STOPPED, BROKEN_PIPE = 1, 2, 130, 141
+FAILED, BAD_INPUT, STOPPED, BROKEN_PIPE = 1, 2, 130, 141  #: The last: the reader of the output closed the pipe
 
 _SHELLS = ("bash", "zsh")
 _SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
@@ -122,12 +116,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def guarded(action: Callable[[], int], *, debug: bool = False) -> int:
-    """Run an action and return the exit status; print exceptions and signals as one line on stderr.
-
-    Args:
-        action: returns an exit status.
-        debug: print the traceback of an exception too.
-    """
+    """Run an action and return the exit status; print exceptions and signals as one line on stderr."""
     try:
         with orderly_stop():
             status = action()
@@ -149,7 +138,6 @@ def guarded(action: Callable[[], int], *, debug: bool = False) -> int:
 
 
 def _dispatch(words: list[str]) -> int:
-    """Parse the command line, run the handler of its subcommand, and return the exit status."""
     parser, commands = build_parser()
     arguments, unknown = parser.parse_known_args(words)
     if arguments.command is None:
@@ -164,7 +152,6 @@ def _dispatch(words: list[str]) -> int:
 
 
 def _explain(error: Exception) -> tuple[str, int]:
-    """Return message and exit status of an error."""
     if isinstance(error, InputError):
         return str(error), BAD_INPUT
     if isinstance(error, RunError):

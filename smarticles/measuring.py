@@ -30,14 +30,11 @@ def has_frames(directory: Path) -> bool:
 
 
 def sources(directories: Sequence[Path]) -> dict[Path, Mapping[str, Any]]:
-    """Find the runs to measure in directories of runs and sweeps.
+    """Find the runs to measure in directories of runs and sweeps; raise InputError if a sweep has none.
 
     Returns:
         Values of the sweep's variables by run directory, empty for runs without a sweep. Runs of a sweep that have no
         frames are left out.
-
-    Raises:
-        InputError: a sweep has no run with frames yet.
     """
     from templates.sweep.folder import open_folder  # noqa: PLC0415
 
@@ -78,7 +75,6 @@ def measured(
     """Measure runs and sweeps.
 
     Args:
-        directories: directories of runs and sweeps.
         frames: return one row per frame instead of one row per run and phase.
         costly: when to compute the costly packing fractions, see `postprocess.measure_run`.
         jobs: number of processes. More than 1 needs `if __name__ == "__main__":` in the calling script, since the
@@ -122,14 +118,7 @@ def _table(directory: Path, values: Mapping[str, Any], *, frames: bool, costly: 
 
 
 def grouped(table: pd.DataFrame, by: Sequence[str]) -> pd.DataFrame:
-    """Average a table of `measured` over runs with equal values in the columns `by`.
-
-    Returns:
-        One row per group and phase: means, and standard errors over runs.
-
-    Raises:
-        InputError: a column does not exist.
-    """
+    """Average a table of `measured` over runs of equal values in `by`: means and standard errors by phase."""
     from postprocess.statistics.points import means_by  # noqa: PLC0415
 
     for name in by:

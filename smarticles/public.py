@@ -1,7 +1,5 @@
 """Python API: run and read scenes and sweeps, and measure them."""
 
-from __future__ import annotations
-
 import shlex
 import subprocess
 import tempfile
@@ -50,10 +48,8 @@ class SweepDirectory(Sequence[Run]):
 
     @overload
     def __getitem__(self, index: int) -> Run: ...
-
     @overload
     def __getitem__(self, index: slice) -> list[Run]: ...
-
     def __getitem__(self, index: int | slice) -> Run | list[Run]:
         return self.folder.runs()[index]
 
@@ -80,7 +76,7 @@ class SweepDirectory(Sequence[Run]):
 def run(
     scene: Scene | Path | str, out: Path | str, *, threads: int = 1, ranks: int | None = None, resume: bool = False
 ) -> Run:
-    """Run a scene in a new process, as `smarticles run` does.
+    """Run a scene in a new process, as `smarticles run` does, and return the finished run.
 
     A new process is needed because YADE and PyVista must not be loaded in one process.
 
@@ -90,9 +86,6 @@ def run(
         threads: number of threads of YADE. Results are reproducible bit by bit with one thread only.
         ranks: number of MPI processes of LAMMPS; None: 1, or with `resume` the number at the start.
         resume: continue an unfinished run from its last checkpoint.
-
-    Returns:
-        The finished run.
 
     Raises:
         InputError: the scene is not valid, or `out` contains other files.
@@ -115,11 +108,7 @@ def run(
 
 
 def read(directory: Path | str) -> Run:
-    """Open the run directory of a finished or unfinished run.
-
-    Raises:
-        InputError: the directory is not a run directory.
-    """
+    """Open the run directory of a finished or unfinished run; raise InputError if it is none."""
     return open_run(directory)
 
 
@@ -141,11 +130,7 @@ def measure(run: Run | Path | str, *, frames: bool = False) -> pd.DataFrame:
 
 
 def read_sweep(directory: Path | str) -> SweepDirectory:
-    """Open the directory of a sweep or a study, whose runs need not be finished.
-
-    Raises:
-        InputError: the directory is not the directory of a sweep.
-    """
+    """Open the directory of a sweep or a study, finished or not; raise InputError if it is none."""
     return SweepDirectory(open_folder(Path(directory)))
 
 
@@ -156,7 +141,7 @@ def sweep(
     vary: Mapping[str, Sequence[Any]] | None = None,
     jobs: int | None = None,
 ) -> SweepDirectory:
-    """Compute the missing runs of a sweep on this machine.
+    """Compute the missing runs of a sweep on this machine, and return the finished sweep.
 
     Args:
         what: path of a sweep file; with `vary` a scene or the path of a scene file.
@@ -165,9 +150,6 @@ def sweep(
             the name of the variable: {"smarticle.aspect_ratio": [0.4, 0.7], "seed": [1, 2, 3]} has the variables
             `aspect_ratio` and `seed`.
         jobs: number of simultaneous runs; None: one per core.
-
-    Returns:
-        The finished sweep.
 
     Raises:
         InputError: a scene or the sweep is not valid, or the directory contains other files.
@@ -189,19 +171,7 @@ def sweep(
 
 
 def write_sweep(scene: Scene | Path | str, vary: Mapping[str, Sequence[Any]], folder: Path) -> Path:
-    """Write the sweep file `sweep.yaml` and its template `scene.yaml.j2` for all combinations of `vary`.
-
-    Args:
-        scene: scene, or path of a scene file.
-        vary: values by key of the scene, see `sweep`.
-        folder: existing folder for both files.
-
-    Returns:
-        The path of the sweep file.
-
-    Raises:
-        InputError: the scene cannot be read or contains template syntax, a key does not exist, or `vary` is empty.
-    """
+    """Write `sweep.yaml` and its template `scene.yaml.j2` for all combinations of `vary`; return its path."""
     if not vary:
         raise InputError("vary: is empty; give a key of the scene and its values, e.g. {'seed': [1, 2, 3]}")
     data = _explicit_keys(scene) if isinstance(scene, Scene) else _read_scene_file(Path(scene))

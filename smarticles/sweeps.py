@@ -74,15 +74,10 @@ def compute(folder: Folder, *, jobs: int | None, command: str) -> list[Outcome]:
     """Compute the missing runs of a sweep on this machine.
 
     Args:
-        folder: directory of the sweep.
         jobs: number of simultaneous runs; None: one per core.
         command: command line that continues the sweep, for the message after Ctrl-C.
 
-    Returns:
-        One outcome per run.
-
     Raises:
-        InputError: runs of the sweep are in Slurm's queue.
         KeyboardInterrupt: Ctrl-C was pressed; the message contains `command`.
     """
     from rich.console import Console  # noqa: PLC0415
@@ -192,15 +187,7 @@ def draft_of(path: Path, name: str, entries: Sequence[Entry], arguments: argpars
 
 
 def enqueue(folder: Folder, arguments: argparse.Namespace) -> int:
-    """Write a job for the missing runs of a sweep that are not in the queue, and submit the job with --submit slurm.
-
-    Returns:
-        The exit status, 0.
-
-    Raises:
-        InputError: unknown cluster, a request beyond its limits, or another process computes the sweep.
-        RunError: Slurm does not answer or rejects the job.
-    """
+    """Write a job for the missing runs of a sweep that are not in the queue, and submit the job with --submit slurm."""
     from templates.slurm.submission import submissions, submit, tasks_of_runs, to_submit, write  # noqa: PLC0415
 
     quoted = shlex.quote(str(folder.path))

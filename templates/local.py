@@ -4,8 +4,6 @@ Runs with the longest expected time start first, see `Folder.in_order_of_start`.
 others. Ctrl-C stops all runs, after they have closed their files.
 """
 
-from __future__ import annotations
-
 import contextlib
 import os
 import signal
@@ -176,15 +174,11 @@ def run_folder(
     its beginning; its old directory is renamed.
 
     Args:
-        folder: Directory of the sweep.
-        display: Display of the progress.
         slots: Number of runs at once; one per core if not given.
-        command: Returns the command of a run.
         poll_s: Time between updates of the display [s].
         grace_s: Time between one signal to stop and the next stronger one [s].
 
     Raises:
-        InputError: Another process already computes this sweep.
         KeyboardInterrupt: Ctrl-C was pressed; all runs were stopped.
     """
     with folder.lock() as lock, display:

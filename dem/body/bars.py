@@ -1,7 +1,5 @@
 """A rigid body of straight flat bars that are joined at their ends: staples, crosses, rings and other shapes."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from functools import cached_property

@@ -4,8 +4,6 @@
 along x, its middle at the origin. Source: Savoie et al., Soft Matter 2023, "Robophysical experiment".
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from typing import Literal
@@ -77,11 +75,7 @@ class Chain:
         return Poses(positions, tuple(Rotation.from_rotvec([0.0, 0.0, math.pi * half]) for half in turned))
 
     def ties(self, tied_at: Literal["tip", "axis"]) -> tuple[Tie, Tie]:
-        """Return where the two strings are tied: the outer barbs of the first and the last smarticle.
-
-        Args:
-            tied_at: "tip": at the barbs' tips; "axis": where the barbs cross the chain's axis.
-        """
+        """Return where strings are tied to the outer barbs: at the tips, or at the chain's axis."""
         half = self.particle.boxes.barb_length / 2
         along = half - self.particle.radius if tied_at == "tip" else self.offset / 2 - half
         last = self.count - 1
@@ -89,12 +83,7 @@ class Chain:
 
 
 def parted(state: State, diameter: float) -> bool:
-    """Return whether a line across the chain separates two neighbours, which then cannot hook again.
-
-    Args:
-        state: smarticles in their order along x.
-        diameter: thickness of the links [m].
-    """
+    """Return whether a line across the chain separates two neighbours; `diameter`: thickness of links [m]."""
     along = _corners(state)[..., 0]
     return bool((along[:-1].max(axis=1) + diameter < along[1:].min(axis=1)).any())
 

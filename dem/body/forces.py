@@ -5,8 +5,6 @@ each other. Here all points of one pair of links, or of one link and one boundar
 of contacts does not depend on the engine.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import TypeVar
 

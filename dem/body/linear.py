@@ -4,8 +4,6 @@ BLAS and LAPACK choose their kernels by the processor and differ in the last dig
 within a second: it is chaotic. Here everything consists of NumPy's elementwise operations and sums in a fixed order.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from dem.arrays import Array, Flags

@@ -10,8 +10,6 @@ A middle link may be thicker in the plane than the barbs, like the body of a rob
 in the plane, and the barbs begin outside of them.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
@@ -125,10 +123,7 @@ class Boxes:
 
     @cached_property
     def directions(self) -> Array:
-        """(3, 3) float64: unit vectors along the links, in the middle link's frame.
-
-        Barbs point from the hinge to the tip, the middle link from hinge 1 to hinge 2.
-        """
+        """(3, 3) float64: unit vectors hinge to tip, hinge 1 to 2, hinge to tip, in the middle link's frame."""
         a1, a2 = self.angles
         barbs = [-math.cos(a1), math.sin(a1), 0.0], [math.cos(a2), math.sin(a2), 0.0]
         return np.array([barbs[0], [1.0, 0.0, 0.0], barbs[1]])
@@ -184,10 +179,7 @@ class Boxes:
 
     @property
     def link_inertias(self) -> Array:
-        """(3, 3) float64 [kg m²]: principal moments of each link about its own centre.
-
-        The axes are along the link, across it in the smarticle's plane, and along the plane's normal.
-        """
+        """(3, 3) float64 [kg m²]: principal moments of links about their centres, axes as in `link_rotations`."""
         t1, length = self.thickness_normal, self.lengths
         t2_squared = np.array([t2**2 for t2 in self.thicknesses_in_plane])
         squares = np.stack([t1**2 + t2_squared, length**2 + t1**2, length**2 + t2_squared], axis=1)

@@ -1,7 +1,5 @@
 """Poses of smarticles: random poses without overlap, and poses fitted to recorded vertices."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -109,8 +107,7 @@ def fitted_poses(boxes: Boxes, vertices: Array) -> tuple[Poses, Array]:
     Returns:
         The poses, and (N,) the largest distance between a given and a fitted vertex of each smarticle [m].
 
-    Source:
-        Horn, J. Opt. Soc. Am. A 4, 629 (1987).
+    Source: Horn, J. Opt. Soc. Am. A 4, 629 (1987).
     """
     centre, shape_centre = vertices.mean(axis=1), boxes.vertices.mean(axis=0)
     turns = _turns(np.einsum("nvi,vj->nij", vertices - centre[:, None], boxes.vertices - shape_centre))

@@ -1,9 +1,8 @@
 """Poses and velocities of all smarticles at one instant."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Self
 
 import numpy as np
 
@@ -34,7 +33,7 @@ class State:
         spins: Array,
         *,
         shapes: tuple[Array, Array] | None = None,
-    ) -> State:
+    ) -> Self:
         """Return the state of N rigid smarticles.
 
         Args:

@@ -1,7 +1,5 @@
 """Number of cores that this process may use, and checks of threads and ranks against it."""
 
-from __future__ import annotations
-
 import os
 
 from dem.errors import InputError
@@ -31,19 +29,11 @@ def ranks() -> int:
     return max(1, int(given)) if given.isdecimal() else 1
 
 
-def most_ranks() -> int:
-    """Return the largest number of ranks with a core each, on this machine or the nodes of a batch job."""
-    given = os.environ.get("SLURM_NTASKS", "")
-    return max(usable_cores(), int(given) if given.isdecimal() else 0)
-
-
 def check_ranks(wanted: int) -> None:
-    """Reject a number of ranks above the number of cores.
-
-    Raises:
-        InputError: there are fewer cores than ranks, which wait for each other at every step.
-    """
-    most = most_ranks()
+    """Raise InputError if there are more ranks than cores, since ranks wait for each other at every step."""
+    # On this machine, or on the nodes of a batch job.
+    tasks = os.environ.get("SLURM_NTASKS", "")
+    most = max(usable_cores(), int(tasks) if tasks.isdecimal() else 0)
     if wanted > most:
         raise InputError(
             f"--ranks {wanted}: there are {most} core{'s' if most > 1 else ''} for this process, and each rank waits "

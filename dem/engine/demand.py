@@ -1,7 +1,5 @@
 """The part of a scene that engines use."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from enum import Enum, auto
 from typing import Protocol
@@ -35,49 +33,34 @@ class Demand(Protocol):
 
     @property
     def smarticle(self) -> Smarticle: ...
-
     @property
     def count(self) -> int: ...
-
     @property
     def hooks(self) -> Hooks | None: ...
-
     @property
     def contact(self) -> Contact: ...
-
     @property
     def motor(self) -> Motor: ...
-
     @property
     def gravity_m_per_s2(self) -> float: ...
-
     @property
     def fidelity(self) -> Fidelity: ...
-
     @property
     def recording(self) -> Recording: ...
-
     @property
     def particle(self) -> Particle: ...
-
     @property
     def cylinder(self) -> Cylinder: ...
-
     @property
     def channel(self) -> Channel | None: ...
-
     @property
     def torque_limit(self) -> float: ...
-
     @property
     def motor_strengths(self) -> Array | None: ...
-
     @property
     def actuates(self) -> bool: ...
-
     @property
     def pulled_by(self) -> Sequence[tuple[float, float]]: ...
-
     def calls_for(self, effect: EffectName) -> bool: ...
 
 

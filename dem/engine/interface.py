@@ -8,8 +8,6 @@ Heights, velocities and forces are in the laboratory frame. Engines sum some for
 two sums, divided by the number of steps in between, is a mean force that misses no impact.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -165,13 +163,7 @@ class Strings(Protocol):
         """Whether strings are tied to smarticles at present."""
 
     def tie(self, ties: Sequence[Tie], law: StringLaw, speeds: Sequence[float]) -> None:
-        """Tie taut strings to smarticles, with the far ends on the chain's axis.
-
-        Args:
-            ties: points at which strings are tied.
-            law: stiffness and damping of each string.
-            speeds: speeds at which the far ends move outwards along x [m/s].
-        """
+        """Tie taut strings; their far ends, on the chain's axis, move outwards along x at `speeds` [m/s]."""
 
     def untie(self) -> None:
         """Remove all strings."""
@@ -260,11 +252,7 @@ class Engine(Protocol):
         """Set the length of all further steps [s]."""
 
     def advance(self, steps: int) -> None:
-        """Advance by a number of steps; none if the number is not positive.
-
-        Raises:
-            RunError: the engine stopped before the last step.
-        """
+        """Advance by a number of steps, if positive; raise RunError if the engine stops before the last one."""
 
     # -- smarticles --------------------------------------------------------------------------------------------
 
@@ -279,11 +267,7 @@ class Engine(Protocol):
         """Set all velocities of welded smarticles to zero; the kinetic energy counts as dissipated."""
 
     def state(self) -> State:
-        """Return poses and velocities of all smarticles.
-
-        Raises:
-            RunError: a position or velocity is not finite.
-        """
+        """Return poses and velocities of all smarticles; raise RunError if one is not finite."""
 
     @property
     def impulse(self) -> float:
@@ -305,19 +289,12 @@ class Engine(Protocol):
         """Return the forces at all contacts, at present or in the last step, as one contact per pair of links."""
 
     def extremes(self, state: State) -> Extremes | None:
-        """Return extremes over all smarticles in the present state; None if a full check is needed.
-
-        Engines that cannot compute them faster than a full check always return None.
-        """
+        """Return extremes over all smarticles at present; None if a full check is needed or no slower."""
 
     # -- checkpoints -------------------------------------------------------------------------------------------
 
     def save(self, scratch: Path) -> Saved:
-        """Return the state for `load`; after loading, the simulation continues with identical bits.
-
-        Args:
-            scratch: folder for temporary files.
-        """
+        """Return the state, from which `load` continues with identical bits; temporary files are in `scratch`."""
 
     def load(self, saved: Saved, scratch: Path) -> None:
         """Replace the state by one that `save` returned for an engine of this scene; arguments as in `save`."""

@@ -1,7 +1,5 @@
 """List of the engines, with facts about them that are known without a simulation."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Protocol
 
@@ -26,21 +24,13 @@ class EngineKind(Protocol):
         """All names in `Adds.engines`, in the order in which a step runs them."""
 
     def version(self) -> str:
-        """Return the version of the software on which results depend.
-
-        Raises:
-            RunError: the engine is not installed.
-        """
+        """Return the version on which results depend; raise RunError if the engine is not installed."""
 
     def threads(self) -> int:
         """Return the number of threads, or ranks, of runs that this process starts."""
 
     def stable_step(self, scene: Demand, *, articulated: bool) -> float:
-        """Return the largest stable time step [s].
-
-        Args:
-            articulated: whether barbs can turn, or have turned before.
-        """
+        """Return the largest stable time step [s]; `articulated`: whether barbs can turn or have turned."""
 
     def seconds_per_second(self, scene: Demand, time_step: float, activity: Activity) -> float:
         """Return an estimate of the wall time per simulated time [1] on one core, with a time step [s]."""
@@ -50,11 +40,7 @@ class EngineKind(Protocol):
 
 
 def engine_kind(name: str) -> EngineKind:
-    """Return the facts about an engine, by its name in scenes.
-
-    Raises:
-        InputError: there is no engine of that name.
-    """
+    """Return the facts about an engine by its name in scenes; raise InputError for an unknown name."""
     # Imported only when used, since each engine needs software of its own.
     if name == "yade":
         from dem.engine.yade.kind import YadeKind  # noqa: PLC0415

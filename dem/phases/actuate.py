@@ -1,7 +1,5 @@
 """The phases that move barbs: by given motions, or by one of the paper's two gaits."""
 
-from __future__ import annotations
-
 import math
 from typing import Annotated, Any, Literal, Self
 

@@ -68,7 +68,12 @@ class ActuatedPhase(Phase):
         if not any(before.actuates for before in scene.phases[:index]):
             yield from _of_barbs(scene, index)
             yield from _of_control(scene)
-        yield from _of_active(scene, index)
+        gait = _gait(scene, index)
+        if not gait.active_count(scene.count):
+            yield (
+                f"phases.{index}.active_fraction: {gait.active_fraction:g} of {scene.count} smarticles is none; "
+                f"use e.g. {_up(1 / scene.count)}"
+            )
         highest = yield from _of_motions(scene, index)
         # Halted motors lag behind the schedule, so that both barbs may be at their highest angles at one time.
         if scene.smarticle.tip_clearance(highest) < 0:
@@ -121,8 +126,6 @@ class ActuatedPhase(Phase):
 
 @dataclass(frozen=True, eq=False)
 class _Track:
-    """One motion of all barbs that follow it."""
-
     span: slice  #: The K entries of `Drive` that the motion sets
     course: Course  #: The motion from K starting angles
     shifts: Array  #: (1,) or (K,) time by which the motion is ahead at the beginning of the phase [s]
@@ -271,15 +274,6 @@ def _whole_fraction(whole: float, parts: int) -> str:
         if math.isclose(float(text) * more, whole, rel_tol=TOLERANCE):
             return text
     return repr(whole / parts)
-
-
-def _of_active(scene: SceneView, index: int) -> Iterator[str]:
-    gait = _gait(scene, index)
-    if not gait.active_count(scene.count):
-        yield (
-            f"phases.{index}.active_fraction: {gait.active_fraction:g} of {scene.count} smarticles is none; "
-            f"use e.g. {_up(1 / scene.count)}"
-        )
 
 
 def _of_motions(scene: SceneView, index: int) -> Generator[str, None, tuple[float, float]]:

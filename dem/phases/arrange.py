@@ -1,7 +1,5 @@
 """The phase that arranges smarticles as a chain in a plane."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from typing import ClassVar, Literal
 

@@ -1,7 +1,5 @@
 """The phase that pours smarticles, layer by layer."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator
 from typing import ClassVar, Literal
@@ -12,16 +10,7 @@ from pydantic import Field
 from dem.body.placement import place_layer
 from dem.engine.interface import Engine
 from dem.errors import RunError
-from dem.phases.phase import (
-    CHECK_INTERVAL,
-    SETTLE_SECONDS,
-    Memory,
-    Phase,
-    SceneView,
-    Settle,
-    Stage,
-    has_settled,
-)
+from dem.phases.phase import CHECK_INTERVAL, SETTLE_SECONDS, Memory, Phase, SceneView, Settle, Stage, has_settled
 from dem.setting.part import Part, Speed
 
 LAYER_TIMEOUT = 2.0  # s; the fall of a layer takes less than 0.1 s

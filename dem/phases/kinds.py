@@ -1,7 +1,5 @@
 """All kinds of phases; a new kind is added here."""
 
-from __future__ import annotations
-
 from typing import Annotated, get_args
 
 from pydantic import Field

@@ -1,8 +1,5 @@
 """Interface of phases, the stage that is a phase while it runs, and the criterion for a settled pile.
 
-A kind of phase has one file with its data (a validated part of the scene), checks, duration, effects and actions.
-`dem.phases.kinds` lists the kinds.
-
 `proceed` is called again whenever the time that it returned has passed; in between, the simulation advances and the
 recorder writes. The memory of a stage is plain data, so that a run can stop between any two steps and be resumed.
 """
@@ -76,11 +73,7 @@ class Phase:
         yield from ()
 
     def ready(self, scene: SceneView) -> None:
-        """Check before a run begins that the source of the phase's content is present and unchanged.
-
-        Raises:
-            InputError: one line with key, value and what to do.
-        """
+        """Raise InputError before a run if the source of the phase's content is missing or has changed."""
 
     @property
     def origin(self) -> Mapping[str, Any] | None:
@@ -148,24 +141,17 @@ class SceneView(Demand, Protocol):
 
     @property
     def container(self) -> Container: ...
-
     @property
     def plane(self) -> Plane | None: ...
-
     @property
     def phases(self) -> Sequence[Phase]: ...
-
     @property
     def smooth(self) -> bool: ...
-
     @property
     def sphere_diameter(self) -> float: ...
-
     def ample_height(self, hooks_top: float = 0.0) -> float: ...
-
     @property
     def loose_height(self) -> float: ...
-
     def seed_for(self, purpose: str) -> int: ...
 
 

@@ -1,7 +1,5 @@
 """The phase that pulls a hook out of the pile."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, Literal, Self
 

@@ -1,7 +1,5 @@
 """The phase in which a pile rests."""
 
-from __future__ import annotations
-
 from typing import ClassVar, Literal
 
 from pydantic import Field

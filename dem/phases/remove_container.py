@@ -1,7 +1,5 @@
 """The phase that takes the container away."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 from typing import ClassVar, Literal
 

@@ -1,7 +1,5 @@
 """The phase that shakes the container."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Literal
@@ -84,5 +82,4 @@ class Shake(Part, Phase):
 
 
 def _freed(scene: SceneView, index: int) -> bool:
-    """Return whether an earlier phase takes the container away."""
     return any(before.frees for before in scene.phases[:index])

@@ -1,7 +1,5 @@
 """The phase that pulls a chain apart."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 from typing import ClassVar, Literal
 

@@ -5,8 +5,6 @@ another engine, or at another fidelity, these poses may overlap: spheres of one 
 chain, smooth links do not. Such overlaps are relaxed first, with velocities set to zero every few steps.
 """
 
-from __future__ import annotations
-
 import hashlib
 import math
 import re
@@ -153,11 +151,7 @@ class TakeOver(Part, Phase):
 
     @cached_property
     def taken(self) -> Taken:
-        """The frame that is taken over.
-
-        Raises:
-            InputError: the frame is missing, or its content has changed since the scene was made.
-        """
+        """The frame that is taken over; InputError if it is missing or has changed since the scene was made."""
         taken = take(Path(self.run), self.frame)
         if taken.sha256 != self.sha256:
             raise InputError(
@@ -262,12 +256,7 @@ def _mean_height(engine: Engine) -> float:
 
 
 def poses_of(scene: SceneView, taken: Taken) -> Poses:
-    """Return the poses of a scene's smarticles in a frame of another run.
-
-    Raises:
-        InputError: the frame's smarticles differ from the scene's, or do not fit into its container; one line with
-            key, value and what to do.
-    """
+    """Return the poses of a scene's smarticles in a taken frame; raise InputError if they do not fit."""
     for mismatch in _mismatches(scene, taken):
         raise InputError(mismatch)
     return fitted_poses(scene.particle.boxes, taken.vertices)[0]

@@ -1,7 +1,5 @@
 """Laws of contacts and strings, and the damping that gives a coefficient of restitution."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """Motors at the hinges, velocity-controlled and with a torque limit: what a control update computes."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Literal, get_args
@@ -25,12 +23,7 @@ class MotorLaw:
     torque_limit: float  #: Τ_max [N m]
     speed_limit: float  #: ω, the greatest speed of a command [rad/s]
     stiffness: float  #: Twist stiffness of the shaft between motor and barb [N m/rad]
-    #: What a motor does when its torque reaches τ_max. "halt": it stops advancing against the torque, and holds with
-    #: any torque that this takes. "stall": it moves in neither direction until the torque has fallen, the rule of the
-    #: paper's text. "ease": it goes on at half the speed with any torque that this takes, and stops only when twenty
-    #: barbs in a row, barb 1 and barb 2 in turn, were found at τ_max, the rule of the paper's code. "slip": the shaft
-    #: is a spring whose torque is capped at τ_max. "servo": a spring and a damper, whose total torque is capped there.
-    law: Law
+    law: Law  #: What a motor does when its torque reaches τ_max, as `dem.setting.motor.Motor.law` describes it
     damping: float = 0.0  #: A servo's derivative gain [N m s/rad]
 
 
@@ -64,9 +57,8 @@ class Motors:
     """Two motors on each of N smarticles.
 
     A motor turns one end of its shaft to the command. The barb is at the other end, at the actual angle, and receives
-    the torque k (command - actual). Under the law "halt" a motor at its limit ignores only commands that would load the
-    shaft further. Under "stall" it ignores all commands; since the load of an elastic contact stays, it starts again
-    only after neighbours have moved.
+    the torque k (command - actual). Under the law "stall" the load of an elastic contact stays, so that a motor starts
+    again only after neighbours have moved.
 
     Args:
         angles: (N, 2) angles at the start [rad].
@@ -85,11 +77,9 @@ class Motors:
     def engage(self, angles: Array) -> None:
         """Start anew with commands at (N, 2) actual angles [rad], so that torques are 0."""
         self.commands: Array = angles.copy()  #: (N, 2) angles that the motors hold at present [rad]
-        self.schedule: Array = angles.copy()
-        """(N, 2) angles of the schedule at the last control update [rad]; `commands` of halted motors lag behind."""
+        self.schedule: Array = angles.copy()  #: (N, 2) angles of the schedule at the last control update [rad]
         self.angles: Array = angles.copy()  #: (N, 2) actual angles at the last control update [rad]
-        self.torques: Array = np.zeros_like(angles)
-        """(N, 2) torques on the barbs since the last control update [N m]; positive ones raise the angle."""
+        self.torques: Array = np.zeros_like(angles)  #: (N, 2) torques since that update [N m]; above 0: angles rise
         self.halted: Flags = np.zeros(angles.shape, dtype=bool)
         """(N, 2) whether a motor wanted to advance at the last control update and did not."""
         self._begun: Array = angles.copy()
@@ -141,8 +131,6 @@ class Motors:
         if self.law.law == "servo":
             torque = torque - self.law.damping * self._rates
         return torque if self.law.law not in ("slip", "servo") else np.clip(torque, -self._limit, self._limit)
-
-    # -- memory ------------------------------------------------------------------------------------------------
 
     def _kept(self) -> dict[str, str]:
         """Return the names of the attributes that `memory` holds, by its keys."""

@@ -1,7 +1,5 @@
 """Overlaps of contacts and extremes of a pile, which the watchdog checks."""
 
-from __future__ import annotations
-
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from itertools import combinations

@@ -5,12 +5,10 @@ measured processor times to planned wall times, by which the hours planned for a
 knob `engine` compare engines with one reference, rows of the knob `fidelity` the fidelities of one engine.
 """
 
-from __future__ import annotations
-
 import csv
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -21,8 +19,7 @@ from dem.scene.reading import parse_scene
 from dem.scene.scene import Scene
 from dem.setting.fidelity import FIDELITIES, fidelities
 
-SHIPPED = Path(__file__).with_name("work_precision.csv")
-"""Default table."""
+SHIPPED = Path(__file__).with_name("work_precision.csv")  #: Default table
 
 QUANTITIES = {"phi_0": "φ_0", "phi_f": "φ_f", "crossings": "⟨N⟩"}
 """Quantities with measured errors: symbols by the names in columns and in `--of`."""
@@ -191,19 +188,12 @@ class Choice:
     notes: tuple[str, ...]  #: Caveats
 
     def to_dict(self) -> dict[str, Any]:
-        """Return plain data for `--json`, with null for unknown numbers."""
-
-        def known(number: float) -> float | None:
-            return None if math.isnan(number) else number
-
+        """Return plain data for `--json`."""
         return {
             "engine": self.expected.engine,
             "fidelity": self.expected.fidelity,
             "expected_hours": self.expected.hours,
-            "errors": [
-                {"of": error.of, "value": known(error.value), "band": known(error.band)}
-                for error in self.expected.errors
-            ],
+            "errors": [asdict(error) for error in self.expected.errors],
             "seeds": self.expected.seeds,
             "why": self.why,
             "notes": list(self.notes),
@@ -258,13 +248,7 @@ def pick(expected: Sequence[Measured], *, max_error: float | None, max_hours: fl
 
     With a limit of the error it is the cheapest fidelity within the limit. With a limit of the hours alone it is the
     most exact fidelity within the limit: the reference, or else, among the finest ones of all engines, the one with the
-    least known error.
-
-    Args:
-        expected: fidelities with their hours, for each engine from coarse to fine.
-
-    Raises:
-        InputError: as in `choose`.
+    least known error. For each engine `expected` is ordered from coarse to fine.
     """
     quick = [one for one in expected if max_hours is None or one.hours <= max_hours]
     if max_error is None:

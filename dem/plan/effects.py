@@ -1,10 +1,4 @@
-"""Effects of a scene: which ones it needs, why, and what each adds to a run.
-
-`dem.plan.outlook` prints the effects, `dem.run` builds a run from them, and tests compare them with an engine's own
-lists and the files of runs.
-"""
-
-from __future__ import annotations
+"""Effects of a scene: which ones it needs, why, and what each adds to a run."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -13,41 +7,30 @@ from dem.engine.effect import Adds, EffectName
 from dem.engine.kinds import engine_kind
 from dem.phases.actuated import overshoot
 from dem.phases.arrange import chain_of
-from dem.record.columns import (
-    COLUMNS,
-    ENERGY_COLUMNS,
-    FIELDS,
-    FORCE_FIELDS,
-    HOOK_COLUMNS,
-    LEDGER_COLUMNS,
-    MOTOR_COLUMNS,
-    MOTOR_FIELDS,
-    RELEASE_COLUMNS,
-    STRAIN_COLUMNS,
-)
+from dem.record import columns
 from dem.scene.scene import Scene
 
 _NOTHING = Adds()
 
 ADDS: Mapping[EffectName, Adds] = {
-    EffectName.STRINGS: Adds(series=tuple(STRAIN_COLUMNS)),
-    EffectName.MOTORS: Adds(series=tuple(MOTOR_COLUMNS), arrays=tuple(MOTOR_FIELDS)),
-    EffectName.HOOKS: Adds(series=tuple(HOOK_COLUMNS)),
+    EffectName.STRINGS: Adds(series=tuple(columns.STRAIN_COLUMNS)),
+    EffectName.MOTORS: Adds(series=tuple(columns.MOTOR_COLUMNS), arrays=tuple(columns.MOTOR_FIELDS)),
+    EffectName.HOOKS: Adds(series=tuple(columns.HOOK_COLUMNS)),
     EffectName.WALL_REMOVAL: Adds(
-        series=tuple(RELEASE_COLUMNS), python="checks the pile's top every 10 ms while the wall is lifted"
+        series=tuple(columns.RELEASE_COLUMNS), python="checks the pile's top every 10 ms while the wall is lifted"
     ),
-    EffectName.ENERGIES: Adds(series=tuple(ENERGY_COLUMNS)),
-    EffectName.ENERGY_ACCOUNT: Adds(series=tuple(LEDGER_COLUMNS)),
+    EffectName.ENERGIES: Adds(series=tuple(columns.ENERGY_COLUMNS)),
+    EffectName.ENERGY_ACCOUNT: Adds(series=tuple(columns.LEDGER_COLUMNS)),
     EffectName.SERIES: Adds(
-        series=tuple(COLUMNS), files=("series.h5",), python="reads the state of all smarticles once per sample"
+        series=tuple(columns.COLUMNS), files=("series.h5",), python="reads the state of all smarticles once per sample"
     ),
     EffectName.FRAMES: Adds(
-        arrays=tuple(FIELDS),
+        arrays=tuple(columns.FIELDS),
         files=("frames.pvd", "frames"),
         python="reads all contacts and writes one file per frame",
     ),
     EffectName.CONTACT_FORCES: Adds(
-        arrays=tuple(FORCE_FIELDS),
+        arrays=tuple(columns.FORCE_FIELDS),
         files=("forces.pvd", "forces"),
         python="reads the forces of all contacts and writes one file per frame",
     ),
@@ -84,7 +67,6 @@ def called_for(scene: Scene) -> frozenset[EffectName]:
 
 
 def _reasons(scene: Scene) -> Mapping[EffectName, tuple[bool, str]]:
-    """Return whether a scene needs each effect, and why."""
     contact, plane, gravity = scene.contact, scene.plane, scene.gravity_m_per_s2
     recording = scene.recording
     by_phases: dict[EffectName, list[str]] = {}

@@ -1,7 +1,5 @@
 """Plan of a run: phases, effects with reasons, engines, time steps, cost, warnings."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any, Self
@@ -132,11 +130,7 @@ def _wall_time(wall: float) -> str:
 
 
 def plan(scene: Scene) -> Plan:
-    """Return the plan of a scene.
-
-    Raises:
-        InputError: as in `time_steps`.
-    """
+    """Return the plan of a scene."""
     kind = engine_kind(scene.engine)
     steps = time_steps(scene)
     particle = scene.particle

@@ -1,7 +1,5 @@
 """Time steps of phases, from the engine's stable step and the intervals that steps must divide."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 

@@ -1,14 +1,9 @@
 """Checkpoints: all that a run needs to be resumed, in one checksummed file; the previous one is kept.
 
 The engine's state is stored as bytes in the engine's own format, with the engine's name and version. The rest is plain
-data.
-
-On one thread a resumed run gives bitwise the results of a run that was never stopped, because the running simulation
-reloads each checkpoint that it writes: an engine may order bodies and contacts anew when it loads, and sums of forces
-depend on the order.
+data. The running simulation reloads each checkpoint that it writes, since an engine may order bodies and contacts anew
+when it loads.
 """
-
-from __future__ import annotations
 
 import io
 import json
@@ -27,8 +22,6 @@ from dem.record.files import whole
 from dem.record.names import CHECKPOINT, CHECKPOINT_BEFORE, CHECKPOINT_FORMAT
 
 _ENGINE, _STATE, _SERIES = "engine.bin", "state.json", "series.npz"
-# Checkpoints written before engines had names: the member of the only engine, and the key of its version.
-_YADE, _YADE_MEMBER = "yade", "engine.yade"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -43,11 +36,7 @@ class Checkpoint:
 
 
 def write_checkpoint(folder: Path, checkpoint: Checkpoint) -> None:
-    """Write a checkpoint into a run directory and flush it to the disk; the previous one is kept.
-
-    Raises:
-        RunError: the file cannot be written; older checkpoints stay.
-    """
+    """Write a checkpoint to the disk and keep the previous one; raise RunError if it cannot be written."""
     newest = folder / CHECKPOINT
     name, version = checkpoint.made_by
     head = {
@@ -73,11 +62,7 @@ def write_checkpoint(folder: Path, checkpoint: Checkpoint) -> None:
 
 
 def read_checkpoint(folder: Path, *, scene_sha256: str, made_by: tuple[str, str]) -> tuple[Checkpoint, str | None]:
-    """Read the newest undamaged checkpoint of a run directory.
-
-    Args:
-        scene_sha256: hash of the scene that the checkpoint must have.
-        made_by: name and version of the engine that the checkpoint must have.
+    """Read the newest undamaged checkpoint of a run directory, made by an engine (name, version).
 
     Returns:
         The checkpoint, and a warning if the newest one is damaged and the previous one was read.
@@ -121,10 +106,7 @@ def _read(path: Path) -> tuple[object, Checkpoint]:
         state = json.loads(archive.read(_STATE))
         with np.load(io.BytesIO(archive.read(_SERIES))) as columns:
             series = {name: columns[name] for name in columns.files}
-        if "made_by" in state:
-            engine, made_by = archive.read(_ENGINE), (state["made_by"]["engine"], state["made_by"]["version"])
-        else:
-            engine, made_by = archive.read(_YADE_MEMBER), (_YADE, str(state.get(_YADE)))
-    scene = str(state.get("scene_sha256"))
+        engine = archive.read(_ENGINE)
+    scene, made_by = str(state.get("scene_sha256")), (state["made_by"]["engine"], state["made_by"]["version"])
     checkpoint = Checkpoint(scene_sha256=scene, made_by=made_by, state=state, series=series, engine=engine)
     return state.get("format"), checkpoint

@@ -1,7 +1,5 @@
 """Recorded quantities with units and descriptions, in `series.h5` and the cell data of VTK files."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import NamedTuple
 

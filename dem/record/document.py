@@ -1,22 +1,12 @@
 """JSON files of a run directory: `run.json`, `done.json`, `failed.json` and `progress.json`."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
+from contextlib import suppress
 from pathlib import Path
 from typing import Any, ClassVar, Literal, Self
 
-from pydantic import (
-    BaseModel,
-    ConfigDict,
-    Field,
-    NonNegativeFloat,
-    NonNegativeInt,
-    PositiveFloat,
-    PositiveInt,
-    ValidationError,
-    model_validator,
-)
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+from pydantic.types import NonNegativeFloat, NonNegativeInt, PositiveFloat, PositiveInt
 
 from dem.errors import RunError, shown
 from dem.record.files import cannot_read, write_text
@@ -33,11 +23,7 @@ class Document(BaseModel):
 
     @classmethod
     def read(cls, path: Path) -> Self:
-        """Return the content of a file.
-
-        Raises:
-            InputError: the file is missing, damaged, or lacks a key; one line with file, key and value.
-        """
+        """Return the content of a file; raise InputError if it is missing or damaged, or lacks a key."""
         try:
             return cls.model_validate_json(path.read_bytes())
         except OSError as error:
@@ -51,11 +37,7 @@ class Document(BaseModel):
             cannot_read("manifest", path, ": ".join([".".join(place), text] if place else [text]), cls.remedy)
 
     def write(self, path: Path, *, make_folder: bool = False) -> None:
-        """Write a file, without keys that are None, and make its folder if `make_folder`.
-
-        Raises:
-            RunError: the file cannot be written.
-        """
+        """Write a file, without keys that are None, and make its folder if `make_folder`."""
         write_text(path, self.model_dump_json(indent=2, exclude_none=True) + "\n", make_folder=make_folder)
 
 
@@ -168,17 +150,14 @@ class Failed(Document):
 
     def mark(self, out: Path) -> None:
         """Write `failed.json` into a run directory; errors are ignored, since the terminal has the cause too."""
-        try:
+        with suppress(RunError):
             self.write(out / FAILED)
-        except RunError:
-            return
 
 
 class Progress(Document):
     """Progress of a running run, `progress.json`, at most a second old."""
 
     phase: str | None = None
-    phase_index: int | None = None
     time_s: float | None = None
     end_s: float | None = None
     phi: float | None = None

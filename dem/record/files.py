@@ -1,7 +1,5 @@
 """Writing of files that appear complete or not at all, and the error about a file that cannot be read."""
 
-from __future__ import annotations
-
 import contextlib
 import os
 from collections.abc import Callable, Iterator
@@ -35,11 +33,7 @@ def whole(path: Path, *, before: Path | None = None, shared: bool = False) -> It
 
 
 def write_whole(path: Path, write: Callable[[Path], object], *, make_folder: bool = True) -> None:
-    """Write or replace a file, complete or not at all.
-
-    Args:
-        write: function that writes the content to a temporary path.
-        make_folder: whether to make the folder of the file.
+    """Write or replace a file by a function of a temporary path, complete or not at all.
 
     Raises:
         RunError: the disk is full or the folder cannot be written; an existing file is unchanged.
@@ -67,13 +61,7 @@ def write_text(path: Path, text: str, *, make_folder: bool = True) -> None:
 
 
 def cannot_read(what: str, path: Path, cause: BaseException | str, remedy: str) -> NoReturn:
-    """Raise InputError about a file that is missing, truncated or wrong.
-
-    Args:
-        what: kind of the file, e.g. "frame".
-        cause: an error, or the cause in words.
-        remedy: what to do.
-    """
+    """Raise InputError about a file that is missing, truncated or wrong."""
     if isinstance(cause, BaseException):
         lines = str(cause).strip().splitlines()
         named = ": ".join([type(cause).__name__, *lines[:1]])

@@ -1,7 +1,5 @@
 """Forces at contacts at one time: a VTK file of lines, one per contact; see docs/reference/files.md."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -30,7 +28,6 @@ def force_mesh(found: ContactForces, positions: Array, *, time: float, phase: in
 
     Args:
         positions: (N, 3) centres of mass of the smarticles [m].
-        time: simulated time [s].
     """
     number, between = len(found.forces), found.boundaries == NONE
     ends = np.empty((number, 2, 3))
@@ -75,11 +72,7 @@ def has_forces(directory: Path) -> bool:
 
 
 def read_forces(frame: Frame) -> RecordedForces:
-    """Return the forces at contacts that were recorded together with a frame of a run.
-
-    Raises:
-        InputError: the run recorded no forces, or the file is damaged.
-    """
+    """Return the forces recorded together with a frame; raise InputError if they are missing or damaged."""
     path = frame.path.parent.parent / member(FORCE, int(frame.path.stem.rpartition("_")[2]))
     points, data = _content(path)
     number = len(points) // 2

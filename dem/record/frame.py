@@ -1,9 +1,4 @@
-"""Frames: VTK files of the centrelines, or of the spheres, of all smarticles at one time.
-
-docs/reference/files.md describes the format.
-"""
-
-from __future__ import annotations
+"""Frames: VTK files of centrelines, or of spheres, at one time; see docs/reference/files.md."""
 
 import contextlib
 import io
@@ -145,11 +140,7 @@ class Frame:
 
 
 def read_frame(path: Path | str) -> Frame:
-    """Return the content of a frame file, a `.vtu` as described in docs/reference/files.md.
-
-    Raises:
-        InputError: the file is missing or damaged, or lacks cell data of frames.
-    """
+    """Return the content of a frame file, `.vtu`; raise InputError if it is missing or damaged."""
     path = Path(path)
     mesh = read_mesh(path)
 
@@ -209,15 +200,7 @@ def read_frame(path: Path | str) -> Frame:
 
 
 def read_mesh(path: Path, what: str = "frame", remedy: str | None = None) -> Any:
-    """Return the mesh of a VTK file.
-
-    Args:
-        what: kind of the file in messages.
-        remedy: what to do about a damaged file; None: advice for frames.
-
-    Raises:
-        InputError: the file is missing, truncated or not VTK.
-    """
+    """Return the mesh of a VTK file; raise InputError with `remedy`, what to do (None: advice for frames)."""
     # `meshio.read` prints and exits on damaged files. The reader of the format raises any exception, or prints a
     # warning and continues, which the callers' checks of shapes find.
     noise = io.StringIO()

@@ -32,11 +32,7 @@ class FrameWriter:
     times: list[float] = field(default_factory=list)  #: Times of the frames written so far [s]
 
     def write(self, mesh: meshio.Mesh, time: float) -> None:
-        """Write one frame at a simulated time [s].
-
-        Raises:
-            RunError: the file cannot be written.
-        """
+        """Write one frame at a simulated time [s]."""
         name = names.member(self.noun, len(self.times))
         write_whole(self.folder / name, lambda path: mesh.write(path, file_format="vtu"))
         self.times.append(time)
@@ -82,21 +78,15 @@ class FrameSequence(Sequence[Frame]):
 
     @overload
     def __getitem__(self, index: int) -> Frame: ...
-
     @overload
     def __getitem__(self, index: slice) -> FrameSequence: ...
-
     def __getitem__(self, index: int | slice) -> Frame | FrameSequence:
         if isinstance(index, slice):
             return FrameSequence(self.times[index], self.paths[index])
         return read_frame(self.paths[index])
 
     def nearest(self, time: float) -> int:
-        """Return the index of the frame nearest to a time [s].
-
-        Raises:
-            InputError: the time is before the first or after the last frame.
-        """
+        """Return the index of the frame nearest to a time [s]; raise InputError outside of the frames' times."""
         first, last = float(self.times[0]), float(self.times[-1])
         slack = 1e-9 * max(abs(first), abs(last), 1.0)
         if not first - slack <= time <= last + slack:
@@ -116,17 +106,7 @@ class FrameSequence(Sequence[Frame]):
 
 
 def read_frames(directory: Path | str) -> FrameSequence:
-    """Return the frames of a run directory, whose run may be done, failed or still running.
-
-    Raises:
-        InputError: `frames.pvd` is missing, damaged or not in time order.
-
-    Example:
-        >>> for frame in read_frames("runs/pile")[-2:]:
-        ...     print(frame.phase, frame.vertices.shape)
-        3 (12, 4, 3)
-        3 (12, 4, 3)
-    """
+    """Return the frames of a run directory, whose run may be done, failed or still running."""
     path = Path(directory) / names.collection(names.FRAME)
     times, files = [], []
     cause: BaseException | str | None = None

@@ -1,7 +1,5 @@
 """File names of a run directory and numbers of formats, as docs/reference/files.md describes them."""
 
-from __future__ import annotations
-
 SCENE = "scene.yaml"
 MANIFEST = "run.json"
 OF_SWEEP = "sweep.json"  # the manifest of a sweep, which holds run directories; written by `templates.sweep`

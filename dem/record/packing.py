@@ -1,7 +1,5 @@
 """Packing fraction by the paper's definition, up to the second-highest centre of mass."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np
@@ -18,7 +16,6 @@ def filled(count: int, *, solid_volume: float, radius: float, height: float) -> 
     """Return the packing fraction N V_s / (π r² z) [1] of N = `count` smarticles in a cylinder.
 
     Args:
-        count: N.
         solid_volume: volume V_s of one smarticle [m³].
         radius: radius r of the container [m].
         height: height z of the pile [m].

@@ -1,7 +1,5 @@
 """Progress of a running simulation, in `progress.json` and in one line on the terminal."""
 
-from __future__ import annotations
-
 import math
 import sys
 from dataclasses import dataclass, field
@@ -31,7 +29,7 @@ class ProgressWriter:
     def __post_init__(self) -> None:
         self._begun = monotonic()
 
-    def begin(self, *, index: int, phase: str, start: float, time: float, end: float | None) -> None:
+    def begin(self, *, phase: str, start: float, time: float, end: float | None) -> None:
         """Begin or resume a phase.
 
         Args:
@@ -39,7 +37,7 @@ class ProgressWriter:
             time: present simulated time [s].
             end: simulated time at which the phase will end [s]; None: unknown.
         """
-        self._progress = self._progress.model_copy(update={"phase": phase, "phase_index": index, "end_s": end})
+        self._progress = self._progress.model_copy(update={"phase": phase, "end_s": end})
         self._start = start
         self._resumed = (monotonic(), time)
         self._last = -math.inf

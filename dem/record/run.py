@@ -38,7 +38,10 @@ class Status:
 
 @dataclass(frozen=True)
 class Run:
-    """A run directory, finished or not; each part is read once, at the first access."""
+    """A run directory, finished or not; each part is read once, at the first access.
+
+    Access to a part raises InputError if its file is missing, damaged or of another format.
+    """
 
     path: Path
 
@@ -50,22 +53,14 @@ class Run:
 
     @cached_property
     def manifest(self) -> Manifest:
-        """The manifest, `run.json`: how the run was made, and numbers of its scene.
-
-        Raises:
-            InputError: the directory or its `run.json` is missing, damaged or of another format.
-        """
+        """The manifest, `run.json`: how the run was made, and numbers of its scene."""
         if not (self.path / MANIFEST).is_file():
             _reject_place(self.path)
         return Manifest.read(self.path / MANIFEST)
 
     @cached_property
     def scene(self) -> SceneData:
-        """The resolved scene, `scene.yaml`, as a mapping in which all defaults are filled in.
-
-        Raises:
-            InputError: `scene.yaml` is missing or damaged.
-        """
+        """The resolved scene, `scene.yaml`, as a mapping in which all defaults are filled in."""
         path = self.path / SCENE
         try:
             content = yaml.load(path.read_text(encoding="utf-8"), yaml.CSafeLoader)
@@ -77,11 +72,7 @@ class Run:
 
     @cached_property
     def phases(self) -> tuple[Phase, ...]:
-        """The phases in order; if the run is done, with their times and cost.
-
-        Raises:
-            InputError: `run.json` and `done.json` are not of one run.
-        """
+        """The phases in order; if the run is done, with their times and cost."""
         planned = self.manifest.phases
         if not (self.path / DONE).exists():
             return planned
@@ -94,11 +85,7 @@ class Run:
 
     @cached_property
     def frames(self) -> FrameSequence:
-        """The recorded frames in time order, each read when it is asked for.
-
-        Raises:
-            InputError: the run has written no frame yet, or their list is damaged.
-        """
+        """The recorded frames in time order, each read when it is asked for."""
         return read_frames(self.path)
 
     @property
@@ -108,11 +95,7 @@ class Run:
 
     @cached_property
     def series(self) -> Series:
-        """The recorded time series as arrays.
-
-        Raises:
-            InputError: the run has written no series yet, or the file is damaged.
-        """
+        """The recorded time series as arrays."""
         return read_series(self.path)
 
     @cached_property
@@ -122,11 +105,7 @@ class Run:
 
     @property
     def status(self) -> Status:
-        """The present state and progress of the run.
-
-        Raises:
-            InputError: `done.json` or `failed.json` is damaged.
-        """
+        """The present state and progress of the run."""
         if not self.path.is_dir() or not any(self.path.iterdir()):
             return Status(state="missing")
         # A resumed run may have left an older failed.json behind.
@@ -134,13 +113,8 @@ class Run:
             done = Done.read(self.path / DONE)
             return Status(state="done", time_s=done.time_s, steps=done.steps, wall_s=done.wall_s, cpu_s=done.cpu_s)
         progress = self.progress
-        status = Status(
-            state="running",
-            phase=progress.phase,
-            time_s=progress.time_s,
-            wall_s=progress.wall_s,
-            checkpoint_s=progress.checkpoint_s,
-        )
+        known = progress.model_dump(include={"phase", "time_s", "wall_s", "checkpoint_s"})
+        status = Status(state="running", **known)
         if not (self.path / FAILED).exists():
             return status if in_use(self.path) else replace(status, state="stopped")
         failed = Failed.read(self.path / FAILED)
@@ -219,11 +193,7 @@ def _reject_place(path: Path) -> NoReturn:
 
 
 def open_run(path: Path | str) -> Run:
-    """Return a run directory as a `Run`, after reading its manifest.
-
-    Raises:
-        InputError: the path is no run directory.
-    """
+    """Return a run directory as a `Run`, after reading its manifest; raise InputError if it is none."""
     run = Run(Path(path))
     _ = run.manifest
     return run

@@ -1,7 +1,5 @@
 """The lock and the log of a run directory: one process at a time writes into it."""
 
-from __future__ import annotations
-
 import fcntl
 import logging
 import os
@@ -47,7 +45,6 @@ def claimed(out: Path, *, resume: bool) -> Iterator[None]:
 
 
 def _check_content(out: Path, *, resume: bool) -> None:
-    """Make the directory if needed, and reject wrong content."""
     try:
         out.mkdir(parents=True, exist_ok=True)
         held = sorted(path.name for path in out.iterdir() if path.name != LOCK and not is_partial(path.name))

@@ -66,11 +66,7 @@ class SeriesWriter:
             self.write()
 
     def write(self) -> None:
-        """Rewrite the file with all rows.
-
-        Raises:
-            RunError: the file cannot be written.
-        """
+        """Rewrite the file with all rows."""
         write_whole(self.folder / names.SERIES, self._write, make_folder=False)
         self._written = time.monotonic()
 
@@ -103,11 +99,7 @@ class Series:
     seed: int
 
     def __getitem__(self, name: str) -> NDArray[Any]:
-        """Return the array of one quantity.
-
-        Raises:
-            InputError: the series has no quantity of that name.
-        """
+        """Return the array of one quantity; raise InputError if the series has none of that name."""
         try:
             return self.data[name]
         except KeyError:
@@ -138,16 +130,7 @@ class Series:
 
 
 def read_series(directory: Path | str) -> Series:
-    """Return the time series of a run directory, whose run may be done, failed or still running.
-
-    Raises:
-        InputError: the file is missing or damaged, or lacks an attribute or dataset.
-
-    Example:
-        >>> series = read_series("runs/pile")
-        >>> series["com_height_m"].shape == series.time.shape, series.units["com_height_m"]
-        (True, 'm')
-    """
+    """Return the time series of a run directory, whose run may be done, failed or still running."""
     path = Path(directory) / names.SERIES
     if not path.is_file():
         cannot_read("series", path, "no such file", _REMEDY)

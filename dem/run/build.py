@@ -1,7 +1,5 @@
 """Functions that make the parts of a run from its scene: engine, recorder, watchdog."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """Writing of a run's files while time advances, and checks by the watchdog."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -45,11 +43,7 @@ class Recorder:
     next_step: int = 0  #: Step of the next sample
 
     def record(self, engine: Engine, phase: int) -> None:
-        """Take a sample at the present step, and write frames and check the state if they are due.
-
-        Raises:
-            RunError: the watchdog stopped the run, or a file cannot be written.
-        """
+        """Take a sample at the present step, and write frames and check the state if they are due."""
         state = engine.state()
         row = self.sampler.sample(engine, state, phase)
         self.series.add(row)
@@ -89,11 +83,7 @@ class Recorder:
         self.next_step = engine.steps + max(1, round((self.samples * self.interval - engine.time) / engine.time_step))
 
     def watch(self, engine: Engine, state: State | None = None) -> None:
-        """Let the watchdog check the state, overlaps and energy.
-
-        Raises:
-            RunError: a limit is exceeded.
-        """
+        """Let the watchdog check the state, overlaps and energy; it raises RunError beyond a limit."""
         state, time, watchdog = state or engine.state(), engine.time, self.watchdog
         floor, raised, extremes = engine.boundaries.floor, engine.boundaries.raised, engine.extremes(state)
         if extremes is not None and watchdog.within_limits(extremes, floor=floor, raised=raised):

@@ -1,7 +1,5 @@
 """Simulation of one scene into a run directory, and the manifest of the run."""
 
-from __future__ import annotations
-
 import contextlib
 import logging
 import os
@@ -39,8 +37,6 @@ def run_scene(
 
     Args:
         out: the run directory; it must not exist, or be empty, or with `resume` hold an unfinished run of this scene.
-        command: the command line, for the manifest.
-        progress: whether to show progress on the terminal.
         resume: whether to continue from the newest undamaged checkpoint, or from the start if none was written.
         builders: functions that make the parts of the run; None: the default ones.
 
@@ -109,7 +105,6 @@ def _check_ready(scene: Scene) -> None:
 
 
 def _check_scene(scene: Scene, out: Path) -> None:
-    """Reject a run directory that was made from another scene."""
     recorded_hash = Run(out).manifest.scene_sha256
     if recorded_hash == scene_hash(scene):
         return
@@ -179,7 +174,6 @@ def manifest(
     Args:
         steps: time step of each phase [s].
         made_by: name and version of the engine.
-        threads: threads, or ranks, of the engine.
     """
     particle, boxes, origin = scene.particle, scene.smarticle.boxes, scene.phases[0].origin
     if origin is not None:  # a relative path stays right if both runs are moved together

@@ -1,7 +1,5 @@
 """Rows of the series, computed from the engine at each sample."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Set
 from dataclasses import dataclass, field

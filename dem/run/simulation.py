@@ -1,7 +1,5 @@
 """The loop of a run: phases in order, steps from one recording to the next, and checkpoints."""
 
-from __future__ import annotations
-
 import logging
 import shutil
 import signal
@@ -52,12 +50,7 @@ class Simulation:
     _stop_requested: bool = False
 
     def run(self) -> tuple[Phase, ...]:
-        """Run from the present state to the end of the last phase; return the phases with their times.
-
-        Raises:
-            RunError: a phase failed.
-            StopRequestedError: SIGUSR1 came; the run can be resumed from its last checkpoint.
-        """
+        """Run from the present state to the end of the last phase; return the phases with their times."""
         before = signal.signal(signal.SIGUSR1, self._request_stop)
         try:
             if not self.engine.steps:
@@ -87,7 +80,6 @@ class Simulation:
         entry = self._performed[-1]
         duration = phase.known_duration
         self.recorder.progress.begin(
-            index=self._phase,
             phase=phase.type,
             start=entry["start_s"],
             time=self.engine.time,
@@ -113,7 +105,6 @@ class Simulation:
         self.recorder.progress.warn(message)
 
     def _advance(self) -> None:
-        """Advance to the target step, recording what is due on the way."""
         engine, recorder, recording = self.engine, self.recorder, self.scene.recording
         while engine.steps < self._target:
             engine.advance(min(self._target, recorder.next_step) - engine.steps)

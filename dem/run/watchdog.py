@@ -1,7 +1,5 @@
 """Checks that stop a run whose result would have no meaning."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 
@@ -20,7 +18,10 @@ BOTH_HOOKS = ("the lower hook", "the upper hook")
 
 @dataclass(kw_only=True)
 class Watchdog:
-    """Limits that no smarticle may exceed."""
+    """Limits that no smarticle may exceed.
+
+    Checks take the simulated time [s], and raise RunError beyond a limit with cause, smarticles, time and what to do.
+    """
 
     #: The container. A smarticle has escaped if a sphere's centre or a link's axis is beyond the wall or under the
     #: floor, or if its centre of mass is above the wall
@@ -58,16 +59,11 @@ class Watchdog:
         """Check speeds, hinges and positions of all smarticles.
 
         Args:
-            state: poses and velocities of the smarticles.
             floor: height of the floor [m].
-            time: simulated time [s].
             points: (N, P, 3) centres of the spheres, or points of the links' axes [m]; None: centres of mass. They are
                 needed beside overlaps, which YADE underestimates where a centre is beyond wall or floor.
             raised: distance by which a hook may have raised smarticles [m]; None: nothing encloses them.
             gaps: (N, 2) distances between the links of each hinge [m]; None while welded.
-
-        Raises:
-            RunError: a limit is exceeded; the message names cause, smarticles, time and what to do.
         """
         positions = state.positions
         speeds = _speeds(state)
@@ -107,11 +103,7 @@ class Watchdog:
         )
 
     def check_depths(self, overlaps: Overlaps, *, time: float) -> None:
-        """Check the overlaps of all contacts at a simulated time [s].
-
-        Raises:
-            RunError: a contact is deeper than `depth`.
-        """
+        """Check the overlaps of all contacts at a simulated time [s]; raise RunError beyond `depth`."""
         cause = (
             f"contacts more than {self.depth:.3g} m deep (deepest {overlaps.deepest:.3g} m), so that links pass "
             "through each other or through the container"
@@ -145,10 +137,6 @@ class Watchdog:
             energy: kinetic and potential energy, less all energy added and all work done since the start [J]; NaN if
                 the work is unknown at present, which removes the ceiling.
             elastic: upper bound of the elastic energy of contacts and hinges [J].
-            time: simulated time [s].
-
-        Raises:
-            RunError: the energy is above the ceiling by more than the limit `energy`.
         """
         if math.isnan(energy):
             self._ceiling = math.inf
@@ -171,10 +159,6 @@ class Watchdog:
         Args:
             residual: energy added and work done, less all energy stored and dissipated [J].
             dissipated: energy dissipated by contacts, hinges and welding since the start [J].
-            time: simulated time [s].
-
-        Raises:
-            RunError: the residual exceeds the limit `missed`.
         """
         if not abs(residual) > WARNED_FRACTION * self.missed * dissipated > 0.0:
             return None

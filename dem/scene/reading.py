@@ -1,11 +1,9 @@
 """Reading scenes from files, changing them by `--set`, and writing, hashing and comparing them."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 import os
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
@@ -30,15 +28,11 @@ ADDED_KEYS: Mapping[str, Mapping[str, Any]] = MappingProxyType(
 
 
 def parse_scene(data: Any, *, source: str, folder: Path | None = None) -> Scene:
-    """Return the scene that plain data describe.
+    """Return the scene that plain data describe, or raise InputError in one line with file, key and value.
 
     Args:
-        data: keys and values of a scene, as read from YAML.
         source: name of the data in messages.
         folder: folder that paths of other runs are relative to; None: the working directory.
-
-    Raises:
-        InputError: one line with file, key, value and the way out.
     """
     if problem := _not_a_scene(data):
         raise InputError(f"{source}: {problem}")
@@ -174,21 +168,24 @@ def scene_hash(scene: Scene) -> str:
 
 def difference(there: Scene, here: Scene) -> str:
     """Return the first keys in which two scenes differ, as `seed 1 there, 2 here; count 9 there, 8 here`."""
-    one, other = (dict(_leaves(scene.model_dump(mode="json"))) for scene in (there, here))
+    one, other = (flattened(scene.model_dump(mode="json")) for scene in (there, here))
     pairs = [(key, one.get(key, "absent"), other.get(key, "absent")) for key in {**one, **other}]
     texts = [f"{key} {a} there, {b} here" for key, a, b in pairs if a != b]
     more = len(texts) - MOST_DIFFERENCES
     return "; ".join(texts[:MOST_DIFFERENCES]) + (f"; {more} more" if more > 0 else "")
 
 
-def _leaves(data: Any, place: str = "") -> Iterator[tuple[str, Any]]:
-    """Yield every value with its key, `phases.1.duration_s`."""
-    items = data.items() if isinstance(data, Mapping) else enumerate(data) if isinstance(data, list) else None
-    if items is None:
-        yield place, data
-        return
-    for key, value in items:
-        yield from _leaves(value, f"{place}.{key}" if place else str(key))
+def flattened(value: Any, place: str = "") -> dict[str, Any]:
+    """Return all leaves of nested mappings and lists, by keys with dots that begin with `place`."""
+    if isinstance(value, list) and any(isinstance(item, Mapping | list) for item in value):
+        value = {str(index): item for index, item in enumerate(value)}
+    if not isinstance(value, Mapping):
+        return {place: value}
+    return {
+        key: found
+        for name, item in value.items()
+        for key, found in flattened(item, f"{place}.{name}" if place else name).items()
+    }
 
 
 def json_schema() -> dict[str, Any]:

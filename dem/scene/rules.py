@@ -1,9 +1,4 @@
-"""Checks of a scene that involve several of its parts.
-
-Each limit follows from what engines can compute, or excludes runs without meaning.
-"""
-
-from __future__ import annotations
+"""Checks of several parts of a scene together: what engines can compute, and what has a meaning."""
 
 import math
 from collections.abc import Iterator

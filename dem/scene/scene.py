@@ -1,9 +1,4 @@
-"""The scene: validated, frozen description of one run.
-
-Its parts are in `dem.setting`, its phases in `dem.phases`; `dem.scene.rules` checks that they fit together.
-"""
-
-from __future__ import annotations
+"""The scene: parts of `dem.setting` and phases of `dem.phases` that fit together by `dem.scene.rules`."""
 
 import hashlib
 import math
@@ -148,14 +143,11 @@ class Scene(Part):
         )
 
     def ample_height(self, hooks_top: float = 0.0) -> float:
-        """Return a height of the wall [m] with room for the loosest pile, or for hooks, and a layer above.
+        """Return a height of the wall [m] for the loosest pile, or hooks up to `hooks_top` [m], and a layer.
 
         A loose random packing of thin bars has the packing fraction φ ≈ 2.4 d/L, with d the mean width of the section
         and L the length of all three links (Gravish's φ_0 at l/w = 0, 0.7 and 1.4). The loosest pile is assumed to have
         half this packing fraction.
-
-        Args:
-            hooks_top: height of the upper hook's top above the floor [m]; 0 without hooks.
         """
         # Smarticles may come to lie on a hook.
         pile = self._height_at(1.2)

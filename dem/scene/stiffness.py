@@ -9,8 +9,6 @@ Three loads are estimated:
 The overlap of an impact is inversely proportional to the root of the stiffness, other overlaps to the stiffness itself.
 """
 
-from __future__ import annotations
-
 import math
 from typing import NamedTuple
 

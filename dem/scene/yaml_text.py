@@ -1,7 +1,5 @@
 """Strict reader of YAML, for scenes, sweeps and templates."""
 
-from __future__ import annotations
-
 import re
 import sys
 from typing import Any
@@ -28,11 +26,7 @@ class StrictLoader(yaml.SafeLoader):  # type: ignore[misc]  # PyYAML ships no ty
     """SafeLoader that rejects a key given twice and reads `1e-3` as a number."""
 
     def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Any, Any]:
-        """Return the mapping of a node.
-
-        Raises:
-            yaml.constructor.ConstructorError: a key is given twice, or is neither text nor a number.
-        """
+        """Return a node's mapping; raise ConstructorError if a key is given twice, or is no text or number."""
         if isinstance(node, yaml.MappingNode):
             self.flatten_mapping(node)
             seen: set[Any] = set()
@@ -58,11 +52,7 @@ StrictLoader.add_implicit_resolver("tag:yaml.org,2002:int", _INT, list("-+012345
 
 
 def load_yaml(text: str, loader: type[StrictLoader] = StrictLoader) -> Any:
-    """Return the data of a YAML text.
-
-    Raises:
-        yaml.YAMLError: the text is not YAML; `parse_yaml` explains it to users.
-    """
+    """Return the data of a YAML text; raise yaml.YAMLError, which `parse_yaml` explains to users."""
     try:
         # The loader is a SafeLoader, which makes no Python objects.
         return yaml.load(text, Loader=loader)
@@ -77,11 +67,7 @@ def load_yaml(text: str, loader: type[StrictLoader] = StrictLoader) -> Any:
 
 
 def parse_yaml(text: str, source: str, loader: type[StrictLoader] = StrictLoader) -> Any:
-    """Return the data of a YAML text; `source` is the text's name in messages.
-
-    Raises:
-        InputError: the text is not YAML; the message names the line.
-    """
+    """Return the data of a YAML text; raise InputError with `source`, the text's name, and the line."""
     try:
         return load_yaml(text, loader)
     except yaml.MarkedYAMLError as error:

@@ -1,7 +1,5 @@
 """Contact parameters of a scene."""
 
-from __future__ import annotations
-
 from pydantic import Field
 
 from dem.setting.part import Part

@@ -1,7 +1,5 @@
 """The container: an upright cylinder with a floor, or several coaxial cylinders, narrower upwards."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from itertools import pairwise

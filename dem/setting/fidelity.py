@@ -1,7 +1,5 @@
 """Knobs, the numerical parameters that trade accuracy for cost, and named sets of their values."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any, Literal
 
@@ -85,9 +83,6 @@ _BY_ENGINE: Mapping[str, Mapping[str, Mapping[str, Any]]] = {
 def fidelities(engine: str) -> Mapping[str, Mapping[str, Any]]:
     """Return an engine's named fidelities, from coarse to fine: values of `Fidelity`'s keys by name.
 
-    A named fidelity has similar errors on all engines.
-
-    Args:
-        engine: a name as in `Scene.engine`; an unknown name gives the fidelities for YADE.
+    A named fidelity has similar errors on all engines. An unknown engine gets the fidelities for YADE.
     """
     return _BY_ENGINE.get(engine, FIDELITIES)

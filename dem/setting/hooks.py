@@ -61,13 +61,7 @@ def with_hook_defaults(hooks: Any, smarticle: Smarticle) -> Any:
 
 
 def with_defaults(data: Any, defaults: Mapping[str, tuple[int, int]], smarticle: Smarticle) -> Any:
-    """Return data with missing keys filled in.
-
-    Args:
-        data: a mapping; other data are returned unchanged.
-        defaults: (a, b) by key, for a default of a w + b t2.
-        smarticle: the smarticle with w and t2.
-    """
+    """Return a mapping with missing keys at their defaults, a w + b t2 for (a, b); other data as they are."""
     if not isinstance(data, Mapping):
         return data
     w, t2 = smarticle.middle_length_m, smarticle.thickness_in_plane_m

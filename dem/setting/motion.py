@@ -57,12 +57,7 @@ class BaseMotion(Part):
         return None
 
     def course(self, start: Array, home: Array) -> Course:
-        """Return the angles over time of a motion that begins at angles `start` [rad].
-
-        Args:
-            start: angles at the beginning of the motion [rad].
-            home: angles at the beginning of the phase, in the shape of `start` [rad].
-        """
+        """Return the angles over time [rad] of a motion that begins at `start`, in a phase begun at `home`."""
         raise NotImplementedError
 
     def legs(self, start: Array, home: Array, until: float) -> Iterator[Leg]:

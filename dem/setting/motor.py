@@ -1,7 +1,5 @@
 """Motor parameters of a scene."""
 
-from __future__ import annotations
-
 from typing import Literal, Self
 
 from pydantic import Field, model_validator
@@ -24,7 +22,7 @@ class Motor(Part):
         "halt",
         description="what a motor does at τ_max or above: halt: it stops advancing against the load and holds; stall: "
         "it moves in neither direction, the literal rule of the paper's text; ease: it goes on at half the speed, and "
-        "stops when 20 barbs in a row, both barbs of a smarticle in turn, were found there, the rule of the paper's "
+        "stops after 20 control updates in a row at τ_max, barb 1 and barb 2 counted in turn, the rule of the paper's "
         "own code; slip: it gives way like a spring whose torque is capped at τ_max; servo: proportional and "
         "derivative gain, with the total torque capped at τ_max",
     )

@@ -1,7 +1,5 @@
 """Base of the parts of a scene, and types of numbers that several parts use."""
 
-from __future__ import annotations
-
 import difflib
 from typing import Annotated, get_args
 

@@ -4,8 +4,6 @@ Robots lie flat on a table: they move along x and y and turn about z only. The t
 friction.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 from pydantic import Field

@@ -8,8 +8,6 @@ One difference is in no protocol: the code throws a layer down at 2 m/s every 15
 `thrown_at_m_per_s: 2`). Contacts of the named fidelities are too soft for such impacts; 4000 N/m are enough.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from types import MappingProxyType
 from typing import Any, Literal

@@ -1,7 +1,5 @@
 """What a run records, and how often."""
 
-from __future__ import annotations
-
 from pydantic import Field
 
 from dem.setting.part import Duration, Part

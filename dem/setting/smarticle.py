@@ -1,7 +1,5 @@
 """Geometry and material of one smarticle."""
 
-from __future__ import annotations
-
 import math
 from typing import Self
 

@@ -71,27 +71,18 @@ prints the progress.""",
 def run_accuracy(arguments: argparse.Namespace) -> int:
     """Print a ladder, compute its missing runs, and analyse the finished runs; return the exit status."""
     from dem.scene.reading import load_scene  # noqa: PLC0415
-    from studies.accuracy import (  # noqa: PLC0415
-        BASE,
-        affordable,
-        build_ladder,
-        default_seeds,
-        ladder_sweep,
-        parse_knobs,
-        parse_seeds,
-        study,
-    )
+    from studies import accuracy  # noqa: PLC0415
     from templates.sweep.expand import expand  # noqa: PLC0415
 
-    seeds = None if arguments.seeds is None else parse_seeds(arguments.seeds)
-    knobs = None if arguments.knobs is None else parse_knobs(arguments.knobs)
+    seeds = None if arguments.seeds is None else accuracy.parse_seeds(arguments.seeds)
+    knobs = None if arguments.knobs is None else accuracy.parse_knobs(arguments.knobs)
     scene = load_scene(arguments.scene, scene_settings(arguments))
-    ladder = build_ladder(scene, source=str(arguments.scene), knobs=knobs)
+    ladder = accuracy.build_ladder(scene, source=str(arguments.scene), knobs=knobs)
     expected_s = {setting: expected_wall_s(variant) for setting, variant in ladder.scenes.items()}
     if arguments.max_run_hours is not None:
-        ladder = affordable(ladder, expected_s, 3600 * arguments.max_run_hours)
-    seeds = seeds or default_seeds(scene)
-    sweep = ladder_sweep(scene, ladder, seeds)
+        ladder = accuracy.affordable(ladder, expected_s, 3600 * arguments.max_run_hours)
+    seeds = seeds or accuracy.default_seeds(scene)
+    sweep = accuracy.ladder_sweep(scene, ladder, seeds)
     points = expand(sweep)
     if not arguments.dry_run and arguments.out is None:
         raise InputError("accuracy: --out DIR is missing; give a directory, or --dry-run to only show the ladder")
@@ -106,9 +97,9 @@ def run_accuracy(arguments: argparse.Namespace) -> int:
     return compute_and_analyse(
         folder,
         arguments,
-        partial(study, ladder.rungs, {entry.name: entry.expected_s for entry in folder.entries}),
+        partial(accuracy.study, ladder.rungs, {entry.name: entry.expected_s for entry in folder.entries}),
         note=f"knobs {', '.join(ladder.knobs)} of {arguments.scene}{left_out}",
-        pictured={"setting": BASE},
+        pictured={"setting": accuracy.BASE},
     )
 
 

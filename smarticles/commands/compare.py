@@ -83,7 +83,6 @@ def compare_two(arguments: argparse.Namespace) -> int:
 
 
 def _bits(bits: Mapping[str, Any]) -> str:
-    """Return a result of `compare_bits` as text."""
     if bits["identical"]:
         return f"yes, {'all of the series' if bits['series'] else 'no series to compare'} and {bits['frames']} frames"
     parts = [] if bits["differs_at"] is None else [f"the series differ from t = {bits['differs_at']:g} s on"]
@@ -150,7 +149,6 @@ def compare(one: Path, other: Path) -> dict[str, Any]:
 
 
 def _kind(path: Path) -> str:
-    """Return whether a directory is a "run" or a "sweep"."""
     if (path / OF_SWEEP).is_file():
         return "sweep"
     if (path / MANIFEST).is_file():
@@ -160,7 +158,6 @@ def _kind(path: Path) -> str:
 
 
 def _made_by(run: Run) -> dict[str, Any]:
-    """Return engine, versions, threads and status of a run."""
     manifest = run.manifest
     return {"engine": manifest.engine, **manifest.versions, "threads": manifest.threads, "status": run.status.state}
 
@@ -203,21 +200,10 @@ def _versions(runs: Iterable[Run]) -> dict[str, Any]:
 
 def differences(one: Mapping[str, Any], other: Mapping[str, Any]) -> Differences:
     """Return the keys whose values differ, with dots for nested keys."""
-    first, second = _flat(one), _flat(other)
+    from dem.scene.reading import flattened  # noqa: PLC0415
+
+    first, second = flattened(one), flattened(other)
     return {key: (first.get(key), second.get(key)) for key in first | second if first.get(key) != second.get(key)}
-
-
-def _flat(value: Any, place: str = "") -> dict[str, Any]:
-    """Return all leaves of nested mappings and lists, by keys with dots that begin with `place`."""
-    if isinstance(value, list) and any(isinstance(item, Mapping | list) for item in value):
-        value = {str(index): item for index, item in enumerate(value)}
-    if not isinstance(value, Mapping):
-        return {place: value}
-    return {
-        key: found
-        for name, item in value.items()
-        for key, found in _flat(item, f"{place}.{name}" if place else name).items()
-    }
 
 
 def compare_bits(one: Run, other: Run) -> dict[str, Any]:

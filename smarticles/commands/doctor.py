@@ -3,8 +3,6 @@
 YADE, PyVista and the other packages are tested in separate processes, so that a crash does not end the command.
 """
 
-from __future__ import annotations
-
 import argparse
 import json
 import os

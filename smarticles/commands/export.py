@@ -1,7 +1,5 @@
 """Command `export`: write the bodies of a run for other programs, or a scene for LAMMPS."""
 
-from __future__ import annotations
-
 import argparse
 import sys
 from pathlib import Path
@@ -82,7 +80,6 @@ Fields of each box:
 
 
 def _export_scene(arguments: argparse.Namespace) -> int:
-    """Write the input deck of a scene for LAMMPS."""
     from dem.deck import DECK, write_deck  # noqa: PLC0415
     from smarticles.commands.run import read_scene  # noqa: PLC0415
 

@@ -1,7 +1,5 @@
 """Command `render`: draw a picture or a film of one run, or of several runs side by side."""
 
-from __future__ import annotations
-
 import argparse
 import math
 import sys

@@ -1,7 +1,5 @@
 """Command `report`: write one HTML page about a run, a sweep or a study."""
 
-from __future__ import annotations
-
 import argparse
 from pathlib import Path
 
@@ -37,11 +35,7 @@ and needs no network.""",
 
 
 def write_report(arguments: argparse.Namespace) -> int:
-    """Write the HTML page and print its name and size; return the exit status.
-
-    Raises:
-        InputError: wrong name of the output, unreadable table of errors, or an unknown kind of directory.
-    """
+    """Write the HTML page and print its name and size; return the exit status."""
     from postprocess.report.figures import whole_file  # noqa: PLC0415
 
     directory: Path = arguments.directory
@@ -68,7 +62,6 @@ def write_report(arguments: argparse.Namespace) -> int:
 
 
 def _page(directory: Path, accuracy: Path | None, jobs: int | None) -> str:
-    """Return the HTML page of a run, a sweep, a study, or the results of a study."""
     from dem.engine.cores import usable_cores  # noqa: PLC0415
     from smarticles.reporting.run import run_page  # noqa: PLC0415  (pandas, matplotlib, PyVista)
     from smarticles.reporting.sweep import PROVENANCE, results_page, sweep_page  # noqa: PLC0415

@@ -115,11 +115,7 @@ def resume_directory(arguments: argparse.Namespace) -> int:
 
 
 def read_scene(scene_file: Path, settings: Sequence[str]) -> Scene:
-    """Read a scene file, apply `KEY=VALUE` settings, and check the time steps.
-
-    Raises:
-        InputError: the scene or a time step is not valid; the message names the file.
-    """
+    """Read a scene file, apply `KEY=VALUE` settings, and check the time steps."""
     from dem.plan.steps import time_steps  # noqa: PLC0415
     from dem.scene.reading import load_scene  # noqa: PLC0415
 
@@ -134,7 +130,6 @@ def read_scene(scene_file: Path, settings: Sequence[str]) -> Scene:
 def _run(
     scene_file: Path, out: Path, arguments: argparse.Namespace, settings: Sequence[str] = (), *, resume: bool
 ) -> int:
-    """Compute or resume a scene in this process, print the outcome, and return the exit status."""
     scene = read_scene(scene_file, settings)
     _set_parallelism(scene, out, resume=resume, threads=arguments.threads, ranks=arguments.ranks)
     # Imported last: both import YADE, which takes seconds and needs the variables set above.

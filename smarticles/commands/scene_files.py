@@ -1,7 +1,5 @@
 """Commands `init` and `schema`: write a commented example scene; print the JSON schema of scenes."""
 
-from __future__ import annotations
-
 import argparse
 import json
 import shlex
@@ -43,11 +41,7 @@ the first line of the scene is `# yaml-language-server: $schema=scene.schema.jso
 
 
 def write_scene(arguments: argparse.Namespace) -> int:
-    """Write an example scene to a new file; return the exit status.
-
-    Raises:
-        InputError: the file exists, or its folder does not.
-    """
+    """Write an example scene to a new file; return the exit status."""
     output: Path = arguments.output
     try:
         # Mode "x" fails for existing files and links.

@@ -61,11 +61,7 @@ which `smarticles resume` continues.""",
 
 
 def show_status(arguments: argparse.Namespace) -> int:
-    """Print the states of the runs in a directory, once or repeatedly; return the exit status.
-
-    Raises:
-        InputError: options contradict each other, or the directory holds neither a run nor a sweep.
-    """
+    """Print the states of the runs in a directory, once or repeatedly; return the exit status."""
     directory: Path = arguments.directory
     if arguments.json and arguments.watch:
         raise InputError("--watch: cannot be combined with --json; leave it out with --json")
@@ -85,8 +81,6 @@ def show_status(arguments: argparse.Namespace) -> int:
 
 @dataclass(frozen=True)
 class _Status:
-    """States of all runs of a directory at one time."""
-
     name: str  #: Of the sweep, or of the run directory
     runs: Sequence[RunStatus]
     queue: dict[str, Any] | None = None  #: Jobs, error and task counts of Slurm's queue; None: never submitted

@@ -102,19 +102,11 @@ def compute_and_analyse(
     """Compute the missing runs of a sweep, unless --analyse is given, and analyse the finished runs.
 
     Args:
-        folder: directory of the sweep.
         arguments: parsed command line with --analyse and --jobs.
         load: returns the study that analyses the runs; called late, since it imports large libraries.
         note: how the runs differ from the full study.
         pictured: values of variables that select the run to draw.
         earlier: measured runs of an earlier analysis by name; these runs are not computed.
-
-    Returns:
-        The exit status, 0.
-
-    Raises:
-        InputError: no run is finished, and --analyse is given.
-        RunError: a run failed.
     """
     missing = folder.only([entry for entry in folder.entries if entry.name not in earlier])
     outcomes = [] if arguments.analyse else compute(missing, jobs=arguments.jobs, command=arguments.command_line)
@@ -160,11 +152,6 @@ def _earlier(results: Path, folder: Folder, study: Study) -> Mapping[str, Measur
 
 
 def _fidelity(name: str, file: Path, fidelity: str) -> dict[str, str]:
-    """Return the constant `fidelity` of a study as set by --fidelity.
-
-    Raises:
-        InputError: unknown fidelity, or the study does not allow another one.
-    """
     from dem.setting.fidelity import FIDELITIES  # noqa: PLC0415
     from templates.sweep.expand import expand  # noqa: PLC0415
     from templates.sweep.sweep_file import load_sweep, with_constants  # noqa: PLC0415

@@ -1,11 +1,10 @@
 """Command `view`: serve an interactive view of a run to the browser."""
 
-from __future__ import annotations
-
 import argparse
 import os
 import sys
 import webbrowser
+from contextlib import suppress
 
 from smarticles.command_line import Commands, add_options, reader
 
@@ -46,8 +45,6 @@ def view_run(arguments: argparse.Namespace) -> int:
         if has_display and not arguments.no_browser:
             webbrowser.open(address)
 
-    try:
+    with suppress(KeyboardInterrupt):
         serve(arguments.directory, port=arguments.port, opened=opened)
-    except KeyboardInterrupt:
-        return 0
     return 0

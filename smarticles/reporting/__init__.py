@@ -1,4 +1,1 @@
-"""HTML pages of runs, sweeps and studies for `smarticles report`.
-
-Modules: `page` renders HTML, `charts` draws figures, `run` and `sweep` choose the content.
-"""
+"""HTML pages of `smarticles report`: `page` renders, `charts` draws, `run` and `sweep` choose content."""

@@ -1,22 +1,17 @@
 """Charts of a report, as SVG pictures in data URLs."""
 
-from __future__ import annotations
-
 import io
 from collections.abc import Callable, Mapping, Sequence
 from itertools import cycle
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 
+from dem.arrays import Array
 from postprocess.report.figures import BLACK, BLUE, GREY, ORANGE, new_figure, style
 from smarticles.reporting.page import data_url
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
-
-    from dem.arrays import Array
 
 _BAND = "#f0f1f2"
 _MAX_POINTS = 400
@@ -51,8 +46,6 @@ def against_variable(variable: str, label: str, groups: Groups) -> str:
     """Draw means with error bars against a variable; return the chart as a data URL.
 
     Args:
-        variable: label of the horizontal axis.
-        label: label of the vertical axis, with unit.
         groups: x, means and standard errors of each curve; an error may be NaN.
     """
     values = [x for xs, _, _ in groups.values() for x in xs]
@@ -82,15 +75,7 @@ def against_variable(variable: str, label: str, groups: Groups) -> str:
 
 
 def thinned(times: Array, values: Array) -> tuple[Array, Array]:
-    """Reduce a curve to at most 400 points: the smallest and the largest value of each interval, without NaN.
-
-    Args:
-        times: (n,) [s].
-        values: (n,).
-
-    Returns:
-        Times and values, (m,) each.
-    """
+    """Reduce a curve (n,) to at most 400 points: the extremes of each interval, without NaN."""
     finite = np.isfinite(values)
     times, values = times[finite], values[finite]
     if len(times) <= _MAX_POINTS:
@@ -111,7 +96,6 @@ def _axes(x: str, y: str) -> tuple[Figure, Axes]:
 
 
 def _svg(figure: Figure) -> str:
-    """Return a figure as SVG in a data URL."""
     with io.BytesIO() as file:
         figure.savefig(file, format="svg", metadata={"Date": None})
         return data_url(file.getvalue(), "image/svg+xml")

@@ -1,7 +1,5 @@
 """HTML of a report: one file without scripts and without links to other files."""
 
-from __future__ import annotations
-
 import base64
 import re
 from collections.abc import Iterable, Sequence
@@ -38,11 +36,9 @@ def page(title: str, about: str, lead: Iterable[tuple[str, str]], sections: Iter
     """Return an HTML page.
 
     Args:
-        title: heading.
         about: kind of directory: "run", "sweep", "study" or "results of a study".
         lead: label and value of the most important facts.
         sections: titles and blocks; a section without blocks is left out.
-        source: directory that the page describes.
     """
     try:
         made = f"smarticles {version('smarticles')}"
@@ -79,9 +75,7 @@ def figure(caption: str, alt: str, picture: str, kind: str) -> Markup:
     """Return a picture with caption.
 
     Args:
-        caption: text below the picture.
         alt: description for readers who cannot see the picture.
-        picture: data URL of the picture.
         kind: "chart" (colours are inverted on a dark page), "card" (light background) or "card wide".
     """
     return Markup(_blocks.figure(caption, alt, picture, kind))
@@ -93,8 +87,6 @@ def turntable(caption: str, alt: str, views: Sequence[str]) -> Markup:
     The HTML is a group of radio buttons, one per view, so that the page needs no script.
 
     Args:
-        caption: text below the picture.
-        alt: description for readers who cannot see the picture.
         views: data URLs of pictures from equally spaced angles.
     """
     angles = [round(360 * number / len(views)) for number in range(len(views))]
@@ -107,11 +99,7 @@ def all_numbers(cells: Sequence[str]) -> bool:
 
 
 def embedded(path: Path) -> str:
-    """Return a picture file as a data URL.
-
-    Raises:
-        InputError: unknown suffix, or the file cannot be read.
-    """
+    """Return a picture file as a data URL; raise InputError for an unknown suffix or an unreadable file."""
     try:
         return data_url(path.read_bytes(), _MIMES[path.suffix])
     except (KeyError, OSError) as error:

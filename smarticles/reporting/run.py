@@ -1,7 +1,5 @@
 """Page of a run, and blocks that pages of runs and sweeps share."""
 
-from __future__ import annotations
-
 import io
 import re
 import shlex
@@ -9,8 +7,9 @@ import tempfile
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+import pandas as pd
 from markupsafe import Markup
 
 from dem.errors import InputError, RunError
@@ -21,6 +20,7 @@ from dem.record.columns import EVERY
 from dem.record.names import LOG, SCENE
 from dem.record.run import Run, open_run
 from dem.scene.reading import load_scene
+from dem.scene.scene import Scene
 from dem.setting.fidelity import fidelities
 from postprocess.measures.registry import shown_quantities
 from postprocess.statistics.points import format_with_error, marked
@@ -28,11 +28,6 @@ from smarticles.command_line import format_cell
 from smarticles.measuring import has_frames, measured
 from smarticles.reporting.charts import against_time
 from smarticles.reporting.page import data_url, embedded, figure, listing, page, table, turntable, words
-
-if TYPE_CHECKING:
-    import pandas as pd
-
-    from dem.scene.scene import Scene
 
 # Series drawn against time if recorded: column, unit conversion factor, unit, component of a vector.
 _CURVES = (
@@ -81,7 +76,6 @@ def run_page(directory: Path, accuracy: Path | None) -> str:
 
 
 def _ending(run: Run) -> list[Markup]:
-    """Return a warning if the run is not done."""
     if run.status.state == "done":
         return []
     ending = {"failed": "failed", "interrupted": "was interrupted"}.get(run.status.state, "has not finished")
@@ -104,7 +98,6 @@ def short_table(found: pd.DataFrame, named: Sequence[str], caption: str) -> Mark
     Args:
         found: table of `measured` or `grouped`.
         named: columns that identify a row.
-        caption: caption of the table.
     """
     present = found.columns[found.notna().any()]
     wanted = [(quantity.header, shown) for quantity, shown in shown_quantities() if quantity.header in present]
@@ -130,7 +123,6 @@ def picture_blocks(directory: Path, *, name: str = "", turn: bool = True) -> lis
     """Return pictures of the last frame of a run, or a note with the reason why there are none.
 
     Args:
-        directory: run directory.
         name: name of the run in captions; empty on the page of a single run.
         turn: add views from all sides.
     """
@@ -189,13 +181,7 @@ def _curves(run: Run) -> list[Markup]:
 
 
 def scene_blocks(directory: Path, scene: Scene | None, scene_error: str) -> list[Markup]:
-    """Return the planned phases, the warnings of the plan, and the scene file.
-
-    Args:
-        directory: folder that contains the scene file.
-        scene: the scene; None if it cannot be read.
-        scene_error: message if the scene cannot be read.
-    """
+    """Return planned phases, warnings and the scene file; without a scene `scene_error` and the file."""
     blocks = [words(scene_error, tone="warning")] if scene is None else []
     if scene is not None:
         planned = plan(scene)
@@ -232,7 +218,6 @@ def accuracy_blocks(scene: Scene | None, path: Path | None) -> list[Markup]:
     """Return the knobs of a scene's fidelity, and the measured errors of the named fidelities.
 
     Args:
-        scene: the scene; None if it cannot be read.
         path: table of measured errors by `smarticles accuracy`; None: the table that ships.
     """
     if scene is None:
@@ -276,11 +261,7 @@ def _percent(error: Error) -> str:
 
 
 def warning_blocks(directories: Mapping[str, Path]) -> list[Markup]:
-    """Return a table of the distinct warnings and errors in the logs of runs.
-
-    Args:
-        directories: run directories by name; the name is empty on the page of a single run.
-    """
+    """Return a table of the warnings and errors in the logs of runs; a single run has the name ""."""
     found: dict[str, Counter[str]] = {}
     for name, directory in directories.items():
         log = directory / LOG
@@ -305,7 +286,6 @@ def provenance_table(facts: Sequence[Sequence[Any]], versions: Mapping[str, str]
 
 
 def _repeat(run: Run) -> list[Markup]:
-    """Return the commands that repeat a run, and the versions that computed it."""
     manifest = run.manifest
     # Paths are relative to the parent folder, since a report may be sent to others.
     here, there = shlex.quote(run.path.name), shlex.quote(f"{run.path.name}-again")

@@ -1,20 +1,20 @@
 """Pages of sweeps, studies, and results of studies."""
 
-from __future__ import annotations
-
 import csv
 import json
 import shlex
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+import pandas as pd
 from markupsafe import Markup
 
 from dem.errors import InputError
 from dem.record.run import Run
 from dem.scene.reading import load_scene
+from dem.scene.scene import Scene
 from postprocess.measures.registry import shown_quantities
 from postprocess.statistics.points import marked
 from smarticles.command_line import format_cell
@@ -32,13 +32,8 @@ from smarticles.reporting.run import (
     warning_blocks,
 )
 from studies.registry import STUDIES
-from templates.sweep.folder import Folder, RunStatus
+from templates.sweep.folder import Folder
 from templates.sweep.sweep_file import SEED
-
-if TYPE_CHECKING:
-    import pandas as pd
-
-    from dem.scene.scene import Scene
 
 PROVENANCE = "provenance.json"  #: File in every folder of results
 
@@ -49,13 +44,7 @@ _MAX_STILLS, _MAX_CURVES, _MAX_CHARTS = 4, 5, 4
 
 
 def sweep_page(folder: Folder, accuracy: Path | None, *, jobs: int) -> str:
-    """Return the HTML page of a sweep or a study.
-
-    Args:
-        folder: directory of the sweep.
-        accuracy: table of measured errors; None: the table that ships.
-        jobs: number of processes that measure the runs.
-    """
+    """Return the HTML page of a sweep or a study; `accuracy`: table of measured errors (None: shipped)."""
     states = folder.status()
     study = folder.name.removesuffix("-quick")
     results = folder.path / "results"
@@ -65,7 +54,10 @@ def sweep_page(folder: Folder, accuracy: Path | None, *, jobs: int) -> str:
     first = next(iter(scenes), None)
     scene = scenes[first] if first else None
     scene_error = "This version cannot read the scenes of this sweep."
-    state = _unfinished(states)
+    rows = [[run.name, run.state, run.phase, run.time_s, run.cause] for run in states if run.state != "done"]
+    header = ["run", "state", "phase", "simulated [s]", "cause"]
+    state = [table(f"Runs that are not done: {len(rows)}", header, rows)] if rows else []
+    variables = [[name, ", ".join(map(format_cell, values)), str(len(values))] for name, values in varied.items()]
     if study in STUDIES and not analysed:
         quick = " --quick" if folder.name.endswith("-quick") else ""
         command = f"smarticles study {study}{quick} --out {shlex.quote(folder.path.resolve().name)} --analyse"
@@ -74,7 +66,7 @@ def sweep_page(folder: Folder, accuracy: Path | None, *, jobs: int) -> str:
         ("State", state),
         *(_result_sections(results) if analysed else _measured(folder, varied, jobs=jobs)),
         ("Final states", _pictures(folder)),
-        ("Variables", [table("Variables and constants", ["name", "values", "number of values"], _variables(varied))]),
+        ("Variables", [table("Variables and constants", ["name", "values", "number of values"], variables)]),
         (
             "Scene",
             [
@@ -104,17 +96,6 @@ def results_page(folder: Path) -> str:
     lead = [("study", study), ("runs used", used), ("missing", missing)]
     sections = (*_result_sections(folder), ("How to repeat it", _origin(folder)))
     return page(f"{study}: results", "results of a study", lead, sections, folder)
-
-
-def _unfinished(states: Sequence[RunStatus]) -> list[Markup]:
-    """Return a table of the runs that are not done."""
-    rows = [[run.name, run.state, run.phase, run.time_s, run.cause] for run in states if run.state != "done"]
-    header = ["run", "state", "phase", "simulated [s]", "cause"]
-    return [table(f"Runs that are not done: {len(rows)}", header, rows)] if rows else []
-
-
-def _variables(varied: Mapping[str, Sequence[Any]]) -> list[list[str]]:
-    return [[name, ", ".join(map(format_cell, values)), str(len(values))] for name, values in varied.items()]
 
 
 def _scenes(folder: Folder) -> dict[str, Scene]:
@@ -195,7 +176,6 @@ def _pictures(folder: Folder) -> list[Markup]:
 
 
 def _repeat(folder: Folder) -> list[Markup]:
-    """Return the commands that repeat a sweep, its versions, and the hashes of its scenes."""
     manifest = folder.manifest
     used: Counter[str] = Counter()
     for entry in folder.entries:
@@ -220,11 +200,6 @@ def _repeat(folder: Folder) -> list[Markup]:
 
 
 def _provenance(folder: Path) -> dict[str, Any]:
-    """Read the file that describes the origin of results.
-
-    Raises:
-        InputError: the file cannot be read.
-    """
     try:
         origin = json.loads((folder / PROVENANCE).read_text(encoding="utf-8"))
         if not isinstance(origin, dict):
@@ -259,7 +234,6 @@ def _result_sections(folder: Path) -> list[Section]:
 
 
 def _origin(folder: Path) -> list[Markup]:
-    """Return the references of results and the runs that they are computed from."""
     origin = _provenance(folder)
     header = ["name", "seed", "engine", "fidelity", "scene_sha256", "command"]
     rows = [[run.get(name) for name in header] for run in origin.get("runs", []) if isinstance(run, dict)]

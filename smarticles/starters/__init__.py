@@ -1,7 +1,5 @@
 """Commented example scenes, one file per kind, which `smarticles init` writes."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 from dem.errors import InputError, nearest
@@ -11,11 +9,7 @@ KINDS = ("shaken", "actuated", "hook", "melting", "casting", "collapse", "chain"
 
 
 def starter(kind: str) -> str:
-    """Return the YAML text of the example scene of a kind.
-
-    Raises:
-        InputError: unknown kind.
-    """
+    """Return the YAML text of the example scene of a kind; raise InputError for an unknown kind."""
     if kind not in KINDS:
         raise InputError(f"{kind!r} is no kind of scene; {nearest(kind, KINDS)}")
     return Path(__file__).with_name(f"{kind}.yaml").read_text(encoding="utf-8")

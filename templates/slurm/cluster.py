@@ -1,12 +1,10 @@
 """Read the description of a cluster from a file: partitions, limits, modules, container."""
 
-from __future__ import annotations
-
 import os
 import re
 import tomllib
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Literal, Self
 
 from pydantic import AfterValidator, Field, ValidationError, field_validator, model_validator
 
@@ -128,18 +126,14 @@ class Cluster(Strict):
     template: str | None = Field(default=None, description="Jinja2 file that extends slurm.sh.j2; beside this file")
 
     @model_validator(mode="after")
-    def _check(self) -> Cluster:
+    def _check(self) -> Self:
         if self.default_partition not in self.partitions:
             advice = nearest(self.default_partition, sorted(self.partitions))
             raise ValueError(f"default_partition: there is no {self.default_partition!r}; {advice}")
         return self
 
     def partition(self, name: str | None) -> tuple[str, Partition]:
-        """Return the name and the data of a partition; of the default partition if no name is given.
-
-        Raises:
-            InputError: The cluster has no partition of this name.
-        """
+        """Return name and data of a partition, None: the default one; raise InputError for an unknown name."""
         wanted = name or self.default_partition
         if wanted not in self.partitions:
             advice = nearest(wanted, sorted(self.partitions))
@@ -153,11 +147,7 @@ def shipped_clusters() -> list[str]:
 
 
 def load_cluster(reference: str) -> Cluster:
-    """Read the description of a cluster by its name in this package, or from a file that ends in .toml.
-
-    Raises:
-        InputError: An unknown name, an unreadable file, an unknown key, or an invalid value.
-    """
+    """Read a cluster by its name in this package, or from a file .toml; raise InputError if invalid."""
     own = reference.endswith(".toml")
     if not own and reference not in shipped_clusters():
         advice = nearest(reference, shipped_clusters())

@@ -1,7 +1,5 @@
 """Plan an array job of Slurm within the limits of a cluster, and render its job script."""
 
-from __future__ import annotations
-
 import math
 import os
 import re
@@ -66,11 +64,7 @@ class Request:
 
 
 def plan_request(expected_s: Sequence[float], cluster: Cluster, wishes: Wishes) -> Request:
-    """Return the request for runs with given expected wall times [s].
-
-    Raises:
-        InputError: The request exceeds a limit of the cluster.
-    """
+    """Return the request for runs of expected wall times [s]; raise InputError beyond a cluster's limits."""
     name, partition = cluster.partition(wishes.partition)
     where = f"partition {name} of {cluster.name}"
     memory, ranks = wishes.memory_mib or MEMORY_PER_RUN_MIB, wishes.ranks or 1
@@ -168,19 +162,11 @@ def job_name(sweep: str, token: str) -> str:
 def render_script(
     cluster: Cluster, request: Request, *, sweep: Path, number: str, name: str, count: int, command: Sequence[str]
 ) -> str:
-    """Return the text of the script of an array job.
+    """Return the text of the script of an array job; raise InputError if it cannot be rendered.
 
     Args:
-        cluster: The cluster.
-        request: The request.
-        sweep: Directory of the sweep.
         number: Name of the submission's folder in `jobs/`.
-        name: Name of the job.
-        count: Number of runs.
         command: Command that starts `smarticles`, as words.
-
-    Raises:
-        InputError: The template fails, or the path of the sweep cannot be written into a script.
     """
     folder = f"jobs/{number}"
     where = str(sweep.resolve())

@@ -80,11 +80,7 @@ class Draft:
 
 
 def submissions(folder: Path) -> list[Submission]:
-    """Return the submissions in a directory of a sweep, oldest first.
-
-    Raises:
-        InputError: A `job.json` is damaged.
-    """
+    """Return the submissions in a directory of a sweep, oldest first; raise InputError for a damaged one."""
     files = sorted(folder.glob(f"{JOBS}/*/{JOB}"))
     return [Submission.read(file).model_copy(update={"number": file.parent.name}) for file in files]
 
@@ -96,14 +92,8 @@ def draft(
 
     Args:
         path: Directory of the sweep, which may be absent.
-        name: Name of the sweep.
-        entries: Runs to submit.
         reference: Name of a cluster in this package, or a file that ends in .toml.
-        wishes: Options of the user.
         token: Text that makes the name of the job unique; random if not given.
-
-    Raises:
-        InputError: An unknown cluster, a request beyond its limits, or a script that cannot be rendered.
     """
     cluster = load_cluster(reference)
     request = plan_request([entry.expected_s for entry in entries], cluster, wishes)
@@ -176,7 +166,6 @@ def tasks_of_runs(found: Sequence[Submission]) -> dict[str, Task]:
 
     Raises:
         QueueError: Slurm's queue cannot be queried.
-        RunError: The answer of Slurm cannot be parsed.
     """
     by_name = {submission.job_name: submission for submission in found}
     order = {submission.job_name: place for place, submission in enumerate(found)}
@@ -212,11 +201,7 @@ def to_submit(folder: Folder, tasks: Mapping[str, Task]) -> list[Entry]:
 
 
 def reject_queued(folder: Folder) -> None:
-    """Check that no run of a sweep is in Slurm's queue.
-
-    Raises:
-        InputError: A run is in the queue, or the queue cannot be queried.
-    """
+    """Raise InputError if a run of a sweep is in Slurm's queue, or the queue cannot be queried."""
     found = submissions(folder.path)
     try:
         tasks = tasks_of_runs(found)
@@ -277,11 +262,7 @@ class Task:
 
 
 def require_sbatch() -> None:
-    """Check that Slurm's command sbatch is installed.
-
-    Raises:
-        InputError: There is no sbatch.
-    """
+    """Raise InputError if Slurm's command sbatch is not installed."""
     if shutil.which("sbatch") is None:
         raise InputError(
             "--submit slurm: there is no `sbatch` on this machine; submit on the cluster, "
@@ -290,11 +271,7 @@ def require_sbatch() -> None:
 
 
 def parse_job_id(answer: str, script: Path) -> int:
-    """Return the job number from the answer of `sbatch --parsable`: `12` or `12;cluster`.
-
-    Raises:
-        RunError: The answer has another form.
-    """
+    """Return the job number of an answer `12` or `12;cluster` of `sbatch --parsable`, or raise RunError."""
     lines = [line for line in answer.splitlines() if line.strip()]
     found = re.fullmatch(r"([1-9][0-9]*)(?:;\S+)?", lines[-1].strip()) if lines else None
     if found is None:
@@ -318,11 +295,7 @@ def _ask_queue(names: Sequence[str]) -> list[Task]:
 
 
 def parse_queue(answer: str) -> list[Task]:
-    """Return the tasks from squeue's lines `name|job|index|state|reason`.
-
-    Raises:
-        RunError: A line has another form, or an unknown state.
-    """
+    """Return the tasks of squeue's lines `name|job|index|state|reason`; raise RunError for other lines."""
     tasks = []
     for line in answer.splitlines():
         found = re.fullmatch(r"([^|]+)\|([0-9]+)\|([0-9]+)\|([A-Z_]+)\|(.*)", line.strip())

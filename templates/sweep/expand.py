@@ -1,7 +1,5 @@
 """Make the points of a sweep: named and validated scenes."""
 
-from __future__ import annotations
-
 import itertools
 import math
 import re
@@ -32,11 +30,7 @@ class Point:
 
 
 def expand(sweep: Sweep, *, max_points: int = MAX_POINTS) -> list[Point]:
-    """Make all points of a sweep, in the order of its file.
-
-    Raises:
-        InputError: More than `max_points` runs, an unknown name, two runs with one name or scene, an invalid scene.
-    """
+    """Make all points of a sweep, in the order of its file; raise InputError for invalid ones or too many."""
     # Counted before they are made, which could exhaust the memory.
     sources = _sources(sweep)
     repeats, again = sweep.content.repeats, sweep.content.again
@@ -74,11 +68,12 @@ def _check_count(sweep: Sweep, count: int, most: int) -> None:
 def _sources(sweep: Sweep) -> list[Sequence[Mapping[str, Value]]]:
     """Return lists of values whose combinations are the points; values of later lists vary faster."""
     points = sweep.content.points
+    zipped = points.zip_ or {}
     sources: dict[str, Sequence[Sequence[Mapping[str, Value]]]] = {
         "constants": [[sweep.content.constants]],
         "points.table": [sweep.table],
         "points.list": [points.list_ or []],
-        "points.zip": [_rows(points.zip_ or {})],
+        "points.zip": [[dict(zip(zipped, row, strict=True)) for row in zip(*zipped.values(), strict=True)]],
         "points.grid": [[{name: value} for value in column] for name, column in (points.grid or {}).items()],
     }
     crossed = {where: [rows for rows in parts if rows] for where, parts in sources.items()}
@@ -90,12 +85,7 @@ def _sources(sweep: Sweep) -> list[Sequence[Mapping[str, Value]]]:
     return [rows for parts in crossed.values() for rows in parts]
 
 
-def _rows(columns: Mapping[str, Sequence[Value]]) -> list[dict[str, Value]]:
-    return [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]
-
-
 def _repeated(sweep: Sweep, points: Sequence[dict[str, Value]]) -> Iterator[dict[str, Value]]:
-    """Yield each point once per seed."""
     repeats = sweep.content.repeats
     if repeats is None:
         yield from points
@@ -111,7 +101,6 @@ def _repeated(sweep: Sweep, points: Sequence[dict[str, Value]]) -> Iterator[dict
 
 
 def _derived(sweep: Sweep, values: Mapping[str, Value]) -> dict[str, Value]:
-    """Return the values of a point with its derived variables."""
     values = dict(values)
     for name, expression in sweep.content.derived.items():
         where = f"{sweep.path}: derived.{name}"

@@ -7,15 +7,13 @@ DIR/logs/NAME.txt       output of the run's process
 DIR/jobs/               submissions to a queue, see `templates.slurm.submission`
 """
 
-from __future__ import annotations
-
 import fcntl
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Any, ClassVar, Literal
+from typing import Any, ClassVar, Literal, Self
 
 from dem.errors import InputError
 from dem.record.document import Document
@@ -89,9 +87,9 @@ class Folder:
         """All runs of the sweep, in the order of its file."""
         return self.manifest.points
 
-    def only(self, entries: Sequence[Entry]) -> Folder:
+    def only(self, entries: Sequence[Entry]) -> Self:
         """Return a folder that lists only the given runs."""
-        return Folder(self.path, self.manifest.model_copy(update={"points": tuple(entries)}))
+        return replace(self, manifest=self.manifest.model_copy(update={"points": tuple(entries)}))
 
     def in_order_of_start(self, entries: Sequence[Entry]) -> list[Entry]:
         """Return runs in the order in which to start them, those with the longest expected time first.
@@ -192,10 +190,6 @@ def create_folder(
 
     Args:
         path: The directory, which is absent, empty, or holds this sweep.
-        sweep: The sweep.
-        points: Its points.
-        command: Command line, for the manifest.
-        versions: Versions of the software, for the manifest.
         expected_s: Returns the expected wall time [s] of a scene.
         extend: Whether to add the missing runs to a directory that holds some of these runs and no others.
 
@@ -259,11 +253,7 @@ def _some(what: str, names: Sequence[str], most: int = 8) -> str:
 
 
 def open_folder(path: Path) -> Folder:
-    """Open the directory of a sweep.
-
-    Raises:
-        InputError: The path is not the directory of a sweep, or its manifest is damaged.
-    """
+    """Open the directory of a sweep; raise InputError if it is none, or its manifest is damaged."""
     if (path / MANIFEST).is_file():
         return Folder(path, SweepManifest.read(path / MANIFEST))
     if (path / RUN).is_file():

@@ -4,8 +4,6 @@ For YAML, each `{{ … }}` becomes a placeholder in the text. The text is parsed
 then replaced by the values. A value that is alone keeps its type, and no value can change the structure of the YAML.
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Callable, Mapping
 from typing import Any, NoReturn
@@ -51,7 +49,6 @@ def _line(error: BaseException) -> int | None:
 
 
 def _reject(error: Exception, where: str, values: Mapping[str, Value]) -> NoReturn:
-    """Raise an InputError about the failure of a template or an expression."""
     text = " ".join(str(error).split())
     if isinstance(error, jinja2.UndefinedError):
         name = re.match(r"'([^']+)' is undefined", text)
@@ -67,11 +64,7 @@ _FAILURES = (jinja2.TemplateError, ArithmeticError, TypeError, ValueError, Looku
 
 
 def evaluate(expression: str, values: Mapping[str, Value], source: str) -> Value:
-    """Return the value of a Jinja2 expression such as `(n / 2) | round | int`, evaluated in a sandbox.
-
-    Raises:
-        InputError: The expression uses an unknown name, fails, or has a value that is not plain data.
-    """
+    """Return the value of a Jinja2 expression such as `(n / 2) | round | int`, or raise InputError."""
     environment = _environment()
     try:
         result = environment.compile_expression(expression, undefined_to_none=False)(**values)
@@ -86,11 +79,7 @@ def evaluate(expression: str, values: Mapping[str, Value], source: str) -> Value
 
 
 def render_text(template: str, values: Mapping[str, Value], source: str) -> str:
-    """Render a template as text; `render_yaml` is for YAML.
-
-    Raises:
-        InputError: The template uses an unknown name, or fails.
-    """
+    """Render a template as text, not as YAML; raise InputError if it fails or uses an unknown name."""
     try:
         return _environment().from_string(template).render(**values)
     except _FAILURES as error:
@@ -98,11 +87,7 @@ def render_text(template: str, values: Mapping[str, Value], source: str) -> str:
 
 
 def render_yaml(template: str, values: Mapping[str, Value], source: str) -> Any:
-    """Render a template of YAML, and return its data.
-
-    Raises:
-        InputError: An unknown name, or an error of Jinja2 or YAML; the message names the line.
-    """
+    """Render a template of YAML and return its data; raise InputError that names the line of an error."""
     prefix = "value"
     while prefix in template or prefix in repr(values):
         prefix += "x"
@@ -128,8 +113,6 @@ def render_yaml(template: str, values: Mapping[str, Value], source: str) -> Any:
 
 
 def _loader(placeholder: re.Pattern[str], held: list[Value]) -> type[StrictLoader]:
-    """Return a YAML loader that replaces placeholders by the held values."""
-
     class Loader(StrictLoader):
         pass
 

@@ -4,8 +4,6 @@
 FILE@quick applies the variant `quick`, FILE@code,quick applies `code` and then `quick`.
 """
 
-from __future__ import annotations
-
 import csv
 import io
 import math
@@ -13,7 +11,7 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, Self
 
 import yaml
 from pydantic import AfterValidator, Field, ValidationError, field_validator, model_validator
@@ -24,6 +22,7 @@ from dem.strict import Strict, explained
 from templates.sweep.render import Value
 
 SEED = "seed"
+ENGINE = "engine"  #: The constant of a sweep that names the engine of its scenes
 _IDENTIFIER = re.compile(r"[A-Za-z_][A-Za-z0-9_]*\Z")
 _RESERVED = {SEED, "loop", "true", "false", "none", "True", "False", "None"}
 
@@ -63,7 +62,7 @@ class Points(Strict):
     grid: dict[str, list[Value]] | None = Field(default=None, min_length=1)
 
     @model_validator(mode="after")
-    def _check(self) -> Points:
+    def _check(self) -> Self:
         rows, zip_, grid = self.list_ or [], self.zip_ or {}, self.grid or {}
         if not (self.table or rows or zip_ or grid):
             raise ValueError("no points: give at least one of table, list, zip, grid")
@@ -111,7 +110,7 @@ class Repeats(Strict):
     more: MoreSeeds | None = None
 
     @model_validator(mode="after")
-    def _others(self) -> Repeats:
+    def _others(self) -> Self:
         shared = [seed for seed in self.more.seeds if seed in self.seeds] if self.more else []
         if shared:
             raise ValueError(f"more.seeds: {shared[0]} is one of `seeds` already; leave it out of one of them")
@@ -142,7 +141,7 @@ class SweepFile(Strict):
     variants: dict[str, dict[str, Any]] = Field(default={}, description="merge patches of this file, by name")
 
     @model_validator(mode="after")
-    def _known(self) -> SweepFile:
+    def _known(self) -> Self:
         for name in self.again.constants if self.again else ():
             if name not in self.constants:
                 raise ValueError(f"again.constants: {name!r} is none of the constants; add it there")
@@ -180,11 +179,7 @@ class Sweep:
 
 
 def load_sweep(path: Path) -> Sweep:
-    """Read a sweep file with its template and table; FILE@VARIANT,VARIANT applies variants in order.
-
-    Raises:
-        InputError: A missing or malformed file, an unknown key or variant, or a value out of its range.
-    """
+    """Read FILE or FILE@VARIANT,VARIANT, a sweep with its template and table; raise InputError if invalid."""
     name, _, variants = path.name.partition("@")
     text = read_text(path.with_name(name), "sweep file")
     data = parse_yaml(text, str(path))
@@ -241,20 +236,13 @@ def patched(value: Any, patch: Any) -> Any:
 
 
 def with_constants(sweep: Sweep, constants: Mapping[str, Value]) -> Sweep:
-    """Return a sweep with other values for some of its constants.
-
-    Raises:
-        InputError: The sweep has no constant of this name.
-    """
+    """Return a sweep with other values of some constants; raise InputError if one does not exist."""
     for name in constants:
         if name not in sweep.content.constants:
             msg = f"{sweep.path}: constants: there is no {name!r}; {nearest(name, sorted(sweep.content.constants))}"
             raise InputError(msg)
     content = sweep.content.model_copy(update={"constants": {**sweep.content.constants, **constants}})
     return replace(sweep, content=content)
-
-
-ENGINE = "engine"  #: The constant of a sweep that names the engine of its scenes
 
 
 def on_engine(sweep: Sweep, engine: str) -> Sweep:
@@ -282,11 +270,7 @@ def on_engine(sweep: Sweep, engine: str) -> Sweep:
 
 
 def read_text(path: Path, what: str) -> str:
-    """Return the text of a file; `what` names the kind of file in messages.
-
-    Raises:
-        InputError: The file cannot be read, or is not UTF-8 text.
-    """
+    """Return the text of a file of the kind `what`; raise InputError if it is no readable UTF-8 text."""
     try:
         return path.read_text(encoding="utf-8")
     except UnicodeDecodeError as error:
@@ -347,16 +331,11 @@ def _read_table(path: Path, table: Table | None) -> tuple[list[dict[str, Value]]
 def matching(
     rows: Sequence[dict[str, Value]], only: Mapping[str, Sequence[Value]], where: str, nouns: tuple[str, str]
 ) -> list[dict[str, Value]]:
-    """Return the rows that have one of the wanted values in each variable of `only`.
+    """Return the rows with a wanted value in each variable of `only`; raise InputError if there are none.
 
     Args:
-        rows: Rows of a table, or points.
-        only: Wanted values by variable.
         where: Place of `only`, for messages.
         nouns: Words for a variable and for a row, for messages.
-
-    Raises:
-        InputError: A variable is unknown, no row has one of the wanted values, or no row is kept.
     """
     variable, row_ = nouns
     kept = list(rows)

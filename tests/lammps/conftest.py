@@ -5,7 +5,7 @@ from typing import Any
 
 import pytest
 
-from dem.engine.cores import most_ranks
+from dem.engine.cores import usable_cores
 from dem.engine.demand import contact_law_of
 from dem.engine.lammps.child import lammps_version
 from dem.engine.lammps.engine import LammpsEngine
@@ -21,7 +21,7 @@ def _installed() -> None:
         lammps_version()
     except RunError as error:
         pytest.skip(f"tests of engine: lammps need it (`make setup-mpi`, as .ci/run does): {error}")
-    if most_ranks() < 2:
+    if usable_cores() < 2:
         pytest.skip("mpirun -np 2 needs two cores")
 
 

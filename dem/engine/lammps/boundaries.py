@@ -1,7 +1,5 @@
 """Floor and wall on LAMMPS, whose heights are variables of LAMMPS and are computed here as well."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
@@ -35,8 +33,6 @@ class LammpsBoundaries:
 
     upper_height = math.nan
     hook_sums = channel_sums = np.zeros((0, 3))
-
-    # -- where they are ----------------------------------------------------------------------------------------
 
     def _phase(self) -> float:
         steps, dt = self.clock()
@@ -76,8 +72,6 @@ class LammpsBoundaries:
     def raised(self) -> float | None:
         return 0.0 if self.enclosed else None
 
-    # -- how they move -----------------------------------------------------------------------------------------
-
     def shake(self, *, amplitude: float, frequency: float, walls: bool = True) -> None:
         self._hold()
         self._begun, self._omega = self.clock()[0], 2 * math.pi * frequency
@@ -111,8 +105,6 @@ class LammpsBoundaries:
         for name, part in self._parts.items():
             yield f"variable {name}_base equal {part.base:.17g}"
             yield f"variable {name}_amplitude equal {part.amplitude:.17g}"
-
-    # -- checkpoints -------------------------------------------------------------------------------------------
 
     @property
     def memory(self) -> dict[str, Any]:

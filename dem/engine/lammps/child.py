@@ -1,7 +1,5 @@
 """LAMMPS as a child process under `mpirun`: start, commands, answers, and the cause of an early end."""
 
-from __future__ import annotations
-
 import os
 import re
 import select
@@ -9,14 +7,14 @@ import shutil
 import subprocess
 import tempfile
 import weakref
+from contextlib import suppress
 from functools import lru_cache
 from pathlib import Path
 
 from dem.errors import RunError
 
 LMP, MPIRUN = "lmp", "mpirun"
-NEEDED = ("rigid/small", "gran/hooke/history", "wall/gran/region", "rigid/local")
-"""Styles of LAMMPS that the engine uses."""
+NEEDED = ("rigid/small", "gran/hooke/history", "wall/gran/region", "rigid/local")  #: Styles of LAMMPS in use
 INSTALL = "install it with `make setup-mpi` or `apt-get install lammps openmpi-bin`"
 LOG, OUTPUT, ANSWERS = "log.lammps", "mpirun.txt", "answers"
 POLL_S = 0.2  # s between checks whether a child that has not answered yet is alive
@@ -30,11 +28,7 @@ _OPTIONS = (*"--bind-to none --mca btl_vader_single_copy_mechanism none --mca mp
 
 
 def lammps_version() -> str:
-    """Return the version of the installed LAMMPS.
-
-    Raises:
-        RunError: LAMMPS or mpirun is not installed, or LAMMPS does not start or lacks a style of `NEEDED`.
-    """
+    """Return LAMMPS's version; raise RunError if it or mpirun is missing, does not start or lacks a style."""
     for program, what in ((LMP, "LAMMPS"), (MPIRUN, "Open MPI")):
         if shutil.which(program) is None:
             raise RunError(
@@ -116,11 +110,7 @@ class Child:
         return [child for child in children if _text(Path(f"/proc/{child}/comm")).strip() == LMP]
 
     def send(self, *commands: str) -> None:
-        """Send commands, and wait until LAMMPS has executed them.
-
-        Raises:
-            RunError: LAMMPS ended; the message gives the cause from its log, and what to do.
-        """
+        """Send commands and wait until they are executed; raise RunError with the cause if LAMMPS ends."""
         text = "\n".join(commands) + "\n" + self._answer
         assert self._process.stdin is not None
         try:
@@ -180,7 +170,6 @@ def _text(path: Path) -> str:
 
 
 def _end(process: subprocess.Popen[bytes], answers: int, scratch: Path) -> None:
-    """End a LAMMPS process and remove its files."""
     if process.poll() is None:
         process.terminate()
         try:
@@ -189,9 +178,7 @@ def _end(process: subprocess.Popen[bytes], answers: int, scratch: Path) -> None:
             process.kill()
             process.wait()
     if process.stdin is not None:
-        try:
+        with suppress(OSError):  # LAMMPS had not read all commands
             process.stdin.close()
-        except OSError:
-            pass  # LAMMPS had not read all commands
     os.close(answers)
     shutil.rmtree(scratch, ignore_errors=True)

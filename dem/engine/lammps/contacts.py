@@ -1,8 +1,7 @@
 """Contacts and overlaps, computed here from the positions of the spheres."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
+from typing import Self
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -24,13 +23,8 @@ class Contacts:
     fixed_depths: Array  #: (F,) overlaps of these spheres [m]
 
     @classmethod
-    def of(cls, spheres: Array, radius: float, boundaries: LammpsBoundaries) -> Contacts:
-        """Return the contacts of spheres with each other, floor and wall.
-
-        Args:
-            spheres: (N, S, 3) centres [m].
-            radius: radius of the spheres [m].
-        """
+    def of(cls, spheres: Array, radius: float, boundaries: LammpsBoundaries) -> Self:
+        """Return the contacts of spheres, centres (N, S, 3) [m], with each other, floor and wall; radius in m."""
         count, each = spheres.shape[:2]
         centres = spheres.reshape(-1, 3)
         owners = np.repeat(np.arange(count), each)

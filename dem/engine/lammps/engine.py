@@ -1,7 +1,5 @@
 """A running simulation on LAMMPS, in a child process on one or several ranks."""
 
-from __future__ import annotations
-
 import io
 import json
 import math
@@ -32,6 +30,7 @@ from dem.setting.container import Cylinder
 
 FORMAT = "lammps-2"
 SPHERES, BODIES, RESTART, STATE = "spheres.data", "bodies.txt", "restart", "state.npz"
+FORGET_BODIES = ("undump bodies", "uncompute where", "unfix bodies")
 HEAD = 9  # lines of a dump before its rows
 
 
@@ -132,8 +131,6 @@ class LammpsEngine:
         self.motors, self.strings = NoMotors(), NoStrings()
         self.ledger = LammpsLedger(lambda: self.boundaries.moving, lambda: self.contacts.elastic_energy(law))
 
-    # -- commands ----------------------------------------------------------------------------------------------
-
     def _send(self, commands: Iterator[str]) -> None:
         """Send commands, after which the next run must be set up; before there is a box `_scene` yields them."""
         self._contacts = None
@@ -164,17 +161,10 @@ class LammpsEngine:
         yield f"fix bodies all rigid/small molecule infile {file} reinit no"
         yield from text.body_dump("bodies.*.dump", when="v_when")
 
-    def _forget_bodies(self) -> Iterator[str]:
-        yield "undump bodies"
-        yield "uncompute where"
-        yield "unfix bodies"
-
     def _balanced(self) -> Iterator[str]:
         """Yield the command that balances spheres over ranks; two have equal halves of a round pile anyway."""
         if self.child.ranks > 2:
             yield "balance 1.02 shift xy 20 1.01"
-
-    # -- time --------------------------------------------------------------------------------------------------
 
     @property
     def cpu_elsewhere(self) -> float:
@@ -234,8 +224,6 @@ class LammpsEngine:
             raise RunError(f"LAMMPS wrote {len(rows)} of {self.count} smarticles at step {step}")
         return np.asarray(rows[np.argsort(rows[:, 0])])
 
-    # -- smarticles --------------------------------------------------------------------------------------------
-
     @property
     def count(self) -> int:
         return len(self._moving.positions)
@@ -253,7 +241,7 @@ class LammpsEngine:
         self._write(SPHERES, lines)
         self._write(BODIES, text.body_lines(self.particle, self._moving))
         if self._box:
-            self.child.send(*self._forget_bodies(), f"read_data {SPHERES} add merge", *self._balanced())
+            self.child.send(*FORGET_BODIES, f"read_data {SPHERES} add merge", *self._balanced())
         else:
             self.child.send(*self._scene(f"read_data {SPHERES}"), *self._balanced())
             if self.steps:
@@ -310,8 +298,6 @@ class LammpsEngine:
     def contact_forces(self) -> NoReturn:
         absent("forces at contacts")
 
-    # -- checkpoints -------------------------------------------------------------------------------------------
-
     def save(self, scratch: Path) -> Saved:
         # Saved are LAMMPS's restart files with friction springs and bodies, and the poses of this process. LAMMPS
         # orders spheres differently after reading them, so that the running simulation loads what it has saved. It does
@@ -343,11 +329,7 @@ class LammpsEngine:
         return saved
 
     def load(self, saved: Saved, scratch: Path) -> None:
-        """Replace the state by one that `save` returned for an engine of this scene.
-
-        Raises:
-            InputError: the state was saved by another engine or version, or is damaged.
-        """
+        """Replace the state; raise InputError if another engine or version saved it, or it is damaged."""
         memory = saved.memory
         if memory.get("format") != FORMAT:
             raise InputError(

@@ -1,7 +1,5 @@
 """Facts about LAMMPS as an engine, and the function that builds its simulations."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 
 from dem.engine.cores import ranks

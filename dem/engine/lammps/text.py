@@ -3,11 +3,10 @@
 Keywords are those of version 29 Sep 2021, update 2, which Debian 12 has.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import Self
 
 import numpy as np
 
@@ -35,7 +34,7 @@ class Moving:
     forces: Array  #: (N, 3) forces of contacts and weight [N]
 
     @classmethod
-    def none(cls) -> Moving:
+    def none(cls) -> Self:
         """Return arrays for N = 0."""
         empty = np.zeros((0, 3))
         return cls(empty, np.zeros((0, 3, 3)), empty, empty, empty, empty)
@@ -62,9 +61,7 @@ def sphere_lines(
     Each sphere has number, type, position, diameter, density and number of its smarticle.
 
     Args:
-        cylinder: the container, from which the simulation box follows.
         spheres: (N, S, 3) centres [m].
-        title: first line of the file.
         first: number of smarticles that LAMMPS has already.
     """
     count, each = spheres.shape[:2]
@@ -101,11 +98,8 @@ def contact_terms(law: ContactLaw, mass: float) -> tuple[str, str]:
     """Return the arguments of `pair_style gran/hooke/history` and of `fix wall/gran/region`.
 
     The arguments are kn and ks [N/m]; normal and tangential damping [1/s], which LAMMPS multiplies by the effective
-    mass, M/2 for two smarticles and M at a wall; the friction coefficient; 1, which switches tangential damping on; and
-    the keyword `NEVER_PULLS`.
-
-    Args:
-        mass: mass M of a smarticle [kg].
+    mass, M/2 for two smarticles of mass M [kg] and M at a wall; the friction coefficient; 1, which switches tangential
+    damping on; and the keyword `NEVER_PULLS`.
     """
     between, wall = law.normal_damping / (mass / 2), law.wall_damping / mass
     springs, tangential = f"{law.normal_stiffness:.9g} {law.tangential_stiffness:.9g}", law.tangential_damping
@@ -139,12 +133,7 @@ def neighbours(particle: Particle) -> Iterator[str]:
 
 
 def container(cylinder: Cylinder, at_wall: str, *, walled: bool = True) -> Iterator[str]:
-    """Yield the commands of floor and wall, whose heights are the variables `floor_z` and `wall_z`.
-
-    Args:
-        at_wall: contact with floor and wall, the second result of `contact_terms`.
-        walled: whether there is a wall.
-    """
+    """Yield the commands of floor and wall, whose heights are the variables `floor_z` and `wall_z`."""
     extent = f"{cylinder.radius:.9g} {cylinder.bottom:.9g} {cylinder.height:.9g}"
     yield "variable         wave equal sin(v_omega*(step-v_begun)*dt)"
     yield "variable         floor_z equal v_floor_base+v_floor_amplitude*v_wave"
@@ -157,12 +146,7 @@ def container(cylinder: Cylinder, at_wall: str, *, walled: bool = True) -> Itera
 
 
 def body_dump(dump: str, *, when: str) -> Iterator[str]:
-    """Yield the commands that write all bodies to files.
-
-    Args:
-        dump: name of the files.
-        when: argument of `dump_modify every`.
-    """
+    """Yield the commands that write all bodies to files `dump`, `when` as in `dump_modify every`."""
     count = len(WRITTEN.split())
     yield f"compute          where all rigid/local bodies {WRITTEN}"
     yield f"dump             bodies all local 1 {dump} {' '.join(f'c_where[{k + 1}]' for k in range(count))}"

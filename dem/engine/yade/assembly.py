@@ -4,8 +4,6 @@ Welding and articulating conserve positions, momentum and angular momentum up to
 the kinetic energy; welding dissipates the energy of the links' relative motion.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -139,8 +137,6 @@ class Assembly:
             "lower fidelity.time_step_fraction",
         )
 
-    # -- welding -----------------------------------------------------------------------------------------------
-
     def articulate(self) -> None:
         """Split every smarticle into three links that hinges join; no effect on articulated smarticles."""
         if self.hinges is not None:
@@ -208,11 +204,7 @@ class Assembly:
         return before - self.state().kinetic_energy
 
     def anchor(self, smarticle: int, link: int, point: Array) -> tuple[int, Array]:
-        """Return the id of an articulated link's body, and a point (3,) in YADE's frame of this body [m].
-
-        Args:
-            point: (3,) in the link's frame [m].
-        """
+        """Return the body of an articulated link, and in its frame a point (3,) of the link's frame [m]."""
         number = LINKS * smarticle + link
         arm = self._to_body[number] * self._yade.vector(*point)
         return self._ids[number], np.array([arm[0], arm[1], arm[2]])
@@ -234,8 +226,6 @@ class Assembly:
             # YADE stores no angular momentum of bodies that it rotates like spheres.
             return np.array([[0.0, 0.0, s.inertia[2] * s.angVel[2]] for s in self._states]).reshape(-1, 3)
         return rows_of(state.angMom for state in self._states)
-
-    # -- memory ------------------------------------------------------------------------------------------------
 
     @property
     def memory(self) -> dict[str, Any]:

@@ -1,7 +1,5 @@
 """Rigid boundaries in YADE: floor and wall of flat facets, hooks, or table and walls of a channel."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from itertools import pairwise
@@ -60,8 +58,6 @@ class YadeBoundaries:
     def restore(self, memory: Mapping[str, Any]) -> None:
         self.moving = list(memory["moving"])
         self._sums = [self._yade.vector(*row) for row in memory["sums"]]
-
-    # -- where they are ----------------------------------------------------------------------------------------
 
     @property
     def floor(self) -> float:
@@ -126,8 +122,6 @@ class YadeBoundaries:
         found = {floor: FLOOR, **dict(zip(walls, numbers, strict=True))}
         return found | {bar: LOWER_HOOK + k for k, bars in enumerate(self.hooks) for bar in bars}
 
-    # -- motion ------------------------------------------------------------------------------------------------
-
     def _move(self, bodies: Sequence[int], speed: float) -> None:
         for body in bodies:
             self._yade.omega.bodies[body].state.vel = self._yade.vector(0, 0, speed)
@@ -170,8 +164,6 @@ class YadeBoundaries:
         for body in self.container[:-1]:
             self._yade.omega.bodies.erase(body)
         self.container = self.container[-1:]
-
-    # -- forces ------------------------------------------------------------------------------------------------
 
     def power(self) -> float:
         """Return the power that moving boundaries exerted on smarticles in the last step [W]."""

@@ -1,7 +1,5 @@
 """Materials, engines and functors that each effect needs on YADE, and their construction."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from typing import Any
@@ -67,12 +65,7 @@ VERLET_DISTANCE = 0.15
 
 
 def add_materials(yade: Yade, adds: Adds, law: ContactLaw) -> None:
-    """Add the materials `adds.materials` to YADE's simulation, in that order.
-
-    Args:
-        adds: what all effects of the scene add.
-        law: contact law from which the materials' stiffness and damping follow.
-    """
+    """Add the materials `adds.materials` to YADE's simulation, in that order."""
     # YADE puts two materials in series, so that each has twice the contact's value. The wall's dashpot is chosen such
     # that in series with a smarticle's dashpot it gives `law.wall_damping`. `dem.engine.yade.assembly.clump` sets
     # masses, so that densities are zero.
@@ -102,8 +95,6 @@ def add_engines(
 
     Args:
         yade: YADE, with the materials already added.
-        adds: what all effects of the scene add.
-        law: contact law, for the friction coefficients.
         hinges: law of the hinges; None where smarticles stay welded.
         gravity: g, downwards [m/s²].
         radius: radius of the spheres [m].

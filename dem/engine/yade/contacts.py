@@ -1,7 +1,5 @@
 """Contacts among YADE's interactions, with their overlaps and forces."""
 
-from __future__ import annotations
-
 from collections import defaultdict
 from collections.abc import Iterator
 from typing import Any

@@ -1,9 +1,4 @@
-"""A running simulation on YADE.
-
-One process runs one simulation: YADE keeps its scene in a process-wide singleton.
-"""
-
-from __future__ import annotations
+"""A running simulation on YADE, which keeps its scene in a singleton: one simulation per process."""
 
 import math
 from pathlib import Path
@@ -51,9 +46,6 @@ class YadeEngine:
         hooks: the lower and the upper hook; None: no hooks.
         channel: table and walls instead of the container; all motion is then confined to a plane.
         strengths: (N, 2) factors on torque limit and stiffness of the motors [1]; None: 1 for all motors.
-
-    Raises:
-        RunError: YADE is not installed.
     """
 
     def __init__(
@@ -105,8 +97,6 @@ class YadeEngine:
         self.set_time_step(time_step)
         self.boundaries.bind()
         self._assembly.bind()
-
-    # -- checkpoints -------------------------------------------------------------------------------------------
 
     def save(self, scratch: Path) -> Saved:
         # YADE orders bodies and contacts differently after loading, and sums of forces depend on the order. The running
@@ -161,8 +151,6 @@ class YadeEngine:
         self._assembly.bind()
         self._loaded = (self.steps, memory["unbalanced"])
 
-    # -- time --------------------------------------------------------------------------------------------------
-
     def set_time_step(self, time_step: float) -> None:
         """Set the length of all further steps [s].
 
@@ -199,8 +187,6 @@ class YadeEngine:
             msg = f"YADE stopped at step {self.steps} of {target} (t = {self.time:.4f} s); see its message above"
             raise RunError(msg)
         self._smarticle_seconds += steps * self.time_step * self.count
-
-    # -- smarticles --------------------------------------------------------------------------------------------
 
     @property
     def count(self) -> int:

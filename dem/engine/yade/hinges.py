@@ -5,11 +5,9 @@ and a shaft along the hinge's axis, which transmits the motor's torque, keeps th
 pin's vibrations. Both act between nodes, which have no contacts.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 
@@ -237,7 +235,7 @@ class Hinges:
         }
 
     @classmethod
-    def restored(cls, yade: Yade, law: HingeLaw, memory: Mapping[str, Any]) -> Hinges:
+    def restored(cls, yade: Yade, law: HingeLaw, memory: Mapping[str, Any]) -> Self:
         """Return the hinges of a loaded simulation, from the `memory` that was saved with it."""
         hinges = cls(yade, law, memory["nodes"], np.array(memory["angles"]).reshape(-1, 2))
         hinges.bind()

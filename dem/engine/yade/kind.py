@@ -1,7 +1,5 @@
 """Facts about YADE as an engine, and the function that builds its simulations."""
 
-from __future__ import annotations
-
 from dem.engine.demand import Activity, Demand, contact_law_of, motor_law_of
 from dem.engine.effect import EffectName
 from dem.engine.yade.construction import ADDS, ORDER

@@ -6,8 +6,6 @@ sampled step stands for all steps up to the next sample. The ledger's residual i
 the integration scheme, mostly where contacts begin in the middle of a step.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -74,12 +72,7 @@ class Contacts:
 
 
 class YadeLedger:
-    """`dem.engine.interface.EnergyLedger` on YADE.
-
-    Args:
-        works: whether to sum the work of moving boundaries.
-        dissipation_interval: time between samples of the dissipation [s]; None: no samples.
-    """
+    """`dem.engine.interface.EnergyLedger` on YADE; `dissipation_interval` in s, None: no samples."""
 
     def __init__(
         self,

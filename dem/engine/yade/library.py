@@ -1,7 +1,5 @@
 """Import of the YADE that the Linux distribution ships; no other module imports `yade`."""
 
-from __future__ import annotations
-
 import contextlib
 import importlib
 import io
@@ -60,11 +58,7 @@ def yade_threads() -> int:
 
 
 def import_yade() -> Any:
-    """Import the distribution's YADE into this process.
-
-    Raises:
-        RunError: YADE is not installed.
-    """
+    """Import the distribution's YADE into this process; raise RunError if it is not installed."""
     # Threads that find no free core spin; a run of seconds would take minutes.
     os.environ.setdefault("OMP_NUM_THREADS", "1")
     for folder in Path("/usr/lib").glob("*/yade*/py"):

@@ -1,7 +1,5 @@
 """Motors on YADE: control updates that set the torques of hinges."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any
 

@@ -1,7 +1,5 @@
 """The stable time step on YADE, from masses and inertias of smarticles instead of sphere sizes."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable, Sequence
 
@@ -99,10 +97,7 @@ def planar_stable_time_step(
 
     The stiffest modes are a barb along another barb that moves against it, where each sphere touches
     `CONTACTS_IN_A_ROW` spheres; a middle link along a wall, which all spheres of its outer row touch; and a barb with a
-    string at its tip.
-
-    Args:
-        strings: stiffness [N/m] and damping [N s/m] of each string.
+    string at its tip; `strings` have a stiffness [N/m] and a damping [N s/m] each.
     """
     boxes = particle.boxes
     mass, pins = _mass_matrix(boxes), _hinge_stiffness(boxes, hinges)

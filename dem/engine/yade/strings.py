@@ -4,8 +4,6 @@ The far end of each string, its anchor, is a point in space that may move. Force
 YADE's contact laws use, and so have the stability of such a contact.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass

@@ -17,6 +17,7 @@ from synthetic import SyntheticRun, mesh_of, write_ending, write_manifest
 from dem.body.state import State
 from dem.deck import BODIES, DATA, DECK, DUMP, passive, write_deck
 from dem.errors import InputError
+from dem.plan.steps import time_steps
 from dem.record.frames import FrameWriter
 from dem.scene.reading import parse_scene
 from dem.scene.scene import Scene
@@ -64,14 +65,14 @@ def test_spheres_and_bodies_are_those_of_the_scene(tmp_path: Path) -> None:
     rows = np.array([line.split() for line in text[2].splitlines()], float)
     assert f"{2 * count} atoms" in text[0]
     assert np.array_equal(rows[:, 0], np.arange(1, 2 * count + 1))
-    assert np.array_equal(rows[:, 2:5].reshape(2, count, 3), given.state.spheres(particle))
+    assert np.array_equal(rows[:, 2:5].reshape(2, count, 3), given.spheres(particle))
     assert np.array_equal(rows[:, 7], np.repeat([1, 2], count))
     assert set(rows[:, 5]) == {scene.sphere_diameter}
     masses = (rows[:, 6] * math.pi / 6 * rows[:, 5] ** 3).reshape(2, count)
     assert masses.min() > 0
     assert masses.sum(axis=1) == pytest.approx(particle.boxes.mass, rel=1e-12)
     # Weight turns no smarticle: spheres are balanced about the centre of mass, which equal ones are not.
-    levers = rows[:, 2:5].reshape(2, count, 3) - given.state.positions[:, None]
+    levers = rows[:, 2:5].reshape(2, count, 3) - given.positions[:, None]
     balance = np.einsum("ns,nsi->ni", masses, levers) / particle.boxes.mass
     assert np.abs(balance).max() < 1e-15
     assert np.linalg.norm(levers.mean(axis=1), axis=1).min() > 1e-5
@@ -81,13 +82,13 @@ def test_spheres_and_bodies_are_those_of_the_scene(tmp_path: Path) -> None:
         value = np.array(line.split(), float)
         assert len(value) == 20
         assert (value[0], value[1]) == (k + 1, particle.boxes.mass)
-        assert np.array_equal(value[2:5], given.state.positions[k])
+        assert np.array_equal(value[2:5], given.positions[k])
         xx, yy, zz, xy, xz, yz = value[5:11]
         # The same tensor, link by link.
         whole = np.zeros((3, 3))
         for link in range(3):
-            frame, mass = given.state.link_rotations[k, link], particle.boxes.link_masses[link]
-            arm = given.state.link_positions[k, link] - given.state.positions[k]
+            frame, mass = given.link_rotations[k, link], particle.boxes.link_masses[link]
+            arm = given.link_positions[k, link] - given.positions[k]
             whole += frame @ np.diag(particle.boxes.link_inertias[link]) @ frame.T
             whole += mass * (arm @ arm * np.eye(3) - np.outer(arm, arm))
         np.testing.assert_allclose([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]], whole, atol=1e-12 * whole.max())
@@ -160,15 +161,15 @@ def test_lammps_takes_it_as_it_is(tmp_path: Path) -> None:
     command = [LMP, "-in", DECK, "-log", "log.txt"]
     done = subprocess.run(command, cwd=tmp_path / "deck", capture_output=True, text=True, check=False, timeout=300)
     assert done.returncode == 0, done.stdout[-2000:] + done.stderr
-    given, dt = passive(scene), passive(scene).time_step
+    given, dt = passive(scene), min(time_steps(scene))
     frames = dumped(tmp_path / "deck" / DUMP)
-    np.testing.assert_allclose(frames[0][:, :3], given.state.positions, rtol=1e-11)
+    np.testing.assert_allclose(frames[0][:, :3], given.positions, rtol=1e-11)
     assert not frames[0][:, 3:6].any()
     # The one that hangs falls freely, and does not turn: its weight pulls at its centre of mass.
     falling = [step for step in frames if 0 < step * dt < math.sqrt(2 * (HEIGHT - 2e-3) / 9.81)]
     assert len(falling) > 3
     for step in falling:
-        drop = given.state.positions[1] - frames[step][1, :3]
+        drop = given.positions[1] - frames[step][1, :3]
         # Leapfrog from rest: exact but for half a step's fall.
         assert drop == pytest.approx([0, 0, 9.81 * (step * dt) ** 2 / 2], abs=9.81 * step * dt * dt)
         assert np.abs(frames[step][1, 6:] - frames[0][1, 6:]).max() < 1e-9

@@ -38,8 +38,6 @@ def run_with(own: Phase, out: Path, monkeypatch: pytest.MonkeyPatch) -> Run:
 @pytest.mark.filterwarnings("ignore:Pydantic serializer warnings")
 def test_phi_is_taken_around_the_activity(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     run = run_with(Calm(type="calm", duration_s=0.1), tmp_path / "run", monkeypatch)
-    change = packing_change(run)
-    assert (change.phase_before, change.phase_after) == (1, 2)
     assert activity(run).index == 2
     for name in ("run.json", "done.json"):
         phases = json.loads((run.path / name).read_text())["phases"]

@@ -24,12 +24,11 @@ def wall(monkeypatch: pytest.MonkeyPatch) -> Wall:
 
 def test_file_states_how_far_the_run_is(tmp_path: Path, wall: Wall) -> None:
     bar = ProgressWriter(tmp_path, 270, show=False)
-    bar.begin(index=2, phase="shake", start=3.0, time=3.0, end=8.0)
+    bar.begin(phase="shake", start=3.0, time=3.0, end=8.0)
     wall.now += 5
     bar.update(time=4.5, phi=0.123, count=270)
     assert json.loads((tmp_path / "progress.json").read_text()) == {
         "phase": "shake",
-        "phase_index": 2,
         "time_s": 4.5,
         "end_s": 8.0,
         "phi": 0.123,
@@ -47,7 +46,7 @@ def test_a_checkpoint_is_reported_at_once(tmp_path: Path, wall: Wall) -> None:
         return data["time_s"], data.get("checkpoint_s")
 
     bar = ProgressWriter(tmp_path, 2, show=False)
-    bar.begin(index=1, phase="relax", start=0.0, time=0.0, end=1.0)
+    bar.begin(phase="relax", start=0.0, time=0.0, end=1.0)
     bar.checkpointed(0.1)  # nothing else is known yet
     assert not (tmp_path / "progress.json").exists()
     bar.update(time=0.2, phi=0.1, count=2)
@@ -63,7 +62,7 @@ def test_a_checkpoint_is_reported_at_once(tmp_path: Path, wall: Wall) -> None:
 
 def test_at_most_once_per_second_and_at_once_in_a_new_phase(tmp_path: Path, wall: Wall) -> None:
     bar = ProgressWriter(tmp_path, 2, show=False)
-    bar.begin(index=1, phase="relax", start=0.0, time=0.0, end=1.0)
+    bar.begin(phase="relax", start=0.0, time=0.0, end=1.0)
 
     def written(time: float) -> bool:
         (tmp_path / "progress.json").unlink(missing_ok=True)
@@ -75,5 +74,5 @@ def test_at_most_once_per_second_and_at_once_in_a_new_phase(tmp_path: Path, wall
     assert not written(0.2)
     wall.now += 0.02
     assert written(0.3)
-    bar.begin(index=2, phase="shake", start=1.0, time=1.0, end=2.0)
+    bar.begin(phase="shake", start=1.0, time=1.0, end=2.0)
     assert written(1.0)

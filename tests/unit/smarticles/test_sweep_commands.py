@@ -45,7 +45,7 @@ def test_status_of_a_killed_run_shows_from_where_it_would_go_on(
     tmp_path: Path, write_run: WriteRun, smarticles: Smarticles
 ) -> None:
     run = write_run(tmp_path / "alone", status="unfinished")
-    progress = {"phase": "shake", "phase_index": 2, "time_s": 3.51, "wall_s": 20.0, "checkpoint_s": 3.2}
+    progress = {"phase": "shake", "time_s": 3.51, "wall_s": 20.0, "checkpoint_s": 3.2}
     (run / "progress.json").write_text(json.dumps(progress))
     header, row = smarticles("status", run).out.splitlines()[:2]
     assert [word.strip() for word in header.split("  ") if word] == [

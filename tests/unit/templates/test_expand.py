@@ -214,7 +214,7 @@ def test_bad_sweep_files_are_input_errors(text: str, message: str, write_sweep: 
             "the names 'n_seed1' and 'N_seed1' differ in upper and lower case only",
         ),
         ("[10, 20]", "[10, 20, 10]", "points: n10_seed1 is given twice with equal values; remove one of the two"),
-        ("[10, 20]", "[10, 10.0]", "n10_seed1 and n10.0_seed1 are the same scene although count 10 and 10.0"),
+        ("[10, 20]", "[10, 10.0]", "n10_seed1 and n10.0_seed1 have identical scenes although count 10 and 10.0"),
         ("n{{ count }}_", "../{{ count }}", "gives '../10seed1', which cannot be a directory"),
         ("repeats:", "derived: {count: 3}\nrepeats:", "'count' is set in both points.grid and derived"),
         ("repeats:", "derived: {x: contu}\nrepeats:", "derived.x = 'contu': 'contu' is undefined"),
