@@ -27,8 +27,8 @@ def shaken(*, hinged: bool = False, rows: int = 1, hooked: bool = False) -> Link
         hooks=HOOKS if hooked else None,
     )
     builds.pile(made, COUNT, settle=0.1)
-    made.boundaries.shake(amplitude=1.2e-3, frequency=30.0)
-    made.advance(40)
+    made.boundaries.shake(amplitude=0.2e-3, frequency=30.0)
+    made.advance(120)
     if hinged:
         made.motors.articulate()
         made.motors.actuate(np.full((1, COUNT, 2), 1.4), 2e-4)
