@@ -27,9 +27,7 @@ MEASURED = 1  # index of the compared phase; phase 0 is the pour
 def pairs(seconds: float, hinged_step: float) -> list[tuple[str, str, Changes, Changes]]:
     """Return name, cause of the cost, and changed keys of the scenes without and with the effect, for each effect.
 
-    Args:
-        seconds: duration of the compared phase [s].
-        hinged_step: time step of a scene with hinges [s].
+    The compared phase takes `seconds` [s]; `hinged_step` is the time step of a scene with hinges [s].
     """
     rest = {"type": "relax", "duration_s": seconds}
     still = {"type": "shake", "duration_s": seconds, "peak_acceleration_g": 0}

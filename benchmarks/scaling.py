@@ -38,9 +38,8 @@ WALL, PROCESSOR = "wall time per step and smarticle [us]", "processor time per s
 def time_intervals(run: Path) -> dict[str, Any]:
     """Load the last checkpoint of a run and time the shaking of its pile.
 
-    Returns:
-        Wall times and processor times of all intervals [s] under "wall" and "processor", mean number of contacts per
-        smarticle, and peak memory [MiB].
+    Returns wall times and processor times of all intervals [s], mean number of contacts per smarticle, and peak memory
+    [MiB].
     """
     scene, made_by = load_scene(run / "scene.yaml"), open_run(run).manifest.versions["links"]
     # The scene needs a phase that shakes, or the engine is built without a moving container.

@@ -140,8 +140,7 @@ def default_seeds(scene: Scene) -> tuple[int, ...]:
 def parse_seeds(text: str) -> tuple[int, ...]:
     """Parse seeds from a text such as `1,2,3` or `1-20`.
 
-    Raises:
-        InputError: There is no seed, one is not a whole number from 0, or one is given twice.
+    InputError if there is no seed, one is not a whole number from 0, or one is given twice.
     """
     words = [word.strip() for word in text.split(",") if word.strip()]
     if not words or not all(re.fullmatch(r"[0-9]{1,9}(-[0-9]{1,9})?", word) for word in words):
@@ -159,11 +158,7 @@ def parse_seeds(text: str) -> tuple[int, ...]:
 
 
 def parse_knobs(text: str) -> tuple[str, ...]:
-    """Parse knobs from a text such as `time-step,section`, and return them in the order of `KNOBS`.
-
-    Raises:
-        InputError: There is no knob, or one is unknown.
-    """
+    """Parse known knobs from a text such as `time-step,section`, and return them in the order of `KNOBS`."""
     words = [word.strip() for word in text.split(",") if word.strip()]
     for word in words:
         if word not in KNOBS:
@@ -174,14 +169,10 @@ def parse_knobs(text: str) -> tuple[str, ...]:
 
 
 def build_ladder(scene: Scene, *, source: str, knobs: Sequence[str] | None = None) -> Ladder:
-    """Make the ladder of a scene.
+    """Make the ladder of a scene, for the given knobs or all that change anything in this scene.
 
-    Rungs that the scene cannot have, such as two rows of spheres in a square section, are left out.
-
-    Args:
-        scene: the scene.
-        source: name of its file, for messages.
-        knobs: knobs that are wanted; None: all that change anything in this scene.
+    Rungs that the scene cannot have, such as two rows of spheres in a square section, are left out. `source` names the
+    file of the scene in messages.
 
     Raises:
         InputError: The scene has no activity, a time step of its own, or nothing that a given knob changes.
@@ -553,11 +544,9 @@ def _finding(knob: str, *, sensitivity: bool) -> Finding:
 
 
 def study(rungs: Sequence[Rung], expected_s: Mapping[str, float] = MappingProxyType({})) -> Study:
-    """Make the study of a ladder.
+    """Make the study of a ladder, whose rungs are ordered by knob, from coarse to fine.
 
-    Args:
-        rungs: rungs by knob, from coarse to fine.
-        expected_s: expected wall times of runs [s] by name of the run directory.
+    `expected_s` has expected wall times of runs [s] by name of the run directory.
     """
     knobs = {rung.knob: rung.sensitivity for rung in rungs}
 

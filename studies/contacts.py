@@ -138,15 +138,10 @@ def effects(runs: pd.DataFrame) -> pd.DataFrame:
 
 
 def lowers(name: str, says: str, quantity: str, *changed: str, sign: int = -1, less: str = "") -> Finding:
-    """Make the finding that a change of factors lowers a quantity.
+    """Make the finding that a change of a factor, or the interaction of two, lowers a quantity.
 
-    Args:
-        name: id of the finding.
-        says: statement.
-        quantity: column of the quantity.
-        changed: factor, or two factors whose interaction is judged.
-        sign: −1 if the statement says lowers, +1 if raises.
-        less: factor whose effect is subtracted, if the statement says lowers more than that factor; empty: none.
+    The sign is −1 if the statement says lowers, +1 if raises. `less` is a factor whose effect is subtracted, if the
+    statement says lowers more than that factor.
     """
 
     def outcome(runs: pd.DataFrame) -> Outcome:

@@ -236,9 +236,8 @@ def crossings(found: Curves) -> pd.DataFrame:
 def nearness(found: Curves, friction: float) -> dict[str, float | int | str]:
     """Compute deviations of all curves from Gravish's φ at a friction, and the confidence of being near.
 
-    Returns:
-        Cells by column: mean and largest deviation, the confidence that all points are within `MARGIN`, and that of
-        the worst point.
+    The cells by column are mean and largest deviation, the confidence that all points are within `MARGIN`, and that of
+    the worst point.
     """
     at = np.array([friction])
     deviations = {

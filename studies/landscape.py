@@ -325,8 +325,7 @@ def costs(runs: pd.DataFrame) -> pd.DataFrame:
 def _drawn_ratio(values: Floats) -> Interval:
     """Return the mean gain over the mean energy with its 95 % interval; NaN ends below 3 pairs.
 
-    Args:
-        values: gains and energies (n, 2), or those of two procedures (n, 4), whose gains per energy are divided.
+    Values are gains and energies (n, 2), or those of two procedures (n, 4), whose gains per energy are divided.
     """
 
     def ratio(rows: Whole) -> Floats:

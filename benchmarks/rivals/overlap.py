@@ -92,13 +92,9 @@ def _near(centres: Array, reaches: Array) -> Indices:
 
 
 def solid_of(shape: str, particle: Particle, positions: Array, frames: Array) -> Bars | Swept:
-    """Return the shapes that an engine uses for contacts.
+    """Return the shapes that an engine uses for contacts: "boxes", "strands" (links) or "spheres".
 
-    Args:
-        shape: "boxes", "strands" (engine links) or "spheres" (YADE and LAMMPS).
-        particle: geometry of a smarticle.
-        positions: centres of the links, (N, 3, 3) [m].
-        frames: axes of the links as columns, (N, 3, 3, 3).
+    Positions are the centres of the links, (N, 3, 3) [m], frames their axes as columns, (N, 3, 3, 3).
     """
     if shape == "boxes":
         return _boxes(particle, positions, frames)

@@ -480,10 +480,7 @@ PROCEDURE_LABELS: Mapping[str, str] = MappingProxyType(
 def by_procedure(labels: Mapping[str, str] = PROCEDURE_LABELS, *, apart: float = 0.0, line: bool = True) -> SplitBy:
     """Make a series for each procedure, of the internal oscillation only at θ = `AMPLITUDE`.
 
-    Args:
-        labels: label of each procedure, in the order of the legend.
-        apart: distance of neighbouring series along x, in the unit of the x axis.
-        line: whether lines join the means.
+    Labels are in the order of the legend; neighbouring series are `apart` along x, in the unit of the x axis.
     """
 
     def split(table: pd.DataFrame) -> list[Series]:
@@ -533,9 +530,7 @@ def binned(
     """Average each history over intervals of a width [s], or over 50 logarithmic intervals.
 
     Intervals meet at the beginning of the activity, time 0. Those in which a history has no sample are left out.
-
-    Returns:
-        Centres of the intervals (n,) [s] and means of each history (histories, n).
+    Returns the centres of the intervals (n,) [s] and the means of each history (histories, n).
     """
     first, last = (edge(one.times[at] for one in histories) for edge, at in ((min, 0), (max, -1)))
     if log:
@@ -596,14 +591,8 @@ def draw_means(
 ) -> None:
     """Draw means y (n,) at places x (n,) with their error bars.
 
-    Args:
-        axes: axes to draw into.
-        x: places (n,).
-        y: means (n,).
-        half_widths: of the 95 % intervals of y (n,), NaN where unknown; None: no vertical error bars.
-        properties: of markers and lines, by Matplotlib's names.
-        label: in the legend.
-        across: half-widths of the 95 % intervals of x (n,), or those downwards and upwards (2, n).
+    Half-widths of the 95 % intervals of y (n,) and of x (`across`, (n,), or (2, n) downwards and upwards) are NaN where
+    they are unknown; None draws no error bars.
     """
     bars = axes.errorbar(
         x, y, yerr=half_widths, xerr=across, **{"markersize": 3.4, "linewidth": 0.7, **properties}, label=label

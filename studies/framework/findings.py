@@ -193,18 +193,11 @@ def above(
     """Make the finding that a procedure is above others in a quantity, paired by aspect ratio and seed.
 
     Args:
-        name: id of the finding.
-        says: statement.
         quantities: column, or several columns with a sign each: +1 if the statement says above, −1 if below.
-        one: procedure that is compared with `others`.
-        others: procedures that it must differ from, each.
-        sign: sign of a single column.
         beside: procedures whose difference from `one` is shown but not judged.
         beside_quantity: column of that difference; None: the column that is judged.
         bounds: column that is above 0 if the first of the quantities is a lower bound and the others are unknown.
-        rows: selects the samples.
         shown: columns whose means are shown but not judged.
-        found_if: criterion in words; empty: all differences have their sign.
     """
     signs = {quantities: sign} if isinstance(quantities, str) else quantities
 
@@ -254,13 +247,7 @@ def slope(
     """Make the finding that a quantity rises (sign +1) or falls (−1) with a variable, on straight lines.
 
     Args:
-        name: id of the finding.
-        says: statement.
-        quantity: column of the quantity.
-        against: column of the variable.
-        sign: sign of the slope that the statement asks for.
         within: columns whose values make blocks; lines of all blocks have one slope and levels of their own.
-        rows: selects the samples.
         label: name of the quantity in texts; empty: its symbol.
     """
     label = f"{label or symbol(quantity)} against {symbol(against)}"
@@ -288,11 +275,6 @@ def mean(
     """Make the finding that the mean of a value over all rows is above a threshold.
 
     Args:
-        name: id of the finding.
-        says: statement.
-        values: computes the value of each row.
-        label: name of the mean in texts.
-        rows: selects the samples.
         threshold: in the unit of the value.
         shown: columns whose means are shown but not judged.
         by: column; the means of the columns `shown` are taken at each of its values.
@@ -324,15 +306,9 @@ def ranks(
     ranks above all other values, and a pile that a single smarticle braces has a peak many times those of other piles.
 
     Args:
-        name: id of the finding.
-        says: statement.
-        x: column of x.
-        y: column of y.
         within: columns whose values make blocks; ranks are taken within each block.
         bounds: column that is above 0 if y is a lower bound.
-        found_if: criterion in words.
         unit: unit of the slope of y against x, which is shown but not judged.
-        rows: selects the samples.
     """
 
     def outcome(table: pd.DataFrame) -> Outcome:

@@ -116,13 +116,9 @@ class Study:
 
         Args:
             run_dirs: directories of the runs; runs that are not done or cannot be read are listed as missing.
-            output: folder for the files.
             note: how the runs differ from the full study, for footers.
             command: command line, for footers.
             earlier: runs of an earlier analysis by name, which replace directories that do not exist.
-
-        Returns:
-            The results, with the paths of the files.
 
         Raises:
             InputError: No run is done, runs must not be averaged or compared, or the output is no folder.

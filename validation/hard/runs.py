@@ -87,9 +87,8 @@ class Watched:
     def sound(self, *, rest: float | None = 0.02, depth: float = 0.5) -> list[Check]:
         """Return the checks of every successful run.
 
-        Args:
-            rest: largest allowed speed at the end [m/s]; None: not checked.
-            depth: largest allowed overlap, over the sphere diameter [1].
+        Limits are the speed at the end, `rest` [m/s], None if it is not checked, and the overlap `depth` over the
+        sphere diameter [1].
         """
         checks = [Check("ends", "done" if self.error is None else ": ".join(self.error), "done", self.error is None)]
         if self.error is not None:
@@ -128,14 +127,10 @@ def whole(
     steps: Callable[[Scene], Sequence[float]] = time_steps,
     spoil: Callable[[Engine], None] | None = None,
 ) -> Watched:
-    """Run a scene and return the outcome.
+    """Run a scene, given as a dictionary, and return the outcome.
 
-    Args:
-        data: scene as a dictionary.
-        out: run directory.
-        note: use the watchdog `Noting`.
-        steps: returns the time step of each phase [s].
-        spoil: function that changes the engine before each record.
+    `note` uses the watchdog `Noting`; `steps` returns the time step of each phase [s]; `spoil` changes the engine
+    before each record.
     """
     nearest: dict[str, float] = {}
     checks: list[float] = []  # processor time of each check of the watchdog [s]
