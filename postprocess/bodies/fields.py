@@ -229,11 +229,7 @@ def fields_of(run: Run) -> tuple[Field, ...]:
 
 
 def checked_field(name: str, aliases: Mapping[str, str] = MappingProxyType({})) -> Field:
-    """Return the field with a name, or with a short name among `aliases`.
-
-    Raises:
-        InputError: The name is unknown.
-    """
+    """Return the field with a name, or with a short name among `aliases`; InputError if it is unknown."""
     field = BY_NAME.get(aliases.get(name, name))
     if field is None:
         raise InputError(f"{name!r} is no field; {nearest(name, [*aliases, *BY_NAME], cutoff=0.5)}")

@@ -81,10 +81,7 @@ class RunBoundaries:
     def raised(self, time: float, phase: int, top: float) -> float | None:
         """Return the height by which the wall has been lifted [m]; None if there is no wall any more.
 
-        Args:
-            time: [s].
-            phase: Index of the phase.
-            top: Height of the pile above the floor [m]; a wall lifted above this height counts as removed.
+        A wall that has been lifted above the top of the pile, a height above the floor [m], counts as removed.
         """
         if self.removal is None or phase < self.removal:
             return 0.0
@@ -96,11 +93,7 @@ class RunBoundaries:
 
 
 def read_boundaries(run: Run) -> RunBoundaries:
-    """Read walls and strings of a run from its scene and its series.
-
-    Raises:
-        InputError: `scene.yaml` or `series.h5` is damaged or lacks a key.
-    """
+    """Read walls and strings of a run from its scene and its series."""
     scene, phases = run.scene, run.scene.get("phases", ())
     series = run.series if run.has_series else None
     removal = next((phase.index for phase in run.phases if phase.type == _REMOVAL), None)
@@ -214,13 +207,7 @@ _FACES = np.array([[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2
 def checked_kinds(wanted: Sequence[str], unwanted: Sequence[str], *, also: Sequence[str] = ()) -> tuple[str, ...]:
     """Return the kinds of bodies to export: `USUAL` and the wanted kinds, without the unwanted kinds.
 
-    Args:
-        wanted: Kinds to add.
-        unwanted: Kinds to leave out.
-        also: Other names that `unwanted` may contain.
-
-    Raises:
-        InputError: A kind is unknown, or none is left.
+    `unwanted` may also contain the names in `also`. InputError if a kind is unknown, or none is left.
     """
     for name in (*wanted, *(name for name in unwanted if name not in also)):
         if name not in KINDS:
@@ -235,14 +222,8 @@ def checked_kinds(wanted: Sequence[str], unwanted: Sequence[str], *, also: Seque
 class Bodies:
     """Makes the meshes of a run's bodies in its frames.
 
-    Args:
-        run: The run.
-        kinds: Kinds of bodies, keys of `KINDS`.
-        fields: Fields of the mesh of the smarticles.
-        cut: Whether walls end a little above the pile, as in pictures.
-
-    Raises:
-        InputError: The scene or the series is damaged, or forces are wanted and not recorded.
+    Kinds are keys of `KINDS`; the mesh of the smarticles has the given fields; `cut` ends walls a little above the
+    pile, as in pictures. InputError if forces are wanted and not recorded.
     """
 
     def __init__(
@@ -401,19 +382,13 @@ def link_boxes(
     """Return the boxes of all links as one mesh [m] of quadrilaterals, six per box.
 
     The cross-section of a straight smarticle may be turned around its length by any angle, which its vertices do not
-    determine; an arbitrary angle is used. Links without length have no box.
+    determine; an arbitrary angle is used. Links without length have no box. The mesh has two arrays of cell data:
+    `smarticle`, the index into the vertices (N, 4, 3) [m], and `link`, 0 to 2.
 
     Args:
-        vertices: (N, 4, 3) [m].
         thickness_normal: t1, along the normal of the smarticle's plane [m].
         thickness_in_plane: t2, in the smarticle's plane [m]: one for all links, or one each for barb 1, middle link and
             barb 2.
-
-    Returns:
-        The mesh with two arrays of cell data: `smarticle`, the index into `vertices`, and `link`, 0 to 2.
-
-    Raises:
-        InputError: Bad thicknesses.
     """
     vertices = checked_vertices(vertices)
     in_plane = np.broadcast_to(thickness_in_plane, 3)
@@ -440,8 +415,7 @@ def link_boxes(
 def owners(mesh: pv.PolyData, frame: Frame) -> tuple[Whole, Whole]:
     """Return the owners of the B boxes of a mesh, which must have the fields `IDENTITY`.
 
-    Returns:
-        Indices of the smarticles in the arrays of the frame (B,), and links (B,), 0 to 2.
+    Owners are indices of the smarticles in the arrays of the frame (B,), and links (B,), 0 to 2.
     """
     owner, link = (np.asarray(mesh.cell_data[name])[::BOX_FACES] for name in ("smarticle_id", "link"))
     order = np.argsort(frame.smarticle_ids)
@@ -466,14 +440,8 @@ def force_lines(forces: RecordedForces) -> pv.PolyData:
 def solid(kind: str, mesh: pv.PolyData, run: Run, *, largest: float | None = None) -> pv.PolyData:
     """Return the mesh of a kind of body as triangles, with solids in place of lines and points.
 
-    Strings become tubes, a fifth as thick as a link; crossings become arrows of length w/3; forces become tubes, at
-    most as thick as a link, with a thickness proportional to the normal force.
-
-    Args:
-        kind: Key of `KINDS`.
-        mesh: Mesh of this kind by `Bodies.at`.
-        run: The run, which gives the sizes.
-        largest: Normal force of the thickest tube [N]; the largest of the mesh if not given.
+    Strings become tubes, a fifth as thick as a link; crossings become arrows of length w/3; forces become tubes, with a
+    thickness proportional to the normal force: that of a link for the `largest` one [N], by default that of the mesh.
     """
     thin = min(run.manifest.thickness_in_plane_m, run.manifest.thickness_normal_m)
     if kind == "strings":

@@ -77,8 +77,7 @@ def bounding_spheres(vertices: Floats) -> tuple[Floats, Floats]:
 def close_pairs(vertices: Floats) -> tuple[Whole, Whole]:
     """Find the pairs of smarticles whose bounding spheres overlap; others neither touch nor cross.
 
-    Returns:
-        The lower indices (P,) and the higher indices (P,).
+    Returns the lower indices (P,) and the higher indices (P,).
     """
     if len(vertices) < 2:
         return np.empty(0, dtype=np.int64), np.empty(0, dtype=np.int64)

@@ -67,11 +67,6 @@ def outlines(
         thickness: Diameter of the links, taken as round [m].
         ball: Radius of the ball [m]; see `BALL`.
         pitch: Side of a voxel [m]; a fourth of the ball's radius if not given.
-        regions: Cylinders that the grid must contain besides the piles.
-
-    Raises:
-        InputError: A size is not above 0, or the grid would exceed 40 million voxels.
-        UndefinedMeasureError: There is no pile, or a pile without a smarticle.
     """
     checked = [checked_vertices(vertices) for vertices in piles]
     pitch = ball / FINENESS if pitch is None else pitch

@@ -50,7 +50,6 @@ def local_packing(
             small spacings in piles of 270.
 
     Raises:
-        InputError: The spacing is not above 0.
         UndefinedMeasureError: No smarticle in the region, or one of them has no closed cell.
 
     Source:
@@ -118,15 +117,12 @@ def _mirrored(points: Floats, container: Region, lid: float, band: float) -> Flo
 
 
 def _cell_volumes(points: Floats, count: int, *, reach: float, together: int = TOGETHER) -> Floats:
-    """Compute the Voronoi volumes of the first `count` points among points (n, 3) [m].
+    """Compute the Voronoi volumes (count,) [m³] of the first `count` points among points (n, 3) [m].
 
     The points are divided into slabs along x; the cells of a slab are computed among all points within a reach [m] of
     the slab. A cell is final if the spheres around its corners that pass through its point lie inside this region: they
     must hold no other point. The remaining cells are computed again among all points within twice the reach of them,
-    and so on, until the reach is twice the distance of their farthest corner.
-
-    Returns:
-        (count,) [m³]; infinite for open cells.
+    and so on, until the reach is twice the distance of their farthest corner. Open cells are infinite.
     """
     if count <= together:
         return _cells(points)[0][:count]
@@ -153,11 +149,9 @@ def _cells(points: Floats) -> tuple[Floats, Floats, Floats, Floats]:
     """Compute the Voronoi cells of points (n, 3) [m].
 
     A cell is the union of pyramids with their apex at its point and a face as base; the height of a pyramid is half the
-    distance to the neighbour behind the face.
-
-    Returns:
-        Volumes (n,) [m³], infinite for open cells; distances (n,) of the farthest corner from the point [m]; least and
-        greatest x (n,) of the spheres around the corners through the point [m].
+    distance to the neighbour behind the face. Returns volumes (n,) [m³], infinite for open cells; distances (n,) of the
+    farthest corner from the point [m]; least and greatest x (n,) of the spheres around the corners through the point
+    [m].
     """
     diagram = Voronoi(points)
     pairs = np.asarray(diagram.ridge_points)

@@ -88,8 +88,7 @@ class CollapseTime:
 def vibration(run: Run) -> Vibration:
     """Find the first phase of a run that shakes the floor after the wall was removed.
 
-    Raises:
-        InputError: The run has no such phase, or the scene lacks its acceleration or frequency.
+    InputError if the run has no such phase.
     """
     kinds = [phase.type for phase in run.phases]
     after = kinds.index("remove-container") if "remove-container" in kinds else len(kinds)
@@ -107,13 +106,7 @@ def vibration(run: Run) -> Vibration:
 def column_history(run: Run, definition: str, shaken: Vibration) -> ColumnHistory:
     """Read a column's heights from the phase before its vibration to the end of the vibration.
 
-    Args:
-        run: A finished run.
-        definition: Key of `HEIGHTS`.
-        shaken: The vibration, see `vibration`.
-
-    Raises:
-        InputError: The run lacks its series or frames, or samples before the vibration.
+    The definition is a key of `HEIGHTS`. InputError if the run has no samples before the vibration.
     """
     times, heights = _core(run, shaken) if definition == CORE else _of_series(run, definition, shaken)
     assert shaken.phase.start_s is not None  # the run is finished
@@ -131,8 +124,7 @@ def column_history(run: Run, definition: str, shaken: Vibration) -> ColumnHistor
 def height_with_the_wall(run: Run) -> float:
     """Return the height of the centre of mass at the last sample before the wall was removed [m].
 
-    Raises:
-        InputError: The run lacks its series, or samples before the wall was removed.
+    InputError if the run has no samples before the wall was removed.
     """
     series = run.series
     removal = [phase.type for phase in run.phases].index("remove-container")
@@ -167,28 +159,16 @@ def _core(run: Run, shaken: Vibration) -> tuple[Floats, Floats]:
 def collapse_of(history: ColumnHistory, definition: str, shaken: Vibration) -> CollapseTime:
     """Fit the collapse time of a column to its heights, averaged over each period of the vibration.
 
-    Args:
-        history: Heights of the column.
-        definition: Key of `HEIGHTS` by which the heights were read.
-        shaken: The vibration.
-
-    Raises:
-        InputError: The samples are too few, or the vibration too short.
+    The definition is the key of `HEIGHTS` by which the heights were read.
     """
     times, heights = period_means(history.times, history.heights, shaken.frequency)
     return collapse_time(times, heights, **_KNOWN_ENDS.get(definition, {}))
 
 
 def period_means(times: Floats, values: Floats, frequency: float) -> tuple[Floats, Floats]:
-    """Average samples over each period of a vibration that begins at time 0.
+    """Average values (n,) over each period of a vibration that begins at time 0, of a frequency [Hz].
 
-    Args:
-        times: (n,) times of the samples [s]; samples up to time 0 are left out.
-        values: (n,) values of the samples.
-        frequency: Frequency of the vibration [Hz].
-
-    Returns:
-        Mean times (m,) [s] and mean values (m,) of the m periods that have a sample.
+    Samples up to time 0 are left out. Returns mean times (m,) [s] and mean values (m,) of the m periods with a sample.
     """
     # A sample at the end of a period belongs to this period.
     period = np.ceil(times * frequency - 1e-6).astype(np.int64)

@@ -79,9 +79,6 @@ def pairs_in_contact(frame: Frame, run: Run) -> ContactPairs:
 
     Returns:
         The pairs, with the least distance of two sphere centres or of two strands' axes.
-
-    Raises:
-        InputError: The scene of the run cannot be read.
     """
     vertices, chain = checked_vertices(frame.vertices), chain_of(run)
     if chain.pitch > 0:
@@ -93,11 +90,7 @@ def pairs_in_contact(frame: Frame, run: Run) -> ContactPairs:
 
 
 def chain_of(run: Run) -> Chain:
-    """Return the sphere chain or strands by which the engine of a run represents a smarticle.
-
-    Raises:
-        InputError: The scene of the run cannot be read.
-    """
+    """Return the sphere chain or strands by which the engine of a run represents a smarticle."""
     fidelity = run.scene.get("fidelity")
     rows = 1 if fidelity is None else fidelity["rows"]
     pitch = 1.0 if fidelity is None else fidelity["pitch"]

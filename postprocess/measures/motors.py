@@ -33,19 +33,13 @@ _NEAR = 1e-3  # largest deviation of a frame from its time, over the interval; f
 
 
 def sampled_work(angles: Floats, torques: Floats) -> float:
-    """Compute the sampled work [J]: the sum of τ Δα over all barbs and samples.
+    """Compute the sampled work [J]: the sum of τ Δα over all barbs and samples; NaN below two samples.
 
-    Δα is the change of the angle since the previous sample.
+    Δα is the change of the angle since the previous sample. InputError if the arrays differ in shape.
 
     Args:
         angles: (samples, N, 2) angles of the barbs [rad].
         torques: (samples, N, 2) torques of their motors [N m].
-
-    Returns:
-        The work [J]; NaN for fewer than two samples.
-
-    Raises:
-        InputError: The two arrays differ in shape.
 
     Example:
         >>> import numpy as np

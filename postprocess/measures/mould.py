@@ -50,10 +50,6 @@ def cast(
         tiers: The T cylinders of the mould, from the lowest, heights above the floor.
         thickness: Diameter of the links, taken as round [m].
         ball: Radius of the ball with which the outlines are found [m].
-
-    Raises:
-        InputError: Bad sizes.
-        UndefinedMeasureError: There is no smarticle, or a tier is smaller than a voxel.
     """
     grid = outlines([before, after], thickness=thickness, ball=ball, regions=tiers)
     with_mould, without_mould = grid.inside
@@ -73,13 +69,7 @@ def cast(
 
 
 def read_tiers(run: Run) -> tuple[Region, ...]:
-    """Return the tiers of a run's mould from the lowest; empty if the container is one cylinder.
-
-    Heights are above the floor.
-
-    Raises:
-        InputError: The scene is missing or damaged, or a tier lacks its sizes.
-    """
+    """Return the tiers of a run's mould from the lowest, in heights above the floor; empty for a cylinder."""
     container = run.scene.get("container")
     found, bottom = [], 0.0
     for tier in (container or {}).get("tiers") or ():

@@ -97,11 +97,7 @@ def read_pull(run: Run, series: Series, phase: int) -> HookPull:
 
 
 def weight_of_one(run: Run) -> float:
-    """Return the weight of one smarticle, W_s [N].
-
-    Raises:
-        InputError: The scene cannot be read, or has no gravity.
-    """
+    """Return the weight of one smarticle, W_s [N]."""
     return float(run.manifest.smarticle_mass_kg * run.scene["gravity_m_per_s2"])
 
 
@@ -139,15 +135,9 @@ def freed(pull: HookPull) -> float:
 
 
 def held_fast(pull: HookPull, asked: SceneData) -> bool:
-    """Return whether the force limit stopped the hook of a finished pull.
+    """Return whether the force limit stopped the hook of a finished pull: the peak is a lower bound then.
 
-    The peak force is then a lower bound.
-
-    Args:
-        asked: The phase in the scene.
-
-    Raises:
-        InputError: The phase has a force limit and lacks `distance_m`.
+    `asked` is the phase in the scene.
     """
     if asked.get("force_limit_N") is None:
         return False  # nothing else stops a hook

@@ -99,8 +99,7 @@ def in_space(run: Run) -> bool:
 def registered() -> tuple[FrameMeasure | PhaseMeasure, ...]:
     """Return all measures of this package, in alphabetical order of their modules.
 
-    Raises:
-        ValueError: Two measures have one name, or two quantities one header.
+    ValueError if two measures have one name, or two quantities one header.
     """
     package = import_module(_PACKAGE)
     modules = [import_module(f"{_PACKAGE}.{found.name}") for found in pkgutil.iter_modules(package.__path__)]

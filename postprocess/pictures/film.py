@@ -58,8 +58,6 @@ class FilmTimes:
             start: Simulated time of the first picture [s]; that of the first frame if not given.
             end: Simulated time at which the film ends [s]; that of the last frame if not given.
             every: Simulated time between two pictures [s]; if not given, a multiple of the recorded interval.
-            rate: Pictures per second of playing time [1/s].
-            most: Largest number of pictures if `every` is not given.
 
         Raises:
             InputError: Fewer than two frames or pictures, or an argument out of its range.
@@ -110,8 +108,7 @@ def durations(count: int, rate: float, unit: float) -> list[int]:
 def check_film(path: Path, size: tuple[int, int]) -> None:
     """Check that a film of this size [pixel] can be written to a path.
 
-    Raises:
-        InputError: The encoder of `.mp4` is missing, or the size is odd for `.mp4`.
+    InputError if the encoder of `.mp4` is missing, or the size is odd for `.mp4`.
     """
     if path.suffix != ".mp4":
         return

@@ -176,14 +176,7 @@ def render_film(
 def turntable(directory: Path | str, *, views: int = 24, size: int = 560) -> list[Image.Image]:
     """Draw the last frame of a run from `views` directions all around, at equal angles.
 
-    Args:
-        directory: A run directory with at least one frame.
-        views: Number of pictures.
-        size: Width and height of a picture [pixel].
-
-    Raises:
-        InputError: There is no frame, or it is damaged.
-        RunError: This machine lacks the libraries to draw without a display.
+    Pictures are `size` wide and high [pixel].
     """
     subject = Subject(directory)
     index, frame = len(subject.frames) - 1, subject.frames[-1]
@@ -213,13 +206,8 @@ def pictures(
 ) -> Iterator[Image.Image]:
     """Yield pictures of runs side by side, with one camera and one colour scale.
 
-    Args:
-        subjects: The runs.
-        indices: Indices of the frames of each run, one per picture.
-        style: Style of the pictures.
-        limits: Ends of the colour scale.
-        quick: Whether to leave out the shading of corners.
-        pace: Speed of a film, for the caption.
+    Each run has the indices of its frames, one per picture. `quick` leaves out the shading of corners; `pace` is the
+    speed of a film, for the caption.
     """
     titles = titles_of([subject.run for subject in subjects])
     pairs = list(zip(subjects, indices, strict=True))
@@ -261,10 +249,7 @@ def _span(subjects: Sequence[Subject], values: Sequence[dict[int, Floats]], styl
 def common_times(subjects: Sequence[Subject]) -> Floats:
     """Return the times [s] of one run's frames in the interval common to all runs.
 
-    This run has the fewest frames in the interval.
-
-    Raises:
-        InputError: The runs have no common interval.
+    This run has the fewest frames in the interval. InputError if the runs have no common interval.
     """
     low = max(float(subject.frames.times[0]) for subject in subjects)
     high = min(float(subject.frames.times[-1]) for subject in subjects)
@@ -365,14 +350,9 @@ def titles_of(runs: Sequence[Run]) -> list[str]:
 
 
 def caption_of(frame: Frame, run: Run, *, title: str, pace: str = "", force: float | None = None) -> list[str]:
-    """Return the lines of the caption of a frame.
+    """Return the lines of the caption of a frame; the title is the first.
 
-    Args:
-        frame: The frame.
-        run: Its run.
-        title: First line.
-        pace: Speed of a film.
-        force: Normal force of the thickest line [N]; None: no forces are drawn.
+    `pace` is the speed of a film, `force` the normal force of the thickest line [N], None if no forces are drawn.
     """
     count = f"{run.manifest.count}" if frame.count == run.manifest.count else f"{frame.count} of {run.manifest.count}"
     phase = run.phases[frame.phase].type if frame.phase < len(run.phases) else "?"

@@ -25,22 +25,10 @@ class Row:
 
 
 def draw_strip(rows: Sequence[Row], output: Path, *, columns: Sequence[str], footer: Sequence[str]) -> Path:
-    """Draw a row of pictures for each run, and write them as one figure.
+    """Draw a row of pictures for each run, and write them as one figure, a `.png`; return its path.
 
-    A smarticle has one colour in all pictures of a run.
-
-    Args:
-        rows: The rows, with one time per column.
-        output: File to write, `.png`.
-        columns: Titles of the columns.
-        footer: Lines below the pictures.
-
-    Returns:
-        Path of the written file.
-
-    Raises:
-        InputError: A run has no frames.
-        RunError: This machine lacks the libraries to draw without a display.
+    A row has one time per column. A smarticle has one colour in all pictures of a run. The footer is below the
+    pictures.
     """
     subjects = [Subject(row.directory) for row in rows]
     style = Style.of([subject.run for subject in subjects[:1]], color_by="id", size=_SIZE, view="front")

@@ -137,12 +137,9 @@ def _fitting(lines: Sequence[str], columns: int, most: int) -> list[str]:
 
 
 def save(figure: Figure, path: Path, *, formats: Sequence[str] = ("png", "svg", "pdf")) -> list[Path]:
-    """Write a figure to one file per format, whose name is the path with the format as suffix.
+    """Write a figure to one file per format; return the paths: the given path with the format as suffix.
 
     The files contain no date, so that equal figures have equal bytes.
-
-    Returns:
-        Paths of the written files.
     """
     dates: dict[str, dict[str, None]] = {"svg": {"Date": None}, "pdf": {"CreationDate": None, "ModDate": None}}
     written = []
@@ -174,11 +171,7 @@ def whole_file(path: Path, *, overwrite: bool = True) -> Iterator[Path]:
 
 
 def reject_existing(path: Path, *, overwrite: bool) -> None:
-    """Check that an output does not exist, unless it may be replaced.
-
-    Raises:
-        InputError: the file exists and `overwrite` is false.
-    """
+    """Check that an output does not exist, unless it may be replaced; InputError if it does."""
     if path.exists() and not overwrite:
         msg = f"{path}: exists already and is left as it is; choose another name, or let it be replaced (--overwrite)"
         raise InputError(msg)
@@ -187,9 +180,7 @@ def reject_existing(path: Path, *, overwrite: bool) -> None:
 def sequence(colours: int, *, last: float = 1.0) -> list[str]:
     """Return hexadecimal colours of viridis from dark to light, brightened so that shading is visible.
 
-    Args:
-        colours: Number of colours.
-        last: Position of the last colour in the map, up to 1.
+    `last` is the position of the last colour in the map, up to 1.
     """
     steps = [0.16 + (last - 0.16) * i / max(colours - 1, 1) for i in range(colours)]
     plain = np.array([matplotlib.colormaps["viridis"](step)[:3] for step in steps])
@@ -202,10 +193,8 @@ _MARGIN = 0.03  # space between the data and a widened limit, over the length of
 def hold_everything(figure: Figure) -> list[str]:
     """Widen the limits of axes that would cut lines, error bars or bands; call this before `add_footer`.
 
-    A logarithmic axis cannot show values at or below 0: error bars that reach there are cut.
-
-    Returns:
-        Statements for the footer about error bars that are cut.
+    A logarithmic axis cannot show values at or below 0: error bars that reach there are cut. Statements about them for
+    the footer are returned.
     """
     cut = 0
     for axes in figure.axes:

@@ -93,11 +93,7 @@ def format_with_error(value: float, form: str, error: float = math.nan) -> str:
 
 
 def pairs(one: pd.DataFrame, other: pd.DataFrame, quantity: str) -> pd.DataFrame:
-    """Join a quantity of two tables of runs by aspect ratio and seed.
-
-    Returns:
-        One row per pair of runs: aspect ratio, seed, and the quantity in the columns `one` and `other`.
-    """
+    """Join a quantity of two tables of runs by aspect ratio and seed, as the columns `one` and `other`."""
     keys = [ASPECT, SEED]
     left = one[[*keys, quantity]].rename(columns={quantity: "one"})
     right = other[[*keys, quantity]].rename(columns={quantity: "other"})

@@ -121,13 +121,8 @@ def common_slopes(x: Floats, y: Floats, strata: Whole) -> Floats:
 def resamples(blocks: Whole, strata: Whole, *, count: int, seed: int) -> Iterator[Whole]:
     """Yield `count` bootstrap resamples of a table, as indices of rows.
 
-    A resample has as many blocks of each stratum as the table, drawn with replacement.
-
-    Args:
-        blocks: (n,) block of each row; a block lies in one stratum.
-        strata: (n,) stratum of each row.
-        count: Number of resamples.
-        seed: Seed of the random numbers.
+    A resample has as many blocks of each stratum as the table, drawn with replacement. Each row has a block (n,) and a
+    stratum (n,); a block lies in one stratum.
     """
     random = np.random.default_rng(seed)
     rows = {block: np.nonzero(blocks == block)[0] for block in np.unique(blocks)}
@@ -140,9 +135,7 @@ def resamples(blocks: Whole, strata: Whole, *, count: int, seed: int) -> Iterato
 def interval(value: float, drawn: Sequence[float]) -> Interval:
     """Return a value with its 95 % interval, by percentiles of resampled values.
 
-    Args:
-        value: The value of the data.
-        drawn: The values of the resamples. If more than a tenth of them are not finite, the interval is NaN.
+    If more than a tenth of the resampled values are not finite, the interval is NaN.
     """
     known = np.asarray(drawn, dtype=np.float64)
     known = known[np.isfinite(known)]

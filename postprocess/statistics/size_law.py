@@ -79,9 +79,7 @@ class SizeLaw:
 def scatter_of(counts: Floats, values: Floats) -> Scatter:
     """Fit the variance from seed to seed by maximum likelihood.
 
-    Args:
-        counts: (n,) number of smarticles of each run.
-        values: (n,) finite values of the quantity.
+    Counts (n,) are the numbers of smarticles of each run, values (n,) its finite values of the quantity.
     """
     sizes, place = np.unique(counts, return_inverse=True)
     members = np.bincount(place)
@@ -101,9 +99,7 @@ def scatter_of(counts: Floats, values: Floats) -> Scatter:
 def size_law(counts: Floats, values: Floats) -> SizeLaw:
     """Fit q = q_∞ + a N^(-1/3) to runs with at least two distinct N.
 
-    Args:
-        counts: (n,) number of smarticles of each run.
-        values: (n,) finite values of the quantity.
+    Counts (n,) are the numbers of smarticles of each run, values (n,) its finite values of the quantity.
     """
     scatter = scatter_of(counts, values)
     bulk, slope, left = _fit(counts, values, scatter, POWER)
@@ -190,15 +186,9 @@ class Profile:
 
 
 def profiles(x: Floats, having: Floats, groups: NDArray[np.int64]) -> dict[int, Profile]:
-    """Compute the profile likelihood of the threshold x_c for each group of runs.
+    """Compute the profile likelihood of the threshold x_c for each group of runs, at common values of x_c.
 
-    Args:
-        x: (n,) finite x of each run.
-        having: (n,) 1 if a run has the property, else 0.
-        groups: (n,) group of each run, such as its size.
-
-    Returns:
-        The profiles by group, at common values of x_c.
+    Runs have a finite x (n,), 1 in `having` (n,) if a run has the property, else 0, and a group (n,), such as its size.
     """
     span = float(np.ptp(x)) or 1.0
     places = np.linspace(x.min() - span / 2, x.max() + span / 2, _PLACES)
