@@ -440,14 +440,6 @@ FINDINGS = (
 )
 
 
-def _shown(points: pd.DataFrame) -> pd.DataFrame:
-    return points[points[STAGE].isin(STAGES)]
-
-
-def _gravish(points: pd.DataFrame) -> dict[str, float]:
-    return {f"Gravish, {stage}": gravish_at(points[ASPECT].iloc[0], stage) for stage in ("phi_0", "phi_f")}
-
-
 def _crosses(tables: Mapping[str, pd.DataFrame], aspect: float) -> pd.DataFrame:
     """Return friction (`x`, `low`, `high`) and φ (`y`) [-] at which φ_0 and φ_f of one l/w are Gravish's."""
     found = tables["crossings"]
@@ -473,9 +465,11 @@ STUDY = Study(
             x=FRICTION,
             x_label=r"coefficient of friction $\mu$ [-]",
             split=one_by_one(STAGE, str),
-            rows=_shown,
+            rows=lambda points: points[points[STAGE].isin(STAGES)],
             panels=ASPECT,
-            levels=_gravish,
+            levels=lambda points: {
+                f"Gravish, {stage}": gravish_at(points[ASPECT].iloc[0], stage) for stage in ("phi_0", "phi_f")
+            },
             share_y=True,
             crosses=_crosses,
             bars=POOLED,

@@ -517,10 +517,6 @@ def _bought(table: pd.DataFrame) -> list[Series]:
     return [*one_by_one(THETA, "internal, θ = {:g}°".format)(_swung(table)), *others]
 
 
-def _poured(points: pd.DataFrame) -> dict[str, float]:
-    return {"poured": float(points.loc[points[PROCEDURE] == STATIC, PEAK].mean())}
-
-
 def _correlations(table: pd.DataFrame) -> pd.DataFrame:
     rows = table[(table[STRENGTH] == PEAK) & (table[PART] == EVERY)]
     return pd.concat([rows[rows[SCOPE] == scope] for scope in (WITHIN, ALL)])
@@ -556,7 +552,7 @@ FIGURES = (
         quantities=[QUANTITIES[PEAK]],
         split=_bought,
         panels=ASPECT,
-        levels=_poured,
+        levels=lambda points: {"poured": float(points.loc[points[PROCEDURE] == STATIC, PEAK].mean())},
     ),
     Scatter(
         name="strength_measures",

@@ -452,11 +452,6 @@ def heights(run: Run) -> History:
     return History(times=times, values=values, active=duration(activity(run)))
 
 
-def nearest_aspect(runs: pd.DataFrame) -> pd.DataFrame:
-    """Return the runs at the aspect ratio nearest to 0.7, that of the paper's figure."""
-    return runs[runs[ASPECT] == min(runs[ASPECT].unique(), key=lambda aspect: abs(aspect - 0.7))]
-
-
 def _energy_series(points: pd.DataFrame) -> list[Series]:
     """Return a series of each procedure, and of the internal oscillation at each other amplitude."""
     internal = amplitudes(points)
@@ -499,7 +494,7 @@ STUDY = Study(
         Histories(
             name="height_time",
             history=heights,
-            rows=nearest_aspect,
+            rows=lambda runs: runs[runs[ASPECT] == min(runs[ASPECT].unique(), key=lambda aspect: abs(aspect - 0.7))],
             split=by_procedure(),
             x_label="time since the activity began [s]",
             quantities={"": r"height of the centre of mass $h/h_0$ [-]"},

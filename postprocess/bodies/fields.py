@@ -20,7 +20,7 @@ from postprocess.geometry.voxel import Region
 from postprocess.measures.clusters import Clusters, contact_graph, entanglement_clusters
 from postprocess.measures.entanglement import link_crossings
 from postprocess.measures.force_chains import force_chains
-from postprocess.measures.registry import in_space
+from postprocess.measures.registry import in_one_cylinder, in_space
 
 LINKS = 3
 
@@ -182,7 +182,7 @@ FIELDS: tuple[Field, ...] = (
         f"its volume over that of its set-Voronoi cell, of points every w/{CELLS_PER_LENGTH}; cells end at "
         "floor, wall and the pile's highest point; NaN without one cylindrical wall",
         _local_packing,
-        available_for=lambda run: in_space(run) and run.manifest.container_tiers == 1,
+        available_for=in_one_cylinder,
         costly=True,
     ),
     Field(

@@ -15,7 +15,7 @@ from postprocess.geometry.links import UndefinedMeasureError, Vertices, Whole, c
 from postprocess.measures.contacts import at_wall, contact_pairs, on_floor, pairs_in_contact
 from postprocess.measures.entanglement import crossing_pairs
 from postprocess.measures.heights import material_height
-from postprocess.measures.registry import FrameMeasure, Quantity
+from postprocess.measures.registry import FrameMeasure, Quantity, in_one_cylinder
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -107,10 +107,6 @@ def _spans_of(clusters: Clusters, frame: Frame, run: Run) -> tuple[float, float,
     return clusters.largest, float(height), float(width) if walled else math.nan
 
 
-def _in_one_cylinder(run: Run) -> bool:
-    return not run.manifest.planar and run.manifest.container_tiers == 1
-
-
 MEASURES = tuple(
     FrameMeasure(
         name=f"{name} graph",
@@ -121,7 +117,7 @@ MEASURES = tuple(
             Quantity(f"{name} graph spans width", "-"),
         ),
         take=take,
-        available_for=_in_one_cylinder,
+        available_for=in_one_cylinder,
         costly=True,
     )
     for name, take in (

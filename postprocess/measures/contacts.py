@@ -28,7 +28,7 @@ from postprocess.geometry.links import (
     strands,
     swept_axes,
 )
-from postprocess.measures.registry import FrameMeasure, Quantity, in_space
+from postprocess.measures.registry import FrameMeasure, Quantity, in_one_cylinder
 
 # Pairs of links per block, which limits memory.
 _CHUNK = 200_000
@@ -251,7 +251,6 @@ MEASURES = (
         place=52,
         quantities=(Quantity("rattlers", "-"),),
         take=_rattlers_of,
-        # The tiers of a mould have walls of several radii.
-        available_for=lambda run: in_space(run) and run.manifest.container_tiers == 1,
+        available_for=in_one_cylinder,
     ),
 )

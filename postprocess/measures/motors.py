@@ -54,14 +54,14 @@ def sampled_work(angles: Floats, torques: Floats) -> float:
     return float((torques[1:] * np.diff(angles, axis=0)).sum())
 
 
-def sampled(frames: FrameSequence, apart: float = APART) -> list[int]:
-    """Return the indices of frames at intervals of `apart` [s], from the first frame on.
+def sampled(frames: FrameSequence) -> list[int]:
+    """Return the indices of frames at intervals of `APART`, from the first frame on.
 
     The list is empty if a frame is missing at one of these times.
     """
     if not len(frames):
         return []
-    multiples = (frames.times - frames.times[0]) / apart
+    multiples = (frames.times - frames.times[0]) / APART
     chosen = np.flatnonzero(np.abs(multiples - np.round(multiples)) < _NEAR)
     complete = np.array_equal(np.round(multiples[chosen]), np.arange(len(chosen)))
     return [int(k) for k in chosen] if complete else []

@@ -95,6 +95,11 @@ def in_space(run: Run) -> bool:
     return not run.manifest.planar
 
 
+def in_one_cylinder(run: Run) -> bool:
+    """Return whether the wall of a run has one radius, unlike the tiers of a mould or a channel."""
+    return in_space(run) and run.manifest.container_tiers == 1
+
+
 @cache
 def registered() -> tuple[FrameMeasure | PhaseMeasure, ...]:
     """Return all measures of this package, in alphabetical order of their modules.

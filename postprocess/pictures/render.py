@@ -32,6 +32,7 @@ from postprocess.pictures.canvas import (
     visible_meshes,
 )
 from postprocess.report import figures
+from postprocess.report.tables import reject_existing, whole_file
 
 DEFINITION = "second-highest-com"
 """Definition of the packing fraction in captions, as in the first column of `smarticles measure`."""
@@ -97,7 +98,7 @@ def render_run(
         time = float(common_times(subjects)[-1])
     indices = [[len(subject.frames) - 1 if time is None else subject.frames.nearest(time)] for subject in subjects]
     style = Style.of([subject.run for subject in subjects], color_by=color_by, size=size, view=view)
-    figures.reject_existing(output, overwrite=overwrite)
+    reject_existing(output, overwrite=overwrite)
     if smarticle is not None:
         if compare or color_by is not None or view is not None or forces:
             msg = f"smarticle {smarticle}: is drawn alone, with its own colours and view; leave out the other options"
@@ -105,7 +106,7 @@ def render_run(
         image = _focused(subjects[0], indices[0][0], smarticle, style)
     else:
         image = next(pictures(subjects, indices, style, limits))
-    with figures.whole_file(output, overwrite=overwrite) as temporary:
+    with whole_file(output, overwrite=overwrite) as temporary:
         image.save(temporary)
     return output
 
@@ -166,9 +167,9 @@ def render_film(
         common_times(subjects), start=start, end=end, every=every, rate=frames_per_second, most=most_frames
     )
     indices = [film_times.indices(subject.frames.times) for subject in subjects]
-    figures.reject_existing(output, overwrite=overwrite)
+    reject_existing(output, overwrite=overwrite)
     images, count = pictures(subjects, indices, style, limits, quick=True, pace=film_times.pace), len(film_times.times)
-    with figures.whole_file(output, overwrite=overwrite) as temporary:
+    with whole_file(output, overwrite=overwrite) as temporary:
         film.write_film(temporary, track(images, count) if track else images, count=count, rate=film_times.rate)
     return output
 
@@ -217,8 +218,9 @@ def pictures(
     scale = ColourScale.of(style.field, _span(subjects, values, style, limits))
     force = None
     if "forces" in subjects[0].bodies.kinds:
+        each = (read_forces(subject.frames[i]).contacts.normal for subject, shown in pairs for i in shown)
         # The scale of the lines must be above 0 if no contact carries a force.
-        force = max(_largest_force(subject.frames[i]) for subject, shown in pairs for i in shown) or 1e-3
+        force = max(float(normal.max(initial=0.0)) for normal in each) or 1e-3
     in_view = union([subject.extent(shown, style.axes) for subject, shown in pairs])
     with Canvas(style, in_view, subjects[0].run, columns=len(subjects), scale=scale, quick=quick) as canvas:
         for step in zip(*indices, strict=True):
@@ -228,10 +230,6 @@ def pictures(
                 caption = caption_of(frame, subject.run, title=titles[column], pace=pace, force=force)
                 canvas.show(column, frame, meshes, scale.painted(values[column][index]), caption)
             yield canvas.image()
-
-
-def _largest_force(frame: Frame) -> float:
-    return float(read_forces(frame).contacts.normal.max(initial=0.0))
 
 
 def _span(subjects: Sequence[Subject], values: Sequence[dict[int, Floats]], style: Style, limits: Limits) -> Span:

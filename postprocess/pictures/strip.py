@@ -11,6 +11,7 @@ import numpy as np
 from postprocess.bodies.colours import ColourScale
 from postprocess.pictures.canvas import Canvas, Style, Subject, union, visible_meshes
 from postprocess.report import figures
+from postprocess.report.tables import whole_file
 
 _SIZE = (400, 400)  # of a picture with room for a caption, which is cut off [pixel]
 
@@ -61,6 +62,6 @@ def draw_strip(rows: Sequence[Row], output: Path, *, columns: Sequence[str], foo
             if number % len(columns) == 0:
                 axes.set_ylabel(rows[number // len(columns)].label)
         figures.add_footer(figure, [f"A picture is {width:.3g} mm wide.", *footer])
-        with figures.whole_file(output) as temporary:
+        with whole_file(output) as temporary:
             figure.savefig(temporary, format="png", dpi=130)
     return output

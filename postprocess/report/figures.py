@@ -14,8 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from dem.errors import InputError, RunError
-from dem.record.files import whole
+from postprocess.report.tables import whole_file
 
 with warnings.catch_warnings():
     # A system-wide mpl_toolkits may hide that of the environment; no figure here is three-dimensional.
@@ -149,32 +148,6 @@ def save(figure: Figure, path: Path, *, formats: Sequence[str] = ("png", "svg", 
             figure.savefig(temporary, format=suffix, metadata=dates.get(suffix))
         written.append(target)
     return written
-
-
-@contextmanager
-def whole_file(path: Path, *, overwrite: bool = True) -> Iterator[Path]:
-    """Yield a temporary path, and rename this file to `path` when the block ends without an error.
-
-    Raises:
-        InputError: The file exists and must not be replaced, or its folder does not exist.
-        RunError: The disk is full, or the folder cannot be written.
-    """
-    reject_existing(path, overwrite=overwrite)
-    if not path.parent.is_dir():
-        raise InputError(f"{path}: the folder {path.parent} does not exist: create it or choose another output")
-    try:
-        with whole(path, shared=True) as temporary:
-            yield temporary
-    except OSError as error:  # whose text may name the temporary file
-        msg = f"{path}: cannot be written ({error.strerror or error}); free space or choose another output"
-        raise RunError(msg) from error
-
-
-def reject_existing(path: Path, *, overwrite: bool) -> None:
-    """Check that an output does not exist, unless it may be replaced; InputError if it does."""
-    if path.exists() and not overwrite:
-        msg = f"{path}: exists already and is left as it is; choose another name, or let it be replaced (--overwrite)"
-        raise InputError(msg)
 
 
 def sequence(colours: int, *, last: float = 1.0) -> list[str]:

@@ -88,15 +88,11 @@ def correlation_within(x: Sequence[float], y: Sequence[float], blocks: Sequence[
     for across, up, block in zip(x, y, blocks, strict=True):
         if not (math.isnan(across) or math.isnan(up)):
             parts.setdefault(block, []).append((across, up))
-    each = [_correlation(np.array(part, dtype=np.float64)) for part in parts.values()]
-    mean = mean_over_seeds([one for one in each if math.isfinite(one)])
-    return mean if mean.count >= _COINS else replace(mean, standard_error=math.nan, half_width=math.nan)
-
-
-def _correlation(part: Floats) -> float:
-    one = np.zeros(len(part), dtype=np.int64)
+    arrays = (np.array(part, dtype=np.float64) for part in parts.values())
+    each = (rank_correlations(part[:, :1], part[:, 1], np.zeros(len(part), dtype=np.int64)) for part in arrays)
     # Rounded, so that a correlation of 0 is not printed as 1e-17.
-    return round(float(rank_correlations(part[:, :1], part[:, 1], one)[0]), 12)
+    mean = mean_over_seeds([round(float(one[0]), 12) for one in each])
+    return mean if mean.count >= _COINS else replace(mean, standard_error=math.nan, half_width=math.nan)
 
 
 def common_slopes(x: Floats, y: Floats, strata: Whole) -> Floats:

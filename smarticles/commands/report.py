@@ -42,7 +42,7 @@ def write_report(arguments: argparse.Namespace) -> int:
     Raises:
         InputError: wrong name of the output, unreadable table of errors, or an unknown kind of directory.
     """
-    from postprocess.report.figures import whole_file  # noqa: PLC0415
+    from postprocess.report.tables import whole_file  # noqa: PLC0415
 
     directory: Path = arguments.directory
     output: Path = arguments.output or directory / "report.html"

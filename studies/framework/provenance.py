@@ -14,8 +14,7 @@ import pandas as pd
 from dem.errors import InputError
 from postprocess.measures.packing import DEFINITIONS
 from postprocess.measures.table import LAST_FRAMES
-from postprocess.report.figures import whole_file
-from postprocess.report.tables import table_lines
+from postprocess.report.tables import table_lines, whole_file
 from studies.framework.runs import DEFINITION, Collected
 
 
