@@ -36,8 +36,7 @@ from studies.framework.study import Study
 
 COUNT, RADIUS = "smarticles [-]", "container radius over w [-]"
 BEFORE, AFTER = "before", "after"
-STAGES = {BEFORE: "phi_0", AFTER: "phi_f"}
-"""Symbol of φ of the pile at rest, by stage: before and after the shake."""
+STAGES = {BEFORE: "phi_0", AFTER: "phi_f"}  #: Symbol of φ of the pile at rest, by stage: before and after the shake
 
 DEFINITIONS = (DEFINITION, "top-percentile", "voxel")
 """Definitions of φ: that of the paper, one whose height does not depend on single smarticles, and one of the inside."""
@@ -46,8 +45,7 @@ MOVING = f"phi_f shaken {DEFINITION} [-]"
 WINDOW = 1.0  #: Time at the end of the shake over which φ is averaged [s]: 30 periods
 
 PHASES = ("deposit", "relax", "shake", "relax")
-PAPER_ASPECT, PAPER_COUNT = 0.7, 270
-"""l/w and number of smarticles of the paper's pile whose finite size is judged."""
+PAPER_ASPECT, PAPER_COUNT = 0.7, 270  #: l/w and number of smarticles of the paper's pile whose finite size is judged
 
 LARGEST = 0.2  #: Greatest l/w of the runs that the percolation threshold is fitted to
 
@@ -101,8 +99,7 @@ SCALED = (
     *(phi(stage, one) for stage in STAGES for one in DEFINITIONS),
     MOVING,
     *(crossings(stage) for stage in STAGES),
-)
-"""Columns that the law q_∞ + a N^(-1/3) is fitted to."""
+)  #: Columns that the law q_∞ + a N^(-1/3) is fitted to
 
 ASKED = {
     phi(BEFORE): ("φ_0", ".4f", "phi-0"),
@@ -110,8 +107,7 @@ ASKED = {
     phi(AFTER, "voxel"): ("φ_f by voxels of the inside", ".4f", "phi-f-inside"),
     crossings(BEFORE): ("⟨N⟩_0", ".3f", "crossings-0"),
     crossings(AFTER): ("⟨N⟩_f", ".3f", "crossings-f"),
-}
-"""Symbol, format and name in ids of findings of the quantities that are judged, by column."""
+}  #: Symbol, format and name in ids of findings of the quantities that are judged, by column
 
 
 def measure(run: Run) -> Row:

@@ -65,8 +65,7 @@ COMPARED = {
     "phi 10 s": "phi_f",
     "phi_f": "phi_f",
     "phi_f relaxed": "phi_f relaxed",
-}
-"""Stage of Gravish's that each of our stages is compared with: φ after 5 and 10 s too is compared with their φ_f."""
+}  #: Stage of Gravish's that each of our stages is compared with: φ after 5 and 10 s too is compared with their φ_f
 
 # Sets of stages that a finding asks to be near Gravish's at one friction, by their name.
 JUDGED: dict[str, Sequence[str]] = {

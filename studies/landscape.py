@@ -81,8 +81,7 @@ PREDICTORS = {
     HEIGHT: "height of the centre of mass",
     ABOVE: "share above the hook",
     ENERGY: "energy spent",
-}
-"""Measures of the pile at rest before the pull that may predict strength: names in texts by column."""
+}  #: Measures of the pile at rest before the pull that may predict strength: names in texts by column
 
 STRENGTHS = {PEAK: "strength", BEYOND: "strength beyond the weight above the hook"}
 

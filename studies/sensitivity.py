@@ -34,8 +34,7 @@ VARIANTS = (
     "pitch-1.0",
     "pitch-0.5",
     "two-rows",
-)
-"""Variants in the order of the sweeps."""
+)  #: Variants in the order of the sweeps
 
 COMPARED = {"phi_0": phi("phi_0"), "phi_f": phi("phi_f"), "crossings after": "crossings after [-]"}
 QUANTITIES = declare(

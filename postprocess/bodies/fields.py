@@ -217,8 +217,7 @@ FIELDS: tuple[Field, ...] = (
             ("halted", "-", "1 if the motor at the barb's hinge is halted, else 0; scenes that actuate"),
         )
     ),
-)
-"""All fields, in the order of tables."""
+)  #: All fields, in the order of tables
 
 BY_NAME: Mapping[str, Field] = MappingProxyType({field.name: field for field in FIELDS})
 

@@ -189,8 +189,7 @@ KINDS: Mapping[str, str] = MappingProxyType(
         "crossings": "on request: a point and a vector for each link that passes through a smarticle's plane",
         "forces": "on request: lines from centre to contact to centre, where the run records forces",
     }
-)
-"""Kinds of bodies with their descriptions."""
+)  #: Kinds of bodies with their descriptions
 
 ON_REQUEST = ("crossings", "forces")
 USUAL = tuple(kind for kind in KINDS if kind not in ON_REQUEST)

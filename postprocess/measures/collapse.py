@@ -33,8 +33,7 @@ HEIGHTS: Mapping[str, str] = MappingProxyType(
         CORE: "height of the centre of mass of the smarticles within the container's radius, over its height before "
         "vibration; from frames",
     }
-)
-"""Definitions of a column's height by name, each relative to the height before vibration."""
+)  #: Definitions of a column's height by name, each relative to the height before vibration
 
 _KNOWN_ENDS: Mapping[str, Mapping[str, float]] = MappingProxyType({REMAINING: {"start": 1.0, "end": 0.0}})
 """Start and end of the fitted curve [-] for heights of which they are known: in the end all smarticles have left. The

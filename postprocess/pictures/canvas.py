@@ -37,8 +37,7 @@ from postprocess.report import figures
 
 VIEWS: Mapping[str, tuple[float, float]] = MappingProxyType(
     {"front": (-90.0, 14.0), "oblique": (-62.0, 34.0), "top": (-90.0, 90.0)}
-)
-"""Named views: azimuth and elevation of the camera from the centre of the pile [degree]."""
+)  #: Named views: azimuth and elevation of the camera from the centre of the pile [degree]
 
 MILLIMETRE = 1e3  #: Factor from m to mm, the unit of all drawing: VTK's tolerances do not suit centimetres in m
 

@@ -39,8 +39,7 @@ CRITERION = (
     "A finding is found where it holds beyond the 95 % half-width (Student's t) of the scatter over pairs or runs, "
     "not found where the opposite does, not resolved in between; where nothing holds at all, "
     "one verdict in forty is still `found`"
-)
-"""Definition of the verdicts, for footers of figures and tables."""
+)  #: Definition of the verdicts, for footers of figures and tables
 
 
 def judge(effect: SeedMean, *, threshold: float = 0.0) -> Verdict:

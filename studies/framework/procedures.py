@@ -29,8 +29,7 @@ STATIC, EXTERNAL, SHAPE, INTERNAL = "static", "external", "shape-change", "inter
 ORDER = (STATIC, EXTERNAL, SHAPE, INTERNAL)
 PROCEDURES: Mapping[str, str] = MappingProxyType(
     {"shake": EXTERNAL, "shape-change": SHAPE, "internal-oscillation": INTERNAL}
-)
-"""Procedure by the type of the phase that is its activity."""
+)  #: Procedure by the type of the phase that is its activity
 
 AMPLITUDE = 10.0  #: Amplitude θ at which the internal oscillation is compared with others, as in the paper [deg]
 

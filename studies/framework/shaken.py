@@ -27,8 +27,7 @@ DIGITISING_ERROR = 0.003  #: Assumed error of reading φ from Gravish's figure [
 
 GRAVISH_COLUMNS: Mapping[str, str] = MappingProxyType(
     {"phi_0": "phi_initial", "phi_f": "phi_final", "phi_f relaxed": "phi_final"}
-)
-"""Column of `read_gravish` that each stage is compared with."""
+)  #: Column of `read_gravish` that each stage is compared with
 
 _FILE = files("postprocess") / "reference" / "gravish2012_phi.csv"
 _CITATION = "Gravish et al., PRL 108, 208001 (2012), digitised"
@@ -47,8 +46,7 @@ STAGES: Mapping[str, str] = MappingProxyType(
         "phi_f": "at the end of shaking",
         "phi_f relaxed": "after the relaxation that follows shaking",
     }
-)
-"""Stages at which a packing fraction is measured, as a mean over the last frames of a phase."""
+)  #: Stages at which a packing fraction is measured, as a mean over the last frames of a phase
 
 WHEN = f"before shaking and at the end of shaking, means over the last {LAST_FRAMES} frames or fewer"
 """Statement for footers on how φ_0 and φ_f are averaged."""

@@ -130,8 +130,7 @@ OTHER: list[tuple[Call, dict[str, Any], tuple[str, ...]]] = [
         for aspect in (0.4, 0.7, 1.0)
     ),
     (hinge.tilt, {"sweeps": 3}, YADE),
-]
-"""Cases with other parameters: function, options, engines."""
+]  #: Cases with other parameters: function, options, engines
 
 
 @pytest.mark.parametrize("engine", ON)
