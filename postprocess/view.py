@@ -278,9 +278,7 @@ class Viewer:
                 html.Span("{{ fault }}", v_if="fault", classes="fault", role="alert")
             with html.Main():
                 self._canvas = vtk_widgets.VtkLocalView(
-                    self._view.plotter.render_window,
-                    picking_modes=("['click']",),
-                    click=(self._on_click, "[$event]"),
+                    self._view.plotter.render_window, picking_modes=("['click']",), click=(self._on_click, "[$event]")
                 )
             with html.Aside():
                 with html.Div(v_for="(entry, k) in legend", key="k", classes="key"):

@@ -232,10 +232,7 @@ STUDY: Study = Study(
     name="engines",
     title="Two engines, the same seeds",
     measure=measure,
-    keys=(
-        Key(column=CASE, label="case", order=(*ACTIVE, HOOK, COLLAPSE, CHAIN)),
-        Key(column=VARIANT, label="variant"),
-    ),
+    keys=(Key(column=CASE, label="case", order=(*ACTIVE, HOOK, COLLAPSE, CHAIN)), Key(column=VARIANT, label="variant")),
     quantities=tuple(QUANTITIES.values()),
     findings=tuple(map(_finding, COMPARED)),
     figures=(
@@ -257,11 +254,7 @@ STUDY: Study = Study(
             split=one_by_one("quantity", str),
         ),
     ),
-    extra=lambda runs: {
-        "points": STUDY.points(runs),
-        "equivalence": equivalence(runs),
-        "pitch": refinement(runs),
-    },
+    extra=lambda runs: {"points": STUDY.points(runs), "equivalence": equivalence(runs), "pitch": refinement(runs)},
     order=(CASE, VARIANT, SEED),
     same_count=(CASE,),
     remarks=(

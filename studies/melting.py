@@ -168,11 +168,7 @@ FINDINGS = (
         shown=[SLOUGHED],
     ),
     _above(
-        "narrow-and-high",
-        "Shape change narrows the base and raises the pile",
-        {BASE: -1, TOP: 1},
-        SHAPE,
-        (STATIC,),
+        "narrow-and-high", "Shape change narrows the base and raises the pile", {BASE: -1, TOP: 1}, SHAPE, (STATIC,)
     ),
     Finding(
         id="topples",

@@ -263,12 +263,7 @@ def energy_errors(path: Path) -> tuple[float, float]:
     works = column("motor_work_J") + column("container_work_J")
     stored = sum(
         column(name)
-        for name in (
-            "kinetic_energy_J",
-            "gravitational_energy_J",
-            "contact_elastic_energy_J",
-            "hinge_elastic_energy_J",
-        )
+        for name in ("kinetic_energy_J", "gravitational_energy_J", "contact_elastic_energy_J", "hinge_elastic_energy_J")
     )
     scale = np.maximum.accumulate(np.abs(given) + np.abs(works))
     scale = np.where(scale > 0, scale, np.inf)

@@ -165,8 +165,7 @@ def _cells(points: Floats) -> tuple[Floats, Floats, Floats, Floats]:
     # Corners relative to one of the face: cross products of long vectors would lose digits.
     reference = diagram.vertices[np.repeat(corners[starts], sizes)]
     areas = np.add.reduceat(
-        np.cross(diagram.vertices[corners] - reference, diagram.vertices[followers] - reference),
-        starts,
+        np.cross(diagram.vertices[corners] - reference, diagram.vertices[followers] - reference), starts
     )
     area = np.linalg.norm(areas, axis=1) / 2
     height = np.linalg.norm(points[pairs[:, 0]] - points[pairs[:, 1]], axis=1) / 2

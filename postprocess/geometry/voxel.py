@@ -67,11 +67,7 @@ def solid_fraction(
     than t1 t2 (w + 2l), by about 1 % for usual sizes. UndefinedMeasureError if there is no material in the region.
     """
     points, pitch = solid_points(
-        vertices,
-        thickness_normal=thickness_normal,
-        thickness_in_plane=thickness_in_plane,
-        pitch=pitch,
-        region=region,
+        vertices, thickness_normal=thickness_normal, thickness_in_plane=thickness_in_plane, pitch=pitch, region=region
     )
     if len(points) == 0:
         msg = "no material in the inner region of the pile: the pile is too low or too thin there"

@@ -95,11 +95,7 @@ def vibration(run: Run) -> Vibration:
     if found is None:
         raise InputError(f"{run.path}: no shake after a remove-container: its phases are {', '.join(kinds)}")
     settings = run.scene["phases"][found.index]
-    return Vibration(
-        phase=found,
-        acceleration=settings["peak_acceleration_g"],
-        frequency=settings["frequency_hz"],
-    )
+    return Vibration(phase=found, acceleration=settings["peak_acceleration_g"], frequency=settings["frequency_hz"])
 
 
 def column_history(run: Run, definition: str, shaken: Vibration) -> ColumnHistory:

@@ -34,14 +34,7 @@ class Cast:
     likeness_before: float  #: Jaccard index of the pile before and the mould [-]
 
 
-def cast(
-    before: ArrayLike,
-    after: ArrayLike,
-    tiers: Sequence[Region],
-    *,
-    thickness: float,
-    ball: float,
-) -> Cast:
+def cast(before: ArrayLike, after: ArrayLike, tiers: Sequence[Region], *, thickness: float, ball: float) -> Cast:
     """Compare a pile in a mould with that pile after the mould was removed.
 
     Args:
