@@ -98,9 +98,7 @@ def _local_packing(frame: Frame, run: Run) -> Floats:
     pile = Region(radius=run.manifest.container_radius_m, bottom=frame.floor_z, top=top)
     spacing = run.manifest.middle_length_m / CELLS_PER_LENGTH
     try:
-        found = local_packing(
-            frame.vertices, pile, pile, solid_volume=run.manifest.solid_volume_m3, spacing=spacing
-        ).volumes
+        _, found = local_packing(frame.vertices, pile, pile, solid_volume=run.manifest.solid_volume_m3, spacing=spacing)
     except UndefinedMeasureError:
         return np.full(frame.count, np.nan)
     closed = np.isfinite(found) & (found > 0)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
 from itertools import chain
 
 import numpy as np
@@ -24,18 +23,13 @@ from postprocess.geometry.voxel import Region
 TOGETHER = 60_000  #: Most points per call of Qhull, which takes about 15 kB of memory per point
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class LocalPacking:
-    """Set-Voronoi cells of the smarticles of a pile."""
-
-    volumes: Floats = field(repr=False)  #: (N,) [m³], volume of each smarticle's cell; infinite or 0 without a cell
-    value: float  #: Packing fraction: total solid volume over total cell volume of the smarticles in the region [-]
-
-
 def local_packing(
     vertices: Vertices, container: Region, region: Region, *, solid_volume: float, spacing: float | None = None
-) -> LocalPacking:
+) -> tuple[float, Floats]:
     """Compute the packing fraction in a region by the set-Voronoi cells of its smarticles.
+
+    It is their total solid volume over their total cell volume [-]. The volumes of the cells of all smarticles
+    (N,) [m³] are returned, too; they are infinite or 0 for a smarticle without a cell.
 
     The set-Voronoi cell of a smarticle is the volume that is nearer to it than to any other smarticle. Here it is the
     union of the Voronoi cells of points along its centrelines. Mirror images of the points bound the cells at floor,
@@ -85,8 +79,7 @@ def local_packing(
     total = float(volumes[interior].sum())
     if not np.isfinite(total):
         raise UndefinedMeasureError("a smarticle in the inner region has no closed Voronoi cell: the pile is too thin")
-    value = float(interior.sum() * solid_volume / total)
-    return LocalPacking(volumes=volumes, value=value)
+    return float(interior.sum() * solid_volume / total), volumes
 
 
 def _sample(vertices: Floats, spacing: float) -> tuple[Floats, Whole]:

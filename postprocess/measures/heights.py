@@ -20,7 +20,6 @@ class Heights:
     """Heights of a pile above the floor."""
 
     mean_com: float  #: Height of the centre of mass of all smarticles [m]
-
     second_highest_com: float  #: Second-largest height of a smarticle's centre of mass [m]; NaN for one smarticle
     top: float  #: Height below which 95 % of the material lies [m]
 

@@ -55,9 +55,6 @@ class FilmTimes:
 
         Args:
             recorded: (m,) times of the recorded frames [s], ascending.
-            start: Simulated time of the first picture [s]; that of the first frame if not given.
-            end: Simulated time at which the film ends [s]; that of the last frame if not given.
-            every: Simulated time between two pictures [s]; if not given, a multiple of the recorded interval.
 
         Raises:
             InputError: Fewer than two frames or pictures, or an argument out of its range.

@@ -78,7 +78,6 @@ def render_run(
         view: Key of `VIEWS`; None: "front", for planar runs "top".
         forces: Whether to draw contact forces as lines, with a thickness proportional to the normal force, in front of
             pale smarticles.
-        overwrite: Whether to replace an existing file.
 
     Returns:
         Path of the written file.
@@ -143,14 +142,12 @@ def render_film(
         limits: Ends of the colour scale; those of the film if not given.
         size: Width and height of the picture of one run [pixel]; even numbers for `.mp4`.
         view: Key of `VIEWS`; None: "front", for planar runs "top".
-        frames_per_second: Pictures per second of playing time [1/s].
         start: Simulated time at which the film begins [s]; that of the first frame if not given.
         end: Simulated time at which the film ends [s]; that of the last frame if not given.
         every: Simulated time between two pictures [s]; if not given, a multiple of the recorded interval.
         most_frames: Largest number of pictures if `every` is not given.
         forces: Whether to draw contact forces, see `render_run`.
         track: Shows the progress, see `Track`.
-        overwrite: Whether to replace an existing file.
 
     Returns:
         Path of the written file.

@@ -39,15 +39,9 @@ class Interval:
 
 
 def rank_correlations(x: Floats, y: Floats, strata: Whole) -> Floats:
-    """Compute Spearman's rank correlations of columns with one variable, ranked within strata.
+    """Compute Spearman's rank correlations (m,) of columns x (n, m) with y (n,), within strata (n,).
 
-    Args:
-        x: (n, m) columns.
-        y: (n,) variable.
-        strata: (n,) stratum of each row.
-
-    Returns:
-        (m,) correlations from -1 to 1; NaN if the column, or y, is constant in every stratum.
+    A correlation is NaN if its column, or y, is constant in every stratum.
 
     Example:
         >>> x, y = np.array([[1.0], [2], [3], [10], [20], [30]]), np.array([7.0, 8, 9, 1, 2, 3])
@@ -96,15 +90,9 @@ def correlation_within(x: Sequence[float], y: Sequence[float], blocks: Sequence[
 
 
 def common_slopes(x: Floats, y: Floats, strata: Whole) -> Floats:
-    """Fit slopes of y against each column of x, with a separate intercept for each stratum.
+    """Fit slopes (m,) of y (n,) against columns x (n, m), with an intercept for each of the strata (n,).
 
-    Args:
-        x: (n, m) columns.
-        y: (n,) variable.
-        strata: (n,) stratum of each row.
-
-    Returns:
-        (m,) slopes; NaN if the column is constant in every stratum.
+    A slope is NaN if its column is constant in every stratum.
     """
     values = np.column_stack([x, y])
     for stratum in np.unique(strata):

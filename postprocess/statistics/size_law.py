@@ -35,12 +35,6 @@ class Scatter:
     fall: float  #: Exponent [-]
     freedom: int  #: Number of degrees of freedom
 
-    def error(self, count: float, runs: int) -> float:
-        """Return the 95 % half-width of a mean over `runs` runs with N = `count`; NaN without scatter."""
-        if not self.freedom:
-            return math.nan
-        return float(stdtrit(self.freedom, (1 + CONFIDENCE) / 2)) * math.sqrt(self.variance * count**-self.fall / runs)
-
 
 @dataclass(frozen=True, kw_only=True)
 class SizeLaw:

@@ -11,13 +11,15 @@ from dataclasses import dataclass, field
 from itertools import product
 from pathlib import Path
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import Any, Protocol
 
 import numpy as np
 import pandas as pd
+from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
 from matplotlib.colors import Normalize
 from matplotlib.container import ErrorbarContainer
+from matplotlib.figure import Figure as Canvas
 from numpy.typing import ArrayLike, NDArray
 
 from dem.errors import InputError
@@ -27,10 +29,6 @@ from postprocess.report.figures import hold_everything
 from postprocess.statistics.points import marked
 from studies.framework.procedures import EXTERNAL, INTERNAL, PROCEDURE, SHAPE, STATIC, of_procedure
 from studies.framework.runs import ENGINE_NAMES, Quantity, engines_of, judging, of_engine
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure as Canvas
 
 ASPECT_LABEL, THETA_LABEL = r"aspect ratio $l/w$ [-]", r"amplitude $\theta$ [degree]"
 CROSSINGS_LABEL = r"links through a plane $\langle N\rangle$ [-]"
@@ -150,11 +148,8 @@ class Means:
         every = analysis.tables.get(self.table, pd.DataFrame())
         every = self.rows(every) if len(every) else every
         columns = [quantity.column for quantity in self.quantities]
-        shown = (
-            pd.concat([every.iloc[:0], *(series.rows for series in self.split(judging(every)))])
-            if len(every)
-            else every
-        )
+        drawn = self.split(judging(every)) if len(every) else []
+        shown = pd.concat([every.iloc[:0], *(series.rows for series in drawn)])
         if shown.empty or shown[[*columns, *self.bounds.values()]].isna().all().all():
             return []
         values = sorted(shown[self.panels].unique()) if self.panels else [None]
@@ -185,10 +180,8 @@ class Means:
             label = f"simulation on {ENGINE_NAMES.get(engine, engine)}"
             for series in self.split(of_engine(table, engine) if engine else table):
                 rows = series.rows[series.rows[column].notna()]
-                x, properties = (
-                    self.transform(series.rows[self.x]) + series.shift * (1 + 2 * number),
-                    dict(series.properties),
-                )
+                x = self.transform(series.rows[self.x]) + series.shift * (1 + 2 * number)
+                properties = dict(series.properties)
                 if number:
                     properties |= {"color": style.GREEN, "markerfacecolor": "white", "linestyle": "none"}
                 if len(rows) and self.fit is not None and not number:
@@ -197,17 +190,8 @@ class Means:
                     properties["linestyle"] = "none"
                 if len(rows):
                     errors = scale * rows[marked(column, "95 %")].to_numpy()
-                    across = rows.get(marked(self.x, "95 %"))
-                    shown = label if number else series.label
-                    draw_means(
-                        axes,
-                        x[rows.index],
-                        scale * rows[column],
-                        errors,
-                        across=across,
-                        properties=properties,
-                        label=shown,
-                    )
+                    shown = {"label": label if number else series.label, "across": rows.get(marked(self.x, "95 %"))}
+                    draw_means(axes, x[rows.index], scale * rows[column], errors, properties=properties, **shown)
                     positive &= bool((rows[column] > 0).all())
                     label = "_"
                 if column in self.bounds:
@@ -434,16 +418,10 @@ class Scatter:
                 draw_bounds(axes, held[x], held[y], length, properties={**small, "elinewidth": 0.6, "capsize": 1.6})
             for series in self.split(analysis.table("points")) if self.means else ():
                 properties = {"markersize": 4.2, **series.properties, "linestyle": "none"}
-                errors, across = (series.rows[marked(name, "95 %")] for name in (y, x))
-                draw_means(
-                    axes,
-                    series.rows[x],
-                    series.rows[y],
-                    errors,
-                    across=across,
-                    properties=properties,
-                    label=series.label,
-                )
+                rows = series.rows
+                errors, across = (rows[marked(name, "95 %")] for name in (y, x))
+                shown: dict[str, Any] = {"across": across, "label": series.label, "properties": properties}
+                draw_means(axes, rows[x], rows[y], errors, **shown)
             axes.set_xlabel(quantity.axis or x)
             axes.set_ylabel(self.y.axis or y)
             axes.set_ylim(bottom=0)
