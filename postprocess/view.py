@@ -366,13 +366,8 @@ class Viewer:
 def view_run(directory: Path | str, *, port: int = 0, opened: Callable[[str], None]) -> None:
     """Serve the page of a run to browsers on this machine, until the page is closed.
 
-    Args:
-        directory: A run directory with at least one frame; the run may be unfinished.
-        port: Port of the server; 0: any free port.
-        opened: Called with the address of the page once the server listens.
-
-    Raises:
-        InputError: There is no frame, a file is damaged, or the port is taken.
+    The run may be unfinished. `opened` is called with the address of the page once the server listens on the port; 0 is
+    any free port. InputError if there is no frame, a file is damaged, or the port is taken.
     """
     # The page needs no display, of whose absence VTK would warn.
     vtkLogger.SetStderrVerbosity(vtkLogger.VERBOSITY_ERROR)

@@ -24,7 +24,6 @@ from postprocess.measures.clusters import entanglement_clusters, spans_height, s
 from postprocess.measures.entanglement import entanglement
 from postprocess.measures.packing import packing_of
 from postprocess.measures.spread import escaped
-from postprocess.statistics.findings import judge, negative
 from postprocess.statistics.points import ASPECT, SEED, format_with_error
 from postprocess.statistics.seeds import slope_within
 from postprocess.statistics.size_law import POWER, POWERS, Profile, SizeLaw, alike, profiles, size_law
@@ -228,7 +227,8 @@ def growth(runs: pd.DataFrame) -> pd.DataFrame:
         for aspect, part in runs.groupby(ASPECT):
             size, cluster = (np.log(part[name].to_numpy(dtype=np.float64)).tolist() for name in (COUNT, share(stage)))
             slope = slope_within(size, cluster, [0] * len(part))
-            rows.append((stage, aspect, slope.count, slope.value, slope.half_width, str(judge(negative(slope)))))
+            falls = Effect(label="", value=slope, sign=-1).verdict
+            rows.append((stage, aspect, slope.count, slope.value, slope.half_width, str(falls)))
     powers = ["power of N [-]", "power of N 95 % [-]"]
     return pd.DataFrame(rows, columns=["stage", ASPECT, "runs [-]", *powers, "falls as piles grow"])
 

@@ -30,7 +30,6 @@ from postprocess.geometry.links import centres_of_mass
 from postprocess.measures.pull import PULL, WINDOW, held_fast, peak, read_pull, weight_of_one
 from postprocess.measures.table import summarise_run
 from postprocess.report import figures as style
-from postprocess.statistics.findings import effect_text, judge
 from postprocess.statistics.points import ASPECT, SEED, averaged, format_with_error
 from postprocess.statistics.ranks import (
     Floats,
@@ -44,7 +43,7 @@ from postprocess.statistics.ranks import (
 )
 from postprocess.statistics.seeds import mean_over_seeds
 from studies.framework.figures import Heatmap, Means, Rows, Scatter, Series, marker, one_by_one, procedure_marker
-from studies.framework.findings import Finding, Outcome, Verdict, decide
+from studies.framework.findings import Finding, Outcome, Verdict, decide, effect_text, judge
 from studies.framework.procedures import (
     ACTIVE,
     CROSSINGS,
@@ -443,11 +442,11 @@ def _as_strong(runs: pd.DataFrame, costs: pd.DataFrame) -> Outcome:
         for _, row in swung.iterrows()
     }
     nearest = min(lacks, key=lambda name: math.inf if math.isnan(lacks[name].value) else lacks[name].value)
-    stronger = all(judge(effect) == "found" for effect in lacks.values())
+    stronger = all(judge(effect) == Verdict.FOUND for effect in lacks.values())
     return Outcome(
-        note=f"shape change less the strongest, {nearest}: {effect_text(lacks[nearest], 3)} n W_s over l/w and seeds; "
+        note=f"shape change less the strongest, {nearest}: {effect_text(lacks[nearest])} n W_s over l/w and seeds; "
         f"it spends {shape.iloc[0][LIFTS]:.3g} W_s w per smarticle",
-        verdict=decide(judge(lacks[nearest]) == "not found", stronger),
+        verdict=decide(judge(lacks[nearest]) == Verdict.NOT_FOUND, stronger),
     )
 
 

@@ -14,7 +14,7 @@ import pandas as pd
 
 from dem.record.run import Run
 from postprocess.measures.heights import heights
-from postprocess.measures.spread import OUTSIDE, TOUCHING, centre_of_mass, free_pile, has_toppled
+from postprocess.measures.spread import OUTSIDE, TOUCHING, centre_of_mass, free_pile
 from postprocess.statistics.points import ASPECT, SEED, mean_difference, pairs
 from postprocess.statistics.seeds import mean_over_seeds
 from studies.framework.figures import PROCEDURE_LABELS, Histories, by_procedure
@@ -87,7 +87,7 @@ def measure(run: Run) -> MeasuredRun:
         TOP: levels.top,
         CENTRE: levels.mean_com,
         **rows[-1],
-        TOPPLED: float(has_toppled(rows[-1][OFFSET] * base, base)),
+        TOPPLED: float(rows[-1][OFFSET] * base > base),
         **last_columns(run),
     }
     history = {SINCE: np.array([start, *(frame.time for frame in after)]) - start}

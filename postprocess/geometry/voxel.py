@@ -89,7 +89,6 @@ def solid_points(
     by any angle, which its vertices do not determine; an arbitrary angle is used. InputError for bad sizes.
 
     Args:
-        vertices: (N, 4, 3) [m].
         thickness_normal: t1, along the normal of the smarticle's plane [m].
         thickness_in_plane: t2, in the smarticle's plane [m].
         pitch: Distance of neighbouring points [m]; half the smaller thickness if not given.

@@ -193,11 +193,6 @@ def collapse_time(
 
     Source:
         τ of Gravish, Franklin, Hu, Goldman, Phys. Rev. Lett. 108, 208001 (2012); the function is that of Kohlrausch.
-
-    Example:
-        >>> t = np.linspace(0.05, 5, 100)
-        >>> round(collapse_time(t, 0.02 * np.exp(-(t / 0.8) ** 0.7), end=0.0).time, 3)
-        0.8
     """
     t, h = np.asarray(times, dtype=np.float64), np.asarray(heights, dtype=np.float64)
     _check(t, h)

@@ -61,7 +61,6 @@ def material_height(vertices: Vertices, *, floor_z: float = 0.0, percentile: flo
     linear functions, and the height is found by bisection.
 
     Args:
-        vertices: (N, 4, 3) [m].
         floor_z: Height of the floor [m].
         percentile: Percentage of the material, above 0 and up to 100 [%].
 

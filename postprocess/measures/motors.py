@@ -40,12 +40,6 @@ def sampled_work(angles: Floats, torques: Floats) -> float:
     Args:
         angles: (samples, N, 2) angles of the barbs [rad].
         torques: (samples, N, 2) torques of their motors [N m].
-
-    Example:
-        >>> import numpy as np
-        >>> there, back = np.zeros((1, 1, 2)), np.full((1, 1, 2), 0.5)
-        >>> sampled_work(np.concatenate([there, back]), np.full((2, 1, 2), 2e-3))
-        0.002
     """
     if angles.shape != torques.shape:
         raise InputError(f"angles and torques must be of one shape: got {angles.shape} and {torques.shape}")

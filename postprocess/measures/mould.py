@@ -37,12 +37,8 @@ class Cast:
 def cast(before: ArrayLike, after: ArrayLike, tiers: Sequence[Region], *, thickness: float, ball: float) -> Cast:
     """Compare a pile in a mould with that pile after the mould was removed.
 
-    Args:
-        before: Vertices (N, 4, 3) in the mould, heights above the floor [m].
-        after: Vertices (N, 4, 3) without the mould, heights above the floor [m].
-        tiers: The T cylinders of the mould, from the lowest, heights above the floor.
-        thickness: Diameter of the links, taken as round [m].
-        ball: Radius of the ball with which the outlines are found [m].
+    Vertices (N, 4, 3) before and after [m], and the T tiers from the lowest, have heights above the floor. Links are
+    round with the given thickness [m]; a ball of a radius `ball` [m] finds the outlines.
     """
     grid = outlines([before, after], thickness=thickness, ball=ball, regions=tiers)
     with_mould, without_mould = grid.inside

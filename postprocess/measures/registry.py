@@ -33,12 +33,7 @@ class Shown:
 
 @dataclass(frozen=True)
 class Quantity:
-    """One column of a table.
-
-    Example:
-        >>> Quantity("com height", "m").header
-        'com height [m]'
-    """
+    """One column of a table; its header is `com height [m]`."""
 
     label: str  #: Name of the quantity
     unit: str  #: SI unit, or "-" for a pure number, "degree", "smarticles"

@@ -133,15 +133,6 @@ def tilt(vertices: Vertices, *, foot: tuple[float, float] = (0.0, 0.0), floor_z:
     return math.atan2(math.hypot(x, y), z)
 
 
-def has_toppled(offset: float, base_radius: float) -> bool:
-    """Return whether a pile has fallen over: its centre of mass is no longer above its former base.
-
-    The offset is the horizontal distance of the centre of mass from the foot [m]; the base is a circle around the foot
-    with the radius of the pile before the wall was removed [m].
-    """
-    return offset > base_radius
-
-
 def _shares_within(start: Floats, along: Floats, radius: float) -> Floats:
     """Return the fractions (n,) of line segments inside a circle at the origin; start, along: (n, 2)."""
     square, mixed = (along**2).sum(axis=1), (start * along).sum(axis=1)

@@ -86,10 +86,6 @@ def render_run(
         InputError: No frame, an unknown field or view, a time outside the recorded frames, a bad size, bad limits, an
             unknown smarticle, or an output that exists.
         RunError: This machine lacks the libraries to draw without a display.
-
-    Example:
-        >>> render_run("runs/pile", color_by="height", view="oblique").name
-        'render.png'
     """
     output = _checked_output(directory, output, "render.png", (".png",))
     subjects = [Subject(path, forces=forces) for path in (directory, *compare)]

@@ -111,18 +111,9 @@ def paired_differences(
 ) -> pd.DataFrame:
     """Compute the change of a quantity between two levels of a factor, for each pair of runs.
 
-    The function applied to its own result with another factor gives interactions.
-
-    Args:
-        table: One row per run.
-        quantity: Column of the quantity.
-        factor: Column of the factor.
-        levels: Its first and second level.
-        others: Columns of all other factors in which runs differ, and the seed; equal in both runs of a pair.
-
-    Returns:
-        One row per pair: the columns `others`, and the quantity at the second level less that at the first. Runs
-        without a partner are left out.
+    The function applied to its own result with another factor gives interactions. `others` are the columns of all other
+    factors in which runs differ, and the seed; they are equal in both runs of a pair. Returns one row per pair: the
+    columns `others`, and the quantity at the second level less that at the first. Runs without a partner are left out.
 
     Example:
         >>> runs = pd.DataFrame({"mu": [0.4, 0.8, 0.4, 0.8], "seed": [1, 1, 2, 2], "N": [5.0, 6.0, 5.5, 7.5]})

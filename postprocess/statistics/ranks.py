@@ -32,21 +32,11 @@ class Interval:
     low: float  #: Lower end of the interval; NaN if there are too few blocks
     high: float  #: Upper end of the interval; NaN if there are too few blocks
 
-    @property
-    def clear(self) -> bool:
-        """Whether the interval excludes 0."""
-        return self.low > 0 or self.high < 0
-
 
 def rank_correlations(x: Floats, y: Floats, strata: Whole) -> Floats:
     """Compute Spearman's rank correlations (m,) of columns x (n, m) with y (n,), within strata (n,).
 
     A correlation is NaN if its column, or y, is constant in every stratum.
-
-    Example:
-        >>> x, y = np.array([[1.0], [2], [3], [10], [20], [30]]), np.array([7.0, 8, 9, 1, 2, 3])
-        >>> rank_correlations(x, y, np.array([0, 0, 0, 1, 1, 1]))
-        array([1.])
     """
     ranks = ranks_within(np.column_stack([x, y]), strata)
     squares = np.einsum("nm,nm->m", ranks, ranks)
@@ -73,10 +63,6 @@ def correlation_within(x: Sequence[float], y: Sequence[float], blocks: Sequence[
     A y of which only a lower bound is known counts as `inf`, the highest rank. Points with NaN are left out. The
     standard error is that of the scatter over blocks. It is NaN for fewer than six blocks: five correlations have one
     sign by chance in more than 5 % of all cases.
-
-    Example:
-        >>> f'{correlation_within([1, 2, 1, 2], [5, 7, 1, math.inf], ["a", "a", "b", "b"]).value:.3f}'
-        '1.000'
     """
     parts: dict[Hashable, list[tuple[float, float]]] = {}
     for across, up, block in zip(x, y, blocks, strict=True):

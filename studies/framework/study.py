@@ -12,10 +12,9 @@ from dem.errors import InputError
 from dem.record.run import Run
 from postprocess.report import figures as style
 from postprocess.report.tables import meaning_lines, table_lines
-from postprocess.statistics.findings import CRITERION
 from postprocess.statistics.points import ASPECT, SEED, SEEDS, averaged, seeds_of
 from studies.framework.figures import BARS, Analysis, Figure
-from studies.framework.findings import Finding, Judged, findings_table
+from studies.framework.findings import CRITERION, Finding, Judged, findings_table
 from studies.framework.provenance import SAVOIE, Origin, Reference, make_folder
 from studies.framework.runs import (
     ENGINE,
