@@ -33,7 +33,7 @@ with warnings.catch_warnings():
     import pyvista as pv
 
 
-_REMOVAL, _STRAIN, _ARRANGE = "remove-container", "strain", "arrange"
+_STRAIN, _ARRANGE = "strain", "arrange"
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -56,19 +56,24 @@ class ChainStrings:
         return np.stack([knots(frame.vertices, self.from_hinge), ends], axis=1)
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
 class RunBoundaries:
-    """Walls and strings of a run, and their motion."""
+    """Walls and strings of a run, and their motion, by its scene and its series."""
 
-    #: Radius and top of each tier of a mould, from the lowest [m]; empty for one cylinder
-    tiers: tuple[tuple[float, float], ...] = ()
-    height: float | None = None  #: Height of the cylinder's wall [m]; None: as high as the pile needs
-    #: Indices of phases that move the floor and leave the wall at rest, at z = 0
-    floor_alone: frozenset[int] = frozenset()
-    removal: int | None = None  #: Index of the phase that removes the wall; None if no phase does
-    #: Start [s], end [s] and speed [m/s] of the wall's lifting; None if it disappears at once
-    lift: tuple[float, float, float] | None = None
-    strings: ChainStrings | None = field(default=None, repr=False)  #: Strings of a strain test, if there is one
+    def __init__(self, run: Run) -> None:
+        scene, phases = run.scene, run.scene.get("phases", ())
+        series = run.series if run.has_series else None
+        #: Radius and top of each tier of a mould, from the lowest [m]; empty for one cylinder
+        self.tiers = tuple((tier.radius, tier.top) for tier in read_tiers(run))
+        #: Height of the cylinder's wall [m]; None: as high as the pile needs
+        self.height: float | None = (scene.get("container") or {}).get("height_m")
+        #: Indices of phases that move the floor and leave the wall at rest, at z = 0
+        self.floor_alone = frozenset(index for index, phase in enumerate(phases) if phase.get("moves") == "floor")
+        #: Index of the phase that removes the wall; None if no phase does
+        self.removal = next((phase.index for phase in run.phases if phase.type == "remove-container"), None)
+        #: Start [s], end [s] and speed [m/s] of the wall's lifting; None if it disappears at once
+        self.lift = None if self.removal is None else _lift(phases[self.removal], _start(run, self.removal, series))
+        #: Strings of a strain test, if there is one
+        self.strings = _strings(run, series) if run.manifest.planar else None
 
     @property
     def corners(self) -> list[tuple[float, float]]:
@@ -90,21 +95,6 @@ class RunBoundaries:
         start, end, speed = self.lift
         raised = speed * (min(max(time, start), end) - start)
         return raised if raised <= top else None
-
-
-def read_boundaries(run: Run) -> RunBoundaries:
-    """Read walls and strings of a run from its scene and its series."""
-    scene, phases = run.scene, run.scene.get("phases", ())
-    series = run.series if run.has_series else None
-    removal = next((phase.index for phase in run.phases if phase.type == _REMOVAL), None)
-    return RunBoundaries(
-        tiers=tuple((tier.radius, tier.top) for tier in read_tiers(run)),
-        height=(scene.get("container") or {}).get("height_m"),
-        floor_alone=frozenset(index for index, phase in enumerate(phases) if phase.get("moves") == "floor"),
-        removal=removal,
-        lift=None if removal is None else _lift(phases[removal], _start(run, removal, series)),
-        strings=_strings(run, series) if run.manifest.planar else None,
-    )
 
 
 def _start(run: Run, index: int, series: Series | None) -> float | None:
@@ -232,7 +222,7 @@ class Bodies:
             raise InputError(f"{run.path}: records no forces; {NO_FORCES}")
         self.run = run
         self.kinds = kinds
-        self.boundaries = read_boundaries(run)
+        self.boundaries = RunBoundaries(run)
         self._fields = fields
         self._cut = cut
         self._top = 0.0  # height of the highest point above the floor

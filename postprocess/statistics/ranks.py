@@ -8,7 +8,7 @@ form a stratum; a resample has as many blocks of each stratum as the data.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Hashable, Iterator, Sequence
+from collections.abc import Callable, Hashable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -88,20 +88,6 @@ def common_slopes(x: Floats, y: Floats, strata: Whole) -> Floats:
     return np.where(known, values[:, :-1].T @ values[:, -1] / np.where(known, squares, 1), np.nan)
 
 
-def resamples(blocks: Whole, strata: Whole, *, count: int, seed: int) -> Iterator[Whole]:
-    """Yield `count` bootstrap resamples of a table, as indices of rows.
-
-    A resample has as many blocks of each stratum as the table, drawn with replacement. Each row has a block (n,) and a
-    stratum (n,); a block lies in one stratum.
-    """
-    random = np.random.default_rng(seed)
-    rows = {block: np.nonzero(blocks == block)[0] for block in np.unique(blocks)}
-    inside = [np.unique(blocks[strata == stratum]) for stratum in np.unique(strata)]
-    for _ in range(count):
-        drawn = np.concatenate([random.choice(own, len(own)) for own in inside])
-        yield np.concatenate([rows[block] for block in drawn])
-
-
 def interval(value: float, drawn: Sequence[float]) -> Interval:
     """Return a value with its 95 % interval, by percentiles of resampled values.
 
@@ -121,8 +107,16 @@ def few_blocks(blocks: Whole, strata: Whole) -> bool:
 
 
 def resampled(measures: Callable[[Whole], Floats], blocks: Whole, strata: Whole, *, count: int, seed: int) -> Floats:
-    """Return the m values of `measures` for each of `count` resamples, (count, m); see `resamples`.
+    """Return the m values of `measures` for each of `count` bootstrap resamples of a table, (count, m).
 
-    `measures` takes indices of rows and returns values (m,).
+    A resample has as many blocks of each stratum as the table, drawn with replacement; `measures` takes its indices of
+    rows and returns values (m,). Each row has a block (n,) and a stratum (n,); a block lies in one stratum.
     """
-    return np.array([measures(rows) for rows in resamples(blocks, strata, count=count, seed=seed)])
+    random = np.random.default_rng(seed)
+    rows = {block: np.nonzero(blocks == block)[0] for block in np.unique(blocks)}
+    inside = [np.unique(blocks[strata == stratum]) for stratum in np.unique(strata)]
+    found = []
+    for _ in range(count):
+        drawn = np.concatenate([random.choice(own, len(own)) for own in inside])
+        found.append(measures(np.concatenate([rows[block] for block in drawn])))
+    return np.array(found)
