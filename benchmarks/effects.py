@@ -6,8 +6,6 @@ has the median over pairs of the relative cost, and its quartiles. The first row
 the noise.
 """
 
-from __future__ import annotations
-
 import argparse
 import statistics
 from pathlib import Path

@@ -6,8 +6,6 @@ row per run; a later call with the same `--out` continues the table. A run that 
 time is skipped and reported.
 """
 
-from __future__ import annotations
-
 import argparse
 import json
 import time

@@ -1,7 +1,5 @@
 """Run scenes in separate processes for benchmarks, and read their costs."""
 
-from __future__ import annotations
-
 import json
 import os
 import resource

@@ -5,8 +5,6 @@ processes. All repetitions compute equal bits, so that the smallest time of each
 approximates an idle machine.
 """
 
-from __future__ import annotations
-
 import argparse
 import json
 import os

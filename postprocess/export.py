@@ -1,7 +1,5 @@
 """Export a run for other programs: VTP files for ParaView, or triangles as STL, OBJ or glTF."""
 
-from __future__ import annotations
-
 import os
 import shutil
 import tempfile

@@ -1,7 +1,5 @@
 """Show a run in the browser, in an interactive page that a server on this machine serves."""
 
-from __future__ import annotations
-
 import asyncio
 import contextlib
 import os

@@ -6,8 +6,6 @@ of the model, such as restitution, have no accuracy but a sensitivity; their ref
 within the scatter between seeds is not resolved, which does not prove that it is 0.
 """
 
-from __future__ import annotations
-
 import math
 import re
 from collections.abc import Mapping, Sequence

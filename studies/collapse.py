@@ -9,8 +9,6 @@ bound, this Γ is not used for Δ at that l/w: the runs that did collapse are th
 values. The mean at that Γ, computed with the bounds, is a lower bound too.
 """
 
-from __future__ import annotations
-
 import hashlib
 import math
 from collections.abc import Mapping, Sequence

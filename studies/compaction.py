@@ -6,8 +6,6 @@ of beads follow the inverse logarithm of Knight, Fandrich, Lau, Jaeger and Nagel
 laws have four parameters, so that their residuals can be compared.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from itertools import product

@@ -5,8 +5,6 @@ is the mean of paired differences, second value less first, between runs that ar
 at one l/w and seed are averaged first, so that the number of samples is that of the seeds.
 """
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

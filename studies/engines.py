@@ -7,8 +7,6 @@ is less strict.) The second part refines YADE's chains of spheres to pitches of 
 their limit.
 """
 
-from __future__ import annotations
-
 import math
 from functools import partial
 from typing import NamedTuple

@@ -7,8 +7,6 @@ A pile is spanned if one cluster joins floor and top, and one joins opposite sid
 enough: a pile of 100 thin smarticles is lower than a single smarticle is long.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from functools import partial

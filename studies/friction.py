@@ -6,8 +6,6 @@ friction; Gravish's points are not interpolated. Errors are 95 % by Student's t.
 relative to the mean and pooled over all points of a stage.
 """
 
-from __future__ import annotations
-
 import itertools
 import math
 from collections.abc import Callable, Mapping, Sequence

@@ -4,8 +4,6 @@ Planned hours are the wall times on one core that were estimated when the sweep'
 processor times of finished runs; runs without a directory do not count as finished.
 """
 
-from __future__ import annotations
-
 import argparse
 import math
 from collections.abc import Sequence

@@ -14,8 +14,6 @@ and seed. Energies are divided by W_s w, the work that lifts a smarticle by its 
 weight can be compared.
 """
 
-from __future__ import annotations
-
 import math
 import re
 from collections.abc import Mapping

@@ -5,8 +5,6 @@ pile falls over. Compared with Savoie, Tuazon, Bhamla and Goldman, "Amorphous En
 2023, section "Melting behavior". Runs of one l/w and seed are poured from equal poses and compared pair by pair.
 """
 
-from __future__ import annotations
-
 from functools import partial
 
 import numpy as np

@@ -8,8 +8,6 @@ Runs of equal aspect ratio and seed begin with one pile. So procedures are compa
 are fitted within these blocks; errors come from the scatter over seeds and aspect ratios.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from functools import partial

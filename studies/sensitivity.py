@@ -4,8 +4,6 @@ The first variant is the baseline. Each other variant changes one parameter: res
 or sphere diameter; in `sensitivity-section` pitch and rows of spheres, up to the true cross-section.
 """
 
-from __future__ import annotations
-
 import math
 import re
 

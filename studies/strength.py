@@ -11,8 +11,6 @@ compared by means over both heights, seed by seed, so that the number of samples
 stops at its force limit ("held fast"), the peak force is a lower bound.
 """
 
-from __future__ import annotations
-
 import itertools
 import math
 from collections.abc import Sequence

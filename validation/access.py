@@ -4,8 +4,6 @@ Both engines use the leapfrog scheme, whose velocities belong to the half step b
 t = 0 under an acceleration a, set the velocity v − a dt/2.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """Scenes, contact laws, engines and watchdogs for validation cases. All quantities are in SI units."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path

@@ -3,8 +3,6 @@
 Known answers compare a simulation with theory, ladders measure errors over the time step, hard cases check limits.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import partial

@@ -5,8 +5,6 @@ directories of scenes that fail the check. Scenes with a row in the table are no
 alone and shares no code with the engines.
 """
 
-from __future__ import annotations
-
 import argparse
 import os
 import re

@@ -7,8 +7,6 @@ continues the table. Medians over seeds are written to `rivals_medians.csv` and 
 are skipped.
 """
 
-from __future__ import annotations
-
 import argparse
 import importlib
 import json

@@ -4,8 +4,6 @@ The overlap of two boxes is the shortest displacement that separates them. The o
 spheres as segments of length zero, is the diameter less the distance of the axes. Links of one smarticle are ignored.
 """
 
-from __future__ import annotations
-
 import itertools
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """The task of every engine, its outcome, and the base class of simulations."""
 
-from __future__ import annotations
-
 import math
 import time
 from collections.abc import Iterator, Mapping

@@ -1,7 +1,5 @@
 """Colour bodies: smarticles by the values of a field, all other bodies by their kind."""
 
-from __future__ import annotations
-
 import dataclasses
 import math
 from collections.abc import Iterable, Mapping

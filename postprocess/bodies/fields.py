@@ -1,7 +1,5 @@
 """Define the fields of smarticles and links: names, units, meanings, and their values in a frame."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from types import MappingProxyType

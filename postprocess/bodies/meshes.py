@@ -4,8 +4,6 @@ Meshes have the coordinates of the frames, z upwards, so that a shaken container
 A wall without a height in the scene ends above the highest smarticle; walls and strings have no thickness.
 """
 
-from __future__ import annotations
-
 import math
 import warnings
 from collections.abc import Iterable, Mapping, Sequence

@@ -5,8 +5,6 @@ belongs to the pile. A gap narrower than the ball is thus part of the pile, a wi
 not. Flat faces keep their position, so that a pile that fills a box has the volume of the box.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field

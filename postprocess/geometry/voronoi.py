@@ -1,7 +1,5 @@
 """Compute local packing fractions from approximate set-Voronoi cells of the smarticles."""
 
-from __future__ import annotations
-
 from itertools import chain
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Find clusters of smarticles joined by contacts or crossings, and whether one spans the container."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass, field
 

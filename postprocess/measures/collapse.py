@@ -5,8 +5,6 @@ smarticles that have left hop as high as a low column, so that the mean height o
 of a layer. The height `remaining` avoids this bias: it counts the smarticles that have not left.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass

@@ -6,8 +6,6 @@ underestimates the work of a barb that oscillates faster than that. Because the 
 tables also state the least and the greatest sum over all possible first frames.
 """
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Measure how well a pile fills a mould, and how well the pile keeps this shape without the mould."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

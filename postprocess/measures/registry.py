@@ -5,8 +5,6 @@ columns that this function fills, with units. Tables and `smarticles measure` re
 needs its module, a test, and a line in README.
 """
 
-from __future__ import annotations
-
 import pkgutil
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass

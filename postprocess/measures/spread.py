@@ -1,7 +1,5 @@
 """Count all and escaped smarticles; measure how a pile without a wall spreads and tilts."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

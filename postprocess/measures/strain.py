@@ -5,8 +5,6 @@ the force of the pulled string. A chain has fractured after the last sample at w
 force.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass

@@ -3,8 +3,6 @@
 Pictures are drawn at twice their size and scaled down. No display is needed: VTK falls back to EGL.
 """
 
-from __future__ import annotations
-
 import ctypes
 import math
 import os

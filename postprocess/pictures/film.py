@@ -1,7 +1,5 @@
 """Choose the frames and the speed of films, and write films to files."""
 
-from __future__ import annotations
-
 import importlib
 import math
 from collections.abc import Iterable

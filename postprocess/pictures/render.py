@@ -1,7 +1,5 @@
 """Draw pictures and films of runs, without a display."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """Draw pictures of several runs at several times in one figure, with one row per run and one scale."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path

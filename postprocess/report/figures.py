@@ -3,8 +3,6 @@
 A figure is drawn inside `style()`; `add_footer` adds its provenance, and `save` writes the files.
 """
 
-from __future__ import annotations
-
 import textwrap
 import warnings
 from collections.abc import Iterator, Sequence

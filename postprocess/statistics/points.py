@@ -7,8 +7,6 @@ Source:
     Box, Hunter and Hunter, Statistics for Experimenters, 2nd ed. (Wiley 2005), chapter 5.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable, Sequence
 

@@ -5,8 +5,6 @@ resampling (the bootstrap) draws whole blocks. Runs that agree in a factor set b
 form a stratum; a resample has as many blocks of each stratum as the data.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Hashable, Sequence
 from dataclasses import dataclass, replace

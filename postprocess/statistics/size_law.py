@@ -9,8 +9,6 @@ a logistic function 1/(1 + exp(-(x - x_c)/s)). The 95 % interval of x_c is by pr
 is valid even if no run below some x has the property and all runs above have it.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Collection
 from dataclasses import dataclass

@@ -3,8 +3,6 @@
 All error bars are 95 % intervals: `draw_means` draws them, `finish` explains them once in the figure's footer.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field

@@ -6,8 +6,6 @@ is measured at the end of the activity, as in the paper's own code, and again at
 is looser in motion.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from types import MappingProxyType

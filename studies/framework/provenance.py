@@ -1,7 +1,5 @@
 """Origin of the numbers of a study: footers of tables and figures, and the file `provenance.json`."""
 
-from __future__ import annotations
-
 import importlib.metadata
 import json
 from collections.abc import Mapping, Sequence

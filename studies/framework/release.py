@@ -1,7 +1,5 @@
 """Runs that end with `remove-container`, after a pour, one activity or none, and a rest."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path

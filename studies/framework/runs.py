@@ -3,8 +3,6 @@
 If a study has runs on several engines, findings are judged by the runs on links, which is then the judging engine.
 """
 
-from __future__ import annotations
-
 import json
 import math
 from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence

@@ -1,7 +1,5 @@
 """Shaken piles: packing fraction and crossings before and after shaking, and Gravish's points."""
 
-from __future__ import annotations
-
 import hashlib
 import math
 from collections.abc import Mapping, Sequence

@@ -1,7 +1,5 @@
 """Studies: measure, columns, findings and figures, from which `analyse` makes results."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Corrupted simulations: the watchdog must report the error and the affected smarticles."""
 
-from __future__ import annotations
-
 import math
 from pathlib import Path
 from typing import Any

@@ -4,8 +4,6 @@ SIGKILL is sent after a random fraction of the processor time of the uninterrupt
 process. Processor time, unlike wall time, does not depend on the load of the machine.
 """
 
-from __future__ import annotations
-
 import json
 import os
 import random

@@ -5,8 +5,6 @@ time steps from 0.5 to 4 times the stable step. *Chatter*: smarticles that shoul
 grows without supply, or positions become NaN. Each setting is run with several seeds, which vary the initial poses.
 """
 
-from __future__ import annotations
-
 import math
 import tempfile
 from collections.abc import Iterator, Mapping

@@ -1,7 +1,5 @@
 """Run scenes under a watchdog that records the largest fraction of each limit."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field

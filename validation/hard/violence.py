@@ -1,7 +1,5 @@
 """Fast impacts, deep overlaps, strong shaking, large mass ratios."""
 
-from __future__ import annotations
-
 import math
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Known answers on the floor: sliding, rolling, stacks, flat impacts."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 

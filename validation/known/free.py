@@ -1,7 +1,5 @@
 """Known answers without contact: free fall and free rotation."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Known answers for hinges: gaps under load, sag and tilt of barbs, vibrations of barbs."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 

@@ -1,7 +1,5 @@
 """Known answers for single impacts: rebounds, oblique impacts, bars, tips of smarticles; errors over the step."""
 
-from __future__ import annotations
-
 import dataclasses
 import math
 from collections.abc import Sequence

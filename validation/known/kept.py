@@ -1,7 +1,5 @@
 """Conservation of momentum and energy, the energy ledger of a pile, and impenetrable links."""
 
-from __future__ import annotations
-
 import math
 import tempfile
 from collections.abc import Iterator

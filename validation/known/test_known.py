@@ -1,7 +1,5 @@
 """Tests of known answers and orders of convergence on both engines."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from typing import Any

@@ -1,7 +1,5 @@
 """Answers without closed form, integrated by SciPy independently of the engines."""
 
-from __future__ import annotations
-
 import math
 from typing import NamedTuple
 
