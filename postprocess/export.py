@@ -43,11 +43,11 @@ def export_run(
     color_by: str | None = None,
     progress: Callable[[int, int], None] = lambda _done, _all: None,
 ) -> Path:
-    """Export the bodies of a run to files for other programs.
+    """Export the bodies of a run to files for other programs, in one of `FORMATS`; return the path.
+
+    The run may be unfinished. The written file or folder exists only if the export is complete.
 
     Args:
-        directory: A run directory with at least one frame; the run may be unfinished.
-        to: One of `FORMATS`.
         output: Path that must not exist: a folder for vtp and for all frames, else a file with this suffix;
             `export-TO` or `export.TO` in the run directory if not given.
         time: Simulated time [s], of which the nearest frame is exported; that of the last frame if not given.
@@ -55,9 +55,6 @@ def export_run(
         unwanted: Kinds of bodies and fields to leave out.
         color_by: Name or short name of a field, for formats with colours, see `colour_field`.
         progress: Called after each frame with the number of exported frames and the number of all.
-
-    Returns:
-        Path of the written file or folder, which exists only if the export is complete.
 
     Raises:
         InputError: An unknown format, kind or field, no frame, a damaged file, a time outside the recorded frames, or

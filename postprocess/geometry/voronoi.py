@@ -26,23 +26,20 @@ def local_packing(
 ) -> tuple[float, Floats]:
     """Compute the packing fraction in a region by the set-Voronoi cells of its smarticles.
 
-    It is their total solid volume over their total cell volume [-]. The volumes of the cells of all smarticles
-    (N,) [m³] are returned, too; they are infinite or 0 for a smarticle without a cell.
+    It is their total solid volume over their total cell volume [-]. The volumes of the cells of all smarticles (N,)
+    [m³] are returned, too; they are infinite or 0 for a smarticle without a cell.
 
     The set-Voronoi cell of a smarticle is the volume that is nearer to it than to any other smarticle. Here it is the
     union of the Voronoi cells of points along its centrelines. Mirror images of the points bound the cells at floor,
     wall and lid; the lid lies at the highest point of the smarticles with their centre of mass inside the container.
+    UndefinedMeasureError if no smarticle is in the region, or one of them has no closed cell.
 
     Args:
-        vertices: (N, 4, 3) [m].
         container: The container from its floor to the pile's height.
         region: Region in which the centres of mass of the counted smarticles lie.
         solid_volume: Volume of one smarticle [m³].
         spacing: Largest distance of points along a link [m]; w/8 if not given, which is within 0.5 % of the limit of
             small spacings in piles of 270.
-
-    Raises:
-        UndefinedMeasureError: No smarticle in the region, or one of them has no closed cell.
 
     Source:
         Schaller et al., Philosophical Magazine 93 (2013) 3993 (set Voronoi diagrams).

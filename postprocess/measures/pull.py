@@ -73,8 +73,7 @@ class Peak:
 def read_pull(run: Run, series: Series, phase: int) -> HookPull:
     """Read forces and heights of the hooks in the phase with the given index, as far as the run has come.
 
-    Raises:
-        InputError: The series lacks the hook's force or height, or has fewer than two samples of the phase.
+    InputError if the series lacks the hook's force or height, or has fewer than two samples of the phase.
     """
     inside = np.nonzero(series["phase"] == phase)[0]
     force = -series["hook_upper_force_N"][:, 2]

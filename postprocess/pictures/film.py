@@ -49,13 +49,9 @@ class FilmTimes:
         rate: float = RATE,
         most: int = MOST,
     ) -> Self:
-        """Choose the times of a film's pictures.
+        """Choose the times of a film's pictures by the times (m,) of the recorded frames [s], ascending.
 
-        Args:
-            recorded: (m,) times of the recorded frames [s], ascending.
-
-        Raises:
-            InputError: Fewer than two frames or pictures, or an argument out of its range.
+        InputError if there are fewer than two frames or pictures, or an argument is out of its range.
         """
         recorded = np.asarray(recorded, dtype=np.float64)
         if most < 2:

@@ -61,7 +61,7 @@ def render_run(
 ) -> Path:
     """Draw one frame of a run: boxes of the links, hooks, strings, and the container cut open in front.
 
-    A removed wall is drawn as a faint outline.
+    A removed wall is drawn as a faint outline. Returns the path of the written file.
 
     Args:
         directory: A run directory with at least one frame; the run may be unfinished.
@@ -77,13 +77,9 @@ def render_run(
         forces: Whether to draw contact forces as lines, with a thickness proportional to the normal force, in front of
             pale smarticles.
 
-    Returns:
-        Path of the written file.
-
     Raises:
         InputError: No frame, an unknown field or view, a time outside the recorded frames, a bad size, bad limits, an
             unknown smarticle, or an output that exists.
-        RunError: This machine lacks the libraries to draw without a display.
     """
     output = _checked_output(directory, output, "render.png", (".png",))
     subjects = [Subject(path, forces=forces) for path in (directory, *compare)]
@@ -122,33 +118,25 @@ def render_film(
     track: Track | None = None,
     overwrite: bool = False,
 ) -> Path:
-    """Draw a film of a run with one camera and one colour scale.
+    """Draw a film of a run with one camera and one colour scale, and return the path of the written file.
 
     The pictures are at equal intervals of simulated time; each shows the nearest recorded frame. The caption states the
-    speed.
+    speed. `render_run` describes the arguments that are not listed.
 
     Args:
         directory: A run directory with at least two frames; the run may be unfinished.
         output: File to write: `.gif` or `.webp`, or `.mp4`, which needs the package imageio-ffmpeg; `film.gif` in the
             run directory if not given.
         compare: Further runs, drawn side by side; the film ends at the last time common to all runs.
-        color_by: Name or short name of a field; None: crossings, for planar runs smarticle_id.
-        limits: Ends of the colour scale; those of the film if not given.
         size: Width and height of the picture of one run [pixel]; even numbers for `.mp4`.
-        view: Key of `VIEWS`; None: "front", for planar runs "top".
         start: Simulated time at which the film begins [s]; that of the first frame if not given.
         end: Simulated time at which the film ends [s]; that of the last frame if not given.
         every: Simulated time between two pictures [s]; if not given, a multiple of the recorded interval.
         most_frames: Largest number of pictures if `every` is not given.
-        forces: Whether to draw contact forces, see `render_run`.
         track: Shows the progress, see `Track`.
-
-    Returns:
-        Path of the written file.
 
     Raises:
         InputError: Fewer than two frames, an output that exists or cannot be written, or an argument out of its range.
-        RunError: This machine lacks the libraries to draw without a display.
     """
     output = _checked_output(directory, output, "film.gif", film.KINDS)
     subjects = [Subject(path, forces=forces) for path in (directory, *compare)]

@@ -5,8 +5,8 @@ A figure is drawn inside `style()`; `add_footer` adds its provenance, and `save`
 
 import textwrap
 import warnings
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
+from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import Any
 
@@ -76,11 +76,9 @@ _FOOTER_COLUMNS = 97  # characters of the footer per `COLUMN_WIDTH`
 FOOTER_SHARE = 0.2  #: Largest fraction of a figure's height that its footer takes [-]
 
 
-@contextmanager
-def style() -> Iterator[None]:
+def style() -> AbstractContextManager[None]:
     """Set Matplotlib's parameters for figures, and restore them afterwards."""
-    with rc_context(_STYLE):
-        yield
+    return rc_context(_STYLE)
 
 
 def new_figure(*, width: float = COLUMN_WIDTH, height: float = 2.6) -> tuple[Figure, Axes]:

@@ -15,8 +15,6 @@ import pandas as pd
 from postprocess.statistics.seeds import SeedMean, mean_over_seeds
 
 ASPECT, SEED, SEEDS = "aspect ratio [-]", "seed", "seeds [-]"
-
-
 RUNS = "runs [-]"  #: Column with the number of runs over which a row is averaged
 
 

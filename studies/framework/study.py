@@ -69,8 +69,7 @@ class Study:
     #: Makes further tables by name from the table of runs; one called `points` replaces the means over seeds
     extra: Callable[[pd.DataFrame], Mapping[str, pd.DataFrame]] = lambda _: {}
     shown: Callable[[pd.DataFrame], pd.DataFrame] = lambda points: points  #: Selects the points of the short table
-    #: Runs that agree in these columns must have equal numbers of smarticles
-    same_count: Sequence[str] = (ASPECT,)
+    same_count: Sequence[str] = (ASPECT,)  #: Runs that agree in these columns must have equal numbers of smarticles
     same_fidelity: Sequence[str] = ()  #: Runs that agree in these columns must have one fidelity
     order: Sequence[str]  #: Columns that the table of runs is sorted by; empty: in the order of the runs given
     #: Columns that must be equal in all runs that agree in other columns: those other columns by column

@@ -61,8 +61,7 @@ class Watched:
     scene: Scene | None  #: The scene; None if the scene is not valid
     error: tuple[str, str] | None = None  #: Class and message of the error; None if the run is done
     series: dict[str, np.ndarray] = field(default_factory=dict)  #: Recorded series by name
-    #: Largest fraction of each limit of the watchdog [1]
-    nearest: dict[str, float] = field(default_factory=dict)
+    nearest: dict[str, float] = field(default_factory=dict)  #: Largest fraction of each limit of the watchdog [1]
     cost: float = 0.0  #: Share of the watchdog in the processor time, without its first check [1]
     first_check: float = 0.0  #: Processor time of the first check, which loads compiled code [s]
 
