@@ -170,10 +170,8 @@ def build_ladder(scene: Scene, *, source: str, knobs: Sequence[str] | None = Non
     """Make the ladder of a scene, for the given knobs or all that change anything in this scene.
 
     Rungs that the scene cannot have, such as two rows of spheres in a square section, are left out. `source` names the
-    file of the scene in messages.
-
-    Raises:
-        InputError: The scene has no activity, a time step of its own, or nothing that a given knob changes.
+    file of the scene in messages. InputError if the scene has no activity, a time step of its own, or nothing that a
+    given knob changes.
     """
     types = [phase.type for phase in scene.phases]
     driven = bool(ACTUATED & set(types))
@@ -433,12 +431,11 @@ def _of_series(run: Run) -> dict[str, float]:
 def work_precision(runs: pd.DataFrame, rungs: Sequence[Rung]) -> pd.DataFrame:
     """Compare each rung with the reference of its knob.
 
-    Returns:
-        One row per rung, from coarse to fine within a knob; NaN for a rung without runs. Columns: cost and means over
-        seeds with their standard errors `… SE`; `… error [%]`, relative to the mean of the reference; `… error 95 %
-        [%]`, the band of the error, which is half of its 95 % interval by Student's t, with the scatter pooled over all
-        variants; `… resolved`, whether the error is beyond its band; `verdict`, whether any error of the rung is. The
-        reference has the error 0 and the band of its own mean.
+    The table has one row per rung, from coarse to fine within a knob; NaN for a rung without runs. Columns: cost and
+    means over seeds with their standard errors `… SE`; `… error [%]`, relative to the mean of the reference; `… error
+    95 % [%]`, the band of the error, which is half of its 95 % interval by Student's t, with the scatter pooled over
+    all variants; `… resolved`, whether the error is beyond its band; `verdict`, whether any error of the rung is. The
+    reference has the error 0 and the band of its own mean.
     """
     groups = {rung.setting: runs[runs[VARIANT] == rung.setting] for rung in rungs}
     scatters = {name: pooled_scatter(group[column] for group in groups.values()) for name, column in COMPARED.items()}

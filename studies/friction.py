@@ -118,11 +118,10 @@ class Curve:
     def crossing(self) -> tuple[float, float, float, str]:
         """Find the friction at which φ is Gravish's φ.
 
-        Returns:
-            That friction [-], both ends of its 95 % interval [-], and "within", "above" or "below the range" measured.
-            If scatter makes φ cross Gravish's φ several times, the friction is the middle between the first and the
-            last crossing. The interval covers all friction at which φ does not clearly differ; its ends are ±inf
-            beyond the measured range, NaN without errors.
+        Returns that friction [-], both ends of its 95 % interval [-], and "within", "above" or "below the range"
+        measured. If scatter makes φ cross Gravish's φ several times, the friction is the middle between the first and
+        the last crossing. The interval covers all friction at which φ does not clearly differ; its ends are ±inf beyond
+        the measured range, NaN without errors.
         """
         off = self.packing - self.reference
         left = np.nonzero(off[:-1] * off[1:] < 0)[0]

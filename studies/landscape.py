@@ -191,10 +191,9 @@ def trajectories(runs: pd.DataFrame) -> pd.Series:
 def predicted(runs: pd.DataFrame) -> tuple[pd.DataFrame, pd.DataFrame]:
     """Correlate both strengths with all measures.
 
-    Returns:
-        The table `predictors`: rank correlation and slope with 95 % intervals, a row per strength, part of the runs,
-        scope (over all l/w, within l/w, or one l/w) and measure, best measure first. The table `comparisons`: the
-        difference of the best measure's rank correlation to that of each other measure.
+    The table `predictors` has rank correlation and slope with 95 % intervals, a row per strength, part of the runs,
+    scope (over all l/w, within l/w, or one l/w) and measure, best measure first. The table `comparisons` has the
+    difference of the best measure's rank correlation to that of each other measure.
     """
     each: list[dict[str, object]] = []
     against: list[dict[str, object]] = []
@@ -293,9 +292,8 @@ def common_aspects(runs: pd.DataFrame) -> list[float]:
 def costs(runs: pd.DataFrame) -> pd.DataFrame:
     """Average gain and energy over pairs of l/w and seed, at the `common_aspects` and at each l/w.
 
-    Returns:
-        A row per scope, procedure, θ and planned time: means with errors, the gain per energy with its 95 % interval,
-        and 1 in `FRONTIER` if no other row of the scope gains as much for less energy.
+    The table has a row per scope, procedure, θ and planned time: means with errors, the gain per energy with its 95 %
+    interval, and 1 in `FRONTIER` if no other row of the scope gains as much for less energy.
     """
     gained = gains(runs)
     scopes = {COMMON: gained[gained[ASPECT].isin(common_aspects(runs))]}
@@ -497,11 +495,6 @@ FINDINGS = (
 _by_aspect = one_by_one(ASPECT, "l/w = {:g}".format)
 
 
-def _swung(table: pd.DataFrame) -> pd.DataFrame:
-    """Return the rows of the internal oscillation, in ascending order of energy."""
-    return table[(table[PROCEDURE] == INTERNAL) & (table[ENERGY] > 0)].sort_values(ENERGY)
-
-
 def _bought(table: pd.DataFrame) -> list[Series]:
     """Return a series for each θ of the internal oscillation, and for each other procedure."""
     others = [
@@ -510,7 +503,8 @@ def _bought(table: pd.DataFrame) -> list[Series]:
         )
         for name in (EXTERNAL, SHAPE)
     ]
-    return [*one_by_one(THETA, "internal, θ = {:g}°".format)(_swung(table)), *others]
+    swung = table[(table[PROCEDURE] == INTERNAL) & (table[ENERGY] > 0)].sort_values(ENERGY)
+    return [*one_by_one(THETA, "internal, θ = {:g}°".format)(swung), *others]
 
 
 def _correlations(table: pd.DataFrame) -> pd.DataFrame:

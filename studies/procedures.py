@@ -125,11 +125,6 @@ def with_amplitude(name: str, says: str, quantity: str, sign: int = 1, rows: Row
     return slope(name, says, quantity, THETA, sign=sign, within=(ASPECT, SEED), rows=rows)
 
 
-def _bend(table: pd.DataFrame) -> list[Effect]:
-    bend = parabola(table[ASPECT], table[PHI_ACTIVE], at=1.0).bend
-    return [Effect(label="bend of φ_f against l/w, of the parabola through all runs,", value=bend)]
-
-
 def _compacts_early(table: pd.DataFrame) -> Outcome:
     drop = Effect(label="h comes down by, of h0,", value=mean_over_seeds(1 - table[HEIGHT]))
     half = Effect(
@@ -280,7 +275,12 @@ PACKING = (
     Finding(
         id="shaken-bends",
         says="External oscillation: φ changes with l/w faster than linearly",
-        outcome=_bend,
+        outcome=lambda table: [
+            Effect(
+                label="bend of φ_f against l/w, of the parabola through all runs,",
+                value=parabola(table[ASPECT], table[PHI_ACTIVE], at=1.0).bend,
+            )
+        ],
         rows=only(EXTERNAL, PHI_ACTIVE),
     ),
     mean(

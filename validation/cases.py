@@ -115,9 +115,7 @@ def ladder(  # noqa: PLR0917 # a row of a table
     phases: int | None = None,
     **options: Any,
 ) -> Callable[[Function], Function]:
-    """Register a function `(access, steps, **options) -> list[float]` that returns errors.
-
-    The function returns an error for each time step.
+    """Register a function `(access, steps, **options) -> list[float]`: an error for each time step.
 
     Args:
         quantity: quantity whose error is returned, with its unit.

@@ -37,8 +37,7 @@ class UndefinedMeasureError(InputError):
 def checked_vertices(vertices: Vertices) -> Floats:
     """Return vertices as a float64 array (N, 4, 3) [m] after checking them.
 
-    Raises:
-        InputError: Wrong shape, a value that is not finite, or a smarticle of length 0.
+    InputError for a wrong shape, a value that is not finite, or a smarticle of length 0.
     """
     array = np.asarray(vertices, dtype=np.float64)
     if array.ndim != 3 or array.shape[1:] != (4, 3):

@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import partial
 from types import MappingProxyType
 
 from dem.errors import InputError
@@ -129,6 +130,10 @@ def packing_of(frame: Frame, run: Run, *, definition: str) -> float:
         return math.nan
 
 
+def _packing(definition: str, frame: Frame, run: Run) -> tuple[float]:
+    return (packing_of(frame, run, definition=definition),)
+
+
 # Experiments use the first definition: short tables call it φ and show its error.
 _SHOWN = {
     name: Shown(heading="φ" if place == 0 else name, place=10 + place, form=".4f", with_error=place == 0)
@@ -140,7 +145,7 @@ MEASURES = tuple(
         name=f"phi {definition}",
         place=70,
         quantities=(Quantity(f"phi {definition}", "-", _SHOWN[definition]),),
-        take=lambda frame, run, definition=definition: (packing_of(frame, run, definition=definition),),
+        take=partial(_packing, definition),
         available_for=in_space,
         definition=definition,
         costly=definition in COSTLY_DEFINITIONS,

@@ -4,6 +4,7 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from dem.errors import InputError
 from dem.record.frame import Frame
@@ -56,13 +57,15 @@ def free_pile(
     """
     vertices = checked_vertices(vertices)
     centre = centre_of_mass(vertices)
+    # Outliers have little influence on medians.
+    middle = np.median(centres_of_mass(vertices)[:, :2], axis=0)
     return FreePile(
         touching=contact_clusters(vertices, TOUCHING * run.manifest.sphere_diameter_m).largest,
         entangled=entanglement_clusters(vertices).largest,
         radius_half=spread_radius(vertices, share=0.5),
         radius_most=spread_radius(vertices, share=0.95),
         sloughed=share_outside(
-            vertices, run.manifest.container_radius_m + OUTSIDE * run.manifest.middle_length_m, axis=middle(vertices)
+            vertices, run.manifest.container_radius_m + OUTSIDE * run.manifest.middle_length_m, axis=middle
         ),
         tilt=math.degrees(tilt(vertices, foot=foot, floor_z=floor_z)),
         offset=math.hypot(centre[0] - foot[0], centre[1] - foot[1]),
@@ -99,7 +102,7 @@ def spread_radius(vertices: Vertices, *, share: float, axis: tuple[float, float]
     return least_reaching(lambda radius: float(weights @ _shares_within(start, along, radius)), level, 0.0, farthest)
 
 
-def share_outside(vertices: Vertices, radius: float, *, axis: tuple[float, float] = (0.0, 0.0)) -> float:
+def share_outside(vertices: Vertices, radius: float, *, axis: ArrayLike = (0.0, 0.0)) -> float:
     """Return the fraction [-] of smarticles outside a cylinder around a vertical axis.
 
     The position of a smarticle is its centre of mass. The cylinder has a radius [m] and an axis through x and y [m].
@@ -108,13 +111,7 @@ def share_outside(vertices: Vertices, radius: float, *, axis: tuple[float, float
     centres = centres_of_mass(vertices)
     if len(centres) == 0:
         raise UndefinedMeasureError("a fraction of smarticles needs at least 1 smarticle: got 0")
-    return float((np.hypot(*(centres[:, :2] - axis).T) > radius).mean())
-
-
-def middle(vertices: Vertices) -> tuple[float, float]:
-    """Return the middle of a pile, x and y [m]: medians, on which outliers have little influence."""
-    x, y = np.median(centres_of_mass(vertices)[:, :2], axis=0)
-    return float(x), float(y)
+    return float((np.hypot(*(centres[:, :2] - np.asarray(axis)).T) > radius).mean())
 
 
 def tilt(vertices: Vertices, *, foot: tuple[float, float] = (0.0, 0.0), floor_z: float = 0.0) -> float:

@@ -184,15 +184,14 @@ def add_bodies(plotter: Any, meshes: Mapping[str, pv.PolyData], frame: Frame, co
 class Canvas:
     """An off-screen window with one panel per run, one camera, one colour scale and one scale bar.
 
+    RunError if this machine lacks the libraries to draw without a display.
+
     Args:
         extent: (2, 2) extent in the camera's view [mm].
         run: Run by whose sizes corners are shaded.
         columns: Number of panels.
         scale: Colour scale; None: no colour bar.
         quick: Whether to leave out the shading of corners, which takes most of the time of a picture.
-
-    Raises:
-        RunError: This machine lacks the libraries to draw without a display.
     """
 
     def __init__(

@@ -101,7 +101,8 @@ def add_footer(figure: Figure, lines: Sequence[str]) -> None:
     which names the file with the full text.
     """
     width, height = figure.get_size_inches()
-    text = _fitting(lines, int(_FOOTER_COLUMNS * width / COLUMN_WIDTH), _most_lines(height))
+    room = height * FOOTER_SHARE / (1 - FOOTER_SHARE) - _FOOTER_MARGIN
+    text = _fitting(lines, int(_FOOTER_COLUMNS * width / COLUMN_WIDTH), max(int(room / _FOOTER_LINE), 1))
     below = _FOOTER_LINE * len(text) + _FOOTER_MARGIN
     figure.set_size_inches(width, height + below)
     base = below / (height + below)
@@ -110,12 +111,6 @@ def add_footer(figure: Figure, lines: Sequence[str]) -> None:
         0.015, _FOOTER_MARGIN / 2 / (height + below), "\n".join(text), fontsize=_FOOTER_SIZE, color=GREY,
         va="bottom", ha="left", linespacing=1.25, parse_math=False,
     )  # fmt: skip
-
-
-def _most_lines(height: float) -> int:
-    """Return the number of lines that a footer may have, at least one, by the figure's height [inch]."""
-    room = height * FOOTER_SHARE / (1 - FOOTER_SHARE)
-    return max(int((room - _FOOTER_MARGIN) / _FOOTER_LINE), 1)
 
 
 def _fitting(lines: Sequence[str], columns: int, most: int) -> list[str]:

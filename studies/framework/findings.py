@@ -205,17 +205,7 @@ def within(value: float, half_width: float, margin: float) -> Verdict:
 
 def findings_table(judged: Sequence[Judged]) -> pd.DataFrame:
     """Make the table `findings.csv`: statement, numbers, verdict and criterion, a row per finding."""
-    rows = [
-        {
-            "finding in the paper": one.finding.says,
-            "ours": one.ours,
-            "verdict": str(one.verdict),
-            "criterion": one.criterion,
-            "needed": one.needed,
-            "id": one.finding.id,
-        }
-        for one in judged
-    ]
+    rows = [(one.finding.says, one.ours, str(one.verdict), one.criterion, one.needed, one.finding.id) for one in judged]
     return pd.DataFrame(rows, columns=["finding in the paper", "ours", "verdict", "criterion", "needed", "id"])
 
 

@@ -144,11 +144,9 @@ def compared_engines(runs: pd.DataFrame, keys: Sequence[str], quantities: Iterab
     """Compare the judging engine with the other engines: differences at each point, paired by seed.
 
     Runs with equal point and seed were poured from equal poses. Piles are chaotic and soon forget their poses, so
-    pairing reduces the scatter only a little.
-
-    Returns:
-        One row per point, other engine and quantity: mean of each engine over the pairs, their difference with its
-        95 % half-width by Student's t, and the last two in per cent of the other engine's mean.
+    pairing reduces the scatter only a little. The table has one row per point, other engine and quantity: mean of each
+    engine over the pairs, their difference with its 95 % half-width by Student's t, and the last two in per cent of the
+    other engine's mean.
     """
     first, *others = engines_of(runs)
     rows = []
@@ -298,10 +296,8 @@ def earlier_runs(results: Path | str, wanted: Mapping[str, Wanted]) -> dict[str,
     """Read planned runs from the results of an earlier analysis, so that they need not be computed again.
 
     Rows come from `runs.csv`, with its six digits; versions and command come from `provenance.json`. A run is only read
-    if name and hash of its scene are those of a planned run.
-
-    Raises:
-        InputError: A file is missing or damaged, or none of its runs is planned.
+    if name and hash of its scene are those of a planned run. InputError if a file is missing or damaged, or none of its
+    runs is planned.
     """
     results = Path(results)
     table = read_runs(results)

@@ -180,9 +180,8 @@ class Study:
     def tabulate(self, runs: pd.DataFrame, times: pd.DataFrame | None = None) -> dict[str, pd.DataFrame]:
         """Make all tables from the table of runs and the histories.
 
-        Returns:
-            Tables by name: `runs`, `points`, `engines` if there are several, `times` if there are histories, and those
-            of `extra`.
+        Their names are `runs`, `points`, `engines` if there are several, `times` if there are histories, and those of
+        `extra`.
         """
         runs = sort_rows(runs, self.order, self.keys) if self.order else runs
         extra = self.extra(runs)

@@ -194,12 +194,8 @@ def shaft_mode(one: Scene, pin: float, *, held: bool) -> tuple[float, Array]:
     axis, rotation of the middle link, rotation of the barbs, and the gap of hinge 1 along and across the middle link
     (hinge 2: equal along, opposite across). Rigid pins and a fixed middle link remove coordinates.
 
-    Args:
-        pin: stiffness of a pin [N/m]; may be inf.
-        held: the middle link is fixed.
-
-    Returns:
-        Angular frequency [rad/s], and the mode (5,) [m or rad] for a twist of 1 rad.
+    `pin` is the stiffness of a pin [N/m], which may be inf; the middle link is fixed if `held`. Returns the angular
+    frequency [rad/s], and the mode (5,) [m or rad] for a twist of 1 rad.
     """
     boxes, (mass, own, lever) = one.smarticle.boxes, _barb(one)
     along = np.array([1.0, 0.0, -lever, 1.0, 0.0])
