@@ -222,7 +222,7 @@ class Viewer:
         controller.add("on_server_ready")(
             lambda **_: opened(f"http://{HOST}:{self._server.port}/index.html?token={self._token}")
         )
-        controller.add("on_client_connected")(lambda **_: self._web.config.update(timeout=_CLOSED_FOR))
+        controller.add("on_client_connected")(self._shorten)
         self._lay_out()
 
     def serve(self) -> None:
@@ -261,6 +261,9 @@ class Viewer:
     def _bind(self, served: Any) -> None:
         self._web = served
         protect(served.app, self._token)
+
+    def _shorten(self, **_: Any) -> None:
+        self._web.config["timeout"] = _CLOSED_FOR
 
     def _lay_out(self) -> None:
         with DivLayout(self._server, classes="page"):

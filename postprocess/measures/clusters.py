@@ -67,8 +67,8 @@ def spans_height(clusters: Clusters, vertices: Vertices, *, diameter: float, flo
 def spans_width(clusters: Clusters, vertices: Vertices, *, diameter: float, wall_radius: float) -> bool:
     """Return whether one cluster spans the container: no half of the wall has all its contacts.
 
-    A cluster that touches a round wall on one half alone is not wedged between opposite sides. The wall's axis is x = y
-    = 0. Vertices (N, 4, 3), diameter of the spheres along the links, and radius of the wall are in [m].
+    A cluster that touches a round wall on one half alone is not wedged between opposite sides. Vertices (N, 4, 3),
+    diameter of the spheres along the links, and radius of the wall are in [m]; the wall is centred at x = y = 0.
     """
     vertices = checked_vertices(vertices)
     smarticle, vertex = np.nonzero(at_wall(vertices, diameter=diameter, wall_radius=wall_radius))

@@ -178,16 +178,14 @@ def collapse_time(
 
     Least squares with 0.3 ≤ β ≤ 3 and 0 ≤ h_end ≤ h_start. τ counts as measured if the column lost at least
     `LEAST_FALL` of its height, τ is shorter than the observation, and its relative error is at most `WORST_ERROR`.
-    Otherwise the observation time is a lower bound of τ.
+    Otherwise the observation time is a lower bound of τ. InputError for too few samples, or times or heights out of
+    their range.
 
     Args:
         times: (n,) times since the collapse began [s], ascending and above 0; n ≥ 10.
         heights: (n,) heights in any unit, not below 0.
         start: h_start if it is known, in the unit of the heights; None: fitted.
         end: h_end if it is known, in the unit of the heights; None: fitted.
-
-    Raises:
-        InputError: Too few samples, or times or heights out of their range.
 
     Source:
         τ of Gravish, Franklin, Hu, Goldman, Phys. Rev. Lett. 108, 208001 (2012); the function is that of Kohlrausch.

@@ -48,10 +48,8 @@ class ContactPairs(NamedTuple):
 def contact_pairs(vertices: Vertices, distance: float) -> ContactPairs:
     """Find pairs of smarticles whose centrelines are at most a distance [m] apart, sorted by i, then j.
 
-    Boxes of cross-section t1 × t2 can touch at centreline distances from min(t1, t2) to (t1² + t2²)^½.
-
-    Raises:
-        InputError: The distance is not above 0.
+    Boxes of cross-section t1 × t2 can touch at centreline distances from min(t1, t2) to (t1² + t2²)^½. InputError if
+    the distance is not above 0.
     """
     vertices = checked_vertices(vertices)
     if not (math.isfinite(distance) and distance > 0):

@@ -27,8 +27,7 @@ class Heights:
 def heights(vertices: Vertices, *, floor_z: float = 0.0) -> Heights:
     """Compute the heights of a pile by its vertices (N, 4, 3) [m] and the height of its floor [m].
 
-    Raises:
-        UndefinedMeasureError: There is no smarticle.
+    UndefinedMeasureError if there is no smarticle.
     """
     vertices = checked_vertices(vertices)
     if len(vertices) == 0:

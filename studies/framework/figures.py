@@ -23,7 +23,6 @@ from numpy.typing import ArrayLike, NDArray
 from dem.errors import InputError
 from dem.record.run import Run
 from postprocess.report import figures as style
-from postprocess.report.figures import hold_everything
 from postprocess.statistics.points import marked
 from studies.framework.procedures import EXTERNAL, INTERNAL, PROCEDURE, SHAPE, STATIC, of_procedure
 from studies.framework.runs import ENGINE_NAMES, Quantity, engines_of, judging, of_engine
@@ -602,7 +601,7 @@ def finish(figure: Canvas, path: Path, notes: Sequence[str], footer: Sequence[st
     if len(entries) > 1:
         columns = 2 if figure.get_size_inches()[0] < 1.5 * style.COLUMN_WIDTH else 4
         figure.legend(entries.values(), entries.keys(), loc="outside upper center", ncols=columns)
-    hidden = hold_everything(figure)
+    hidden = style.hold_everything(figure)
     has_bars = any(
         lines.get_label() == _CONFIDENCE
         for axes in figure.axes

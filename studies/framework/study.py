@@ -110,14 +110,13 @@ class Study:
     ) -> Report:
         """Measure runs and write tables, text, provenance and figures; existing files are replaced.
 
+        InputError if no run is done, runs must not be averaged or compared, or the output is no folder.
+
         Args:
             run_dirs: directories of the runs; runs that are not done or cannot be read are listed as missing.
             note: how the runs differ from the full study, for footers.
             command: command line, for footers.
             earlier: runs of an earlier analysis by name, which replace directories that do not exist.
-
-        Raises:
-            InputError: No run is done, runs must not be averaged or compared, or the output is no folder.
         """
         output = make_folder(output)
         found = collect_runs(self.name, run_dirs, self.measured, earlier=earlier)
