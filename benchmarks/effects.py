@@ -6,8 +6,6 @@ has the median over pairs of the relative cost, and its quartiles. The first row
 the noise.
 """
 
-from __future__ import annotations
-
 import argparse
 import statistics
 from pathlib import Path
@@ -27,9 +25,7 @@ MEASURED = 1  # index of the compared phase; phase 0 is the pour
 def pairs(seconds: float, hinged_step: float) -> list[tuple[str, str, Changes, Changes]]:
     """Return name, cause of the cost, and changed keys of the scenes without and with the effect, for each effect.
 
-    Args:
-        seconds: duration of the compared phase [s].
-        hinged_step: time step of a scene with hinges [s].
+    The compared phase takes `seconds` [s]; `hinged_step` is the time step of a scene with hinges [s].
     """
     rest = {"type": "relax", "duration_s": seconds}
     still = {"type": "shake", "duration_s": seconds, "peak_acceleration_g": 0}

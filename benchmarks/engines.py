@@ -6,8 +6,6 @@ row per run; a later call with the same `--out` continues the table. A run that 
 time is skipped and reported.
 """
 
-from __future__ import annotations
-
 import argparse
 import json
 import time
@@ -29,12 +27,7 @@ MEMORY, WHOLE = "peak memory [MiB]", "whole run [s]"
 
 
 def measured(folder: Path, run: dict[str, Any]) -> dict[str, Any]:
-    """Run a scene; return a row of the table.
-
-    Args:
-        folder: for run directories.
-        run: engine, activity, fidelity, count and seed, the first columns of the row.
-    """
+    """Run a scene; return a row of the table, which begins with the columns `run`, from engine to seed."""
     engine, activity, fidelity, count, seed = run.values()
     name = f"{engine}-{activity}-{fidelity}-{count}-{seed}"
     acting = {"type": activity, "duration_s": SECONDS, **ACTIVITIES[activity]}

@@ -1,7 +1,5 @@
 """Run scenes in separate processes for benchmarks, and read their costs."""
 
-from __future__ import annotations
-
 import json
 import os
 import resource
@@ -22,12 +20,7 @@ def pile(
 ) -> dict[str, Any]:
     """Return a scene as a dictionary, with a pile as high as the paper's pile of 270.
 
-    Args:
-        count: number of smarticles.
-        phases: phases after the pour.
-        seed: of the scene.
-        per_layer: smarticles per layer of the pour; None: in proportion to the area of the floor.
-        keys: further keys of the scene.
+    The phases follow the pour, of `per_layer` smarticles at a time, by default in proportion to the area of the floor.
     """
     widening = (count / PAPER_COUNT) ** 0.5
     per_layer = per_layer or max(PAPER_PER_LAYER, round(PAPER_PER_LAYER * widening**2))
@@ -44,8 +37,7 @@ def pile(
 def run_child(folder: Path, name: str, data: dict[str, Any]) -> resource.struct_rusage:
     """Run a scene on one thread into `folder/name`; exit the benchmark if the run fails.
 
-    Returns:
-        Processor time and memory of the process.
+    Returns processor time and memory of the process.
     """
     path = folder / f"{name}.yaml"
     path.write_text(dump_scene(parse_scene(data, source="benchmarks")), encoding="utf-8")

@@ -5,8 +5,6 @@ processes. All repetitions compute equal bits, so that the smallest time of each
 approximates an idle machine.
 """
 
-from __future__ import annotations
-
 import argparse
 import json
 import os
@@ -38,9 +36,8 @@ WALL, PROCESSOR = "wall time per step and smarticle [us]", "processor time per s
 def time_intervals(run: Path) -> dict[str, Any]:
     """Load the last checkpoint of a run and time the shaking of its pile.
 
-    Returns:
-        Wall times and processor times of all intervals [s] under "wall" and "processor", mean number of contacts per
-        smarticle, and peak memory [MiB].
+    Returns wall times and processor times of all intervals [s], mean number of contacts per smarticle, and peak memory
+    [MiB].
     """
     scene, made_by = load_scene(run / "scene.yaml"), open_run(run).manifest.versions["links"]
     # The scene needs a phase that shakes, or the engine is built without a moving container.

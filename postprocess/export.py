@@ -1,7 +1,5 @@
 """Export a run for other programs: VTP files for ParaView, or triangles as STL, OBJ or glTF."""
 
-from __future__ import annotations
-
 import os
 import shutil
 import tempfile
@@ -45,23 +43,18 @@ def export_run(
     color_by: str | None = None,
     progress: Callable[[int, int], None] = lambda _done, _all: None,
 ) -> Path:
-    """Export the bodies of a run to files for other programs.
+    """Export the bodies of a run to files for other programs, in one of `FORMATS`; return the path.
+
+    The run may be unfinished. The written file or folder exists only if the export is complete.
 
     Args:
-        directory: A run directory with at least one frame; the run may be unfinished.
-        to: One of `FORMATS`.
-        output: Path that must not exist: a folder for vtp and for all frames, else a file with the suffix of the
-        format;
+        output: Path that must not exist: a folder for vtp and for all frames, else a file with this suffix;
             `export-TO` or `export.TO` in the run directory if not given.
         time: Simulated time [s], of which the nearest frame is exported; that of the last frame if not given.
-        every_frame: Whether to export all frames.
         wanted: Kinds of bodies besides `postprocess.bodies.meshes.USUAL`.
         unwanted: Kinds of bodies and fields to leave out.
-        color_by: Name or short name of a field, for formats with colours; None: crossings, for planar runs
-        smarticle_id. progress: Called after each frame with the number of exported frames and the number of all.
-
-    Returns:
-        Path of the written file or folder, which exists only if the export is complete.
+        color_by: Name or short name of a field, for formats with colours, see `colour_field`.
+        progress: Called after each frame with the number of exported frames and the number of all.
 
     Raises:
         InputError: An unknown format, kind or field, no frame, a damaged file, a time outside the recorded frames, or
@@ -190,11 +183,7 @@ def _write_mesh(folder: Path, kind: str, mesh: pv.PolyData, frame: tuple[int, fl
 
 
 class _Painter:
-    """Makes files of triangles, with smarticles coloured by a field on one scale for all frames.
-
-    Raises:
-        InputError: The field is unknown, or has no value in these frames.
-    """
+    """Makes files of triangles, with smarticles coloured by a field on one scale for all frames."""
 
     def __init__(self, bodies: Bodies, color_by: str | None, frames: Iterable[Frame]) -> None:
         self._bodies = bodies
@@ -206,9 +195,9 @@ class _Painter:
         self._scale = ColourScale.of(self._field, self._bounds)
 
     def content(self, frame: Frame, suffix: str) -> bytes | None:
-        """Return the content of the file of a frame; None if there is no body.
+        """Return the content of the file of a frame, with one object per kind; None if there is no body.
 
-        The file has one object per kind; an STL has one for all.
+        STL has one object for all kinds.
         """
         scene: Any = trimesh.Scene()
         web = suffix in {"gltf", "glb"}

@@ -102,11 +102,6 @@ def data_at(source: Any, time: float) -> Any:
     return found.GetBlock(0) if found.IsA("vtkMultiBlockDataSet") else found
 
 
-def points_at(source: Any, time: float) -> int:
-    """Return the number of points of a collection at a time [s]."""
-    return int(data_at(source, time).GetNumberOfPoints())
-
-
 def size(source: Any, name: str) -> float:
     """Return a length of the smarticles [m] by its name in the field data."""
     return float(data_at(source, times(source)[0]).GetFieldData().GetArray(name).GetValue(0))
@@ -149,7 +144,7 @@ def colouring(source: Any) -> str:
 def wall(kind: str, source: Any, view: Any) -> None:
     """Show the half of a round wall behind the pile, or all of the walls of a channel."""
     # A removed wall has no points at the last time; load the last time at which it has.
-    next(time for time in times(source) if points_at(source, time))
+    next(time for time in times(source) if data_at(source, time).GetNumberOfPoints())
     low_x, high_x, low_y, high_y = source.GetDataInformation().GetBounds()[:4]
     if abs((high_x - low_x) - (high_y - low_y)) > 0.01 * (high_x - low_x):
         plain(kind, source, view)

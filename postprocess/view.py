@@ -1,7 +1,5 @@
 """Show a run in the browser, in an interactive page that a server on this machine serves."""
 
-from __future__ import annotations
-
 import asyncio
 import contextlib
 import os
@@ -73,11 +71,7 @@ class Pick(NamedTuple):
 
 
 class RunView:
-    """State of the page of a run: shown frame, coloured field, and selected smarticle.
-
-    Raises:
-        InputError: The run has no frame, or is damaged.
-    """
+    """State of the page of a run: shown frame, coloured field, and selected smarticle."""
 
     def __init__(self, directory: Path | str) -> None:
         self.run = open_run(directory)
@@ -117,22 +111,14 @@ class RunView:
         return len(self.frames) > before
 
     def go_to(self, index: int) -> None:
-        """Show the frame with an index.
-
-        Raises:
-            InputError: The file of the frame is damaged; the shown frame does not change.
-        """
+        """Show the frame with an index; InputError if its file is damaged, the shown frame does not change."""
         index = min(max(index, 0), len(self.frames) - 1)
         frame = self.frames[index]
         self._bodies.hold([frame])
         self.index, self.frame = index, frame
 
     def colour_by(self, name: str) -> None:
-        """Colour smarticles by the field with a name.
-
-        Raises:
-            InputError: The name is unknown.
-        """
+        """Colour smarticles by the field with a name."""
         self.field = colour_field(name, self.run)
 
     def draw(self) -> None:
@@ -205,13 +191,7 @@ def _text(value: Any) -> str:
 
 
 class Viewer:
-    """The page of a run, and its server.
-
-    Args:
-        view: State of the page.
-        port: Port of the server; 0: any free port.
-        opened: Called with the address of the page once the server listens.
-    """
+    """The page of a run, and its server; `opened` is called with the address once the server listens."""
 
     def __init__(self, view: RunView, *, port: int, opened: Callable[[str], None]) -> None:
         self._view = view
@@ -246,11 +226,7 @@ class Viewer:
         self._lay_out()
 
     def serve(self) -> None:
-        """Serve the page until it is closed.
-
-        Raises:
-            InputError: The port is taken.
-        """
+        """Serve the page until it is closed; InputError if the port is taken."""
         # Otherwise trame would read the arguments of this process.
         os.environ["TRAME_ARGS"] = f"--server --host {HOST} --authKey={self._token} --nosignalhandlers"
         os.environ["WSLINK_READY_MSG"] = ""
@@ -300,9 +276,7 @@ class Viewer:
                 html.Span("{{ fault }}", v_if="fault", classes="fault", role="alert")
             with html.Main():
                 self._canvas = vtk_widgets.VtkLocalView(
-                    self._view.plotter.render_window,
-                    picking_modes=("['click']",),
-                    click=(self._on_click, "[$event]"),
+                    self._view.plotter.render_window, picking_modes=("['click']",), click=(self._on_click, "[$event]")
                 )
             with html.Aside():
                 with html.Div(v_for="(entry, k) in legend", key="k", classes="key"):
@@ -390,13 +364,8 @@ class Viewer:
 def view_run(directory: Path | str, *, port: int = 0, opened: Callable[[str], None]) -> None:
     """Serve the page of a run to browsers on this machine, until the page is closed.
 
-    Args:
-        directory: A run directory with at least one frame; the run may be unfinished.
-        port: Port of the server; 0: any free port.
-        opened: Called with the address of the page once the server listens.
-
-    Raises:
-        InputError: There is no frame, a file is damaged, or the port is taken.
+    The run may be unfinished. `opened` is called with the address of the page once the server listens on the port; 0 is
+    any free port. InputError if there is no frame, a file is damaged, or the port is taken.
     """
     # The page needs no display, of whose absence VTK would warn.
     vtkLogger.SetStderrVerbosity(vtkLogger.VERBOSITY_ERROR)

@@ -6,8 +6,6 @@ of the model, such as restitution, have no accuracy but a sensitivity; their ref
 within the scatter between seeds is not resolved, which does not prove that it is 0.
 """
 
-from __future__ import annotations
-
 import math
 import re
 from collections.abc import Mapping, Sequence
@@ -140,8 +138,7 @@ def default_seeds(scene: Scene) -> tuple[int, ...]:
 def parse_seeds(text: str) -> tuple[int, ...]:
     """Parse seeds from a text such as `1,2,3` or `1-20`.
 
-    Raises:
-        InputError: There is no seed, one is not a whole number from 0, or one is given twice.
+    InputError if there is no seed, one is not a whole number from 0, or one is given twice.
     """
     words = [word.strip() for word in text.split(",") if word.strip()]
     if not words or not all(re.fullmatch(r"[0-9]{1,9}(-[0-9]{1,9})?", word) for word in words):
@@ -159,11 +156,7 @@ def parse_seeds(text: str) -> tuple[int, ...]:
 
 
 def parse_knobs(text: str) -> tuple[str, ...]:
-    """Parse knobs from a text such as `time-step,section`, and return them in the order of `KNOBS`.
-
-    Raises:
-        InputError: There is no knob, or one is unknown.
-    """
+    """Parse known knobs from a text such as `time-step,section`, and return them in the order of `KNOBS`."""
     words = [word.strip() for word in text.split(",") if word.strip()]
     for word in words:
         if word not in KNOBS:
@@ -174,17 +167,11 @@ def parse_knobs(text: str) -> tuple[str, ...]:
 
 
 def build_ladder(scene: Scene, *, source: str, knobs: Sequence[str] | None = None) -> Ladder:
-    """Make the ladder of a scene.
+    """Make the ladder of a scene, for the given knobs or all that change anything in this scene.
 
-    Rungs that the scene cannot have, such as two rows of spheres in a square section, are left out.
-
-    Args:
-        scene: the scene.
-        source: name of its file, for messages.
-        knobs: knobs that are wanted; None: all that change anything in this scene.
-
-    Raises:
-        InputError: The scene has no activity, a time step of its own, or nothing that a given knob changes.
+    Rungs that the scene cannot have, such as two rows of spheres in a square section, are left out. `source` names the
+    file of the scene in messages. InputError if the scene has no activity, a time step of its own, or nothing that a
+    given knob changes.
     """
     types = [phase.type for phase in scene.phases]
     driven = bool(ACTUATED & set(types))
@@ -444,12 +431,11 @@ def _of_series(run: Run) -> dict[str, float]:
 def work_precision(runs: pd.DataFrame, rungs: Sequence[Rung]) -> pd.DataFrame:
     """Compare each rung with the reference of its knob.
 
-    Returns:
-        One row per rung, from coarse to fine within a knob; NaN for a rung without runs. Columns: cost and means over
-        seeds with their standard errors `… SE`; `… error [%]`, relative to the mean of the reference; `… error 95 %
-        [%]`, the band of the error, which is half of its 95 % interval by Student's t, with the scatter pooled over all
-        variants; `… resolved`, whether the error is beyond its band; `verdict`, whether any error of the rung is. The
-        reference has the error 0 and the band of its own mean.
+    The table has one row per rung, from coarse to fine within a knob; NaN for a rung without runs. Columns: cost and
+    means over seeds with their standard errors `… SE`; `… error [%]`, relative to the mean of the reference; `… error
+    95 % [%]`, the band of the error, which is half of its 95 % interval by Student's t, with the scatter pooled over
+    all variants; `… resolved`, whether the error is beyond its band; `verdict`, whether any error of the rung is. The
+    reference has the error 0 and the band of its own mean.
     """
     groups = {rung.setting: runs[runs[VARIANT] == rung.setting] for rung in rungs}
     scatters = {name: pooled_scatter(group[column] for group in groups.values()) for name, column in COMPARED.items()}
@@ -553,11 +539,9 @@ def _finding(knob: str, *, sensitivity: bool) -> Finding:
 
 
 def study(rungs: Sequence[Rung], expected_s: Mapping[str, float] = MappingProxyType({})) -> Study:
-    """Make the study of a ladder.
+    """Make the study of a ladder, whose rungs are ordered by knob, from coarse to fine.
 
-    Args:
-        rungs: rungs by knob, from coarse to fine.
-        expected_s: expected wall times of runs [s] by name of the run directory.
+    `expected_s` has expected wall times of runs [s] by name of the run directory.
     """
     knobs = {rung.knob: rung.sensitivity for rung in rungs}
 

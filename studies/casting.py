@@ -5,8 +5,6 @@ much of that is filled 1 s after. Compared with Savoie, Tuazon, Bhamla and Goldm
 Soft Matter 2023, section "Casting". Procedures are compared seed by seed.
 """
 
-from __future__ import annotations
-
 import math
 from functools import partial
 

@@ -6,8 +6,6 @@ servos and strings; variants of the sweep show their influence. In `chain-bodies
 of one seed have equal servos. --quick takes minutes.
 """
 
-from __future__ import annotations
-
 from functools import partial
 
 import numpy as np

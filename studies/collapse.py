@@ -9,8 +9,6 @@ bound, this Γ is not used for Δ at that l/w: the runs that did collapse are th
 values. The mean at that Γ, computed with the bounds, is a lower bound too.
 """
 
-from __future__ import annotations
-
 import hashlib
 import math
 from collections.abc import Mapping, Sequence
@@ -175,10 +173,6 @@ def change(used: pd.DataFrame) -> Slope:
     return slope_within(list(used[GAMMA] / span), list(relative), list(zip(used[ASPECT], used[SEED], strict=True)))
 
 
-def _gentler(runs: pd.DataFrame) -> list[Effect]:
-    return [Effect(label="slope of ln(fτ) against 1/Γ", value=rise(_used(runs)))]
-
-
 def _law(runs: pd.DataFrame) -> Outcome:
     found = change(_used(runs))
     effect = Effect(label="Γ ln(fτ) from the least Γ to the greatest, over its mean", value=found, sign=0)
@@ -217,7 +211,7 @@ FINDINGS = (
     Finding(
         id="gentler-is-later",
         says="Columns collapse the later the gentler the vibration",
-        outcome=_gentler,
+        outcome=lambda runs: [Effect(label="slope of ln(fτ) against 1/Γ", value=rise(_used(runs)))],
     ),
     Finding(
         id="law",

@@ -6,8 +6,6 @@ of beads follow the inverse logarithm of Knight, Fandrich, Lau, Jaeger and Nagel
 laws have four parameters, so that their residuals can be compared.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from itertools import product
@@ -103,8 +101,7 @@ def fit(law: str, times: Array, packing: Array) -> Fit:
 def spread_out(times: Array, packing: Array) -> tuple[Array, Array]:
     """Average φ (n,) [-] at times (n,) [s] over logarithmic intervals; empty ones are left out.
 
-    Returns:
-        Geometric centres of the intervals (m,) [s], and means of φ (m,) [-].
+    Returns the geometric centres of the intervals (m,) [s], and means of φ (m,) [-].
     """
     edges = np.geomspace(FIRST, times[-1] * (1 + 1e-9), INTERVALS + 1)
     place = np.searchsorted(edges, times, side="right") - 1
@@ -146,11 +143,7 @@ def measure(run: Run) -> Row:
 def positive(name: str, says: str, values: Callable[[pd.DataFrame], pd.Series], form: str) -> Finding:
     """Make the finding that the mean of a value over all runs is above 0.
 
-    Args:
-        name: id of the finding.
-        says: statement.
-        values: computes the value of each run.
-        form: text with `{}` for the mean and its 95 % half-width.
+    `form` is a text with `{}` for the mean and its 95 % half-width.
     """
 
     def outcome(runs: pd.DataFrame) -> list[Effect]:

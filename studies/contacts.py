@@ -5,8 +5,6 @@ is the mean of paired differences, second value less first, between runs that ar
 at one l/w and seed are averaged first, so that the number of samples is that of the seeds.
 """
 
-from __future__ import annotations
-
 import math
 
 import numpy as np
@@ -138,15 +136,10 @@ def effects(runs: pd.DataFrame) -> pd.DataFrame:
 
 
 def lowers(name: str, says: str, quantity: str, *changed: str, sign: int = -1, less: str = "") -> Finding:
-    """Make the finding that a change of factors lowers a quantity.
+    """Make the finding that a change of a factor, or the interaction of two, lowers a quantity.
 
-    Args:
-        name: id of the finding.
-        says: statement.
-        quantity: column of the quantity.
-        changed: factor, or two factors whose interaction is judged.
-        sign: −1 if the statement says lowers, +1 if raises.
-        less: factor whose effect is subtracted, if the statement says lowers more than that factor; empty: none.
+    The sign is −1 if the statement says lowers, +1 if raises. `less` is a factor whose effect is subtracted, if the
+    statement says lowers more than that factor.
     """
 
     def outcome(runs: pd.DataFrame) -> Outcome:

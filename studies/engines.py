@@ -7,8 +7,6 @@ is less strict.) The second part refines YADE's chains of spheres to pitches of 
 their limit.
 """
 
-from __future__ import annotations
-
 import math
 from functools import partial
 from typing import NamedTuple
@@ -60,8 +58,7 @@ QUANTITIES = declare(
         TAU: ("τ [s]", "", "time in which a free column on a shaking floor collapses; empty where it stood"),
         FORCE: ("chain [N]", "", "largest force of the string that pulls the chain"),
     }
-)
-"""Measured quantities; those that a case does not have are NaN."""
+)  #: Measured quantities; those that a case does not have are NaN
 
 
 class Compared(NamedTuple):
@@ -98,15 +95,13 @@ COMPARED: tuple[Compared, ...] = (
     Compared("hook force", (HOOK,), PEAK, 20.0, _PEAK_WHY),
     Compared("collapse time", (COLLAPSE,), TAU, 30.0, _TAU_WHY),
     Compared("chain force", (CHAIN,), FORCE, 10.0, "the servos of a chain differ from each other by 10 %"),
-)
-"""Compared quantities in the order of tables and figures."""
+)  #: Compared quantities in the order of tables and figures
 
 REFINED = tuple(
     one
     for one in COMPARED
     if one.cases == ACTIVE or (one.cases == (EXTERNAL,) and one.column in (PHI_ACTIVE, PHI, CROSSINGS))
-)
-"""Quantities that are compared at every pitch of YADE's chains."""
+)  #: Quantities that are compared at every pitch of YADE's chains
 
 _WORDS = {Verdict.FOUND: "equivalent", Verdict.NOT_FOUND: "different"}
 
@@ -235,10 +230,7 @@ STUDY: Study = Study(
     name="engines",
     title="Two engines, the same seeds",
     measure=measure,
-    keys=(
-        Key(column=CASE, label="case", order=(*ACTIVE, HOOK, COLLAPSE, CHAIN)),
-        Key(column=VARIANT, label="variant"),
-    ),
+    keys=(Key(column=CASE, label="case", order=(*ACTIVE, HOOK, COLLAPSE, CHAIN)), Key(column=VARIANT, label="variant")),
     quantities=tuple(QUANTITIES.values()),
     findings=tuple(map(_finding, COMPARED)),
     figures=(
@@ -260,11 +252,7 @@ STUDY: Study = Study(
             split=one_by_one("quantity", str),
         ),
     ),
-    extra=lambda runs: {
-        "points": STUDY.points(runs),
-        "equivalence": equivalence(runs),
-        "pitch": refinement(runs),
-    },
+    extra=lambda runs: {"points": STUDY.points(runs), "equivalence": equivalence(runs), "pitch": refinement(runs)},
     order=(CASE, VARIANT, SEED),
     same_count=(CASE,),
     remarks=(

@@ -5,8 +5,6 @@ and the radius of the wall. The main effect of each is the mean of paired differ
 ratios, seeds and all combinations of the other two.
 """
 
-from __future__ import annotations
-
 from itertools import product
 
 import pandas as pd

@@ -7,8 +7,6 @@ A pile is spanned if one cluster joins floor and top, and one joins opposite sid
 enough: a pile of 100 thin smarticles is lower than a single smarticle is long.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from functools import partial
@@ -24,7 +22,6 @@ from postprocess.measures.clusters import entanglement_clusters, spans_height, s
 from postprocess.measures.entanglement import entanglement
 from postprocess.measures.packing import packing_of
 from postprocess.measures.spread import escaped
-from postprocess.statistics.findings import judge, negative
 from postprocess.statistics.points import ASPECT, SEED, format_with_error
 from postprocess.statistics.seeds import slope_within
 from postprocess.statistics.size_law import POWER, POWERS, Profile, SizeLaw, alike, profiles, size_law
@@ -36,8 +33,7 @@ from studies.framework.study import Study
 
 COUNT, RADIUS = "smarticles [-]", "container radius over w [-]"
 BEFORE, AFTER = "before", "after"
-STAGES = {BEFORE: "phi_0", AFTER: "phi_f"}
-"""Symbol of φ of the pile at rest, by stage: before and after the shake."""
+STAGES = {BEFORE: "phi_0", AFTER: "phi_f"}  #: Symbol of φ of the pile at rest, by stage: before and after the shake
 
 DEFINITIONS = (DEFINITION, "top-percentile", "voxel")
 """Definitions of φ: that of the paper, one whose height does not depend on single smarticles, and one of the inside."""
@@ -46,8 +42,7 @@ MOVING = f"phi_f shaken {DEFINITION} [-]"
 WINDOW = 1.0  #: Time at the end of the shake over which φ is averaged [s]: 30 periods
 
 PHASES = ("deposit", "relax", "shake", "relax")
-PAPER_ASPECT, PAPER_COUNT = 0.7, 270
-"""l/w and number of smarticles of the paper's pile whose finite size is judged."""
+PAPER_ASPECT, PAPER_COUNT = 0.7, 270  #: l/w and number of smarticles of the paper's pile whose finite size is judged
 
 LARGEST = 0.2  #: Greatest l/w of the runs that the percolation threshold is fitted to
 
@@ -101,8 +96,7 @@ SCALED = (
     *(phi(stage, one) for stage in STAGES for one in DEFINITIONS),
     MOVING,
     *(crossings(stage) for stage in STAGES),
-)
-"""Columns that the law q_∞ + a N^(-1/3) is fitted to."""
+)  #: Columns that the law q_∞ + a N^(-1/3) is fitted to
 
 ASKED = {
     phi(BEFORE): ("φ_0", ".4f", "phi-0"),
@@ -110,8 +104,7 @@ ASKED = {
     phi(AFTER, "voxel"): ("φ_f by voxels of the inside", ".4f", "phi-f-inside"),
     crossings(BEFORE): ("⟨N⟩_0", ".3f", "crossings-0"),
     crossings(AFTER): ("⟨N⟩_f", ".3f", "crossings-f"),
-}
-"""Symbol, format and name in ids of findings of the quantities that are judged, by column."""
+}  #: Symbol, format and name in ids of findings of the quantities that are judged, by column
 
 
 def measure(run: Run) -> Row:
@@ -232,7 +225,8 @@ def growth(runs: pd.DataFrame) -> pd.DataFrame:
         for aspect, part in runs.groupby(ASPECT):
             size, cluster = (np.log(part[name].to_numpy(dtype=np.float64)).tolist() for name in (COUNT, share(stage)))
             slope = slope_within(size, cluster, [0] * len(part))
-            rows.append((stage, aspect, slope.count, slope.value, slope.half_width, str(judge(negative(slope)))))
+            falls = Effect(label="", value=slope, sign=-1).verdict
+            rows.append((stage, aspect, slope.count, slope.value, slope.half_width, str(falls)))
     powers = ["power of N [-]", "power of N 95 % [-]"]
     return pd.DataFrame(rows, columns=["stage", ASPECT, "runs [-]", *powers, "falls as piles grow"])
 

@@ -6,8 +6,6 @@ fracture". Runs of one l/w and seed are poured from equal poses and compared pai
 force limit ("held fast"), the peak force is a lower bound.
 """
 
-from __future__ import annotations
-
 import math
 from functools import partial
 

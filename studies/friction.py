@@ -6,8 +6,6 @@ friction; Gravish's points are not interpolated. Errors are 95 % by Student's t.
 relative to the mean and pooled over all points of a stage.
 """
 
-from __future__ import annotations
-
 import itertools
 import math
 from collections.abc import Callable, Mapping, Sequence
@@ -65,8 +63,7 @@ COMPARED = {
     "phi 10 s": "phi_f",
     "phi_f": "phi_f",
     "phi_f relaxed": "phi_f relaxed",
-}
-"""Stage of Gravish's that each of our stages is compared with: φ after 5 and 10 s too is compared with their φ_f."""
+}  #: Stage of Gravish's that each of our stages is compared with: φ after 5 and 10 s too is compared with their φ_f
 
 # Sets of stages that a finding asks to be near Gravish's at one friction, by their name.
 JUDGED: dict[str, Sequence[str]] = {
@@ -121,11 +118,10 @@ class Curve:
     def crossing(self) -> tuple[float, float, float, str]:
         """Find the friction at which φ is Gravish's φ.
 
-        Returns:
-            That friction [-], both ends of its 95 % interval [-], and "within", "above" or "below the range" measured.
-            If scatter makes φ cross Gravish's φ several times, the friction is the middle between the first and the
-            last crossing. The interval covers all friction at which φ does not clearly differ; its ends are ±inf
-            beyond the measured range, NaN without errors.
+        Returns that friction [-], both ends of its 95 % interval [-], and "within", "above" or "below the range"
+        measured. If scatter makes φ cross Gravish's φ several times, the friction is the middle between the first and
+        the last crossing. The interval covers all friction at which φ does not clearly differ; its ends are ±inf beyond
+        the measured range, NaN without errors.
         """
         off = self.packing - self.reference
         left = np.nonzero(off[:-1] * off[1:] < 0)[0]
@@ -236,9 +232,8 @@ def crossings(found: Curves) -> pd.DataFrame:
 def nearness(found: Curves, friction: float) -> dict[str, float | int | str]:
     """Compute deviations of all curves from Gravish's φ at a friction, and the confidence of being near.
 
-    Returns:
-        Cells by column: mean and largest deviation, the confidence that all points are within `MARGIN`, and that of
-        the worst point.
+    The cells by column are mean and largest deviation, the confidence that all points are within `MARGIN`, and that of
+    the worst point.
     """
     at = np.array([friction])
     deviations = {
@@ -441,14 +436,6 @@ FINDINGS = (
 )
 
 
-def _shown(points: pd.DataFrame) -> pd.DataFrame:
-    return points[points[STAGE].isin(STAGES)]
-
-
-def _gravish(points: pd.DataFrame) -> dict[str, float]:
-    return {f"Gravish, {stage}": gravish_at(points[ASPECT].iloc[0], stage) for stage in ("phi_0", "phi_f")}
-
-
 def _crosses(tables: Mapping[str, pd.DataFrame], aspect: float) -> pd.DataFrame:
     """Return friction (`x`, `low`, `high`) and φ (`y`) [-] at which φ_0 and φ_f of one l/w are Gravish's."""
     found = tables["crossings"]
@@ -474,9 +461,11 @@ STUDY = Study(
             x=FRICTION,
             x_label=r"coefficient of friction $\mu$ [-]",
             split=one_by_one(STAGE, str),
-            rows=_shown,
+            rows=lambda points: points[points[STAGE].isin(STAGES)],
             panels=ASPECT,
-            levels=_gravish,
+            levels=lambda points: {
+                f"Gravish, {stage}": gravish_at(points[ASPECT].iloc[0], stage) for stage in ("phi_0", "phi_f")
+            },
             share_y=True,
             crosses=_crosses,
             bars=POOLED,

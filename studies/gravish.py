@@ -5,8 +5,6 @@ for 20 s. Their points were digitised (`postprocess/reference/README.md`). They 
 interpolated. --quick takes minutes.
 """
 
-from __future__ import annotations
-
 import itertools
 import math
 from collections.abc import Mapping

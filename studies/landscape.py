@@ -14,8 +14,6 @@ and seed. Energies are divided by W_s w, the work that lifts a smarticle by its 
 weight can be compared.
 """
 
-from __future__ import annotations
-
 import math
 import re
 from collections.abc import Mapping
@@ -30,7 +28,6 @@ from postprocess.geometry.links import centres_of_mass
 from postprocess.measures.pull import PULL, WINDOW, held_fast, peak, read_pull, weight_of_one
 from postprocess.measures.table import summarise_run
 from postprocess.report import figures as style
-from postprocess.statistics.findings import effect_text, judge
 from postprocess.statistics.points import ASPECT, SEED, averaged, format_with_error
 from postprocess.statistics.ranks import (
     Floats,
@@ -44,7 +41,7 @@ from postprocess.statistics.ranks import (
 )
 from postprocess.statistics.seeds import mean_over_seeds
 from studies.framework.figures import Heatmap, Means, Rows, Scatter, Series, marker, one_by_one, procedure_marker
-from studies.framework.findings import Finding, Outcome, Verdict, decide
+from studies.framework.findings import Finding, Outcome, Verdict, decide, effect_text, judge
 from studies.framework.procedures import (
     ACTIVE,
     CROSSINGS,
@@ -81,8 +78,7 @@ PREDICTORS = {
     HEIGHT: "height of the centre of mass",
     ABOVE: "share above the hook",
     ENERGY: "energy spent",
-}
-"""Measures of the pile at rest before the pull that may predict strength: names in texts by column."""
+}  #: Measures of the pile at rest before the pull that may predict strength: names in texts by column
 
 STRENGTHS = {PEAK: "strength", BEYOND: "strength beyond the weight above the hook"}
 
@@ -195,10 +191,9 @@ def trajectories(runs: pd.DataFrame) -> pd.Series:
 def predicted(runs: pd.DataFrame) -> tuple[pd.DataFrame, pd.DataFrame]:
     """Correlate both strengths with all measures.
 
-    Returns:
-        The table `predictors`: rank correlation and slope with 95 % intervals, a row per strength, part of the runs,
-        scope (over all l/w, within l/w, or one l/w) and measure, best measure first. The table `comparisons`: the
-        difference of the best measure's rank correlation to that of each other measure.
+    The table `predictors` has rank correlation and slope with 95 % intervals, a row per strength, part of the runs,
+    scope (over all l/w, within l/w, or one l/w) and measure, best measure first. The table `comparisons` has the
+    difference of the best measure's rank correlation to that of each other measure.
     """
     each: list[dict[str, object]] = []
     against: list[dict[str, object]] = []
@@ -297,9 +292,8 @@ def common_aspects(runs: pd.DataFrame) -> list[float]:
 def costs(runs: pd.DataFrame) -> pd.DataFrame:
     """Average gain and energy over pairs of l/w and seed, at the `common_aspects` and at each l/w.
 
-    Returns:
-        A row per scope, procedure, θ and planned time: means with errors, the gain per energy with its 95 % interval,
-        and 1 in `FRONTIER` if no other row of the scope gains as much for less energy.
+    The table has a row per scope, procedure, θ and planned time: means with errors, the gain per energy with its 95 %
+    interval, and 1 in `FRONTIER` if no other row of the scope gains as much for less energy.
     """
     gained = gains(runs)
     scopes = {COMMON: gained[gained[ASPECT].isin(common_aspects(runs))]}
@@ -325,8 +319,7 @@ def costs(runs: pd.DataFrame) -> pd.DataFrame:
 def _drawn_ratio(values: Floats) -> Interval:
     """Return the mean gain over the mean energy with its 95 % interval; NaN ends below 3 pairs.
 
-    Args:
-        values: gains and energies (n, 2), or those of two procedures (n, 4), whose gains per energy are divided.
+    Values are gains and energies (n, 2), or those of two procedures (n, 4), whose gains per energy are divided.
     """
 
     def ratio(rows: Whole) -> Floats:
@@ -445,11 +438,11 @@ def _as_strong(runs: pd.DataFrame, costs: pd.DataFrame) -> Outcome:
         for _, row in swung.iterrows()
     }
     nearest = min(lacks, key=lambda name: math.inf if math.isnan(lacks[name].value) else lacks[name].value)
-    stronger = all(judge(effect) == "found" for effect in lacks.values())
+    stronger = all(judge(effect) == Verdict.FOUND for effect in lacks.values())
     return Outcome(
-        note=f"shape change less the strongest, {nearest}: {effect_text(lacks[nearest], 3)} n W_s over l/w and seeds; "
+        note=f"shape change less the strongest, {nearest}: {effect_text(lacks[nearest])} n W_s over l/w and seeds; "
         f"it spends {shape.iloc[0][LIFTS]:.3g} W_s w per smarticle",
-        verdict=decide(judge(lacks[nearest]) == "not found", stronger),
+        verdict=decide(judge(lacks[nearest]) == Verdict.NOT_FOUND, stronger),
     )
 
 
@@ -502,11 +495,6 @@ FINDINGS = (
 _by_aspect = one_by_one(ASPECT, "l/w = {:g}".format)
 
 
-def _swung(table: pd.DataFrame) -> pd.DataFrame:
-    """Return the rows of the internal oscillation, in ascending order of energy."""
-    return table[(table[PROCEDURE] == INTERNAL) & (table[ENERGY] > 0)].sort_values(ENERGY)
-
-
 def _bought(table: pd.DataFrame) -> list[Series]:
     """Return a series for each θ of the internal oscillation, and for each other procedure."""
     others = [
@@ -515,11 +503,8 @@ def _bought(table: pd.DataFrame) -> list[Series]:
         )
         for name in (EXTERNAL, SHAPE)
     ]
-    return [*one_by_one(THETA, "internal, θ = {:g}°".format)(_swung(table)), *others]
-
-
-def _poured(points: pd.DataFrame) -> dict[str, float]:
-    return {"poured": float(points.loc[points[PROCEDURE] == STATIC, PEAK].mean())}
+    swung = table[(table[PROCEDURE] == INTERNAL) & (table[ENERGY] > 0)].sort_values(ENERGY)
+    return [*one_by_one(THETA, "internal, θ = {:g}°".format)(swung), *others]
 
 
 def _correlations(table: pd.DataFrame) -> pd.DataFrame:
@@ -557,7 +542,7 @@ FIGURES = (
         quantities=[QUANTITIES[PEAK]],
         split=_bought,
         panels=ASPECT,
-        levels=_poured,
+        levels=lambda points: {"poured": float(points.loc[points[PROCEDURE] == STATIC, PEAK].mean())},
     ),
     Scatter(
         name="strength_measures",

@@ -5,8 +5,6 @@ pile falls over. Compared with Savoie, Tuazon, Bhamla and Goldman, "Amorphous En
 2023, section "Melting behavior". Runs of one l/w and seed are poured from equal poses and compared pair by pair.
 """
 
-from __future__ import annotations
-
 from functools import partial
 
 import numpy as np
@@ -14,7 +12,7 @@ import pandas as pd
 
 from dem.record.run import Run
 from postprocess.measures.heights import heights
-from postprocess.measures.spread import OUTSIDE, TOUCHING, centre_of_mass, free_pile, has_toppled
+from postprocess.measures.spread import OUTSIDE, TOUCHING, centre_of_mass, free_pile
 from postprocess.statistics.points import ASPECT, SEED, mean_difference, pairs
 from postprocess.statistics.seeds import mean_over_seeds
 from studies.framework.figures import PROCEDURE_LABELS, Histories, by_procedure
@@ -87,7 +85,7 @@ def measure(run: Run) -> MeasuredRun:
         TOP: levels.top,
         CENTRE: levels.mean_com,
         **rows[-1],
-        TOPPLED: float(has_toppled(rows[-1][OFFSET] * base, base)),
+        TOPPLED: float(rows[-1][OFFSET] * base > base),
         **last_columns(run),
     }
     history = {SINCE: np.array([start, *(frame.time for frame in after)]) - start}
@@ -168,11 +166,7 @@ FINDINGS = (
         shown=[SLOUGHED],
     ),
     _above(
-        "narrow-and-high",
-        "Shape change narrows the base and raises the pile",
-        {BASE: -1, TOP: 1},
-        SHAPE,
-        (STATIC,),
+        "narrow-and-high", "Shape change narrows the base and raises the pile", {BASE: -1, TOP: 1}, SHAPE, (STATIC,)
     ),
     Finding(
         id="topples",

@@ -8,8 +8,6 @@ Runs of equal aspect ratio and seed begin with one pile. So procedures are compa
 are fitted within these blocks; errors come from the scatter over seeds and aspect ratios.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from functools import partial
@@ -125,11 +123,6 @@ def with_aspect(name: str, says: str, rows: Rows, quantity: str, sign: int = 1) 
 def with_amplitude(name: str, says: str, quantity: str, sign: int = 1, rows: Rows = amplitudes) -> Finding:
     """Make the finding that a quantity rises (sign +1) or falls (−1) with θ, within l/w and seed."""
     return slope(name, says, quantity, THETA, sign=sign, within=(ASPECT, SEED), rows=rows)
-
-
-def _bend(table: pd.DataFrame) -> list[Effect]:
-    bend = parabola(table[ASPECT], table[PHI_ACTIVE], at=1.0).bend
-    return [Effect(label="bend of φ_f against l/w, of the parabola through all runs,", value=bend)]
 
 
 def _compacts_early(table: pd.DataFrame) -> Outcome:
@@ -282,7 +275,12 @@ PACKING = (
     Finding(
         id="shaken-bends",
         says="External oscillation: φ changes with l/w faster than linearly",
-        outcome=_bend,
+        outcome=lambda table: [
+            Effect(
+                label="bend of φ_f against l/w, of the parabola through all runs,",
+                value=parabola(table[ASPECT], table[PHI_ACTIVE], at=1.0).bend,
+            )
+        ],
         rows=only(EXTERNAL, PHI_ACTIVE),
     ),
     mean(
@@ -452,11 +450,6 @@ def heights(run: Run) -> History:
     return History(times=times, values=values, active=duration(activity(run)))
 
 
-def nearest_aspect(runs: pd.DataFrame) -> pd.DataFrame:
-    """Return the runs at the aspect ratio nearest to 0.7, that of the paper's figure."""
-    return runs[runs[ASPECT] == min(runs[ASPECT].unique(), key=lambda aspect: abs(aspect - 0.7))]
-
-
 def _energy_series(points: pd.DataFrame) -> list[Series]:
     """Return a series of each procedure, and of the internal oscillation at each other amplitude."""
     internal = amplitudes(points)
@@ -499,7 +492,7 @@ STUDY = Study(
         Histories(
             name="height_time",
             history=heights,
-            rows=nearest_aspect,
+            rows=lambda runs: runs[runs[ASPECT] == min(runs[ASPECT].unique(), key=lambda aspect: abs(aspect - 0.7))],
             split=by_procedure(),
             x_label="time since the activity began [s]",
             quantities={"": r"height of the centre of mass $h/h_0$ [-]"},

@@ -4,8 +4,6 @@ The first variant is the baseline. Each other variant changes one parameter: res
 or sphere diameter; in `sensitivity-section` pitch and rows of spheres, up to the true cross-section.
 """
 
-from __future__ import annotations
-
 import math
 import re
 
@@ -34,8 +32,7 @@ VARIANTS = (
     "pitch-1.0",
     "pitch-0.5",
     "two-rows",
-)
-"""Variants in the order of the sweeps."""
+)  #: Variants in the order of the sweeps
 
 COMPARED = {"phi_0": phi("phi_0"), "phi_f": phi("phi_f"), "crossings after": "crossings after [-]"}
 QUANTITIES = declare(

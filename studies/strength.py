@@ -11,8 +11,6 @@ compared by means over both heights, seed by seed, so that the number of samples
 stops at its force limit ("held fast"), the peak force is a lower bound.
 """
 
-from __future__ import annotations
-
 import itertools
 import math
 from collections.abc import Sequence
@@ -204,11 +202,7 @@ def with_crossings(
 ) -> tuple[Finding, Finding]:
     """Make the findings that peak force rises with ⟨N⟩, over all procedures and over the amplitudes θ.
 
-    Args:
-        rows: selects the samples of the first finding.
-        within: columns whose values make blocks for the first finding.
-        theta: selects the samples of the second finding.
-        within_theta: columns whose values make blocks for the second finding.
+    The columns `within` and `within_theta` make the blocks of the two findings.
     """
     keys: dict[str, Any] = {"bounds": HELD_FAST, "unit": "n W_s per link"}
     where, where_theta = (", ".join(map(symbol, columns)) for columns in (within, within_theta))

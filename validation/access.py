@@ -4,8 +4,6 @@ Both engines use the leapfrog scheme, whose velocities belong to the half step b
 t = 0 under an acceleration a, set the velocity v − a dt/2.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -60,13 +58,7 @@ class _Access:
     ) -> Engine:
         """Build an engine with a floor at z = 0 and a wall of radius 0.5 m, which no body reaches.
 
-        Args:
-            particle: geometry of all smarticles.
-            law: contact law.
-            dt: time step [s].
-            gravity: [m/s²].
-            height: of the wall [m].
-            motors: arguments of the engine for motors, see `motors_of`.
+        Time step [s], gravity [m/s²] and height of the wall [m]; `motors`: arguments of the engine, see `motors_of`.
         """
         cylinder = Cylinder(radius=0.5, height=height, facets=16)
         keys = {"particle": particle, "cylinder": cylinder, "law": law, "gravity": gravity, "time_step": dt}
@@ -237,10 +229,8 @@ class LinksAccess(_Access):
     def swing(self, engine: Engine, links: Iterable[tuple[float, float, float]]) -> None:
         """Set velocities in the plane for smarticle 0, which must be articulated and unrotated.
 
-        Args:
-            engine: the engine.
-            links: velocity along x and y [m/s] and angular velocity about z [rad/s] of barb 1, middle link and barb 2;
-                they must be consistent with the hinges.
+        Links are velocity along x and y [m/s] and angular velocity about z [rad/s] of barb 1, middle link and barb 2;
+        they must be consistent with the hinges.
         """
         world = _links(engine)._world
         motors, (first, middle, second) = world.motors, np.array(list(links))

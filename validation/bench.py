@@ -1,7 +1,5 @@
 """Scenes, contact laws, engines and watchdogs for validation cases. All quantities are in SI units."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
@@ -81,13 +79,9 @@ def law_of(scene: Scene) -> ContactLaw:
 def ball_law(
     *, restitution: float = 1.0, friction: float = 0.0, tangential: float = 0.82, dashpot: float = 0.9
 ) -> ContactLaw:
-    """Return a contact law for the ball, with dashpots that give the restitution at its mass.
+    """Return a contact law for the ball, with dashpots that give the restitution [1] at its mass.
 
-    Args:
-        restitution: coefficient of restitution [1].
-        friction: of smarticles and wall [1].
-        tangential: tangential over normal stiffness [1].
-        dashpot: tangential over normal damping [1].
+    `tangential` is tangential over normal stiffness, `dashpot` tangential over normal damping [1].
     """
     critical = 2 * damping_ratio(restitution) * math.sqrt(STIFFNESS * BALL_MASS)
     return ContactLaw(
@@ -131,18 +125,10 @@ def drive(
     each: Callable[[], None] | None = None,
     interval: float | None = None,
 ) -> Iterator[float]:
-    """Actuate the motors for a time, and yield after each control period.
+    """Actuate the motors for a duration [s], and yield after each control period.
 
-    Args:
-        engine: the engine.
-        scene: supplies the default control period.
-        duration: [s].
-        targets: angles of all barbs [rad] at a time since the start [s].
-        each: function to call after every step.
-        interval: control period [s]; None: the control period of the scene.
-
-    Yields:
-        Time since the start [s].
+    Yields the time since the start [s], at which `targets` returns the angles of all barbs [rad]. `each` is called
+    after every step. The control period [s] is that of the scene unless `interval` is given.
     """
     interval = interval or scene.fidelity.control_interval_s
     steps = round(interval / engine.time_step)
@@ -156,12 +142,9 @@ def drive(
 
 
 def watched(data: dict[str, Any], out: Path | str, *, dt: float | None = None) -> tuple[Scene, Engine, Recorder]:
-    """Build scene, engine and recorder with watchdog as a run does.
+    """Build scene, engine and recorder with watchdog as a run does, from a scene as a dictionary.
 
-    Args:
-        data: scene as a dictionary.
-        out: run directory.
-        dt: time step [s], which may exceed the stable step; None: the time step of the scene.
+    The time step `dt` [s] may exceed the stable step; it is that of the scene if not given.
     """
     scene = scene_of(data)
     Path(out).mkdir(parents=True, exist_ok=True)

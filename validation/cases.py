@@ -3,8 +3,6 @@
 Known answers compare a simulation with theory, ladders measure errors over the time step, hard cases check limits.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import partial
@@ -100,12 +98,8 @@ def case(
 ) -> Callable[[Function], Function]:
     """Register a function `(access, **options) -> list[Answer]` as a case with a known answer.
 
-    Args:
-        name: unique name.
-        about: description of the simulation.
-        theory: formula or source of the answer.
-        absent: reasons why the case does not apply to an engine, by engine.
-        options: keyword arguments of the function.
+    `about` describes the simulation, `theory` is the formula or source of the answer. `absent` has reasons why the case
+    does not apply to an engine, by engine.
     """
     return _register(CASES, name, options, about, theory, absent or {})
 
@@ -121,17 +115,14 @@ def ladder(  # noqa: PLR0917 # a row of a table
     phases: int | None = None,
     **options: Any,
 ) -> Callable[[Function], Function]:
-    """Register a function `(access, steps, **options) -> list[float]` that returns an error for each time step.
+    """Register a function `(access, steps, **options) -> list[float]`: an error for each time step.
 
     Args:
-        name: unique name.
-        about: description of the motion.
         quantity: quantity whose error is returned, with its unit.
         size: size of the motion, in this unit.
         steps: time steps [s], in decreasing order.
         scheme: expected order of convergence [1] and its reason, for all engines or by engine.
         phases: argument `phases` of the function in the short form of the test; None: the function has no `phases`.
-        options: other keyword arguments of the function.
     """
     by_engine = scheme if isinstance(scheme, dict) else dict.fromkeys(ENGINES, scheme)
     return _register(LADDERS, name, options, about, quantity, size, steps, by_engine, phases)
@@ -145,10 +136,7 @@ def hard(
 ) -> Callable[[Function], Function]:
     """Register a function `(access, folder, **options) -> list[Check]` as a hard case.
 
-    Args:
-        name: unique name.
-        short: keyword arguments in continuous integration; None: the case has a long form only.
-        long: keyword arguments that differ in the long form.
-        absent: reasons why the case does not apply to an engine, by engine.
+    `short` has the keyword arguments in continuous integration, or is None if the case has a long form only; `long` has
+    those that differ in the long form. `absent` has reasons why the case does not apply to an engine, by engine.
     """
     return _register(HARD, name, {}, short, long or {}, absent or {})

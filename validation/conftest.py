@@ -1,7 +1,5 @@
 """Fixtures: run engines in separate processes, and write tables with `--results DIR`."""
 
-from __future__ import annotations
-
 import multiprocessing
 import os
 from collections.abc import Callable, Iterator, Sequence

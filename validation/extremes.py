@@ -5,8 +5,6 @@ directories of scenes that fail the check. Scenes with a row in the table are no
 alone and shares no code with the engines.
 """
 
-from __future__ import annotations
-
 import argparse
 import os
 import re
@@ -128,17 +126,11 @@ def segments(vertices: Array) -> Array:
 
 
 def surface(vertices: Array, thickness: float) -> tuple[Array, Array]:
-    """Return points on the axes of all links, and the radius of the material around each point.
+    """Return points (M, 3) [m] on the axes of all links, and the radii of material around them (M,) [m].
 
     Points are the ends of each axis, with radius 0, and the points thickness/2 from the ends, with radius thickness/2.
-    These spheres are inside of a link, whether its ends are square or round.
-
-    Args:
-        vertices: (N, 4, 3) [m].
-        thickness: of a link [m].
-
-    Returns:
-        Points (M, 3) [m] and radii (M,) [m].
+    These spheres are inside of a link, whether its ends are square or round. Vertices (N, 4, 3) and thickness are in
+    [m].
     """
     ends = segments(vertices)
     along = ends[:, 1] - ends[:, 0]
@@ -153,15 +145,9 @@ def surface(vertices: Array, thickness: float) -> tuple[Array, Array]:
 def crossings(before: Array, after: Array) -> list[tuple[int, int]]:
     """Find links of different smarticles whose axes passed through each other between two frames.
 
-    Vertices are assumed to move along straight lines. When two axes pass through each other, the volume of the
-    tetrahedron of their four ends changes sign, and the common point lies within both axes.
-
-    Args:
-        before: vertices of the first frame, (N, 4, 3) [m].
-        after: vertices of the second frame, (N, 4, 3) [m].
-
-    Returns:
-        Pairs of links, with the indices of `segments`.
+    Vertices (N, 4, 3) [m] are assumed to move along straight lines. When two axes pass through each other, the volume
+    of the tetrahedron of their four ends changes sign, and the common point lies within both axes. The pairs of links
+    have the indices of `segments`.
     """
     one, two = segments(before), segments(after)
     # Links without length (l/w = 0) cannot cross.
@@ -210,10 +196,9 @@ def crossings(before: Array, after: Array) -> list[tuple[int, int]]:
 
 
 def check_run(path: Path, scene: Mapping[str, Any]) -> dict[str, Any]:
-    """Check the finished run of a scene of `draw_scene`.
+    """Check the finished run of a scene of `draw_scene`; return measured values by quantity.
 
-    Returns:
-        Measured values by quantity, and a description of all failed checks under "wrong", empty if all passed.
+    The value "wrong" describes all failed checks; it is empty if all passed.
     """
     thickness = min(scene["smarticle"]["thickness_normal_m"], scene["smarticle"]["thickness_in_plane_m"])
     radius, wall = scene["container"]["radius_m"], scene["container"]["height_m"]
@@ -263,11 +248,8 @@ def energy_errors(path: Path) -> tuple[float, float]:
     """Return the relative errors of the energy in the series of a run.
 
     The supplied energy is `added_energy_J`, from the heights and speeds of poured smarticles, plus the work of motors
-    and container.
-
-    Returns:
-        Largest excess of the stored energy over the supplied energy [1], and largest residual of the ledger over the
-        dissipated energy [1]; NaN if the series contains NaN.
+    and container. The errors are the largest excess of the stored energy over the supplied energy [1], and the largest
+    residual of the ledger over the dissipated energy [1]; NaN if the series contains NaN.
     """
     with h5py.File(path / "series.h5") as file:
         series = {name: np.asarray(dataset[()], dtype=float) for name, dataset in file.items()}
@@ -279,12 +261,7 @@ def energy_errors(path: Path) -> tuple[float, float]:
     works = column("motor_work_J") + column("container_work_J")
     stored = sum(
         column(name)
-        for name in (
-            "kinetic_energy_J",
-            "gravitational_energy_J",
-            "contact_elastic_energy_J",
-            "hinge_elastic_energy_J",
-        )
+        for name in ("kinetic_energy_J", "gravitational_energy_J", "contact_elastic_energy_J", "hinge_elastic_energy_J")
     )
     scale = np.maximum.accumulate(np.abs(given) + np.abs(works))
     scale = np.where(scale > 0, scale, np.inf)
@@ -302,11 +279,7 @@ RIGHT, REJECTED, STOPPED, WRONG, LATE = "right", "rejected by plan", "stopped wi
 def run_one(number: int, out: Path, tree: Path, limit: float) -> dict[str, Any]:
     """Plan, run and check one scene; return its row of the table.
 
-    Args:
-        number: number of the scene.
-        out: folder for scene file and run directory.
-        tree: source tree whose `smarticles` is used.
-        limit: largest wall time of `plan` and of `run` [s].
+    `tree` is the source tree whose `smarticles` is used, `limit` the largest wall time of `plan` and of `run` [s].
     """
     scene, path, run = draw_scene(number), out / f"{number:04d}.yaml", out / f"{number:04d}"
     path.write_text(yaml.safe_dump(scene, sort_keys=False), encoding="utf-8")

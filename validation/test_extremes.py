@@ -1,7 +1,5 @@
 """Tests of the checker in `validation.extremes` and of its random scenes."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -7,8 +7,6 @@ continues the table. Medians over seeds are written to `rivals_medians.csv` and 
 are skipped.
 """
 
-from __future__ import annotations
-
 import argparse
 import importlib
 import json
@@ -61,16 +59,9 @@ def data_of(count: int, seed: int, *phases: dict[str, Any], **keys: Any) -> dict
 def scene_of(
     setting: Setting, activity: str, poured: Path, *, count: int, seed: int, seconds: float, sample: float
 ) -> dict[str, Any]:
-    """Return the scene of a setting as a dictionary: take-over, rest and activity.
+    """Return the scene of a setting as a dictionary: take-over of a poured pile, rest and activity.
 
-    Args:
-        setting: engine and its parameters.
-        activity: type of the last phase.
-        poured: run directory of the poured pile.
-        count: number of smarticles.
-        seed: of the scene.
-        seconds: duration of the activity [s].
-        sample: time between two frames [s].
+    The activity takes `seconds` [s]; `sample` is the time between two frames [s].
     """
     recording = {"frame_interval_s": sample, "series_interval_s": sample, "checkpoint_interval_s": None}
     data = {**data_of(count, seed, recording=recording), "engine": "links", **setting.scene}
@@ -100,11 +91,7 @@ def perform(task: Path) -> None:
 
 
 def run(folder: Path, setting: Setting, activity: str, seed: int, given: argparse.Namespace) -> Any:
-    """Simulate a setting in a separate process and measure the result; return a row of the table.
-
-    Raises:
-        CalledProcessError: the simulation failed.
-    """
+    """Simulate a setting in a separate process and measure the result; return a row of the table."""
     count, seconds, poured = given.count, given.seconds, folder / f"pile-{given.count}-{seed}"
     if not (poured / "done.json").exists():
         run_child(folder, poured.name, data_of(count, seed, {"type": "relax", "duration_s": 0.3}, **POUR))
@@ -127,11 +114,7 @@ def run(folder: Path, setting: Setting, activity: str, seed: int, given: argpars
 def measured(scene: Scene, shape: str, positions: Array, frames: Array) -> dict[str, float]:
     """Measure overlaps and packing fractions of a simulation.
 
-    Args:
-        scene: simulated scene.
-        shape: shape that the engine uses, see `benchmarks.rivals.overlap.solid_of`.
-        positions: see `benchmarks.rivals.task.Outcome`.
-        frames: see `benchmarks.rivals.task.Outcome`.
+    `shape` is that which the engine uses, see `solid_of`; `Outcome` describes positions and frames.
     """
     before, rested, *acting = zip(positions, frames, strict=True)
     depths = np.array(

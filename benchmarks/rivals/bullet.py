@@ -1,7 +1,5 @@
 """Bullet (PyBullet) with rigid boxes; lengths are multiplied by 100 to suit its tolerances."""
 
-from __future__ import annotations
-
 import importlib
 import math
 from importlib.metadata import version

@@ -1,7 +1,5 @@
 """LAMMPS (Debian's `lmp`) with the deck of `smarticles export --to lammps`: rigid bodies of spheres."""
 
-from __future__ import annotations
-
 import re
 import shutil
 import subprocess

@@ -1,7 +1,5 @@
 """MuJoCo with boxes of the true size, welded, or hinged with position servos of limited torque."""
 
-from __future__ import annotations
-
 import importlib
 from collections.abc import Sequence
 from typing import Any

@@ -1,7 +1,5 @@
 """The engines links and YADE, through the interface that runs use."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from benchmarks.rivals.task import ACTIVITY, REST, Array, Knobs, Outcome, Task, World, simulated

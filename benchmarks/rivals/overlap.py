@@ -4,8 +4,6 @@ The overlap of two boxes is the shortest displacement that separates them. The o
 spheres as segments of length zero, is the diameter less the distance of the axes. Links of one smarticle are ignored.
 """
 
-from __future__ import annotations
-
 import itertools
 from dataclasses import dataclass
 
@@ -32,9 +30,10 @@ class Bars:
     halves: Array  #: Half lengths of the sides, (B, 3) [m]
     owners: Indices  #: Indices of smarticles, (B,)
 
-    def candidates(self) -> Indices:
-        """Return the pairs (P, 2) that may overlap."""
-        return _near(self.centres, np.linalg.norm(self.halves, axis=1))
+    @property
+    def bounds(self) -> tuple[Array, Array]:
+        """Centres (B, 3) and radii (B,) of spheres around the boxes [m]."""
+        return self.centres, np.linalg.norm(self.halves, axis=1)
 
     def depths(self, pairs: Indices) -> Array:
         """Compute the overlaps of pairs (P, 2) of boxes, (P,) [m], by the separating-axis theorem for 15 axes."""
@@ -63,10 +62,11 @@ class Swept:
     radius: float  #: [m]
     owners: Indices  #: Indices of smarticles, (S,)
 
-    def candidates(self) -> Indices:
-        """Return the pairs (P, 2) that may overlap."""
+    @property
+    def bounds(self) -> tuple[Array, Array]:
+        """Centres (S, 3) and radii (S,) of spheres around the segments [m]."""
         reaches = np.linalg.norm(self.ends - self.starts, axis=1) / 2 + self.radius
-        return _near((self.starts + self.ends) / 2, reaches)
+        return (self.starts + self.ends) / 2, reaches
 
     def depths(self, pairs: Indices) -> Array:
         """Compute the overlaps of pairs (P, 2) of segments, (P,) [m]; negative for separate segments."""
@@ -77,28 +77,18 @@ class Swept:
 
 def deepest(solid: Bars | Swept) -> float:
     """Return the largest overlap between different smarticles [m], 0 without any overlap."""
-    pairs = solid.candidates()
-    pairs = pairs[solid.owners[pairs[:, 0]] != solid.owners[pairs[:, 1]]]
-    return max(0.0, float(solid.depths(pairs).max())) if len(pairs) else 0.0
-
-
-def _near(centres: Array, reaches: Array) -> Indices:
-    """Return the pairs (P, 2) whose bounding spheres overlap."""
+    centres, reaches = solid.bounds
     pairs = cKDTree(centres).query_pairs(2 * float(reaches.max()), output_type="ndarray").astype(np.int64)
     one, other = pairs.T
     meet = np.linalg.norm(centres[one] - centres[other], axis=1) < reaches[one] + reaches[other]
-    near: Indices = pairs[meet]
-    return near
+    pairs = pairs[meet & (solid.owners[one] != solid.owners[other])]
+    return max(0.0, float(solid.depths(pairs).max())) if len(pairs) else 0.0
 
 
 def solid_of(shape: str, particle: Particle, positions: Array, frames: Array) -> Bars | Swept:
-    """Return the shapes that an engine uses for contacts.
+    """Return the shapes that an engine uses for contacts: "boxes", "strands" (links) or "spheres".
 
-    Args:
-        shape: "boxes", "strands" (engine links) or "spheres" (YADE and LAMMPS).
-        particle: geometry of a smarticle.
-        positions: centres of the links, (N, 3, 3) [m].
-        frames: axes of the links as columns, (N, 3, 3, 3).
+    Positions are the centres of the links, (N, 3, 3) [m], frames their axes as columns, (N, 3, 3, 3).
     """
     if shape == "boxes":
         return _boxes(particle, positions, frames)

@@ -1,7 +1,5 @@
 """Rapier with rigid boxes in single precision; lengths are multiplied by 100."""
 
-from __future__ import annotations
-
 import importlib
 from importlib.metadata import version
 from typing import Any

@@ -1,7 +1,5 @@
 """The compared engines, and the settings of each."""
 
-from __future__ import annotations
-
 import importlib.util
 import re
 import shutil

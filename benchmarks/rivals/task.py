@@ -1,7 +1,5 @@
 """The task of every engine, its outcome, and the base class of simulations."""
 
-from __future__ import annotations
-
 import math
 import time
 from collections.abc import Iterator, Mapping
@@ -137,12 +135,7 @@ class World:
         raise NotImplementedError
 
     def step(self, gravity: float, time_s: float) -> None:
-        """Take one step.
-
-        Args:
-            gravity: downward gravity during the step [m/s²].
-            time_s: time at the end of the step, since the start of the activity [s].
-        """
+        """Take one step with a downward gravity [m/s²]; `time_s` after it, since the start of the activity."""
         raise NotImplementedError
 
     def begin(self) -> None:
@@ -184,10 +177,7 @@ def simulated(task: Task, simulation: World) -> Outcome:
 def rigid_links(boxes: Boxes, positions: Array, turns: Array) -> tuple[Array, Array]:
     """Return centres (N, 3, 3) [m] and axes (N, 3, 3, 3) of the links of rigid smarticles.
 
-    Args:
-        boxes: geometry of a smarticle.
-        positions: centres of mass, (N, 3) [m].
-        turns: rotations from body frame to laboratory frame, (N, 3, 3).
+    Positions are the centres of mass, (N, 3) [m], turns the rotations from body frame to laboratory frame, (N, 3, 3).
     """
     still = np.zeros_like(positions)
     state = State.rigid(boxes, positions, turns, still, still)

@@ -1,7 +1,5 @@
 """Colour bodies: smarticles by the values of a field, all other bodies by their kind."""
 
-from __future__ import annotations
-
 import dataclasses
 import math
 from collections.abc import Iterable, Mapping
@@ -104,8 +102,7 @@ class ColourScale:
 def colour_field(name: str | None, run: Run) -> Field:
     """Return the field of a run by name or short name; None: crossings, for planar runs smarticle_id.
 
-    Raises:
-        InputError: The name is unknown, or the run lacks the field.
+    InputError if the name is unknown, or the run lacks the field.
     """
     usual = "smarticle_id" if run.manifest.planar else "crossings"
     field = checked_field(usual if name is None else name, ALIASES)

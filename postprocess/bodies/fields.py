@@ -1,7 +1,5 @@
 """Define the fields of smarticles and links: names, units, meanings, and their values in a frame."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
@@ -20,7 +18,7 @@ from postprocess.geometry.voxel import Region
 from postprocess.measures.clusters import Clusters, contact_graph, entanglement_clusters
 from postprocess.measures.entanglement import link_crossings
 from postprocess.measures.force_chains import force_chains
-from postprocess.measures.registry import in_space
+from postprocess.measures.registry import in_one_cylinder, in_space
 
 LINKS = 3
 
@@ -98,9 +96,7 @@ def _local_packing(frame: Frame, run: Run) -> Floats:
     pile = Region(radius=run.manifest.container_radius_m, bottom=frame.floor_z, top=top)
     spacing = run.manifest.middle_length_m / CELLS_PER_LENGTH
     try:
-        found = local_packing(
-            frame.vertices, pile, pile, solid_volume=run.manifest.solid_volume_m3, spacing=spacing
-        ).volumes
+        _, found = local_packing(frame.vertices, pile, pile, solid_volume=run.manifest.solid_volume_m3, spacing=spacing)
     except UndefinedMeasureError:
         return np.full(frame.count, np.nan)
     closed = np.isfinite(found) & (found > 0)
@@ -182,7 +178,7 @@ FIELDS: tuple[Field, ...] = (
         f"its volume over that of its set-Voronoi cell, of points every w/{CELLS_PER_LENGTH}; cells end at "
         "floor, wall and the pile's highest point; NaN without one cylindrical wall",
         _local_packing,
-        available_for=lambda run: in_space(run) and run.manifest.container_tiers == 1,
+        available_for=in_one_cylinder,
         costly=True,
     ),
     Field(
@@ -217,8 +213,7 @@ FIELDS: tuple[Field, ...] = (
             ("halted", "-", "1 if the motor at the barb's hinge is halted, else 0; scenes that actuate"),
         )
     ),
-)
-"""All fields, in the order of tables."""
+)  #: All fields, in the order of tables
 
 BY_NAME: Mapping[str, Field] = MappingProxyType({field.name: field for field in FIELDS})
 
@@ -229,11 +224,7 @@ def fields_of(run: Run) -> tuple[Field, ...]:
 
 
 def checked_field(name: str, aliases: Mapping[str, str] = MappingProxyType({})) -> Field:
-    """Return the field with a name, or with a short name among `aliases`.
-
-    Raises:
-        InputError: The name is unknown.
-    """
+    """Return the field with a name, or with a short name among `aliases`; InputError if it is unknown."""
     field = BY_NAME.get(aliases.get(name, name))
     if field is None:
         raise InputError(f"{name!r} is no field; {nearest(name, [*aliases, *BY_NAME], cutoff=0.5)}")

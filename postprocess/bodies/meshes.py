@@ -4,8 +4,6 @@ Meshes have the coordinates of the frames, z upwards, so that a shaken container
 A wall without a height in the scene ends above the highest smarticle; walls and strings have no thickness.
 """
 
-from __future__ import annotations
-
 import math
 import warnings
 from collections.abc import Iterable, Mapping, Sequence
@@ -33,7 +31,7 @@ with warnings.catch_warnings():
     import pyvista as pv
 
 
-_REMOVAL, _STRAIN, _ARRANGE = "remove-container", "strain", "arrange"
+_STRAIN, _ARRANGE = "strain", "arrange"
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -56,19 +54,24 @@ class ChainStrings:
         return np.stack([knots(frame.vertices, self.from_hinge), ends], axis=1)
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
 class RunBoundaries:
-    """Walls and strings of a run, and their motion."""
+    """Walls and strings of a run, and their motion, by its scene and its series."""
 
-    #: Radius and top of each tier of a mould, from the lowest [m]; empty for one cylinder
-    tiers: tuple[tuple[float, float], ...] = ()
-    height: float | None = None  #: Height of the cylinder's wall [m]; None: as high as the pile needs
-    #: Indices of phases that move the floor and leave the wall at rest, at z = 0
-    floor_alone: frozenset[int] = frozenset()
-    removal: int | None = None  #: Index of the phase that removes the wall; None if no phase does
-    #: Start [s], end [s] and speed [m/s] of the wall's lifting; None if it disappears at once
-    lift: tuple[float, float, float] | None = None
-    strings: ChainStrings | None = field(default=None, repr=False)  #: Strings of a strain test, if there is one
+    def __init__(self, run: Run) -> None:
+        scene, phases = run.scene, run.scene.get("phases", ())
+        series = run.series if run.has_series else None
+        #: Radius and top of each tier of a mould, from the lowest [m]; empty for one cylinder
+        self.tiers = tuple((tier.radius, tier.top) for tier in read_tiers(run))
+        #: Height of the cylinder's wall [m]; None: as high as the pile needs
+        self.height: float | None = (scene.get("container") or {}).get("height_m")
+        #: Indices of phases that move the floor and leave the wall at rest, at z = 0
+        self.floor_alone = frozenset(index for index, phase in enumerate(phases) if phase.get("moves") == "floor")
+        #: Index of the phase that removes the wall; None if no phase does
+        self.removal = next((phase.index for phase in run.phases if phase.type == "remove-container"), None)
+        #: Start [s], end [s] and speed [m/s] of the wall's lifting; None if it disappears at once
+        self.lift = None if self.removal is None else _lift(phases[self.removal], _start(run, self.removal, series))
+        #: Strings of a strain test, if there is one
+        self.strings = _strings(run, series) if run.manifest.planar else None
 
     @property
     def corners(self) -> list[tuple[float, float]]:
@@ -81,10 +84,7 @@ class RunBoundaries:
     def raised(self, time: float, phase: int, top: float) -> float | None:
         """Return the height by which the wall has been lifted [m]; None if there is no wall any more.
 
-        Args:
-            time: [s].
-            phase: Index of the phase.
-            top: Height of the pile above the floor [m]; a wall lifted above this height counts as removed.
+        A wall that has been lifted above the top of the pile, a height above the floor [m], counts as removed.
         """
         if self.removal is None or phase < self.removal:
             return 0.0
@@ -93,25 +93,6 @@ class RunBoundaries:
         start, end, speed = self.lift
         raised = speed * (min(max(time, start), end) - start)
         return raised if raised <= top else None
-
-
-def read_boundaries(run: Run) -> RunBoundaries:
-    """Read walls and strings of a run from its scene and its series.
-
-    Raises:
-        InputError: `scene.yaml` or `series.h5` is damaged or lacks a key.
-    """
-    scene, phases = run.scene, run.scene.get("phases", ())
-    series = run.series if run.has_series else None
-    removal = next((phase.index for phase in run.phases if phase.type == _REMOVAL), None)
-    return RunBoundaries(
-        tiers=tuple((tier.radius, tier.top) for tier in read_tiers(run)),
-        height=(scene.get("container") or {}).get("height_m"),
-        floor_alone=frozenset(index for index, phase in enumerate(phases) if phase.get("moves") == "floor"),
-        removal=removal,
-        lift=None if removal is None else _lift(phases[removal], _start(run, removal, series)),
-        strings=_strings(run, series) if run.manifest.planar else None,
-    )
 
 
 def _start(run: Run, index: int, series: Series | None) -> float | None:
@@ -196,8 +177,7 @@ KINDS: Mapping[str, str] = MappingProxyType(
         "crossings": "on request: a point and a vector for each link that passes through a smarticle's plane",
         "forces": "on request: lines from centre to contact to centre, where the run records forces",
     }
-)
-"""Kinds of bodies with their descriptions."""
+)  #: Kinds of bodies with their descriptions
 
 ON_REQUEST = ("crossings", "forces")
 USUAL = tuple(kind for kind in KINDS if kind not in ON_REQUEST)
@@ -214,13 +194,7 @@ _FACES = np.array([[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2
 def checked_kinds(wanted: Sequence[str], unwanted: Sequence[str], *, also: Sequence[str] = ()) -> tuple[str, ...]:
     """Return the kinds of bodies to export: `USUAL` and the wanted kinds, without the unwanted kinds.
 
-    Args:
-        wanted: Kinds to add.
-        unwanted: Kinds to leave out.
-        also: Other names that `unwanted` may contain.
-
-    Raises:
-        InputError: A kind is unknown, or none is left.
+    `unwanted` may also contain the names in `also`. InputError if a kind is unknown, or none is left.
     """
     for name in (*wanted, *(name for name in unwanted if name not in also)):
         if name not in KINDS:
@@ -235,14 +209,8 @@ def checked_kinds(wanted: Sequence[str], unwanted: Sequence[str], *, also: Seque
 class Bodies:
     """Makes the meshes of a run's bodies in its frames.
 
-    Args:
-        run: The run.
-        kinds: Kinds of bodies, keys of `KINDS`.
-        fields: Fields of the mesh of the smarticles.
-        cut: Whether walls end a little above the pile, as in pictures.
-
-    Raises:
-        InputError: The scene or the series is damaged, or forces are wanted and not recorded.
+    Kinds are keys of `KINDS`; the mesh of the smarticles has the given fields; `cut` ends walls a little above the
+    pile, as in pictures. InputError if forces are wanted and not recorded.
     """
 
     def __init__(
@@ -252,7 +220,7 @@ class Bodies:
             raise InputError(f"{run.path}: records no forces; {NO_FORCES}")
         self.run = run
         self.kinds = kinds
-        self.boundaries = read_boundaries(run)
+        self.boundaries = RunBoundaries(run)
         self._fields = fields
         self._cut = cut
         self._top = 0.0  # height of the highest point above the floor
@@ -401,19 +369,13 @@ def link_boxes(
     """Return the boxes of all links as one mesh [m] of quadrilaterals, six per box.
 
     The cross-section of a straight smarticle may be turned around its length by any angle, which its vertices do not
-    determine; an arbitrary angle is used. Links without length have no box.
+    determine; an arbitrary angle is used. Links without length have no box. The mesh has two arrays of cell data:
+    `smarticle`, the index into the vertices (N, 4, 3) [m], and `link`, 0 to 2.
 
     Args:
-        vertices: (N, 4, 3) [m].
         thickness_normal: t1, along the normal of the smarticle's plane [m].
         thickness_in_plane: t2, in the smarticle's plane [m]: one for all links, or one each for barb 1, middle link and
             barb 2.
-
-    Returns:
-        The mesh with two arrays of cell data: `smarticle`, the index into `vertices`, and `link`, 0 to 2.
-
-    Raises:
-        InputError: Bad thicknesses.
     """
     vertices = checked_vertices(vertices)
     in_plane = np.broadcast_to(thickness_in_plane, 3)
@@ -440,8 +402,7 @@ def link_boxes(
 def owners(mesh: pv.PolyData, frame: Frame) -> tuple[Whole, Whole]:
     """Return the owners of the B boxes of a mesh, which must have the fields `IDENTITY`.
 
-    Returns:
-        Indices of the smarticles in the arrays of the frame (B,), and links (B,), 0 to 2.
+    Owners are indices of the smarticles in the arrays of the frame (B,), and links (B,), 0 to 2.
     """
     owner, link = (np.asarray(mesh.cell_data[name])[::BOX_FACES] for name in ("smarticle_id", "link"))
     order = np.argsort(frame.smarticle_ids)
@@ -466,14 +427,8 @@ def force_lines(forces: RecordedForces) -> pv.PolyData:
 def solid(kind: str, mesh: pv.PolyData, run: Run, *, largest: float | None = None) -> pv.PolyData:
     """Return the mesh of a kind of body as triangles, with solids in place of lines and points.
 
-    Strings become tubes, a fifth as thick as a link; crossings become arrows of length w/3; forces become tubes, at
-    most as thick as a link, with a thickness proportional to the normal force.
-
-    Args:
-        kind: Key of `KINDS`.
-        mesh: Mesh of this kind by `Bodies.at`.
-        run: The run, which gives the sizes.
-        largest: Normal force of the thickest tube [N]; the largest of the mesh if not given.
+    Strings become tubes, a fifth as thick as a link; crossings become arrows of length w/3; forces become tubes, with a
+    thickness proportional to the normal force: that of a link for the `largest` one [N], by default that of the mesh.
     """
     thin = min(run.manifest.thickness_in_plane_m, run.manifest.thickness_normal_m)
     if kind == "strings":

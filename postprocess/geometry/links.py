@@ -37,8 +37,7 @@ class UndefinedMeasureError(InputError):
 def checked_vertices(vertices: Vertices) -> Floats:
     """Return vertices as a float64 array (N, 4, 3) [m] after checking them.
 
-    Raises:
-        InputError: Wrong shape, a value that is not finite, or a smarticle of length 0.
+    InputError for a wrong shape, a value that is not finite, or a smarticle of length 0.
     """
     array = np.asarray(vertices, dtype=np.float64)
     if array.ndim != 3 or array.shape[1:] != (4, 3):
@@ -77,8 +76,7 @@ def bounding_spheres(vertices: Floats) -> tuple[Floats, Floats]:
 def close_pairs(vertices: Floats) -> tuple[Whole, Whole]:
     """Find the pairs of smarticles whose bounding spheres overlap; others neither touch nor cross.
 
-    Returns:
-        The lower indices (P,) and the higher indices (P,).
+    Returns the lower indices (P,) and the higher indices (P,).
     """
     if len(vertices) < 2:
         return np.empty(0, dtype=np.int64), np.empty(0, dtype=np.int64)

@@ -5,8 +5,6 @@ belongs to the pile. A gap narrower than the ball is thus part of the pile, a wi
 not. Flat faces keep their position, so that a pile that fills a box has the volume of the box.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -58,20 +56,11 @@ def outlines(
     pitch: float | None = None,
     regions: Sequence[Region] = (),
 ) -> Outlines:
-    """Find the regions inside the outlines of piles, on a common grid.
+    """Find the regions inside the outlines of piles, on a grid that also contains the given regions.
 
-    The position of a flat face is accurate to half a voxel.
-
-    Args:
-        piles: Vertices (N, 4, 3) of each pile, heights above the floor [m].
-        thickness: Diameter of the links, taken as round [m].
-        ball: Radius of the ball [m]; see `BALL`.
-        pitch: Side of a voxel [m]; a fourth of the ball's radius if not given.
-        regions: Cylinders that the grid must contain besides the piles.
-
-    Raises:
-        InputError: A size is not above 0, or the grid would exceed 40 million voxels.
-        UndefinedMeasureError: There is no pile, or a pile without a smarticle.
+    The position of a flat face is accurate to half a voxel. Piles are vertices (N, 4, 3) with heights above the floor
+    [m]; links are round with the given thickness [m]; the radius of the ball is in [m], see `BALL`; `pitch` is the side
+    of a voxel [m], a fourth of that radius if not given.
     """
     checked = [checked_vertices(vertices) for vertices in piles]
     pitch = ball / FINENESS if pitch is None else pitch

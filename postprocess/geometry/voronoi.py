@@ -1,8 +1,5 @@
 """Compute local packing fractions from approximate set-Voronoi cells of the smarticles."""
 
-from __future__ import annotations
-
-from dataclasses import dataclass, field
 from itertools import chain
 
 import numpy as np
@@ -24,34 +21,25 @@ from postprocess.geometry.voxel import Region
 TOGETHER = 60_000  #: Most points per call of Qhull, which takes about 15 kB of memory per point
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class LocalPacking:
-    """Set-Voronoi cells of the smarticles of a pile."""
-
-    volumes: Floats = field(repr=False)  #: (N,) [m³], volume of each smarticle's cell; infinite or 0 without a cell
-    value: float  #: Packing fraction: total solid volume over total cell volume of the smarticles in the region [-]
-
-
 def local_packing(
     vertices: Vertices, container: Region, region: Region, *, solid_volume: float, spacing: float | None = None
-) -> LocalPacking:
+) -> tuple[float, Floats]:
     """Compute the packing fraction in a region by the set-Voronoi cells of its smarticles.
+
+    It is their total solid volume over their total cell volume [-]. The volumes of the cells of all smarticles (N,)
+    [m³] are returned, too; they are infinite or 0 for a smarticle without a cell.
 
     The set-Voronoi cell of a smarticle is the volume that is nearer to it than to any other smarticle. Here it is the
     union of the Voronoi cells of points along its centrelines. Mirror images of the points bound the cells at floor,
     wall and lid; the lid lies at the highest point of the smarticles with their centre of mass inside the container.
+    UndefinedMeasureError if no smarticle is in the region, or one of them has no closed cell.
 
     Args:
-        vertices: (N, 4, 3) [m].
         container: The container from its floor to the pile's height.
         region: Region in which the centres of mass of the counted smarticles lie.
         solid_volume: Volume of one smarticle [m³].
         spacing: Largest distance of points along a link [m]; w/8 if not given, which is within 0.5 % of the limit of
             small spacings in piles of 270.
-
-    Raises:
-        InputError: The spacing is not above 0.
-        UndefinedMeasureError: No smarticle in the region, or one of them has no closed cell.
 
     Source:
         Schaller et al., Philosophical Magazine 93 (2013) 3993 (set Voronoi diagrams).
@@ -86,8 +74,7 @@ def local_packing(
     total = float(volumes[interior].sum())
     if not np.isfinite(total):
         raise UndefinedMeasureError("a smarticle in the inner region has no closed Voronoi cell: the pile is too thin")
-    value = float(interior.sum() * solid_volume / total)
-    return LocalPacking(volumes=volumes, value=value)
+    return float(interior.sum() * solid_volume / total), volumes
 
 
 def _sample(vertices: Floats, spacing: float) -> tuple[Floats, Whole]:
@@ -118,15 +105,12 @@ def _mirrored(points: Floats, container: Region, lid: float, band: float) -> Flo
 
 
 def _cell_volumes(points: Floats, count: int, *, reach: float, together: int = TOGETHER) -> Floats:
-    """Compute the Voronoi volumes of the first `count` points among points (n, 3) [m].
+    """Compute the Voronoi volumes (count,) [m³] of the first `count` points among points (n, 3) [m].
 
     The points are divided into slabs along x; the cells of a slab are computed among all points within a reach [m] of
     the slab. A cell is final if the spheres around its corners that pass through its point lie inside this region: they
     must hold no other point. The remaining cells are computed again among all points within twice the reach of them,
-    and so on, until the reach is twice the distance of their farthest corner.
-
-    Returns:
-        (count,) [m³]; infinite for open cells.
+    and so on, until the reach is twice the distance of their farthest corner. Open cells are infinite.
     """
     if count <= together:
         return _cells(points)[0][:count]
@@ -153,11 +137,9 @@ def _cells(points: Floats) -> tuple[Floats, Floats, Floats, Floats]:
     """Compute the Voronoi cells of points (n, 3) [m].
 
     A cell is the union of pyramids with their apex at its point and a face as base; the height of a pyramid is half the
-    distance to the neighbour behind the face.
-
-    Returns:
-        Volumes (n,) [m³], infinite for open cells; distances (n,) of the farthest corner from the point [m]; least and
-        greatest x (n,) of the spheres around the corners through the point [m].
+    distance to the neighbour behind the face. Returns volumes (n,) [m³], infinite for open cells; distances (n,) of the
+    farthest corner from the point [m]; least and greatest x (n,) of the spheres around the corners through the point
+    [m].
     """
     diagram = Voronoi(points)
     pairs = np.asarray(diagram.ridge_points)
@@ -171,8 +153,7 @@ def _cells(points: Floats) -> tuple[Floats, Floats, Floats, Floats]:
     # Corners relative to one of the face: cross products of long vectors would lose digits.
     reference = diagram.vertices[np.repeat(corners[starts], sizes)]
     areas = np.add.reduceat(
-        np.cross(diagram.vertices[corners] - reference, diagram.vertices[followers] - reference),
-        starts,
+        np.cross(diagram.vertices[corners] - reference, diagram.vertices[followers] - reference), starts
     )
     area = np.linalg.norm(areas, axis=1) / 2
     height = np.linalg.norm(points[pairs[:, 0]] - points[pairs[:, 1]], axis=1) / 2

@@ -61,22 +61,13 @@ def solid_fraction(
     thickness_in_plane: float,
     pitch: float | None = None,
 ) -> float:
-    """Return the fraction of a region's volume inside the boxes of the links [-].
+    """Return the fraction of a region's volume inside the boxes of the links [-], see `solid_points`.
 
-    `solid_points` describes the arguments.
     A point in two boxes counts once. The boxes of a smarticle overlap at its hinges, so the volume of a U is smaller
-    than t1 t2 (w + 2l), by about 1 % for usual sizes.
-
-    Raises:
-        InputError: Bad sizes.
-        UndefinedMeasureError: No material in the region.
+    than t1 t2 (w + 2l), by about 1 % for usual sizes. UndefinedMeasureError if there is no material in the region.
     """
     points, pitch = solid_points(
-        vertices,
-        thickness_normal=thickness_normal,
-        thickness_in_plane=thickness_in_plane,
-        pitch=pitch,
-        region=region,
+        vertices, thickness_normal=thickness_normal, thickness_in_plane=thickness_in_plane, pitch=pitch, region=region
     )
     if len(points) == 0:
         msg = "no material in the inner region of the pile: the pile is too low or too thin there"
@@ -92,23 +83,16 @@ def solid_points(
     pitch: float | None = None,
     region: Region | None = None,
 ) -> tuple[Floats, float]:
-    """Find the points of a cubic grid that lie inside the boxes of the links.
+    """Find the points of a cubic grid that lie inside the boxes of the links; return also their pitch [m].
 
-    The cross-section of a straight smarticle may be turned around its length by any angle, which its vertices do not
-    determine; an arbitrary angle is used.
+    Points (n, 3) [m] are returned once each. The cross-section of a straight smarticle may be turned around its length
+    by any angle, which its vertices do not determine; an arbitrary angle is used. InputError for bad sizes.
 
     Args:
-        vertices: (N, 4, 3) [m].
         thickness_normal: t1, along the normal of the smarticle's plane [m].
         thickness_in_plane: t2, in the smarticle's plane [m].
         pitch: Distance of neighbouring points [m]; half the smaller thickness if not given.
         region: Region to which points are restricted; None: no restriction.
-
-    Returns:
-        The points (n, 3) [m], each once, and the pitch [m].
-
-    Raises:
-        InputError: Bad sizes.
     """
     vertices = checked_vertices(vertices)
     sizes = (thickness_normal, thickness_in_plane)

@@ -1,7 +1,5 @@
 """Find clusters of smarticles joined by contacts or crossings, and whether one spans the container."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass, field
 
@@ -15,7 +13,7 @@ from postprocess.geometry.links import UndefinedMeasureError, Vertices, Whole, c
 from postprocess.measures.contacts import at_wall, contact_pairs, on_floor, pairs_in_contact
 from postprocess.measures.entanglement import crossing_pairs
 from postprocess.measures.heights import material_height
-from postprocess.measures.registry import FrameMeasure, Quantity
+from postprocess.measures.registry import FrameMeasure, Quantity, in_one_cylinder
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -32,33 +30,19 @@ class Clusters:
 
 
 def contact_clusters(vertices: Vertices, distance: float) -> Clusters:
-    """Find clusters of smarticles whose centrelines are at most a distance [m] apart.
-
-    Raises:
-        InputError: The distance is not above 0.
-        UndefinedMeasureError: There is no smarticle.
-    """
+    """Find clusters of smarticles whose centrelines are at most a distance [m] apart."""
     pairs = contact_pairs(vertices, distance)
     return joined_clusters(len(checked_vertices(vertices)), pairs.i, pairs.j)
 
 
 def entanglement_clusters(vertices: Vertices) -> Clusters:
-    """Find clusters of smarticles joined by crossings.
-
-    Raises:
-        UndefinedMeasureError: There is no smarticle.
-    """
+    """Find clusters of smarticles joined by crossings."""
     pairs = crossing_pairs(vertices)
     return joined_clusters(len(checked_vertices(vertices)), pairs.i, pairs.j)
 
 
 def contact_graph(frame: Frame, run: Run) -> Clusters:
-    """Find clusters of smarticles that touch in the run's engine, see `contacts.pairs_in_contact`.
-
-    Raises:
-        InputError: The scene of the run cannot be read.
-        UndefinedMeasureError: There is no smarticle.
-    """
+    """Find clusters of smarticles that touch in the run's engine, see `contacts.pairs_in_contact`."""
     pairs = pairs_in_contact(frame, run)
     return joined_clusters(frame.count, pairs.i, pairs.j)
 
@@ -66,11 +50,8 @@ def contact_graph(frame: Frame, run: Run) -> Clusters:
 def spans_height(clusters: Clusters, vertices: Vertices, *, diameter: float, floor_z: float) -> bool:
     """Return whether one cluster reaches from the floor to the top of the pile.
 
-    Args:
-        clusters: Clusters of the smarticles.
-        vertices: (N, 4, 3) [m].
-        diameter: Diameter of the spheres along the links [m].
-        floor_z: Height of the floor [m]. The top is the height below which 95 % of the material lies.
+    Vertices (N, 4, 3), diameter of the spheres along the links, and height of the floor are in [m]. The top is the
+    height below which 95 % of the material lies.
 
     Source:
         Stauffer & Aharony, Introduction to Percolation Theory (1994), section 2: a cluster percolates if it joins
@@ -86,13 +67,8 @@ def spans_height(clusters: Clusters, vertices: Vertices, *, diameter: float, flo
 def spans_width(clusters: Clusters, vertices: Vertices, *, diameter: float, wall_radius: float) -> bool:
     """Return whether one cluster spans the container: no half of the wall has all its contacts.
 
-    A cluster that touches a round wall on one half alone is not wedged between opposite sides.
-
-    Args:
-        clusters: Clusters of the smarticles.
-        vertices: (N, 4, 3) [m].
-        diameter: Diameter of the spheres along the links [m].
-        wall_radius: Radius of the wall around the axis x = y = 0 [m].
+    A cluster that touches a round wall on one half alone is not wedged between opposite sides. Vertices (N, 4, 3),
+    diameter of the spheres along the links, and radius of the wall are in [m]; the wall is centred at x = y = 0.
     """
     vertices = checked_vertices(vertices)
     smarticle, vertex = np.nonzero(at_wall(vertices, diameter=diameter, wall_radius=wall_radius))
@@ -107,8 +83,7 @@ def spans_width(clusters: Clusters, vertices: Vertices, *, diameter: float, wall
 def joined_clusters(count: int, i: Whole, j: Whole) -> Clusters:
     """Find the clusters of a graph of `count` smarticles, by the indices i (P,) and j (P,) of its P edges.
 
-    Raises:
-        UndefinedMeasureError: There is no smarticle.
+    UndefinedMeasureError if there is no smarticle.
     """
     if count == 0:
         raise UndefinedMeasureError("a cluster needs at least 1 smarticle: got 0")
@@ -130,10 +105,6 @@ def _spans_of(clusters: Clusters, frame: Frame, run: Run) -> tuple[float, float,
     return clusters.largest, float(height), float(width) if walled else math.nan
 
 
-def _in_one_cylinder(run: Run) -> bool:
-    return not run.manifest.planar and run.manifest.container_tiers == 1
-
-
 MEASURES = tuple(
     FrameMeasure(
         name=f"{name} graph",
@@ -144,7 +115,7 @@ MEASURES = tuple(
             Quantity(f"{name} graph spans width", "-"),
         ),
         take=take,
-        available_for=_in_one_cylinder,
+        available_for=in_one_cylinder,
         costly=True,
     )
     for name, take in (

@@ -5,8 +5,6 @@ smarticles that have left hop as high as a low column, so that the mean height o
 of a layer. The height `remaining` avoids this bias: it counts the smarticles that have not left.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -33,8 +31,7 @@ HEIGHTS: Mapping[str, str] = MappingProxyType(
         CORE: "height of the centre of mass of the smarticles within the container's radius, over its height before "
         "vibration; from frames",
     }
-)
-"""Definitions of a column's height by name, each relative to the height before vibration."""
+)  #: Definitions of a column's height by name, each relative to the height before vibration
 
 _KNOWN_ENDS: Mapping[str, Mapping[str, float]] = MappingProxyType({REMAINING: {"start": 1.0, "end": 0.0}})
 """Start and end of the fitted curve [-] for heights of which they are known: in the end all smarticles have left. The
@@ -88,8 +85,7 @@ class CollapseTime:
 def vibration(run: Run) -> Vibration:
     """Find the first phase of a run that shakes the floor after the wall was removed.
 
-    Raises:
-        InputError: The run has no such phase, or the scene lacks its acceleration or frequency.
+    InputError if the run has no such phase.
     """
     kinds = [phase.type for phase in run.phases]
     after = kinds.index("remove-container") if "remove-container" in kinds else len(kinds)
@@ -97,23 +93,13 @@ def vibration(run: Run) -> Vibration:
     if found is None:
         raise InputError(f"{run.path}: no shake after a remove-container: its phases are {', '.join(kinds)}")
     settings = run.scene["phases"][found.index]
-    return Vibration(
-        phase=found,
-        acceleration=settings["peak_acceleration_g"],
-        frequency=settings["frequency_hz"],
-    )
+    return Vibration(phase=found, acceleration=settings["peak_acceleration_g"], frequency=settings["frequency_hz"])
 
 
 def column_history(run: Run, definition: str, shaken: Vibration) -> ColumnHistory:
     """Read a column's heights from the phase before its vibration to the end of the vibration.
 
-    Args:
-        run: A finished run.
-        definition: Key of `HEIGHTS`.
-        shaken: The vibration, see `vibration`.
-
-    Raises:
-        InputError: The run lacks its series or frames, or samples before the vibration.
+    The definition is a key of `HEIGHTS`. InputError if the run has no samples before the vibration.
     """
     times, heights = _core(run, shaken) if definition == CORE else _of_series(run, definition, shaken)
     assert shaken.phase.start_s is not None  # the run is finished
@@ -131,8 +117,7 @@ def column_history(run: Run, definition: str, shaken: Vibration) -> ColumnHistor
 def height_with_the_wall(run: Run) -> float:
     """Return the height of the centre of mass at the last sample before the wall was removed [m].
 
-    Raises:
-        InputError: The run lacks its series, or samples before the wall was removed.
+    InputError if the run has no samples before the wall was removed.
     """
     series = run.series
     removal = [phase.type for phase in run.phases].index("remove-container")
@@ -167,28 +152,16 @@ def _core(run: Run, shaken: Vibration) -> tuple[Floats, Floats]:
 def collapse_of(history: ColumnHistory, definition: str, shaken: Vibration) -> CollapseTime:
     """Fit the collapse time of a column to its heights, averaged over each period of the vibration.
 
-    Args:
-        history: Heights of the column.
-        definition: Key of `HEIGHTS` by which the heights were read.
-        shaken: The vibration.
-
-    Raises:
-        InputError: The samples are too few, or the vibration too short.
+    The definition is the key of `HEIGHTS` by which the heights were read.
     """
     times, heights = period_means(history.times, history.heights, shaken.frequency)
     return collapse_time(times, heights, **_KNOWN_ENDS.get(definition, {}))
 
 
 def period_means(times: Floats, values: Floats, frequency: float) -> tuple[Floats, Floats]:
-    """Average samples over each period of a vibration that begins at time 0.
+    """Average values (n,) over each period of a vibration that begins at time 0, of a frequency [Hz].
 
-    Args:
-        times: (n,) times of the samples [s]; samples up to time 0 are left out.
-        values: (n,) values of the samples.
-        frequency: Frequency of the vibration [Hz].
-
-    Returns:
-        Mean times (m,) [s] and mean values (m,) of the m periods that have a sample.
+    Samples up to time 0 are left out. Returns mean times (m,) [s] and mean values (m,) of the m periods with a sample.
     """
     # A sample at the end of a period belongs to this period.
     period = np.ceil(times * frequency - 1e-6).astype(np.int64)
@@ -205,7 +178,8 @@ def collapse_time(
 
     Least squares with 0.3 ≤ β ≤ 3 and 0 ≤ h_end ≤ h_start. τ counts as measured if the column lost at least
     `LEAST_FALL` of its height, τ is shorter than the observation, and its relative error is at most `WORST_ERROR`.
-    Otherwise the observation time is a lower bound of τ.
+    Otherwise the observation time is a lower bound of τ. InputError for too few samples, or times or heights out of
+    their range.
 
     Args:
         times: (n,) times since the collapse began [s], ascending and above 0; n ≥ 10.
@@ -213,16 +187,8 @@ def collapse_time(
         start: h_start if it is known, in the unit of the heights; None: fitted.
         end: h_end if it is known, in the unit of the heights; None: fitted.
 
-    Raises:
-        InputError: Too few samples, or times or heights out of their range.
-
     Source:
         τ of Gravish, Franklin, Hu, Goldman, Phys. Rev. Lett. 108, 208001 (2012); the function is that of Kohlrausch.
-
-    Example:
-        >>> t = np.linspace(0.05, 5, 100)
-        >>> round(collapse_time(t, 0.02 * np.exp(-(t / 0.8) ** 0.7), end=0.0).time, 3)
-        0.8
     """
     t, h = np.asarray(times, dtype=np.float64), np.asarray(heights, dtype=np.float64)
     _check(t, h)

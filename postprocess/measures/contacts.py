@@ -28,7 +28,7 @@ from postprocess.geometry.links import (
     strands,
     swept_axes,
 )
-from postprocess.measures.registry import FrameMeasure, Quantity, in_space
+from postprocess.measures.registry import FrameMeasure, Quantity, in_one_cylinder
 
 # Pairs of links per block, which limits memory.
 _CHUNK = 200_000
@@ -48,10 +48,8 @@ class ContactPairs(NamedTuple):
 def contact_pairs(vertices: Vertices, distance: float) -> ContactPairs:
     """Find pairs of smarticles whose centrelines are at most a distance [m] apart, sorted by i, then j.
 
-    Boxes of cross-section t1 × t2 can touch at centreline distances from min(t1, t2) to (t1² + t2²)^½.
-
-    Raises:
-        InputError: The distance is not above 0.
+    Boxes of cross-section t1 × t2 can touch at centreline distances from min(t1, t2) to (t1² + t2²)^½. InputError if
+    the distance is not above 0.
     """
     vertices = checked_vertices(vertices)
     if not (math.isfinite(distance) and distance > 0):
@@ -79,9 +77,6 @@ def pairs_in_contact(frame: Frame, run: Run) -> ContactPairs:
 
     Returns:
         The pairs, with the least distance of two sphere centres or of two strands' axes.
-
-    Raises:
-        InputError: The scene of the run cannot be read.
     """
     vertices, chain = checked_vertices(frame.vertices), chain_of(run)
     if chain.pitch > 0:
@@ -93,11 +88,7 @@ def pairs_in_contact(frame: Frame, run: Run) -> ContactPairs:
 
 
 def chain_of(run: Run) -> Chain:
-    """Return the sphere chain or strands by which the engine of a run represents a smarticle.
-
-    Raises:
-        InputError: The scene of the run cannot be read.
-    """
+    """Return the sphere chain or strands by which the engine of a run represents a smarticle."""
     fidelity = run.scene.get("fidelity")
     rows = 1 if fidelity is None else fidelity["rows"]
     pitch = 1.0 if fidelity is None else fidelity["pitch"]
@@ -258,7 +249,6 @@ MEASURES = (
         place=52,
         quantities=(Quantity("rattlers", "-"),),
         take=_rattlers_of,
-        # The tiers of a mould have walls of several radii.
-        available_for=lambda run: in_space(run) and run.manifest.container_tiers == 1,
+        available_for=in_one_cylinder,
     ),
 )

@@ -29,9 +29,7 @@ from postprocess.measures.registry import FrameMeasure, Quantity
 def checked_forces(normal: ArrayLike) -> Floats:
     """Return normal forces as a float64 array (M,) [N] after checking them.
 
-    Raises:
-        InputError: Not (M,) finite numbers above 0.
-        UndefinedMeasureError: There is no force.
+    InputError unless they are (M,) finite numbers above 0; UndefinedMeasureError if there is no force.
     """
     normal = np.asarray(normal, dtype=np.float64)
     if normal.ndim != 1 or not np.all(np.isfinite(normal)) or np.any(normal <= 0):

@@ -20,7 +20,6 @@ class Heights:
     """Heights of a pile above the floor."""
 
     mean_com: float  #: Height of the centre of mass of all smarticles [m]
-
     second_highest_com: float  #: Second-largest height of a smarticle's centre of mass [m]; NaN for one smarticle
     top: float  #: Height below which 95 % of the material lies [m]
 
@@ -28,8 +27,7 @@ class Heights:
 def heights(vertices: Vertices, *, floor_z: float = 0.0) -> Heights:
     """Compute the heights of a pile by its vertices (N, 4, 3) [m] and the height of its floor [m].
 
-    Raises:
-        UndefinedMeasureError: There is no smarticle.
+    UndefinedMeasureError if there is no smarticle.
     """
     vertices = checked_vertices(vertices)
     if len(vertices) == 0:
@@ -62,7 +60,6 @@ def material_height(vertices: Vertices, *, floor_z: float = 0.0, percentile: flo
     linear functions, and the height is found by bisection.
 
     Args:
-        vertices: (N, 4, 3) [m].
         floor_z: Height of the floor [m].
         percentile: Percentage of the material, above 0 and up to 100 [%].
 

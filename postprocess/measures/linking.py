@@ -14,8 +14,6 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from dem.errors import InputError
-from dem.record.frame import Frame
-from dem.record.run import Run
 from postprocess.geometry.links import Floats, Vertices, Whole, checked_vertices, close_pairs
 from postprocess.measures.registry import FrameMeasure, Quantity, in_space
 
@@ -115,16 +113,12 @@ def _dot(a: Floats, b: Floats) -> Floats:
     return product
 
 
-def _linking_of(frame: Frame, _: Run) -> tuple[float]:
-    return (linking(frame.vertices).mean,)
-
-
 MEASURES = (
     FrameMeasure(
         name="linking",
         place=42,
         quantities=(Quantity("linking mean", "-"),),
-        take=_linking_of,
+        take=lambda frame, _: (linking(frame.vertices).mean,),
         available_for=in_space,
         costly=True,
     ),

@@ -6,8 +6,6 @@ underestimates the work of a barb that oscillates faster than that. Because the 
 tables also state the least and the greatest sum over all possible first frames.
 """
 
-from __future__ import annotations
-
 import math
 
 import numpy as np
@@ -33,25 +31,13 @@ _NEAR = 1e-3  # largest deviation of a frame from its time, over the interval; f
 
 
 def sampled_work(angles: Floats, torques: Floats) -> float:
-    """Compute the sampled work [J]: the sum of τ Δα over all barbs and samples.
+    """Compute the sampled work [J]: the sum of τ Δα over all barbs and samples; NaN below two samples.
 
-    Δα is the change of the angle since the previous sample.
+    Δα is the change of the angle since the previous sample. InputError if the arrays differ in shape.
 
     Args:
         angles: (samples, N, 2) angles of the barbs [rad].
         torques: (samples, N, 2) torques of their motors [N m].
-
-    Returns:
-        The work [J]; NaN for fewer than two samples.
-
-    Raises:
-        InputError: The two arrays differ in shape.
-
-    Example:
-        >>> import numpy as np
-        >>> there, back = np.zeros((1, 1, 2)), np.full((1, 1, 2), 0.5)
-        >>> sampled_work(np.concatenate([there, back]), np.full((2, 1, 2), 2e-3))
-        0.002
     """
     if angles.shape != torques.shape:
         raise InputError(f"angles and torques must be of one shape: got {angles.shape} and {torques.shape}")
@@ -60,14 +46,14 @@ def sampled_work(angles: Floats, torques: Floats) -> float:
     return float((torques[1:] * np.diff(angles, axis=0)).sum())
 
 
-def sampled(frames: FrameSequence, apart: float = APART) -> list[int]:
-    """Return the indices of frames at intervals of `apart` [s], from the first frame on.
+def sampled(frames: FrameSequence) -> list[int]:
+    """Return the indices of frames at intervals of `APART`, from the first frame on.
 
     The list is empty if a frame is missing at one of these times.
     """
     if not len(frames):
         return []
-    multiples = (frames.times - frames.times[0]) / apart
+    multiples = (frames.times - frames.times[0]) / APART
     chosen = np.flatnonzero(np.abs(multiples - np.round(multiples)) < _NEAR)
     complete = np.array_equal(np.round(multiples[chosen]), np.arange(len(chosen)))
     return [int(k) for k in chosen] if complete else []

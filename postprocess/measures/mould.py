@@ -1,7 +1,5 @@
 """Measure how well a pile fills a mould, and how well the pile keeps this shape without the mould."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -34,26 +32,11 @@ class Cast:
     likeness_before: float  #: Jaccard index of the pile before and the mould [-]
 
 
-def cast(
-    before: ArrayLike,
-    after: ArrayLike,
-    tiers: Sequence[Region],
-    *,
-    thickness: float,
-    ball: float,
-) -> Cast:
+def cast(before: ArrayLike, after: ArrayLike, tiers: Sequence[Region], *, thickness: float, ball: float) -> Cast:
     """Compare a pile in a mould with that pile after the mould was removed.
 
-    Args:
-        before: Vertices (N, 4, 3) in the mould, heights above the floor [m].
-        after: Vertices (N, 4, 3) without the mould, heights above the floor [m].
-        tiers: The T cylinders of the mould, from the lowest, heights above the floor.
-        thickness: Diameter of the links, taken as round [m].
-        ball: Radius of the ball with which the outlines are found [m].
-
-    Raises:
-        InputError: Bad sizes.
-        UndefinedMeasureError: There is no smarticle, or a tier is smaller than a voxel.
+    Vertices (N, 4, 3) before and after [m], and the T tiers from the lowest, have heights above the floor. Links are
+    round with the given thickness [m]; a ball of a radius `ball` [m] finds the outlines.
     """
     grid = outlines([before, after], thickness=thickness, ball=ball, regions=tiers)
     with_mould, without_mould = grid.inside
@@ -73,13 +56,7 @@ def cast(
 
 
 def read_tiers(run: Run) -> tuple[Region, ...]:
-    """Return the tiers of a run's mould from the lowest; empty if the container is one cylinder.
-
-    Heights are above the floor.
-
-    Raises:
-        InputError: The scene is missing or damaged, or a tier lacks its sizes.
-    """
+    """Return the tiers of a run's mould from the lowest, in heights above the floor; empty for a cylinder."""
     container = run.scene.get("container")
     found, bottom = [], 0.0
     for tier in (container or {}).get("tiers") or ():

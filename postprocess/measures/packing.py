@@ -104,7 +104,7 @@ def packing_fraction(
             vertices, pile.inner, thickness_normal=thickness_normal, thickness_in_plane=thickness_in_plane
         )
     elif definition == "voronoi":
-        value = local_packing(vertices, pile, pile.inner, solid_volume=solid_volume).value
+        value = local_packing(vertices, pile, pile.inner, solid_volume=solid_volume)[0]
     else:
         value = filled(len(vertices), solid_volume=solid_volume, radius=radius, height=pile.top - pile.bottom)
     return PackingFraction(value=value, definition=definition, height=height)

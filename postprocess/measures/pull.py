@@ -73,8 +73,7 @@ class Peak:
 def read_pull(run: Run, series: Series, phase: int) -> HookPull:
     """Read forces and heights of the hooks in the phase with the given index, as far as the run has come.
 
-    Raises:
-        InputError: The series lacks the hook's force or height, or has fewer than two samples of the phase.
+    InputError if the series lacks the hook's force or height, or has fewer than two samples of the phase.
     """
     inside = np.nonzero(series["phase"] == phase)[0]
     force = -series["hook_upper_force_N"][:, 2]
@@ -97,11 +96,7 @@ def read_pull(run: Run, series: Series, phase: int) -> HookPull:
 
 
 def weight_of_one(run: Run) -> float:
-    """Return the weight of one smarticle, W_s [N].
-
-    Raises:
-        InputError: The scene cannot be read, or has no gravity.
-    """
+    """Return the weight of one smarticle, W_s [N]."""
     return float(run.manifest.smarticle_mass_kg * run.scene["gravity_m_per_s2"])
 
 
@@ -139,15 +134,9 @@ def freed(pull: HookPull) -> float:
 
 
 def held_fast(pull: HookPull, asked: SceneData) -> bool:
-    """Return whether the force limit stopped the hook of a finished pull.
+    """Return whether the force limit stopped the hook of a finished pull: the peak is a lower bound then.
 
-    The peak force is then a lower bound.
-
-    Args:
-        asked: The phase in the scene.
-
-    Raises:
-        InputError: The phase has a force limit and lacks `distance_m`.
+    `asked` is the phase in the scene.
     """
     if asked.get("force_limit_N") is None:
         return False  # nothing else stops a hook

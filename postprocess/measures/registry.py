@@ -5,8 +5,6 @@ columns that this function fills, with units. Tables and `smarticles measure` re
 needs its module, a test, and a line in README.
 """
 
-from __future__ import annotations
-
 import pkgutil
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -33,12 +31,7 @@ class Shown:
 
 @dataclass(frozen=True)
 class Quantity:
-    """One column of a table.
-
-    Example:
-        >>> Quantity("com height", "m").header
-        'com height [m]'
-    """
+    """One column of a table; its header is `com height [m]`."""
 
     label: str  #: Name of the quantity
     unit: str  #: SI unit, or "-" for a pure number, "degree", "smarticles"
@@ -95,12 +88,16 @@ def in_space(run: Run) -> bool:
     return not run.manifest.planar
 
 
+def in_one_cylinder(run: Run) -> bool:
+    """Return whether the wall of a run has one radius, unlike the tiers of a mould or a channel."""
+    return in_space(run) and run.manifest.container_tiers == 1
+
+
 @cache
 def registered() -> tuple[FrameMeasure | PhaseMeasure, ...]:
     """Return all measures of this package, in alphabetical order of their modules.
 
-    Raises:
-        ValueError: Two measures have one name, or two quantities one header.
+    ValueError if two measures have one name, or two quantities one header.
     """
     package = import_module(_PACKAGE)
     modules = [import_module(f"{_PACKAGE}.{found.name}") for found in pkgutil.iter_modules(package.__path__)]

@@ -1,11 +1,10 @@
 """Count all and escaped smarticles; measure how a pile without a wall spreads and tilts."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from dem.errors import InputError
 from dem.record.frame import Frame
@@ -52,26 +51,21 @@ class FreePile:
 def free_pile(
     vertices: Vertices, run: Run, *, floor_z: float = 0.0, foot: tuple[float, float] = (0.0, 0.0)
 ) -> FreePile:
-    """Measure a pile without a wall.
+    """Measure a pile without a wall, by its vertices (N, 4, 3) [m] and the height of its floor [m].
 
-    Args:
-        vertices: (N, 4, 3) [m].
-        run: The run, which gives the sizes of container and smarticles.
-        floor_z: Height of the floor [m].
-        foot: x and y [m] of the point on which the pile stood, best the centre of mass before the wall was removed.
-
-    Raises:
-        UndefinedMeasureError: There is no smarticle.
+    The foot, x and y [m], is the point on which the pile stood, best the centre of mass before the wall was removed.
     """
     vertices = checked_vertices(vertices)
     centre = centre_of_mass(vertices)
+    # Outliers have little influence on medians.
+    middle = np.median(centres_of_mass(vertices)[:, :2], axis=0)
     return FreePile(
         touching=contact_clusters(vertices, TOUCHING * run.manifest.sphere_diameter_m).largest,
         entangled=entanglement_clusters(vertices).largest,
         radius_half=spread_radius(vertices, share=0.5),
         radius_most=spread_radius(vertices, share=0.95),
         sloughed=share_outside(
-            vertices, run.manifest.container_radius_m + OUTSIDE * run.manifest.middle_length_m, axis=middle(vertices)
+            vertices, run.manifest.container_radius_m + OUTSIDE * run.manifest.middle_length_m, axis=middle
         ),
         tilt=math.degrees(tilt(vertices, foot=foot, floor_z=floor_z)),
         offset=math.hypot(centre[0] - foot[0], centre[1] - foot[1]),
@@ -79,11 +73,7 @@ def free_pile(
 
 
 def centre_of_mass(vertices: Vertices) -> Floats:
-    """Return the centre of mass (3,) [m] of the whole pile.
-
-    Raises:
-        UndefinedMeasureError: There is no smarticle.
-    """
+    """Return the centre of mass (3,) [m] of the whole pile; UndefinedMeasureError if it is empty."""
     vertices = checked_vertices(vertices)
     if len(vertices) == 0:
         raise UndefinedMeasureError("a centre of mass needs at least 1 smarticle: got 0")
@@ -97,16 +87,8 @@ def spread_radius(vertices: Vertices, *, share: float, axis: tuple[float, float]
     """Return the radius [m] around a vertical axis that holds a fraction of the material.
 
     The material is spread evenly along each link's centreline. The part of each centreline inside a circle, seen from
-    above, is exact; the radius is found by bisection.
-
-    Args:
-        vertices: (N, 4, 3) [m].
-        share: Fraction of the material, above 0 and up to 1 [-].
-        axis: x and y of the axis [m]; that of the pile's centre of mass if not given.
-
-    Raises:
-        InputError: The fraction is out of its range.
-        UndefinedMeasureError: There is no smarticle.
+    above, is exact; the radius is found by bisection. The axis, x and y [m], is that through the pile's centre of mass
+    if not given. InputError unless the fraction `share` is above 0 and up to 1.
     """
     vertices = checked_vertices(vertices)
     if not 0 < share <= 1:
@@ -120,54 +102,30 @@ def spread_radius(vertices: Vertices, *, share: float, axis: tuple[float, float]
     return least_reaching(lambda radius: float(weights @ _shares_within(start, along, radius)), level, 0.0, farthest)
 
 
-def share_outside(vertices: Vertices, radius: float, *, axis: tuple[float, float] = (0.0, 0.0)) -> float:
+def share_outside(vertices: Vertices, radius: float, *, axis: ArrayLike = (0.0, 0.0)) -> float:
     """Return the fraction [-] of smarticles outside a cylinder around a vertical axis.
 
     The position of a smarticle is its centre of mass. The cylinder has a radius [m] and an axis through x and y [m].
-
-    Raises:
-        UndefinedMeasureError: There is no smarticle.
+    UndefinedMeasureError if there is no smarticle.
     """
     centres = centres_of_mass(vertices)
     if len(centres) == 0:
         raise UndefinedMeasureError("a fraction of smarticles needs at least 1 smarticle: got 0")
-    return float((np.hypot(*(centres[:, :2] - axis).T) > radius).mean())
-
-
-def middle(vertices: Vertices) -> tuple[float, float]:
-    """Return the middle of a pile, x and y [m]: medians, on which outliers have little influence."""
-    x, y = np.median(centres_of_mass(vertices)[:, :2], axis=0)
-    return float(x), float(y)
+    return float((np.hypot(*(centres[:, :2] - np.asarray(axis)).T) > radius).mean())
 
 
 def tilt(vertices: Vertices, *, foot: tuple[float, float] = (0.0, 0.0), floor_z: float = 0.0) -> float:
     """Return the angle [rad] between the vertical and the line from a pile's foot to its centre of mass.
 
-    A rigid rotation of a pile about its foot changes the tilt by the angle of rotation; a pile that spreads evenly to
-    all sides keeps the tilt 0. The principal axis of inertia is no substitute: it is horizontal in every pile lower
-    than about 1.7 times its radius.
-
-    Args:
-        vertices: (N, 4, 3) [m].
-        foot: x and y [m] of the point on which the pile stood before it tilted.
-        floor_z: Height of the floor [m].
-
-    Raises:
-        UndefinedMeasureError: There is no smarticle, or the centre of mass is not above the floor.
+    A rigid rotation of a pile about its foot, x and y [m], changes the tilt by the angle of rotation; a pile that
+    spreads evenly to all sides keeps the tilt 0. The principal axis of inertia is no substitute: it is horizontal in
+    every pile lower than about 1.7 times its radius. UndefinedMeasureError if the centre of mass is not above the
+    floor.
     """
     x, y, z = centre_of_mass(vertices) - [*foot, floor_z]
     if not z > 0:
         raise UndefinedMeasureError(f"the centre of mass is {-z:g} m below the floor; check floor_z")
     return math.atan2(math.hypot(x, y), z)
-
-
-def has_toppled(offset: float, base_radius: float) -> bool:
-    """Return whether a pile has fallen over: its centre of mass is no longer above its former base.
-
-    The offset is the horizontal distance of the centre of mass from the foot [m]; the base is a circle around the foot
-    with the radius of the pile before the wall was removed [m].
-    """
-    return offset > base_radius
 
 
 def _shares_within(start: Floats, along: Floats, radius: float) -> Floats:

@@ -5,8 +5,6 @@ the force of the pulled string. A chain has fractured after the last sample at w
 force.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -104,11 +102,7 @@ def _strain_of(run: Run, _: Series, __: int) -> tuple[float, ...]:
 
 
 def read_strain_test(run: Run) -> StrainTest:
-    """Read the strain test of a run from its series.
-
-    Raises:
-        InputError: The run has no strain test, or its series cannot be read.
-    """
+    """Read the strain test of a run from its series; InputError if the run has none."""
     series = run.series
     if not has_strain(series):
         raise InputError(f"{run.path}: no chain was pulled in this run; give runs of the study chain")
@@ -163,11 +157,9 @@ def _mean_over(values: Floats, samples: float) -> Floats:
 def first_drop(forces: Floats) -> tuple[int, float]:
     """Find the first maximum of forces (n,) [N] that is followed by a loss of a tenth or more.
 
-    Losses that begin below three tenths of the largest force do not count.
-
-    Returns:
-        Index of this maximum, and the fraction of its force that is lost before the force exceeds it again [-]. Without
-        such a loss: index of the largest force, and 0.
+    Losses that begin below three tenths of the largest force do not count. Returns the index of this maximum, and the
+    fraction of its force that is lost before the force exceeds it again [-]; without such a loss the index of the
+    largest force, and 0.
     """
     highest = np.maximum.accumulate(forces)
     lost = np.flatnonzero((forces < (1 - LOSS) * highest) & (highest > _TAUT * forces.max()))

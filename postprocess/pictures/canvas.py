@@ -3,8 +3,6 @@
 Pictures are drawn at twice their size and scaled down. No display is needed: VTK falls back to EGL.
 """
 
-from __future__ import annotations
-
 import ctypes
 import math
 import os
@@ -37,8 +35,7 @@ from postprocess.report import figures
 
 VIEWS: Mapping[str, tuple[float, float]] = MappingProxyType(
     {"front": (-90.0, 14.0), "oblique": (-62.0, 34.0), "top": (-90.0, 90.0)}
-)
-"""Named views: azimuth and elevation of the camera from the centre of the pile [degree]."""
+)  #: Named views: azimuth and elevation of the camera from the centre of the pile [degree]
 
 MILLIMETRE = 1e3  #: Factor from m to mm, the unit of all drawing: VTK's tolerances do not suit centimetres in m
 
@@ -64,16 +61,11 @@ class Style:
 
     @classmethod
     def of(cls, runs: Sequence[Run], *, color_by: str | None, size: tuple[int, int], view: str | None) -> Self:
-        """Return the style of a picture of runs.
+        """Return the style of a picture of runs side by side, with panels of a width and a height [pixel].
 
-        Args:
-            runs: Runs side by side.
-            color_by: Name or short name of a field; None: crossings, for planar runs smarticle_id.
-            size: Width and height of the panel of one run [pixel].
-            view: Key of `VIEWS`; None: "front", for planar runs "top".
-
-        Raises:
-            InputError: An unknown field or view, a bad size, or planar runs beside others.
+        `color_by` is the name or short name of a field, see `colour_field`; `view` is a key of `VIEWS`, by default
+        "front", for planar runs "top". InputError for an unknown field or view, a bad size, or planar runs beside
+        others.
         """
         if len({run.manifest.planar for run in runs}) > 1:
             raise InputError("a run in a plane and one in space have no view in common; compare runs of one kind")
@@ -102,11 +94,7 @@ class Style:
 
 
 class Subject:
-    """A run to be drawn, with its frames and bodies.
-
-    Raises:
-        InputError: A file of the run is missing or damaged, or forces are wanted and not recorded.
-    """
+    """A run to be drawn, with its frames and bodies; InputError if forces are wanted and not recorded."""
 
     def __init__(self, directory: Path | str, *, forces: bool = False) -> None:
         self.run = open_run(directory)
@@ -136,14 +124,11 @@ def visible_meshes(
 ) -> dict[str, pv.PolyData]:
     """Return the meshes of a frame by kind, [mm] above the floor, with lines as tubes.
 
+    A removed wall has the kind `ghost`.
+
     Args:
-        bodies: Bodies of the run.
-        frame: The frame.
         forward: (3,) direction of view; the half of the wall in front is cut away, unless this vector is zero.
         largest: Normal force of the thickest line of force [N]; the largest of the frame if not given.
-
-    Returns:
-        The meshes by kind. A removed wall has the kind `ghost`.
     """
     made = bodies.at(frame)
     if "wall" in bodies.kinds and "wall" not in made and bodies.boundaries.removal is not None:
@@ -169,14 +154,7 @@ def union(extents: Sequence[Floats]) -> Floats:
 
 
 def add_bodies(plotter: Any, meshes: Mapping[str, pv.PolyData], frame: Frame, colours: NDArray[np.uint8]) -> None:
-    """Replace the meshes in a window.
-
-    Args:
-        plotter: The window.
-        meshes: Meshes by `visible_meshes`.
-        frame: Their frame.
-        colours: (N, 3, 3) sRGB colours of the links, uint8.
-    """
+    """Replace the meshes of a frame in a window; colours of the links are sRGB (N, 3, 3), uint8."""
     pale = "forces" in meshes
     for kind in (*PAINTS, "ghost"):
         for name in (kind, f"{kind} edges"):
@@ -206,16 +184,14 @@ def add_bodies(plotter: Any, meshes: Mapping[str, pv.PolyData], frame: Frame, co
 class Canvas:
     """An off-screen window with one panel per run, one camera, one colour scale and one scale bar.
 
+    RunError if this machine lacks the libraries to draw without a display.
+
     Args:
-        style: Style of the picture.
         extent: (2, 2) extent in the camera's view [mm].
         run: Run by whose sizes corners are shaded.
         columns: Number of panels.
         scale: Colour scale; None: no colour bar.
         quick: Whether to leave out the shading of corners, which takes most of the time of a picture.
-
-    Raises:
-        RunError: This machine lacks the libraries to draw without a display.
     """
 
     def __init__(
@@ -295,14 +271,9 @@ class Canvas:
         colours: NDArray[np.uint8],
         caption: Sequence[str] = (),
     ) -> None:
-        """Show meshes and a caption in a panel.
+        """Show the meshes of a frame in a panel, with colours of the links, sRGB (N, 3, 3), uint8.
 
-        Args:
-            column: Index of the panel.
-            frame: The frame.
-            meshes: Its meshes by `visible_meshes`.
-            colours: (N, 3, 3) sRGB colours of the links, uint8.
-            caption: Lines of the caption; the first is the title.
+        The first line of the caption is the title.
         """
         with quiet_vtk():
             self._plotter.subplot(0, column)
@@ -373,8 +344,7 @@ def round_length(most: float) -> float:
 def check_graphics() -> None:
     """Check that VTK can draw on this machine; without a library it would end by a segmentation fault.
 
-    Raises:
-        RunError: There is neither a display nor a library to draw without one.
+    RunError if there is neither a display nor a library to draw without one.
     """
     if sys.platform != "linux" or os.environ.get("DISPLAY"):
         return

@@ -1,7 +1,5 @@
 """Choose the frames and the speed of films, and write films to files."""
 
-from __future__ import annotations
-
 import importlib
 import math
 from collections.abc import Iterable
@@ -51,18 +49,9 @@ class FilmTimes:
         rate: float = RATE,
         most: int = MOST,
     ) -> Self:
-        """Choose the times of a film's pictures.
+        """Choose the times of a film's pictures by the times (m,) of the recorded frames [s], ascending.
 
-        Args:
-            recorded: (m,) times of the recorded frames [s], ascending.
-            start: Simulated time of the first picture [s]; that of the first frame if not given.
-            end: Simulated time at which the film ends [s]; that of the last frame if not given.
-            every: Simulated time between two pictures [s]; if not given, a multiple of the recorded interval.
-            rate: Pictures per second of playing time [1/s].
-            most: Largest number of pictures if `every` is not given.
-
-        Raises:
-            InputError: Fewer than two frames or pictures, or an argument out of its range.
+        InputError if there are fewer than two frames or pictures, or an argument is out of its range.
         """
         recorded = np.asarray(recorded, dtype=np.float64)
         if most < 2:
@@ -110,8 +99,7 @@ def durations(count: int, rate: float, unit: float) -> list[int]:
 def check_film(path: Path, size: tuple[int, int]) -> None:
     """Check that a film of this size [pixel] can be written to a path.
 
-    Raises:
-        InputError: The encoder of `.mp4` is missing, or the size is odd for `.mp4`.
+    InputError if the encoder of `.mp4` is missing, or the size is odd for `.mp4`.
     """
     if path.suffix != ".mp4":
         return

@@ -1,7 +1,5 @@
 """Draw pictures and films of runs, without a display."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
@@ -32,6 +30,7 @@ from postprocess.pictures.canvas import (
     visible_meshes,
 )
 from postprocess.report import figures
+from postprocess.report.tables import reject_existing, whole_file
 
 DEFINITION = "second-highest-com"
 """Definition of the packing fraction in captions, as in the first column of `smarticles measure`."""
@@ -62,7 +61,7 @@ def render_run(
 ) -> Path:
     """Draw one frame of a run: boxes of the links, hooks, strings, and the container cut open in front.
 
-    A removed wall is drawn as a faint outline.
+    A removed wall is drawn as a faint outline. Returns the path of the written file.
 
     Args:
         directory: A run directory with at least one frame; the run may be unfinished.
@@ -77,19 +76,10 @@ def render_run(
         view: Key of `VIEWS`; None: "front", for planar runs "top".
         forces: Whether to draw contact forces as lines, with a thickness proportional to the normal force, in front of
             pale smarticles.
-        overwrite: Whether to replace an existing file.
-
-    Returns:
-        Path of the written file.
 
     Raises:
         InputError: No frame, an unknown field or view, a time outside the recorded frames, a bad size, bad limits, an
             unknown smarticle, or an output that exists.
-        RunError: This machine lacks the libraries to draw without a display.
-
-    Example:
-        >>> render_run("runs/pile", color_by="height", view="oblique").name
-        'render.png'
     """
     output = _checked_output(directory, output, "render.png", (".png",))
     subjects = [Subject(path, forces=forces) for path in (directory, *compare)]
@@ -97,7 +87,7 @@ def render_run(
         time = float(common_times(subjects)[-1])
     indices = [[len(subject.frames) - 1 if time is None else subject.frames.nearest(time)] for subject in subjects]
     style = Style.of([subject.run for subject in subjects], color_by=color_by, size=size, view=view)
-    figures.reject_existing(output, overwrite=overwrite)
+    reject_existing(output, overwrite=overwrite)
     if smarticle is not None:
         if compare or color_by is not None or view is not None or forces:
             msg = f"smarticle {smarticle}: is drawn alone, with its own colours and view; leave out the other options"
@@ -105,7 +95,7 @@ def render_run(
         image = _focused(subjects[0], indices[0][0], smarticle, style)
     else:
         image = next(pictures(subjects, indices, style, limits))
-    with figures.whole_file(output, overwrite=overwrite) as temporary:
+    with whole_file(output, overwrite=overwrite) as temporary:
         image.save(temporary)
     return output
 
@@ -128,35 +118,25 @@ def render_film(
     track: Track | None = None,
     overwrite: bool = False,
 ) -> Path:
-    """Draw a film of a run with one camera and one colour scale.
+    """Draw a film of a run with one camera and one colour scale, and return the path of the written file.
 
     The pictures are at equal intervals of simulated time; each shows the nearest recorded frame. The caption states the
-    speed.
+    speed. `render_run` describes the arguments that are not listed.
 
     Args:
         directory: A run directory with at least two frames; the run may be unfinished.
         output: File to write: `.gif` or `.webp`, or `.mp4`, which needs the package imageio-ffmpeg; `film.gif` in the
             run directory if not given.
         compare: Further runs, drawn side by side; the film ends at the last time common to all runs.
-        color_by: Name or short name of a field; None: crossings, for planar runs smarticle_id.
-        limits: Ends of the colour scale; those of the film if not given.
         size: Width and height of the picture of one run [pixel]; even numbers for `.mp4`.
-        view: Key of `VIEWS`; None: "front", for planar runs "top".
-        frames_per_second: Pictures per second of playing time [1/s].
         start: Simulated time at which the film begins [s]; that of the first frame if not given.
         end: Simulated time at which the film ends [s]; that of the last frame if not given.
         every: Simulated time between two pictures [s]; if not given, a multiple of the recorded interval.
         most_frames: Largest number of pictures if `every` is not given.
-        forces: Whether to draw contact forces, see `render_run`.
         track: Shows the progress, see `Track`.
-        overwrite: Whether to replace an existing file.
-
-    Returns:
-        Path of the written file.
 
     Raises:
         InputError: Fewer than two frames, an output that exists or cannot be written, or an argument out of its range.
-        RunError: This machine lacks the libraries to draw without a display.
     """
     output = _checked_output(directory, output, "film.gif", film.KINDS)
     subjects = [Subject(path, forces=forces) for path in (directory, *compare)]
@@ -166,9 +146,9 @@ def render_film(
         common_times(subjects), start=start, end=end, every=every, rate=frames_per_second, most=most_frames
     )
     indices = [film_times.indices(subject.frames.times) for subject in subjects]
-    figures.reject_existing(output, overwrite=overwrite)
+    reject_existing(output, overwrite=overwrite)
     images, count = pictures(subjects, indices, style, limits, quick=True, pace=film_times.pace), len(film_times.times)
-    with figures.whole_file(output, overwrite=overwrite) as temporary:
+    with whole_file(output, overwrite=overwrite) as temporary:
         film.write_film(temporary, track(images, count) if track else images, count=count, rate=film_times.rate)
     return output
 
@@ -176,14 +156,7 @@ def render_film(
 def turntable(directory: Path | str, *, views: int = 24, size: int = 560) -> list[Image.Image]:
     """Draw the last frame of a run from `views` directions all around, at equal angles.
 
-    Args:
-        directory: A run directory with at least one frame.
-        views: Number of pictures.
-        size: Width and height of a picture [pixel].
-
-    Raises:
-        InputError: There is no frame, or it is damaged.
-        RunError: This machine lacks the libraries to draw without a display.
+    Pictures are `size` wide and high [pixel].
     """
     subject = Subject(directory)
     index, frame = len(subject.frames) - 1, subject.frames[-1]
@@ -213,13 +186,8 @@ def pictures(
 ) -> Iterator[Image.Image]:
     """Yield pictures of runs side by side, with one camera and one colour scale.
 
-    Args:
-        subjects: The runs.
-        indices: Indices of the frames of each run, one per picture.
-        style: Style of the pictures.
-        limits: Ends of the colour scale.
-        quick: Whether to leave out the shading of corners.
-        pace: Speed of a film, for the caption.
+    Each run has the indices of its frames, one per picture. `quick` leaves out the shading of corners; `pace` is the
+    speed of a film, for the caption.
     """
     titles = titles_of([subject.run for subject in subjects])
     pairs = list(zip(subjects, indices, strict=True))
@@ -229,8 +197,9 @@ def pictures(
     scale = ColourScale.of(style.field, _span(subjects, values, style, limits))
     force = None
     if "forces" in subjects[0].bodies.kinds:
+        each = (read_forces(subject.frames[i]).contacts.normal for subject, shown in pairs for i in shown)
         # The scale of the lines must be above 0 if no contact carries a force.
-        force = max(_largest_force(subject.frames[i]) for subject, shown in pairs for i in shown) or 1e-3
+        force = max(float(normal.max(initial=0.0)) for normal in each) or 1e-3
     in_view = union([subject.extent(shown, style.axes) for subject, shown in pairs])
     with Canvas(style, in_view, subjects[0].run, columns=len(subjects), scale=scale, quick=quick) as canvas:
         for step in zip(*indices, strict=True):
@@ -240,10 +209,6 @@ def pictures(
                 caption = caption_of(frame, subject.run, title=titles[column], pace=pace, force=force)
                 canvas.show(column, frame, meshes, scale.painted(values[column][index]), caption)
             yield canvas.image()
-
-
-def _largest_force(frame: Frame) -> float:
-    return float(read_forces(frame).contacts.normal.max(initial=0.0))
 
 
 def _span(subjects: Sequence[Subject], values: Sequence[dict[int, Floats]], style: Style, limits: Limits) -> Span:
@@ -261,10 +226,7 @@ def _span(subjects: Sequence[Subject], values: Sequence[dict[int, Floats]], styl
 def common_times(subjects: Sequence[Subject]) -> Floats:
     """Return the times [s] of one run's frames in the interval common to all runs.
 
-    This run has the fewest frames in the interval.
-
-    Raises:
-        InputError: The runs have no common interval.
+    This run has the fewest frames in the interval. InputError if the runs have no common interval.
     """
     low = max(float(subject.frames.times[0]) for subject in subjects)
     high = min(float(subject.frames.times[-1]) for subject in subjects)
@@ -365,14 +327,9 @@ def titles_of(runs: Sequence[Run]) -> list[str]:
 
 
 def caption_of(frame: Frame, run: Run, *, title: str, pace: str = "", force: float | None = None) -> list[str]:
-    """Return the lines of the caption of a frame.
+    """Return the lines of the caption of a frame; the title is the first.
 
-    Args:
-        frame: The frame.
-        run: Its run.
-        title: First line.
-        pace: Speed of a film.
-        force: Normal force of the thickest line [N]; None: no forces are drawn.
+    `pace` is the speed of a film, `force` the normal force of the thickest line [N], None if no forces are drawn.
     """
     count = f"{run.manifest.count}" if frame.count == run.manifest.count else f"{frame.count} of {run.manifest.count}"
     phase = run.phases[frame.phase].type if frame.phase < len(run.phases) else "?"

@@ -1,7 +1,5 @@
 """Draw pictures of several runs at several times in one figure, with one row per run and one scale."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,6 +9,7 @@ import numpy as np
 from postprocess.bodies.colours import ColourScale
 from postprocess.pictures.canvas import Canvas, Style, Subject, union, visible_meshes
 from postprocess.report import figures
+from postprocess.report.tables import whole_file
 
 _SIZE = (400, 400)  # of a picture with room for a caption, which is cut off [pixel]
 
@@ -25,22 +24,10 @@ class Row:
 
 
 def draw_strip(rows: Sequence[Row], output: Path, *, columns: Sequence[str], footer: Sequence[str]) -> Path:
-    """Draw a row of pictures for each run, and write them as one figure.
+    """Draw a row of pictures for each run, and write them as one figure, a `.png`; return its path.
 
-    A smarticle has one colour in all pictures of a run.
-
-    Args:
-        rows: The rows, with one time per column.
-        output: File to write, `.png`.
-        columns: Titles of the columns.
-        footer: Lines below the pictures.
-
-    Returns:
-        Path of the written file.
-
-    Raises:
-        InputError: A run has no frames.
-        RunError: This machine lacks the libraries to draw without a display.
+    A row has one time per column. A smarticle has one colour in all pictures of a run. The footer is below the
+    pictures.
     """
     subjects = [Subject(row.directory) for row in rows]
     style = Style.of([subject.run for subject in subjects[:1]], color_by="id", size=_SIZE, view="front")
@@ -73,6 +60,6 @@ def draw_strip(rows: Sequence[Row], output: Path, *, columns: Sequence[str], foo
             if number % len(columns) == 0:
                 axes.set_ylabel(rows[number // len(columns)].label)
         figures.add_footer(figure, [f"A picture is {width:.3g} mm wide.", *footer])
-        with figures.whole_file(output) as temporary:
+        with whole_file(output) as temporary:
             figure.savefig(temporary, format="png", dpi=130)
     return output

@@ -3,19 +3,16 @@
 A figure is drawn inside `style()`; `add_footer` adds its provenance, and `save` writes the files.
 """
 
-from __future__ import annotations
-
 import textwrap
 import warnings
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
+from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from dem.errors import InputError, RunError
-from dem.record.files import whole
+from postprocess.report.tables import whole_file
 
 with warnings.catch_warnings():
     # A system-wide mpl_toolkits may hide that of the environment; no figure here is three-dimensional.
@@ -79,11 +76,9 @@ _FOOTER_COLUMNS = 97  # characters of the footer per `COLUMN_WIDTH`
 FOOTER_SHARE = 0.2  #: Largest fraction of a figure's height that its footer takes [-]
 
 
-@contextmanager
-def style() -> Iterator[None]:
+def style() -> AbstractContextManager[None]:
     """Set Matplotlib's parameters for figures, and restore them afterwards."""
-    with rc_context(_STYLE):
-        yield
+    return rc_context(_STYLE)
 
 
 def new_figure(*, width: float = COLUMN_WIDTH, height: float = 2.6) -> tuple[Figure, Axes]:
@@ -106,7 +101,8 @@ def add_footer(figure: Figure, lines: Sequence[str]) -> None:
     which names the file with the full text.
     """
     width, height = figure.get_size_inches()
-    text = _fitting(lines, int(_FOOTER_COLUMNS * width / COLUMN_WIDTH), _most_lines(height))
+    room = height * FOOTER_SHARE / (1 - FOOTER_SHARE) - _FOOTER_MARGIN
+    text = _fitting(lines, int(_FOOTER_COLUMNS * width / COLUMN_WIDTH), max(int(room / _FOOTER_LINE), 1))
     below = _FOOTER_LINE * len(text) + _FOOTER_MARGIN
     figure.set_size_inches(width, height + below)
     base = below / (height + below)
@@ -115,12 +111,6 @@ def add_footer(figure: Figure, lines: Sequence[str]) -> None:
         0.015, _FOOTER_MARGIN / 2 / (height + below), "\n".join(text), fontsize=_FOOTER_SIZE, color=GREY,
         va="bottom", ha="left", linespacing=1.25, parse_math=False,
     )  # fmt: skip
-
-
-def _most_lines(height: float) -> int:
-    """Return the number of lines that a footer may have, at least one, by the figure's height [inch]."""
-    room = height * FOOTER_SHARE / (1 - FOOTER_SHARE)
-    return max(int((room - _FOOTER_MARGIN) / _FOOTER_LINE), 1)
 
 
 def _fitting(lines: Sequence[str], columns: int, most: int) -> list[str]:
@@ -137,12 +127,9 @@ def _fitting(lines: Sequence[str], columns: int, most: int) -> list[str]:
 
 
 def save(figure: Figure, path: Path, *, formats: Sequence[str] = ("png", "svg", "pdf")) -> list[Path]:
-    """Write a figure to one file per format, whose name is the path with the format as suffix.
+    """Write a figure to one file per format; return the paths: the given path with the format as suffix.
 
     The files contain no date, so that equal figures have equal bytes.
-
-    Returns:
-        Paths of the written files.
     """
     dates: dict[str, dict[str, None]] = {"svg": {"Date": None}, "pdf": {"CreationDate": None, "ModDate": None}}
     written = []
@@ -154,42 +141,10 @@ def save(figure: Figure, path: Path, *, formats: Sequence[str] = ("png", "svg", 
     return written
 
 
-@contextmanager
-def whole_file(path: Path, *, overwrite: bool = True) -> Iterator[Path]:
-    """Yield a temporary path, and rename this file to `path` when the block ends without an error.
-
-    Raises:
-        InputError: The file exists and must not be replaced, or its folder does not exist.
-        RunError: The disk is full, or the folder cannot be written.
-    """
-    reject_existing(path, overwrite=overwrite)
-    if not path.parent.is_dir():
-        raise InputError(f"{path}: the folder {path.parent} does not exist: create it or choose another output")
-    try:
-        with whole(path, shared=True) as temporary:
-            yield temporary
-    except OSError as error:  # whose text may name the temporary file
-        msg = f"{path}: cannot be written ({error.strerror or error}); free space or choose another output"
-        raise RunError(msg) from error
-
-
-def reject_existing(path: Path, *, overwrite: bool) -> None:
-    """Check that an output does not exist, unless it may be replaced.
-
-    Raises:
-        InputError: the file exists and `overwrite` is false.
-    """
-    if path.exists() and not overwrite:
-        msg = f"{path}: exists already and is left as it is; choose another name, or let it be replaced (--overwrite)"
-        raise InputError(msg)
-
-
 def sequence(colours: int, *, last: float = 1.0) -> list[str]:
     """Return hexadecimal colours of viridis from dark to light, brightened so that shading is visible.
 
-    Args:
-        colours: Number of colours.
-        last: Position of the last colour in the map, up to 1.
+    `last` is the position of the last colour in the map, up to 1.
     """
     steps = [0.16 + (last - 0.16) * i / max(colours - 1, 1) for i in range(colours)]
     plain = np.array([matplotlib.colormaps["viridis"](step)[:3] for step in steps])
@@ -202,10 +157,8 @@ _MARGIN = 0.03  # space between the data and a widened limit, over the length of
 def hold_everything(figure: Figure) -> list[str]:
     """Widen the limits of axes that would cut lines, error bars or bands; call this before `add_footer`.
 
-    A logarithmic axis cannot show values at or below 0: error bars that reach there are cut.
-
-    Returns:
-        Statements for the footer about error bars that are cut.
+    A logarithmic axis cannot show values at or below 0: error bars that reach there are cut. Statements about them for
+    the footer are returned.
     """
     cut = 0
     for axes in figure.axes:

@@ -1,8 +1,9 @@
-"""Write tables to CSV files, and format tables as Markdown."""
+"""Write files that are never incomplete, tables among them, and format tables as Markdown."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 
 import pandas as pd
@@ -11,29 +12,39 @@ from dem.errors import InputError, RunError
 from dem.record.files import whole
 
 
-def write_table(table: pd.DataFrame, path: Path | str, *, overwrite: bool = False) -> Path:
-    """Write a table as CSV to a temporary file and rename it, so that the file is never incomplete.
-
-    Returns:
-        The path.
+@contextmanager
+def whole_file(path: Path, *, overwrite: bool = True) -> Iterator[Path]:
+    """Yield a temporary path, and rename this file to `path` when the block ends without an error.
 
     Raises:
-        InputError: The path does not end in `.csv`, the file exists, or its folder is missing or read-only.
+        InputError: The file exists and must not be replaced, or its folder is missing or read-only.
         RunError: Writing fails, for example because the disk is full.
     """
+    reject_existing(path, overwrite=overwrite)
+    if not path.parent.is_dir():
+        raise InputError(f"{path}: the folder {path.parent} does not exist: create it or choose another output")
+    try:
+        with whole(path, shared=True) as temporary:
+            yield temporary
+    except OSError as error:  # whose text may name the temporary file
+        msg = f"{path}: cannot be written ({error.strerror or error}); free space or choose another output"
+        raise (InputError if isinstance(error, PermissionError) else RunError)(msg) from error
+
+
+def reject_existing(path: Path, *, overwrite: bool) -> None:
+    """Check that an output does not exist, unless it may be replaced; InputError if it does."""
+    if path.exists() and not overwrite:
+        msg = f"{path}: exists already and is left as it is; choose another name, or let it be replaced (--overwrite)"
+        raise InputError(msg)
+
+
+def write_table(table: pd.DataFrame, path: Path | str, *, overwrite: bool = False) -> Path:
+    """Write a table as CSV, and return its path; InputError unless the path ends in `.csv`; see `whole_file`."""
     path = Path(path)
     if path.suffix != ".csv":
         raise InputError(f"cannot write table {path}: tables are CSV; let its name end in .csv")
-    if path.exists() and not overwrite:
-        raise InputError(f"cannot write table {path}: it exists; choose another name or ask to overwrite it")
-    try:
-        with whole(path, shared=True) as temporary, temporary.open("w", encoding="utf-8", newline="") as file:
-            table.to_csv(file, index=False)
-    except (FileNotFoundError, PermissionError) as error:
-        raise InputError(f"cannot write table {path}: {error.strerror}; choose a folder that can be written") from None
-    except OSError as error:  # whose text may name the temporary file
-        msg = f"cannot write table {path}: {error.strerror or error}; free space or choose another folder"
-        raise RunError(msg) from error
+    with whole_file(path, overwrite=overwrite) as temporary:
+        table.to_csv(temporary, index=False)
     return path
 
 

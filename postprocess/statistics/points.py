@@ -7,8 +7,6 @@ Source:
     Box, Hunter and Hunter, Statistics for Experimenters, 2nd ed. (Wiley 2005), chapter 5.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable, Sequence
 
@@ -17,8 +15,6 @@ import pandas as pd
 from postprocess.statistics.seeds import SeedMean, mean_over_seeds
 
 ASPECT, SEED, SEEDS = "aspect ratio [-]", "seed", "seeds [-]"
-
-
 RUNS = "runs [-]"  #: Column with the number of runs over which a row is averaged
 
 
@@ -93,11 +89,7 @@ def format_with_error(value: float, form: str, error: float = math.nan) -> str:
 
 
 def pairs(one: pd.DataFrame, other: pd.DataFrame, quantity: str) -> pd.DataFrame:
-    """Join a quantity of two tables of runs by aspect ratio and seed.
-
-    Returns:
-        One row per pair of runs: aspect ratio, seed, and the quantity in the columns `one` and `other`.
-    """
+    """Join a quantity of two tables of runs by aspect ratio and seed, as the columns `one` and `other`."""
     keys = [ASPECT, SEED]
     left = one[[*keys, quantity]].rename(columns={quantity: "one"})
     right = other[[*keys, quantity]].rename(columns={quantity: "other"})
@@ -115,18 +107,9 @@ def paired_differences(
 ) -> pd.DataFrame:
     """Compute the change of a quantity between two levels of a factor, for each pair of runs.
 
-    The function applied to its own result with another factor gives interactions.
-
-    Args:
-        table: One row per run.
-        quantity: Column of the quantity.
-        factor: Column of the factor.
-        levels: Its first and second level.
-        others: Columns of all other factors in which runs differ, and the seed; equal in both runs of a pair.
-
-    Returns:
-        One row per pair: the columns `others`, and the quantity at the second level less that at the first. Runs
-        without a partner are left out.
+    The function applied to its own result with another factor gives interactions. `others` are the columns of all other
+    factors in which runs differ, and the seed; they are equal in both runs of a pair. Returns one row per pair: the
+    columns `others`, and the quantity at the second level less that at the first. Runs without a partner are left out.
 
     Example:
         >>> runs = pd.DataFrame({"mu": [0.4, 0.8, 0.4, 0.8], "seed": [1, 1, 2, 2], "N": [5.0, 6.0, 5.5, 7.5]})

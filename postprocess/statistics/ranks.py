@@ -5,10 +5,8 @@ resampling (the bootstrap) draws whole blocks. Runs that agree in a factor set b
 form a stratum; a resample has as many blocks of each stratum as the data.
 """
 
-from __future__ import annotations
-
 import math
-from collections.abc import Callable, Hashable, Iterator, Sequence
+from collections.abc import Callable, Hashable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -32,27 +30,11 @@ class Interval:
     low: float  #: Lower end of the interval; NaN if there are too few blocks
     high: float  #: Upper end of the interval; NaN if there are too few blocks
 
-    @property
-    def clear(self) -> bool:
-        """Whether the interval excludes 0."""
-        return self.low > 0 or self.high < 0
-
 
 def rank_correlations(x: Floats, y: Floats, strata: Whole) -> Floats:
-    """Compute Spearman's rank correlations of columns with one variable, ranked within strata.
+    """Compute Spearman's rank correlations (m,) of columns x (n, m) with y (n,), within strata (n,).
 
-    Args:
-        x: (n, m) columns.
-        y: (n,) variable.
-        strata: (n,) stratum of each row.
-
-    Returns:
-        (m,) correlations from -1 to 1; NaN if the column, or y, is constant in every stratum.
-
-    Example:
-        >>> x, y = np.array([[1.0], [2], [3], [10], [20], [30]]), np.array([7.0, 8, 9, 1, 2, 3])
-        >>> rank_correlations(x, y, np.array([0, 0, 0, 1, 1, 1]))
-        array([1.])
+    A correlation is NaN if its column, or y, is constant in every stratum.
     """
     ranks = ranks_within(np.column_stack([x, y]), strata)
     squares = np.einsum("nm,nm->m", ranks, ranks)
@@ -79,36 +61,22 @@ def correlation_within(x: Sequence[float], y: Sequence[float], blocks: Sequence[
     A y of which only a lower bound is known counts as `inf`, the highest rank. Points with NaN are left out. The
     standard error is that of the scatter over blocks. It is NaN for fewer than six blocks: five correlations have one
     sign by chance in more than 5 % of all cases.
-
-    Example:
-        >>> f'{correlation_within([1, 2, 1, 2], [5, 7, 1, math.inf], ["a", "a", "b", "b"]).value:.3f}'
-        '1.000'
     """
     parts: dict[Hashable, list[tuple[float, float]]] = {}
     for across, up, block in zip(x, y, blocks, strict=True):
         if not (math.isnan(across) or math.isnan(up)):
             parts.setdefault(block, []).append((across, up))
-    each = [_correlation(np.array(part, dtype=np.float64)) for part in parts.values()]
-    mean = mean_over_seeds([one for one in each if math.isfinite(one)])
+    arrays = (np.array(part, dtype=np.float64) for part in parts.values())
+    each = (rank_correlations(part[:, :1], part[:, 1], np.zeros(len(part), dtype=np.int64)) for part in arrays)
+    # Rounded, so that a correlation of 0 is not printed as 1e-17.
+    mean = mean_over_seeds([round(float(one[0]), 12) for one in each])
     return mean if mean.count >= _COINS else replace(mean, standard_error=math.nan, half_width=math.nan)
 
 
-def _correlation(part: Floats) -> float:
-    one = np.zeros(len(part), dtype=np.int64)
-    # Rounded, so that a correlation of 0 is not printed as 1e-17.
-    return round(float(rank_correlations(part[:, :1], part[:, 1], one)[0]), 12)
-
-
 def common_slopes(x: Floats, y: Floats, strata: Whole) -> Floats:
-    """Fit slopes of y against each column of x, with a separate intercept for each stratum.
+    """Fit slopes (m,) of y (n,) against columns x (n, m), with an intercept for each of the strata (n,).
 
-    Args:
-        x: (n, m) columns.
-        y: (n,) variable.
-        strata: (n,) stratum of each row.
-
-    Returns:
-        (m,) slopes; NaN if the column is constant in every stratum.
+    A slope is NaN if its column is constant in every stratum.
     """
     values = np.column_stack([x, y])
     for stratum in np.unique(strata):
@@ -118,31 +86,10 @@ def common_slopes(x: Floats, y: Floats, strata: Whole) -> Floats:
     return np.where(known, values[:, :-1].T @ values[:, -1] / np.where(known, squares, 1), np.nan)
 
 
-def resamples(blocks: Whole, strata: Whole, *, count: int, seed: int) -> Iterator[Whole]:
-    """Yield `count` bootstrap resamples of a table, as indices of rows.
-
-    A resample has as many blocks of each stratum as the table, drawn with replacement.
-
-    Args:
-        blocks: (n,) block of each row; a block lies in one stratum.
-        strata: (n,) stratum of each row.
-        count: Number of resamples.
-        seed: Seed of the random numbers.
-    """
-    random = np.random.default_rng(seed)
-    rows = {block: np.nonzero(blocks == block)[0] for block in np.unique(blocks)}
-    inside = [np.unique(blocks[strata == stratum]) for stratum in np.unique(strata)]
-    for _ in range(count):
-        drawn = np.concatenate([random.choice(own, len(own)) for own in inside])
-        yield np.concatenate([rows[block] for block in drawn])
-
-
 def interval(value: float, drawn: Sequence[float]) -> Interval:
     """Return a value with its 95 % interval, by percentiles of resampled values.
 
-    Args:
-        value: The value of the data.
-        drawn: The values of the resamples. If more than a tenth of them are not finite, the interval is NaN.
+    If more than a tenth of the resampled values are not finite, the interval is NaN.
     """
     known = np.asarray(drawn, dtype=np.float64)
     known = known[np.isfinite(known)]
@@ -158,8 +105,16 @@ def few_blocks(blocks: Whole, strata: Whole) -> bool:
 
 
 def resampled(measures: Callable[[Whole], Floats], blocks: Whole, strata: Whole, *, count: int, seed: int) -> Floats:
-    """Return the m values of `measures` for each of `count` resamples, (count, m); see `resamples`.
+    """Return the m values of `measures` for each of `count` bootstrap resamples of a table, (count, m).
 
-    `measures` takes indices of rows and returns values (m,).
+    A resample has as many blocks of each stratum as the table, drawn with replacement; `measures` takes its indices of
+    rows and returns values (m,). Each row has a block (n,) and a stratum (n,); a block lies in one stratum.
     """
-    return np.array([measures(rows) for rows in resamples(blocks, strata, count=count, seed=seed)])
+    random = np.random.default_rng(seed)
+    rows = {block: np.nonzero(blocks == block)[0] for block in np.unique(blocks)}
+    inside = [np.unique(blocks[strata == stratum]) for stratum in np.unique(strata)]
+    found = []
+    for _ in range(count):
+        drawn = np.concatenate([random.choice(own, len(own)) for own in inside])
+        found.append(measures(np.concatenate([rows[block] for block in drawn])))
+    return np.array(found)

@@ -105,12 +105,7 @@ def _correlation_time(deviations: Floats) -> float:
 
 
 def pooled_scatter(groups: Iterable[Sequence[float]]) -> Scatter:
-    """Estimate the standard deviation within groups, assumed equal in all groups; NaN are left out.
-
-    Example:
-        >>> pooled_scatter([[1.0, 3.0], [10.0, 12.0], [5.0]])
-        Scatter(value=1.4142135623730951, freedom=2)
-    """
+    """Estimate the standard deviation within groups, assumed equal in all groups; NaN are left out."""
     known = [array[~np.isnan(array)] for array in (np.asarray(group, dtype=np.float64) for group in groups)]
     freedom = sum(len(group) - 1 for group in known if len(group))
     if not freedom:
@@ -120,13 +115,7 @@ def pooled_scatter(groups: Iterable[Sequence[float]]) -> Scatter:
 
 
 def mean_over_seeds(values: Sequence[float]) -> SeedMean:
-    """Average independent values (n,), one per seed; values of NaN are left out.
-
-    Example:
-        >>> mean = mean_over_seeds([1.0, 2.0, 3.0])
-        >>> mean.value, round(mean.half_width, 3)
-        (2.0, 2.484)
-    """
+    """Average independent values (n,), one per seed; values of NaN are left out."""
     known = np.asarray(values, dtype=np.float64)
     known = known[~np.isnan(known)]
     count = len(known)
@@ -175,10 +164,6 @@ def slope_within(x: Sequence[float], y: Sequence[float], blocks: Sequence[Hashab
 
     Differences between blocks, such as between initial piles, thus do not count as scatter. Points with NaN are left
     out. The number of degrees of freedom is n less the number of blocks less 1.
-
-    Example:
-        >>> slope_within([0, 1, 0, 1], [5, 7, 1, 3], ["a", "a", "b", "b"]).value
-        2.0
     """
     across, up = np.asarray(x, dtype=np.float64), np.asarray(y, dtype=np.float64)
     known = np.isfinite(across) & np.isfinite(up)
@@ -215,10 +200,6 @@ def parabola(x: Sequence[float], y: Sequence[float], *, at: float) -> Parabola:
 
     The sign of the slope says on which side of `at` the extremum lies, and its error stays finite if the bend is small.
     Errors are by the residuals, with n − 3 degrees of freedom. Points with NaN are left out.
-
-    Example:
-        >>> round(parabola([0, 1, 2, 3], [0, 3, 4, 3], at=1.0).slope.value, 9)
-        2.0
     """
     across, up = np.asarray(x, dtype=np.float64) - at, np.asarray(y, dtype=np.float64)
     known = np.isfinite(across) & np.isfinite(up)

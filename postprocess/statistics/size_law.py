@@ -9,8 +9,6 @@ a logistic function 1/(1 + exp(-(x - x_c)/s)). The 95 % interval of x_c is by pr
 is valid even if no run below some x has the property and all runs above have it.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Collection
 from dataclasses import dataclass
@@ -34,12 +32,6 @@ class Scatter:
     variance: float  #: c, in the square of the quantity's unit
     fall: float  #: Exponent [-]
     freedom: int  #: Number of degrees of freedom
-
-    def error(self, count: float, runs: int) -> float:
-        """Return the 95 % half-width of a mean over `runs` runs with N = `count`; NaN without scatter."""
-        if not self.freedom:
-            return math.nan
-        return float(stdtrit(self.freedom, (1 + CONFIDENCE) / 2)) * math.sqrt(self.variance * count**-self.fall / runs)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -79,9 +71,7 @@ class SizeLaw:
 def scatter_of(counts: Floats, values: Floats) -> Scatter:
     """Fit the variance from seed to seed by maximum likelihood.
 
-    Args:
-        counts: (n,) number of smarticles of each run.
-        values: (n,) finite values of the quantity.
+    Counts (n,) are the numbers of smarticles of each run, values (n,) its finite values of the quantity.
     """
     sizes, place = np.unique(counts, return_inverse=True)
     members = np.bincount(place)
@@ -101,9 +91,7 @@ def scatter_of(counts: Floats, values: Floats) -> Scatter:
 def size_law(counts: Floats, values: Floats) -> SizeLaw:
     """Fit q = q_∞ + a N^(-1/3) to runs with at least two distinct N.
 
-    Args:
-        counts: (n,) number of smarticles of each run.
-        values: (n,) finite values of the quantity.
+    Counts (n,) are the numbers of smarticles of each run, values (n,) its finite values of the quantity.
     """
     scatter = scatter_of(counts, values)
     bulk, slope, left = _fit(counts, values, scatter, POWER)
@@ -190,15 +178,9 @@ class Profile:
 
 
 def profiles(x: Floats, having: Floats, groups: NDArray[np.int64]) -> dict[int, Profile]:
-    """Compute the profile likelihood of the threshold x_c for each group of runs.
+    """Compute the profile likelihood of the threshold x_c for each group of runs, at common values of x_c.
 
-    Args:
-        x: (n,) finite x of each run.
-        having: (n,) 1 if a run has the property, else 0.
-        groups: (n,) group of each run, such as its size.
-
-    Returns:
-        The profiles by group, at common values of x_c.
+    Runs have a finite x (n,), 1 in `having` (n,) if a run has the property, else 0, and a group (n,), such as its size.
     """
     span = float(np.ptp(x)) or 1.0
     places = np.linspace(x.min() - span / 2, x.max() + span / 2, _PLACES)

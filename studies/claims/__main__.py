@@ -1,7 +1,5 @@
 """Write `CLAIMS.md` and `claims.csv` into a folder of results: `python -m studies.claims [RESULTS]`."""
 
-from __future__ import annotations
-
 import argparse
 from collections import Counter
 from collections.abc import Sequence

@@ -89,14 +89,9 @@ class Claim:
 
 
 def claims(results: Path, listed: Path = CLAIMS) -> tuple[Claim, ...]:
-    """Read the verdicts on all claims of a list from the published tables of the studies.
+    """Read the verdicts on all claims of a YAML list from the published tables of the studies.
 
-    Args:
-        results: folder with a folder for each study.
-        listed: list of the claims, a YAML file.
-
-    Raises:
-        InputError: A study or a finding that the list names does not exist.
+    `results` has a folder for each study. InputError if a study or a finding that the list names does not exist.
     """
 
     @cache

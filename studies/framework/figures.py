@@ -3,34 +3,29 @@
 All error bars are 95 % intervals: `draw_means` draws them, `finish` explains them once in the figure's footer.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import product
 from pathlib import Path
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import Any, Protocol
 
 import numpy as np
 import pandas as pd
+from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
 from matplotlib.colors import Normalize
 from matplotlib.container import ErrorbarContainer
+from matplotlib.figure import Figure as Canvas
 from numpy.typing import ArrayLike, NDArray
 
 from dem.errors import InputError
 from dem.record.run import Run
 from postprocess.report import figures as style
-from postprocess.report.figures import hold_everything
 from postprocess.statistics.points import marked
 from studies.framework.procedures import EXTERNAL, INTERNAL, PROCEDURE, SHAPE, STATIC, of_procedure
 from studies.framework.runs import ENGINE_NAMES, Quantity, engines_of, judging, of_engine
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure as Canvas
 
 ASPECT_LABEL, THETA_LABEL = r"aspect ratio $l/w$ [-]", r"amplitude $\theta$ [degree]"
 CROSSINGS_LABEL = r"links through a plane $\langle N\rangle$ [-]"
@@ -150,11 +145,8 @@ class Means:
         every = analysis.tables.get(self.table, pd.DataFrame())
         every = self.rows(every) if len(every) else every
         columns = [quantity.column for quantity in self.quantities]
-        shown = (
-            pd.concat([every.iloc[:0], *(series.rows for series in self.split(judging(every)))])
-            if len(every)
-            else every
-        )
+        drawn = self.split(judging(every)) if len(every) else []
+        shown = pd.concat([every.iloc[:0], *(series.rows for series in drawn)])
         if shown.empty or shown[[*columns, *self.bounds.values()]].isna().all().all():
             return []
         values = sorted(shown[self.panels].unique()) if self.panels else [None]
@@ -185,10 +177,8 @@ class Means:
             label = f"simulation on {ENGINE_NAMES.get(engine, engine)}"
             for series in self.split(of_engine(table, engine) if engine else table):
                 rows = series.rows[series.rows[column].notna()]
-                x, properties = (
-                    self.transform(series.rows[self.x]) + series.shift * (1 + 2 * number),
-                    dict(series.properties),
-                )
+                x = self.transform(series.rows[self.x]) + series.shift * (1 + 2 * number)
+                properties = dict(series.properties)
                 if number:
                     properties |= {"color": style.GREEN, "markerfacecolor": "white", "linestyle": "none"}
                 if len(rows) and self.fit is not None and not number:
@@ -197,17 +187,8 @@ class Means:
                     properties["linestyle"] = "none"
                 if len(rows):
                     errors = scale * rows[marked(column, "95 %")].to_numpy()
-                    across = rows.get(marked(self.x, "95 %"))
-                    shown = label if number else series.label
-                    draw_means(
-                        axes,
-                        x[rows.index],
-                        scale * rows[column],
-                        errors,
-                        across=across,
-                        properties=properties,
-                        label=shown,
-                    )
+                    shown = {"label": label if number else series.label, "across": rows.get(marked(self.x, "95 %"))}
+                    draw_means(axes, x[rows.index], scale * rows[column], errors, properties=properties, **shown)
                     positive &= bool((rows[column] > 0).all())
                     label = "_"
                 if column in self.bounds:
@@ -434,16 +415,10 @@ class Scatter:
                 draw_bounds(axes, held[x], held[y], length, properties={**small, "elinewidth": 0.6, "capsize": 1.6})
             for series in self.split(analysis.table("points")) if self.means else ():
                 properties = {"markersize": 4.2, **series.properties, "linestyle": "none"}
-                errors, across = (series.rows[marked(name, "95 %")] for name in (y, x))
-                draw_means(
-                    axes,
-                    series.rows[x],
-                    series.rows[y],
-                    errors,
-                    across=across,
-                    properties=properties,
-                    label=series.label,
-                )
+                rows = series.rows
+                errors, across = (rows[marked(name, "95 %")] for name in (y, x))
+                shown: dict[str, Any] = {"across": across, "label": series.label, "properties": properties}
+                draw_means(axes, rows[x], rows[y], errors, **shown)
             axes.set_xlabel(quantity.axis or x)
             axes.set_ylabel(self.y.axis or y)
             axes.set_ylim(bottom=0)
@@ -480,10 +455,7 @@ PROCEDURE_LABELS: Mapping[str, str] = MappingProxyType(
 def by_procedure(labels: Mapping[str, str] = PROCEDURE_LABELS, *, apart: float = 0.0, line: bool = True) -> SplitBy:
     """Make a series for each procedure, of the internal oscillation only at θ = `AMPLITUDE`.
 
-    Args:
-        labels: label of each procedure, in the order of the legend.
-        apart: distance of neighbouring series along x, in the unit of the x axis.
-        line: whether lines join the means.
+    Labels are in the order of the legend; neighbouring series are `apart` along x, in the unit of the x axis.
     """
 
     def split(table: pd.DataFrame) -> list[Series]:
@@ -533,9 +505,7 @@ def binned(
     """Average each history over intervals of a width [s], or over 50 logarithmic intervals.
 
     Intervals meet at the beginning of the activity, time 0. Those in which a history has no sample are left out.
-
-    Returns:
-        Centres of the intervals (n,) [s] and means of each history (histories, n).
+    Returns the centres of the intervals (n,) [s] and the means of each history (histories, n).
     """
     first, last = (edge(one.times[at] for one in histories) for edge, at in ((min, 0), (max, -1)))
     if log:
@@ -596,14 +566,8 @@ def draw_means(
 ) -> None:
     """Draw means y (n,) at places x (n,) with their error bars.
 
-    Args:
-        axes: axes to draw into.
-        x: places (n,).
-        y: means (n,).
-        half_widths: of the 95 % intervals of y (n,), NaN where unknown; None: no vertical error bars.
-        properties: of markers and lines, by Matplotlib's names.
-        label: in the legend.
-        across: half-widths of the 95 % intervals of x (n,), or those downwards and upwards (2, n).
+    Half-widths of the 95 % intervals of y (n,) and of x (`across`, (n,), or (2, n) downwards and upwards) are NaN where
+    they are unknown; None draws no error bars.
     """
     bars = axes.errorbar(
         x, y, yerr=half_widths, xerr=across, **{"markersize": 3.4, "linewidth": 0.7, **properties}, label=label
@@ -637,7 +601,7 @@ def finish(figure: Canvas, path: Path, notes: Sequence[str], footer: Sequence[st
     if len(entries) > 1:
         columns = 2 if figure.get_size_inches()[0] < 1.5 * style.COLUMN_WIDTH else 4
         figure.legend(entries.values(), entries.keys(), loc="outside upper center", ncols=columns)
-    hidden = hold_everything(figure)
+    hidden = style.hold_everything(figure)
     has_bars = any(
         lines.get_label() == _CONFIDENCE
         for axes in figure.axes

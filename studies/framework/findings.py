@@ -8,20 +8,30 @@ and the text with our numbers follow from the effects. `above`, `slope`, `mean` 
 from __future__ import annotations
 
 import math
+from bisect import bisect_left
 from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
 
 import numpy as np
 import pandas as pd
+from scipy.special import stdtrit
 
-from postprocess.statistics.findings import Unresolved, effect_text, judge, more_runs_text
 from postprocess.statistics.points import ASPECT, SEED, pairs
 from postprocess.statistics.ranks import correlation_within
-from postprocess.statistics.seeds import SeedMean, Slope, mean_over_seeds, slope_within
+from postprocess.statistics.seeds import CONFIDENCE, SeedMean, Slope, mean_over_seeds, slope_within
 from studies.framework.procedures import CROSSINGS, ENERGY, PHI, PHI_ACTIVE, PROCEDURE, THETA, of_procedure
 
 _SYMBOLS = {ASPECT: "l/w", SEED: "seed", THETA: "θ", PHI: "φ", PHI_ACTIVE: "φ_f", CROSSINGS: "⟨N⟩", ENERGY: "energy"}
+
+CRITERION = (
+    "A finding is found where it holds beyond the 95 % half-width (Student's t) of the scatter over pairs or runs, "
+    "not found where the opposite does, not resolved in between; where nothing holds at all, "
+    "one verdict in forty is still `found`"
+)  #: Definition of the verdicts, for footers of figures and tables
+
+_MOST_RUNS = 1 << 20  # more runs count as infinitely many
+_MOST_TIMES = 100  # a larger ratio of runs is stated as "more than 100"
 
 Rows = Callable[[pd.DataFrame], pd.DataFrame]  #: Selects or computes the rows that a finding is judged by
 
@@ -33,6 +43,37 @@ class Verdict(StrEnum):
     NOT_FOUND = "not found"
     NOT_RESOLVED = "not resolved"
     NO_DATA = "no data"
+
+
+def judge(effect: SeedMean, *, threshold: float = 0.0) -> Verdict:
+    """Decide whether an effect is above a threshold, by its 95 % interval; see `CRITERION`."""
+    low, high = effect.value - effect.half_width, effect.value + effect.half_width
+    return decide(low > threshold, high < threshold, data=not math.isnan(effect.value))
+
+
+def more_runs(effect: SeedMean, *, threshold: float = 0.0) -> float:
+    """Return the factor in the number of runs that would resolve an effect, if effect and scatter stay.
+
+    It is infinite above a million runs, and NaN if the scatter is unknown.
+    """
+    size, scatter = abs(effect.value - threshold), effect.standard_error * math.sqrt(effect.count)
+    if not math.isfinite(scatter):
+        return math.nan
+
+    def enough(runs: int) -> bool:
+        return bool(scatter * stdtrit(runs - 1, (1 + CONFIDENCE) / 2) / math.sqrt(runs) <= size)
+
+    counts = range(2, _MOST_RUNS + 1)
+    place = bisect_left(counts, True, key=enough)
+    return counts[place] / effect.count if place < len(counts) else math.inf
+
+
+def effect_text(effect: SeedMean, digits: int = 3, unit: str = "") -> str:
+    """Return `+0.0123 ± 0.0011 (n = 15)`: effect, standard error and number of runs, or `no data`."""
+    if math.isnan(effect.value):
+        return "no data"
+    error = f" ± {effect.standard_error:.{digits}g}" if math.isfinite(effect.standard_error) else " without an error"
+    return f"{effect.value:+.{digits}g}{error}{unit} (n = {effect.count})"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -56,7 +97,7 @@ class Effect:
 
         It is not resolved if the estimate is a bound and the true value may lie on the other side.
         """
-        verdict = Verdict(str(self._judged))
+        verdict = self._judged
         high, low = (self.may_be_higher, self.may_be_lower)[:: self.sign or 1]
         if (verdict == Verdict.FOUND and low) or (verdict == Verdict.NOT_FOUND and high):
             return Verdict.NOT_RESOLVED
@@ -65,18 +106,18 @@ class Effect:
     @property
     def more(self) -> float:
         """Factor in the number of runs that would resolve the effect; NaN if it is resolved or unknown."""
-        judged = self._judged
-        return judged.more if isinstance(judged, Unresolved) else math.nan
+        unresolved = self._judged == Verdict.NOT_RESOLVED
+        return more_runs(self.value, threshold=self.threshold) if unresolved else math.nan
 
     @property
-    def _judged(self) -> str:
+    def _judged(self) -> Verdict:
         signed = replace(self.value, value=self.sign * self.value.value)
         return judge(signed, threshold=self.sign * self.threshold)
 
     def __str__(self) -> str:
         """Format the effect with its error: `shape-change less internal +0.12 ± 0.01 (n = 8)`."""
         beside = "" if self.sign else ", not judged"
-        return f"{self.label} {self.text or effect_text(self.value, 3, self.unit)}{self.note}{beside}"
+        return f"{self.label} {self.text or effect_text(self.value, unit=self.unit)}{self.note}{beside}"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -129,7 +170,10 @@ class Judged:
     @property
     def needed(self) -> str:
         """Text on how many more runs would resolve the finding; empty if it is resolved or that is unknown."""
-        return more_runs_text(Unresolved(more=self.more))
+        if math.isnan(self.more):
+            return ""
+        times = f"more than {_MOST_TIMES}" if self.more > _MOST_TIMES else f"{self.more:.2g}"
+        return f"an effect of this size would take {times} times as many runs"
 
 
 def _verdict(effects: Sequence[Effect]) -> tuple[Verdict, float]:
@@ -161,17 +205,7 @@ def within(value: float, half_width: float, margin: float) -> Verdict:
 
 def findings_table(judged: Sequence[Judged]) -> pd.DataFrame:
     """Make the table `findings.csv`: statement, numbers, verdict and criterion, a row per finding."""
-    rows = [
-        {
-            "finding in the paper": one.finding.says,
-            "ours": one.ours,
-            "verdict": str(one.verdict),
-            "criterion": one.criterion,
-            "needed": one.needed,
-            "id": one.finding.id,
-        }
-        for one in judged
-    ]
+    rows = [(one.finding.says, one.ours, str(one.verdict), one.criterion, one.needed, one.finding.id) for one in judged]
     return pd.DataFrame(rows, columns=["finding in the paper", "ours", "verdict", "criterion", "needed", "id"])
 
 
@@ -193,18 +227,11 @@ def above(
     """Make the finding that a procedure is above others in a quantity, paired by aspect ratio and seed.
 
     Args:
-        name: id of the finding.
-        says: statement.
         quantities: column, or several columns with a sign each: +1 if the statement says above, −1 if below.
-        one: procedure that is compared with `others`.
-        others: procedures that it must differ from, each.
-        sign: sign of a single column.
         beside: procedures whose difference from `one` is shown but not judged.
         beside_quantity: column of that difference; None: the column that is judged.
         bounds: column that is above 0 if the first of the quantities is a lower bound and the others are unknown.
-        rows: selects the samples.
         shown: columns whose means are shown but not judged.
-        found_if: criterion in words; empty: all differences have their sign.
     """
     signs = {quantities: sign} if isinstance(quantities, str) else quantities
 
@@ -254,13 +281,7 @@ def slope(
     """Make the finding that a quantity rises (sign +1) or falls (−1) with a variable, on straight lines.
 
     Args:
-        name: id of the finding.
-        says: statement.
-        quantity: column of the quantity.
-        against: column of the variable.
-        sign: sign of the slope that the statement asks for.
         within: columns whose values make blocks; lines of all blocks have one slope and levels of their own.
-        rows: selects the samples.
         label: name of the quantity in texts; empty: its symbol.
     """
     label = f"{label or symbol(quantity)} against {symbol(against)}"
@@ -288,11 +309,6 @@ def mean(
     """Make the finding that the mean of a value over all rows is above a threshold.
 
     Args:
-        name: id of the finding.
-        says: statement.
-        values: computes the value of each row.
-        label: name of the mean in texts.
-        rows: selects the samples.
         threshold: in the unit of the value.
         shown: columns whose means are shown but not judged.
         by: column; the means of the columns `shown` are taken at each of its values.
@@ -324,15 +340,9 @@ def ranks(
     ranks above all other values, and a pile that a single smarticle braces has a peak many times those of other piles.
 
     Args:
-        name: id of the finding.
-        says: statement.
-        x: column of x.
-        y: column of y.
         within: columns whose values make blocks; ranks are taken within each block.
         bounds: column that is above 0 if y is a lower bound.
-        found_if: criterion in words.
         unit: unit of the slope of y against x, which is shown but not judged.
-        rows: selects the samples.
     """
 
     def outcome(table: pd.DataFrame) -> Outcome:

@@ -6,8 +6,6 @@ is measured at the end of the activity, as in the paper's own code, and again at
 is looser in motion.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from types import MappingProxyType
@@ -29,8 +27,7 @@ STATIC, EXTERNAL, SHAPE, INTERNAL = "static", "external", "shape-change", "inter
 ORDER = (STATIC, EXTERNAL, SHAPE, INTERNAL)
 PROCEDURES: Mapping[str, str] = MappingProxyType(
     {"shake": EXTERNAL, "shape-change": SHAPE, "internal-oscillation": INTERNAL}
-)
-"""Procedure by the type of the phase that is its activity."""
+)  #: Procedure by the type of the phase that is its activity
 
 AMPLITUDE = 10.0  #: Amplitude θ at which the internal oscillation is compared with others, as in the paper [deg]
 
@@ -53,10 +50,8 @@ _WINDOW = 0.1  # s, of moving means of heights: longer than a swing at θ = 10°
 def prepared_by(run: Run, *then: str) -> dict[str, object]:
     """Return the cells procedure, θ [deg], those of `run_columns`, and time of the activity [s].
 
-    The run must consist of a pour, a rest, one activity with a rest or none, and phases of the types `then`.
-
-    Raises:
-        InputError: The run has other phases.
+    InputError unless the run consists of a pour, a rest, one activity with a rest or none, and phases of the types
+    `then`.
     """
     types = [phase.type for phase in run.phases]
     active = [kind for kind in types if kind in PROCEDURES]
@@ -134,13 +129,10 @@ def procedure_row(run: Run) -> dict[str, object]:
 
 
 def height_history(run: Run) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Read the height of the centre of mass against time, from the rest before the activity on.
+    """Read heights over h0 (n,) [-] and times since the activity began (n,) [s].
 
-    Returns:
-        Heights over h0 (n,) [-], where h0 is the mean over that rest, and times since the activity began (n,) [s].
-
-    Raises:
-        InputError: The height was not recorded.
+    Both begin with the rest before the activity; h0 is the mean height of the centre of mass over that rest. InputError
+    if the height was not recorded.
     """
     series, active = run.series, activity(run)
     height = np.asarray(series["com_height_m"], dtype=np.float64)
@@ -200,13 +192,8 @@ def gained(work: NDArray[np.float64], before: NDArray[np.bool_]) -> float:
 def half_compaction(time: NDArray[np.float64], height: NDArray[np.float64], duration: float) -> float:
     """Return the time at which half of the compaction is reached, over the duration of the activity [-].
 
-    Args:
-        time: times since the activity began (n,) [s], including the rests before and after it.
-        height: heights of the centre of mass over that in the rest before (n,) [-].
-        duration: duration of the activity [s].
-
-    Returns:
-        The share of the activity; NaN if the centre of mass is not lower in the rest after the activity.
+    Times (n,) since the activity began [s] and heights (n,) over that in the rest before [-] include the rests before
+    and after the activity. NaN if the centre of mass is not lower in the rest after it.
     """
     final = height[time > duration]
     moving = (time >= 0) & (time <= duration)
@@ -233,13 +220,7 @@ def samples(runs: pd.DataFrame) -> pd.DataFrame:
     """Make the samples, a row per procedure, aspect ratio, θ and seed; static is a procedure too.
 
     Runs of equal aspect ratio and seed are poured from equal poses. So the static state is one sample: the mean over
-    these runs.
-
-    Args:
-        runs: table of runs with the columns of `procedure_row`.
-
-    Returns:
-        The samples; "runs [-]" is the number of runs in a row, and quantities that a procedure lacks are NaN.
+    these runs, whose number is "runs [-]". Quantities that a procedure lacks are NaN.
     """
     columns = {f"{STATIC} {quantity}": quantity for quantity in (PHI_ACTIVE, PHI, CROSSINGS)}
     static = runs.groupby([ASPECT, SEED], as_index=False)[list(columns)].mean().rename(columns=columns)

@@ -1,7 +1,5 @@
 """Origin of the numbers of a study: footers of tables and figures, and the file `provenance.json`."""
 
-from __future__ import annotations
-
 import importlib.metadata
 import json
 from collections.abc import Mapping, Sequence
@@ -14,8 +12,7 @@ import pandas as pd
 from dem.errors import InputError
 from postprocess.measures.packing import DEFINITIONS
 from postprocess.measures.table import LAST_FRAMES
-from postprocess.report.figures import whole_file
-from postprocess.report.tables import table_lines
+from postprocess.report.tables import table_lines, whole_file
 from studies.framework.runs import DEFINITION, Collected
 
 
@@ -67,12 +64,7 @@ class Origin:
         return f"Study {self.found.study}, fidelity {fidelities}{engines}: {used} of {used + missing} runs{lacking}"
 
     def figure_footer(self, points: str, text_name: str) -> list[str]:
-        """Return the footer of a figure, two statements.
-
-        Args:
-            points: statement about points and seeds, which follows the number of runs.
-            text_name: name of the file that has the full footer.
-        """
+        """Return the footer of a figure, which names the file with the full footer."""
         first, *more = (f"planned: {self.note}" if self.found.missing else self.note).split("; ")
         commits = self._versions("git")
         made = f"{len(commits)} commits" if len(commits) > 2 else f"Commit {', '.join(commits)}"
@@ -82,12 +74,7 @@ class Origin:
         ]
 
     def footer(self, points: str, *statements: str) -> list[str]:
-        """Return the footer of tables and texts, a line for each statement.
-
-        Args:
-            points: statement about points and seeds, which follows the number of runs.
-            statements: further statements.
-        """
+        """Return the footer of tables and texts, a line for each statement."""
         named = [("smarticles", ""), ("git", ""), *((engine, engine) for engine in self._engines)]
         versions = "; ".join(f"{name} {', '.join(self._versions(name, engine))}" for name, engine in named)
         return [
@@ -106,16 +93,10 @@ class Origin:
         tables: Mapping[str, pd.DataFrame],
         text: tuple[str, Sequence[str]],
     ) -> dict[str, Path]:
-        """Write tables, text and provenance.
+        """Write tables, text and provenance; return the paths of the files by their names.
 
-        Args:
-            output: folder for the files.
-            footer: goes below the text, and into CSV files as comments, to be read with `comment="#"`.
-            tables: tables by name, without suffix.
-            text: name of the Markdown file and its lines; missing runs are listed below them.
-
-        Returns:
-            Paths of the files by their names.
+        `text` is the name of a Markdown file and its lines; missing runs are listed below them. The footer goes below
+        the text, and into CSV files as comments, to be read with `comment="#"`.
         """
         missing = pd.DataFrame([asdict(run) for run in self.found.missing], columns=["directory", "status", "cause"])
         below = "".join(f"# {line}\n" for line in footer)

@@ -1,7 +1,5 @@
 """Runs that end with `remove-container`, after a pour, one activity or none, and a rest."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -42,8 +40,7 @@ def removal_frames(run: Run) -> tuple[Frame, FrameSequence]:
 def named_columns(run: Run) -> dict[str, object]:
     """Return the cells procedure, aspect ratio, seed, count and fidelity of a run's row.
 
-    Raises:
-        InputError: The run has several activities, or one of an unknown type.
+    InputError if the run has several activities, or one of an unknown type.
     """
     active = [phase.type for phase in run.phases if not phase.at_rest and phase.type != _REMOVAL]
     if len(active) > 1 or not set(active) <= set(PROCEDURES):

@@ -3,8 +3,6 @@
 If a study has runs on several engines, findings are judged by the runs on links, which is then the judging engine.
 """
 
-from __future__ import annotations
-
 import json
 import math
 from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
@@ -65,16 +63,7 @@ def declare(
     axes: Mapping[str, str] = MappingProxyType({}),
     scales: Mapping[str, float] = MappingProxyType({}),
 ) -> dict[str, Quantity]:
-    """Make quantities from label, format and meaning of each column.
-
-    Args:
-        rows: label, format (empty: `.3g`) and meaning by column.
-        axes: labels of axes by column, where they are not the name of the column.
-        scales: factors for short table and figures by column, where they are not 1.
-
-    Returns:
-        The quantities by column.
-    """
+    """Make quantities by column from label, format (empty: `.3g`) and meaning of each."""
     return {
         column: Quantity(
             column=column,
@@ -155,16 +144,9 @@ def compared_engines(runs: pd.DataFrame, keys: Sequence[str], quantities: Iterab
     """Compare the judging engine with the other engines: differences at each point, paired by seed.
 
     Runs with equal point and seed were poured from equal poses. Piles are chaotic and soon forget their poses, so
-    pairing reduces the scatter only a little.
-
-    Args:
-        runs: table of runs with the column `engine`.
-        keys: columns that name a point.
-        quantities: columns that are compared.
-
-    Returns:
-        One row per point, other engine and quantity: mean of each engine over the pairs, their difference with its
-        95 % half-width by Student's t, and the last two in per cent of the other engine's mean.
+    pairing reduces the scatter only a little. The table has one row per point, other engine and quantity: mean of each
+    engine over the pairs, their difference with its 95 % half-width by Student's t, and the last two in per cent of the
+    other engine's mean.
     """
     first, *others = engines_of(runs)
     rows = []
@@ -245,13 +227,7 @@ class Collected:
         *,
         within: Callable[[MeasuredRun], Hashable] = lambda _: None,
     ) -> None:
-        """Raise InputError if runs of one group differ in a quantity.
-
-        Args:
-            quantity: name of the quantity, for the message.
-            value: computes the quantity of a run.
-            within: computes the group of a run; by default all runs are one group.
-        """
+        """Raise InputError if runs of one group, by default all runs, differ in a quantity."""
         firsts: dict[Hashable, MeasuredRun] = {}
         for run in self.runs:
             first = firsts.setdefault(within(run), run)
@@ -280,16 +256,10 @@ def collect_runs(
     *,
     earlier: Mapping[str, MeasuredRun] | None = None,
 ) -> Collected:
-    """Measure finished runs and list the others as missing.
+    """Measure finished runs and list the others as missing; InputError if no run is done.
 
-    Args:
-        study: name of the study, for messages.
-        run_dirs: directories of the runs.
-        measure: measures a run; an InputError lists the run as missing, with the status "unusable".
-        earlier: runs of an earlier analysis by name, which replace directories that do not exist.
-
-    Raises:
-        InputError: No run is done.
+    A run for which `measure` raises InputError is missing, with the status "unusable". Runs of an earlier analysis, by
+    name, replace directories that do not exist.
     """
     runs: list[MeasuredRun] = []
     missing: list[MissingRun] = []
@@ -325,17 +295,9 @@ class Wanted:
 def earlier_runs(results: Path | str, wanted: Mapping[str, Wanted]) -> dict[str, MeasuredRun]:
     """Read planned runs from the results of an earlier analysis, so that they need not be computed again.
 
-    Rows come from `runs.csv`, with its six digits; versions and command come from `provenance.json`.
-
-    Args:
-        results: folder with both files.
-        wanted: planned runs by name; a run is only read if name and hash of its scene are equal.
-
-    Returns:
-        The runs by name.
-
-    Raises:
-        InputError: A file is missing or damaged, or none of its runs is planned.
+    Rows come from `runs.csv`, with its six digits; versions and command come from `provenance.json`. A run is only read
+    if name and hash of its scene are those of a planned run. InputError if a file is missing or damaged, or none of its
+    runs is planned.
     """
     results = Path(results)
     table = read_runs(results)

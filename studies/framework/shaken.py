@@ -1,7 +1,5 @@
 """Shaken piles: packing fraction and crossings before and after shaking, and Gravish's points."""
 
-from __future__ import annotations
-
 import hashlib
 import math
 from collections.abc import Mapping, Sequence
@@ -27,8 +25,7 @@ DIGITISING_ERROR = 0.003  #: Assumed error of reading φ from Gravish's figure [
 
 GRAVISH_COLUMNS: Mapping[str, str] = MappingProxyType(
     {"phi_0": "phi_initial", "phi_f": "phi_final", "phi_f relaxed": "phi_final"}
-)
-"""Column of `read_gravish` that each stage is compared with."""
+)  #: Column of `read_gravish` that each stage is compared with
 
 _FILE = files("postprocess") / "reference" / "gravish2012_phi.csv"
 _CITATION = "Gravish et al., PRL 108, 208001 (2012), digitised"
@@ -47,8 +44,7 @@ STAGES: Mapping[str, str] = MappingProxyType(
         "phi_f": "at the end of shaking",
         "phi_f relaxed": "after the relaxation that follows shaking",
     }
-)
-"""Stages at which a packing fraction is measured, as a mean over the last frames of a phase."""
+)  #: Stages at which a packing fraction is measured, as a mean over the last frames of a phase
 
 WHEN = f"before shaking and at the end of shaking, means over the last {LAST_FRAMES} frames or fewer"
 """Statement for footers on how φ_0 and φ_f are averaged."""
@@ -62,10 +58,9 @@ _SHAKE, _SERIES = "shake", "packing_fraction"
 
 
 def read_gravish() -> pd.DataFrame:
-    """Read Gravish's digitised points.
+    """Read Gravish's digitised points: columns `l_over_w`, `phi_initial`, `phi_final` [-].
 
-    Returns:
-        Columns `l_over_w`, `phi_initial`, `phi_final` [-]; NaN where their figure has no point.
+    NaN where their figure has no point.
     """
     with _FILE.open(encoding="utf-8") as file:
         return pd.read_csv(file)
@@ -138,12 +133,8 @@ def while_shaken(run: Run) -> History:
 def measured_row(run: Run, definitions: Sequence[str]) -> dict[str, object]:
     """Measure φ and crossings before and after shaking; return the run's row.
 
-    Args:
-        run: a finished run.
-        definitions: definitions of φ besides `DEFINITION`; costly ones are measured in the last frame only.
-
-    Raises:
-        InputError: The run has no shaking after another phase, or a frame is missing.
+    φ is measured by `DEFINITION` and the given definitions; costly ones are measured in the last frame only. InputError
+    if the run has no shaking after another phase, or a frame is missing.
     """
     shakes = [phase for phase in run.phases if phase.type == _SHAKE]
     if not shakes or shakes[0].index == 0:

@@ -1,7 +1,5 @@
 """Studies: measure, columns, findings and figures, from which `analyse` makes results."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -12,10 +10,9 @@ from dem.errors import InputError
 from dem.record.run import Run
 from postprocess.report import figures as style
 from postprocess.report.tables import meaning_lines, table_lines
-from postprocess.statistics.findings import CRITERION
 from postprocess.statistics.points import ASPECT, SEED, SEEDS, averaged, seeds_of
 from studies.framework.figures import BARS, Analysis, Figure
-from studies.framework.findings import Finding, Judged, findings_table
+from studies.framework.findings import CRITERION, Finding, Judged, findings_table
 from studies.framework.provenance import SAVOIE, Origin, Reference, make_folder
 from studies.framework.runs import (
     ENGINE,
@@ -72,8 +69,7 @@ class Study:
     #: Makes further tables by name from the table of runs; one called `points` replaces the means over seeds
     extra: Callable[[pd.DataFrame], Mapping[str, pd.DataFrame]] = lambda _: {}
     shown: Callable[[pd.DataFrame], pd.DataFrame] = lambda points: points  #: Selects the points of the short table
-    #: Runs that agree in these columns must have equal numbers of smarticles
-    same_count: Sequence[str] = (ASPECT,)
+    same_count: Sequence[str] = (ASPECT,)  #: Runs that agree in these columns must have equal numbers of smarticles
     same_fidelity: Sequence[str] = ()  #: Runs that agree in these columns must have one fidelity
     order: Sequence[str]  #: Columns that the table of runs is sorted by; empty: in the order of the runs given
     #: Columns that must be equal in all runs that agree in other columns: those other columns by column
@@ -114,18 +110,13 @@ class Study:
     ) -> Report:
         """Measure runs and write tables, text, provenance and figures; existing files are replaced.
 
+        InputError if no run is done, runs must not be averaged or compared, or the output is no folder.
+
         Args:
             run_dirs: directories of the runs; runs that are not done or cannot be read are listed as missing.
-            output: folder for the files.
             note: how the runs differ from the full study, for footers.
             command: command line, for footers.
             earlier: runs of an earlier analysis by name, which replace directories that do not exist.
-
-        Returns:
-            The results, with the paths of the files.
-
-        Raises:
-            InputError: No run is done, runs must not be averaged or compared, or the output is no folder.
         """
         output = make_folder(output)
         found = collect_runs(self.name, run_dirs, self.measured, earlier=earlier)
@@ -188,9 +179,8 @@ class Study:
     def tabulate(self, runs: pd.DataFrame, times: pd.DataFrame | None = None) -> dict[str, pd.DataFrame]:
         """Make all tables from the table of runs and the histories.
 
-        Returns:
-            Tables by name: `runs`, `points`, `engines` if there are several, `times` if there are histories, and those
-            of `extra`.
+        Their names are `runs`, `points`, `engines` if there are several, `times` if there are histories, and those of
+        `extra`.
         """
         runs = sort_rows(runs, self.order, self.keys) if self.order else runs
         extra = self.extra(runs)

@@ -3,14 +3,17 @@
 import json
 from pathlib import Path
 
+import pandas as pd
 import pytest
 from synthetic import SyntheticRun, write_run
 
-from studies.hours import ALL, DONE, ENGINE, EXPECTED, OVER, PLANNED, RUNS, STUDY, TAKEN, hours
+from dem.errors import InputError
+from studies.hours import hours
 from templates.sweep.expand import expand
 from templates.sweep.folder import create_folder
 from templates.sweep.sweep_file import load_sweep
 
+HOURS = Path(__file__).parents[2] / "results" / "hours.csv"
 SWEEP = """\
 schema_version: 1
 name: two
@@ -54,10 +57,13 @@ def studies(tmp_path: Path) -> Path:
 
 
 def test_hours_are_those_planned_and_those_that_finished_runs_took(studies: Path) -> None:
-    table = hours(studies).set_index([STUDY, ENGINE])
-    links, yade, every = table.loc[("two", "links")], table.loc[("two", "yade")], table.loc[(ALL, "")]
-    assert (links[RUNS], links[DONE], yade[RUNS], yade[DONE]) == (2, 1, 2, 1)
-    assert (links[PLANNED], links[EXPECTED], links[TAKEN]) == pytest.approx((0.02, 0.01, 0.005))
-    assert (yade[PLANNED], yade[EXPECTED], yade[TAKEN]) == pytest.approx((2.0, 1.0, 2.0))
-    assert (links[OVER], yade[OVER]) == pytest.approx((0.5, 2.0))
-    assert (every[RUNS], every[DONE], every[TAKEN]) == pytest.approx((4, 2, 2.005))
+    table = hours(studies).set_index(["study", "engine"])
+    assert list(table.columns) == pd.read_csv(HOURS, nrows=0).columns.tolist()[2:]
+    assert table.loc[("two", "links")].tolist() == pytest.approx([2, 0.02, 1, 0.01, 0.005, 0.5])
+    assert table.loc[("two", "yade")].tolist() == pytest.approx([2, 2.0, 1, 1.0, 2.0, 2.0])
+    assert table.loc[("all", "")].tolist() == pytest.approx([4, 2.02, 2, 1.01, 2.005, 2.005 / 1.01])
+
+
+def test_a_folder_without_sweeps_is_rejected(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="has no folder of a sweep; give"):
+        hours(tmp_path)

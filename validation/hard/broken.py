@@ -1,7 +1,5 @@
 """Corrupted simulations: the watchdog must report the error and the affected smarticles."""
 
-from __future__ import annotations
-
 import math
 from pathlib import Path
 from typing import Any
@@ -142,10 +140,7 @@ def wrong_step(access: EngineAccess, out: Path, *, factor: float, count: int, se
     data = scene_data(access, swing(seconds), count=count, fidelity=fidelity, recording=recording)
     run = whole(data, out, steps=lambda scene: (_too_long(scene, factor),) * len(scene.phases))
     kind = run.error[0] if run.error else "none"
-    return [
-        Check("kind of error", kind, "RunError", kind == "RunError"),
-        says(run.text, "(last good checkpoint: "),
-    ]
+    return [Check("kind of error", kind, "RunError", kind == "RunError"), says(run.text, "(last good checkpoint: ")]
 
 
 @hard("spoilt: late in a run", {})

@@ -1,7 +1,5 @@
 """Scenes with extreme shapes, counts, friction, time steps, motors, containers and hooks."""
 
-from __future__ import annotations
-
 import math
 from pathlib import Path
 from typing import Any

@@ -4,8 +4,6 @@ SIGKILL is sent after a random fraction of the processor time of the uninterrupt
 process. Processor time, unlike wall time, does not depend on the load of the machine.
 """
 
-from __future__ import annotations
-
 import json
 import os
 import random
@@ -48,8 +46,7 @@ def start(path: Path, out: Path) -> subprocess.Popen[bytes]:
 def finish(process: subprocess.Popen[bytes], what: str) -> float:
     """Wait until a process has ended; return its processor time [s].
 
-    Raises:
-        RunError: the process failed; the message begins with `what`.
+    RunError, whose message begins with `what`, if the process failed.
     """
     _, status, usage = os.wait4(process.pid, 0)
     process.returncode = os.waitstatus_to_exitcode(status)
@@ -83,19 +80,9 @@ def results(out: Path) -> dict[str, bytes]:
 
 
 def row_of(whole: Path, out: Path, *, seconds: float, killed: str) -> dict[str, Any]:
-    """Compare a killed and resumed run with the uninterrupted run.
+    """Compare a resumed run with the uninterrupted run; return a row of the table.
 
-    Args:
-        whole: directory of the uninterrupted run.
-        out: directory of the resumed run.
-        seconds: processor time before the kill [s].
-        killed: phase in which the run was killed.
-
-    Returns:
-        A row of the table.
-
-    Raises:
-        RunError: too few files to compare.
+    `seconds` of processor time passed before the kill, in the phase `killed`. RunError if there are too few files.
     """
     log = (out / "log.txt").read_text(encoding="utf-8")
     from_where = re.search(r"resumed from (?:the checkpoint of t = ([\d.]+) s|the start)", log)
@@ -126,17 +113,8 @@ def _phase_of(out: Path) -> str:
 def kills(engine: str, number: int, folder: Path, *, seed: int) -> list[dict[str, Any]]:
     """Kill runs of one scene at random times, and compare each with the uninterrupted run.
 
-    Args:
-        engine: name of the engine.
-        number: number of kills.
-        folder: for run directories; those of equal runs are removed.
-        seed: of the scene and of the random times.
-
-    Returns:
-        One row of the table per kill.
-
-    Raises:
-        RunError: a run failed, or two uninterrupted runs differ.
+    Returns one row of the table per kill. `seed` is that of the scene and of the random times. Run directories of equal
+    runs are removed. RunError if a run failed, or two uninterrupted runs differ.
     """
     rng, path, whole = random.Random(1000 * seed + 1), folder / f"{seed}.yaml", folder / f"whole-{seed}"
     write_text(path, json.dumps(scene_to_kill(engine, seed)))

@@ -5,8 +5,6 @@ time steps from 0.5 to 4 times the stable step. *Chatter*: smarticles that shoul
 grows without supply, or positions become NaN. Each setting is run with several seeds, which vary the initial poses.
 """
 
-from __future__ import annotations
-
 import math
 import tempfile
 from collections.abc import Iterator, Mapping
@@ -177,10 +175,6 @@ def onset(name: str, runs: pd.DataFrame) -> dict[str, Any]:
 
     A factor is inf if no run chattered or blew up. Chatter is NaN for smarticles that are not at rest at half the
     stable step, and for crossed or random smarticles, which may rock at any time step.
-
-    Args:
-        name: key of `SETTINGS`.
-        runs: rows of `climb` for this setting.
     """
     factor, speed, rise = (pd.to_numeric(runs[column], errors="coerce") for column in (FACTOR, SPEED, RISE))
     small, blown = factor <= 0.9, rise > BLOW_UP

@@ -1,7 +1,5 @@
 """Run scenes under a watchdog that records the largest fraction of each limit."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
@@ -63,8 +61,7 @@ class Watched:
     scene: Scene | None  #: The scene; None if the scene is not valid
     error: tuple[str, str] | None = None  #: Class and message of the error; None if the run is done
     series: dict[str, np.ndarray] = field(default_factory=dict)  #: Recorded series by name
-    #: Largest fraction of each limit of the watchdog [1]
-    nearest: dict[str, float] = field(default_factory=dict)
+    nearest: dict[str, float] = field(default_factory=dict)  #: Largest fraction of each limit of the watchdog [1]
     cost: float = 0.0  #: Share of the watchdog in the processor time, without its first check [1]
     first_check: float = 0.0  #: Processor time of the first check, which loads compiled code [s]
 
@@ -87,9 +84,8 @@ class Watched:
     def sound(self, *, rest: float | None = 0.02, depth: float = 0.5) -> list[Check]:
         """Return the checks of every successful run.
 
-        Args:
-            rest: largest allowed speed at the end [m/s]; None: not checked.
-            depth: largest allowed overlap, over the sphere diameter [1].
+        Limits are the speed at the end, `rest` [m/s], None if it is not checked, and the overlap `depth` over the
+        sphere diameter [1].
         """
         checks = [Check("ends", "done" if self.error is None else ": ".join(self.error), "done", self.error is None)]
         if self.error is not None:
@@ -128,14 +124,10 @@ def whole(
     steps: Callable[[Scene], Sequence[float]] = time_steps,
     spoil: Callable[[Engine], None] | None = None,
 ) -> Watched:
-    """Run a scene and return the outcome.
+    """Run a scene, given as a dictionary, and return the outcome.
 
-    Args:
-        data: scene as a dictionary.
-        out: run directory.
-        note: use the watchdog `Noting`.
-        steps: returns the time step of each phase [s].
-        spoil: function that changes the engine before each record.
+    `note` uses the watchdog `Noting`; `steps` returns the time step of each phase [s]; `spoil` changes the engine
+    before each record.
     """
     nearest: dict[str, float] = {}
     checks: list[float] = []  # processor time of each check of the watchdog [s]

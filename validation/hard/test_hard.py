@@ -1,7 +1,5 @@
 """Tests of hard cases, of killed and resumed runs, and of the onset of instability."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any

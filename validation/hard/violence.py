@@ -1,7 +1,5 @@
 """Fast impacts, deep overlaps, strong shaking, large mass ratios."""
 
-from __future__ import annotations
-
 import math
 from pathlib import Path
 
@@ -152,11 +150,7 @@ def same_place(access: EngineAccess, out: Path, *, time: float) -> list[Check]:
     return [says(message, "2 smarticle(s) (0, 1)")]
 
 
-@hard(
-    "shaken at Γ = 10",
-    {"count": 6, "seconds": 0.2, "rest": 0.8},
-    {"count": 100, "seconds": 2.0, "rest": 1.0},
-)
+@hard("shaken at Γ = 10", {"count": 6, "seconds": 0.2, "rest": 0.8}, {"count": 100, "seconds": 2.0, "rest": 1.0})
 def shaken(access: EngineAccess, out: Path, *, count: int, seconds: float, rest: float) -> list[Check]:
     """Shake at Γ = 10 and 30 Hz, then rest."""
     shake = {"type": "shake", "duration_s": seconds, "frequency_hz": 30, "peak_acceleration_g": 10}

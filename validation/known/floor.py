@@ -1,7 +1,5 @@
 """Known answers on the floor: sliding, rolling, stacks, flat impacts."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 
@@ -152,12 +150,7 @@ def two_high(
 ) -> Engine:
     """Stack two balls on the floor, at their static overlaps if `sunk`, otherwise just touching.
 
-    Args:
-        access: test access to the engine.
-        law: contact law.
-        dt: time step [s].
-        velocities: upward velocities of lower and upper ball [m/s].
-        sunk: start at the static overlaps.
+    Velocities are those of lower and upper ball, upwards [m/s].
     """
     press = BALL_MASS * G / STIFFNESS * sunk
     engine = access.build(access.ball(), law, dt=dt, gravity=G)
@@ -223,13 +216,10 @@ def _level(found: ContactForces, level: int, each: int) -> Array:
 
 
 def _answers(engine: Engine, levels: int, each: int, *, contacts: int | None) -> list[Answer]:
-    """Return the forces from below on all levels, compared with the weight above.
+    """Return the forces from below on all levels of a stack at rest, compared with the weight above.
 
-    Args:
-        engine: engine with the stack at rest.
-        levels: number of levels.
-        each: bodies per level.
-        contacts: number of equivalent contacts below a level, which share the weight equally; None: not equivalent.
+    A level has `each` bodies. If the contacts below a level are equivalent, they share the weight equally; `contacts`
+    is their number, None if they are not equivalent.
     """
     found = engine.contact_forces()
     weight = each * engine.particle.boxes.mass * G

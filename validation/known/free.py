@@ -1,7 +1,5 @@
 """Known answers without contact: free fall and free rotation."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np
@@ -22,18 +20,10 @@ ABOUT_MIDDLE = np.array([10.0, 40.0, 5.0])  # [rad/s], body frame; mainly about 
 
 
 def fall(access: EngineAccess, dt: float, *, time: float, throw: float, centred: bool) -> tuple[Array, float, float]:
-    """Throw a smarticle upwards without rotation.
+    """Throw a smarticle upwards [m/s] without rotation, for a time [s].
 
-    Args:
-        access: test access to the engine.
-        dt: time step [s].
-        time: duration of the flight [s].
-        throw: initial upward velocity [m/s].
-        centred: correct the velocity for the half step between velocities and positions.
-
-    Returns:
-        Displacement of the centre of mass (3,) [m], upward velocity half a step before the end [m/s], and angle of
-        rotation [rad].
+    `centred` corrects the velocity for the half step between velocities and positions. Returns the displacement of the
+    centre of mass (3,) [m], the upward velocity half a step before the end [m/s], and the angle of rotation [rad].
     """
     one = scene(access)
     engine = access.build(one.particle, law_of(one), dt=dt, gravity=G)
@@ -72,16 +62,9 @@ def fall_errors(access: EngineAccess, steps: Sequence[float]) -> list[float]:
 
 
 def spin_rotations(access: EngineAccess, dt: float, *, spin: Array, times: Array) -> tuple[Rotation, Array]:
-    """Simulate a freely rotating smarticle.
+    """Simulate a freely rotating smarticle with an initial angular velocity (3,) [rad/s].
 
-    Args:
-        access: test access to the engine.
-        dt: time step [s].
-        spin: initial angular velocity, (3,) [rad/s].
-        times: times of output, (n,) [s].
-
-    Returns:
-        n rotations, and mean angular velocities in the step before each, (n, 3) [rad/s].
+    Returns the rotations at n times [s], and the mean angular velocities in the step before each, (n, 3) [rad/s].
     """
     one = scene(access)
     engine = access.build(one.particle, law_of(one), dt=dt)

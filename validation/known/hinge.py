@@ -1,7 +1,5 @@
 """Known answers for hinges: gaps under load, sag and tilt of barbs, vibrations of barbs."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 
@@ -34,12 +32,7 @@ def hinged(
 ) -> Scene:
     """Return a scene of one articulated smarticle with springs as shafts.
 
-    Args:
-        access: test access to the engine.
-        aspect_ratio: l/w [1].
-        fidelity: name of the fidelity.
-        angles: of the barbs [deg].
-        motor: keys of `motor` in a scene.
+    Angles are those of the barbs [deg]; `motor` has keys of `motor` in a scene.
     """
     smarticle = {"aspect_ratio": aspect_ratio, "angles_deg": list(angles)}
     return scene(access, shape_change(), fidelity=fidelity, smarticle=smarticle, motor=access.spring_shafts | motor)
@@ -195,19 +188,14 @@ def pendulum(access: EngineAccess, *, aspect_ratio: float = 0.7) -> list[Answer]
 
 
 def shaft_mode(one: Scene, pin: float, *, held: bool) -> tuple[float, Array]:
-    """Compute the vibration mode of the barbs on their shafts, between rigid motions and vibrations of the pins.
+    """Compute the vibration mode of the barbs on their shafts, between rigid motions and pin vibrations.
 
     The five coordinates describe a U whose barbs turn in the same sense: displacement of the middle link along its
     axis, rotation of the middle link, rotation of the barbs, and the gap of hinge 1 along and across the middle link
     (hinge 2: equal along, opposite across). Rigid pins and a fixed middle link remove coordinates.
 
-    Args:
-        one: scene of one smarticle.
-        pin: stiffness of a pin [N/m]; may be inf.
-        held: the middle link is fixed.
-
-    Returns:
-        Angular frequency [rad/s], and the mode (5,) [m or rad] for a twist of 1 rad.
+    `pin` is the stiffness of a pin [N/m], which may be inf; the middle link is fixed if `held`. Returns the angular
+    frequency [rad/s], and the mode (5,) [m or rad] for a twist of 1 rad.
     """
     boxes, (mass, own, lever) = one.smarticle.boxes, _barb(one)
     along = np.array([1.0, 0.0, -lever, 1.0, 0.0])

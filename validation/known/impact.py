@@ -1,7 +1,5 @@
 """Known answers for single impacts: rebounds, oblique impacts, bars, tips of smarticles; errors over the step."""
 
-from __future__ import annotations
-
 import dataclasses
 import math
 from collections.abc import Sequence
@@ -61,12 +59,7 @@ def touch(access: EngineAccess, engine: Engine, *, most: int) -> Touch:
 def ball_impact(access: EngineAccess, law: ContactLaw, *, speed: float, slip: float = 0.0, dt: float) -> Touch:
     """Throw a ball at the floor without gravity; return the measurements.
 
-    Args:
-        access: test access to the engine.
-        law: contact law.
-        speed: downward velocity [m/s].
-        slip: velocity along x [m/s].
-        dt: time step [s].
+    `speed` is its downward velocity, `slip` its velocity along x [m/s].
     """
     engine = access.build(access.ball(), law, dt=dt)
     add(engine, (0, 0, BALL_RADIUS + 3.3 * speed * dt), access.ball_turn)

@@ -1,7 +1,5 @@
 """Conservation of momentum and energy, the energy ledger of a pile, and impenetrable links."""
 
-from __future__ import annotations
-
 import math
 import tempfile
 from collections.abc import Iterator
@@ -35,12 +33,9 @@ VELOCITIES = np.array([[0.1, -0.2, 0.3], [0.0, 0.1, 0.0]])  # m/s
 
 
 def free_pair(access: EngineAccess, law: str, damping: float) -> tuple[Engine, Iterator[float]]:
-    """Build two distant smarticles that spin and drift; return the engine, and an iterator that swings their barbs.
+    """Build two distant smarticles that spin and drift; return the engine and an iterator.
 
-    Args:
-        access: test access to the engine.
-        law: `motor.law`.
-        damping: of the motor [N m s/rad]; 0: default.
+    The iterator swings their barbs. The motors have a law and a damping [N m s/rad], 0 for the default.
     """
     motor = {"law": law, "torque_limit_N_m": 1e-4} | ({"damping_N_m_s_per_rad": damping} if damping else {})
     one = scene(access, shape_change(), motor=motor)

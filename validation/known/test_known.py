@@ -1,7 +1,5 @@
 """Tests of known answers and orders of convergence on both engines."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from typing import Any
@@ -130,8 +128,7 @@ OTHER: list[tuple[Call, dict[str, Any], tuple[str, ...]]] = [
         for aspect in (0.4, 0.7, 1.0)
     ),
     (hinge.tilt, {"sweeps": 3}, YADE),
-]
-"""Cases with other parameters: function, options, engines."""
+]  #: Cases with other parameters: function, options, engines
 
 
 @pytest.mark.parametrize("engine", ON)

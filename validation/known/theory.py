@@ -1,7 +1,5 @@
 """Answers without closed form, integrated by SciPy independently of the engines."""
 
-from __future__ import annotations
-
 import math
 from typing import NamedTuple
 
@@ -18,16 +16,8 @@ def _impact(
 ) -> tuple[float, float, float]:
     """Integrate m x'' = −k x − c x' − m g from first touch until the contact force is zero.
 
-    Args:
-        stiffness: k [N/m].
-        damping: c [N s/m].
-        mass: m [kg].
-        gravity: g [m/s²].
-        speed: downward speed at first touch [m/s].
-        depth: initial overlap [m].
-
-    Returns:
-        Contact time [s], and height above first touch [m] and upward speed [m/s] at the end of the contact.
+    k [N/m], c [N s/m], m [kg], g [m/s²]; downward speed [m/s] and overlap [m] at first touch. Returns the contact time
+    [s], and height above first touch [m] and upward speed [m/s] at the end of the contact.
     """
 
     def push(y: Array) -> float:
@@ -60,12 +50,8 @@ class Impact(NamedTuple):
 def dashpot_impact(*, stiffness: float, damping: float, mass: float) -> Impact:
     """Integrate an impact without gravity; restitution and duration do not depend on the speed.
 
-    Args:
-        stiffness: [N/m].
-        damping: [N s/m].
-        mass: effective mass [kg].
-
-    Source: Schwager and Pöschel, Granular Matter 9, 465 (2007), integrated numerically.
+    Stiffness [N/m], damping [N s/m] and effective mass [kg]. Source: Schwager and Pöschel, Granular Matter 9, 465
+    (2007), integrated numerically.
     """
     duration, _, velocity = _impact(stiffness=stiffness, damping=damping, mass=mass, gravity=0.0, speed=1.0)
     return Impact(velocity, duration)
@@ -74,12 +60,8 @@ def dashpot_impact(*, stiffness: float, damping: float, mass: float) -> Impact:
 def bounced(*, gap: float, speed: float, time: float, gravity: float, **springs: float) -> float:
     """Return the height above first touch [m] of a body that has bounced once on a spring and a dashpot.
 
-    Args:
-        gap: height above first touch at t = 0 [m].
-        speed: downward speed at t = 0 [m/s].
-        time: time after the bounce [s].
-        gravity: [m/s²].
-        springs: stiffness [N/m], damping [N s/m] and mass [kg].
+    At t = 0 the body is at a height `gap` above first touch [m] and has a downward speed [m/s]. `time` [s] is after the
+    bounce; `springs` are stiffness [N/m], damping [N s/m] and mass [kg].
     """
     touch = (math.sqrt(speed**2 + 2 * gravity * gap) - speed) / gravity
     # Starts just below first touch, so that the end of the contact is not found at its beginning.
@@ -89,16 +71,10 @@ def bounced(*, gap: float, speed: float, time: float, gravity: float, **springs:
 
 
 def free_rotation(*, inertia: Array, start: Rotation, spin: Array, times: Array) -> tuple[Rotation, Array]:
-    """Integrate Euler's equations of a free rigid body.
+    """Integrate Euler's equations of a free rigid body with principal moments of inertia (3,) [kg m²].
 
-    Args:
-        inertia: principal moments of inertia, (3,) [kg m²].
-        start: rotation from body frame to laboratory frame at t = 0.
-        spin: angular velocity at t = 0 in the laboratory frame, (3,) [rad/s].
-        times: increasing times above 0, (n,) [s].
-
-    Returns:
-        n rotations from body frame to laboratory frame, and angular velocities in the body frame, (n, 3) [rad/s].
+    At t = 0 `start` is the rotation from body frame to laboratory frame, `spin` the angular velocity in the laboratory
+    frame, (3,) [rad/s]. Returns the rotations at n times [s], and angular velocities in the body frame, (n, 3) [rad/s].
     """
 
     def slope(_: float, y: Array) -> Array:
@@ -114,7 +90,7 @@ def free_rotation(*, inertia: Array, start: Rotation, spin: Array, times: Array)
 def falling_on_springs(
     points: Array, *, stiffness: float, damping: float, mass: float, inertia: NDArray[np.float64], speed: float
 ) -> tuple[Array, float]:
-    """Integrate the impact of a horizontal rigid body on springs and dashpots at several points, for small tilts.
+    """Integrate the impact of a horizontal rigid body on springs and dashpots, for small tilts.
 
     Args:
         points: x and y of the contacts relative to the centre of mass, (n, 2) [m].

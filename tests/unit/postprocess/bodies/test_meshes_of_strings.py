@@ -12,7 +12,7 @@ from dem.body.particle import Boxes, Particle, SphereChain
 from dem.body.state import State
 from dem.record.frames import FrameWriter, read_frames
 from dem.record.run import open_run
-from postprocess.bodies.meshes import read_boundaries
+from postprocess.bodies.meshes import RunBoundaries
 
 W, T, GAP, LENGTH, SPEED = 0.0467, 0.0095, 0.00105, 0.1, 0.02
 BOXES = Boxes(middle_length=W, barb_length=W, thickness_normal=0.021, thickness_in_plane=T, density=1250.0)
@@ -57,7 +57,7 @@ def laid_out(directory, count, tied_at):
 def test_strings_are_tied_where_the_simulator_ties_them(tmp_path, count, tied_at):
     knots = laid_out(tmp_path, count, tied_at)
     run, frames = open_run(tmp_path), read_frames(tmp_path)
-    strings = read_boundaries(run).strings
+    strings = RunBoundaries(run).strings
     assert len(strings.lines(frames[0])) == 0
     first, later = strings.lines(frames[1]), strings.lines(frames[2])
     assert first[:, 0] == pytest.approx(knots, abs=1e-12)
