@@ -35,17 +35,8 @@ and needs no network.""",
 
 
 def write_report(arguments: argparse.Namespace) -> int:
-<<<<<<< HEAD
     """Write the HTML page and print its name and size; return the exit status."""
-    from postprocess.report.figures import whole_file  # noqa: PLC0415
-=======
-    """Write the HTML page and print its name and size; return the exit status.
-
-    Raises:
-        InputError: wrong name of the output, unreadable table of errors, or an unknown kind of directory.
-    """
     from postprocess.report.tables import whole_file  # noqa: PLC0415
->>>>>>> s-b
 
     directory: Path = arguments.directory
     output: Path = arguments.output or directory / "report.html"

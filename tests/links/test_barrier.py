@@ -36,12 +36,12 @@ def thin(width: float = 0.5e-3) -> Particle:
 
 def test_ordinary_contacts_are_linear_to_the_bit() -> None:
     for depth in (0.0, 1e-6, 0.1 * ROOM, LINEAR * ROOM):
-        assert stretch(depth, LINEAR * ROOM, ROOM) == (depth, 1.0, 1.0)
+        assert stretch(depth, ROOM) == (depth, 1.0, 1.0)
 
 
 def test_it_has_two_continuous_derivatives_and_grows_without_bound() -> None:
     depths = np.linspace(0.2, LINEAR + 0.97 * LAST * (1 - LINEAR), 4001) * ROOM
-    u, slope, hardening = np.array([stretch(depth, LINEAR * ROOM, ROOM) for depth in depths]).T
+    u, slope, hardening = np.array([stretch(depth, ROOM) for depth in depths]).T
     step = depths[1] - depths[0]
     np.testing.assert_allclose(np.gradient(u, step)[1:-1], slope[1:-1], rtol=1e-3)
     curvature = np.gradient(slope, step)
@@ -49,8 +49,8 @@ def test_it_has_two_continuous_derivatives_and_grows_without_bound() -> None:
     assert abs(np.diff(curvature[depths < 0.3 * ROOM])).max() < 0.01 / ROOM  # no jump where it begins
     assert (np.diff(slope) >= 0).all()
     last = LINEAR + LAST * (1 - LINEAR)
-    assert stretch(last * ROOM, LINEAR * ROOM, ROOM)[0] > 15 * ROOM
-    assert stretch(1.5 * ROOM, LINEAR * ROOM, ROOM)[0] > stretch(last * ROOM, LINEAR * ROOM, ROOM)[0]
+    assert stretch(last * ROOM, ROOM)[0] > 15 * ROOM
+    assert stretch(1.5 * ROOM, ROOM)[0] > stretch(last * ROOM, ROOM)[0]
 
 
 def test_sub_steps_begin_at_multiples_of_their_length_and_fill_the_step() -> None:
@@ -68,9 +68,9 @@ def test_contacts_ask_for_sub_steps_only_beyond_the_linear_range() -> None:
     need = np.ones(1)
     step = Step(1e-4, 1e-4, need)
     for depth, closing in ((0.1 * ROOM, 0.5), (0.24 * ROOM, -3.0)):
-        resolve(step, depth, LINEAR * ROOM, ROOM, closing)
+        resolve(step, depth, ROOM, closing)
         assert need[0] == 1.0
-    resolve(step, 0.6 * ROOM, LINEAR * ROOM, ROOM, 0.0)
+    resolve(step, 0.6 * ROOM, ROOM, 0.0)
     assert 2.0 < need[0] < FINEST
 
 

@@ -9,7 +9,6 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from dem.engine.links.arrays import Segments
-from dem.engine.links.contact.law import RIGID
 from dem.engine.links.neighbours.lists import build
 from dem.engine.links.shapes import RADIUS as RADIUS_AT
 from dem.physics.contact import damping_ratio
@@ -27,7 +26,7 @@ def test_a_bar_rests_with_its_weight_on_the_floor() -> None:
     made.add(builds.at([0, 0, RADIUS], [FLAT]))
     made.advance(8000)
     assert made.boundaries.container_force[2] == pytest.approx(-weight, rel=1e-6)
-    assert RADIUS - made.state().positions[0, 2] == pytest.approx(weight / (2 * RIGID * 500.0), rel=1e-6)
+    assert RADIUS - made.state().positions[0, 2] == pytest.approx(weight / (2 * 500.0), rel=1e-6)
     assert made.touches().tolist() == [2]
     assert made.neighbours().tolist() == [0]
     assert made.unbalanced_force() < 1e-6
@@ -36,7 +35,7 @@ def test_a_bar_rests_with_its_weight_on_the_floor() -> None:
 def test_it_sticks_on_an_incline_and_slides_where_friction_is_too_small() -> None:
     for friction, sticks in ((0.5, True), (0.2, False)):
         made = builds.engine(law=replace(builds.LAW, wall_friction=friction), gravity=9.81, dt=2e-5)
-        made.add(builds.at([0, 0, RADIUS - MASS * 9.81 / (2 * RIGID * 500.0)], [FLAT]))
+        made.add(builds.at([0, 0, RADIUS - MASS * 9.81 / (2 * 500.0)], [FLAT]))
         made.advance(2000)
         for _ in range(1000):  # a push of 0.3 g along x
             made._world.bodies.velocity[0, 0] += 0.3 * 9.81 * 2e-5 * 5
@@ -143,7 +142,7 @@ def test_a_smarticle_that_bridges_both_grips_is_two_springs_in_a_row(count: int)
     mean = (made.boundaries.hook_sums - sums) / 1000
     # Each barb lies across a bar: one spring, and each of the two gives way by half of the way. The tolerance: one step
     # of raising is 0.25 % of it.
-    assert mean[1, 2] == pytest.approx(-RIGID * 500.0 * (raised - gap) / 2, rel=3e-3)
+    assert mean[1, 2] == pytest.approx(-500.0 * (raised - gap) / 2, rel=3e-3)
     assert mean[0, 2] == pytest.approx(-mean[1, 2], rel=1e-6)
 
 
@@ -256,7 +255,7 @@ def test_what_contacts_remember_survives_a_new_list() -> None:
     assert memory() == before
 
 
-@pytest.mark.parametrize(("speed", "tolerance"), [(0.2, 6e-3), (0.5, 1.5e-2)])
+@pytest.mark.parametrize(("speed", "tolerance"), [(0.5, 6e-3), (2.0, 1.5e-2)])
 def test_a_contact_that_begins_and_ends_within_steps_keeps_its_energy(speed: float, tolerance: float) -> None:
     """Bars that bounce off the floor, their heights a share of a step's way apart.
 
@@ -266,7 +265,7 @@ def test_a_contact_that_begins_and_ends_within_steps_keeps_its_energy(speed: flo
     bar, count = builds.particle(aspect=0.0), 40
     zeta, mass = damping_ratio(0.6), bar.boxes.mass
     law = replace(builds.LAW, wall_damping=2 * zeta * math.sqrt(2 * 500.0 * mass) / 2, friction=0.0, wall_friction=0.0)
-    dt = 0.4 * math.sqrt(mass / (2 * RIGID * 500.0))
+    dt = 0.4 * math.sqrt(mass / (2 * 500.0))
     made = builds.engine(law=law, dt=dt, made_of=bar, keep_ledger=True)
     heights = RADIUS + 5 * speed * dt + np.linspace(0, 1, count, endpoint=False) * speed * dt
     places = np.stack([np.linspace(-0.8, 0.8, count), np.zeros(count), heights], axis=1)

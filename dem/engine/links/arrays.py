@@ -131,7 +131,6 @@ class Ground(NamedTuple):
     base: Array  #: (4,) heights that shaking began at [m]
     shaken: NDArray[np.int64]  #: (4,) whether a part is shaken
     wave: Array  #: (3,) amplitude [m], 2πf [rad/s] and begin [s] of the shaking
-    sunk: Array  #: (1,) overlap that the weight of the pile is allowed for at floor and wall [m]
     force: Array  #: (6, 3) of the bodies on the parts and on a channel's lower and upper wall in the last step [N]
     sums: Array  #: (6, 3) the same, summed over all steps [N]
 

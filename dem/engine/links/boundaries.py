@@ -35,7 +35,6 @@ def ground_for(cylinder: Cylinder, hooks: tuple[Cross, Cross] | None, channel: C
         base=np.zeros(4),
         shaken=np.zeros(4, dtype=np.int64),
         wave=np.zeros(3),
-        sunk=np.zeros(1),
         force=np.zeros((6, 3)),
         sums=np.zeros((6, 3)),
     )

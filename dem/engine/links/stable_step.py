@@ -16,7 +16,6 @@ from numpy.typing import NDArray
 from dem.body.linear import matrix_product, positive_definite
 from dem.body.particle import Particle
 from dem.engine.links.arrays import PLANE
-from dem.engine.links.contact.law import RIGID
 from dem.engine.links.motion.planar import lay_out
 from dem.engine.links.shapes import AT_END, AT_START, RADIUS, Shape, smarticle_shape
 from dem.physics.contact import ContactLaw
@@ -80,10 +79,10 @@ def _step_of(
     tips = sum((matrix_product(push.T, push) for push in tip), np.zeros_like(mass))
     heave = sum((matrix_product(push[2:].T, push[2:]) for push in top), np.zeros_like(mass))
     rub = sum((matrix_product(push[:2].T, push[:2]) for push in top), np.zeros_like(mass))
-    damping = max(cn, math.sqrt(RIGID) * cw / 2)
+    damping = max(cn, cw / 2)
     modes = [
         (2 * CONTACTS_AT_A_TIP * kn * tips, 2 * CONTACTS_AT_A_TIP * cn * tips),
-        (CONTACTS_AT_A_TIP * RIGID * kn * tips, CONTACTS_AT_A_TIP * math.sqrt(RIGID) * cw * tips),
+        (CONTACTS_AT_A_TIP * kn * tips, CONTACTS_AT_A_TIP * cw * tips),
         (AGAINST_NEIGHBOURS * kn * heave, AGAINST_NEIGHBOURS * damping * heave),
         (AGAINST_NEIGHBOURS * ks * rub, AGAINST_NEIGHBOURS * damping * cs * rub),
     ]

@@ -40,7 +40,6 @@ from dem.engine.links.arrays import (
 )
 from dem.engine.links.contact import boundaries, meeting
 from dem.engine.links.contact.boundaries import END_SLOTS, slots_for
-from dem.engine.links.contact.law import RIGID
 from dem.engine.links.contact.queries import (
     WIDTH,
     Found,
@@ -67,9 +66,6 @@ FAR = 1e30  # m; where a link is marked that was not there when the list was bui
 LISTS = ("first", "second", "slip", "used", "near")  # of pairs
 FRESH = ("touching", "nearest")  # of pairs, made anew in every step
 GROWTH = 1.5  # of a list that is full
-# Share of the weight of all bodies that one contact with the floor may bear in the linear range, and the deepest such
-# contact in radii. Measured on the paper's pile of 270, shaken at Γ = 2.
-BORNE, MOST_SUNK = 1 / 2, 0.7
 
 
 @dataclass(frozen=True)
@@ -118,14 +114,12 @@ class World:
         pairs = np.sqrt(2 * masses * masses[:, None] / ((masses + masses[:, None]) * masses[0]))
         walls = np.sqrt(masses / masses[0])[:, None]
         self.laws = tuple(
-            Law(
-                stiffer * law.normal_stiffness, stiffer * law.tangential_stiffness, math.sqrt(stiffer) * damping,
-                law.tangential_damping, friction,
+            Law(law.normal_stiffness, law.tangential_stiffness, damping, law.tangential_damping, friction)
+            for damping, friction in (
+                (law.normal_damping * pairs, law.friction),
+                (law.wall_damping * walls, law.wall_friction),
             )
-            for stiffer, damping, friction in (
-                (1.0, law.normal_damping * pairs, law.friction), (RIGID, law.wall_damping * walls, law.wall_friction)
-            )
-        )  # fmt: skip
+        )
         self.bodies: Bodies = bodies_for(0)
         self.pairs: Pairs = pairs_for(0, 0, 256)
         self.cells: Cells = cells_for(0, 0, 0, 256)
@@ -195,13 +189,6 @@ class World:
         self.forget_places()
         self._make_room_at_boundaries()
         self.make_room()
-        self._allow_for_weight()
-
-    def _allow_for_weight(self) -> None:
-        """Let a contact with floor or wall be linear while it bears its share of the pile's weight."""
-        weight = float(self.shapes.mass[self.bodies.shape].sum()) * self.gravity
-        most = float(self.shapes.radius.min()) * MOST_SUNK
-        self.ground.sunk[0] = min(most, BORNE * weight / self.laws[1].stiffness)
 
     def _lay_out_parts(self) -> None:
         """Number parts and segments of all bodies."""

@@ -1,9 +1,10 @@
 """The barrier that keeps axes apart, and the sub-steps that resolve it.
 
-A contact's energy is kn/2 u(δ)², u the stretched overlap. Up to a share of the room, u = δ: ordinary contacts are
-linear. Beyond it u grows without bound as the overlap fills the room:
+A contact's energy is kn/2 u(δ)², u the stretched overlap. Up to a quarter of the room, u = δ: ordinary contacts are
+linear. Beyond it u grows without bound as the overlap fills the room, in which the axes of two links, or an axis and a
+surface, would meet:
 
-    u = δ + room x³ / (1 - x),   x = (δ - begin) / (room - begin),
+    u = δ + room x³ / (1 - x),   x = (δ - room/4) / (3/4 room),
 
 which has two continuous derivatives. The force is kn u u', the stiffness kn h² with h² = u'² + u u''. Dashpots are
 scaled by the hardening h, so that their ratio to critical damping stays, and restitution with it (Tsuji et al., Powder
@@ -21,10 +22,7 @@ from typing import NamedTuple
 from dem.engine.links.arrays import Array
 from dem.engine.links.compiler import inlined, part
 
-LINEAR = 0.25  # of the overlap at which the axes of two links meet, up to which their contact is linear
-# Of a radius: overlap up to which a contact with a surface is linear, and how much there is beyond it. Together they
-# are less than a tenth of a link's thickness. Where the pile's weight presses links deeper, its overlap stands instead.
-SURFACE_LINEAR, SURFACE_REST = 0.11, 0.04
+LINEAR = 0.25  # of the room, up to which a contact is linear
 LAST = 0.95  # x from which on u follows its tangent, so that a pile that is taken over has finite forces
 APPROACH = 0.25  # of the room that is left, which a contact may close in a sub-step
 STRIDE, LONGEST = 0.25, 0.5  # radii that a link moves in a sub-step, and from which on a step is divided
@@ -44,14 +42,14 @@ class Step(NamedTuple):
 
 
 @inlined
-def stretch(depth: float, begin: float, room: float) -> tuple[float, float, float]:
+def stretch(depth: float, room: float) -> tuple[float, float, float]:
     """Return the stretched overlap u [m], its slope u' [1] and the hardening h [1].
 
     Args:
         depth: overlap δ [m].
-        begin: overlap up to which the contact is linear [m].
-        room: overlap that no contact reaches [m].
+        room: overlap at which axes meet [m].
     """
+    begin = LINEAR * room
     u, slope, hardening = depth, 1.0, 1.0
     if depth > begin:
         rest = room - begin
@@ -68,33 +66,27 @@ def stretch(depth: float, begin: float, room: float) -> tuple[float, float, floa
 
 
 @part
-def _demand(depth: float, begin: float, room: float, closing: float, whole: float) -> float:
+def _demand(depth: float, room: float, closing: float, whole: float) -> float:
     """Sub-steps per step that a contact beyond the linear range asks for."""
     left = max(room - depth, 1e-6 * room)
     ahead = min(depth + max(0.0, min(whole * closing, APPROACH * left)), room)
-    _, _, hardening = stretch(ahead, begin, room)
+    _, _, hardening = stretch(ahead, room)
     # Twice as many as stability needs: where forces are far from linear, energy is kept less well.
     return max(2.0 * hardening - 1.0, whole * closing / (APPROACH * left))
 
 
 @inlined
-def resolve(step: Step, depth: float, begin: float, room: float, closing: float) -> None:
-    """Ask for sub-steps where a contact leaves the linear range within a step, and until such a contact has ended.
+def resolve(step: Step, depth: float, room: float, closing: float) -> None:
+    """Ask for sub-steps where a contact leaves the linear range within a step.
 
     Args:
         step: `need` is written.
         depth: overlap [m].
-        begin: overlap up to which the contact is linear [m].
-        room: overlap that no contact reaches [m].
+        room: overlap at which axes meet [m].
         closing: rate at which the overlap grows [m/s].
     """
-    after = depth + step.whole * closing
-    if step.past < step.whole and after < 0.0 < depth:
-        # It ends within the next sub-step, which is no longer than the last: `law.share_of_step` counts on that.
-        step.need[0] = max(step.need[0], step.whole / step.past)
-    # Two steps ahead, so that sub-steps are short already as the contact begins.
-    if max(depth, depth + 2.0 * step.whole * closing) > begin:
-        step.need[0] = max(step.need[0], _demand(depth, begin, room, closing, step.whole))
+    if depth + step.whole * max(0.0, closing) > LINEAR * room:
+        step.need[0] = max(step.need[0], _demand(depth, room, closing, step.whole))
 
 
 @inlined

@@ -31,7 +31,7 @@ from dem.engine.links.arrays import (
 )  # fmt: skip
 from dem.engine.links.compiler import inlined, part
 from dem.engine.links.contact import meeting
-from dem.engine.links.contact.barrier import LINEAR, LONGEST, SURFACE_LINEAR, SURFACE_REST, Step, resolve, stretch
+from dem.engine.links.contact.barrier import Step, resolve, stretch
 from dem.engine.links.contact.law import resist, share_of_step
 from dem.engine.links.contact.meeting import POINTS, meet
 from dem.engine.links.contact.pairs import enter, push, velocity_at
@@ -40,8 +40,8 @@ from dem.engine.links.vectors import Vector, add, along, dot, put, scale, sub, v
 
 # Columns of a row that `contacts_of_segment` writes: slot in the memory of contacts; the boundary; overlap [m]; share
 # of a whole contact [1]; energy over kn/2 u² [1]; the point on the link's axis [m]; normal, from the boundary [1];
-# overlap up to which the contact is linear and overlap that it never reaches [m].
-SLOT, PART, DEPTH, SHARE, FACTOR, AXIS, NORMAL, BEGIN, ROOM, COLUMNS = 0, 1, 2, 3, 4, 5, 8, 11, 12, 13
+# overlap at which axes meet, or an axis and a surface [m].
+SLOT, PART, DEPTH, SHARE, FACTOR, AXIS, NORMAL, ROOM, COLUMNS = 0, 1, 2, 3, 4, 5, 8, 11, 12
 SURFACES = 3  # of an end of a link
 END_SLOTS = 2 * SURFACES
 
@@ -60,30 +60,20 @@ def slots_for(hooks: Hooks | None, rims: Rims | None) -> int:
 
 @inlined
 def _note(
-    rows: Array, count: int, slot: int, part_of: int, depth: float, linear: tuple[float, float], point: Vector,
-    normal: Vector,
-) -> int:  # fmt: skip
+    rows: Array, count: int, slot: int, part_of: int, depth: float, room: float, point: Vector, normal: Vector
+) -> int:
     """Write a whole contact at a point of an axis; the number of rows."""
     row = rows[count]
-    row[SLOT], row[PART], row[DEPTH], row[SHARE], row[FACTOR] = slot, part_of, depth, 1.0, 1.0
-    row[BEGIN], row[ROOM] = linear
+    row[SLOT], row[PART], row[DEPTH], row[SHARE], row[FACTOR], row[ROOM] = slot, part_of, depth, 1.0, 1.0, room
     put(row, AXIS, point)
     put(row, NORMAL, normal)
     return count + 1
 
 
 @inlined
-def _range_at_surface(radius: float, ground: Ground) -> tuple[float, float]:
-    """Return the overlap up to which a contact with a surface is linear and the overlap that it never reaches [m]."""
-    begin = max(SURFACE_LINEAR * radius, ground.sunk[0])
-    return begin, begin + SURFACE_REST * radius
-
-
-@inlined
 def contacts_of_segment(
-    segments: Segments, ground: Ground, channel: Any, hooks: Any, rims: Any, p: int, ahead: float, rows: Array,
-    met: Array,
-) -> int:  # fmt: skip
+    segments: Segments, ground: Ground, channel: Any, hooks: Any, rims: Any, p: int, rows: Array, met: Array
+) -> int:
     """Find the contacts of a segment with all boundaries.
 
     Args:
@@ -93,15 +83,13 @@ def contacts_of_segment(
         hooks: None where there are none.
         rims: None where the wall has no edges that links can reach.
         p: the segment; joints at its ends are contacts of the segments that have them first.
-        ahead: distance from floor and walls up to which ends are written as well, with a negative overlap [radii].
         rows: (slots, COLUMNS) written, see `SLOT`.
 
     Returns:
         Rows that were written.
     """
     link, shared, count = segments.line[p], segments.shared[p], 0
-    radius, room = link[RADIUS], _range_at_surface(link[RADIUS], ground)
-    reach = radius * (1.0 + ahead)
+    radius = link[RADIUS]
     for end in range(2):
         if shared & (AT_START << end):
             continue
@@ -113,16 +101,16 @@ def contacts_of_segment(
             for side in range(2):
                 inward = 1.0 if side == 0 else -1.0
                 depth = radius - channel[0] - inward * y
-                if depth > radius - reach:
+                if depth > 0.0:
                     slot = SURFACES * end + side
-                    count = _note(rows, count, slot, CHANNEL + side, depth, room, point, (0.0, inward, 0.0))
+                    count = _note(rows, count, slot, CHANNEL + side, depth, radius, point, (0.0, inward, 0.0))
         else:
             depth = radius - (z - ground.place[FLOOR])
-            if depth > radius - reach:
-                count = _note(rows, count, SURFACES * end, FLOOR, depth, room, point, (0.0, 0.0, 1.0))
-            inner = ground.radii[ground.radii.shape[0] - 1] - reach
+            if depth > 0.0:
+                count = _note(rows, count, SURFACES * end, FLOOR, depth, radius, point, (0.0, 0.0, 1.0))
+            inner = ground.radii[ground.radii.shape[0] - 1] - radius
             if ground.flags[0] != 0 and x * x + y * y > inner * inner:
-                count = _contacts_with_wall(radius, reach, ground, SURFACES * end, point, rows, count)
+                count = _contacts_with_wall(radius, ground, SURFACES * end, point, rows, count)
     if hooks is not None:
         count = _contacts_with_hooks(link, ground, hooks, rows, count, met)
     if rims is not None:
@@ -134,12 +122,9 @@ def contacts_of_segment(
 
 
 @inlined
-def _contacts_with_wall(
-    radius: float, reach: float, ground: Ground, slot: int, point: Vector, rows: Array, count: int
-) -> int:
+def _contacts_with_wall(radius: float, ground: Ground, slot: int, point: Vector, rows: Array, count: int) -> int:
     """Find the contacts of an end with wall and ceilings; the number of rows."""
     x, y, z = point
-    room, whole = _range_at_surface(radius, ground), (LINEAR * radius, radius)
     height, r, tiers = z - ground.place[WALL], math.sqrt(x * x + y * y), ground.radii.shape[0]
     lifted = ground.flags[1] != 0
     if height > ground.top:
@@ -156,17 +141,17 @@ def _contacts_with_wall(
         gap, sign = ground.radii[tier] - r, -1.0
         if lifted and gap < 0.0:
             gap, sign = -gap, 1.0
-        if gap < reach:
-            count = _note(rows, count, slot + 1, WALL, radius - gap, room, point, (sign * ex, sign * ey, 0.0))
+        if gap < radius:
+            count = _note(rows, count, slot + 1, WALL, radius - gap, radius, point, (sign * ex, sign * ey, 0.0))
         if tier + 1 < tiers and height > ground.bottoms[tier + 1] - radius:
             edge, above, away = 2, height - ground.bottoms[tier + 1], r - ground.radii[tier + 1]
             if away >= 0.0:
-                return _note(rows, count, slot + 2, WALL, radius + above, whole, point, (0.0, 0.0, -1.0))
+                return _note(rows, count, slot + 2, WALL, radius + above, radius, point, (0.0, 0.0, -1.0))
     if edge:
         distance = math.sqrt(away * away + above * above)
         if 0.0 < distance < radius:
             normal = ex * away / distance, ey * away / distance, above / distance
-            count = _note(rows, count, slot + edge, WALL, radius - distance, whole, point, normal)
+            count = _note(rows, count, slot + edge, WALL, radius - distance, radius, point, normal)
     return count
 
 
@@ -187,8 +172,7 @@ def _contacts_with_rims(link: Array, ground: Ground, rims: Rims, first: int, row
                 up, r = z_at - height, math.sqrt(x * x + y * y)
                 out, up = (r - round_) / (r * distance), up / distance
                 depth, normal = radius - distance, (out * x, out * y, up)
-                linear = (LINEAR * radius, radius)
-                count = _note(rows, count, first + rim, WALL, depth, linear, (x, y, z_at), normal)
+                count = _note(rows, count, first + rim, WALL, depth, radius, (x, y, z_at), normal)
     return count
 
 
@@ -220,7 +204,7 @@ def _contacts_with_hooks(link: Array, ground: Ground, hooks: Hooks, rows: Array,
                     normal = vector(row, MET_NORMAL)
                     place = along(vector(row, MET_PLACE), half, normal)
                     depth = reach - row[MET_DISTANCE]
-                    count = _note(rows, count, slot, LOWER + hook, depth, (LINEAR * reach, reach), place, normal)
+                    count = _note(rows, count, slot, LOWER + hook, depth, reach, place, normal)
                     # E = kn/2 u0² (2 - share) goes with the first point; where that has no share, all are as deep.
                     written = rows[count - 1]
                     written[SHARE] = row[MET_SHARE]
@@ -234,7 +218,7 @@ def contacts_with_boundaries(
     segments: Segments, ground: Ground, channel: Any, hooks: Any, rims: Any, p: int, rows: Array, met: Array
 ) -> int:
     """Find the contacts of a segment, compiled apart: for queries, where speed does not matter."""
-    return contacts_of_segment(segments, ground, channel, hooks, rims, p, 0.0, rows, met)
+    return contacts_of_segment(segments, ground, channel, hooks, rims, p, rows, met)
 
 
 # -- forces ------------------------------------------------------------------------------------------------------
@@ -276,17 +260,14 @@ def push_boundaries(
     """
     lost = 0.0
     for p in range(segments.line.shape[0]):
-        found = contacts_of_segment(segments, ground, channel, hooks, rims, p, LONGEST, rows, met)
-        if found == 0 and kept.contacts[p] == 0:
+        count = contacts_of_segment(segments, ground, channel, hooks, rims, p, rows, met)
+        if count == 0 and kept.contacts[p] == 0:
             continue
-        count = 0
-        for k in range(found):
+        for k in range(count):
             contact = rows[k]
             slot = int(contact[SLOT])
             _rub(law, bodies, parts, segments, p, ground, ledger, step, contact, kept.slip[p, slot])
-            if contact[DEPTH] > 0.0:
-                kept.used[p, slot] |= 2
-                count += 1
+            kept.used[p, slot] |= 2
         for slot in range(kept.used.shape[1]):
             if kept.used[p, slot] == 1:
                 lost += kept.slip[p, slot, 3]
@@ -302,20 +283,18 @@ def _rub(
     law: Law, bodies: Bodies, parts: Parts, segments: Segments, p: int, ground: Ground, ledger: Any, step: Step,
     contact: Array, slip: Array,
 ) -> None:  # fmt: skip
-    """Let a boundary push a segment at a contact, or divide a step that would carry an end through its surface."""
+    """Let a boundary push a segment at a contact."""
     i, row, damping = segments.body[p], segments.part[p], law.damping[bodies.shape[segments.body[p]], 0]
     depth, share, room, normal = contact[DEPTH], contact[SHARE], contact[ROOM], vector(contact, NORMAL)
     place, velocity, speed, turning = place_and_motion(segments.line[p, RADIUS], parts, ground, row, contact)
-    closing = (speed - velocity[2]) * normal[2] - velocity[0] * normal[0] - velocity[1] * normal[1]
-    resolve(step, depth, contact[BEGIN], room, closing)
-    if depth <= 0.0:
-        return
     relative = velocity[0], velocity[1], velocity[2] - speed
-    u, slope, hardening = stretch(depth, contact[BEGIN], room)
+    u, slope, hardening = stretch(depth, room)
+    closing = (speed - velocity[2]) * normal[2] - velocity[0] * normal[0] - velocity[1] * normal[1]
     load = law.stiffness * u * slope * share * share_of_step(depth, closing, step.past)
     stored, twist = slip[3], 0.5 * step.past * turning
     force = resist(law, damping, load, share, hardening, normal, relative, twist, step.past, slip)
-    bodies.deepest[i] = max(bodies.deepest[i], depth / max(room, segments.line[p, RADIUS]))
+    resolve(step, depth, room, closing)
+    bodies.deepest[i] = max(bodies.deepest[i], depth / room)
     if ledger is not None:
         # The boundary keeps its speed: of the mean of before and after, twice its half.
         power = 0.5 * dot(force, (velocity[0], velocity[1], velocity[2] - 2 * speed))

@@ -8,10 +8,6 @@ from dem.engine.links.arrays import Array, Law
 from dem.engine.links.compiler import inlined
 from dem.engine.links.vectors import Vector, add, along, cross, dot, put, scale, sub, vector
 
-# Stiffness of a contact with a boundary over that of two bodies: kn is that of two equal springs in series, one in each
-# body, and a boundary is rigid.
-RIGID = 2.0
-
 
 @inlined
 def share_of_step(depth: float, closing: float, dt: float) -> float:

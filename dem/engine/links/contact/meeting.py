@@ -28,7 +28,7 @@ import math
 
 from dem.engine.links.arrays import Array
 from dem.engine.links.compiler import inlined, part
-from dem.engine.links.contact.barrier import LINEAR, stretch
+from dem.engine.links.contact.barrier import stretch
 from dem.engine.links.shapes import AT_END, AT_START, RADIUS
 from dem.engine.links.vectors import (
     Lines,
@@ -99,7 +99,7 @@ def meet_at(
         out: (ROWS, COLUMNS) written.
     """
     deepest = diameter - distance
-    u, slope, hardening = stretch(deepest, LINEAR * diameter, diameter)
+    u, slope, hardening = stretch(deepest, diameter)
     _note(out, 0, both, s, t, gap, distance, stiffness * u * slope, 1.0, hardening)
     out[1, SHARE] = out[2, SHARE] = 0.0
     out[ENERGY, 0], out[ENERGY, 1] = 0.5 * stiffness * u * u, deepest
@@ -201,8 +201,8 @@ def _lie_along(
         return 0
     first, second = math.sqrt(first), math.sqrt(second)
     # No deeper than the deepest, whatever the rounding.
-    u1, slope1, hardening1 = stretch(min(diameter - first, deepest), LINEAR * diameter, diameter)
-    u2, slope2, hardening2 = stretch(min(diameter - second, deepest), LINEAR * diameter, diameter)
+    u1, slope1, hardening1 = stretch(min(diameter - first, deepest), diameter)
+    u2, slope2, hardening2 = stretch(min(diameter - second, deepest), diameter)
     length = math.sqrt(both.a)
     reach = (s2 - s1) * length / diameter
     grown, growth = 1.0, 0.0
@@ -239,7 +239,7 @@ def _joint(
     if squared >= diameter * diameter:
         return bare
     distance = math.sqrt(squared)
-    u, slope, _ = stretch(diameter - distance, LINEAR * diameter, diameter)
+    u, slope, _ = stretch(diameter - distance, diameter)
     load = sign * stiffness * u * slope
     out[ENERGY, 0] += 0.5 * sign * stiffness * u * u
     place = _halfway(both, s, t)

@@ -7,7 +7,7 @@ from typing import Any
 
 from dem.engine.links.arrays import ORIGIN, SPIN, VELOCITY, Array, Bodies, Law, Pairs, Parts, Segments
 from dem.engine.links.compiler import inlined, part
-from dem.engine.links.contact.barrier import LINEAR, Step, resolve, stretch
+from dem.engine.links.contact.barrier import Step, resolve, stretch
 from dem.engine.links.contact.law import resist, share_of_step
 from dem.engine.links.contact.meeting import (
     CARRIED,
@@ -179,7 +179,7 @@ def push_apart(
         if (others == 0) & (distance < diameter):
             # Nine of ten: one point, and nothing that a branch would have to be predicted for.
             place = scale(0.5, along(add(along(both.p, s, both.u), both.q), t, both.v))
-            u, slope, hardening = stretch(depth, LINEAR * diameter, diameter)
+            u, slope, hardening = stretch(depth, diameter)
             load = law.stiffness * u * slope
             closing = _rub(
                 law, damping, parts, rows, ledger, step, place, scale(1 / distance, gap), depth, load, load, 1.0,
@@ -207,7 +207,7 @@ def push_apart(
         if pairs.used[pair] & ~used:
             lost += _forget(pairs, pair, pairs.used[pair] & ~used)
         pairs.used[pair] = used
-        resolve(step, depth, LINEAR * diameter, diameter, closing)
+        resolve(step, depth, diameter, closing)
         filled = depth / diameter
         bodies.deepest[i] = max(bodies.deepest[i], filled)
         bodies.deepest[j] = max(bodies.deepest[j], filled)

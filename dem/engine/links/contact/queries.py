@@ -40,9 +40,8 @@ FASTEST, LOWEST, HIGHEST, WIDEST, DEEPEST, BETWEEN, ELASTIC = range(7)  # places
 FIRST, SECOND, PRESSED, POINT, FRICTION, WHOLE, WIDTH = 0, 1, 2, 3, 6, 9, 12
 
 # Columns of `boundaries`, which compiled code takes as constants from here.
-SLOT, PART, DEPTH, FACTOR, BEGIN, ROOM, AT, PARTLY = (
-    rows_of.SLOT, rows_of.PART, rows_of.DEPTH, rows_of.FACTOR, rows_of.BEGIN, rows_of.ROOM, rows_of.NORMAL,
-    rows_of.SHARE,
+SLOT, PART, DEPTH, FACTOR, ROOM, AT, PARTLY = (
+    rows_of.SLOT, rows_of.PART, rows_of.DEPTH, rows_of.FACTOR, rows_of.ROOM, rows_of.NORMAL, rows_of.SHARE,
 )  # fmt: skip
 
 
@@ -95,8 +94,8 @@ def _query_boundaries(
             contact = found.rows[k]
             found.touches[i] += 1
             found.held[i, int(contact[PART])] = True
-            found.depth[i] = max(found.depth[i], contact[DEPTH] / max(contact[ROOM], segments.line[p, RADIUS]))
-            u, _, _ = stretch(contact[DEPTH], contact[BEGIN], contact[ROOM])
+            found.depth[i] = max(found.depth[i], contact[DEPTH] / contact[ROOM])
+            u, _, _ = stretch(contact[DEPTH], contact[ROOM])
             squares += u * u * contact[FACTOR]
     return 0.5 * stiffness * squares
 
@@ -282,7 +281,7 @@ def forces_of_boundaries(
             place, velocity, speed, _ = place_and_motion(radius, parts, known.ground, segments.part[p], contact)
             relative = velocity[0], velocity[1], velocity[2] - speed
             _copy(slip, kept.slip[p, int(contact[SLOT])])
-            u, slope, hardening = stretch(contact[DEPTH], contact[BEGIN], contact[ROOM])
+            u, slope, hardening = stretch(contact[DEPTH], contact[ROOM])
             load = law.stiffness * u * slope * share
             force = resist(law, damping, load, share, hardening, normal, relative, 0.0, 0.0, slip)
             count = _write(rows, count, links[p], -1 - contact[PART], load, load, place, normal, force)
