@@ -95,7 +95,7 @@ def folder() -> Path | None:
         except (OSError, RuntimeError) as error:
             causes.append(f"{path} ({getattr(error, 'strerror', None) or error})")
     LOG.warning(
-        "compiled code cannot be kept in %s; every run compiles for about 20 s; set %s to a writable folder",
+        "compiled code cannot be kept in %s; every run compiles for about 15 s; set %s to a writable folder",
         " or ".join(causes),
         FOLDER,
     )
@@ -106,7 +106,7 @@ def folder() -> Path | None:
 def _announce() -> None:
     where = folder()
     kept = "" if where is None else f", kept in {where}"
-    LOG.warning("compiling the links engine, about 20 s for each kind of phase%s", kept)
+    LOG.warning("compiling the links engine, about 15 s, and 10 s for each further kind of phase%s", kept)
 
 
 class _Locator(_CacheLocator):
