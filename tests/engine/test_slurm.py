@@ -156,7 +156,7 @@ def test_a_rejected_job_is_reported_and_nothing_is_lost(
     command = [sys.executable, "-m", "smarticles", *words, tmp_path / "here.toml"]
     done = slurm.ask(*map(str, command))
     assert done.returncode == 1
-    assert "sbatch rejects it: " in done.stderr
+    assert "sbatch rejects the job: " in done.stderr
     assert "invalid partition specified: absent" in done.stderr
     assert json.loads((tmp_path / "out/jobs/001/job.json").read_text()).get("job_id") is None
     (tmp_path / "here.toml").write_text(CLUSTER)
