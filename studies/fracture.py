@@ -160,7 +160,7 @@ def amplitudes(table: pd.DataFrame) -> pd.DataFrame:
 
 
 def aspects(table: pd.DataFrame) -> pd.DataFrame:
-    """Return the rows of the internal oscillation at θ = `AMPLITUDE`; none if they have one l/w."""
+    """Return the rows of internal oscillation at θ = `AMPLITUDE`; none unless they have two l/w or more."""
     part = of_procedure(table, INTERNAL)
     return part if part[ASPECT].nunique() > 1 else part.iloc[:0]
 

@@ -53,7 +53,7 @@ class Decision:
 
 
 def decide(scene: Scene) -> tuple[Decision, ...]:
-    """Return all effects of a scene on its engine, on or off."""
+    """Return a decision for each effect: whether the scene needs it, why, and what it adds to a run."""
     own, reasons = engine_kind(scene.engine).adds, _reasons(scene)
     return tuple(
         Decision(name, on, why, Adds.together((own.get(name, _NOTHING), ADDS.get(name, _NOTHING))) if on else _NOTHING)

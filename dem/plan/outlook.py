@@ -213,7 +213,7 @@ def recording_warnings(scene: Scene) -> tuple[str, ...]:
 
 
 def protocol_lines(scene: Scene) -> tuple[str, ...]:
-    """Return a line of keys with the protocol's values, and one of deviating keys; none without protocol."""
+    """Return a line of the keys that equal the protocol's and one of those that differ, if any."""
     if scene.protocol is None:
         return ()
     kept, other = [], []

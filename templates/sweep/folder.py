@@ -118,7 +118,7 @@ class Folder:
         return self.path / "logs" / f"{entry.name}.txt"
 
     def is_done(self, entry: Entry) -> bool:
-        """Return whether a run is done, with the scene of the manifest."""
+        """Return whether an entry's run has ended well and has this entry's scene (by its hash)."""
         return Run(self.run(entry)).status.state == "done" and self._is_of_scene(entry)
 
     def can_resume(self, entry: Entry) -> bool:

@@ -171,7 +171,7 @@ class LinksEngine:
         return self._world.contacts().touches
 
     def overlaps(self, limit: float) -> Overlaps:
-        """Return the contacts, those at boundaries with twice their overlap, since half of the room is left there.
+        """Return the deepest overlap, which smarticles exceed `limit` [m] or are held, and the energy.
 
         Contacts that may have let links pass since the last check count as well. A smarticle that two boundaries hold
         counts as too deep from `HOLDS` on.

@@ -116,7 +116,7 @@ class YadeBoundaries:
 
     @property
     def part_of(self) -> Mapping[int, int]:
-        """Places in `dem.body.forces.BOUNDARIES` by ids of bodies."""
+        """Index in `dem.body.forces.BOUNDARIES` of each YADE body that is a floor, wall or hook, by its id."""
         *walls, floor = self.container
         numbers = [CHANNEL + k for k in range(len(walls))] if self._planar else [WALL] * len(walls)
         found = {floor: FLOOR, **dict(zip(walls, numbers, strict=True))}

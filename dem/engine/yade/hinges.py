@@ -108,7 +108,7 @@ class Hinges:
         self.bind()
 
     def bind(self) -> None:
-        """Look up YADE's bonds, all of which loading replaces."""
+        """Keep references to the bonds of hinges in YADE, which loading a simulation replaces."""
         interactions = self._yade.omega.interactions
         self._pins = [interactions[centre, middle].geom for centre, _, middle in self._hinges()]
         shafts = [interactions[end, middle] for _, end, middle in self._hinges()]

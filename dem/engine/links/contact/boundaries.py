@@ -217,7 +217,7 @@ def _contacts_with_hooks(link: Array, ground: Ground, hooks: Hooks, rows: Array,
 def contacts_with_boundaries(
     segments: Segments, ground: Ground, channel: Any, hooks: Any, rims: Any, p: int, rows: Array, met: Array
 ) -> int:
-    """Find the contacts of a segment, compiled apart: for queries, where speed does not matter."""
+    """Call `contacts_of_segment`, compiled apart and not inlined: for queries, where speed matters less."""
     return contacts_of_segment(segments, ground, channel, hooks, rims, p, rows, met)
 
 

@@ -61,7 +61,7 @@ def push(parts: Parts, row: int, place: Vector, force: Vector) -> None:
 
 @inlined
 def enter(ledger: Array, rows: tuple[int, int], place: Vector, force: Vector, power: float, gain: float) -> None:
-    """Enter a force beyond a normal spring's, whose dissipation follows once velocities after it are known.
+    """Append a contact force, without the normal spring's part, to the ledger.
 
     Args:
         ledger: (n, LEDGER); row 0 begins with the number of rows in use.

@@ -261,7 +261,7 @@ def forces_of_boundaries(
     law: Law, bodies: Bodies, parts: Parts, segments: Segments, kept: Kept, known: Boundaries, links: Indices,
     out: Array, contacts: Array, slip: Array, rows: Array,
 ) -> int:  # fmt: skip
-    """Write the forces of boundaries on bodies; see `forces_of_pairs`.
+    """Write a row per contact with a boundary; return the rows needed, see `forces_of_pairs`.
 
     Args:
         links: (Q,) number that each segment's link is recorded with.
