@@ -60,7 +60,7 @@ class YadeKind:
 
 
 def hinge_law(scene: Demand, time_step: float = 0.0) -> HingeLaw:
-    """Return the law of the hinges of a scene with motors; dampers relax in `DAMPER_TIME` or, if longer, `time_step`."""
+    """Return the law of the hinges of a scene with motors; dampers relax in `DAMPER_TIME` or longer."""
     motor, pin = scene.motor, scene.fidelity.hinge_stiffness_N_per_m
     return HingeLaw(
         pin_stiffness=pin,
