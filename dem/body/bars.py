@@ -15,6 +15,13 @@ from dem.errors import InputError
 JOINED = 1e-9  # of the longest bar: ends that are nearer are one joint
 
 
+def first_ends(points: Array) -> Numbers:
+    """Return for each end of segments (S, 2, 3) [m] the number of the first end at its place, (2 S,)."""
+    places = points.reshape(-1, 3)
+    longest = np.abs(points[:, 1] - points[:, 0]).max()
+    return np.asarray((np.abs(places[:, None] - places).max(axis=-1) <= JOINED * longest).argmax(axis=1))
+
+
 @dataclass(frozen=True, kw_only=True)
 class Bars:
     """Bars of one section, S of them. Mass and inertia are those of boxes that overlap at joints, as in the paper.
@@ -105,23 +112,11 @@ class Bars:
         """(S, 2, 3) both ends of each bar in the body's frame [m]: from the centre of mass, along principal axes."""
         return applied(self.rotation.T, self.points - self._centre_of_mass)
 
-    @cached_property
-    def _joints(self) -> Numbers:
-        """(2 S,) number of the first end, in the order of `points`, which is at the place of each end."""
-        places = self.points.reshape(-1, 3)
-        near = np.abs(places[:, None] - places).max(axis=-1) <= JOINED * self.lengths.max()
-        return np.asarray(near.argmax(axis=1))
-
     @property
     def free(self) -> Array:
         """(S, 2) whether an end of a bar is the end of no other one."""
-        return np.asarray((np.bincount(self._joints, minlength=2 * len(self.points))[self._joints] == 1).reshape(-1, 2))
-
-    @property
-    def shared(self) -> Numbers:
-        """(S,) bits of the ends which are ends of bars before it: 1 the start, 2 the end."""
-        later = (self._joints != np.arange(len(self._joints))).reshape(-1, 2)
-        return np.asarray(later @ [1, 2])
+        first = first_ends(self.points)
+        return np.asarray((np.bincount(first, minlength=len(first))[first] == 1).reshape(-1, 2))
 
     def radius(self, rows: int) -> float:
         """Return the radius of the spheres that sweep the bars in so many strands [m].

@@ -1,6 +1,7 @@
 """Rigid bodies of any shape on the links engine, and several kinds in one pile."""
 
 import math
+from dataclasses import replace
 
 import builds
 import numpy as np
@@ -53,7 +54,25 @@ def test_a_staple_has_mass_centre_and_inertia_of_a_smarticle() -> None:
     np.testing.assert_allclose(own.inertia, boxes.inertia, rtol=1e-12)
     np.testing.assert_allclose(own.rotation, np.eye(3), atol=1e-12)
     np.testing.assert_allclose(own.ends[[0, 1, 1, 2], [1, 0, 1, 1]], boxes.vertices, atol=1e-17)
-    assert own.shared.tolist() == [0, 1, 1]
+    assert rigid_shape(own).shared.tolist() == [0, 1, 1]
+
+
+@pytest.mark.parametrize("turn", [[0, 0, 0], [0.4, -0.3, 0.9]])
+def test_strands_are_across_their_bars_at_the_edges(turn: list[float]) -> None:
+    # Normals of any length, in a frame that is turned against the body's.
+    rotation = Rotation.from_rotvec(turn)
+    for own in (TRIPOD, CROSS):
+        turned = replace(
+            own, points=own.points @ rotation.as_matrix().T, normals=3 * own.normals @ rotation.as_matrix().T
+        )
+        lines = rigid_shape(turned, 2).lines.reshape(-1, 2, 8)
+        across = lines[:, 1, :3] - lines[:, 0, :3]
+        np.testing.assert_allclose(np.linalg.norm(across, axis=1), builds.T1 - builds.T2, rtol=1e-9)
+        np.testing.assert_allclose((across * lines[:, 0, 3:6]).sum(axis=1), 0.0, atol=1e-15)
+        np.testing.assert_allclose(np.cross(across, turned.frames[:, :, 2]), 0.0, atol=1e-12)
+    # Bars of the cross lie in one plane, so that their strands meet; those of the tripod do not.
+    assert rigid_shape(CROSS, 2).shared.tolist() == [0, 0, 1, 1, 1, 1, 1, 1]
+    assert rigid_shape(TRIPOD, 2).shared.tolist() == [0] * 6
 
 
 @pytest.mark.parametrize("own", [CROSS, RING, TRIPOD], ids=["cross", "ring", "tripod"])

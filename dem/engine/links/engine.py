@@ -258,4 +258,4 @@ class LinksEngine:
         self.motors.restore({name[len(prefix) :]: array for name, array in arrays.items() if name.startswith(prefix)})
         self.ledger.added = saved.memory["added"]
         self._smarticle_seconds = saved.memory["smarticle_seconds"]
-        self._thrown = saved.memory.get("thrown", 0.0)  # there was no such thing once
+        self._thrown = saved.memory["thrown"]

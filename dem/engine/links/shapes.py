@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from dem.body.bars import Bars
+from dem.body.bars import Bars, first_ends
 from dem.body.particle import Particle
 from dem.physics.contact import typical_effective_mass
 
@@ -57,11 +57,6 @@ class Shape:
     shared: NDArray[np.uint8]  #: (M,) which ends of a segment are those of segments before it, see `AT_START`
     effective_mass: float  #: Harmonic mean of the mass felt by a push on it [kg], for the dashpots
     planar: Planar | None = None  #: Of a smarticle; None: a rigid body
-
-    @property
-    def links(self) -> int:
-        """Links."""
-        return len(np.unique(self.link))
 
     @property
     def reach(self) -> float:
@@ -149,15 +144,18 @@ def rigid_shape(bars: Bars, rows: int = 1) -> Shape:
     reach = 0.0 if rows == 1 else bars.thickness_normal / 2 - radius
     starts, ends = bars.axes(radius)
     # (bars, rows, 3): strands along each bar's normal.
-    offsets = np.linspace(-reach, reach, rows)[:, None] * bars.normals[:, None, :]
-    lines = np.concatenate([starts[:, None] + offsets, np.repeat((ends - starts)[:, None], rows, axis=1)], axis=-1)
+    offsets = np.linspace(-reach, reach, rows)[:, None] * bars.frames[:, None, :, 2]
+    points = np.stack([starts[:, None] + offsets, ends[:, None] + offsets], axis=2).reshape(-1, 2, 3)
+    first = first_ends(points)
+    later = (first != np.arange(len(first))).reshape(-1, 2)
     xx, yy, zz = bars.inertia
     return Shape(
         mass=bars.mass,
         inertia=np.array([xx, yy, zz, 0.0]),
-        lines=_lines(lines.reshape(-1, 6), radius),
+        lines=_lines(np.concatenate([points[:, 0], points[:, 1] - points[:, 0]], axis=1), radius),
         link=np.repeat(np.arange(len(starts)), rows),
-        shared=np.repeat(bars.shared.astype(np.uint8), rows),
+        # Strands of bars that are twisted against each other do not meet, and count apart.
+        shared=(later @ [AT_START, AT_END]).astype(np.uint8),
         effective_mass=bars.effective_mass,
     )
 

@@ -298,11 +298,14 @@ class World:
     def system(self) -> System:
         """Everything that kernels read and change."""
         law, wall_law = self.laws
-        boundaries = Boundaries(self.ground, self.channel, self.hooks, self.rims)
         return System(
-            self.shapes, law, wall_law, self.bodies, self.parts, self.segments, self.pairs, self.kept, boundaries,
+            self.shapes, law, wall_law, self.bodies, self.parts, self.segments, self.pairs, self.kept, self._known,
             self.gravity, self.planar, self.skins, self.hinged, self.cords, self.ledger,
         )  # fmt: skip
+
+    @property
+    def _known(self) -> Boundaries:
+        return Boundaries(self.ground, self.channel, self.hooks, self.rims)
 
     @property
     def scratch(self) -> Scratch:
@@ -346,8 +349,9 @@ class World:
 
     def _query(self) -> tuple[Found, int, float]:
         found, (law, wall_law) = self._room(), self.laws
-        known = Boundaries(self.ground, self.channel, self.hooks, self.rims)
-        count, energy = query_all(self.segments, self.pairs, self.kept, known, law.stiffness, wall_law.stiffness, found)
+        count, energy = query_all(
+            self.segments, self.pairs, self.kept, self._known, law.stiffness, wall_law.stiffness, found
+        )
         return found, count, energy
 
     def _room(self) -> Found:
@@ -371,7 +375,7 @@ class World:
         """Return the forces at all points of contact, (P, WIDTH) as `queries` has the columns."""
         self.posed()
         slip, contacts, (law, wall_law) = np.zeros(4), self.scratch.contacts, self.laws
-        bodies, parts, segments, known = self.bodies, self.parts, self.segments, self.system.boundaries
+        bodies, parts, segments, known = self.bodies, self.parts, self.segments, self._known
         return np.concatenate(
             [
                 _rows(

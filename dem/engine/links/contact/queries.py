@@ -86,10 +86,8 @@ def _query_boundaries(
     """Query all contacts with boundaries; the energy of all normal springs [J]."""
     squares = 0.0
     for p in range(segments.line.shape[0]):
-        i, count = (
-            segments.body[p],
-            contacts_with_boundaries(segments, ground, channel, hooks, rims, p, found.rows, found.out),
-        )
+        i = segments.body[p]
+        count = contacts_with_boundaries(segments, ground, channel, hooks, rims, p, found.rows, found.out)
         for k in range(count):
             contact = found.rows[k]
             found.touches[i] += 1
