@@ -52,7 +52,7 @@ _ENGINES = ("yade", "links")
 # Fields of the fidelity that no knob changes; a scene with its own time step is rejected.
 _FIXED = frozenset({"wall_facets", "time_step_s"})
 _STIFFNESSES = (125.0, 250.0, 500.0, 1000.0, 2000.0, 4000.0)
-_CONVERGED = {"rows": 3, "stiffness_N_per_m": 2000.0}
+_CONVERGED = {"rows": 3, "stiffness_N_per_m": 4000.0}
 """Changes to the finest named fidelity on links that make the reference of the knobs `fidelity` and `engine`."""
 _ROWS = {2: "two", 3: "three", 4: "four"}
 _MOST_SEEDS = 1000
@@ -112,15 +112,17 @@ COMPARED = {
     "phi_f": f"phi_f {DEFINITION} [-]",
     "height": "com height [m]",
     "crossings": "crossings [-]",
+    "energy": "energy put in [J]",
     "hook_force": "peak hook force over n W_s [-]",
 }
 """Compared quantities: column of the table of runs by short name.
 
 The height is that of the centre of mass before the first activity. It is a mean over all smarticles and scatters half
-as much as φ_0, which depends on a single smarticle near the top.
+as much as φ_0, which depends on a single smarticle near the top. The energy put in is the work of container and motors
+in all activities; it needs `recording.energy`.
 """
 
-SYMBOLS = {"phi_0": "φ_0", "phi_f": "φ_f", "height": "h_0", "crossings": "⟨N⟩", "hook_force": "F_peak"}
+SYMBOLS = {"phi_0": "φ_0", "phi_f": "φ_f", "height": "h_0", "crossings": "⟨N⟩", "energy": "E", "hook_force": "F_peak"}
 
 RESOLVED, NOT_RESOLVED, IS_REFERENCE, UNKNOWN = "resolved", "not resolved", "reference", "unknown"
 """Verdicts on a rung: an error beyond its 95 % band; no such error; the reference itself; no band or no runs."""
@@ -369,7 +371,9 @@ def measure(run: Run, expected_s: Mapping[str, float]) -> Row:
         msg = f"{run.path}: not named SETTING_seed{run.manifest.seed}, as runs of a ladder are; do not rename runs"
         raise InputError(msg)
     last = active[-1]
-    wanted = [active[0].index - 1, last.index]
+    # The pile is measured at rest if the scene lets it come to rest after its last activity.
+    rested = next((phase.index for phase in run.phases[last.index + 1 :] if phase.at_rest), last.index)
+    wanted = [active[0].index - 1, rested]
     table = summarise_run(run, definitions=[DEFINITION], phases=set(wanted)).set_index("phase")
     if len(table) != len(wanted):
         raise InputError(f"{run.path}: no frame of the phase before its activity, or of its last one; run it again")
@@ -396,7 +400,7 @@ def measure(run: Run, expected_s: Mapping[str, float]) -> Row:
         f"phi_f {DEFINITION} SE in run [-]": after[f"{phi} SE [-]"],
         COMPARED["height"]: before["com height [m]"],
         COMPARED["crossings"]: after["crossings mean [-]"],
-        **_of_series(run),
+        **_of_series(run, [phase.index for phase in active]),
         "escaped at the end [-]": after["escaped [-]"],
         "frames averaged [-]": int(table["frames averaged"].min()),
         **last_columns(run),
@@ -407,9 +411,13 @@ def _or_nan(number: float | None) -> float:
     return math.nan if number is None else number
 
 
-def _of_series(run: Run) -> dict[str, float]:
-    """Return the cells peak hook force, energy residual and joint gap of a run; NaN if not recorded."""
-    found = {COMPARED["hook_force"]: math.nan, RESIDUAL: math.nan, GAP: math.nan}
+def _of_series(run: Run, active: Sequence[int]) -> dict[str, float]:
+    """Return the cells peak hook force, energies and joint gap of a run; NaN if not recorded.
+
+    `active` has the indices of the phases whose work is added up.
+    """
+    names = (COMPARED["hook_force"], COMPARED["energy"], RESIDUAL, GAP)
+    found = dict.fromkeys(names, math.nan)
     if not (run.path / "series.h5").exists():
         return found
     series = run.series
@@ -418,6 +426,9 @@ def _of_series(run: Run) -> dict[str, float]:
         highest = peak(read_pull(run, series, pulled[0])).force
         found[COMPARED["hook_force"]] = highest / (run.manifest.count * weight_of_one(run))
     data = series.data
+    if "container_work_J" in data:
+        work, phases = data["container_work_J"] + data["motor_work_J"], data["phase"]
+        found[COMPARED["energy"]] = math.fsum(work[phases == one][-1] - work[phases < one][-1] for one in active)
     if "energy_residual_J" in data and "dissipated_energy_J" in data:
         residual, dissipated = data["energy_residual_J"], data["dissipated_energy_J"]
         known = np.isfinite(residual) & np.isfinite(dissipated)
