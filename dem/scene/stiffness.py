@@ -2,7 +2,8 @@
 
 Three loads are estimated:
 
-- the hardest impact, of the typical effective mass at the greatest speed that a phase causes, increased by a fall by w;
+- the hardest impact: the typical effective mass hits at the greatest speed that a phase or a motor causes, increased by
+  a fall from the height w;
 - the pile's weight times 1 + Γ, shared by two contacts of each smarticle that can lie on the floor;
 - the pile's weight on the four contacts of a hook that lifts it.
 
@@ -26,7 +27,7 @@ class Overlap(NamedTuple):
 
     cause: str  #: The load in words
     widths: float  #: Overlap over the mean width of a link's section, 2 (t1 + t2)/π [1]
-    stiffness: float  #: kn at which it is `WANTED` [N/m]
+    stiffness: float  #: kn at which `widths` would be `WANTED` [N/m]
 
 
 def expected_overlaps(scene: SceneView) -> tuple[Overlap, ...]:
