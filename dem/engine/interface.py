@@ -70,7 +70,11 @@ class Boundaries(Protocol):
 
     @property
     def raised(self) -> float | None:
-        """Height by which a hook may have raised the pile [m]; None once the pile is no longer enclosed."""
+        """Rise of the upper hook above the floor since the start [m], 0 or more; 0 without hooks.
+
+        None if the wall does not enclose the pile: the wall is removed, its lower edge is above the floor, the upper
+        hook is above its top, or the scene is in a plane.
+        """
 
     @property
     def upper_height(self) -> float:
@@ -203,7 +207,7 @@ class EnergyLedger(Protocol):
 
     @property
     def given(self) -> float:
-        """Sum of `added` and the work of moving boundaries since the start [J]; NaN if this work is unknown."""
+        """Sum of `added` and `container_work` [J]; NaN while boundaries move whose work is not recorded."""
 
     def elastic(self) -> tuple[float, float]:
         """Return the energy in the springs of all contacts and the energy in those of all hinges [J]."""
