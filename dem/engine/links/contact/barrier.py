@@ -11,7 +11,7 @@ scaled by the hardening h, which keeps the damping ratio and the restitution con
 239 (1992)). No load can push axes through each other, as in incremental potential contact (Li et al., ACM Trans. Graph.
 39, 49 (2020)); its logarithm is replaced by a rational function that joins a linear spring.
 
-Time steps are stable for the linear spring. If a contact is stiffer, or closes fast, the step is divided into sub-steps.
+Time steps are stable for the linear spring. A step is divided into sub-steps if a contact is stiffer or closes fast.
 """
 
 from __future__ import annotations

@@ -172,13 +172,13 @@ def _boxed(
     boxes: Array, close: Indices, count: int, start: int, stop: int,
     ly: float, lz: float, hx: float, hy: float, hz: float,
 ) -> int:  # fmt: skip
-    """Append to `close` the indices of those boxes from `start` to before `stop` that overlap a given box.
+    """Append to `close` the indices of boxes from `start` to before `stop` that may overlap a given box.
 
     The first loop is vectorised by the compiler. In the second loop every index is written, and overwritten by the next
     one if its box does not overlap, so that no branch is needed.
 
     Args:
-        boxes: (6, L) lower x, y, z and upper x, y, z of all boxes [m]; those given must not begin below the box in x.
+        boxes: (6, L) lower x, y, z and upper x, y, z of all boxes [m].
         count: number of indices in `close` before.
         ly: lower y of the given box [m].
         lz: lower z of the given box [m].
