@@ -427,7 +427,7 @@ def _of_series(run: Run, active: Sequence[int]) -> dict[str, float]:
         found[COMPARED["hook_force"]] = highest / (run.manifest.count * weight_of_one(run))
     data = series.data
     if "container_work_J" in data:
-        work, phases = data["container_work_J"] + data["motor_work_J"], data["phase"]
+        work, phases = data["container_work_J"] + data.get("motor_work_J", 0.0), data["phase"]
         found[COMPARED["energy"]] = math.fsum(work[phases == one][-1] - work[phases < one][-1] for one in active)
     if "energy_residual_J" in data and "dissipated_energy_J" in data:
         residual, dissipated = data["energy_residual_J"], data["dissipated_energy_J"]
