@@ -1,4 +1,4 @@
-"""A rigid body of straight flat bars that are joined at their ends: staples, crosses, rings and other shapes."""
+"""Rigid bodies of straight flat bars that are joined at their ends: staples, crosses, rings, …"""
 
 import math
 from dataclasses import dataclass
@@ -116,7 +116,7 @@ class Bars:
 
     @cached_property
     def ends(self) -> Array:
-        """(S, 2, 3) both ends of each bar in the body's frame [m]: from the centre of mass, along principal axes."""
+        """(S, 2, 3) both ends of each bar in the body's frame: centre of mass, principal axes [m]."""
         return applied(self.rotation.T, self.points - self._centre_of_mass)
 
     @property
@@ -126,7 +126,7 @@ class Bars:
         return np.asarray((np.bincount(first, minlength=len(first))[first] == 1).reshape(-1, 2))
 
     def radius(self, rows: int) -> float:
-        """Return the radius [m] of the strands, `rows` swept spheres side by side, that represent a bar in contacts.
+        """Return the radius [m] of the `rows` strands, swept spheres side by side, that represent a bar.
 
         The diameter of a single strand is the mean width of the section. The diameter of several strands is the bar's
         thickness in the plane.

@@ -35,7 +35,7 @@ class ContactForces:
 
 
 def at_links(smarticle: Number, link: Number) -> Number:
-    """Return the codes of links, 0 or above, for `contacts_of_points`, from numbers of smarticles and links."""
+    """Return the codes of links for `contacts_of_points`, 0 or above, from smarticles and links."""
     return LINKS * smarticle + link
 
 

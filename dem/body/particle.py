@@ -152,7 +152,7 @@ class Boxes:
 
     @cached_property
     def _principal(self) -> tuple[Array, Array]:
-        """Principal moments (3,) [kg m²] and rotation (3, 3): columns are body axes in the middle link's frame."""
+        """Principal moments (3,) [kg m²], and body axes in the middle link's frame, as columns (3, 3)."""
         tensor = np.zeros((3, 3))
         for length, in_plane, direction, centre in zip(
             self.lengths, self.thicknesses_in_plane, self.directions, self._plain_centres, strict=True

@@ -114,11 +114,14 @@ class Boundaries(Protocol):
 
     @property
     def channel_sums(self) -> Array:
-        """(2, 3) forces on the channel's lower and upper wall [N], summed over all steps; (0, 3) without walls."""
+        """(2, 3) forces on the channel's lower and upper wall [N], summed over all steps; (0, 3): no walls."""
 
 
 class Motors(Protocol):
-    """Motors at the hinges; smarticles are welded (rigid) at first, and can be articulated and welded again."""
+    """Motors at the hinges.
+
+    Smarticles are welded (rigid) at first; they can be articulated and welded again.
+    """
 
     @property
     def present(self) -> bool:
@@ -156,7 +159,7 @@ class Motors(Protocol):
         """Work of all motors on the links since the start, up to now [J]."""
 
     def gaps(self) -> Array:
-        """Return the gaps of the hinges (N, 2): distances between the joined ends of links [m]; 0 while welded."""
+        """Return the gaps of the hinges (N, 2), distances between joined ends of links [m]; 0 while welded."""
 
 
 class Strings(Protocol):

@@ -36,7 +36,11 @@ class EngineKind(Protocol):
         """Return an estimate of the wall time per simulated time [1] on one core, for a time step [s]."""
 
     def build(self, scene: Demand, time_step: float) -> Engine:
-        """Return a simulation without smarticles, for a shortest time step [s], whose stability is not checked."""
+        """Return a simulation without smarticles.
+
+        Args:
+            time_step: shortest time step of all phases [s]; whether it is stable is not checked.
+        """
 
 
 def engine_kind(name: str) -> EngineKind:

@@ -61,7 +61,7 @@ class ActuatedPhase(Phase):
         raise NotImplementedError
 
     def source_of(self, key: str) -> tuple[str, float | None]:
-        """Return the key of this phase that sets a key of the gait's motions, and the value of the phase's key.
+        """Return the key of this phase that sets a key of the gait's motions, and its value.
 
         Args:
             key: key in the motions with dots for nesting, such as `barbs.steps.0.duration_s`.
@@ -221,7 +221,7 @@ def overshoot(scene: SceneView) -> float:
 
 
 def actuation_warnings(scene: SceneView) -> tuple[str, ...]:
-    """Return a warning in one line if motors can exceed τ_max by more than `MOST_OVERSHOOT` τ_max; else none.
+    """Return a warning if motors can exceed τ_max by more than `MOST_OVERSHOOT` τ_max; else none.
 
     Such a scene is not rejected: a motor halts at the next control update, and motors too weak to move anything are
     worth studying.
@@ -287,7 +287,7 @@ def _whole_fraction(whole: float, parts: int) -> str:
 
 
 def _of_motions(scene: SceneView, index: int) -> Generator[str, None, tuple[float, float]]:
-    """Yield errors about range and speed of the motions; return the highest angles of barb 1 and barb 2 [deg].
+    """Yield errors of the motions' range and speed; return the highest angles of barb 1 and barb 2 [deg].
 
     The highest angles are those of all smarticles, whether they move or not.
     """
@@ -350,7 +350,7 @@ def _of_speed(place: str, motion: SimpleMotion, speed: float, limit: float) -> I
 
 
 def _of_first_spheres(scene: SceneView, index: int, angle: float) -> Iterator[str]:
-    """Yield an error if the first sphere of a barb at `angle` [deg] would touch spheres of the middle link.
+    """Yield an error if the first sphere of a barb at `angle` [deg] touches spheres of the middle link.
 
     At the angle α a barb's sphere at the distance s from the hinge is √(s² + m² + 2 s m cos α) from the middle link's
     sphere at m, so that they are clear of each other while -cos α ≤ (s² + m² - d²) / (2 s m).

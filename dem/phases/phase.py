@@ -90,7 +90,7 @@ class Phase:
         return getattr(self, "duration_s", None)
 
     def expected_duration(self, count: int) -> float:
-        """Return the simulated time that the phase takes [s]; if a criterion ends it, an estimate from N = `count`."""
+        """Return the simulated time of the phase [s]; if a criterion ends it, an estimate from `count`."""
         return self.known_duration or 0.0
 
     @property

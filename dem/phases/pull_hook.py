@@ -131,6 +131,6 @@ def with_pull_defaults(phase: Any, smarticle: Smarticle) -> Any:
 
 
 def _force_sum(engine: Engine) -> list[float]:
-    """Return the force on the upper hook (3,), summed over all steps [N]; constant while nothing touches it."""
+    """Return the force on the upper hook, summed over all steps (3,) [N]; constant without contacts."""
     total: list[float] = engine.boundaries.hook_sums[1].tolist()
     return total

@@ -330,7 +330,7 @@ def _mismatches(scene: SceneView, taken: Taken) -> Iterator[str]:
 
 
 def _within_tips(vertices: Array, radius: float) -> Array:
-    """Return vertices (N, 4, 3) with both tips moved inwards by a radius [m], to the last spheres' centres."""
+    """Return vertices (N, 4, 3) with both tips moved inwards by a radius [m], to centres of spheres."""
     moved = vertices.copy()
     for tip, hinge, far in ((0, 1, 2), (3, 2, 1)):
         # Without barbs the middle link ends at the tips.

@@ -11,7 +11,7 @@ APART = 0.1  # of the limit for overlaps: boundaries that have moved apart by le
 
 @dataclass(frozen=True)
 class Held:
-    """A smarticle that touches two boundaries whose distance has changed, so that only its contacts can give way."""
+    """A smarticle that touches two boundaries whose distance has changed: only contacts can give way."""
 
     smarticle: int  #: Number of the smarticle
     between: tuple[str, str]  #: Names of the boundaries

@@ -213,7 +213,7 @@ def recording_warnings(scene: Scene) -> tuple[str, ...]:
 
 
 def protocol_lines(scene: Scene) -> tuple[str, ...]:
-    """Return a line of keys at the protocol's values and, if any, a line of the other keys; () without protocol."""
+    """Return lines about keys with the protocol's values and with others; () without a protocol."""
     if scene.protocol is None:
         return ()
     kept, other = [], []

@@ -117,7 +117,7 @@ class Manifest(Document):
         return not self.planar and all(record.type != "remove-container" for record in self.phases[: phase + 1])
 
     def fills_cylinder(self, phase: int) -> bool:
-        """Return whether the pile fills a cylinder, and so has a packing fraction, in a phase given by its index."""
+        """Return whether the pile fills a cylinder in a phase (index), and so has a packing fraction."""
         return self.container_tiers == 1 and self.walled(phase)
 
 

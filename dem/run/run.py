@@ -147,7 +147,7 @@ def _restore(simulation: Simulation, saved: tuple[Checkpoint, str | None] | None
 
 
 def _mark_ended(simulation: Simulation | None, out: Path, log: logging.Logger, error: BaseException) -> str:
-    """Write the series and `failed.json`; return the cause, to which a failed run adds its last checkpoint."""
+    """Write the series and `failed.json`; return the cause, for a failed run with the last checkpoint."""
     status: Ended = "interrupted" if isinstance(error, StopRequestedError | KeyboardInterrupt) else "failed"
     cause = "interrupted by the user" if isinstance(error, KeyboardInterrupt) else str(error)
     if not isinstance(error, RunError | StopRequestedError | KeyboardInterrupt):
@@ -217,7 +217,7 @@ def manifest(
 
 
 def versions(made_by: tuple[str, str]) -> dict[str, str]:
-    """Return the versions of all software on which results depend; `made_by`: name and version of the engine."""
+    """Return the versions of all software on which results depend; `made_by`: engine and its version."""
     try:
         own = version("smarticles")
     except PackageNotFoundError:

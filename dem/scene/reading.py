@@ -180,9 +180,9 @@ def difference(there: Scene, here: Scene) -> str:
 
 
 def flattened(value: Any, place: str = "") -> dict[str, Any]:
-    """Return the leaves of nested data by their dotted keys, such as `phases.0.type`, which begin with `place`.
+    """Return the leaves of nested data by their dotted keys, such as `phases.0.type`.
 
-    A list of plain values is one leaf.
+    A list of plain values is one leaf. `place` is put before all keys.
     """
     if isinstance(value, list) and any(isinstance(item, Mapping | list) for item in value):
         value = {str(index): item for index, item in enumerate(value)}

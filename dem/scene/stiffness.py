@@ -19,8 +19,8 @@ from dem.phases.pull_hook import PullHook
 from dem.phases.shake import Shake
 from dem.physics.contact import typical_effective_mass
 
-# Overlaps over a link's mean width that `stiffness_for` aims at. The named stiffnesses have these overlaps in the paper's
-# scenes up to l/w = 1.8, where a fall from the height w is the hardest load. So a name has similar errors in all scenes.
+# Overlaps over a link's mean width that `stiffness_for` aims at. The named stiffnesses have these overlaps in the
+# paper's scenes up to l/w = 1.8, in a fall from the height w, so that a name has similar errors in all scenes.
 WANTED = {"draft": 0.3, "standard": 0.17, "reference": 0.12}
 LIMIT = 0.5  # largest overlap over a link's mean width that is accepted
 
@@ -56,7 +56,7 @@ def expected_overlaps(scene: SceneView) -> tuple[Overlap, ...]:
 
 
 def stiffness_for(scene: SceneView) -> float:
-    """Return the least kn [N/m] that keeps expected overlaps within `WANTED` of the fidelity, rounded up to two digits."""
+    """Return the least kn [N/m], rounded up to two digits, that keeps expected overlaps within `WANTED`."""
     needed = max(overlap.stiffness for overlap in expected_overlaps(scene))
     if needed <= 0.0:
         return 0.0

@@ -92,7 +92,7 @@ class Cylinder:
         return self.corner_radius_of(self.radius)
 
     def corner_radius_of(self, radius: float) -> float:
-        """Return the distance [m] of the wall's vertical edges from the axis, for a tier of a given radius [m]."""
+        """Return the distance [m] of the wall's vertical edges from the axis, for a tier with this radius [m]."""
         turn = 2 * math.pi / self.facets
         return radius * math.sqrt(turn / math.sin(turn))
 

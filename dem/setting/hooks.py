@@ -55,7 +55,7 @@ _HOOK_DEFAULTS = {"side_m": (0, 1), "length_m": (1, 0), "lower_height_m": (0, 10
 
 
 def with_hook_defaults(hooks: Any, smarticle: Smarticle) -> Any:
-    """Return data of `Hooks`, not yet validated, with lengths that are missing computed from the smarticle's."""
+    """Return unvalidated data of `Hooks`, with missing lengths computed from those of the smarticle."""
     filled = with_defaults(hooks, _HOOK_DEFAULTS, smarticle)
     return {"lower_length_m": filled["length_m"]} | filled if isinstance(filled, dict) else filled
 

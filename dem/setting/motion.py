@@ -73,7 +73,7 @@ class BaseMotion(Part):
         raise NotImplementedError
 
     def end(self, start: Array, home: Array) -> Array:
-        """Return the angles [rad] at the end of the motion, whose duration must be finite; arguments as in `course`."""
+        """Return the angles [rad] at the end of a motion of finite duration; arguments as in `course`."""
         return self.course(start, home)(np.array(self.duration))
 
 

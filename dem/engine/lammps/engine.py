@@ -170,7 +170,7 @@ class LammpsEngine:
         yield from text.body_dump("bodies.*.dump", when="v_when")
 
     def _balanced(self) -> Iterator[str]:
-        """Yield the command that balances spheres among ranks; two ranks need none, as each has half of the pile."""
+        """Yield the command that balances spheres among ranks; up to two ranks need none."""
         if self.child.ranks > 2:
             yield "balance 1.02 shift xy 20 1.01"
 

@@ -1,4 +1,7 @@
-"""Additions of each effect on the engine links: names of kernels; a kernel that no effect needs is not compiled."""
+"""Additions of each effect on the engine links, by names of kernels.
+
+A kernel that no effect needs is not compiled.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""Arrays that kernels read and write, and functions that make them; all are contiguous, none is made in a step."""
+"""Arrays that kernels read and write, and functions that make them.
+
+All arrays are contiguous, and none is made in a step.
+"""
 
 from __future__ import annotations
 
@@ -67,7 +70,7 @@ class Segments(NamedTuple):
 
 
 class Pairs(NamedTuple):
-    """P pairs of segments that are near each other: the wide list, and the tight list of pairs that can touch soon.
+    """Lists of near segments: the wide list, and the tight list of those pairs that can touch soon.
 
     Arrays have room for P pairs, of which `counts` are in use. Pairs with equal `first` stand one after the other.
     """
@@ -122,7 +125,7 @@ class Law(NamedTuple):
 
 
 class Kept(NamedTuple):
-    """Memory of contacts with boundaries. Each contact of a segment has a slot, see `contact.boundaries.SLOT`."""
+    """Memory of contacts with boundaries; for the slots of a segment see `contact.boundaries.SLOT`."""
 
     slip: Array  #: (Q, slots, 4) stretch of the tangential spring [m], and its energy [J]
     used: NDArray[np.uint8]  #: (Q, slots) whether there was a contact in the last step
@@ -163,7 +166,7 @@ class Hooks(NamedTuple):
 
 
 class Rims(NamedTuple):
-    """Round edges of the wall that links can touch between their ends: between tiers, and below a lifted wall."""
+    """Round edges of the wall that links can touch, between tiers and below a lifted wall."""
 
     heights: Array  #: (rims,) heights above `place` of the wall [m]
     radii: Array  #: (rims,) radii [m]
@@ -289,7 +292,7 @@ def pairs_for(bodies: int, segments: int, capacity: int) -> Pairs:
 
 
 def cells_for(bodies: int, links: int, segments: int, capacity: int) -> Cells:
-    """Return arrays for a search that finds at most `capacity` pairs; other arguments are numbers of objects."""
+    """Return arrays for a search among so many bodies, links and segments, for up to `capacity` pairs."""
     return Cells(
         np.zeros(links, np.int32),
         np.zeros(links, np.int32),

@@ -37,7 +37,7 @@ NOT_FROM_PYTHON: dict[str, Any] = {"no_cpython_wrapper": True, "no_cfunc_wrapper
 
 
 def part(function: F) -> F:
-    """Compile a function as a part of the kernels that call it; Python cannot call it, and crashes if it tries."""
+    """Compile a function that only kernels call; a call from Python crashes the process."""
     return numba.njit(**OPTIONS, **NOT_FROM_PYTHON)(function)  # type: ignore[no-any-return]
 
 
@@ -59,7 +59,7 @@ def kernel(function: F) -> F:
 
 @cache
 def stamp() -> str:
-    """Return the hash of all that compiled code depends on: these sources, the motor law, the options, Numba, NumPy."""
+    """Return the hash of all that compiled code depends on: sources, options, versions of Numba and NumPy."""
     digest = hashlib.sha256()
     for path in (*sorted(Path(__file__).parent.rglob("*.py")), Path(motor.__file__)):
         digest.update(path.name.encode() + b"\0" + path.read_bytes() + b"\0")
@@ -79,7 +79,7 @@ def _folders() -> Iterator[Path]:
 
 @cache
 def folder() -> Path | None:
-    """Return the folder of compiled code, which is made if needed; None, with a warning, if none can be written."""
+    """Return the folder of compiled code, made if needed; log a warning and return None if that fails."""
     causes = []
     for base in _folders():
         path = base / f"links-{stamp()}"

@@ -218,10 +218,12 @@ class LinksEngine:
         )
 
     def _held(self, held: NDArray[np.bool_], deep: NDArray[np.bool_], least: float) -> tuple[Held, ...]:
-        """Return the smarticles of `deep` (N,) that touch two boundaries whose distance changed by `least` [m].
+        """Return the deep smarticles that touch two boundaries whose distance has changed.
 
         Args:
             held: (N, 6) whether each smarticle touches each boundary.
+            deep: (N,) whether each smarticle has a deep contact.
+            least: smallest change of distance that counts [m].
         """
         parts = self.boundaries.parts() if deep.any() else {}
         touched = {int(k): [name for name, (part, _) in parts.items() if held[k, part]] for k in np.flatnonzero(deep)}

@@ -36,7 +36,7 @@ class LinksLedger:
         self.added += self.elastic()[0]
 
     def removed(self, remove: Callable[[], None]) -> None:
-        """Call a function that removes contacts; their elastic energy counts as dissipated if the ledger is kept."""
+        """Call a function that removes contacts; if the ledger is kept, their energy counts as dissipated."""
         counted = self._world.ledger is not None
         stored = self.elastic()[0] if counted else 0.0
         remove()

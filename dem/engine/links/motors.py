@@ -1,4 +1,4 @@
-"""Motors on the engine links, which prescribe rates or leave angles free; see `dem.engine.links.motion.motoring`."""
+"""Motors on the engine links; `dem.engine.links.motion.motoring` describes how they act."""
 
 from __future__ import annotations
 

@@ -61,7 +61,7 @@ class Shape:
 
     @property
     def reach(self) -> float:
-        """Largest distance of the links' axes from the centre of mass [m]; of a smarticle at its initial angles."""
+        """Largest distance of the links' axes from the centre of mass [m], at a smarticle's initial angles."""
         starts, ends = self.lines[:, :3], self.lines[:, :3] + self.lines[:, 3:6]
         return float(np.linalg.norm(np.concatenate([starts, ends]), axis=1).max(initial=0.0))
 
@@ -130,7 +130,7 @@ def smarticle_shape(particle: Particle) -> Shape:
 
 
 def offsets_of(particle: Particle) -> Array:
-    """Return the offsets (S,) of a link's strands along the normal [m]; several strands reach to both faces."""
+    """Return the offsets (S,) of a link's strands along the normal [m]; several reach to both faces."""
     reach = (particle.boxes.thickness_normal - particle.chain.diameter) / 2
     return np.zeros(1) if particle.chain.rows == 1 else np.linspace(-reach, reach, particle.chain.rows)
 

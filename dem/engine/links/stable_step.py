@@ -40,7 +40,7 @@ def links_stable_time_step(
     free: bool = False,
     strings: Sequence[tuple[float, float]] = (),
 ) -> float:
-    """Return the largest time step [s] that is stable for the stiffest modes of a smarticle in contact with others.
+    """Return the largest time step [s] that is stable for the stiffest modes of a smarticle in a pile.
 
     The modes are:
 
@@ -115,7 +115,7 @@ def _mass(shape: Shape, row: Array, free: bool) -> Array:
 
 
 def _ends(shape: Shape) -> list[tuple[int, tuple[float, float, float]]]:
-    """Return the link and the position from the centre of mass [m] of each end of a segment; each joint once."""
+    """Return link and position from the centre of mass [m] of all ends of segments, joints once."""
     ends = []
     for line, link, shared in zip(shape.lines, shape.link, shape.shared, strict=True):
         for bit, place in ((AT_END, line[:3] + line[3:6]), (AT_START, line[:3])):
@@ -126,13 +126,13 @@ def _ends(shape: Shape) -> list[tuple[int, tuple[float, float, float]]]:
 
 
 def _tip_of(ends: list[tuple[int, tuple[float, float, float]]]) -> tuple[int, float, float]:
-    """Return link, x and y [m] of the first tip: that of barb 1, or an end of the middle link without barbs."""
+    """Return link, x and y [m] of the first tip, which is that of barb 1 if there are barbs."""
     link, (x, y, _) = ends[0]
     return link, x, y
 
 
 def _motion_of(shape: Shape, row: Array, link: int, place: tuple[float, float, float], free: bool) -> Array:
-    """Return the matrix (3, 6), with free angles (3, 8), from velocities of a smarticle to that of a point.
+    """Return the matrix (3, 6), with free angles (3, 8), that gives the velocity of a point of a link.
 
     Args:
         row: plane geometry of the smarticle.
@@ -154,7 +154,7 @@ def _motion_of(shape: Shape, row: Array, link: int, place: tuple[float, float, f
 
 
 def _stable_step(mass: Array, stiffness: Array, damping: Array) -> float:
-    """Return the largest step [s] up to which 4 M - K dt² - 2 C dt is positive definite for all modes, by bisection.
+    """Return the largest step [s] up to which 4 M - K dt² - 2 C dt is positive definite for all modes.
 
     Args:
         mass: (k, k) M.

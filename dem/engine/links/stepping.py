@@ -1,4 +1,4 @@
-"""Make many time steps in one call; `advance` and `act` show everything that happens in a step, in order."""
+"""Make many time steps in one call; `advance` and `act` show all that happens in a step, in order."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ TOTALS = 6
 
 @part
 def shaken_to(ground: Ground, time: float) -> None:
-    """Move the shaken boundaries to their heights at a time [s]; `place` and `speed` of `ground` are written."""
+    """Move the shaken boundaries to their heights at a time [s]; `place` and `speed` are written."""
     if ground.wave[1] > 0.0:
         phase = ground.wave[1] * (time - ground.wave[2])
         for k in range(4):

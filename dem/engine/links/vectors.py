@@ -1,4 +1,4 @@
-"""Vectors of three numbers as tuples, which the compiler keeps in registers, and nearest points of two segments."""
+"""Vectors as tuples of three numbers, which cost no memory, and nearest points of two segments."""
 
 from __future__ import annotations
 

@@ -473,7 +473,7 @@ def quaternion_of(matrix: Array) -> Array:
 
 
 def no_contacts(segments: int, slots: int) -> Kept:
-    """Return the memory of segments without contacts with boundaries; `slots`: largest number of contacts each."""
+    """Return the memory of segments that touch no boundary, with `slots` contacts of each at most."""
     return Kept(np.zeros((segments, slots, 4)), np.zeros((segments, slots), np.uint8), np.zeros(segments, np.uint8))
 
 

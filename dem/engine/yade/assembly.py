@@ -1,4 +1,4 @@
-"""Smarticles as rigid bodies of spheres: one body if welded, three links and two hinges if articulated.
+"""Smarticles as rigid bodies of spheres: one body if welded, three bodies and two hinges otherwise.
 
 Welding and articulating conserve positions, momentum and angular momentum up to rounding. Articulating also conserves
 the kinetic energy; welding dissipates the energy of the links' relative motion.

@@ -147,7 +147,7 @@ def _mass_matrix(boxes: Boxes) -> Array:
 
 
 def _velocity_of(boxes: Boxes, link: int, point: Array) -> Array:
-    """Return the matrix (3, 18) that maps the velocities of all links to the velocity of a point of `link`.
+    """Return the matrix (3, 18) that maps the velocities of all links to that of a point of `link`.
 
     Args:
         point: (3,) the point in the body frame [m].

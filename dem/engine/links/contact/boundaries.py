@@ -63,7 +63,7 @@ def slots_for(hooks: Hooks | None, rims: Rims | None) -> int:
 def _note(
     rows: Array, count: int, slot: int, part_of: int, depth: float, room: float, point: Vector, normal: Vector
 ) -> int:
-    """Write a full contact (SHARE 1) at a point of a link's axis as row `count`; return the new number of rows."""
+    """Write a full contact (SHARE 1) at a point of a link's axis; return the new number of rows."""
     row = rows[count]
     row[SLOT], row[PART], row[DEPTH], row[SHARE], row[FACTOR], row[ROOM] = slot, part_of, depth, 1.0, 1.0, room
     put(row, AXIS, point)
@@ -159,7 +159,7 @@ def _contacts_with_wall(radius: float, ground: Ground, slot: int, point: Vector,
 
 @inlined
 def _contacts_with_rims(link: Array, ground: Ground, rims: Rims, first: int, rows: Array, count: int) -> int:
-    """Find the contacts of a link, without its ends, with edges of the wall; return the new number of rows."""
+    """Find the contacts of a link, without its ends, with the wall's edges; return the new number of rows."""
     if ground.flags[0] == 0:
         return count
     z, uz, radius = link[2], link[5], link[RADIUS]
@@ -291,7 +291,7 @@ def _rub(
     law: Law, bodies: Bodies, parts: Parts, segments: Segments, p: int, ground: Ground, ledger: Any, step: Step,
     contact: Array, slip: Array,
 ) -> None:  # fmt: skip
-    """Add the force of a boundary on segment `p` at a contact, and update its tangential spring `slip` (4,)."""
+    """Add the force of a boundary on segment `p` at a contact, and update the tangential spring `slip`."""
     i, row, damping = segments.body[p], segments.part[p], law.damping[bodies.shape[segments.body[p]], 0]
     depth, share, room, normal = contact[DEPTH], contact[SHARE], contact[ROOM], vector(contact, NORMAL)
     place, velocity, speed, turning = place_and_motion(segments.line[p, RADIUS], parts, ground, row, contact)
@@ -318,7 +318,7 @@ def _rub(
 
 @part
 def _squared(link: Array, s: float, radius: float, height: float) -> float:
-    """Return the squared distance of a point of a link's axis from a horizontal circle about the z-axis [m²]."""
+    """Return the squared distance [m²] of a point of an axis from a horizontal circle about the z-axis."""
     x, y, z = along(vector(link, 0), s, vector(link, 3))
     out, up = math.sqrt(x * x + y * y) - radius, z - height
     return float(out * out + up * up)
@@ -326,7 +326,7 @@ def _squared(link: Array, s: float, radius: float, height: float) -> float:
 
 @part
 def nearest_to_circle(link: Array, radius: float, height: float) -> float:
-    """Return the place along a link's axis, 0 to 1, that is nearest to a horizontal circle about the z-axis.
+    """Return the place on a link's axis, 0 to 1, that is nearest to a horizontal circle about the z-axis.
 
     Args:
         link: (6,) start of the axis and vector to its end [m].

@@ -1,4 +1,4 @@
-"""The contact law: a linear spring and a dashpot that never pull, and a tangential spring with Coulomb friction."""
+"""The contact law: normal spring and dashpot that never pull, tangential spring with Coulomb friction."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from dem.engine.links.vectors import Vector, add, along, cross, dot, put, scale,
 
 @inlined
 def share_of_step(depth: float, closing: float, dt: float) -> float:
-    """Return the factor on the spring's force in a step [1]: below 1 in the first and the last step of a contact.
+    """Return a factor on the spring's force [1], below 1 in the first and the last step of a contact.
 
     In these steps the bodies are in contact for a part of the step only. The leapfrog scheme conserves kn/2 δ_n δ_n+1
     of consecutive overlaps. With this factor a contact does no work in total, whatever its first and last overlap are.
@@ -31,7 +31,7 @@ def resist(
     law: Law, cn: float, load: float, share: float, hardening: float, normal: Vector, velocity: Vector, twist: float,
     dt: float, slip: Array,
 ) -> Vector:  # fmt: skip
-    """Return the force on the first body at a point of contact [N], without the force of the normal spring.
+    """Return the force on the first body at a point of contact [N], without that of the normal spring.
 
     The tangential spring keeps its direction in the tangent plane and turns with the two bodies about the normal. If
     its force would exceed the friction limit, the force is reduced to the limit and the tangential dashpot does not

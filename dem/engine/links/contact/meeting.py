@@ -124,9 +124,9 @@ def meet_at(
 
 @inlined
 def meets_elsewhere(both: Lines, reach: float, shared_p: int, shared_q: int) -> int:
-    """Count places besides the nearest points at which `meet_at` may find forces; 0 for most segments that touch.
+    """Count places besides the nearest points at which `meet_at` may find forces.
 
-    The code has no branches, since a mispredicted branch takes as long as the whole function. Numbers are bitwise equal
+    Most segments that touch have none. The code has no branches, since a mispredicted branch takes as long as the whole function. Numbers are bitwise equal
     to those of `_lie_along` and `_joint`. A joint at the end of a segment, which is rare, always counts.
 
     Args:

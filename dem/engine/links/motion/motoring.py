@@ -171,7 +171,7 @@ def update(shapes: Shapes, bodies: Bodies, motors: Motoring) -> None:
 
 @inlined
 def _prescribed(bodies: Bodies, motors: Motoring, i: int, k: int, target: float, interval: float) -> float:
-    """Return the rate of an angle [rad/s] in the control period that begins, for the laws halt, stall and ease.
+    """Return the rate of an angle [rad/s] in the control period that begins: laws halt, stall and ease.
 
     `halted` and `over` of `motors` are written.
 

@@ -1,4 +1,4 @@
-"""Move the bodies by one step: a kick changes momenta by the present forces, then a drift moves and turns all bodies.
+"""Move the bodies by one step: a kick changes momenta, then a drift moves and turns all bodies.
 
 The scheme is leapfrog: momenta are at the middles of steps, positions at their ends. Between kicks a body keeps its
 angular momentum L in the laboratory exactly. It turns by the implicit midpoint rule for L' = L × ω in the body frame,
@@ -84,7 +84,7 @@ def kick(
 def resolve_speeds(
     shapes: Shapes, bodies: Bodies, parts: Parts, segments: Segments, gravity: float, step: Step
 ) -> None:
-    """Raise `step.need` if a segment would move so far in a step that it could enter another one too deeply.
+    """Raise `step.need` if a segment moves so far in a step that it could enter another one too deeply.
 
     Args:
         bodies: the bodies, with the present forces in `load`.

@@ -1,4 +1,4 @@
-"""Compute centre of mass, inertia and generalised momenta of three hinged links in a plane, in closed form.
+"""Centre of mass, inertia and generalised momenta of three hinged links in a plane, in closed form.
 
 Frame: origin at the centre of mass, x along the middle link from hinge 1 to hinge 2, y towards the mouth, z along the
 normal: the middle link's axes. With the angular velocity ω of the middle link and the rates α̇ of the two angles

@@ -59,7 +59,7 @@ def _move(parts: Parts, row: int, velocity: Vector, spin: Vector, origin: Vector
 
 @inlined
 def find_motion(shapes: Shapes, bodies: Bodies, parts: Parts, i: int, hinged: Any) -> None:
-    """Write the velocities of the parts of body `i` at its centre of mass, and their spins, into `parts.motion`."""
+    """Write the motion of the parts of body `i` into `parts.motion`, for points at its centre of mass."""
     row, position = parts.begin[i], vector(bodies.position[i], 0)
     velocity, spin = vector(bodies.velocity[i], 0), vector(bodies.spin[i], 0)
     if hinged is not None and shapes.hinged[bodies.shape[i]]:
@@ -81,7 +81,7 @@ def find_motion(shapes: Shapes, bodies: Bodies, parts: Parts, i: int, hinged: An
 
 @inlined
 def _planar_line(planar: Planar, plane: Array, link: int) -> tuple[float, float, float, float]:
-    """Return x and y of a link's start and of the vector to its end [m], from the smarticle's centre of mass."""
+    """Return x and y of a link's start, from the centre of mass, and of the vector to its end [m]."""
     x, y, ux, uy = -planar.end - plane[0], -plane[1], 2 * planar.end, 0.0
     if link == 0:
         x, ux, uy = -planar.half - plane[0], planar.tip * plane[10], planar.tip * plane[11]
@@ -108,7 +108,7 @@ def place_segments(shapes: Shapes, bodies: Bodies, segments: Segments, i: int) -
 
 @inlined
 def find_motions(shapes: Shapes, bodies: Bodies, parts: Parts, hinged: Any) -> None:
-    """Write angular velocities of all bodies into `bodies.spin`, and motions of all parts into `parts.motion`."""
+    """Write the angular velocities of all bodies and the motion of all parts."""
     for i in range(bodies.position.shape[0]):
         find_spin(bodies, i, hinged)
         find_motion(shapes, bodies, parts, i, hinged)

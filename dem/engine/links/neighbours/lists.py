@@ -1,4 +1,4 @@
-"""Lists of near segments: a wide list, rebuilt seldom, and a tight list within the wide one, which steps read.
+"""Lists of near segments: a wide list, rebuilt seldom, and within it a tight list, which steps read.
 
 A list holds every pair of segments whose axes are nearer than the sum of their radii and skins. The order of both lists
 depends on positions only. The memory of a contact stays with its pair when a list is rebuilt.

@@ -1,4 +1,4 @@
-"""Find all pairs of segments that are nearer than the sum of their radii, their skins and a bare reach.
+"""Find all pairs of segments that are nearer than the sum of their radii, skins and a bare reach.
 
 Every link has a box about all its segments, enlarged by their radii, their skins and half the bare reach. Boxes are
 sorted by their lower corners into strips along y and, within a strip, into short bins along x. All boxes that can
@@ -38,7 +38,7 @@ class Grid(NamedTuple):
 
 @inlined
 def off_lines(line: Array, p: int, q: int, reach: float) -> bool:
-    """Return whether the infinite lines through two axes are farther apart than `reach` [m], without a division."""
+    """Return whether the infinite lines through two axes are farther apart than `reach` [m]."""
     one, other = line[p], line[q]
     normal = cross(vector(one, 3), vector(other, 3))
     across = dot(sub(vector(one, 0), vector(other, 0)), normal)
@@ -56,7 +56,7 @@ def near_each_other(line: Array, p: int, q: int, reach: float) -> bool:
 
 @part
 def search(segments: Segments, cells: Cells, bare: float, piece: float) -> int:
-    """Find all near pairs, and write them into `cells.first` and `cells.second`, grouped by the first segment.
+    """Write all near pairs into `cells.first` and `cells.second`, grouped by the first segment.
 
     Args:
         segments: positions of segments, and the link and body of each.
@@ -94,7 +94,7 @@ def search(segments: Segments, cells: Cells, bare: float, piece: float) -> int:
 
 @inlined
 def _bin(offset: float, size: float, last: int) -> int:
-    """Return the bin of an offset [m]; `last` for an offset beyond the last bin, and 0 for a negative one or NaN."""
+    """Return the bin of an offset [m]; `last` beyond the last bin, 0 for negative offsets and NaN."""
     return int(min(offset / size, float(last))) if offset > 0.0 else 0
 
 
@@ -129,7 +129,7 @@ def grid_over(cells: Cells, bare: float, piece: float) -> Grid:
 
 @inlined
 def sort_bins(cells: Cells, grid: Grid) -> None:
-    """Sort links into bins: write the bin of each link into `keys`, links by bin into `order`, bins into `starts`."""
+    """Sort links into bins; `keys`, `order` and `starts` of `cells` are written."""
     keys, starts, order = cells.keys, cells.starts, cells.order
     count, total = keys.shape[0], grid.columns * grid.strips
     for link in range(count):
@@ -152,7 +152,7 @@ def sort_bins(cells: Cells, grid: Grid) -> None:
 
 @inlined
 def copy_by_bin(segments: Segments, cells: Cells) -> None:
-    """Copy the boxes of links and their segments in the order of the bins, and number the groups of the list."""
+    """Copy boxes and segments of links in the order of the bins, and number the groups of the list."""
     few, n = cells.marks.shape[0] <= FEW, 0
     for m in range(cells.keys.shape[0]):
         link = cells.order[m]
