@@ -141,7 +141,7 @@ def spheres(vertices: Floats, chain: Chain) -> Floats:
     """Return the centres (N, S, 3) [m] of the S spheres of each smarticle.
 
     The spheres at the hinges belong to the middle link. The first sphere of a barb is a little more than a diameter
-    from the hinge, the surface of its last sphere touches the tip.
+    from the hinge. The surface of its last sphere touches the tip.
 
     Source:
         `dem.body.particle`.
@@ -163,7 +163,7 @@ def spheres(vertices: Floats, chain: Chain) -> Floats:
 
 
 def _side_by_side(points: Floats, vertices: Floats, chain: Chain) -> Floats:
-    """Repeat points (N, P, 3) of smarticles in each of R rows, shifted along the normal: (N, R, P, 3)."""
+    """Repeat points (N, P, 3) of smarticles in R rows shifted along each smarticle's normal: (N, R, P, 3)."""
     if chain.rows == 1:
         return points[:, None]
     reach = (chain.width - chain.diameter) / 2
@@ -173,7 +173,10 @@ def _side_by_side(points: Floats, vertices: Floats, chain: Chain) -> Floats:
 
 
 def _stations(length: float, chain: Chain, *, middle: bool, barbs: bool) -> Floats:
-    """Return the distances (S,) [m] of the sphere centres of a link from its hinge."""
+    """Return the distances (S,) [m] of the sphere centres of a link from its first hinge.
+
+    `middle`: the link is the middle link; `barbs`: the smarticle has barbs.
+    """
     if middle:
         inset = 0.0 if barbs else chain.diameter / 2
         start, end = inset, length - inset

@@ -174,7 +174,7 @@ def _frames_by_phase(run: Run, frames: FrameSequence) -> list[FrameSequence]:
 def _rows(
     part: FrameSequence, run: Run, series: Series | None, definitions: Sequence[str], costly: Costly, *, offset: int = 0
 ) -> list[dict[str, object]]:
-    """Return one row for each of some frames of one phase; `offset` is the number of the first of them."""
+    """Return one row per frame of a part of one phase; `offset` is the number of the first frame."""
     rows: list[dict[str, object]] = []
     measures = [measure for measure in frame_measures(definitions) if measure.available_for(run)]
     made = run.manifest
