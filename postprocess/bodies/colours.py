@@ -102,7 +102,8 @@ class ColourScale:
 def colour_field(name: str | None, run: Run) -> Field:
     """Return the field of a run by name or short name.
 
-    None stands for crossings, or for smarticle_id if the run is planar. InputError if the name is unknown, or the run lacks the field.
+    None stands for crossings, or for smarticle_id if the run is planar. InputError if the name is unknown, or the run
+    lacks the field.
     """
     usual = "smarticle_id" if run.manifest.planar else "crossings"
     field = checked_field(usual if name is None else name, ALIASES)
