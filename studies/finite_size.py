@@ -1,7 +1,7 @@
 """Finite size: packing, entanglement and percolation in piles of 100 to 10 000 smarticles.
 
-Measured are φ and ⟨N⟩ against N^(-1/3), where N is the number of smarticles, and the l/w from which entangled clusters
-span piles of each size. A run is a pour, a rest, a shake and a rest.
+The study measures φ and ⟨N⟩ against N^(-1/3), where N is the number of smarticles, and the l/w above which entangled
+clusters span piles of each size. A run is a pour, a rest, a shake and a rest.
 
 A pile is spanned if one cluster joins floor and top, and one joins opposite sides of the wall. The height alone is not
 enough: a pile of 100 thin smarticles is lower than a single smarticle is long.

@@ -1,8 +1,8 @@
 """A hook is pulled out of piles that were prepared by each procedure, at several θ and l/w.
 
-Measured are force against time, peak force and work, and their correlation with entanglement. They are compared with
-Savoie, Tuazon, Bhamla and Goldman, "Amorphous Entangled Active Matter", Soft Matter 2023, section "Tensile loading and
-fracture". Runs of one l/w and seed are poured from equal poses and compared pair by pair. If the hook stops at its
+The study measures force against time, peak force and work, and their correlation with entanglement, and compares them
+with Savoie, Tuazon, Bhamla and Goldman, "Amorphous Entangled Active Matter", Soft Matter 2023, section "Tensile loading
+and fracture". Runs of one l/w and seed are poured from equal poses and compared pair by pair. If the hook stops at its
 force limit ("held fast"), the peak force is a lower bound.
 """
 

@@ -3,8 +3,8 @@
 In the paper's own test (study `fracture`) a single smarticle may hold both hooks, or the hook lifts the whole pile,
 which rubs on the wall. Here a grid of bars 2.5 mm above the floor holds the pile, the wall is removed before the pull,
 and the hook is farther from the grid than a smarticle is long. So the force beyond the lifted weight is transmitted
-through the pile. Measured are force against displacement, peak force, work and the share that is torn off. They are
-compared with the findings of Savoie et al. (Soft Matter 2023).
+through the pile. The study measures force against displacement, peak force, work and the share of the pile that is torn
+off. It compares them with the findings of Savoie et al. (Soft Matter 2023).
 
 All procedures start from equal poses at each seed, and both heights of the hook from nearly equal ones. Procedures are
 compared by means over both heights, seed by seed, so that the number of samples is that of the seeds. If the hook
