@@ -108,7 +108,7 @@ def run(
 
 
 def read(directory: Path | str) -> Run:
-    """Open the run directory of a finished or unfinished run; raise InputError if it is none."""
+    """Open the directory of a finished or unfinished run; raise InputError for any other directory."""
     return open_run(directory)
 
 
@@ -130,7 +130,7 @@ def measure(run: Run | Path | str, *, frames: bool = False) -> pd.DataFrame:
 
 
 def read_sweep(directory: Path | str) -> SweepDirectory:
-    """Open the directory of a sweep or a study, finished or not; raise InputError if it is none."""
+    """Open the directory of a sweep or a study, finished or not; raise InputError for any other directory."""
     return SweepDirectory(open_folder(Path(directory)))
 
 

@@ -114,7 +114,7 @@ def colour_field(name: str | None, run: Run) -> Field:
 
 
 def scalars(field: Field, frame: Frame, run: Run) -> Floats:
-    """Return a value of a field per link, (N, 3), for vectors the length; NaN if the frame lacks it."""
+    """Return one value per link, (N, 3): a field's value or its length; NaN if the frame lacks the field."""
     values = link_values(field, frame, run)
     if values is None:
         return np.full((frame.count, 3), np.nan)

@@ -90,8 +90,9 @@ def close_pairs(vertices: Floats) -> tuple[Whole, Whole]:
 def swept_axes(vertices: Floats, diameter: float) -> Floats:
     """Return the axes (N, 4, 3) [m] of the bodies that a sphere sweeps along each smarticle.
 
-    An axis is the centrelines with both tips moved inwards by the sphere's radius, so that the body ends at the tips. A
-    barb shorter than the radius shrinks to its hinge; without barbs the ends of the middle link move inwards.
+    An axis consists of the three centrelines, with both tips moved inwards by the sphere's radius, so that the body
+    ends at the tips. A barb shorter than the radius shrinks to its hinge; without barbs the ends of the middle link
+    move inwards.
 
     Source:
         `dem.engine.links.shapes`; the sphere chains of `dem.body.particle` lie along these axes too.

@@ -1,7 +1,7 @@
 """Find the region inside the outline of a pile: the morphological closing of its links by a ball.
 
 The ball may be at every position at which it overlaps neither a link nor the floor. All space that no such ball covers
-belongs to the pile. A gap narrower than the ball is thus part of the pile, a wider one that is open to the outside is
+belongs to the pile. A gap narrower than the ball is thus part of the pile; a wider gap that is open to the outside is
 not. Flat faces keep their position, so that a pile that fills a box has the volume of the box.
 """
 

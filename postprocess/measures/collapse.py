@@ -75,7 +75,7 @@ class CollapseTime:
     outcome: Literal["collapsed", "collapsing", "standing"]
     time: float  #: τ [s]; NaN unless collapsed
     #: Standard error of τ [s], which allows for the correlation of successive residuals. If τ is shorter than the time
-    #: of the first sample, it is that time. NaN unless collapsed
+    #: of the first sample, the error is that time. NaN unless collapsed
     error: float
     bound: float  #: Lower bound of τ [s]: the observation time; NaN if collapsed
     exponent: float  #: β [-]

@@ -1,7 +1,7 @@
 """Find pairs of smarticles that touch or are close to each other, and smarticles that touch nothing.
 
-A frame holds the number of contacts of each smarticle as counted by the engine, not the pairs; these are found from the
-vertices. Recorded forces at contacts are the subject of `force_chains`.
+A frame holds the number of contacts of each smarticle as counted by the engine, not the pairs. The pairs are found
+from the vertices. Recorded forces at contacts are the subject of `force_chains`.
 """
 
 from __future__ import annotations

@@ -37,7 +37,7 @@ VIEWS: Mapping[str, tuple[float, float]] = MappingProxyType(
     {"front": (-90.0, 14.0), "oblique": (-62.0, 34.0), "top": (-90.0, 90.0)}
 )  #: Named views: azimuth and elevation of the camera from the centre of the pile [degree]
 
-MILLIMETRE = 1e3  #: Factor from m to mm, the unit of all drawing: VTK's tolerances are too coarse for metres
+MILLIMETRE = 1e3  #: Factor from m to mm, the unit of all drawing: VTK's tolerances do not suit a few cm given in m
 
 _OVERSAMPLING = 2
 _LEAST_SIZE, _LARGEST_SIZE = 200, 8000  # of a picture [pixel]
@@ -103,7 +103,7 @@ class Subject:
         self.frames = read_frames(directory)
 
     def extent(self, indices: Iterable[int], axes: Floats) -> Floats:
-        """Return the extent (2, 2) [mm] of some frames in the plane of the picture, see `extent`."""
+        """Return the lower left and upper right (2, 2) [mm] of some frames in the plane of the picture."""
         return union([extent(visible_meshes(self.bodies, self.frames[i], axes[2]).values(), axes) for i in indices])
 
     def values(self, indices: Iterable[int], style: Style) -> list[Floats]:

@@ -60,7 +60,7 @@ class Mean:
     value: float  #: Mean; NaN without samples, or if samples are infinite with both signs
     standard_error: float  #: Standard error; NaN for fewer than two samples, or if a sample is infinite
     count: int  #: Number of samples averaged
-    effective_count: float  #: Number of independent samples with an equal error of the mean; NaN if infinite
+    effective_count: float  #: Number of independent samples whose mean has this error; NaN if a sample is infinite
 
 
 def mean_with_error(samples: ArrayLike) -> Mean:

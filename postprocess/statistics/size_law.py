@@ -2,7 +2,7 @@
 
 N^(-1/3) is proportional to the surface of a pile over its volume. The variance from seed to seed is fitted as a power
 of N, by the differences of seeds at equal N. If the means deviate from the law by more than this variance explains,
-errors are multiplied by the square root of the ratio (Birge, Phys. Rev. 40, 207, 1932); it is rejected at 95 %.
+errors are multiplied by the square root of the ratio (Birge, Phys. Rev. 40, 207, 1932). The law is rejected at 95 %.
 
 A threshold is the x_c at which half of all runs have a property. The fraction of runs with the property rises with x as
 a logistic function 1/(1 + exp(-(x - x_c)/s)). The 95 % interval of x_c is by profile likelihood over all widths s; it

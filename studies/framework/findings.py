@@ -178,7 +178,7 @@ class Judged:
 
 
 def _verdict(effects: Sequence[Effect]) -> tuple[Verdict, float]:
-    """Return the common verdict of all effects, and the largest `Effect.more` of effects not resolved."""
+    """Return the combined verdict of all effects, and the largest `Effect.more` of effects not resolved."""
     verdict = all_of(effect.verdict for effect in effects)
     needed = [effect.more for effect in effects if effect.verdict == verdict == Verdict.NOT_RESOLVED]
     return verdict, float(np.max(needed)) if needed else math.nan

@@ -50,7 +50,7 @@ _WINDOW = 0.1  # s, of moving means of heights: longer than a swing at θ = 10°
 def prepared_by(run: Run, *then: str) -> dict[str, object]:
     """Return procedure, θ [deg], `run_columns`, and duration of the activity [s] of a run, by column.
 
-    InputError unless the phases are a pour, a rest, perhaps one activity and another rest, and last phases of the
+    InputError unless the phases are a pour, a rest, optionally one activity and another rest, and then phases of the
     types `then`.
     """
     types = [phase.type for phase in run.phases]

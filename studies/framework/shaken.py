@@ -101,7 +101,7 @@ def contact_of(run: Run) -> SceneData:
 
 
 def common_friction(run: Run) -> float:
-    """Return the coefficient of friction of a run [-]; InputError if smarticles and walls differ in it."""
+    """Return the coefficient of friction of a run [-]; InputError if it differs at walls."""
     contact = contact_of(run)
     between, wall = contact["friction_smarticle"], contact["friction_wall"]
     if between != wall:

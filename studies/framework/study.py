@@ -72,7 +72,7 @@ class Study:
     same_count: Sequence[str] = (ASPECT,)  #: Runs that agree in these columns must have equal numbers of smarticles
     same_fidelity: Sequence[str] = ()  #: Runs that agree in these columns must have one fidelity
     order: Sequence[str]  #: Columns that the table of runs is sorted by; empty: in the order of the runs given
-    #: Other columns by column: runs that agree in the other columns must have equal values in the column
+    #: Other columns by column: runs that agree in the other columns must agree in the column, too
     constant: Mapping[str, Sequence[str]] = field(default_factory=dict)
     #: Column that is above 0 for a run whose quantities are lower bounds, and the word for such runs in texts
     bounds: tuple[str, str] | None = None

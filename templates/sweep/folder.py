@@ -253,7 +253,7 @@ def _some(what: str, names: Sequence[str], most: int = 8) -> str:
 
 
 def open_folder(path: Path) -> Folder:
-    """Open the directory of a sweep; raise InputError if it is none, or its manifest is damaged."""
+    """Open the directory of a sweep; raise InputError if it has no manifest, or a damaged one."""
     if (path / MANIFEST).is_file():
         return Folder(path, SweepManifest.read(path / MANIFEST))
     if (path / RUN).is_file():

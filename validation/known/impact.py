@@ -239,7 +239,8 @@ def sliding_impact(access: EngineAccess, restitution: float, *, dashpot: float, 
 
     A tangential dashpot adds to the impulse: its force is not limited by friction until the tangential spring reaches
     Coulomb's limit. With slip speed s and approach speed v this happens at t* = μ cn v / (ks s − μ kn v). Until then
-    the impulse exceeds Coulomb's by (cs s − μ cn v/2) t*. Time steps longer than t* do not resolve this.
+    the impulse exceeds Coulomb's by (cs s − μ cn v/2) t*. Stiffnesses and dampings are kn, cn (normal) and ks, cs
+    (tangential). Time steps longer than t* do not resolve this.
     """
     speed, slip, dt = 0.2, 1.5, CONTACT_TIME / steps
     law = ball_law(restitution=restitution, friction=FRICTION, dashpot=dashpot)
