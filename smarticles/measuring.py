@@ -30,7 +30,7 @@ def has_frames(directory: Path) -> bool:
 
 
 def sources(directories: Sequence[Path]) -> dict[Path, Mapping[str, Any]]:
-    """Find the runs to measure in directories of runs and sweeps; raise InputError if a sweep has none.
+    """Find the runs to measure in directories of runs and sweeps; InputError if a sweep has no frames.
 
     Returns:
         Values of the sweep's variables by run directory, empty for runs without a sweep. Runs of a sweep that have no

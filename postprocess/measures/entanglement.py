@@ -122,8 +122,8 @@ def link_passages(vertices: Vertices) -> LinkPassages:
 def has_plane(vertices: Vertices) -> Flags:
     """Return which of N smarticles are bent enough to span a plane: (N,) bool.
 
-    A smarticle has no plane if its tips are farther apart than `STRAIGHT` (2l + w), or if all four vertices lie on one
-    line.
+    A smarticle has no plane if its tips are farther apart than `STRAIGHT` times 2l + w, or if all four vertices lie on
+    one line.
     """
     vertices = checked_vertices(vertices)
     unfolded = link_lengths(vertices).sum(axis=1)

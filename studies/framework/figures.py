@@ -393,7 +393,7 @@ class Histories:
 
 @dataclass(frozen=True, kw_only=True)
 class Scatter:
-    """A quantity against others in a panel each: small markers for runs, large ones for means over seeds."""
+    """A quantity against several others, one per panel: runs as small markers, means over seeds as large."""
 
     name: str  #: Name of the files without suffix
     xs: Sequence[Quantity]  #: Drawn along x, in a panel each

@@ -57,8 +57,8 @@ class Study:
 
     name: str  #: Name of the study on the command line and in the provenance
     title: str  #: Heading of the text
-    #: Measures one finished run and returns its row of the table of runs, several rows, or a `MeasuredRun` with a
-    #: history. If it raises InputError, the run is listed as missing
+    #: Measures one finished run and returns its row or rows of the table of runs, or a `MeasuredRun` with a history.
+    #: If it raises InputError, the run is listed as missing
     measure: Callable[[Run], Row | Sequence[Row] | MeasuredRun]
     keys: Sequence[Key]  #: Columns that name a point: one combination of the sweep's variables
     quantities: Sequence[Quantity]  #: Columns that are averaged over seeds
