@@ -28,7 +28,8 @@ from postprocess.measures.pull import PULL, has_pull, peak, read_pull, weight_of
 from postprocess.measures.table import LAST_FRAMES, summarise_run
 from postprocess.statistics.points import ASPECT, SEED, SEEDS, format_with_error, marked, seeds_of
 from postprocess.statistics.seeds import Scatter, mean_over_seeds, pooled_scatter, relative_difference
-from studies.framework.figures import POOLED, Means, one_by_one
+from postprocess.report.figures import BLUE, GREY, ORANGE
+from studies.framework.figures import POOLED, Analysis, Means, finish, one_by_one, panels
 from studies.framework.findings import Finding, Outcome, Verdict, decide
 from studies.framework.provenance import Reference
 from studies.framework.runs import DEFINITION, ENGINE, Key, Quantity, Row, duration, last_columns
@@ -54,6 +55,8 @@ _FIXED = frozenset({"wall_facets", "time_step_s"})
 _STIFFNESSES = (125.0, 250.0, 500.0, 1000.0, 2000.0, 4000.0)
 _CONVERGED = {"rows": 3, "stiffness_N_per_m": 4000.0}
 """Changes to the finest named fidelity on links that make the reference of the knobs `fidelity` and `engine`."""
+PROMISES = {"draft": 8.0, "standard": 3.0, "reference": 1.5}
+"""Largest error [%] of each named fidelity on links, with 95 % confidence, in all compared quantities."""
 _ROWS = {2: "two", 3: "three", 4: "four"}
 _MOST_SEEDS = 1000
 _TEMPLATE = Path("accuracy.yaml.j2")
@@ -427,7 +430,7 @@ def _of_series(run: Run, active: Sequence[int]) -> dict[str, float]:
         found[COMPARED["hook_force"]] = highest / (run.manifest.count * weight_of_one(run))
     data = series.data
     if "container_work_J" in data:
-        work, phases = data["container_work_J"] + data["motor_work_J"], data["phase"]
+        work, phases = data["container_work_J"] + data.get("motor_work_J", 0.0), data["phase"]
         found[COMPARED["energy"]] = math.fsum(work[phases == one][-1] - work[phases < one][-1] for one in active)
     if "energy_residual_J" in data and "dissipated_energy_J" in data:
         residual, dissipated = data["energy_residual_J"], data["dissipated_energy_J"]
@@ -539,6 +542,58 @@ def advise(table: pd.DataFrame, knob: str) -> Outcome:
     )
 
 
+def worst_errors(table: pd.DataFrame) -> pd.DataFrame:
+    """Return the named fidelities with their largest error over all compared quantities but hook forces.
+
+    The largest error is that with the largest bound: its absolute value plus its 95 % band. Columns: `engine`,
+    `fidelity`, `COST`, `quantity` (its symbol), `error [%]` (absolute value), `bound [%]`, and the number of seeds.
+    """
+    knob = "engine" if (table[KNOB] == "engine").any() else "fidelity"
+    rows = []
+    for _, row in table[(table[KNOB] == knob) & (table[SEEDS] > 1) & (table[VERDICT] != IS_REFERENCE)].iterrows():
+        errors = {
+            SYMBOLS[name]: (abs(row[f"{name} error [%]"]), row[f"{name} error 95 % [%]"])
+            for name in COMPARED
+            if name != "hook_force" and math.isfinite(row[f"{name} error [%]"])
+        }
+        symbol, (error, band) = max(errors.items(), key=lambda item: sum(item[1]))
+        labels = {ENGINE: row[ENGINE], "fidelity": row[VALUE].split()[-1], COST: row[COST], SEEDS: row[SEEDS]}
+        rows.append({**labels, "quantity": symbol, "error [%]": error, "bound [%]": error + band})
+    return pd.DataFrame(rows)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Promises:
+    """Largest error of each named fidelity against its cost, one panel for each scene."""
+
+    name: str = "fidelities"
+
+    def draw(self, path: Path, analysis: Analysis) -> list[Path]:
+        table = analysis.tables["work_precision"]
+        return self.compare(path, {str(table[ACTIVITY].dropna().iloc[0]): table}, analysis.footer)
+
+    def compare(self, path: Path, tables: Mapping[str, pd.DataFrame], footer: Sequence[str]) -> list[Path]:
+        """Draw tables of work and precision by the name of their scene; return the files."""
+        figure, axes = panels(len(tables), columns=3, height=3.0, sharey=True)
+        for panel, (title, table) in zip(axes, tables.items(), strict=True):
+            panel.set(title=title, xscale="log", xlabel="processor time per simulated time [s/s]")
+            for promise in PROMISES.values():
+                panel.axhline(promise, color=GREY, linewidth=0.6, linestyle=":")
+            for _, row in worst_errors(table).iterrows():
+                colour = {"links": BLUE, "yade": ORANGE}[row[ENGINE]]
+                bar = [[0.0], [row["bound [%]"] - row["error [%]"]]]
+                panel.errorbar(row[COST], row["error [%]"], yerr=bar, color=colour, marker="o", label=row[ENGINE])
+                text = f"{row['fidelity']}\n{row['quantity']}"
+                panel.annotate(text, (row[COST], row["bound [%]"]), (0, 3), textcoords="offset points", ha="center",
+                               color=colour)  # fmt: skip
+            panel.margins(x=0.25, y=0.12)
+            panel.set_ylim(bottom=0)
+        axes[0].set_ylabel("largest error of φ, height, ⟨N⟩, energy [%]")
+        limits = ", ".join(f"{name} {limit:g} %" for name, limit in PROMISES.items())
+        notes = [f"Point: error; end of the bar: what the seeds do not exclude (95 %). Dotted: promises, {limits}."]
+        return finish(figure, path, notes, footer)
+
+
 def _finding(knob: str, *, sensitivity: bool) -> Finding:
     return Finding(
         id=knob,
@@ -587,6 +642,7 @@ def study(rungs: Sequence[Rung], expected_s: Mapping[str, float] = MappingProxyT
         ),
         findings=[_finding(knob, sensitivity=sensitivity) for knob, sensitivity in knobs.items()],
         figures=(
+            *([Promises()] if {"fidelity", "engine"} & set(knobs) else []),
             Means(
                 name="accuracy",
                 table="work_precision",
