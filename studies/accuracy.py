@@ -26,9 +26,9 @@ from dem.setting.fidelity import Fidelity, fidelities
 from postprocess.measures.packing import DEFINITIONS
 from postprocess.measures.pull import PULL, has_pull, peak, read_pull, weight_of_one
 from postprocess.measures.table import LAST_FRAMES, summarise_run
+from postprocess.report.figures import BLUE, GREY, ORANGE
 from postprocess.statistics.points import ASPECT, SEED, SEEDS, format_with_error, marked, seeds_of
 from postprocess.statistics.seeds import Scatter, mean_over_seeds, pooled_scatter, relative_difference
-from postprocess.report.figures import BLUE, GREY, ORANGE
 from studies.framework.figures import POOLED, Analysis, Means, finish, one_by_one, panels
 from studies.framework.findings import Finding, Outcome, Verdict, decide
 from studies.framework.provenance import Reference
@@ -569,6 +569,7 @@ class Promises:
     name: str = "fidelities"
 
     def draw(self, path: Path, analysis: Analysis) -> list[Path]:
+        """Draw the ladder of one scene; return the files."""
         table = analysis.tables["work_precision"]
         return self.compare(path, {str(table[ACTIVITY].dropna().iloc[0]): table}, analysis.footer)
 

@@ -18,8 +18,9 @@ from dem.phases.pull_hook import PullHook
 from dem.phases.shake import Shake
 from dem.physics.contact import typical_effective_mass
 
-# Overlaps over a link's mean width. The aims of `stiffness_for` are those of the named stiffnesses in the paper's scenes
-# up to l/w = 1.8, where a fall by w presses contacts in most, so that a name has similar errors in violent scenes.
+# Overlaps over a link's mean width. The aims of `stiffness_for` are those of the named stiffnesses in the paper's
+# scenes up to l/w = 1.8, where a fall by w presses contacts in most, so that a name has similar errors in violent
+# scenes.
 WANTED = {"draft": 0.3, "standard": 0.17, "reference": 0.12}
 LIMIT = 0.5  # most that is accepted
 
