@@ -26,9 +26,9 @@ from dem.setting.fidelity import Fidelity, fidelities
 from postprocess.measures.packing import DEFINITIONS
 from postprocess.measures.pull import PULL, has_pull, peak, read_pull, weight_of_one
 from postprocess.measures.table import LAST_FRAMES, summarise_run
+from postprocess.report.figures import BLUE, GREY, ORANGE
 from postprocess.statistics.points import ASPECT, SEED, SEEDS, format_with_error, marked, seeds_of
 from postprocess.statistics.seeds import Scatter, mean_over_seeds, pooled_scatter, relative_difference
-from postprocess.report.figures import BLUE, GREY, ORANGE
 from studies.framework.figures import POOLED, Analysis, Means, finish, one_by_one, panels
 from studies.framework.findings import Finding, Outcome, Verdict, decide
 from studies.framework.provenance import Reference
@@ -49,7 +49,7 @@ ACTIVITIES = ACTUATED | {"shake"}
 
 _OF_MOTORS = frozenset({"control", "hinge"})
 _ENGINES = ("yade", "links")
-"""From coarse to fine: links have smooth bodies and walls, so that their converged results are the reference."""
+"""Engines from coarse to fine; links have smooth bodies and walls, so their converged results are the reference."""
 # Fields of the fidelity that no knob changes; a scene with its own time step is rejected.
 _FIXED = frozenset({"wall_facets", "time_step_s"})
 _STIFFNESSES = (125.0, 250.0, 500.0, 1000.0, 2000.0, 4000.0)
@@ -67,8 +67,8 @@ class Rung:
     """One value of a knob."""
 
     knob: str
-    value: str  #: As text
-    unit: str  #: Empty for a pure number or a name
+    value: str  #: Value of the knob, as text
+    unit: str  #: Unit of the value; empty for a pure number or a name
     setting: str  #: Name of the variant of the scene; its runs are named SETTING_seedN
 
     @property
@@ -86,7 +86,7 @@ class Rung:
 class Ladder:
     """Rungs of all knobs, and the variants of the scene that they need."""
 
-    rungs: tuple[Rung, ...]  #: By knob, from coarse to fine
+    rungs: tuple[Rung, ...]  #: Rungs by knob, from coarse to fine
     settings: Mapping[str, Mapping[str, Value]] = field(repr=False)  #: Variables of the template by variant
     left_out: tuple[str, ...] = ()  #: Rungs that the scene cannot have, with the reason, as text
     scenes: Mapping[str, Scene] = field(repr=False)  #: Scenes by variant
@@ -104,7 +104,7 @@ class Ladder:
 VARIANT, KNOB, VALUE, UNIT, REFERENCE, VERDICT = "variant", "knob", "value", "unit", "reference", "verdict"
 ACTIVITY, COUNT = "activity", "smarticles [-]"
 COST, WALL = "processor time per simulated time of the last activity [s/s]", "wall time [s]"
-"""Cost is given as processor time, which other processes change less than wall time; a run has one thread."""
+"""The cost is a processor time, which other processes change less than the wall time; a run has one thread."""
 
 EXPECTED = "processor time over expected wall time [-]"
 RESIDUAL, GAP = "energy residual over dissipated [-]", "largest joint gap [m]"
@@ -136,14 +136,14 @@ _NAMED = re.compile(r"(?P<variant>.+)_seed(?P<seed>\d+)")
 
 
 def default_seeds(scene: Scene) -> tuple[int, ...]:
-    """Return the default seeds: 1 to 20 on links, where runs are cheap, 1 to 3 on YADE."""
+    """Return the default seeds: 1 to 20 on links, where runs are cheap, otherwise 1 to 3."""
     return tuple(range(1, 21 if scene.smooth else 4))
 
 
 def parse_seeds(text: str) -> tuple[int, ...]:
     """Parse seeds from a text such as `1,2,3` or `1-20`.
 
-    InputError if there is no seed, one is not a whole number from 0, or one is given twice.
+    InputError if there is no seed, a seed is not a whole number from 0, or a seed is given twice.
     """
     words = [word.strip() for word in text.split(",") if word.strip()]
     if not words or not all(re.fullmatch(r"[0-9]{1,9}(-[0-9]{1,9})?", word) for word in words):
@@ -291,7 +291,7 @@ _Point = tuple[str, str, str, dict[str, Value]]
 
 
 def _rungs(knob: str, base: Mapping[str, Value], *, smooth: bool) -> list[_Point]:
-    """Return all rungs of a knob, from coarse to fine; `smooth`: links are smooth, not chains of spheres."""
+    """Return all rungs of a knob, from coarse to fine; `smooth`: links are swept bars, not sphere chains."""
     if knob == "section":
         return _strands(base) if smooth else _sections(base)
     if knob == "fidelity":
@@ -361,9 +361,9 @@ def _shaped(name: str, shape: dict[str, Value]) -> _Point:
 
 
 def measure(run: Run, expected_s: Mapping[str, float]) -> Row:
-    """Measure cost and compared quantities of a run, named SETTING_seedN; return its row.
+    """Measure cost and compared quantities of a run, whose directory is SETTING_seedN; return its row.
 
-    `expected_s` has expected wall times [s] by name of the run directory, as far as known.
+    `expected_s` has the known expected wall times [s] by name of the run directory.
     """
     active = [phase for phase in run.phases if phase.type in ACTIVITIES]
     if not active or active[0].index == 0:
@@ -415,9 +415,9 @@ def _or_nan(number: float | None) -> float:
 
 
 def _of_series(run: Run, active: Sequence[int]) -> dict[str, float]:
-    """Return the cells peak hook force, energies and joint gap of a run; NaN if not recorded.
+    """Return peak hook force, energies and joint gap of a run, by column; NaN if not recorded.
 
-    `active` has the indices of the phases whose work is added up.
+    `active` are the indices of the phases whose work is added up.
     """
     names = (COMPARED["hook_force"], COMPARED["energy"], RESIDUAL, GAP)
     found = dict.fromkeys(names, math.nan)
@@ -447,9 +447,9 @@ def work_precision(runs: pd.DataFrame, rungs: Sequence[Rung]) -> pd.DataFrame:
 
     The table has one row per rung, from coarse to fine within a knob; NaN for a rung without runs. Columns: cost and
     means over seeds with their standard errors `… SE`; `… error [%]`, relative to the mean of the reference; `… error
-    95 % [%]`, the band of the error, which is half of its 95 % interval by Student's t, with the scatter pooled over
-    all variants; `… resolved`, whether the error is beyond its band; `verdict`, whether any error of the rung is. The
-    reference has the error 0 and the band of its own mean.
+    95 % [%]`, the band of the error; `… resolved`, whether the error is beyond its band; `verdict`, whether any error
+    of the rung is resolved. The band is half of the 95 % interval by Student's t, with the scatter pooled over all
+    variants. The reference has the error 0 and the band of its own mean.
     """
     groups = {rung.setting: runs[runs[VARIANT] == rung.setting] for rung in rungs}
     scatters = {name: pooled_scatter(group[column] for group in groups.values()) for name, column in COMPARED.items()}
@@ -569,6 +569,7 @@ class Promises:
     name: str = "fidelities"
 
     def draw(self, path: Path, analysis: Analysis) -> list[Path]:
+        """Draw the ladder of one scene; return the files."""
         table = analysis.tables["work_precision"]
         return self.compare(path, {str(table[ACTIVITY].dropna().iloc[0]): table}, analysis.footer)
 
