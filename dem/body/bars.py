@@ -85,7 +85,10 @@ class Bars:
 
     @cached_property
     def _principal(self) -> tuple[Array, Array]:
-        """Principal moments (3,) [kg m²] and axes (3, 3) in columns, in the order that turns the frame least."""
+        """Principal moments (3,) [kg m²] and principal axes (3, 3) in columns, in the frame of `points`.
+
+        Axes are ordered and directed such that each is as near as possible to the axis of `points` with its number.
+        """
         squares = np.array([self.thickness_in_plane**2, self.thickness_normal**2])
         tensor = np.zeros((3, 3))
         for mass, length, frame, ends in zip(self.masses, self.lengths, self._frames, self.points, strict=True):

@@ -102,11 +102,11 @@ class ActuatedPhase(Phase):
     def follow(self, stage: Stage, engine: Engine, check_every: int | None = None) -> float:
         """Articulate smarticles, and make the control updates that are due.
 
-        Returns:
-            The simulated time until the next call [s]; 0 at the end of the phase.
-
         Args:
             check_every: number of updates after which the caller wants to check the pile; None: no checks.
+
+        Returns:
+            The simulated time until the next call [s]; 0 at the end of the phase.
         """
         update: int = stage.memory["look"]
         if update == 0:

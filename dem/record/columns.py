@@ -20,8 +20,8 @@ Columns = Mapping[str, Column]  #: Datasets by name, in the order of the file
 def _columns(*, whole_names: bool = False, **described: str | tuple[str, str]) -> Columns:
     """Return columns by name, from descriptions or pairs of label and description.
 
-    Units follow from the ends of the names. Default labels are the names without units, or, with `whole_names`, the
-    names.
+    Units follow from the ends of the names. A label that is not given is the name without its unit, or with
+    `whole_names` the whole name.
     """
     found = {}
     for name, text in described.items():

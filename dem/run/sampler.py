@@ -19,7 +19,7 @@ from dem.record.packing import packing_fraction
 
 @dataclass
 class Sampler:
-    """Computes rows of the series, and keeps values of the previous sample for means over time."""
+    """Compute rows of the series, and keep values of the previous sample for means over time."""
 
     radius: float  #: Radius for packing fractions [m]; NaN: they have no meaning
     effects: Set[EffectName] = frozenset()  #: Effects of the scene

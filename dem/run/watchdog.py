@@ -36,8 +36,8 @@ class Watchdog:
     def within_limits(self, extremes: Extremes, *, floor: float, raised: float | None = 0.0) -> bool:
         """Return whether extremes over all smarticles prove that all limits hold, except that of the energy.
 
-        If the result is false, a limit may still hold: `check` and `check_depths` must decide. `floor` and `raised`
-        are as in `check`.
+        If the result is false, all limits may hold nevertheless: `check` and `check_depths` must decide. `floor` and
+        `raised` are as in `check`.
         """
         inside = extremes.lowest >= floor
         if raised is not None:

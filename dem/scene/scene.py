@@ -38,7 +38,7 @@ _LEAST_GRAVITY = 1e-6  # m/s²; below it motors, whose torque limit is proportio
 def _named(base: str, given: Mapping[str, Any]) -> Mapping[str, Any]:
     """Return the knobs of the named fidelity `base`, adapted to given keys of a scene and its fidelity.
 
-    On the engine links `rows` is 1 if the scene has a plane, if t1 is at most t2, or if it gives `diameter_m`.
+    On the engine links `rows` is 1 if `given` has a plane or a `diameter_m`, or if t1 is at most t2.
     """
     engine, smarticle = given.get("engine", ""), given.get("smarticle") or Smarticle()
     narrow = smarticle.thickness_normal_m <= smarticle.thickness_in_plane_m

@@ -62,7 +62,7 @@ def stable_time_step(particle: Particle, law: ContactLaw) -> float:
 def hinged_stable_time_step(particle: Particle, law: ContactLaw, hinges: HingeLaw) -> float:
     """Return the largest stable time step [s] of an articulated smarticle with its hinges and contacts.
 
-    The smarticle is three links with 18 degrees of freedom, joined by the hinges' springs, with the contacts of
+    The smarticle has three links with 18 degrees of freedom, joined by the hinges' springs. Its contacts are those of
     `stable_time_step`: a barb's tip at another tip or at the container, a flat pile, and a rolling one. With matrices M
     of mass, K of stiffness and C of damping, a step is stable while K dt² + 2 C dt - 4 M has no positive eigenvalue.
     """

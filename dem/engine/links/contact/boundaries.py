@@ -78,9 +78,9 @@ def contacts_of_segment(
     """Find the contacts of a segment with all boundaries.
 
     Args:
-        segments: where all segments are.
-        ground: floor and wall, and where all boundaries are.
-        channel: (1,) half the distance of the walls that stand in for the container [m]; None for a container.
+        segments: all segments, with their positions.
+        ground: floor and wall, and the heights of all boundaries.
+        channel: (1,) half the distance of a channel's walls [m]; None in a container.
         hooks: the hooks; None: no hooks.
         rims: edges of the wall that links can reach; None: no such edges.
         p: number of the segment; contacts at a joint belong to the first segment that has the joint.
@@ -259,7 +259,7 @@ def push_boundaries(
         bodies: `deepest` is raised.
         parts: forces are added to `load`.
         kept: memory of the contacts, which is updated.
-        ground: forces are added to `force`.
+        ground: forces of the bodies on boundaries are added to `force`.
         rows: scratch of `contacts_of_segment`.
         met: scratch of `meeting.meet`.
 

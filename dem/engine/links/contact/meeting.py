@@ -126,8 +126,9 @@ def meet_at(
 def meets_elsewhere(both: Lines, reach: float, shared_p: int, shared_q: int) -> int:
     """Count places besides the nearest points at which `meet_at` may find forces.
 
-    Most segments that touch have none. The code has no branches, since a mispredicted branch takes as long as the whole function. Numbers are bitwise equal
-    to those of `_lie_along` and `_joint`. A joint at the end of a segment, which is rare, always counts.
+    Most segments that touch have no such place. The code has no branches, since a mispredicted branch takes as long as
+    the whole function. Numbers are bitwise equal to those of `_lie_along` and `_joint`. A joint at the end of a
+    segment, which is rare, always counts.
 
     Args:
         reach: square of the sum of both radii [m²].

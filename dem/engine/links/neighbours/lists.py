@@ -95,7 +95,7 @@ def _copy(to: Array, source: Array) -> None:
 
 @part
 def _replace(pairs: Pairs, cells: Cells, found: int) -> None:
-    """Replace the wide list by the `found` pairs in `cells`, and keep the memory of contacts."""
+    """Replace the wide list by the first `found` pairs in `cells`, and keep the memory of contacts."""
     kept = 0
     for k in range(pairs.counts[0]):
         if pairs.used[k]:
