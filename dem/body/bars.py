@@ -1,4 +1,4 @@
-"""Rigid bodies of straight flat bars that are joined at their ends: staples, crosses, rings, …"""
+"""Rigid bodies of straight flat bars that are joined at their ends: staples, crosses or rings."""
 
 import math
 from dataclasses import dataclass
@@ -87,7 +87,7 @@ class Bars:
     def _principal(self) -> tuple[Array, Array]:
         """Principal moments (3,) [kg m²] and principal axes (3, 3) in columns, in the frame of `points`.
 
-        Axes are ordered and directed such that each is as near as possible to the axis of `points` with its number.
+        Axes are right-handed, and ordered such that they are as near as possible to the axes of that frame.
         """
         squares = np.array([self.thickness_in_plane**2, self.thickness_normal**2])
         tensor = np.zeros((3, 3))
