@@ -54,7 +54,7 @@ class Boundaries(Protocol):
 
     @property
     def velocity(self) -> float:
-        """Vertical velocity of the container [m/s]; of its floor alone after the wall was removed."""
+        """Vertical velocity of the container's floor [m/s]."""
 
     @property
     def walled(self) -> bool:
@@ -206,7 +206,7 @@ class EnergyLedger(Protocol):
 
     @property
     def dissipated(self) -> float:
-        """Energy dissipated since the start, by contacts, hinges and welding [J]."""
+        """Energy dissipated since the start, by contacts, hinges, welding and `Engine.still` [J]."""
 
     @property
     def given(self) -> float:

@@ -21,7 +21,7 @@ class LinksLedger:
 
     @property
     def dissipated(self) -> float:
-        """Energy dissipated since the start by welding and, if the scene samples dissipation, by contacts [J]."""
+        """Energy dissipated since the start [J], by welding and stopping, and by contacts if recorded."""
         return float(self._world.totals[LOST])
 
     @property
