@@ -38,6 +38,7 @@ class Origin:
 
     found: Collected  #: Runs that were measured, and runs that are missing
     note: str  #: How the planned runs differ from the full study
+    full: str = ""  #: What the full study found; empty if these runs are the full study
     command: str  #: Command line
     reference: Reference
 
@@ -46,6 +47,10 @@ class Origin:
         """Text on how the measured runs differ from the full study, with the number of missing runs."""
         used, missing = len(self.found.runs), len(self.found.missing)
         return f"only {used} of {used + missing} runs of what is planned: {self.note}" if missing else self.note
+
+    @property
+    def _full(self) -> list[str]:
+        return [f"{self.full[0].upper()}{self.full[1:]}"] if self.full else []
 
     def _versions(self, name: str, engine: str = "") -> list[str]:
         manifests = [run.run.manifest for run in self.found.runs if engine in ("", run.run.manifest.engine)]
@@ -70,6 +75,7 @@ class Origin:
         made = f"{len(commits)} commits" if len(commits) > 2 else f"Commit {', '.join(commits)}"
         return [
             f"{self._which}; {points}",
+            *self._full,
             f"{first[0].upper()}{first[1:]}{' and more' if more else ''}. {made}. More: {text_name}, provenance.json.",
         ]
 
@@ -82,6 +88,7 @@ class Origin:
             *statements,
             f"Reference: {self.reference.statement}.",
             f"Note: {self.whole_note}",
+            *self._full,
             f"Versions: {versions}. Command: {self.command}",
         ]
 
