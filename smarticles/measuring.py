@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from functools import partial
 from multiprocessing import get_context
@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from dem.errors import InputError, nearest
 from dem.record.names import FRAME, OF_SWEEP, collection
+from smarticles.kept_tables import keep, key_of, read_kept
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -70,15 +71,21 @@ def follows(name: str, other: str, points: Iterable[Mapping[str, object]]) -> bo
 
 
 def measured(
-    directories: Sequence[Path], *, frames: bool = False, costly: Costly = "phase-end", jobs: int = 1
+    directories: Sequence[Path],
+    *,
+    frames: bool = False,
+    costly: Costly = "phase-end",
+    jobs: int = 1,
+    progress: Callable[[int, int], None] = lambda _done, _runs: None,
 ) -> pd.DataFrame:
-    """Measure runs and sweeps.
+    """Measure runs and sweeps; tables of runs that have not changed since are read from their directories.
 
     Args:
         frames: return one row per frame instead of one row per run and phase.
         costly: when to compute the costly packing fractions, see `postprocess.measure_run`.
         jobs: number of processes. More than 1 needs `if __name__ == "__main__":` in the calling script, since the
             processes import it.
+        progress: is called with the number of measured runs and of all runs to measure, after each run.
 
     Returns:
         A table with units in the column names. Variables of a sweep are columns after the first one. A variable is
@@ -89,23 +96,45 @@ def measured(
     """
     import pandas as pd  # noqa: PLC0415
 
-    found = sources(directories)
-    take = partial(_table, frames=frames, costly=costly)
-    if jobs == 1 or len(found) < _MIN_RUNS_FOR_PROCESSES:
-        tables = list(map(take, found, found.values()))
+    found, kind = sources(directories), f"{'frames' if frames else 'phases'}-{costly}"
+    keys = {directory: key_of(directory) for directory in found}
+    tables = {directory: read_kept(directory, kind, key) for directory, key in keys.items()}
+    missing = [directory for directory, table in tables.items() if table is None]
+    take = partial(_measure_and_keep, frames=frames, costly=costly, kind=kind)
+    if jobs == 1 or len(missing) < _MIN_RUNS_FOR_PROCESSES:
+        _collect(map(take, missing, (keys[directory] for directory in missing)), missing, tables, progress)
     else:
         # Spawned, since a forked process would not have the threads of VTK and matplotlib.
-        with ProcessPoolExecutor(jobs, mp_context=get_context("spawn")) as pool:
-            tables = list(pool.map(take, found, found.values()))
-    return pd.concat(tables, ignore_index=True)
+        with ProcessPoolExecutor(min(jobs, len(missing)), mp_context=get_context("spawn")) as pool:
+            made = pool.map(take, missing, (keys[directory] for directory in missing))
+            _collect(made, missing, tables, progress)
+    return pd.concat(
+        [_with_variables(table, found[run]) for run, table in tables.items() if table is not None], ignore_index=True
+    )
 
 
-def _table(directory: Path, values: Mapping[str, Any], *, frames: bool, costly: Costly) -> pd.DataFrame:
-    """Return the measures of one run, with the variables of its sweep after the first column."""
+def _collect(
+    made: Iterable[pd.DataFrame],
+    missing: Sequence[Path],
+    tables: dict[Path, pd.DataFrame | None],
+    progress: Callable[[int, int], None],
+) -> None:
+    for number, (directory, table) in enumerate(zip(missing, made, strict=True), start=1):
+        tables[directory] = table
+        progress(number, len(missing))
+
+
+def _measure_and_keep(directory: Path, key: str, *, frames: bool, costly: Costly, kind: str) -> pd.DataFrame:
     from dem.record.run import Run  # noqa: PLC0415
     from postprocess.measures.table import measure_run, summarise_run  # noqa: PLC0415
 
     table = (measure_run if frames else summarise_run)(Run(directory), costly=costly)
+    keep(table, directory, kind, key)
+    return table
+
+
+def _with_variables(table: pd.DataFrame, values: Mapping[str, Any]) -> pd.DataFrame:
+    """Return the measures of one run with the variables of its sweep after the first column."""
     for place, (name, value) in enumerate(values.items(), start=1):
         column = name
         if name in table.columns and (table[name] == value).all():
@@ -115,6 +144,19 @@ def _table(directory: Path, values: Mapping[str, Any], *, frames: bool, costly: 
         cell = value if isinstance(value, str | int | float | bool) else json.dumps(value, ensure_ascii=False)
         table.insert(place, column, [cell] * len(table))
     return table
+
+
+def of_phase(table: pd.DataFrame, phase: str) -> pd.DataFrame:
+    """Return the rows of a table of `measured` of one type of phase, or of the last phase of each run ("last").
+
+    Raises:
+        InputError: no run has a phase of this type.
+    """
+    if phase == "last":
+        return table[table["phase"] == table.groupby("run")["phase"].transform("max")].reset_index(drop=True)
+    if not (table["phase type"] == phase).any():
+        raise InputError(f"no run has a phase {phase!r}; {nearest(phase, [*table['phase type'].unique(), 'last'])}")
+    return table[table["phase type"] == phase].reset_index(drop=True)
 
 
 def grouped(table: pd.DataFrame, by: Sequence[str]) -> pd.DataFrame:

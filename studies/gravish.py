@@ -256,10 +256,7 @@ STUDY = Study(
             reference={
                 phi(stage): (_PUBLISHED["l_over_w"], _PUBLISHED[GRAVISH_COLUMNS[stage]]) for stage in ("phi_0", "phi_f")
             },
-            notes=[
-                gravish_note(sorted(_PUBLISHED["l_over_w"])),
-                "Piles that were shaken for less time than others are left out of φ_f.",
-            ],
+            notes=[gravish_note(sorted(_PUBLISHED["l_over_w"]))],
         ),
         Means(
             name="crossings",
@@ -284,7 +281,8 @@ STUDY = Study(
     remarks=(
         f"φ by {DEFINITION} unless named otherwise; {WHEN} (voxel and voronoi: the last frame, voronoi not of drafts). "
         f"φ_f at rest: the last frame after shaking, which is compared with Gravish et al., who shook for "
-        f"{SHAKE_TIME:g} s and measured piles at rest.",
+        f"{SHAKE_TIME:g} s and measured piles at rest. "
+        "Figures leave out φ_f of piles that were shaken for less time than others.",
     ),
     reference=GRAVISH,
     pictured={"l_over_w": 0.7},

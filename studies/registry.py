@@ -50,7 +50,7 @@ class Script:
         page = FOLDER.parent / "results" / self.name / "README.md"
         lines = page.read_text(encoding="utf-8").splitlines() if page.is_file() else []
         finding = next((line.removeprefix("> ") for line in lines if line.startswith("> ")), "")
-        return finding and f"{finding} (results/{self.name})"
+        return finding and f"{finding.rstrip('.')} (results/{self.name})."
 
     def load(self) -> Study:
         """Import the script and return its study."""

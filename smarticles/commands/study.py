@@ -82,8 +82,8 @@ def run_study(arguments: argparse.Namespace) -> int:
     folder = folder_of(sweep, points, arguments.out, arguments.command_line)
     lines = differences(points, expand(load_sweep(shipped.sweep_file())))
     note = f"not the full study: {'; '.join(lines)}" if lines else "the full study as shipped"
-    full = f"the full study found: {shipped.found}" if lines and shipped.found else ""
-    print(*filter(None, (note, full)), sep="\n", flush=True)
+    full = shipped.found if lines else ""
+    print(note, *([f"the full study found: {full}"] if full else []), sep="\n", flush=True)
     earlier = {} if arguments.earlier is None else _earlier(arguments.earlier, folder, shipped.load())
     if earlier:
         note += f"; {len(earlier)} runs from the tables of an earlier analysis, {arguments.earlier}"

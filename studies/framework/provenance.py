@@ -48,10 +48,6 @@ class Origin:
         used, missing = len(self.found.runs), len(self.found.missing)
         return f"only {used} of {used + missing} runs of what is planned: {self.note}" if missing else self.note
 
-    @property
-    def _full(self) -> list[str]:
-        return [f"{self.full[0].upper()}{self.full[1:]}"] if self.full else []
-
     def _versions(self, name: str, engine: str = "") -> list[str]:
         manifests = [run.run.manifest for run in self.found.runs if engine in ("", run.run.manifest.engine)]
         return sorted({manifest.versions.get(name, "unknown") for manifest in manifests})
@@ -71,12 +67,14 @@ class Origin:
     def figure_footer(self, points: str, text_name: str) -> list[str]:
         """Return the footer of a figure, which names the file with the full footer."""
         first, *more = (f"planned: {self.note}" if self.found.missing else self.note).split("; ")
+        differs = f"{first[0].upper()}{first[1:]}{' and more' if more else ''}."
+        if self.full:
+            differs = f"Not the full study, which found: {self.full}"
         commits = self._versions("git")
         made = f"{len(commits)} commits" if len(commits) > 2 else f"Commit {', '.join(commits)}"
         return [
             f"{self._which}; {points}",
-            *self._full,
-            f"{first[0].upper()}{first[1:]}{' and more' if more else ''}. {made}. More: {text_name}, provenance.json.",
+            f"{differs} {made}. More: {text_name}, provenance.json.",
         ]
 
     def footer(self, points: str, *statements: str) -> list[str]:
@@ -88,7 +86,7 @@ class Origin:
             *statements,
             f"Reference: {self.reference.statement}.",
             f"Note: {self.whole_note}",
-            *self._full,
+            *([f"The full study found: {self.full}"] if self.full else []),
             f"Versions: {versions}. Command: {self.command}",
         ]
 

@@ -1,5 +1,6 @@
 """The study of Gravish's packing: each finding from tables that deserve each verdict, and runs of known packing."""
 
+import re
 from collections.abc import Mapping
 from pathlib import Path
 
@@ -12,6 +13,7 @@ from dem.record.run import open_run
 from postprocess.statistics.points import ASPECT, SEED
 from studies.framework.shaken import AT_REST, SHAKEN, STAGES, phi, read_gravish
 from studies.gravish import STUDY, deviations, measure, steps
+from studies.registry import shipped
 
 SPREAD = {1: -0.002, 2: 0.0, 3: 0.002}
 
@@ -91,3 +93,17 @@ def test_the_figure_shows_fully_shaken_piles_alone() -> None:
     assert values["after rest"].loc[0.7].tolist() == [0.1155, 0.143]
     assert values["while shaken"].loc[0.7].isna().tolist() == [True, False]
     assert values["after rest"].loc[0.4].isna().tolist() == [False, True]  # shaken for 1.5 s beside 20 s
+
+
+def test_figures_of_a_quick_study_say_what_the_full_study_found(tmp_path: Path) -> None:
+    runs = [
+        write_run(tmp_path / f"{aspect}_{seed}", SyntheticRun(aspect_ratio=aspect, seed=seed, frames_per_phase=1))
+        for aspect in (0.4, 0.7)
+        for seed in (1, 2)
+    ]
+    note, full = "not the full study: 18 runs instead of 73; fidelity: draft", shipped("gravish").found
+    report = STUDY.analyse(runs, tmp_path / "results", note=note, full=full, command="smarticles study gravish --quick")
+    for name in ("phi", "crossings", "phi_time"):
+        texts = re.findall(r"<text[^>]*>([^<]*)</text>", report.files[f"{name}.svg"].read_text(encoding="utf-8"))
+        assert f"Not the full study, which found: {full}" in " ".join(texts)
+        assert {"phi": "Gravish 2012", "crossings": "0.40", "phi_time": "l/w = 0.7"}[name] in texts

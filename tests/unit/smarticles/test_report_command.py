@@ -200,7 +200,7 @@ def test_a_study_is_analysed_drawn_and_reported(tmp_path: Path, write_run: Write
     assert "; shake_s: 1.5 instead of 20.0 in 3 of 18 runs; " in lines[0]
     assert lines[1] == f"the full study found: {shipped('gravish').found}"
     assert "(results/gravish)" in lines[1]
-    assert lines[3].split()[:4] == ["links", "0.4", "20", "3"], said.err
+    assert lines[3].split()[:4] == ["links", "0.4", "20", "3"]
     for table in ("points.csv", "deviations.csv", "findings.md"):
         assert f"The full study found: {shipped('gravish').found}" in (results / table).read_text(encoding="utf-8")
     assert "FOUND: φ_f is above φ_0 at every l/w" in lines
