@@ -17,6 +17,7 @@ from smarticles.kept_tables import keep, key_of, read_kept
 if TYPE_CHECKING:
     import pandas as pd
 
+    from postprocess.measures.registry import FrameMeasure
     from postprocess.measures.table import Costly
     from templates.sweep.folder import Folder
 
@@ -75,6 +76,7 @@ def measured(
     *,
     frames: bool = False,
     costly: Costly = "phase-end",
+    measures: Sequence[FrameMeasure] = (),
     jobs: int = 1,
     progress: Callable[[int, int], None] = lambda _done, _runs: None,
 ) -> pd.DataFrame:
@@ -83,6 +85,7 @@ def measured(
     Args:
         frames: return one row per frame instead of one row per run and phase.
         costly: when to compute the costly packing fractions, see `postprocess.measure_run`.
+        measures: further measures; tables with their columns are not kept.
         jobs: number of processes. More than 1 needs `if __name__ == "__main__":` in the calling script, since the
             processes import it.
         progress: is called with the number of measured runs and of all runs to measure, after each run.
@@ -96,11 +99,12 @@ def measured(
     """
     import pandas as pd  # noqa: PLC0415
 
-    found, kind = sources(directories), f"{'frames' if frames else 'phases'}-{costly}"
-    keys = {directory: key_of(directory) for directory in found}
-    tables = {directory: read_kept(directory, kind, key) for directory, key in keys.items()}
+    # A further measure is a function whose source may be unknown, so that its tables are not kept.
+    found, kind = sources(directories), "" if measures else f"{'frames' if frames else 'phases'}-{costly}"
+    keys = {directory: key_of(directory) if kind else "" for directory in found}
+    tables = {directory: read_kept(directory, kind, key) if kind else None for directory, key in keys.items()}
     missing = [directory for directory, table in tables.items() if table is None]
-    take = partial(_measure_and_keep, frames=frames, costly=costly, kind=kind)
+    take = partial(_measure_and_keep, frames=frames, costly=costly, measures=measures, kind=kind)
     if jobs == 1 or len(missing) < _MIN_RUNS_FOR_PROCESSES:
         _collect(map(take, missing, (keys[directory] for directory in missing)), missing, tables, progress)
     else:
@@ -124,12 +128,15 @@ def _collect(
         progress(number, len(missing))
 
 
-def _measure_and_keep(directory: Path, key: str, *, frames: bool, costly: Costly, kind: str) -> pd.DataFrame:
+def _measure_and_keep(
+    directory: Path, key: str, *, frames: bool, costly: Costly, measures: Sequence[FrameMeasure], kind: str
+) -> pd.DataFrame:
     from dem.record.run import Run  # noqa: PLC0415
     from postprocess.measures.table import measure_run, summarise_run  # noqa: PLC0415
 
-    table = (measure_run if frames else summarise_run)(Run(directory), costly=costly)
-    keep(table, directory, kind, key)
+    table = (measure_run if frames else summarise_run)(Run(directory), costly=costly, measures=measures)
+    if kind:
+        keep(table, directory, kind, key)
     return table
 
 

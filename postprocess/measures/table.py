@@ -14,7 +14,7 @@ from dem.record.frames import FrameSequence
 from dem.record.run import Run
 from dem.record.series import Series
 from postprocess.measures.packing import DEFINITIONS, packing_of
-from postprocess.measures.registry import frame_measures, phase_measures
+from postprocess.measures.registry import FrameMeasure, frame_measures, phase_measures
 from postprocess.statistics.points import ASPECT, SEED, marked
 from postprocess.statistics.seeds import Mean, mean_with_error
 
@@ -39,13 +39,18 @@ class PackingChange:
 
 
 def measure_run(
-    run: Run, *, definitions: Sequence[str] = tuple(DEFINITIONS), costly: Costly = "phase-end"
+    run: Run,
+    *,
+    definitions: Sequence[str] = tuple(DEFINITIONS),
+    costly: Costly = "phase-end",
+    measures: Sequence[FrameMeasure] = (),
 ) -> pd.DataFrame:
     """Measure every frame of a run, which may be finished, failed or still running.
 
     Args:
         definitions: Definitions of the packing fraction, keys of `packing.DEFINITIONS`.
         costly: Frames for which costly measures are computed: none, the last recorded frame of each phase, or all.
+        measures: Further measures, whose columns follow those of the registered ones.
 
     Returns:
         A table with one row per frame and units in its column names. Columns of `series.h5`, if that file exists, have
@@ -58,7 +63,7 @@ def measure_run(
     frames, series = _open(run, definitions)
     rows: list[dict[str, object]] = []
     for part in _frames_by_phase(run, frames):
-        rows += _rows(part, run, series, definitions, costly, offset=len(rows))
+        rows += _rows(part, run, series, definitions, costly, further=measures, offset=len(rows))
     return pd.DataFrame(rows)
 
 
@@ -69,6 +74,7 @@ def summarise_run(
     definitions: Sequence[str] = tuple(DEFINITIONS),
     costly: Costly = "phase-end",
     phases: Collection[int] | None = None,
+    measures: Sequence[FrameMeasure] = (),
 ) -> pd.DataFrame:
     """Measure each phase of a run: means over its last frames, and measures of the whole phase.
 
@@ -77,6 +83,7 @@ def summarise_run(
         definitions: Definitions of the packing fraction, keys of `packing.DEFINITIONS`.
         costly: Frames for which costly measures are computed, see `measure_run`.
         phases: Indices of the phases to measure; all if not given.
+        measures: Further measures, whose columns follow those of the registered ones.
 
     Returns:
         A table with one row per phase and units in its column names. A column "… SE" follows each mean with its
@@ -92,7 +99,7 @@ def summarise_run(
     for part in _frames_by_phase(run, frames):
         if phases is not None and part[0].phase not in phases:
             continue
-        table = pd.DataFrame(_rows(part[-last:], run, series, definitions, costly))
+        table = pd.DataFrame(_rows(part[-last:], run, series, definitions, costly, further=measures))
         summary = {name: table[name].iloc[-1] for name in (*_LABELS, "phase", "phase type", "time [s]")}
         summary["frames averaged"] = len(table)
         for name in table.columns.difference([*summary, "frame"], sort=False):
@@ -172,11 +179,18 @@ def _frames_by_phase(run: Run, frames: FrameSequence) -> list[FrameSequence]:
 
 
 def _rows(
-    part: FrameSequence, run: Run, series: Series | None, definitions: Sequence[str], costly: Costly, *, offset: int = 0
+    part: FrameSequence,
+    run: Run,
+    series: Series | None,
+    definitions: Sequence[str],
+    costly: Costly,
+    *,
+    further: Sequence[FrameMeasure],
+    offset: int = 0,
 ) -> list[dict[str, object]]:
     """Return one row per frame of a part of one phase; `offset` is the number of the first frame."""
     rows: list[dict[str, object]] = []
-    measures = [measure for measure in frame_measures(definitions) if measure.available_for(run)]
+    measures = [measure for measure in (*frame_measures(definitions), *further) if measure.available_for(run)]
     made = run.manifest
     values = (str(run.path), made.name, made.seed, made.aspect_ratio, made.count, made.fidelity, made.scene_sha256)
     labels = dict(zip(_LABELS, values, strict=True))

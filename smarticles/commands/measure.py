@@ -76,9 +76,9 @@ def measure_runs(arguments: argparse.Namespace) -> int:
     """Print the measures of runs or write them to files; return the exit status."""
     import pandas as pd  # noqa: PLC0415
 
+    from dem.engine.cores import usable_cores  # noqa: PLC0415
     from dem.record.run import Run, open_run  # noqa: PLC0415
     from postprocess.measures.profile import profile_table  # noqa: PLC0415
-    from dem.engine.cores import usable_cores  # noqa: PLC0415
     from postprocess.report.tables import write_table  # noqa: PLC0415
 
     output: Path | None = arguments.table
@@ -134,7 +134,12 @@ class _Progress:
         if runs > 1 and (terminal or now - self._last > 10):
             self._last = now
             text = f"measured {done} of {runs} runs"
-            print(f"\r{text}" if terminal else text, end="\n" * (done == runs or not terminal), file=sys.stderr, flush=True)
+            print(
+                f"\r{text}" if terminal else text,
+                end="\n" * (done == runs or not terminal),
+                file=sys.stderr,
+                flush=True,
+            )
 
 
 def _groups(arguments: argparse.Namespace) -> Sequence[str]:

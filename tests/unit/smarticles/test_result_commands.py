@@ -70,7 +70,8 @@ def test_measure_has_the_variables_of_a_sweep_and_means_by_them(
     rest = smarticles("measure", out, "--by", "kind", "--by", "count", "--phase", "last").out.splitlines()
     assert [line.split()[:4] for line in rest[1:3]] == [["a", "5", "1", "relax"], ["a", "6", "1", "relax"]]
     unknown = smarticles("measure", out, "--phase", "shakes")
-    assert (unknown.status, "--phase shakes: no run has a phase 'shakes'; did you mean 'shake'?" in unknown.err) == (2, True)
+    assert unknown.status == 2
+    assert "--phase shakes: no run has a phase 'shakes'; did you mean 'shake'?" in unknown.err
 
 
 def test_measure_keeps_the_tables_of_runs_that_have_not_changed(
