@@ -114,6 +114,16 @@ class Scene(Part):
             raise ValueError(f"unknown fidelity {shown(base)}; {nearest(str(base), FIDELITIES)}")
         return {"base": base, **_named(base, {**info.data, **value}), **value}
 
+    @field_validator("container", mode="before")
+    @classmethod
+    def _some_container(cls, value: Any) -> Any:
+        if value is None:
+            raise ValueError(
+                "got null, but there is no scene without a container; leave the key out, give a radius_m that is "
+                "never reached, or add the phase remove-container; see docs/limits.md"
+            )
+        return value
+
     @field_validator("gravity_m_per_s2")
     @classmethod
     def _some_or_none(cls, value: float) -> float:

@@ -12,6 +12,17 @@ LONGEST_LENGTH = 1.0  # m; longer smarticles or containers are taken for lengths
 REFERENCE_ASPECT_RATIO = 0.7  # l/w of the smarticle for which the paper states torques and swings
 
 
+# Words that users try as keys, and what no scene can describe.
+_BEYOND = {
+    **dict.fromkeys(("shape", "shapes", "mesh"), "shapes by this key"),
+    **dict.fromkeys(("mixture", "species", "types"), "mixtures by this key"),
+    **dict.fromkeys(("cohesion", "adhesion", "capillary", "glue", "magnets"), "cohesion"),
+    **dict.fromkeys(("air", "drag", "fluid", "water", "wind"), "air or water"),
+    **dict.fromkeys(("material", "materials", "young_modulus", "poisson_ratio"), "materials by this key"),
+    **dict.fromkeys(("lid", "box", "walls", "periodic"), "containers by this key"),
+}
+
+
 class Part(Strict):
     """Base of all parts of a scene: a frozen mapping of keys."""
 
@@ -29,6 +40,8 @@ class Part(Strict):
             elsewhere = difflib.get_close_matches(key, part.model_fields, n=1, cutoff=0.65)
             if elsewhere:
                 return f"{elsewhere[0]!r} belongs in {part.tag()}"
+        if key in _BEYOND:
+            return f"scenes have no {_BEYOND[key]}; docs/limits.md lists what the project cannot do and what there is"
         return "known keys: " + ", ".join(cls.model_fields)
 
     @classmethod
