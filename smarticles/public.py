@@ -18,6 +18,7 @@ import yaml
 
 from dem.errors import InputError, RunError
 from dem.record.frame import Frame
+from dem.record.names import SCENE
 from dem.record.run import Run, open_run
 from dem.scene.reading import SCHEMA_VERSION, apply_override, dump_scene
 from dem.scene.scene import Scene
@@ -129,6 +130,9 @@ def run(
             file.write_text(dump_scene(scene), encoding="utf-8")
         words = [*smarticles_command(file, Path(out), resume), "--threads", str(threads)]
         words += [] if ranks is None else ["--ranks", str(ranks)]
+        if isinstance(scene, Scene):
+            # The file in the temporary folder will not exist; `scene.yaml` in the run directory will.
+            words += ["--recorded-as", shlex.join(["smarticles", "run", str(Path(out) / SCENE), "--out", "NEW"])]
         done = subprocess.run(
             words, env=environment(), stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True, check=False
         )

@@ -6,6 +6,7 @@ from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
+import numpy as np
 import pandas as pd
 
 from dem.errors import InputError
@@ -219,8 +220,10 @@ def _series_columns(series: Series, time: float) -> dict[str, float]:
             continue
         # A newer version may have recorded a column that is unknown here.
         label = EVERY[name].label if name in EVERY else name
-        # Files write a pure number's unit as 1, tables as a dash.
-        unit = "-" if series.units[name] in {"1", ""} else series.units[name]
+        # Files write a pure number's unit as 1 and have angles in radians, tables have a dash and degrees, as scenes do.
+        unit = {"1": "-", "": "-", "rad": "degree"}.get(series.units[name], series.units[name])
+        if unit == "degree":
+            values = np.degrees(values)
         if values.ndim == 1:
             columns[f"{label} [{unit}]"] = float(values[index])
         else:

@@ -47,6 +47,7 @@ directory that contains other files is rejected and not changed.""",
     add_options(run, "--out", required=True, help="new run directory")
     resume_help = "continue the unfinished run of this scene in DIR from its last checkpoint"
     run.add_argument("--resume", action="store_true", help=resume_help)
+    run.add_argument("--recorded-as", metavar="COMMAND", help=argparse.SUPPRESS)  # for `smarticles.run` in Python
     add_options(
         run,
         "--threads",
@@ -137,8 +138,9 @@ def _run(
     from dem.run.simulation import StopRequestedError  # noqa: PLC0415
 
     quoted_out = shlex.quote(str(out))
+    command = getattr(arguments, "recorded_as", None) or arguments.command_line
     try:
-        outcome = run.run_scene(scene, out, command=arguments.command_line, progress=sys.stderr.isatty(), resume=resume)
+        outcome = run.run_scene(scene, out, command=command, progress=sys.stderr.isatty(), resume=resume)
     except StopRequestedError as stop:
         print(f"smarticles: {stop}; to be continued: smarticles resume {quoted_out}", file=sys.stderr)
         return TO_BE_CONTINUED

@@ -2,6 +2,7 @@
 
 import importlib.metadata
 import json
+import shlex
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -51,6 +52,11 @@ class Origin:
     def _versions(self, name: str, engine: str = "") -> list[str]:
         manifests = [run.run.manifest for run in self.found.runs if engine in ("", run.run.manifest.engine)]
         return sorted({manifest.versions.get(name, "unknown") for manifest in manifests})
+
+    @property
+    def _start(self) -> str:
+        words = [word for word in shlex.split(self.command) if word != "--analyse"]
+        return shlex.join(words)
 
     @property
     def _engines(self) -> list[str]:
@@ -146,6 +152,8 @@ class Origin:
             "study": self.found.study,
             "note": self.whole_note,
             "command": self.command,
+            # Commands of runs name scene files in the directory of the study.
+            "scenes": f"written into DIR/scenes by the command that starts the study: {self._start}",
             "footer": list(footer),
             "analysed_with": {"smarticles": version},
             **(packing if any(DEFINITION in column for column in columns) else {}),

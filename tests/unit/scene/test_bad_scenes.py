@@ -230,7 +230,9 @@ def test_every_shipped_scene_names_its_engine() -> None:
         for number, block in enumerate(re.findall(r"```yaml\n(.*?)```", path.read_text(encoding="utf-8"), re.DOTALL)):
             if "schema_version: 1" in block and "phases:" in block:
                 texts[f"{path.name} {number}"] = block
-        for number, call in enumerate(re.findall(r"smarticles\.Scene\((.*?)\n\)", path.read_text(encoding="utf-8"), re.S)):
+        for number, call in enumerate(
+            re.findall(r"smarticles\.Scene\((.*?)\n\)", path.read_text(encoding="utf-8"), re.S)
+        ):
             texts[f"{path.name} Scene {number}"] = call.replace("engine=", "engine:")
     texts["gait.ipynb"] = (root / "examples" / "gait.ipynb").read_text(encoding="utf-8").replace("engine=", "engine:")
     assert len(texts) > 25

@@ -143,6 +143,15 @@ def test_errors_of_a_run_name_arguments(tmp_path: Path) -> None:
     assert str(raised.value) == f"out {tmp_path / 'a'}: holds no run to resume; leave resume=True out to start one"
 
 
+def test_the_recorded_command_names_a_scene_that_exists(tmp_path: Path) -> None:
+    scene = smarticles.Scene(seed=1, count=1, engine="links", fidelity="draft", phases=[{"type": "deposit"}])
+    done = smarticles.run(scene, tmp_path / "a")
+    words = done.manifest.command.split()
+    assert words[:2] + words[3:] == ["smarticles", "run", "--out", "NEW"]
+    assert Path(words[2]) == tmp_path / "a" / "scene.yaml"
+    assert smarticles.load_scene(words[2]) == scene
+
+
 def test_measures_of_ones_own_are_columns(swept: smarticles.SweepDirectory) -> None:
     def top_m(frame: Frame, run: smarticles.Run) -> float:
         return float(frame.vertices[..., 2].max())
