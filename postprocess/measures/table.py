@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
-import numpy as np
 import pandas as pd
 
 from dem.errors import InputError
@@ -220,13 +220,12 @@ def _series_columns(series: Series, time: float) -> dict[str, float]:
             continue
         # A newer version may have recorded a column that is unknown here.
         label = EVERY[name].label if name in EVERY else name
-        # Files write a pure number's unit as 1 and have angles in radians, tables have a dash and degrees, as scenes do.
+        # Files write a pure number's unit as 1 and angles in radians; tables have a dash, and degrees as scenes do.
         unit = {"1": "-", "": "-", "rad": "degree"}.get(series.units[name], series.units[name])
-        if unit == "degree":
-            values = np.degrees(values)
+        factor = math.degrees(1) if unit == "degree" else 1
         if values.ndim == 1:
-            columns[f"{label} [{unit}]"] = float(values[index])
+            columns[f"{label} [{unit}]"] = factor * float(values[index])
         else:
             for component, value in zip(_COMPONENTS[values.shape[1]], values[index], strict=True):
-                columns[f"{label} {component} [{unit}]"] = float(value)
+                columns[f"{label} {component} [{unit}]"] = factor * float(value)
     return columns

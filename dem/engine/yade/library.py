@@ -71,6 +71,6 @@ def import_yade() -> Any:
     except ImportError as error:
         raise RunError(
             f"YADE cannot be imported ({error}), the engine of scenes without the key engine; install it with "
-            "`make setup` or `apt-get install yade`, see environment.md, or write `engine: links` into the scene, which "
-            "needs none (--engine links); `smarticles doctor` reports what is missing"
+            "`make setup` or `apt-get install yade`, see environment.md, or write `engine: links` into the scene, "
+            "which needs no YADE (--engine links); `smarticles doctor` reports what is missing"
         ) from None

@@ -105,7 +105,7 @@ def test_keys_are_printed_with_range_and_meaning(smarticles: Smarticles) -> None
     place = next(k for k, line in enumerate(lines) if line.strip().startswith("friction_wall"))
     assert "default 0.4, ≥ 0" in lines[place]
     assert "smarticle-container" in lines[place + 1]
-    assert any(line.startswith("  duration_s    needed") for line in smarticles("keys", "shake").out.splitlines())
+    assert any(line.startswith("  duration_s    ") for line in smarticles("keys", "shake").out.splitlines())
     whole = smarticles("keys").out
     names = whole.partition("more, by `smarticles keys NAME`: ")[2].replace("\n", " ").strip().split(", ")
     assert {"motor", "shake", "container", "recording", "fidelity"} <= set(names)
