@@ -51,6 +51,7 @@ class Phase:
 
     actuates: ClassVar[bool] = False  #: Whether motors move or hold the barbs
     begins: ClassVar[bool] = False  #: Whether the phase adds the smarticles; a run begins with one such phase
+    of_smarticles: ClassVar[bool] = False  #: Whether the phase has no meaning for other bodies than smarticles
     sources: ClassVar[frozenset[str]] = frozenset()
     """Keys that name the source of content whose hash is another key; a scene's hash omits them."""
     at_rest: ClassVar[bool] = False

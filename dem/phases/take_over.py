@@ -99,6 +99,7 @@ class TakeOver(Part, Phase):
     """Take the smarticles' poses from a frame of another run, at rest, then wait until the pile settles."""
 
     begins: ClassVar[bool] = True
+    of_smarticles: ClassVar[bool] = True
     at_rest: ClassVar[bool] = True
     sources: ClassVar[frozenset[str]] = frozenset({"run", "frame"})
     type: Literal["take-over"]
