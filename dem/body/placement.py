@@ -9,8 +9,8 @@ from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
 
 from dem.arrays import Array, Numbers
-from dem.body.linear import applied, eigen_symmetric
 from dem.body.kinds import Body
+from dem.body.linear import applied, eigen_symmetric
 from dem.body.particle import Boxes
 from dem.errors import RunError
 

@@ -35,7 +35,8 @@ class Deposit(Part, Phase):
         1.0,
         ge=1e-3,
         le=10,
-        description="height of the slab above the pile that a layer is spread over, in units of w, of other bodies than smarticles the longest bar [1]",
+        description="height of the slab above the pile that a layer is spread over, in units of w, or of the longest "
+        "bar of other bodies [1]",
     )
     landed_speed_m_per_s: Speed = Field(
         0.2,

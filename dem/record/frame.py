@@ -155,7 +155,7 @@ def _lines(count: int) -> Numbers:
     return np.stack([first, first + 1], axis=-1).reshape(-1, 2)
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class RecordedBars:
     """All bars of N bodies that are no smarticles, M of them, body by body."""
 
@@ -232,9 +232,7 @@ def read_frame(path: Path | str) -> Frame:
     points, lines = np.asarray(mesh.points), np.asarray(mesh.cells[0].data)
     data = {name: np.asarray(values[0]) for name, values in mesh.cell_data.items()}
     general = "kind" in data
-    count, each = len(lines) // LINKS, LINKS
-    if general:
-        count, each = len(np.unique(data.get("smarticle_id", ()))), 1
+    count = len(np.unique(data.get("smarticle_id", ()))) if general else len(lines) // LINKS
     if count == 0:
         reject("it holds no smarticle")
     expected = 2 * len(lines) if general else VERTICES * count
@@ -246,13 +244,13 @@ def read_frame(path: Path | str) -> Frame:
         reject("a point is not finite")
 
     def per_link(name: str, kind: Any, *shape: int) -> NDArray[Any]:
-        """Return cell data (N, 3, …) of smarticles, or (M, 1, …) of other bodies."""
+        """Return cell data (N, 3, …) of smarticles, or (M, …) of other bodies."""
         values = data.pop(name, None)
         if values is None:
             reject(f"cell data '{name}' is missing")
         if values.shape != (len(lines) if general else LINKS * count, *shape):
             reject(f"cell data '{name}' has shape {values.shape}")
-        return frozen(values.astype(kind).reshape(-1, each, *shape))
+        return frozen(values.astype(kind).reshape(*((-1,) if general else (count, LINKS)), *shape))
 
     def constant(name: str) -> float:
         values = per_link(name, np.float64)
@@ -262,38 +260,30 @@ def read_frame(path: Path | str) -> Frame:
         return first
 
     identifiers, links = per_link("smarticle_id", np.int64), per_link("link", np.int64)
-    if general:
-        if np.any(np.diff(identifiers[:, 0]) < 0):
-            reject("'smarticle_id' does not go body by body")
-    elif np.any(identifiers != identifiers[:, :1]) or np.any(links != np.arange(LINKS)):
+    if general and np.any(np.diff(identifiers) < 0):
+        reject("'smarticle_id' does not go body by body")
+    if not general and np.any((identifiers != identifiers[:, :1]) | (links != np.arange(LINKS))):
         reject("'smarticle_id' and 'link' are not in smarticle-major order")
     phase = constant("phase")
     if phase < 0 or phase != math.floor(phase):
         reject(f"'phase' must be a whole number, 0 or more: got {phase:g}")
-    bars, starts = None, np.arange(count)
-    vertices = np.empty((count, 0, 3)) if general else points.astype(np.float64).reshape(count, VERTICES, 3)
-    velocity, spin = (per_link(name, np.float64, 3) for name in ("velocity_m_per_s", "angular_velocity_rad_per_s"))
-    contacts = per_link("contacts", np.int64)
+    vertices, bars, first = np.empty((count, 0, 3)), None, LINKS * np.arange(count)
     if general:
-        _, starts, body = np.unique(identifiers[:, 0], return_index=True, return_inverse=True)
-        velocity, spin = velocity[:, 0], spin[:, 0]
-        bars = RecordedBars(
-            segments=frozen(points.astype(np.float64).reshape(-1, 2, 3)),
-            body=frozen(body),
-            number=frozen(links[:, 0]),
-            kind=frozen(per_link("kind", np.int64)[starts, 0]),
-            normals=frozen(per_link("normal", np.float64, 3)[:, 0]),
-        )
+        _, first, body = np.unique(identifiers, return_index=True, return_inverse=True)
+        kinds, normals = per_link("kind", np.int64)[first], per_link("normal", np.float64, 3)
+        bars = RecordedBars(frozen(points.astype(np.float64).reshape(-1, 2, 3)), body, links, kinds, normals)
+    else:
+        vertices = points.astype(np.float64).reshape(count, VERTICES, 3)
     return Frame(
         path=path,
         time=constant("time_s"),
         floor_z=constant("floor_z_m"),
         phase=int(phase),
         vertices=frozen(vertices),
-        smarticle_ids=frozen(identifiers[starts, 0]),
-        link_velocity=velocity,
-        link_angular_velocity=spin,
-        contacts=frozen(contacts[starts, 0]),
+        smarticle_ids=frozen(identifiers.ravel()[first]),
+        link_velocity=per_link("velocity_m_per_s", np.float64, 3),
+        link_angular_velocity=per_link("angular_velocity_rad_per_s", np.float64, 3),
+        contacts=frozen(per_link("contacts", np.int64).ravel()[first]),
         # `data` now holds only what `per_link` has not removed.
         cell_data=MappingProxyType(
             {

@@ -68,8 +68,8 @@ def _of_particle(scene: SceneView) -> Iterator[str]:
     for index, phase in enumerate(scene.phases):
         if phase.actuates or phase.of_smarticles:
             yield (
-                f"phases.{index}: {phase.kind} needs smarticles, which have barbs, but particle has rigid shapes; leave "
-                "the phase or particle out"
+                f"phases.{index}: {phase.kind} needs smarticles, which have barbs, but particle has rigid shapes; "
+                "leave the phase or particle out"
             )
 
 

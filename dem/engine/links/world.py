@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from dem.body.linear import matrix_product
 from dem.body.kinds import Mixture
+from dem.body.linear import matrix_product
 from dem.body.particle import Particle
 from dem.body.placement import Poses
 from dem.body.state import PileState, RigidState, State
@@ -169,9 +169,7 @@ class World:
         middle = self.particle.boxes.link_rotations[1]
         self.add_bodies(0, poses.positions, matrix_product(turns, middle), speed=speed)
 
-    def add_bodies(
-        self, shape: int | NDArray[np.int64], positions: Array, turns: Array, *, speed: float = 0.0
-    ) -> None:
+    def add_bodies(self, shape: int | NDArray[np.int64], positions: Array, turns: Array, *, speed: float = 0.0) -> None:
         """Add bodies.
 
         Args:
