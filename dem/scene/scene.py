@@ -37,6 +37,17 @@ SMOOTH_PITCH = 0.35
 _LEAST_GRAVITY = 1e-6  # m/s²; below it motors, whose torque limit is proportional to gravity, cannot move anything
 
 
+def _named(base: str, given: Mapping[str, Any]) -> Mapping[str, Any]:
+    """Return the knobs of a named fidelity in a scene of which some keys are given.
+
+    Links have one strand in a plane, in a section that is no wider than thick, and with a diameter of the scene's own.
+    """
+    engine, smarticle = given.get("engine", ""), given.get("smarticle") or Smarticle()
+    narrow = smarticle.thickness_normal_m <= smarticle.thickness_in_plane_m
+    single = given.get("plane") is not None or narrow or given.get("diameter_m") is not None
+    return {**fidelities(engine)[base], **({"rows": 1} if engine == "links" and single else {})}
+
+
 class Scene(Part):
     """Description of one run: everything that its result depends on."""
 
@@ -74,7 +85,7 @@ class Scene(Part):
     motor: Motor = Field(default_factory=Motor, description="the motors of the hinges, for phases that actuate")
     gravity_m_per_s2: float = Field(9.81, ge=0, le=1000, description="g, downwards [m/s²]; 0 or from 1e-6")
     fidelity: Fidelity = Field(
-        default_factory=lambda given: Fidelity(base="standard", **fidelities(given.get("engine", ""))["standard"]),
+        default_factory=lambda given: Fidelity(base="standard", **_named("standard", given)),
         description="a name (draft, standard, reference) or a mapping: base and the knobs that differ from it",
     )
     phases: tuple[AnyPhase, ...] = Field(..., min_length=1, description="phases of the run, in order")
@@ -95,7 +106,7 @@ class Scene(Part):
         base = value.get("base", "standard")
         if not isinstance(base, str) or base not in FIDELITIES:
             raise ValueError(f"unknown fidelity {shown(base)}; {nearest(str(base), FIDELITIES)}")
-        return {"base": base, **fidelities(info.data.get("engine", ""))[base], **value}
+        return {"base": base, **_named(base, {**info.data, **value}), **value}
 
     @field_validator("gravity_m_per_s2")
     @classmethod

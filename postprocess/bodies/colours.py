@@ -100,10 +100,10 @@ class ColourScale:
 
 
 def colour_field(name: str | None, run: Run) -> Field:
-    """Return the field of a run by name or short name; None: crossings, for planar runs smarticle_id.
+    """Return the field of a run by name or short name.
 
-    Of bodies that are no smarticles it is contacts, of several kinds kind, without a name. InputError if the name is
-    unknown, or the run lacks the field.
+    None stands for crossings, for smarticle_id if the run is planar, and for contacts, or kind, if bodies are no
+    smarticles. InputError if the name is unknown, or the run lacks the field.
     """
     usual = "smarticle_id" if run.manifest.planar else "crossings"
     if run.manifest.kinds is not None:
@@ -124,7 +124,7 @@ def scalars(field: Field, frame: Frame, run: Run) -> Floats:
 
 
 def span(values: Iterable[Floats]) -> Span:
-    """Return the least and the greatest finite value of several arrays; 0 and 1 if no value is finite."""
+    """Return the least and the greatest of all finite values in several arrays; (0, 1) if there are none."""
     finite = [each[np.isfinite(each)] for each in values]
     joined = np.concatenate([np.empty(0), *finite])
     return (float(joined.min()), float(joined.max())) if joined.size else (0.0, 1.0)
