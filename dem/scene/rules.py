@@ -9,6 +9,7 @@ from dem.phases.kinds import KINDS
 from dem.phases.phase import SceneView
 from dem.phases.remove_container import RemoveContainer
 from dem.setting.hooks import TOLERANCE, Hooks
+from dem.setting.motor import Motor
 from dem.setting.smarticle import Smarticle
 
 
@@ -63,6 +64,8 @@ def _of_particle(scene: SceneView) -> Iterator[str]:
     """Yield what has no meaning for rigid bodies that are no smarticles."""
     if scene.smarticle != Smarticle():
         yield "smarticle: describes smarticles, but particle has other shapes; leave smarticle or particle out"
+    if scene.motor != Motor() and scene.protocol is None:
+        yield "motor: rigid shapes have no hinges; leave motor or particle out"
     if scene.plane is not None:
         yield "plane: motion in a plane is that of smarticles; leave plane or particle out"
     for index, phase in enumerate(scene.phases):

@@ -38,7 +38,7 @@ def expected_overlaps(scene: SceneView) -> tuple[Overlap, ...]:
     gravity, stiffness, model = scene.gravity_m_per_s2, scene.fidelity.stiffness_N_per_m, scene.model
     width, thickness = model.size, min(mean_width(*body.thicknesses) for body in scene.bodies)
     speeds = [phase.peak_speed(gravity) for phase in scene.phases]
-    if scene.actuates:
+    if scene.actuates and scene.mixture is None:
         speeds.append(scene.motor.speed_limit_rad_per_s * scene.particle.boxes.barb_length)
     speed = math.sqrt(max(speeds) ** 2 + 2 * gravity * width)
     mass = max(map(typical_effective_mass, scene.bodies))

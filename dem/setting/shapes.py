@@ -24,10 +24,14 @@ def _twice(value: Any) -> Any:
 
 Angle = Annotated[float, Field(ge=1, le=180)]
 Turn = Annotated[float, Field(ge=-180, le=180)]
-Point = tuple[float, float, float]
-Lengths = Annotated[tuple[Length, Length], BeforeValidator(_twice, json_schema_input_type=float | tuple[float, float])]
-Angles = Annotated[tuple[Angle, Angle], BeforeValidator(_twice, json_schema_input_type=float | tuple[float, float])]
-Turns = Annotated[tuple[Turn, Turn], BeforeValidator(_twice, json_schema_input_type=float | tuple[float, float])]
+Coordinate = Annotated[float, Field(ge=-LONGEST_LENGTH, le=LONGEST_LENGTH)]
+Point = tuple[Coordinate, Coordinate, Coordinate]
+Number = Annotated[int, Field(ge=0, lt=400)]
+Lengths = Annotated[
+    tuple[Length, Length], BeforeValidator(_twice, json_schema_input_type=Length | tuple[Length, Length])
+]
+Angles = Annotated[tuple[Angle, Angle], BeforeValidator(_twice, json_schema_input_type=Angle | tuple[Angle, Angle])]
+Turns = Annotated[tuple[Turn, Turn], BeforeValidator(_twice, json_schema_input_type=Turn | tuple[Turn, Turn])]
 Segments = Annotated[int, Field(ge=2, le=200)]
 
 
@@ -261,7 +265,7 @@ class Free(Shaped):
 
     shape: Literal["segments"]
     points_m: tuple[Point, ...] = Field(..., min_length=2, max_length=400, description="points (x, y, z) [m]")
-    pairs: tuple[tuple[int, int], ...] = Field(
+    pairs: tuple[tuple[Number, Number], ...] = Field(
         ..., min_length=1, max_length=400, description="bars: the numbers, from 0, of the two points that each joins"
     )
     normal: Point = Field((0.0, 0.0, 1.0), description="direction of the thickness along the normal, of all bars [1]")
@@ -287,9 +291,6 @@ class Free(Shaped):
                     raise ValueError(f"pairs.{k}: there is no point {end!r}; use 0 to {len(points) - 1}")
             if points[pair[0]] == points[pair[1]]:
                 raise ValueError(f"pairs.{k}: joins a point with itself, a bar 0 m long; join two different points")
-        longest = max((abs(x) for point in points for x in point), default=0.0)
-        if not longest <= LONGEST_LENGTH:
-            raise ValueError(f"points_m: a coordinate of {longest:g} m; coordinates are in metres, at most 1 m")
         reached = {pairs[0][0]} if pairs else set()
         for _ in pairs:
             reached |= {end for pair in pairs if reached & set(pair) for end in pair}
