@@ -213,6 +213,7 @@ class LinksEngine:
             points=rows[:, queries.POINT : queries.FRICTION],
             friction=rows[:, queries.FRICTION : queries.WHOLE],
             forces=rows[:, queries.WHOLE :],
+            each=self._world.each,
         )
 
     def extremes(self, state: PileState) -> Extremes | None:

@@ -10,9 +10,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from dem.body.forces import at_links
 from dem.body.kinds import Mixture
 from dem.body.linear import matrix_product
-from dem.body.particle import Particle
+from dem.body.particle import LINKS, Particle
 from dem.body.placement import Poses
 from dem.body.state import PileState, RigidState, State
 from dem.engine.links.arrays import (
@@ -140,6 +141,11 @@ class World:
         return len(self.bodies.position)
 
     @property
+    def each(self) -> int:
+        """Most links of a body, 3 at least."""
+        return max(LINKS, 1 + max(int(kind.link.max()) for kind in self.kinds))
+
+    @property
     def time(self) -> float:
         """Simulated time [s]."""
         return self.begin + self.made * self.time_step
@@ -212,7 +218,7 @@ class World:
         own = np.concatenate([np.zeros(0, np.int64), *(kinds[k].link for k in shapes)])
         fresh = np.append(True, (np.diff(own) != 0) | (np.diff(body) != 0)) if len(own) else np.zeros(0, np.bool_)
         hinged = np.repeat(self.shapes.hinged[shapes], sizes)
-        self.links = (3 * body + np.where(hinged, own, 0)).astype(np.int32)  #: as records number them
+        self.links = at_links(body, own, self.each).astype(np.int32)  #: as records number them
         self.segments = Segments(
             line=np.concatenate([np.zeros((0, LINE)), *(kinds[k].lines for k in shapes)]),
             begin=np.cumsum([0, *sizes]).astype(np.int32),
