@@ -38,9 +38,9 @@ _LEAST_GRAVITY = 1e-6  # m/s²; below it motors, whose torque limit is proportio
 
 
 def _named(base: str, given: Mapping[str, Any]) -> Mapping[str, Any]:
-    """Return the knobs of a named fidelity in a scene of which some keys are given.
+    """Return the knobs of the named fidelity `base`, adapted to given keys of a scene and its fidelity.
 
-    Links have one strand in a plane, in a section that is no wider than thick, and with a diameter of the scene's own.
+    On the engine links `rows` is 1 if `given` has a plane or a `diameter_m`, or if t1 is at most t2.
     """
     engine, smarticle = given.get("engine", ""), given.get("smarticle") or Smarticle()
     narrow = smarticle.thickness_normal_m <= smarticle.thickness_in_plane_m
@@ -135,7 +135,7 @@ class Scene(Part):
     @model_validator(mode="wrap")
     @classmethod
     def _stiff_enough(cls, data: Any, handler: ModelWrapValidatorHandler[Self]) -> Self:
-        """Raise the stiffness of a named fidelity where the scene's loads and speeds need more."""
+        """On links, raise the stiffness of a named fidelity if the scene's loads and speeds need more."""
         scene = handler(data)
         given = data.get("fidelity") if isinstance(data, Mapping) else scene.fidelity
         chosen = given is not None and not isinstance(given, str | Mapping)
@@ -171,11 +171,14 @@ class Scene(Part):
         )
 
     def ample_height(self, hooks_top: float = 0.0) -> float:
-        """Return a height of the wall [m] for the loosest pile, or hooks up to `hooks_top` [m], and a layer.
+        """Return a wall height [m] that leaves room for a layer above the loosest pile and above the hooks.
 
         A loose random packing of thin bars has the packing fraction φ ≈ 2.4 d/L, with d the mean width of the section
         and L the length of all three links (Gravish's φ_0 at l/w = 0, 0.7 and 1.4). The loosest pile is assumed to have
         half this packing fraction.
+
+        Args:
+            hooks_top: height of the highest point of the hooks [m].
         """
         # Smarticles may come to lie on a hook.
         pile = self._height_at(1.2)

@@ -1,4 +1,4 @@
-"""Hooks in the pile, which a phase pulls."""
+"""Two hooks in the pile; the phase pull-hook pulls the upper one."""
 
 from __future__ import annotations
 
@@ -54,15 +54,16 @@ _HOOK_DEFAULTS = {"side_m": (0, 1), "length_m": (1, 0), "lower_height_m": (0, 10
 
 
 def with_hook_defaults(hooks: Any, sizes: tuple[float, float]) -> Any:
-    """Return data of `Hooks`, not yet validated, with the missing keys that follow from the body's `sizes`."""
+    """Return unvalidated data of `Hooks`, with missing lengths computed from `sizes`."""
     filled = with_defaults(hooks, _HOOK_DEFAULTS, sizes)
     return {"lower_length_m": filled["length_m"]} | filled if isinstance(filled, dict) else filled
 
 
 def with_defaults(data: Any, defaults: Mapping[str, tuple[int, int]], sizes: tuple[float, float]) -> Any:
-    """Return a mapping with missing keys at their defaults, a w + b t2 for (a, b); other data as they are.
+    """Return a mapping with its missing keys filled in; data that are no mapping are returned unchanged.
 
     Args:
+        defaults: numbers (a, b) by key; the key's default is a w + b t2 [m].
         sizes: w and t2 of the smarticle, or the longest bar and smallest thickness of other bodies [m].
     """
     if not isinstance(data, Mapping):
@@ -82,14 +83,14 @@ class Bar(NamedTuple):
 class Cross:
     """One hook of a simulation. Lengths in m."""
 
-    height: float  #: Of the centre above the floor
-    side: float  #: Of the bars' square section
-    length: float  #: Length of the two bars; of more bars, diameter of the disc at whose edge they end
-    count: int = 1  #: Number of bars along x, and of bars along y, evenly spaced
+    height: float  #: Height of the centre above the floor
+    side: float  #: Side of the bars' square section
+    length: float  #: With one bar along each axis: its length; with more: diameter of the disc at whose edge bars end
+    count: int = 1  #: Number of bars along x, which is also the number of bars along y; bars are evenly spaced
 
     @property
     def bars(self) -> tuple[Bar, ...]:
-        """The bars: one along x and one along y in turn."""
+        """The 2 `count` bars, alternately along x and along y."""
         found: list[Bar] = []
         for k in range(self.count):
             place = self.length * ((k + 1) / (self.count + 1) - 0.5)

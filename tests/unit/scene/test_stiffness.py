@@ -23,7 +23,7 @@ def deepest(scene: Scene) -> float:
     return max(overlap.widths for overlap in expected_overlaps(scene))
 
 
-@pytest.mark.parametrize(("base", "stiffness"), [("draft", 250.0), ("standard", 1000.0), ("reference", 2000.0)])
+@pytest.mark.parametrize(("base", "stiffness"), [("draft", 500.0), ("standard", 1000.0), ("reference", 2000.0)])
 def test_ordinary_scenes_keep_the_stiffness_of_their_name(base: str, stiffness: float) -> None:
     for ratio in (0.0, 0.4, 1.1):
         scene = links(fidelity=base, smarticle={"aspect_ratio": ratio})
