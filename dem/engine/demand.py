@@ -5,7 +5,7 @@ from enum import Enum, auto
 from typing import Protocol
 
 from dem.arrays import Array
-from dem.body.kinds import Body, Mixture
+from dem.body.kinds import Kind, Mixture
 from dem.body.particle import Particle
 from dem.engine.effect import EffectName
 from dem.physics.contact import ContactLaw, contact_law
@@ -55,7 +55,7 @@ class Demand(Protocol):
     @property
     def model(self) -> Particle | Mixture: ...
     @property
-    def bodies(self) -> Sequence[Body]: ...
+    def bodies(self) -> Sequence[Particle | Kind]: ...
     @property
     def cylinder(self) -> Cylinder: ...
     @property

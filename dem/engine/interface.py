@@ -223,9 +223,12 @@ class EnergyLedger(Protocol):
 class Engine(Protocol):
     """A running simulation; one per process, since an engine may be a process-wide singleton."""
 
-    particle: Particle | Mixture  #: Geometry of each smarticle, or the kinds of other bodies
     cylinder: Cylinder  #: The container
     gravity: float  #: g, downwards [m/s²]
+
+    @property
+    def particle(self) -> Particle | Mixture:
+        """Geometry of each smarticle, or the kinds of other bodies."""
 
     @property
     def boundaries(self) -> Boundaries:

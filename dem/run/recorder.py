@@ -113,15 +113,18 @@ class Recorder:
 
 def _mesh(engine: Engine, state: PileState, phase: int) -> meshio.Mesh:
     """Return the frame of the present state, in a phase given by its index."""
-    now = {"contacts": engine.neighbours(), "time": engine.time, "floor": engine.boundaries.floor, "phase": phase}
+    contacts, time, floor = engine.neighbours(), engine.time, engine.boundaries.floor
     if state.bodies is not None:
-        return segment_mesh(state.bodies, **now)
+        return segment_mesh(state.bodies, contacts=contacts, time=time, floor=floor, phase=phase)
     smarticles, motors = state.smarticles, engine.motors.readings if engine.motors.articulated else None
     at_work = () if motors is None else (motors.torques, motors.work, motors.halted)
     return centreline_mesh(
         smarticles.vertices,
         velocities=smarticles.link_velocities,
         spins=smarticles.link_spins,
+        contacts=contacts,
+        time=time,
+        floor=floor,
+        phase=phase,
         extra=motor_fields(smarticles.angles, *at_work) if engine.motors.present else None,
-        **now,
     )

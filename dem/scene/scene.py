@@ -10,8 +10,8 @@ from typing import Any, Literal, Self
 import numpy as np
 from pydantic import ConfigDict, Field, ModelWrapValidatorHandler, ValidationInfo, field_validator, model_validator
 
-from dem.arrays import Array
-from dem.body.kinds import Body, Kind, Mixture
+from dem.arrays import Array, Numbers
+from dem.body.kinds import Kind, Mixture
 from dem.body.particle import Particle, SphereChain, chain_mean_width, mean_width
 from dem.engine.effect import EffectName
 from dem.errors import nearest, shown
@@ -294,7 +294,7 @@ class Scene(Part):
             return None
         rng = np.random.default_rng(self.seed_for("shapes"))
         kinds: list[Kind] = []
-        of: list[Array] = []
+        of: list[Numbers] = []
         for shape, number in zip(self.shapes, numbers_of_shapes(self.shapes, self.count), strict=True):
             of.append(len(kinds) + rng.integers(len(shape.factors), size=number))
             kinds += [self._kind(shape, float(factor)) for factor in shape.factors]
@@ -315,7 +315,7 @@ class Scene(Part):
         return self.mixture or self.particle
 
     @property
-    def bodies(self) -> tuple[Body, ...]:
+    def bodies(self) -> tuple[Particle | Kind, ...]:
         """One body of each kind; the first is the one to which the contact law refers."""
         return (self.particle,) if self.mixture is None else self.mixture.kinds
 

@@ -31,7 +31,6 @@ with warnings.catch_warnings():
     # PyVista imports pyplot: see postprocess.report.figures.
     warnings.filterwarnings("ignore", message="Unable to import Axes3D")
     import pyvista as pv
-    from vtkmodules.util.numpy_support import vtk_to_numpy
 
 
 _STRAIN, _ARRANGE = "strain", "arrange"
@@ -453,7 +452,7 @@ def _prism(sides: int) -> tuple[Floats, Whole]:
 def at_points(mesh: pv.PolyData, values: NDArray[Any]) -> NDArray[Any]:
     """Return values (C, …) of the cells of a mesh at its points (P, …), which belong to one bar each."""
     cells = mesh.GetPolys()
-    ends, corners = (vtk_to_numpy(array) for array in (cells.GetOffsetsArray(), cells.GetConnectivityArray()))
+    ends, corners = (np.asarray(array) for array in (cells.GetOffsetsArray(), cells.GetConnectivityArray()))
     found = np.empty((mesh.n_points, *values.shape[1:]), dtype=values.dtype)
     found[corners] = np.repeat(values, np.diff(ends), axis=0)
     return found

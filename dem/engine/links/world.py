@@ -220,7 +220,7 @@ class World:
         fresh = np.append(True, (np.diff(own) != 0) | (np.diff(body) != 0)) if len(own) else np.zeros(0, np.bool_)
         hinged = np.repeat(self.shapes.hinged[shapes], sizes)
         #: (Q,) code of each segment's link in recorded contacts
-        self.links = at_links(body, own, self.each).astype(np.int32)
+        self.links = at_links(body.astype(np.int64), own, self.each).astype(np.int32)
         self.segments = Segments(
             line=np.concatenate([np.zeros((0, LINE)), *(kinds[k].lines for k in shapes)]),
             begin=np.cumsum([0, *sizes]).astype(np.int32),
