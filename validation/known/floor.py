@@ -294,7 +294,7 @@ def _thrown(access: EngineAccess, one: Scene, dt: float) -> tuple[float, float]:
         if access.floor_force(engine)[2]:
             first, last = first or engine.steps, engine.steps
     energy = one.smarticle.boxes.mass * THROWN**2 / 2
-    return math.sqrt(engine.state().smarticles.kinetic_energy / energy), (last - first + 1) * dt
+    return math.sqrt(engine.state().kinetic_energy / energy), (last - first + 1) * dt
 
 
 def _sunk(access: EngineAccess, one: Scene, dt: float, *, time: float) -> float:

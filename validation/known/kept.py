@@ -81,10 +81,8 @@ def free_gait(access: EngineAccess, *, law: str, damping: float = 0.0) -> list[A
 
 def pair_work(access: EngineAccess, *, law: str, damping: float = 0.0) -> list[Answer]:
     engine, swinging = free_pair(access, law, damping)
-    start = engine.state().smarticles.kinetic_energy
-    gains, works = np.array(
-        [(engine.state().smarticles.kinetic_energy - start, engine.motors.work) for _ in swinging]
-    ).T
+    start = engine.state().kinetic_energy
+    gains, works = np.array([(engine.state().kinetic_energy - start, engine.motors.work) for _ in swinging]).T
     what, worst = "work of the motors less gain of energy, worst [J]", float(np.abs(gains - works).max())
     reason = "second order in the time step where they drive; jumps of a rate are counted exactly"
     return [Answer(what, 0.0, worst, 1e-3, reason, scale=float(np.abs(gains).max()))]
@@ -110,7 +108,7 @@ def thousand_turns(access: EngineAccess) -> list[Answer]:
     for k, spin in enumerate(spins):
         add(engine, (0.2 * k - 0.2, 0, 0.1), Rotation.random(random_state=k))
         access.push(engine, k, spin=spin)
-    before, momentum = engine.state().smarticles.kinetic_energy, engine.state().smarticles.angular_momentum
+    before, momentum = engine.state().kinetic_energy, engine.state().smarticles.angular_momentum
     engine.advance(round(1000 * 2 * math.pi / rate / engine.time_step))
     after, size = engine.state().smarticles, float(np.linalg.norm(momentum))
     change, what = (
