@@ -316,8 +316,9 @@ def _notes(scene: Scene, table: AccuracyTable, measured: Measured, max_error: fl
     if not table.reference.endswith(_FINEST):
         notes.append(f"errors are against {table.reference}: the table has no finished runs of {_FINEST[0]}")
     activity = " ".join(dict.fromkeys(phase.type for phase in scene.phases if not phase.at_rest))
+    own_ratio = f"{scene.smarticle.aspect_ratio:g}" if scene.mixture is None else "that of no smarticle (key particle)"
     here = {
-        "l/w": (f"{scene.smarticle.aspect_ratio:g}", f"{table.aspect_ratio:g}"),
+        "l/w": (own_ratio, f"{table.aspect_ratio:g}"),
         "N": (str(scene.count), str(table.count)),
         "activity": (activity, table.activity),
     }
