@@ -13,7 +13,7 @@ import pandas as pd
 from markupsafe import Markup
 
 from dem.errors import InputError, RunError
-from dem.plan.choice import QUANTITIES, Error, read_table
+from dem.plan.choice import QUANTITIES, Error, activity_of, read_table
 from dem.plan.effects import decide
 from dem.plan.outlook import plan
 from dem.record.columns import EVERY
