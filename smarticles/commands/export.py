@@ -30,7 +30,9 @@ scenes that actuate:
   angle_rad [rad]                      angle of the barb
   motor_torque_N_m [N m]               torque of the motor at the barb's hinge
   motor_work_J [J]                     work of that motor since the start
-  halted [-]                           1 if that motor is halted"""
+  halted [-]                           1 if that motor is halted
+scenes with the key particle:
+  kind [-]                             kind of the body, a place in `kinds` of run.json"""
 
 
 def add(commands: Commands) -> None:
