@@ -118,7 +118,7 @@ class LammpsEngine:
         time_step: float,
         ranks: int = 1,
     ) -> None:
-        self.particle = particle
+        self.particle: Particle | Mixture = particle
         self.cylinder = cylinder
         self.gravity = gravity
         self.time, self.steps, self.time_step = 0.0, 0, time_step
@@ -134,9 +134,9 @@ class LammpsEngine:
         self._seconds = 0.0
         self._thrown = 0.0
         self._contacts: Contacts | None = None
-        self.boundaries = LammpsBoundaries(cylinder, self._send, lambda: (self.steps, self.time_step))
+        self.boundaries: LammpsBoundaries = LammpsBoundaries(cylinder, self._send, lambda: (self.steps, self.time_step))
         self.motors, self.strings = NoMotors(), NoStrings()
-        self.ledger = LammpsLedger(lambda: self.boundaries.moving, lambda: self.contacts.elastic_energy(law))
+        self.ledger: LammpsLedger = LammpsLedger(lambda: self.boundaries.moving, lambda: self.contacts.elastic_energy(law))
 
     def _send(self, commands: Iterator[str]) -> None:
         """Send commands, and have LAMMPS set up its next run anew.
