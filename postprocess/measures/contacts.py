@@ -23,11 +23,11 @@ from postprocess.geometry.links import (
     Vertices,
     Whole,
     checked_vertices,
-    link_lengths,
     spheres,
     strands,
     swept_axes,
 )
+from postprocess.geometry.segments import close_segments
 from postprocess.measures.registry import FrameMeasure, Quantity, in_one_cylinder
 
 # Pairs of links per block, which limits memory.
@@ -56,7 +56,7 @@ def contact_pairs(vertices: Vertices, distance: float) -> ContactPairs:
         raise InputError(f"distance must be above 0 m: got {distance} m; a link's thickness is usual")
     count = len(vertices)
     starts, ends = vertices[:, :-1].reshape(-1, 3), vertices[:, 1:].reshape(-1, 3)
-    a, b = _close_links(starts, ends, link_lengths(vertices).ravel(), distance)
+    a, b = close_segments(starts, ends, np.repeat(np.arange(count), 3), distance)
     gaps = np.empty(len(a))
     for start in range(0, len(a), _CHUNK):
         p, q = a[start : start + _CHUNK], b[start : start + _CHUNK]
@@ -147,18 +147,6 @@ def segment_distances(p0: Floats, p1: Floats, q0: Floats, q1: Floats) -> Floats:
     across = np.linalg.norm(w + s[:, None] * u - t[:, None] * v, axis=1)
     distances: Floats = np.where(inside, np.minimum(across, ends), ends)
     return distances
-
-
-def _close_links(starts: Floats, ends: Floats, lengths: Floats, distance: float) -> tuple[Whole, Whole]:
-    """Find pairs of links of different smarticles whose bounding spheres are at most a distance [m] apart."""
-    if len(starts) == 0:
-        return np.empty(0, dtype=np.int64), np.empty(0, dtype=np.int64)
-    middles = (starts + ends) / 2
-    pairs = cKDTree(middles).query_pairs(lengths.max() + distance, output_type="ndarray")
-    a, b = pairs.astype(np.int64).T
-    apart = np.linalg.norm(middles[a] - middles[b], axis=1)
-    keep = (a // 3 != b // 3) & (apart <= (lengths[a] + lengths[b]) / 2 + distance)
-    return a[keep], b[keep]
 
 
 def _point_distances(points: Floats, origins: Floats, along: Floats) -> Floats:

@@ -32,8 +32,8 @@ from postprocess.measures.registry import FrameMeasure, Quantity, Shown, in_spac
 STRAIGHT = 0.99  #: Tip-to-tip distance over unfolded length above which a smarticle counts as straight [-]
 
 _TOLERANCE = 1e-9
-# Pairs of smarticles per block, which limits memory.
-_CHUNK = 100_000
+# Pairs of polygons and segments per block, which limits memory.
+_CHUNK = 300_000
 
 
 class CrossingPairs(NamedTuple):
@@ -142,26 +142,38 @@ def _close_pairs(vertices: Floats, planes: Flags) -> tuple[Whole, Whole]:
 
 def _passing(vertices: Floats, i: Whole, j: Whole) -> Flags:
     """Return which links of each j pass through the plane of its i: (P, 3) bool."""
-    centres, radii = bounding_spheres(vertices)
-    frames = plane_frames(vertices)
-    corners = np.einsum("nkc,nac->nka", vertices - centres[:, None], frames[:, :2])
-    passing = np.zeros((len(i), 3), dtype=bool)
-    for start in range(0, len(i), _CHUNK):
-        a, b = i[start : start + _CHUNK], j[start : start + _CHUNK]
-        relative = vertices[b] - centres[a, None]
-        heights = np.einsum("pkc,pc->pk", relative, frames[a, 2])
-        heights[np.abs(heights) <= _TOLERANCE * radii[a, None]] = 0.0
-        row, link = np.nonzero(heights[:, :-1] * heights[:, 1:] < 0)
-        first, last = heights[row, link], heights[row, link + 1]
-        from_, to = relative[row, link], relative[row, link + 1]
+    links = np.stack([vertices[:, :-1], vertices[:, 1:]], axis=2)
+    return passing_segments(vertices, np.repeat(i, 3), links[j].reshape(-1, 2, 3)).reshape(-1, 3)
+
+
+def passing_segments(corners: Floats, polygon: Whole, segments: Floats) -> Flags:
+    """Return which segments pass through a polygon: (P,) bool.
+
+    Args:
+        corners: (N, n, 3) corners of N polygons [m]; the last one is joined to the first one.
+        polygon: (P,) index of the polygon that each segment is compared with.
+        segments: (P, 2, 3) ends of the segments [m].
+    """
+    centres, radii = bounding_spheres(corners)
+    frames = plane_frames(corners)
+    outlines = np.einsum("nkc,nac->nka", corners - centres[:, None], frames[:, :2])
+    passing = np.zeros(len(polygon), dtype=bool)
+    for start in range(0, len(polygon), _CHUNK):
+        which = polygon[start : start + _CHUNK]
+        relative = segments[start : start + _CHUNK] - centres[which, None]
+        heights = np.einsum("pkc,pc->pk", relative, frames[which, 2])
+        heights[np.abs(heights) <= _TOLERANCE * radii[which, None]] = 0.0
+        row = np.nonzero(heights[:, 0] * heights[:, 1] < 0)[0]
+        first, last = heights[row].T
+        from_, to = relative[row, 0], relative[row, 1]
         hits = from_ + (first / (first - last))[:, None] * (to - from_)
-        flat = np.einsum("pc,pac->pa", hits, frames[a[row], :2])
-        passing[start + row, link] = _winding(flat, corners[a[row]], _TOLERANCE * radii[a[row]]) != 0
+        flat = np.einsum("pc,pac->pa", hits, frames[which[row], :2])
+        passing[start + row] = _winding(flat, outlines[which[row]], _TOLERANCE * radii[which[row]]) != 0
     return passing
 
 
 def _winding(points: Floats, corners: Floats, tolerance: Floats) -> Whole:
-    """Compute the winding numbers (n,) of quadrilaterals (n, 4, 2) around points (n, 2) [m].
+    """Compute the winding numbers (n,) of polygons (n, k, 2) around points (n, 2) [m].
 
     A point nearer to an edge than its tolerance (n,) [m] has the winding number 0.
     """

@@ -1,0 +1,211 @@
+"""Find bodies that the bodies around them cage, and the number of contacts that cage a shape.
+
+A body is caged if its contacts block all of its motions, without friction. At a contact with the normal n, which points
+into the body, the body can move with the velocity v only if n · v ≥ 0. All motions are blocked to first order if sums
+of the normals with coefficients of 0 or more give every vector. For translations v is a velocity (3 components); for
+all rigid motions it is joined by an angular velocity, and the normal by its moment (6 components). A motion that no
+contact on a body's sides can block, as of a rod along or about its axis, does not count. Contacts with floor and wall
+are left out.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.optimize import nnls
+
+from dem.errors import InputError
+from dem.record.frame import Frame
+from dem.record.run import Run
+from postprocess.geometry.links import Flags, Floats, Whole, strands
+from postprocess.geometry.segments import checked_segments, close_segments, nearest_points
+from postprocess.measures.contacts import chain_of
+from postprocess.measures.registry import FrameMeasure, Quantity, in_space
+
+# Least singular value, over the largest one, of directions that count for a rank.
+_RANK = 1e-6
+# Residual per normal of a sum that counts as 0.
+_BALANCE = 1e-9
+
+
+class ContactNormals(NamedTuple):
+    """P contacts between segments of different bodies; both bodies of a contact have a row."""
+
+    body: Whole  #: (P,) int64, index of the body, by ascending number
+    point: Floats  #: (P, 3) [m], point of contact
+    normal: Floats  #: (P, 3) unit vector [-], into the body
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Cages:
+    """Whether contacts cage each of B bodies."""
+
+    bodies: Whole = field(repr=False)  #: (B,) int64, numbers of the bodies
+    contacts: Whole = field(repr=False)  #: (B,) int64, contacts of each body's segments with those of other bodies
+    translation: Flags = field(repr=False)  #: (B,) bool, whether contacts block all translations that they can block
+    motion: Flags = field(repr=False)  #: (B,) bool, whether contacts block all motions that they can block
+    #: (B,) float64 [-], fraction of all directions in which contacts let the body move, 1 without contact; found on a
+    #: set of 2000 directions, so that less than 0.001 may be 0
+    free: Floats = field(repr=False)
+
+
+def cages(segments: ArrayLike, body: ArrayLike, *, diameter: float, gap: float = 0.0) -> Cages:
+    """Find which bodies are caged by their contacts with other bodies.
+
+    Segments that touch along a line count as one contact.
+
+    Args:
+        segments: (M, 2, 3) axes of round sections [m].
+        body: (M,) number of the body of each segment.
+        diameter: Diameter of the sections [m].
+        gap: Largest distance of two surfaces that counts as contact [m].
+
+    Raises:
+        InputError: See `checked_segments`; the diameter is not above 0, or the gap is below 0.
+
+    Source:
+        Peters, Kollmann, Barenbrug & Philipse, Phys. Rev. E 63, 021404 (2001): caging as arrest of all translations.
+        Lakshminarayana, ASME paper 78-DET-32 (1978): form closure, the arrest of all motions by contacts.
+    """
+    segments, body = checked_segments(segments, body)
+    bodies, number = np.unique(body, return_inverse=True)
+    found = contact_normals(segments, number, diameter=diameter, gap=gap)
+    order = np.argsort(found.body, kind="stable")
+    ends = np.searchsorted(found.body[order], np.arange(len(bodies) + 1))
+    directions = _directions(2000)
+    translation, motion = np.zeros(len(bodies), dtype=bool), np.zeros(len(bodies), dtype=bool)
+    free = np.ones(len(bodies))
+    for k in range(len(bodies)):
+        own = order[ends[k] : ends[k + 1]]
+        axes, normals = segments[number == k], found.normal[own]
+        free[k] = (directions @ normals.T >= 0).all(axis=1).mean()
+        middle, size = _size(axes)
+        sides = _sides(axes)
+        translation[k] = positively_spans(normals @ _basis(sides[:, :3]).T)
+        motion[k] = positively_spans(_wrenches((found.point[own] - middle) / size, normals) @ _basis(sides).T)
+    return Cages(bodies=bodies, contacts=np.diff(ends), translation=translation, motion=motion, free=free)
+
+
+def caging_number(segments: ArrayLike) -> int:
+    """Return the mean number of random contacts on the sides of a body that block all its motions.
+
+    Contacts are independent, and anywhere on the sides of the round sections; each one is as likely as the one on the
+    opposite side, which has the opposite normal and moment. By Wendel's theorem the mean number is then 2 k + 1, where
+    k is the number of motions that contacts can block: 4 for a rod, which can always slide along and turn about its
+    axis, and 6 for every shape that is not straight. So a rod has 9, others 13. Without rotations a sphere has 7.
+
+    Args:
+        segments: (M, 2, 3) segments of one body [m].
+
+    Raises:
+        InputError: See `checked_segments`.
+
+    Source:
+        Wendel, Math. Scand. 11, 109 (1962); Peters et al., Phys. Rev. E 63, 021404 (2001): 2 d + 1; Wouterse, Luding &
+        Philipse, Granular Matter 11, 169 (2009): 9 for thin rods, experiments have 9.8 contacts.
+
+    Example:
+        >>> caging_number([[[0.0, 0, 0], [1, 0, 0]]])
+        9
+    """
+    axes, _ = checked_segments(segments, np.zeros(len(np.asarray(segments)), dtype=np.int64))
+    return 2 * len(_basis(_sides(axes))) + 1
+
+
+def contact_normals(segments: Floats, number: Whole, *, diameter: float, gap: float = 0.0) -> ContactNormals:
+    """Find the contacts of round segments; arguments as of `cages`, with indices (M,) of bodies."""
+    if not (np.isfinite(diameter) and diameter > 0 and gap >= 0):
+        raise InputError(f"a contact needs a diameter above 0 m and a gap of 0 m or more: got {diameter} m, {gap} m")
+    i, j = close_segments(segments[:, 0], segments[:, 1], number, diameter + gap)
+    first, second = nearest_points(segments[i], segments[j])
+    apart = first - second
+    distance = np.linalg.norm(apart, axis=1)
+    # Axes that meet have no normal.
+    touching = (distance <= diameter + gap) & (distance > 0)
+    i, j, middle = i[touching], j[touching], (first[touching] + second[touching]) / 2
+    normal = apart[touching] / distance[touching, None]
+    return ContactNormals(
+        np.concatenate([number[i], number[j]]), np.tile(middle, (2, 1)), np.concatenate([normal, -normal])
+    )
+
+
+def positively_spans(vectors: Floats) -> bool:
+    """Return whether each vector of a space is a sum of vectors (P, d) with coefficients of 0 or more.
+
+    Then, and only then, v · n ≥ 0 for all vectors n has no solution but v = 0.
+    """
+    count, rank = vectors.shape
+    if count <= rank or np.linalg.matrix_rank(vectors, tol=_RANK * count) < rank:
+        return False
+    # With the full rank, a combination 0 with positive coefficients is enough: Σ (μ + 1) n = 0, μ ≥ 0, up to scale.
+    _, residual = nnls(vectors.T, -vectors.sum(axis=0), maxiter=100 * count)
+    return bool(residual <= _BALANCE * count)
+
+
+def _wrenches(points: Floats, normals: Floats) -> Floats:
+    """Return forces and moments (P, 6) of unit forces at points (P, 3)."""
+    return np.concatenate([normals, np.cross(points, normals)], axis=1)
+
+
+def _sides(axes: Floats) -> Floats:
+    """Return wrenches (4 m, 6) that span those of all contacts on the sides of segments (m, 2, 3).
+
+    Moments are about the middle, over the size, so that all components are comparable.
+    """
+    middle, size = _size(axes)
+    ends = (axes - middle) / size
+    across = np.linalg.svd((ends[:, 1] - ends[:, 0])[:, None])[2][:, 1:]
+    return np.concatenate([_wrenches(ends[:, end], across[:, one]) for end in (0, 1) for one in (0, 1)])
+
+
+def _basis(vectors: Floats) -> Floats:
+    """Return orthonormal vectors (k, d) that span all vectors (n, d)."""
+    _, sizes, axes = np.linalg.svd(vectors)
+    basis: Floats = axes[: int((sizes > _RANK * sizes[0]).sum())]
+    return basis
+
+
+def _size(axes: Floats) -> tuple[Floats, float]:
+    """Return the middle (3,) and the size [m] of a body's segments: mean corner, and largest distance from it."""
+    middle = axes.mean(axis=(0, 1))
+    return middle, float(np.linalg.norm(axes - middle, axis=2).max())
+
+
+def _directions(count: int) -> Floats:
+    """Return unit vectors (count, 3) spread evenly over the sphere, on a golden spiral."""
+    k = np.arange(count) + 0.5
+    z, azimuth = 1 - 2 * k / count, np.pi * (1 + 5**0.5) * k
+    across = np.sqrt(1 - z**2)
+    return np.stack([across * np.cos(azimuth), across * np.sin(azimuth), z], axis=1)
+
+
+def _cages_of(frame: Frame, run: Run) -> tuple[float, float, float]:
+    chain = chain_of(run)
+    # A smarticle of several strands touches with each of them.
+    each = strands(frame.vertices, chain).reshape(-1, 4, 3)
+    links = np.stack([each[:, :-1], each[:, 1:]], axis=2).reshape(-1, 2, 3)
+    owner = np.repeat(np.arange(frame.count), 3 * chain.rows)
+    real = np.any(links[:, 0] != links[:, 1], axis=1)
+    # Recorded vertices are rounded, which would lose contacts of zero overlap.
+    found = cages(links[real], owner[real], diameter=chain.diameter, gap=1e-9 * chain.diameter)
+    return float(found.translation.mean()), float(found.motion.mean()), float(found.contacts.mean())
+
+
+MEASURES = (
+    FrameMeasure(
+        name="caging",
+        place=53,
+        quantities=(
+            Quantity("caged against translation", "-"),
+            Quantity("caged", "-"),
+            Quantity("contacts of segments mean", "-"),
+        ),
+        take=_cages_of,
+        available_for=in_space,
+        costly=True,
+        on_request=True,
+    ),
+)
