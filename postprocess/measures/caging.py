@@ -10,6 +10,7 @@ are left out.
 
 from __future__ import annotations
 
+from bisect import bisect_left
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
@@ -24,6 +25,7 @@ from postprocess.geometry.links import Flags, Floats, Whole, strands
 from postprocess.geometry.segments import checked_segments, close_segments, nearest_points
 from postprocess.measures.contacts import chain_of
 from postprocess.measures.registry import FrameMeasure, Quantity, in_space
+from postprocess.statistics.seeds import SeedMean, mean_over_seeds
 
 # Least singular value, over the largest one, of directions that count for a rank.
 _RANK = 1e-6
@@ -89,30 +91,55 @@ def cages(segments: ArrayLike, body: ArrayLike, *, diameter: float, gap: float =
     return Cages(bodies=bodies, contacts=np.diff(ends), translation=translation, motion=motion, free=free)
 
 
-def caging_number(segments: ArrayLike) -> int:
-    """Return the mean number of random contacts on the sides of a body that block all its motions.
+def caging_number(segments: ArrayLike, *, trials: int = 400, seed: int = 0) -> SeedMean:
+    """Compute the mean number of random contacts on the sides of a body that block all its motions.
 
-    Contacts are independent, and anywhere on the sides of the round sections; each one is as likely as the one on the
-    opposite side, which has the opposite normal and moment. By Wendel's theorem the mean number is then 2 k + 1, where
-    k is the number of motions that contacts can block: 4 for a rod, which can always slide along and turn about its
-    axis, and 6 for every shape that is not straight. So a rod has 9, others 13. Without rotations a sphere has 7.
+    Contacts are independent, and equally likely everywhere on the sides of the round segments. Motions that no such
+    contact can block do not count: a rod has 4 motions, every other shape 6. The number of a rod is 9, twice its
+    motions plus one; that of a U with equal links is 14.6. A pile in which bodies have fewer contacts than this number
+    cages them by order, or not at all.
 
     Args:
         segments: (M, 2, 3) segments of one body [m].
+        trials: Number of random sequences of contacts.
+        seed: Seed of the random numbers.
+
+    Returns:
+        The mean over the trials, with its standard error and 95 % interval.
 
     Raises:
-        InputError: See `checked_segments`.
+        InputError: See `checked_segments`; fewer than 2 trials; or 5000 contacts are not enough.
 
     Source:
-        Wendel, Math. Scand. 11, 109 (1962); Peters et al., Phys. Rev. E 63, 021404 (2001): 2 d + 1; Wouterse, Luding &
-        Philipse, Granular Matter 11, 169 (2009): 9 for thin rods, experiments have 9.8 contacts.
-
-    Example:
-        >>> caging_number([[[0.0, 0, 0], [1, 0, 0]]])
-        9
+        Peters et al., Phys. Rev. E 63, 021404 (2001): 2 d + 1 for d motions if any d contacts are independent, by
+        Wendel, Math. Scand. 11, 109 (1962). Wouterse, Luding & Philipse, Granular Matter 11, 169 (2009): 9 for thin
+        rods; packings have 9.8 contacts.
     """
     axes, _ = checked_segments(segments, np.zeros(len(np.asarray(segments)), dtype=np.int64))
-    return 2 * len(_basis(_sides(axes))) + 1
+    if trials < 2 or len(axes) == 0:
+        raise InputError(f"a caging number needs 1 segment and 2 trials or more: got {len(axes)}, {trials}")
+    random, basis = np.random.default_rng(seed), _basis(_sides(axes))
+    middle, size = _size(axes)
+    along = axes[:, 1] - axes[:, 0]
+    lengths = np.linalg.norm(along, axis=1)
+
+    def draw(count: int) -> Floats:
+        which = random.choice(len(axes), size=count, p=lengths / lengths.sum())
+        points = (axes[which, 0] + random.uniform(size=(count, 1)) * along[which] - middle) / size
+        normal = np.cross(random.normal(size=(count, 3)), along[which])
+        return _wrenches(points, normal / np.linalg.norm(normal, axis=1, keepdims=True)) @ basis.T
+
+    needed: list[float] = []
+    for _ in range(trials):
+        contacts = draw(64)
+        while not positively_spans(contacts):
+            if len(contacts) > 5000:
+                raise InputError("5000 random contacts do not block all motions; a segment is far shorter than others")
+            contacts = np.concatenate([contacts, draw(len(contacts))])
+        # A further contact never frees a body.
+        counts = range(1, len(contacts) + 1)
+        needed.append(counts[bisect_left(counts, True, key=lambda count: positively_spans(contacts[:count]))])
+    return mean_over_seeds(needed)
 
 
 def contact_normals(segments: Floats, number: Whole, *, diameter: float, gap: float = 0.0) -> ContactNormals:

@@ -48,9 +48,7 @@ class LinkLifetimes:
     first: Whole = field(repr=False)  #: (L,) int64, number of the first body
     second: Whole = field(repr=False)  #: (L,) int64, number of the second body
     begin: Floats = field(repr=False)  #: (L,) float64 [s], time of the first graph with the link
-    end: Floats = field(
-        repr=False
-    )  #: (L,) float64 [s], time of the next graph without it, or the last time
+    end: Floats = field(repr=False)  #: (L,) float64 [s], time of the next graph without it, or the last time
     formed: Flags = field(repr=False)  #: (L,) bool, False for links of the first graph
     broken: Flags = field(repr=False)  #: (L,) bool, False for links of the last graph
     observed: float  #: Time from the first to the last graph [s]

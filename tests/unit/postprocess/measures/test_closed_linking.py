@@ -20,8 +20,8 @@ LINKS = {
     "mirrored (2,4)": ((torus_curve(1, 2) * MIRROR, torus_curve(1, 2, shift=np.pi) * MIRROR), 2),
     "one reversed": ((torus_curve(1, 2)[::-1], torus_curve(1, 2, shift=np.pi)), 2),
     "Whitehead": (whitehead(), 0),
-    "rings side by side": ((CIRCLE, CIRCLE + [0.0, 0, 0.5]), 0),
-    "rings far apart": ((CIRCLE, CIRCLE + [50.0, 0, 0]), 0),
+    "rings side by side": ((CIRCLE, CIRCLE + np.array([0.0, 0, 0.5])), 0),
+    "rings far apart": ((CIRCLE, CIRCLE + np.array([50.0, 0, 0])), 0),
 }
 
 
@@ -38,7 +38,7 @@ def test_links_have_their_whole_numbers(name):
 @given(st.integers(0, 10_000))
 def test_motions_and_the_order_of_segments_keep_the_number_of_links(seed):
     random = np.random.default_rng(seed)
-    segments, body = rings(torus_curve(1, 2), torus_curve(1, 2, shift=np.pi), CIRCLE + [9.0, 0, 0])
+    segments, body = rings(torus_curve(1, 2), torus_curve(1, 2, shift=np.pi), CIRCLE + np.array([9.0, 0, 0]))
     turned = segments @ Rotation.random(rng=random).as_matrix().T + random.normal(size=3)
     order = random.permutation(len(segments))
     found = closed_linking(turned[order], 10 - body[order])
