@@ -61,7 +61,7 @@ def read_centrelines(path: Path | str, *, unit: str | None = None) -> Centreline
     elif suffix in {".vtu", ".vtp", ".vtk"}:
         points, lines, body, kind = _read_vtu(path) if suffix == ".vtu" else _read_polydata(path)
     else:
-        raise InputError(f"{path}: centre lines are read from .csv, .vtu, .vtp and .vtk: got {suffix or 'no suffix'!r}")
+        raise InputError(f"{path}: centre lines are read from .csv, .vtu, .vtp and .vtk: got {suffix or 'no suffix'}")
     if unit is None:
         raise InputError(f"{path}: states no unit of length; give unit='mm', or another one of {', '.join(UNITS)}")
     segments = points[lines] * _factor(path, unit)
@@ -80,7 +80,7 @@ _Lines = tuple[Floats, Whole, Whole, NDArray[Any] | None]  # points (P, 3), line
 
 def _read_csv(path: Path, unit: str | None) -> tuple[Floats, Whole, Whole, NDArray[Any] | None, str | None]:
     try:
-        table = pd.read_csv(path)
+        table = pd.read_csv(path, skipinitialspace=True)
     except (OSError, ValueError) as error:
         cannot_read("centre lines", path, error, _REMEDY)
     headers = [str(name).strip() for name in table.columns]

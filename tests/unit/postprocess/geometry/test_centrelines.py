@@ -3,6 +3,7 @@
 import meshio
 import numpy as np
 import pytest
+from synthetic import write_frame
 from synthetic.curves import rings, torus_curve
 
 from dem.errors import InputError
@@ -64,7 +65,7 @@ def test_files_that_are_missing_or_of_another_kind_are_rejected(tmp_path):
         read_centrelines(tmp_path / "b.vtu", unit="m")
 
 
-def test_a_frame_of_a_run_is_measured_as_in_the_run(tmp_path, scene, write_frame):
+def test_a_frame_of_a_run_is_measured_as_in_the_run(tmp_path, scene):
     write_frame(tmp_path / "frame.vtu", scene(20, 4, box=1.2, angles=(90, 90)))
     frame, found = read_frame(tmp_path / "frame.vtu"), read_centrelines(tmp_path / "frame.vtu", unit="m")
     segments, body = segments_of(frame)

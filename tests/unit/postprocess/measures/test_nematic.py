@@ -84,7 +84,7 @@ def test_bodies_have_the_axes_and_openings_of_their_shape():
 def test_shapes_without_an_axis_or_an_opening_are_rejected():
     square, ring = rings(torus_curve(1, 0))
     assert abs(body_axes(square, ring, longest=False)[0, 2]) == pytest.approx(1)
-    with pytest.raises(InputError, match="body 0 has no longest axis: .* use the shortest axis, or `segment_order`"):
+    with pytest.raises(InputError, match=r"body 0 has no longest axis: .* use the shortest axis, or `segment_order`"):
         body_axes(square, ring)
     with pytest.raises(InputError, match="body 0 has no opening: it is closed"):
         opening_directions(square, ring)
