@@ -203,6 +203,10 @@ def _legend(shown: Container[str], *, per_frame: bool, by: Sequence[str]) -> str
             "⟨N⟩: mean number of links of others through a smarticle's plane; z: height of the centre of mass "
             "above the floor"
         )
+    if "average crossing number mean [-]" in shown:
+        lines.append(
+            "⟨ACN⟩: average crossing number of a smarticle with all others, half the crossings seen from a random direction"
+        )
     if "hook work [J]" in shown:
         lines.append(
             f"peak F/nW: largest running mean ({WINDOW:g} s) of the force on the raised hook, divided by the weight of "
