@@ -205,7 +205,8 @@ def _legend(shown: Container[str], *, per_frame: bool, by: Sequence[str]) -> str
         )
     if "average crossing number mean [-]" in shown:
         lines.append(
-            "⟨ACN⟩: average crossing number of a smarticle with all others, half the crossings seen from a random direction"
+            "⟨ACN⟩: average crossing number of a smarticle with all others, half the crossings that are seen from a "
+            "random direction"
         )
     if "hook work [J]" in shown:
         lines.append(
