@@ -37,7 +37,8 @@ class ClosedLinking:
     closed: Flags = field(repr=False)  #: (B,) bool, False for bodies that were closed straight
     i: Whole = field(repr=False)  #: (P,) int64, index in `bodies` of the first body of each pair
     j: Whole = field(repr=False)  #: (P,) int64, index in `bodies` of the second body, above i
-    #: (P,) float64 [-], whole numbers; the sign depends on the directions of the curves; NaN if two curves touch
+    #: (P,) float64 [-], whole numbers; the sign depends on the directions of the curves; NaN if the integral is not
+    #: whole, as it is for curves that touch in one point
     number: Floats = field(repr=False)
 
     @property

@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 
 from dem.errors import InputError
 from postprocess import cages, caging_number
-from postprocess.measures.caging import positively_spans
+from postprocess.measures.caging import contact_normals, positively_spans
 
 U = np.array([[[-1.0, 2, 0], [-1, 0, 0]], [[-1, 0, 0], [1, 0, 0]], [[1, 0, 0], [1, 2, 0]]])
 ROD = np.array([[[-10.0, 0, 0], [10, 0, 0]]])
@@ -54,6 +54,13 @@ def test_a_rod_between_four_others_is_held_only_with_contacts_across():
     assert found.translation[0]
     assert not found.motion[0]
     np.testing.assert_array_equal(found.motion, cages(turned(middle), np.arange(5), diameter=1.0 + 1e-9).motion)
+
+
+def test_normals_point_into_their_bodies():
+    body, point, normal = contact_normals(rods_around([(3, 1)]), np.arange(2), diameter=1.0)
+    assert body.tolist() == [0, 1]
+    np.testing.assert_allclose(point, [[3, 0.5, 0]] * 2)
+    np.testing.assert_allclose(normal, [[0, -1, 0], [0, 1, 0]])
 
 
 def test_contacts_of_one_body_with_itself_do_not_count():

@@ -9,7 +9,6 @@ from synthetic.shapes import random_scene
 
 from dem.errors import InputError
 from postprocess import crossing_pairs, link_crossings, polygon_crossings
-from postprocess.geometry.segments import curves
 from postprocess.measures.entanglement import entanglement
 
 SQUARE = np.array([[1.0, 1, 0], [-1, 1, 0], [-1, -1, 0], [1, -1, 0]])
@@ -84,12 +83,8 @@ def test_a_shape_without_a_polygon_has_no_crossings(corners, text):
         polygon_crossings(cross, np.zeros(3, dtype=int))
 
 
-def test_segments_are_joined_to_curves_in_the_order_of_the_file():
-    square, bent = (rings(SQUARE, closed=closed)[0] for closed in (True, False))
-    ring, hook = curves(np.concatenate([square[[2, 0, 3, 1]], bent[[1, 2, 0], ::-1]]), [3] * 4 + [1] * 3)[::-1]
-    assert (ring.body, ring.closed, hook.body, hook.closed) == (3, True, 1, False)
-    np.testing.assert_array_equal(ring.corners, SQUARE[[2, 3, 0, 1]])
-    np.testing.assert_array_equal(hook.corners, SQUARE[::-1])
-    assert curves(np.empty((0, 2, 3)), []) == ()
-    there_and_back = np.array([[[0.0, 0, 0], [1, 0, 0]], [[1, 0, 0], [0, 0, 0]]])
-    assert curves(there_and_back, [0, 0])[0].flaw == "goes to and fro along one line"
+def test_a_wavy_spiral_does_not_cross_itself():
+    t = np.linspace(0, 4 * np.pi, 40)
+    spiral = np.stack([(1 + t) * np.cos(t), (1 + t) * np.sin(t), 0.3 * np.cos(5 * t)], axis=1)
+    assert polygon_crossings(*rings(spiral, closed=False)).crossings.tolist() == [0]
+    assert polygon_crossings(*with_pin(spiral, closed=False)).crossings.tolist() == [1, 0]
