@@ -91,7 +91,7 @@ def curves(segments: ArrayLike, body: ArrayLike) -> tuple[Curve, ...]:
         InputError: See `checked_segments`.
     """
     segments, body = checked_segments(segments, body)
-    ends = _corner_numbers(segments, body)
+    ends = _corner_numbers(segments)
     sorted_ = np.argsort(body, kind="stable")
     bodies, first = np.unique(body[sorted_], return_index=True)
     found = []
@@ -164,15 +164,14 @@ def nearest_points(first: Floats, second: Floats) -> tuple[Floats, Floats]:
     return first[:, 0] + s[:, None] * u, second[:, 0] + t[:, None] * v
 
 
-def _corner_numbers(segments: Floats, body: Whole) -> Whole:
-    """Number the corners at which segments of one body meet: (M, 2), one number per end."""
-    points, owner = segments.reshape(-1, 3), np.repeat(body, 2)
+def _corner_numbers(segments: Floats) -> Whole:
+    """Number the corners at which segments meet, also those of different bodies: (M, 2), one number per end."""
+    points = segments.reshape(-1, 3)
     if len(points) == 0:
         return np.empty((0, 2), dtype=np.int64)
     reach = JOINED * float(np.linalg.norm(segments[:, 1] - segments[:, 0], axis=1).mean())
     i, j = cKDTree(points).query_pairs(reach, output_type="ndarray").T
-    one = owner[i] == owner[j]
-    graph = coo_array((np.ones(one.sum()), (i[one], j[one])), shape=(len(points), len(points)))
+    graph = coo_array((np.ones(len(i)), (i, j)), shape=(len(points), len(points)))
     numbers: Whole = connected_components(graph, directed=False)[1].astype(np.int64).reshape(-1, 2)
     return numbers
 

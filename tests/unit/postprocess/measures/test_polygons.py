@@ -81,10 +81,3 @@ def test_a_shape_without_a_polygon_has_no_crossings(corners, text):
     cross = np.array([[[-1.0, 0, 0], [0, 0, 0]], [[0, 0, 0], [1, 0, 0]], [[0, 0, 0], [0, 1, 0]]])
     with pytest.raises(InputError, match=r"branches, .*; the average crossing number is defined for every shape"):
         polygon_crossings(cross, np.zeros(3, dtype=int))
-
-
-def test_a_wavy_spiral_does_not_cross_itself():
-    t = np.linspace(0, 4 * np.pi, 40)
-    spiral = np.stack([(1 + t) * np.cos(t), (1 + t) * np.sin(t), 0.3 * np.cos(5 * t)], axis=1)
-    assert polygon_crossings(*rings(spiral, closed=False)).crossings.tolist() == [0]
-    assert polygon_crossings(*with_pin(spiral, closed=False)).crossings.tolist() == [1, 0]
