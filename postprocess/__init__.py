@@ -28,7 +28,14 @@ from postprocess.measures.crossing_number import (
     grid_points,
     region_spans,
 )
-from postprocess.measures.entanglement import CrossingPairs, crossing_pairs, has_plane, link_crossings
+from postprocess.measures.entanglement import (
+    CrossingPairs,
+    PolygonCrossings,
+    crossing_pairs,
+    has_plane,
+    link_crossings,
+    polygon_crossings,
+)
 from postprocess.measures.force_chains import force_chains, force_participation, strong_contacts
 from postprocess.measures.graph import EntanglementGraph, LinkLifetimes, entanglement_graph, link_lifetimes
 from postprocess.measures.heights import material_height
@@ -43,7 +50,6 @@ from postprocess.measures.nematic import (
     segment_order,
 )
 from postprocess.measures.packing import DEFINITIONS, PackingFraction, packing_fraction
-from postprocess.measures.polygons import PolygonCrossings, polygon_crossings
 from postprocess.measures.profile import PackingProfile, packing_profile, profile_table
 from postprocess.measures.table import PackingChange, measure_run, packing_change, summarise_run
 from postprocess.report.tables import write_table

@@ -54,7 +54,7 @@ class Cages:
     free: Floats = field(repr=False)
 
 
-def cages(segments: ArrayLike, body: ArrayLike, *, diameter: float, gap: float = 0.0) -> Cages:
+def cages(segments: ArrayLike, body: ArrayLike, *, diameter: ArrayLike, gap: float = 0.0) -> Cages:
     """Find which bodies are caged by their contacts with other bodies.
 
     Segments that touch along a line count as one contact.
@@ -62,7 +62,7 @@ def cages(segments: ArrayLike, body: ArrayLike, *, diameter: float, gap: float =
     Args:
         segments: (M, 2, 3) axes of round sections [m].
         body: (M,) number of the body of each segment.
-        diameter: Diameter of the sections [m].
+        diameter: Diameter of all sections, or (M,) of each segment [m].
         gap: Largest distance of two surfaces that counts as contact [m].
 
     Raises:
@@ -142,20 +142,26 @@ def caging_number(segments: ArrayLike, *, trials: int = 400, seed: int = 0) -> S
     return mean_over_seeds(needed)
 
 
-def contact_normals(segments: Floats, number: Whole, *, diameter: float, gap: float = 0.0) -> ContactNormals:
+def contact_normals(segments: Floats, number: Whole, *, diameter: ArrayLike, gap: float = 0.0) -> ContactNormals:
     """Find the contacts of round segments; arguments as of `cages`, with indices (M,) of bodies."""
-    if not (np.isfinite(diameter) and diameter > 0 and gap >= 0):
-        raise InputError(f"a contact needs a diameter above 0 m and a gap of 0 m or more: got {diameter} m, {gap} m")
-    i, j = close_segments(segments[:, 0], segments[:, 1], number, diameter + gap)
+    sizes = np.asarray(diameter, dtype=np.float64)
+    if sizes.shape not in {(), (len(segments),)} or not np.all(np.isfinite(sizes) & (sizes > 0)) or not gap >= 0:
+        raise InputError(
+            f"a contact needs one diameter above 0 m, or one per segment, and a gap of 0 m or more: got {diameter} m, "
+            f"{gap} m"
+        )
+    radius = np.broadcast_to(sizes / 2, len(segments))
+    i, j = close_segments(segments[:, 0], segments[:, 1], number, 2 * radius.max(initial=0) + gap)
     first, second = nearest_points(segments[i], segments[j])
     apart = first - second
     distance = np.linalg.norm(apart, axis=1)
     # Axes that meet have no normal.
-    touching = (distance <= diameter + gap) & (distance > 0)
-    i, j, middle = i[touching], j[touching], (first[touching] + second[touching]) / 2
+    touching = (distance <= radius[i] + radius[j] + gap) & (distance > 0)
+    i, j = i[touching], j[touching]
     normal = apart[touching] / distance[touching, None]
+    point = first[touching] - (radius[i] / (radius[i] + radius[j]) * distance[touching])[:, None] * normal
     return ContactNormals(
-        np.concatenate([number[i], number[j]]), np.tile(middle, (2, 1)), np.concatenate([normal, -normal])
+        np.concatenate([number[i], number[j]]), np.tile(point, (2, 1)), np.concatenate([normal, -normal])
     )
 
 

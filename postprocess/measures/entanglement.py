@@ -5,6 +5,11 @@ link of another smarticle passes through this plane if the link's ends lie stric
 the link meets the plane strictly inside the quadrilateral. A link that ends in the plane, lies in the plane, or meets
 an edge does not pass, within 1e-9 of the smarticle's size. Barbs at unequal angles make the quadrilateral concave or
 self-intersecting; its inside is then where its winding number is not zero.
+
+`polygon_crossings` counts for bodies of any shape. An open bent body spans the polygon of its corners, closed by the
+straight line between its free ends, as a U, C, Z or hook does; a ring spans its own polygon. These bodies span no
+polygon: a straight one, one that branches or has several pieces (a star, a cross), and one whose corners do not lie in
+a plane. The average crossing number is defined for these, too.
 """
 
 from __future__ import annotations
@@ -13,12 +18,15 @@ from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import ArrayLike
+from scipy.spatial import cKDTree
 
 from dem.record.frame import Frame
 from dem.record.run import Run
 from postprocess.geometry.links import (
     Flags,
     Floats,
+    UndefinedMeasureError,
     Vertices,
     Whole,
     bounding_spheres,
@@ -27,9 +35,11 @@ from postprocess.geometry.links import (
     link_lengths,
     plane_frames,
 )
+from postprocess.geometry.segments import Curve, checked_segments, curves
 from postprocess.measures.registry import FrameMeasure, Quantity, Shown, in_space
 
-STRAIGHT = 0.99  #: Tip-to-tip distance over unfolded length above which a smarticle counts as straight [-]
+STRAIGHT = 0.99  #: Tip-to-tip distance over unfolded length above which a body counts as straight [-]
+FLAT = 0.1  #: Largest distance of a corner from the plane of its body, over the body's radius, for a flat body [-]
 
 _TOLERANCE = 1e-9
 # Pairs of polygons and segments per block, which limits memory.
@@ -61,6 +71,28 @@ class Entanglement:
     crossings: Whole = field(repr=False)
     has_plane: Flags = field(repr=False)  #: (N,) bool, False for (nearly) straight smarticles, which have no plane
     mean: float  #: ⟨N⟩, mean crossings of the smarticles that have a plane [-]; NaN if none has
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class PolygonCrossings:
+    """Crossings of B bodies, and the P ordered pairs (i, j) where j passes through the polygon of i."""
+
+    bodies: Whole = field(repr=False)  #: (B,) int64, numbers of the bodies
+    crossings: Whole = field(repr=False)  #: (B,) int64, segments of others through the polygon; 0 without a polygon
+    flaws: tuple[str, ...] = field(repr=False)  #: (B,) reason why a body spans no polygon; empty if it spans one
+    i: Whole = field(repr=False)  #: (P,) int64, index in `bodies` of the body that is crossed
+    j: Whole = field(repr=False)  #: (P,) int64, index in `bodies` of the body that passes through
+    segments: Whole = field(repr=False)  #: (P,) int64, number of segments of j that pass through
+
+    @property
+    def has_polygon(self) -> Flags:
+        """Whether each body spans a polygon: (B,) bool."""
+        return np.array([not flaw for flaw in self.flaws], dtype=bool)
+
+    @property
+    def mean(self) -> float:
+        """Mean crossings of the bodies that span a polygon [-]."""
+        return float(self.crossings[self.has_polygon].mean())
 
 
 def entanglement(vertices: Vertices) -> Entanglement:
@@ -119,6 +151,52 @@ def link_passages(vertices: Vertices) -> LinkPassages:
     return LinkPassages(i, j, link.astype(np.int64), start + fraction[:, None] * (end - start))
 
 
+def polygon_crossings(segments: ArrayLike, body: ArrayLike) -> PolygonCrossings:
+    """Count the segments of others that pass through the polygon of each body.
+
+    Args:
+        segments: (M, 2, 3) [m].
+        body: (M,) number of the body of each segment.
+
+    Raises:
+        InputError: See `checked_segments`.
+        UndefinedMeasureError: No body spans a polygon; the message has the reason for the first one.
+
+    Source:
+        Savoie et al., Soft Matter 2023, ⟨N⟩ of smarticles; here for any flat curve.
+    """
+    segments, body = checked_segments(segments, body)
+    found = curves(segments, body)
+    flaws = tuple(_flaw(one) for one in found)
+    if all(flaws):
+        first = f"body {found[0].body} {flaws[0]}" if found else "there is no body"
+        raise UndefinedMeasureError(
+            f"no body spans a polygon: {first}; the average crossing number is defined for every shape"
+        )
+    bodies, number = np.unique(body, return_inverse=True)
+    middles = segments.mean(axis=1)
+    half = np.linalg.norm(segments[:, 1] - segments[:, 0], axis=1) / 2
+    tree, reach = cKDTree(middles), half.max()
+    counts = np.zeros((0, 3), dtype=np.int64)
+    # Polygons of equal numbers of corners are one array.
+    for size in sorted({len(one.corners) for one, flaw in zip(found, flaws, strict=True) if not flaw}):
+        owner = np.array([k for k, one in enumerate(found) if not flaws[k] and len(one.corners) == size])
+        corners = np.array([found[k].corners for k in owner])
+        centres, radii = bounding_spheres(corners)
+        near = tree.query_ball_point(centres, radii + reach)
+        polygon = np.repeat(np.arange(len(owner)), [len(one) for one in near])
+        other = np.concatenate([np.array(one, dtype=np.int64) for one in near])
+        apart = number[other] != owner[polygon]
+        polygon, other = polygon[apart], other[apart]
+        passing = _passing_segments(corners, polygon, segments[other])
+        pairs = np.stack([owner[polygon[passing]], number[other[passing]]], axis=1)
+        unique, times = np.unique(pairs, axis=0, return_counts=True)
+        counts = np.concatenate([counts, np.column_stack([unique.reshape(-1, 2), times])])
+    i, j, passed = counts[np.lexsort((counts[:, 1], counts[:, 0]))].T
+    crossings = np.bincount(i, passed, minlength=len(bodies)).astype(np.int64)
+    return PolygonCrossings(bodies=bodies, crossings=crossings, flaws=flaws, i=i, j=j, segments=passed)
+
+
 def has_plane(vertices: Vertices) -> Flags:
     """Return which of N smarticles are bent enough to span a plane: (N,) bool.
 
@@ -133,6 +211,22 @@ def has_plane(vertices: Vertices) -> Flags:
     return bent
 
 
+def _flaw(curve: Curve) -> str:
+    """Return the reason why a body spans no polygon; empty if it spans one."""
+    if curve.flaw:
+        return curve.flaw
+    corners = curve.corners
+    length = float(np.linalg.norm(np.diff(corners, axis=0), axis=1).sum())
+    if not curve.closed and float(np.linalg.norm(corners[-1] - corners[0])) > STRAIGHT * length:
+        return f"is straight: its ends are more than {STRAIGHT} of its length apart"
+    centred: Floats = corners - corners.mean(axis=0)
+    _, spread, axes = np.linalg.svd(centred)
+    if spread[1] <= 1e-6 * length:
+        return "is straight: its corners lie on one line"
+    off = float(np.abs(centred @ axes[2]).max() / np.linalg.norm(centred, axis=1).max())
+    return f"is not flat: a corner is {off:.2g} of its radius off its plane, above {FLAT}" if off > FLAT else ""
+
+
 def _close_pairs(vertices: Floats, planes: Flags) -> tuple[Whole, Whole]:
     """Find ordered pairs (i, j) whose bounding spheres overlap, where i has a plane."""
     low, high = close_pairs(vertices)
@@ -143,10 +237,10 @@ def _close_pairs(vertices: Floats, planes: Flags) -> tuple[Whole, Whole]:
 def _passing(vertices: Floats, i: Whole, j: Whole) -> Flags:
     """Return which links of each j pass through the plane of its i: (P, 3) bool."""
     links = np.stack([vertices[:, :-1], vertices[:, 1:]], axis=2)
-    return passing_segments(vertices, np.repeat(i, 3), links[j].reshape(-1, 2, 3)).reshape(-1, 3)
+    return _passing_segments(vertices, np.repeat(i, 3), links[j].reshape(-1, 2, 3)).reshape(-1, 3)
 
 
-def passing_segments(corners: Floats, polygon: Whole, segments: Floats) -> Flags:
+def _passing_segments(corners: Floats, polygon: Whole, segments: Floats) -> Flags:
     """Return which segments pass through a polygon: (P,) bool.
 
     Args:

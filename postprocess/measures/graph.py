@@ -19,7 +19,7 @@ from postprocess.geometry.links import Flags, Floats, Whole
 from postprocess.measures.closed_linking import ClosedLinking
 from postprocess.measures.clusters import Clusters, joined_clusters
 from postprocess.measures.crossing_number import CrossingNumbers
-from postprocess.measures.polygons import PolygonCrossings
+from postprocess.measures.entanglement import PolygonCrossings
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -61,6 +61,9 @@ def test_normals_point_into_their_bodies():
     assert body.tolist() == [0, 1]
     np.testing.assert_allclose(point, [[3, 0.5, 0]] * 2)
     np.testing.assert_allclose(normal, [[0, -1, 0], [0, 1, 0]])
+    thick = contact_normals(rods_around([(3, 1)]), np.arange(2), diameter=[0.5, 1.5])
+    np.testing.assert_allclose(thick.point, [[3, 0.25, 0]] * 2)
+    assert len(contact_normals(rods_around([(3, 1)]), np.arange(2), diameter=[0.5, 1.4]).body) == 0
 
 
 def test_contacts_of_one_body_with_itself_do_not_count():
@@ -103,6 +106,7 @@ def test_the_caging_number_of_a_bent_body_is_above_that_of_independent_contacts(
         caging_number(U * [1, 1e-5, 1], trials=2)
 
 
-def test_bad_sizes_are_rejected():
-    with pytest.raises(InputError, match="a contact needs a diameter above 0 m and a gap of 0 m or more: got 0 m"):
-        cages(U, [0, 1, 2], diameter=0)
+@pytest.mark.parametrize(("diameter", "gap"), [(0, 0), ([1, 1], 0), (float("nan"), 0), (1, -1)])
+def test_bad_sizes_are_rejected(diameter, gap):
+    with pytest.raises(InputError, match="a contact needs one diameter above 0 m, or one per segment, and a gap of"):
+        cages(U, [0, 1, 2], diameter=diameter, gap=gap)
