@@ -20,7 +20,7 @@ from dem.record.run import Run
 from postprocess.geometry.links import Flags, Floats, Whole, close_pairs
 from postprocess.geometry.segments import checked_curves, padded, segments_of
 from postprocess.measures.clusters import joined_clusters
-from postprocess.measures.linking import gauss_integral
+from postprocess.measures.linking import gauss_integral, segment_integrals
 from postprocess.measures.registry import FrameMeasure, Quantity, in_space
 
 # Pairs of segments per block, which limits memory.
@@ -45,7 +45,8 @@ class ClosedLinking:
     def per_body(self) -> Floats:
         """Sum of |Lk| over the pairs of each body: (B,) [-]."""
         total: Floats = np.zeros(len(self.bodies))
-        np.add.at(total, np.stack([self.i, self.j]), np.abs(self.number))
+        # `np.add.at` does not broadcast its values in NumPy 2.4.
+        np.add.at(total, np.concatenate([self.i, self.j]), np.abs(np.tile(self.number, 2)))
         return total
 
     @property
@@ -124,16 +125,15 @@ def writhe(corners: ArrayLike, *, closed: bool) -> float:
     ends = np.stack([points, np.roll(points, -1, axis=0)], axis=1)[: None if closed else -1]
     if np.any(np.all(ends[:, 0] == ends[:, 1], axis=1)):
         raise InputError("corners that follow each other must not coincide; a closed curve does not repeat its first")
-    count = len(ends)
-    # Segments that meet at a corner lie in one plane and have no crossings.
-    i, j = np.triu_indices(count, k=2)
-    apart = (j - i < count - 1) if closed else np.ones(len(i), dtype=bool)
-    i, j = i[apart], j[apart]
-    total = 0.0
-    for start in range(0, len(i), _CHUNK):
-        part = slice(start, start + _CHUNK)
-        total += float(gauss_integral(ends[i[part]], ends[j[part]]).sum())
-    return 2 * total
+    number, total = np.arange(len(ends)), 0.0
+    step = max(1, _CHUNK // len(ends))
+    for start in range(0, len(ends), step):
+        values = segment_integrals(ends[start : start + step], ends)
+        apart = np.abs(number[start : start + step, None] - number)
+        # Segments that meet at a corner lie in one plane and have no crossings.
+        values[(np.minimum(apart, len(ends) - apart) if closed else apart) <= 1] = 0.0
+        total += float(values.sum())
+    return total
 
 
 def writhes(segments: ArrayLike, body: ArrayLike) -> Floats:

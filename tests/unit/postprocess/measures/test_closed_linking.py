@@ -55,6 +55,8 @@ def test_smarticles_closed_straight_are_linked_as_their_crossings_say(scene):
     outlines = np.stack([pile, np.roll(pile, -1, axis=1)], axis=2)
     assert not found.closed.any()
     assert len(found.number) > 30
+    each = [np.abs(found.number[(found.i == k) | (found.j == k)]).sum() for k in range(30)]
+    np.testing.assert_array_equal(found.per_body, each)
     assert np.abs(found.number).max() <= 2
     hooked = set(zip(found.i[found.number % 2 == 1].tolist(), found.j[found.number % 2 == 1].tolist(), strict=True))
     for i, j in ((0, 1), (3, 7), *list(hooked)[:10]):
