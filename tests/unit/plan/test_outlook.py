@@ -105,7 +105,9 @@ def bench(activity: dict[str, object], count: int = 270) -> Plan:
     """A scene of `benchmarks.engines`, in a container as wide as keeps the pile's height."""
     radius = 0.0234 * (count / 270) ** 0.5
     phases = [{"type": "deposit", "per_layer": max(4, count // 27)}, {"duration_s": 2.0, **activity}]
+    strand = {"base": "standard", "rows": 1, "stiffness_N_per_m": 500.0}
     data = {"schema_version": 1, "engine": "links", "seed": 1, "count": count, "container": {"radius_m": radius}}
+    data |= {"fidelity": strand}
     return plan(parse_scene({**data, "phases": phases}, source="test"))
 
 
