@@ -147,7 +147,7 @@ def contact_normals(segments: Floats, number: Whole, *, diameter: ArrayLike, gap
     sizes = np.asarray(diameter, dtype=np.float64)
     if sizes.shape not in {(), (len(segments),)} or not np.all(np.isfinite(sizes) & (sizes > 0)) or not gap >= 0:
         raise InputError(
-            f"a contact needs one diameter above 0 m, or one per segment, and a gap of 0 m or more: got {diameter} m, "
+            f"a contact needs one diameter above 0 m, or one per segment, and a gap of 0 m or more: got {sizes} m, "
             f"{gap} m"
         )
     radius = np.broadcast_to(sizes / 2, len(segments))
