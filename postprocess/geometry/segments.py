@@ -49,14 +49,12 @@ class Curve:
 
 
 def segments_of(frame: Frame) -> Segments:
-    """Return the segments of all smarticles of a frame: three links each, without links of length 0.
+    """Return the segments of all bodies of a frame, without links of length 0.
 
-    The number of a body is the index of the smarticle in `Frame.vertices`.
+    The number of a body is its index in the frame, as in `Frame.contacts`.
     """
-    links = np.stack([frame.vertices[:, :-1], frame.vertices[:, 1:]], axis=2).reshape(-1, 2, 3)
-    body = np.repeat(np.arange(frame.count), 3)
-    real = np.any(links[:, 0] != links[:, 1], axis=1)
-    return Segments(links[real], body[real])
+    real = np.any(frame.segments[:, 0] != frame.segments[:, 1], axis=1)
+    return Segments(frame.segments[real], frame.body[real])
 
 
 def checked_segments(segments: ArrayLike, body: ArrayLike) -> Segments:
@@ -110,6 +108,12 @@ def checked_curves(segments: ArrayLike, body: ArrayLike, what: str) -> tuple[Cur
         if curve.flaw:
             raise InputError(f"body {curve.body} has no {what}: it {curve.flaw}; leave its segments out")
     return found
+
+
+def only_curves(segments: Floats, body: Whole) -> Segments:
+    """Return the segments of all bodies that are one curve."""
+    joined = [one.body for one in curves(segments, body) if not one.flaw]
+    return Segments(segments[np.isin(body, joined)], body[np.isin(body, joined)])
 
 
 def padded(found: tuple[Curve, ...]) -> Floats:

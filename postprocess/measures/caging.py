@@ -24,7 +24,7 @@ from dem.record.run import Run
 from postprocess.geometry.links import Flags, Floats, Whole, strands
 from postprocess.geometry.segments import checked_segments, close_segments, nearest_points
 from postprocess.measures.contacts import chain_of
-from postprocess.measures.registry import FrameMeasure, Quantity, in_space
+from postprocess.measures.registry import FrameMeasure, Quantity, any_in_space
 from postprocess.statistics.seeds import SeedMean, mean_over_seeds
 
 # Least singular value, over the largest one, of directions that count for a rank.
@@ -216,14 +216,18 @@ def _directions(count: int) -> Floats:
 
 
 def _cages_of(frame: Frame, run: Run) -> tuple[float, float, float]:
-    chain = chain_of(run)
-    # A smarticle of several strands touches with each of them.
-    each = strands(frame.vertices, chain).reshape(-1, 4, 3)
-    links = np.stack([each[:, :-1], each[:, 1:]], axis=2).reshape(-1, 2, 3)
-    owner = np.repeat(np.arange(frame.count), 3 * chain.rows)
-    real = np.any(links[:, 0] != links[:, 1], axis=1)
-    # Recorded vertices are rounded, which would lose contacts of zero overlap.
-    found = cages(links[real], owner[real], diameter=chain.diameter, gap=1e-9 * chain.diameter)
+    if run.manifest.kinds is None:
+        chain = chain_of(run)
+        # A smarticle of several strands touches with each of them.
+        each = strands(frame.vertices, chain).reshape(-1, 4, 3)
+        segments = np.stack([each[:, :-1], each[:, 1:]], axis=2).reshape(-1, 2, 3)
+        body, sizes = np.repeat(np.arange(frame.count), 3 * chain.rows), np.full(len(segments), chain.diameter)
+    else:
+        segments, body = frame.segments, frame.body
+        sizes = np.array([kind.sphere_diameter_m for kind in run.manifest.kinds])[frame.kind[body]]
+    real = np.any(segments[:, 0] != segments[:, 1], axis=1)
+    # Recorded positions are rounded, which would lose contacts of zero overlap.
+    found = cages(segments[real], body[real], diameter=sizes[real], gap=1e-9 * float(sizes.max()))
     return float(found.translation.mean()), float(found.motion.mean()), float(found.contacts.mean())
 
 
@@ -237,7 +241,7 @@ MEASURES = (
             Quantity("contacts of segments mean", "-"),
         ),
         take=_cages_of,
-        available_for=in_space,
+        available_for=any_in_space,
         costly=True,
         on_request=True,
     ),

@@ -18,10 +18,10 @@ from dem.errors import InputError
 from dem.record.frame import Frame
 from dem.record.run import Run
 from postprocess.geometry.links import Flags, Floats, Whole, close_pairs
-from postprocess.geometry.segments import checked_curves, padded, segments_of
+from postprocess.geometry.segments import checked_curves, only_curves, padded, segments_of
 from postprocess.measures.clusters import joined_clusters
 from postprocess.measures.linking import gauss_integral, segment_integrals
-from postprocess.measures.registry import FrameMeasure, Quantity, in_space
+from postprocess.measures.registry import FrameMeasure, Quantity, any_in_space
 
 # Pairs of segments per block, which limits memory.
 _CHUNK = 100_000
@@ -143,8 +143,8 @@ def writhes(segments: ArrayLike, body: ArrayLike) -> Floats:
 
 
 def _linking_of(frame: Frame, _: Run) -> tuple[float, float]:
-    linked = closed_linking(*segments_of(frame))
-    if frame.count == 0:
+    linked = closed_linking(*only_curves(*segments_of(frame)))
+    if len(linked.bodies) == 0:
         return math.nan, math.nan
     return linked.mean, joined_clusters(len(linked.bodies), linked.i, linked.j).largest
 
@@ -155,7 +155,7 @@ MEASURES = (
         place=43,
         quantities=(Quantity("closed linking number mean", "-"), Quantity("linked graph largest share", "-")),
         take=_linking_of,
-        available_for=in_space,
+        available_for=any_in_space,
         costly=True,
         on_request=True,
     ),

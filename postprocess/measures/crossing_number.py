@@ -23,7 +23,7 @@ from dem.errors import InputError
 from postprocess.geometry.links import Flags, Floats, Whole
 from postprocess.geometry.segments import checked_segments, segments_of
 from postprocess.measures.linking import segment_integrals
-from postprocess.measures.registry import FrameMeasure, Quantity, Shown, in_space
+from postprocess.measures.registry import FrameMeasure, Quantity, Shown, any_in_space
 
 # Pairs of segments per block, whose temporary arrays fit the cache of a core.
 _CHUNK = 20_000
@@ -178,7 +178,7 @@ MEASURES = (
         place=43,
         quantities=(Quantity("average crossing number mean", "-", Shown(heading="⟨ACN⟩", place=22, form=".2f")),),
         take=lambda frame, _: (average_crossing_numbers(*segments_of(frame)).mean,),
-        available_for=in_space,
+        available_for=any_in_space,
         costly=True,
         on_request=True,
     ),

@@ -14,6 +14,7 @@ a plane. The average crossing number is defined for these, too.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
@@ -35,8 +36,8 @@ from postprocess.geometry.links import (
     link_lengths,
     plane_frames,
 )
-from postprocess.geometry.segments import Curve, checked_segments, curves
-from postprocess.measures.registry import FrameMeasure, Quantity, Shown, in_space
+from postprocess.geometry.segments import Curve, checked_segments, curves, segments_of
+from postprocess.measures.registry import FrameMeasure, Quantity, Shown, any_in_space
 
 STRAIGHT = 0.99  #: Tip-to-tip distance over unfolded length above which a body counts as straight [-]
 FLAT = 0.1  #: Largest distance of a corner from the plane of its body, over the body's radius, for a flat body [-]
@@ -211,6 +212,11 @@ def has_plane(vertices: Vertices) -> Flags:
     return bent
 
 
+def spans_polygon(curve: Curve) -> bool:
+    """Return whether a body spans a polygon: its segments are one curve, bent or closed, and flat."""
+    return not _flaw(curve)
+
+
 def _flaw(curve: Curve) -> str:
     """Return the reason why a body spans no polygon; empty if it spans one."""
     if curve.flaw:
@@ -287,9 +293,20 @@ def _winding(points: Floats, corners: Floats, tolerance: Floats) -> Whole:
     return counts
 
 
+def frame_crossings(frame: Frame) -> tuple[Whole, Flags]:
+    """Return the crossings (N,) of the bodies of a frame, and whether each one spans a polygon (N,)."""
+    if frame.bars is None:
+        return link_crossings(frame.vertices), has_plane(frame.vertices)
+    try:
+        found = polygon_crossings(*segments_of(frame))
+    except UndefinedMeasureError:
+        return np.zeros(frame.count, dtype=np.int64), np.zeros(frame.count, dtype=bool)
+    return found.crossings, found.has_polygon
+
+
 def _entanglement_of(frame: Frame, _: Run) -> tuple[float, int]:
-    tangle = entanglement(frame.vertices)
-    return tangle.mean, int(tangle.has_plane.sum())
+    crossings, planes = frame_crossings(frame)
+    return float(crossings[planes].mean()) if planes.any() else math.nan, int(planes.sum())
 
 
 MEASURES = (
@@ -301,6 +318,6 @@ MEASURES = (
             Quantity("planes", "-"),
         ),
         take=_entanglement_of,
-        available_for=in_space,
+        available_for=any_in_space,
     ),
 )

@@ -16,9 +16,9 @@ from dem.errors import InputError
 from dem.record.frame import Frame
 from dem.record.run import Run
 from postprocess.geometry.links import Floats, UndefinedMeasureError, Whole, checked_vertices
-from postprocess.geometry.segments import checked_curves, checked_segments, segments_of
-from postprocess.measures.entanglement import has_plane
-from postprocess.measures.registry import FrameMeasure, Quantity, in_space
+from postprocess.geometry.segments import Curve, checked_curves, checked_segments, curves, segments_of
+from postprocess.measures.entanglement import spans_polygon
+from postprocess.measures.registry import FrameMeasure, Quantity, any_in_space, in_space
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -146,21 +146,24 @@ def opening_directions(segments: ArrayLike, body: ArrayLike) -> Floats:
         InputError: See `checked_segments`; or a body has no such direction: it is closed, branches, has several pieces,
             or its ends lie on opposite sides, within 1e-6 of its length, as those of a rod, a Z and an S.
     """
-    found = checked_curves(segments, body, "opening")
-    directions = np.empty((len(found), 3))
-    for number, one in enumerate(found):
-        if one.closed:
-            raise InputError(f"body {one.body} has no opening: it is closed; use `body_axes`")
-        lengths = np.linalg.norm(np.diff(one.corners, axis=0), axis=1)
-        middles = (one.corners[:-1] + one.corners[1:]) / 2
-        opening = (one.corners[0] + one.corners[-1]) / 2 - np.average(middles, axis=0, weights=lengths)
-        if np.linalg.norm(opening) <= 1e-6 * lengths.sum():
-            raise InputError(
-                f"body {one.body} has no opening: its ends lie on opposite sides of its centre of mass, as those of a "
-                "rod, a Z and an S; use `body_axes`"
-            )
-        directions[number] = opening / np.linalg.norm(opening)
-    return directions
+    found = [_opening(one) for one in checked_curves(segments, body, "opening")]
+    for one, (_, flaw) in zip(np.unique(body), found, strict=True):
+        if flaw:
+            raise InputError(f"body {one} has no opening: {flaw}; use `body_axes`")
+    return np.array([direction for direction, _ in found]).reshape(-1, 3)
+
+
+def _opening(curve: Curve) -> tuple[Floats, str]:
+    """Return the unit vector (3,) in which a curve is open, and the reason if there is none."""
+    if curve.closed:
+        return np.zeros(3), "it is closed"
+    lengths = np.linalg.norm(np.diff(curve.corners, axis=0), axis=1)
+    middles = (curve.corners[:-1] + curve.corners[1:]) / 2
+    opening = (curve.corners[0] + curve.corners[-1]) / 2 - np.average(middles, axis=0, weights=lengths)
+    size = float(np.linalg.norm(opening))
+    if size <= 1e-6 * lengths.sum():
+        return np.zeros(3), "its ends lie on opposite sides of its centre of mass, as those of a rod, a Z and an S"
+    return opening / size, ""
 
 
 def _centres(middles: Floats, lengths: Floats, number: Whole) -> Floats:
@@ -191,12 +194,10 @@ def _nematic_of(frame: Frame, _: Run) -> tuple[float, float, float]:
 
 def _orientation_of(frame: Frame, _: Run) -> tuple[float, float, float]:
     segments, body = segments_of(frame)
-    bent = has_plane(frame.vertices)[body]
-    try:
-        mouths = polar_order(opening_directions(segments[bent], body[bent]))
-    except InputError:  # no smarticle is bent, or one is folded to a Z
-        return segment_order(segments, body).order, math.nan, math.nan
-    return segment_order(segments, body).order, mouths.order, float(mouths.vector[2])
+    bent = [one for one in curves(segments, body) if spans_polygon(one)]
+    mouths = np.array([direction for direction, flaw in map(_opening, bent) if not flaw])
+    polar = polar_order(mouths) if len(mouths) else PolarOrder(vector=np.full(3, np.nan), order=math.nan)
+    return segment_order(segments, body).order, polar.order, float(polar.vector[2])
 
 
 MEASURES = (
@@ -220,7 +221,7 @@ MEASURES = (
             Quantity("mouths upwards", "-"),
         ),
         take=_orientation_of,
-        available_for=in_space,
+        available_for=any_in_space,
         on_request=True,
     ),
 )
