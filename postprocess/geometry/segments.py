@@ -133,6 +133,18 @@ def extents(segments: ArrayLike, body: ArrayLike) -> Extents:
     return Extents(low, high)
 
 
+def inner_axes(segments: Floats, radius: Floats) -> Floats:
+    """Return segments (M, 2, 3) [m] whose free ends are moved inwards by radii (M,) [m].
+
+    A sphere of that radius that moves along the result ends at the tips of the body, as in the engines.
+    """
+    corners = _corner_numbers(segments)
+    free = np.bincount(corners.ravel())[corners] == 1
+    along = segments[:, 1] - segments[:, 0]
+    moved = (radius[:, None] * free)[..., None] * (along / np.linalg.norm(along, axis=1, keepdims=True))[:, None]
+    return segments + moved * np.array([1.0, -1.0])[:, None]
+
+
 def close_segments(starts: Floats, ends: Floats, body: Whole, distance: float) -> tuple[Whole, Whole]:
     """Find pairs of segments of different bodies whose bounding spheres are at most a distance [m] apart.
 

@@ -5,7 +5,7 @@ into the body, the body can move with the velocity v only if n · v ≥ 0. All m
 of the normals with coefficients of 0 or more give every vector. For translations v is a velocity (3 components); for
 all rigid motions it is joined by an angular velocity, and the normal by its moment (6 components). A motion that no
 contact on a body's sides can block, as of a rod along or about its axis, does not count. Contacts with floor and wall
-are left out.
+are left out. Tables have this measure for runs on links.
 """
 
 from __future__ import annotations
@@ -21,9 +21,9 @@ from scipy.optimize import nnls
 from dem.errors import InputError
 from dem.record.frame import Frame
 from dem.record.run import Run
-from postprocess.geometry.links import Flags, Floats, Whole, strands
+from postprocess.geometry.links import Flags, Floats, Whole
 from postprocess.geometry.segments import checked_segments, close_segments, nearest_points
-from postprocess.measures.contacts import chain_of
+from postprocess.measures.contacts import strands_of
 from postprocess.measures.registry import FrameMeasure, Quantity, any_in_space
 from postprocess.statistics.seeds import SeedMean, mean_over_seeds
 
@@ -216,18 +216,9 @@ def _directions(count: int) -> Floats:
 
 
 def _cages_of(frame: Frame, run: Run) -> tuple[float, float, float]:
-    if run.manifest.kinds is None:
-        chain = chain_of(run)
-        # A smarticle of several strands touches with each of them.
-        each = strands(frame.vertices, chain).reshape(-1, 4, 3)
-        segments = np.stack([each[:, :-1], each[:, 1:]], axis=2).reshape(-1, 2, 3)
-        body, sizes = np.repeat(np.arange(frame.count), 3 * chain.rows), np.full(len(segments), chain.diameter)
-    else:
-        segments, body = frame.segments, frame.body
-        sizes = np.array([kind.sphere_diameter_m for kind in run.manifest.kinds])[frame.kind[body]]
-    real = np.any(segments[:, 0] != segments[:, 1], axis=1)
+    axes, body, diameter = strands_of(frame, run)
     # Recorded positions are rounded, which would lose contacts of zero overlap.
-    found = cages(segments[real], body[real], diameter=sizes[real], gap=1e-9 * float(sizes.max()))
+    found = cages(axes, body, diameter=diameter, gap=1e-9 * float(diameter.max()))
     return float(found.translation.mean()), float(found.motion.mean()), float(found.contacts.mean())
 
 
@@ -241,7 +232,8 @@ MEASURES = (
             Quantity("contacts of segments mean", "-"),
         ),
         take=_cages_of,
-        available_for=any_in_space,
+        # On other engines spheres touch, whose chains have gaps.
+        available_for=lambda run: any_in_space(run) and run.manifest.engine == "links",
         costly=True,
         on_request=True,
     ),

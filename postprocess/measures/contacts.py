@@ -27,7 +27,7 @@ from postprocess.geometry.links import (
     strands,
     swept_axes,
 )
-from postprocess.geometry.segments import close_segments
+from postprocess.geometry.segments import close_segments, inner_axes
 from postprocess.measures.registry import FrameMeasure, Quantity, in_one_cylinder
 
 # Pairs of links per block, which limits memory.
@@ -99,6 +99,37 @@ def chain_of(run: Run) -> Chain:
         pitch=pitch * run.manifest.sphere_diameter_m if run.manifest.engine == "yade" else 0.0,
         bulge=run.manifest.bulge_m,
     )
+
+
+class Strands(NamedTuple):
+    """K axes of the swept spheres that represent the bodies of a frame in an engine."""
+
+    axes: Floats  #: (K, 2, 3) float64 [m], both ends of each axis
+    body: Whole  #: (K,) int64, index of the body
+    diameter: Floats  #: (K,) float64 [m], of the sphere
+
+
+def strands_of(frame: Frame, run: Run) -> Strands:
+    """Return the strands of all bodies of a frame on links; on other engines the hulls of the chains of spheres.
+
+    Strands that touch agree with the engine links exactly, for smarticles and for other bodies.
+    """
+    chain = chain_of(run)
+    if frame.bars is None:
+        each = strands(checked_vertices(frame.vertices), chain)
+        axes = np.stack([each[:, :, :-1], each[:, :, 1:]], axis=3).reshape(-1, 2, 3)
+        body, diameter = np.repeat(np.arange(frame.count), 3 * chain.rows), np.full(len(axes), chain.diameter)
+    else:
+        kinds = run.manifest.kinds or ()
+        sizes = np.array([(kind.sphere_diameter_m, kind.thickness_normal_m, kind.round) for kind in kinds])
+        thick, normal, round_ = sizes[frame.kind[frame.body]].T
+        inner = inner_axes(frame.segments, thick / 2)
+        reach = np.where((round_ == 1) | (chain.rows == 1), 0.0, (normal - thick) / 2)
+        offsets = np.linspace(-reach, reach, chain.rows, axis=1)[..., None] * frame.bars.normals[:, None]
+        axes = (inner[:, None] + offsets[:, :, None]).reshape(-1, 2, 3)
+        body, diameter = np.repeat(frame.body, chain.rows), np.repeat(thick, chain.rows)
+    real = np.any(axes[:, 0] != axes[:, 1], axis=1)
+    return Strands(axes[real], body[real], diameter[real])
 
 
 def pairs_of_spheres(centres: Floats, diameter: float) -> ContactPairs:
