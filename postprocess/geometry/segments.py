@@ -142,7 +142,8 @@ def inner_axes(segments: Floats, radius: Floats) -> Floats:
     free = np.bincount(corners.ravel())[corners] == 1
     along = segments[:, 1] - segments[:, 0]
     moved = (radius[:, None] * free)[..., None] * (along / np.linalg.norm(along, axis=1, keepdims=True))[:, None]
-    return segments + moved * np.array([1.0, -1.0])[:, None]
+    inner: Floats = segments + moved * np.array([1.0, -1.0])[:, None]
+    return inner
 
 
 def close_segments(starts: Floats, ends: Floats, body: Whole, distance: float) -> tuple[Whole, Whole]:
