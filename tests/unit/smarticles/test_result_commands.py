@@ -46,7 +46,9 @@ def test_measure_gives_json_without_nan(tmp_path: Path, write_run: WriteRun, sma
 def test_measure_adds_measures_on_request_alone(tmp_path: Path, write_run: WriteRun, smarticles: Smarticles) -> None:
     run = write_run(tmp_path / "a")
     plain = json.loads(smarticles("measure", run, "--json").out)[-1]
-    more = json.loads(smarticles("measure", run, "--json", "--also", "crossing-number,orientation,caging").out)[-1]
+    more = json.loads(smarticles("measure", run, "--json", "--also", "crossing-number,closed-linking,orientation").out)[
+        -1
+    ]
     assert {name: more[name] for name in plain} == plain
     added = {name for name in set(more) - set(plain) if " SE " not in name}
     assert added == {
@@ -54,9 +56,8 @@ def test_measure_adds_measures_on_request_alone(tmp_path: Path, write_run: Write
         "nematic order of all links [-]",
         "polar order of mouths [-]",
         "mouths upwards [-]",
-        "caged against translation [-]",
-        "caged [-]",
-        "contacts of segments mean [-]",
+        "closed linking number mean [-]",
+        "linked graph largest share [-]",
     }
     assert more["average crossing number mean [-]"] > 0.1
     said = smarticles("measure", run, "--also", "crossing-number")
