@@ -209,6 +209,10 @@ def json_schema() -> dict[str, Any]:
     mapping = {"$ref": fidelity.pop("$ref")}
     fidelity["anyOf"] = [{"type": "string", "enum": list(FIDELITIES)}, mapping]
     schema["$defs"]["Fidelity"].pop("required")
+    # A file may give one shape without a list, or the default by its name.
+    particle = schema["properties"]["particle"]
+    shapes = particle["anyOf"][0]
+    particle["anyOf"] = [shapes["items"], shapes, {"type": "string", "enum": ["smarticle"]}, {"type": "null"}]
     # Their defaults follow from the smarticle.
     schema["$defs"]["Hooks"].pop("required")
     schema["$defs"]["PullHook"]["required"] = ["type"]
