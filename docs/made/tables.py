@@ -93,6 +93,7 @@ def measure_columns() -> str:
         module = measure.take.func.__module__ if isinstance(measure.take, partial) else measure.take.__module__
         if isinstance(measure, FrameMeasure):
             evaluated = "last frame of each phase" if measure.costly else "each frame"
+            evaluated += f", with `--also {measure.name}`" if measure.on_request else ""
         else:
             evaluated = "phases " + ", ".join(code(name) for name in measure.phases)
         rows = [(code(quantity.header), cell(measure.name), evaluated) for quantity in measure.quantities]

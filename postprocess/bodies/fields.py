@@ -17,9 +17,9 @@ from postprocess.geometry.links import Floats, UndefinedMeasureError, link_lengt
 from postprocess.geometry.voronoi import local_packing
 from postprocess.geometry.voxel import Region
 from postprocess.measures.clusters import Clusters, contact_graph, entanglement_clusters
-from postprocess.measures.entanglement import link_crossings
+from postprocess.measures.entanglement import frame_crossings
 from postprocess.measures.force_chains import force_chains
-from postprocess.measures.registry import in_one_cylinder, in_space
+from postprocess.measures.registry import any_in_space, in_one_cylinder, in_space
 
 LINKS = 3
 
@@ -180,10 +180,10 @@ FIELDS: tuple[Field, ...] = (
         "crossings",
         "-",
         "links of others that pass through its plane; their mean is ⟨N⟩",
-        lambda frame, _: link_crossings(frame.vertices),
+        lambda frame, _: frame_crossings(frame)[0],
         kind="count",
         label="links of others through its plane",
-        available_for=in_space,
+        available_for=any_in_space,
     ),
     Field(
         "contact_cluster",
