@@ -18,13 +18,16 @@ from dem.arrays import Array, Flags, Numbers
 from dem.body.particle import LINKS, Particle
 from dem.body.state import State
 from dem.record.files import cannot_read
-from dem.record.names import FRAME, SCENE, collection
+from dem.record.names import FRAME, SCENE, VTKHDF, collection
+from dem.record.vtkhdf import REMEDY, read_step
 
 VERTICES = 4
 
 
 def _remedy(path: Path) -> str:
     """Return what to do about an unreadable frame; a resumed run does not write earlier frames again."""
+    if path.suffix == ".vtkhdf":
+        return REMEDY.format(path.with_name(SCENE))
     scene = path.parent.parent / SCENE
     return f"remove its line from {scene.with_name(collection(FRAME))} to do without it, or run {scene} anew elsewhere"
 
@@ -120,6 +123,7 @@ class Frame:
     """The smarticles at one recorded time; all arrays are read-only."""
 
     path: Path  #: The file
+    number: int  #: Place in the sequence of the run's frames, from 0
     time: float  #: Simulated time [s]
     floor_z: float  #: Height of the container's floor [m]; heights are measured from it
     phase: int  #: Index into `Run.phases`
@@ -134,18 +138,30 @@ class Frame:
     cell_data: Mapping[str, NDArray[Any]] = field(repr=False)
 
     @property
+    def directory(self) -> Path:
+        """The run directory."""
+        return self.path.parent if self.path.name == VTKHDF else self.path.parent.parent
+
+    @property
     def count(self) -> int:
         """Number of smarticles poured so far."""
         return len(self.vertices)
 
 
-def read_frame(path: Path | str) -> Frame:
-    """Return the content of a frame file, `.vtu`; raise InputError if it is missing or damaged."""
+def read_frame(path: Path | str, number: int | None = None) -> Frame:
+    """Return a frame of a file, `.vtu` or `.vtkhdf`; raise InputError if it is missing or damaged.
+
+    Args:
+        number: number of the frame in its run; needed for `.vtkhdf`. None: by the name of the file.
+    """
     path = Path(path)
-    mesh = read_mesh(path)
+    if number is None:
+        last = path.stem.rpartition("_")[2]
+        number = int(last) if last.isdecimal() else 0
+    mesh = read_mesh(path, number=number)
 
     def reject(cause: str) -> NoReturn:
-        cannot_read("frame", path, cause, _remedy(path))
+        cannot_read(f"frame {number} of" if path.suffix == ".vtkhdf" else "frame", path, cause, _remedy(path))
 
     if [block.type for block in mesh.cells] != ["line"]:
         reject("it must hold one block of lines and no other cells")
@@ -184,6 +200,7 @@ def read_frame(path: Path | str) -> Frame:
         reject(f"'phase' must be a whole number, 0 or more: got {phase:g}")
     return Frame(
         path=path,
+        number=number,
         time=constant("time_s"),
         floor_z=constant("floor_z_m"),
         phase=int(phase),
@@ -199,8 +216,10 @@ def read_frame(path: Path | str) -> Frame:
     )
 
 
-def read_mesh(path: Path, what: str = "frame", remedy: str | None = None) -> Any:
-    """Return the mesh of a VTK file; raise InputError with `remedy`, what to do (None: advice for frames)."""
+def read_mesh(path: Path, what: str = "frame", remedy: str | None = None, *, number: int = 0) -> Any:
+    """Return the mesh of a `.vtu`, or of a frame in a `.vtkhdf`; raise InputError with `remedy`, None: for frames."""
+    if path.suffix == ".vtkhdf":
+        return read_step(path, number)
     # `meshio.read` prints and exits on damaged files. The reader of the format raises any exception, or prints a
     # warning and continues, which the callers' checks of shapes find.
     noise = io.StringIO()

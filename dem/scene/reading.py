@@ -128,7 +128,7 @@ def _plain(scene: Scene) -> dict[str, Any]:
     data = scene.model_dump(mode="json")
     optional: list[tuple[dict[str, Any], Mapping[str, Any]]] = [
         (data, {"engine": DEFAULT_ENGINE}),
-        (data["recording"], {"contact_forces": False}),
+        (data["recording"], {"contact_forces": False, "frames": "vtu"}),
         (data["smarticle"], {"middle_thickness_in_plane_m": None}),
     ]
     if scene.hooks is not None:
