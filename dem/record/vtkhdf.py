@@ -11,7 +11,7 @@ import math
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, NoReturn, TypeVar
 
 import h5py
 import meshio
@@ -31,6 +31,7 @@ _LINES = _KINDS.index("Lines")
 _BY_KIND = ("CellOffsets", "ConnectivityIdOffsets")  # lists with a column per kind
 _CELLS = "RowOffsets"  # list of the first rows of the data of cells
 _CHUNK, _SHORT = 1024, 256  # rows of a chunk of data, and of lists with a row per step
+_FORMAT = ("v110", "v110")  # of HDF5: the oldest whose own structures have checksums
 _TRIES = 20  # how often a reader repeats while the run writes
 _DEFLATED = 1100  # zlib makes data at most 1032 times smaller: a file that claims more was made to fill the memory
 
@@ -40,7 +41,7 @@ T = TypeVar("T")
 def create(path: Path, mesh: meshio.Mesh, time: float) -> None:
     """Write a new file with one step at a time [s]; raise RunError if it cannot be written."""
     content = io.BytesIO()
-    with h5py.File(content, "w") as file:
+    with h5py.File(content, "w", libver=_FORMAT) as file:
         root = file.create_group("VTKHDF")
         root.attrs["Version"] = np.array([2, 0])
         root.attrs["Type"] = np.bytes_("PolyData")
@@ -91,17 +92,27 @@ def read_step(path: Path, number: int) -> meshio.Mesh:
 
 
 def check_times(path: Path, times: Sequence[float]) -> None:
-    """Raise InputError unless the first steps of a file have these times [s], so that it can be continued."""
-    if times and not np.array_equal(read_times(path)[: len(times)], times):
+    """Raise InputError unless a file can be continued after steps of these times [s], its first ones."""
+    if not times:
+        return
+    if not np.array_equal(read_times(path)[: len(times)], times):
         cause = f"its first {len(times)} frames are not those of the checkpoint"
         cannot_read("frames", path, cause, REMEDY.format(path.with_name(SCENE)))
+    try:  # in memory alone
+        with Journaled(path) as stored, h5py.File(stored, "r+", libver=_FORMAT) as file:
+            _truncate(file["VTKHDF"], len(times))
+    except Exception as error:
+        _reject(path, "frames", error)
 
 
 def _make(root: Any, name: str, empty: NDArray[Any], rows: int) -> None:
     """Create a dataset without rows; lists of steps are not packed, since each step changes them."""
     packed = {"compression": 4, "shuffle": True} if rows == _CHUNK else {}
     shape = empty.shape[1:]
-    root.create_dataset(name, data=empty, maxshape=(None, *shape), chunks=(rows, *shape), fletcher32=True, **packed)
+    # Rows whose chunk is lost have values that no frame has.
+    lost = math.nan if empty.dtype.kind == "f" else -1
+    chunks = {"maxshape": (None, *shape), "chunks": (rows, *shape), "fillvalue": lost, "fletcher32": True}
+    root.create_dataset(name, data=empty, **chunks, **packed)
 
 
 def _append(root: Any, mesh: meshio.Mesh, time: float) -> None:
@@ -173,7 +184,7 @@ def _change(path: Path, change: Callable[[Any], None]) -> None:
     try:
         roll_back(path)
         with Journaled(path) as stored:
-            with h5py.File(stored, "r+") as file:
+            with h5py.File(stored, "r+", libver=_FORMAT) as file:
                 change(file["VTKHDF"])
             stored.commit()
     except (OSError, KeyError, RuntimeError) as error:  # HDF5 raises the latter on a file that was damaged meanwhile
@@ -196,10 +207,14 @@ def _read(path: Path, what: str, take: Callable[[Any], T]) -> T:
         if attempt + 1 == _TRIES or before == _stamp(path):
             break
     if failed is not None:
-        text = " ".join(f"{type(failed).__name__}: {failed}".split())[:200]
-        cause = failed if isinstance(failed, FileNotFoundError) else f"truncated or not VTKHDF ({text})"
-        cannot_read(what, path, cause, REMEDY.format(path.with_name(SCENE)))
+        _reject(path, what, failed)
     return taken
+
+
+def _reject(path: Path, what: str, error: Exception) -> NoReturn:
+    text = " ".join(f"{type(error).__name__}: {error}".split())[:200]
+    cause = error if isinstance(error, FileNotFoundError) else f"truncated or not VTKHDF ({text})"
+    cannot_read(what, path, cause, REMEDY.format(path.with_name(SCENE)))
 
 
 @contextmanager
