@@ -55,8 +55,8 @@ def orientations(directions: Floats) -> Floats:
     unit = directions / np.maximum(np.linalg.norm(directions, axis=1, keepdims=True), 1e-300)
     unit = np.where(unit[:, :1] < 0, -unit, unit)  # a capsule has no head
     x, y, z = unit.T
-    turned: Floats = np.column_stack([1 + x, np.zeros_like(x), -z, y])
-    return turned / np.linalg.norm(turned, axis=1, keepdims=True)
+    turned = np.column_stack([1 + x, np.zeros_like(x), -z, y])
+    return np.asarray(turned / np.linalg.norm(turned, axis=1, keepdims=True))
 
 
 def shapes_of(capsules: Capsules) -> list[dict[str, Any]]:

@@ -222,7 +222,7 @@ def read_mesh(path: Path, what: str = "frame", remedy: str | None = None, *, num
     """Return the mesh of a VTK file; raise InputError if it cannot be read.
 
     Args:
-        what: noun for the content, for the message.
+        what: kind of the file, for the message.
         remedy: what to do, for the message; None: advice for frames.
         number: number of the frame in a file of all frames, `.vtkhdf`.
     """
