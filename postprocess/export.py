@@ -20,7 +20,7 @@ from dem.record.frames import read_frames
 from dem.record.run import Run, open_run
 from postprocess.bodies.colours import PAINTS, ColourScale, colour_field, linear, scalars, span
 from postprocess.bodies.fields import IDENTITY, fields_of
-from postprocess.bodies.meshes import BOX_FACES, BOX_POINTS, Bodies, checked_kinds, owners, solid
+from postprocess.bodies.meshes import Bodies, at_points, checked_kinds, owners, solid
 from postprocess.trajectory import write_trajectory
 
 SUFFIXES = ("stl", "obj", "gltf", "glb")
@@ -231,9 +231,7 @@ class _Painter:
         points = np.asarray(triangles.points, dtype=np.float64)
         colours = np.tile(PAINTS[kind].rgb, (len(points), 1))
         if kind == "smarticles":
-            # The points of each box follow those of the previous box and are not shared.
-            found = self._scale.painted(scalars(self._field, frame, run)[owners(mesh, frame)])
-            colours = np.repeat(found, BOX_POINTS, axis=0)
+            colours = at_points(mesh, self._scale.painted(scalars(self._field, frame, run)[owners(mesh, frame)]))
         shape = trimesh.Trimesh(
             points @ _Y_UP.T if web else points,
             triangles.regular_faces.astype(np.int64),
@@ -244,7 +242,7 @@ class _Painter:
             # glTF demands an underscore in names of custom attributes, and has no integers of four bytes for them.
             for name, values in mesh.cell_data.items():
                 if values.ndim == 1 and np.isfinite(values).all():
-                    each = np.repeat(np.asarray(values)[::BOX_FACES], BOX_POINTS, axis=0)
+                    each = at_points(mesh, np.asarray(values))
                     shape.vertex_attributes[f"_{name.upper()}"] = each.astype(np.float32)
         return shape
 

@@ -54,6 +54,7 @@ class Plan:
     engine: str = "yade"
     fidelity: str = "standard"
     stiffness_N_per_m: float = 0.0
+    bodies: str = "smarticles"  #: Kinds of bodies in words
     strands: int = 0  #: Strands of a link on the engine links; 0 on engines with spheres
     correction: float = 1.0  #: Factor by which wall times were corrected
     protocol: tuple[str, ...] = ()  #: Lines about the keys of the scene's protocol
@@ -70,7 +71,7 @@ class Plan:
         section = f"smooth links of {self._strands}" if self.strands else f"{self.spheres_per_smarticle} spheres"
         wall = "in a plane" if self.planar else f"wall {1e3 * self.container_height_m:.0f} mm high"
         lines = [
-            f"{self.name}: {self.count} smarticles of {section}, d = {1e3 * self.sphere_diameter_m:.3g} mm, {wall}",
+            f"{self.name}: {self.count} {self.bodies} of {section}, d = {1e3 * self.sphere_diameter_m:.3g} mm, {wall}",
             *self._engine_to_text(),
             *self.protocol,
             self._steps_to_text(),
@@ -129,11 +130,18 @@ def _wall_time(wall: float) -> str:
     return f"{wall / 3600:.1f} h" if wall < 10 * 3600 else f"{wall / 3600:.0f} h"
 
 
+def _bodies(scene: Scene) -> str:
+    if scene.mixture is None:
+        return "smarticles"
+    names = dict.fromkeys(kind.name for kind in scene.mixture.kinds)
+    return f"bodies ({', '.join(names)})"
+
+
 def plan(scene: Scene) -> Plan:
     """Compute the plan of a scene: phases, effects, time steps and cost."""
     kind = engine_kind(scene.engine)
     steps = time_steps(scene)
-    particle = scene.particle
+    model = scene.model
     phases = []
     for index, (phase, dt) in enumerate(zip(scene.phases, steps, strict=True)):
         estimate = phase.expected_duration(scene.count)
@@ -144,8 +152,8 @@ def plan(scene: Scene) -> Plan:
     return Plan(
         name=scene.name,
         count=scene.count,
-        spheres_per_smarticle=len(particle.centres),
-        sphere_diameter_m=particle.chain.diameter,
+        spheres_per_smarticle=max(len(body.centres) for body in scene.bodies),
+        sphere_diameter_m=model.diameter,
         time_step_s=min(steps),
         stable_time_step_s=stable_step(scene),
         container_height_m=scene.cylinder.height,
@@ -159,6 +167,7 @@ def plan(scene: Scene) -> Plan:
         engine=scene.engine,
         fidelity=scene.fidelity.base,
         stiffness_N_per_m=scene.fidelity.stiffness_N_per_m,
+        bodies=_bodies(scene),
         strands=scene.fidelity.rows if scene.smooth else 0,
         protocol=protocol_lines(scene),
         overlaps={overlap.cause: overlap.widths for overlap in expected_overlaps(scene)},

@@ -63,9 +63,9 @@ def series_columns() -> str:
 
 def frame_fields() -> str:
     """Return tables of the cell data of a frame, which have one value per link."""
-    from dem.record.columns import FIELDS, MOTOR_FIELDS  # noqa: PLC0415
+    from dem.record.columns import BODY_FIELDS, FIELDS, MOTOR_FIELDS  # noqa: PLC0415
 
-    sets = {"In every scene": FIELDS, "In scenes that actuate": MOTOR_FIELDS}
+    sets = {"In every scene": FIELDS, "In scenes that actuate": MOTOR_FIELDS, "In scenes with `particle`": BODY_FIELDS}
     return "\n".join(f"### {title}\n\n{_described(fields, 'field')}" for title, fields in sets.items())
 
 

@@ -83,9 +83,14 @@ class PhaseMeasure:
         return dict(zip((quantity.header for quantity in self.quantities), values, strict=True))
 
 
-def in_space(run: Run) -> bool:
-    """Return whether the smarticles of a run move in three dimensions, not in a plane."""
+def any_in_space(run: Run) -> bool:
+    """Return whether the bodies of a run, of any shape, move in three dimensions, not in a plane."""
     return not run.manifest.planar
+
+
+def in_space(run: Run) -> bool:
+    """Return whether the bodies of a run are smarticles and move in three dimensions, not in a plane."""
+    return any_in_space(run) and run.manifest.kinds is None
 
 
 def in_one_cylinder(run: Run) -> bool:

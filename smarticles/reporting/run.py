@@ -57,8 +57,11 @@ def run_page(directory: Path, accuracy: Path | None) -> str:
     manifest, status = run.manifest, run.status
     lead = [
         ("status", status.state),
-        ("smarticles", str(manifest.count)),
-        ("l/w", f"{manifest.aspect_ratio:g}"),
+        *(
+            [("smarticles", str(manifest.count)), ("l/w", f"{manifest.aspect_ratio:g}")]
+            if manifest.kinds is None
+            else [("bodies", f"{manifest.count} ({', '.join(dict.fromkeys(kind.shape for kind in manifest.kinds))})")]
+        ),
         ("engine", manifest.engine),
         ("fidelity", manifest.fidelity),
         ("seed", str(manifest.seed)),

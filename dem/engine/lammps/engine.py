@@ -16,7 +16,7 @@ from dem.arrays import Array, Numbers
 from dem.body.chain import Tie
 from dem.body.particle import Particle
 from dem.body.placement import Poses
-from dem.body.state import State
+from dem.body.state import PileState, State
 from dem.engine.interface import MotorReadings, Saved
 from dem.engine.lammps import text
 from dem.engine.lammps.boundaries import LammpsBoundaries
@@ -300,7 +300,7 @@ class LammpsEngine:
     def overlaps(self, limit: float) -> Overlaps:
         return self.contacts.overlaps(limit, self._law)
 
-    def extremes(self, state: State) -> None:
+    def extremes(self, state: PileState) -> None:
         """Return None: on LAMMPS extremes are not cheaper than a full check."""
 
     def contact_forces(self) -> NoReturn:

@@ -10,7 +10,8 @@ from dem.engine.links.adds import ADDS, ORDER
 from dem.engine.links.compiler import stamp
 from dem.engine.links.cost import seconds_per_second
 from dem.engine.links.engine import LinksEngine
-from dem.engine.links.stable_step import links_stable_time_step
+from dem.engine.links.shapes import kind_shape
+from dem.engine.links.stable_step import links_stable_time_step, rigid_stable_time_step
 
 
 class LinksKind:
@@ -32,6 +33,9 @@ class LinksKind:
         return 1
 
     def stable_step(self, scene: Demand, *, articulated: bool) -> float:
+        if scene.mixture is not None:
+            shapes = [kind_shape(kind) for kind in scene.mixture.kinds]
+            return rigid_stable_time_step(shapes, contact_law_of(scene))
         return links_stable_time_step(
             scene.particle,
             contact_law_of(scene),
@@ -45,7 +49,7 @@ class LinksKind:
 
     def build(self, scene: Demand, time_step: float) -> LinksEngine:
         return LinksEngine(
-            particle=scene.particle,
+            particle=scene.model,
             cylinder=scene.cylinder,
             law=contact_law_of(scene),
             gravity=scene.gravity_m_per_s2,

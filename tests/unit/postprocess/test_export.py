@@ -155,7 +155,7 @@ def test_vtp_lists_every_frame_with_its_time_and_all_fields(pile, tmp_path):
     assert [float(entry["timestep"]) for entry in listed] == pytest.approx(frames.times.tolist(), rel=1e-8)
     mesh = pv.read(folder / listed[-1]["file"])
     assert mesh.n_cells == 12 * 3 * 6
-    asked_for = {"angle_rad", "motor_torque_N_m", "motor_work_J", "halted", "normal_force_N", "force_chain"}
+    asked_for = {"angle_rad", "motor_torque_N_m", "motor_work_J", "halted", "normal_force_N", "force_chain", "kind"}
     rigid = {field.name for field in FIELDS} - asked_for
     assert set(mesh.cell_data.keys()) == rigid
     assert mesh.field_data["TimeValue"] == pytest.approx([frames.times[-1]])
