@@ -209,23 +209,6 @@ def test_a_killed_process_loses_no_frame_that_it_has_written(tmp_path: Path) -> 
     assert first > 8
 
 
-def test_a_reader_sees_whole_frames_while_a_run_writes(tmp_path: Path) -> None:
-    path, counts = write(tmp_path, (5,)), (5,) * 40
-    child = os.fork()
-    if not child:
-        write(tmp_path, counts, first=1)
-        os._exit(0)
-    seen, ended = [0], False
-    while not ended:
-        ended = os.waitpid(child, os.WNOHANG)[0] != 0
-        seen.append(len(vtkhdf.read_times(path)))
-        for number in {0, seen[-1] - 1}:
-            assert vtkhdf.read_step(path, number).points.tobytes() == mesh(5, number).points.tobytes()
-    assert sorted(seen) == seen
-    assert seen[-1] == 40
-    assert len(set(seen)) > 3
-
-
 def test_a_reader_begins_again_if_the_file_changes_meanwhile(tmp_path: Path) -> None:
     path, numbers = write(tmp_path, (5,)), []
 

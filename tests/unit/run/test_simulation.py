@@ -13,7 +13,9 @@ import pytest
 from double import EngineDouble, KindDouble
 from scenes import CHAIN, SMALL, changed
 
+from dem.engine.effect import EffectName
 from dem.errors import InputError, RunError
+from dem.plan.effects import decide
 from dem.plan.outlook import plan
 from dem.plan.steps import time_steps
 from dem.record.document import Done
@@ -221,6 +223,11 @@ def test_frames_in_one_file_are_those_in_many_also_after_a_stop(
     with h5py.File(one / "frames.vtkhdf", "r+") as file:
         file["VTKHDF/Points"][-1, 2] += 1e-12
     assert compare_bits(Run(many), Run(one))["frames"] == bits["frames"] - 1
+    files = [
+        {entry.name: entry for entry in decide(scene_of(name, **more))}[EffectName.FRAMES].adds.files
+        for more in ({}, ONE_FILE)
+    ]
+    assert files == [("frames.pvd", "frames"), ("frames.vtkhdf",)]
     assert scene_hash(scene_of(name)) == scene_hash(scene_of(name, **{"recording.frames": "vtu"}))
 
 

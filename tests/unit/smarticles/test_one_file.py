@@ -71,11 +71,6 @@ def test_export_and_render(pair: tuple[Path, Path], smarticles: Smarticles, tmp_
     assert made[1] == made[3]
 
 
-def test_report(pair: tuple[Path, Path], smarticles: Smarticles, tmp_path: Path) -> None:
-    assert smarticles("report", pair[1], "--output", tmp_path / "report.html").status == 0
-    assert "16" in (tmp_path / "report.html").read_text(encoding="utf-8")
-
-
 def test_a_damaged_file_ends_each_command_in_one_line(
     pair: tuple[Path, Path], smarticles: Smarticles, tmp_path: Path
 ) -> None:
