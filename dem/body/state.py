@@ -154,6 +154,10 @@ class RigidState:
         local = self.mixture.spheres[self.kind]
         return matrix_product(local, np.swapaxes(self.rotations, 1, 2)) + self.positions[:, None]
 
+    def spheres_by_body(self) -> list[Array]:
+        """Return (S, 3) centres of the spheres of each body [m]."""
+        return [row[: len(kind.centres)] for row, kind in zip(self.spheres(), self._kinds, strict=True)]
+
     @cached_property
     def _masses(self) -> Array:
         return self.mixture.masses[self.kind]

@@ -132,8 +132,7 @@ def sphere_mesh(state: PileState, particle: Particle | Mixture) -> meshio.Mesh:
     if state.bodies is not None:
         bodies = state.bodies
         kinds = [bodies.mixture.kinds[k] for k in bodies.kind]
-        sizes = np.array([len(kind.centres) for kind in kinds])
-        points = np.concatenate([row[:size] for row, size in zip(bodies.spheres(), sizes, strict=True)])
+        sizes, points = [len(kind.centres) for kind in kinds], np.concatenate(bodies.spheres_by_body())
         own = {
             "radius_m": np.repeat([kind.radius for kind in kinds], sizes),
             "smarticle_id": np.repeat(np.arange(state.count), sizes),

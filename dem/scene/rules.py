@@ -216,8 +216,6 @@ def foreign(scene: SceneView) -> Iterator[str]:
 
     Such codes compute only passive chains of spheres in a cylinder.
     """
-    if scene.mixture is not None:
-        yield "particle: other bodies than smarticles"
     if scene.plane is not None:
         yield "plane: motion in a plane"
     if scene.hooks is not None:

@@ -223,7 +223,6 @@ ROD = {"shape": "rod", "length_m": 0.01}
         ({"smarticle.aspect_ratio": 0.3}, ["smarticle", "leave smarticle or particle out"]),
         ({"motor": {"law": "stall"}}, ["motor", "no hinges"]),
         ({"plane": {}}, ["plane"]),
-        ({"engine": "lammps"}, ["engine", "particle"]),
     ],
 )
 def test_what_needs_smarticles_is_rejected(changes: dict[str, Any], said: list[str]) -> None:
