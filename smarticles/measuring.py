@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from dem.errors import InputError, nearest
-from dem.record.names import FRAME, OF_SWEEP, collection
+from dem.record.names import FRAME, OF_SWEEP, VTKHDF, collection
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -26,7 +26,7 @@ PHASE = ("phase", "phase type")  #: Columns that identify a phase within a run
 
 def has_frames(directory: Path) -> bool:
     """Return whether a run directory contains frames."""
-    return (directory / collection(FRAME)).is_file()
+    return any((directory / name).is_file() for name in (collection(FRAME), VTKHDF))
 
 
 def sources(directories: Sequence[Path]) -> dict[Path, Mapping[str, Any]]:

@@ -76,7 +76,7 @@ def has_forces(directory: Path) -> bool:
 
 def read_forces(frame: Frame) -> RecordedForces:
     """Return the forces recorded together with a frame; raise InputError if they are missing or damaged."""
-    path = frame.path.parent.parent / member(FORCE, int(frame.path.stem.rpartition("_")[2]))
+    path = frame.directory / member(FORCE, frame.number)
     points, data = _content(path)
     number = len(points) // 2
 

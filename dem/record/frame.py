@@ -19,13 +19,16 @@ from dem.body.kinds import Mixture
 from dem.body.particle import LINKS, Particle
 from dem.body.state import PileState, RigidState
 from dem.record.files import cannot_read
-from dem.record.names import FRAME, SCENE, collection
+from dem.record.names import FRAME, SCENE, VTKHDF, collection
+from dem.record.vtkhdf import REMEDY, read_step
 
 VERTICES = 4
 
 
 def _remedy(path: Path) -> str:
     """Return what to do about an unreadable frame; a resumed run does not write earlier frames again."""
+    if path.suffix == ".vtkhdf":
+        return REMEDY.format(path.with_name(SCENE))
     scene = path.parent.parent / SCENE
     return f"remove its line from {scene.with_name(collection(FRAME))} to do without it, or run {scene} anew elsewhere"
 
@@ -174,6 +177,7 @@ class Frame:
     """
 
     path: Path  #: The file
+    number: int  #: Place in the sequence of the run's frames, from 0
     time: float  #: Simulated time [s]
     floor_z: float  #: Height of the container's floor [m]; heights are measured from it
     phase: int  #: Index into `Run.phases`
@@ -190,6 +194,11 @@ class Frame:
     #: `angle_rad`, `motor_torque_N_m` and `motor_work_J`, NaN on the middle link and on welded smarticles, and `halted`
     cell_data: Mapping[str, NDArray[Any]] = field(repr=False)
     bars: RecordedBars | None = field(repr=False, default=None)  #: Of bodies that are no smarticles
+
+    @property
+    def directory(self) -> Path:
+        """The run directory."""
+        return self.path.parent if self.path.name == VTKHDF else self.path.parent.parent
 
     @property
     def count(self) -> int:
@@ -219,13 +228,20 @@ class Frame:
         return np.zeros(self.count, np.int64) if self.bars is None else self.bars.kind
 
 
-def read_frame(path: Path | str) -> Frame:
-    """Return the content of a frame file, `.vtu`; raise InputError if it is missing or damaged."""
+def read_frame(path: Path | str, number: int | None = None) -> Frame:
+    """Return a frame of a file, `.vtu` or `.vtkhdf`; raise InputError if it is missing or damaged.
+
+    Args:
+        number: number of the frame in its run; needed for `.vtkhdf`. None: by the name of the file.
+    """
     path = Path(path)
-    mesh = read_mesh(path)
+    if number is None:
+        last = path.stem.rpartition("_")[2]
+        number = int(last) if last.isdecimal() else 0
+    mesh = read_mesh(path, number=number)
 
     def reject(cause: str) -> NoReturn:
-        cannot_read("frame", path, cause, _remedy(path))
+        cannot_read(f"frame {number} of" if path.suffix == ".vtkhdf" else "frame", path, cause, _remedy(path))
 
     if [block.type for block in mesh.cells] != ["line"]:
         reject("it must hold one block of lines and no other cells")
@@ -276,6 +292,7 @@ def read_frame(path: Path | str) -> Frame:
         vertices = points.astype(np.float64).reshape(count, VERTICES, 3)
     return Frame(
         path=path,
+        number=number,
         time=constant("time_s"),
         floor_z=constant("floor_z_m"),
         phase=int(phase),
@@ -295,13 +312,16 @@ def read_frame(path: Path | str) -> Frame:
     )
 
 
-def read_mesh(path: Path, what: str = "frame", remedy: str | None = None) -> Any:
+def read_mesh(path: Path, what: str = "frame", remedy: str | None = None, *, number: int = 0) -> Any:
     """Return the mesh of a VTK file; raise InputError if it cannot be read.
 
     Args:
         what: kind of the file, for the message.
         remedy: what to do, for the message; None: advice for frames.
+        number: number of the frame in a file of all frames, `.vtkhdf`.
     """
+    if path.suffix == ".vtkhdf":
+        return read_step(path, number)
     # `meshio.read` prints and exits on damaged files. The reader of the format raises any exception, or prints a
     # warning and continues, which the callers' checks of shapes find.
     noise = io.StringIO()

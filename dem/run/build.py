@@ -9,13 +9,14 @@ import numpy as np
 
 from dem.arrays import Array
 from dem.body.kinds import Mixture
+from dem.body.particle import LINKS, mean_width
 from dem.body.state import PileState, spheres_of
 from dem.engine.effect import EffectName
 from dem.engine.interface import Engine
 from dem.engine.kinds import engine_kind
 from dem.plan.effects import called_for
 from dem.plan.steps import time_steps
-from dem.record.frames import FrameWriter
+from dem.record.frames import FrameWriter, OneFileWriter
 from dem.record.names import FORCE, SPHERE
 from dem.record.progress import ProgressWriter
 from dem.record.series import SeriesWriter
@@ -61,7 +62,7 @@ def build_recorder(scene: Scene, out: Path, progress: ProgressWriter) -> Recorde
     return Recorder(
         sampler=sampler,
         series=SeriesWriter(out, sampler.described, {"scene_sha256": scene_hash(scene), "seed": scene.seed}),
-        frames=FrameWriter(out),
+        frames=_frame_writer(scene, out),
         watchdog=build_watchdog(scene),
         points=watched_points(scene),
         progress=progress,
@@ -71,6 +72,20 @@ def build_recorder(scene: Scene, out: Path, progress: ProgressWriter) -> Recorde
         spheres=FrameWriter(out, SPHERE) if EffectName.SPHERE_GLYPHS in effects else None,
         sphere_every=recording.samples_in(recording.sphere_interval_s),
     )
+
+
+def _frame_writer(scene: Scene, out: Path) -> FrameWriter:
+    if scene.recording.frames == "vtu":
+        return FrameWriter(out)
+    # No tube about the axis is a flat bar of several rows: one that others meet at an equal mean distance.
+    if scene.mixture is not None:
+        radii = [kind.radius if kind.rows == 1 else mean_width(*kind.thicknesses) / 2 for kind in scene.mixture.kinds]
+        return OneFileWriter(out, radii=radii, kind="kind")
+    particle, boxes = scene.particle, scene.smarticle.boxes
+    if particle.chain.rows == 1 and not boxes.bulge:
+        return OneFileWriter(out, radii=[particle.radius] * LINKS)
+    radii = [mean_width(boxes.thickness_normal, in_plane) / 2 for in_plane in boxes.thicknesses_in_plane]
+    return OneFileWriter(out, radii=radii)
 
 
 def watched_points(scene: Scene) -> Callable[[PileState], Array]:

@@ -21,10 +21,11 @@ from dem.plan.outlook import warnings_of
 from dem.record.checkpoint import Checkpoint, has_checkpoint, read_checkpoint
 from dem.record.document import Done, Ended, Failed, Kind, Manifest, Phase
 from dem.record.files import write_text
-from dem.record.names import DONE, FAILED, MANIFEST, SCENE
+from dem.record.names import DONE, FAILED, MANIFEST, SCENE, VTKHDF
 from dem.record.progress import ProgressWriter
 from dem.record.run import Run
 from dem.record.rundir import claimed, log_of
+from dem.record.vtkhdf import check_times
 from dem.run.build import Builders
 from dem.run.simulation import Simulation, StopRequestedError
 from dem.scene.reading import difference, dump_scene, load_scene, scene_hash
@@ -64,7 +65,7 @@ def run_scene(
                 _check_ready(scene)
             else:
                 # Read before anything is changed, since it may be rejected for its version.
-                saved = read_checkpoint(out, scene_sha256=scene_hash(scene), made_by=made_by)
+                saved = _saved(scene, out, made_by)
         else:
             made = manifest(scene, out, steps=steps, command=command, made_by=made_by, threads=threads)
             made.write(out / MANIFEST, make_folder=True)
@@ -125,6 +126,13 @@ def _check_scene(scene: Scene, out: Path) -> None:
         f"--out {out}: was made from another scene: {difference(recorded, scene)}; resume with {out / SCENE} and no "
         "--set, or run the changed scene in another directory"
     )
+
+
+def _saved(scene: Scene, out: Path, made_by: tuple[str, str]) -> tuple[Checkpoint, str | None]:
+    checkpoint, warning = read_checkpoint(out, scene_sha256=scene_hash(scene), made_by=made_by)
+    if scene.recording.frames == "vtkhdf":
+        check_times(out / VTKHDF, checkpoint.state["recorder"]["frames"])
+    return checkpoint, warning
 
 
 def _restore(simulation: Simulation, saved: tuple[Checkpoint, str | None] | None, threads: int) -> None:

@@ -29,7 +29,12 @@ def scene_keys() -> str:
     shapes = _kinds(next(iter(_options(schema["properties"]["particle"]))))
     others = [name for name in definitions if name not in (*phases, *motions, *shapes)]
     parts = [_table(schema)]
-    for title, names in (("Phases", phases), ("Motions of the barbs", motions), ("Shapes of bodies", shapes), ("Mappings", others)):
+    for title, names in (
+        ("Phases", phases),
+        ("Motions of the barbs", motions),
+        ("Shapes of bodies", shapes),
+        ("Mappings", others),
+    ):
         parts += [f"## {title}\n", *(_part(name, definitions[name]) for name in names)]
     return "\n".join(parts)
 

@@ -21,7 +21,7 @@ from smarticles.command_line import Commands, add_options
 EXTRAS = {
     **dict.fromkeys(("matplotlib", "PIL", "pyvista", "vtk", "vtkmodules", "imageio_ffmpeg"), "viz"),
     **dict.fromkeys(("trame", "trame_vtk", "trame_client", "trame_server", "aiohttp", "wslink"), "view"),
-    "trimesh": "export",
+    **dict.fromkeys(("trimesh", "gsd"), "export"),
 }
 """Extra of the project that installs a module; other modules come with the project itself."""
 
@@ -85,7 +85,7 @@ _NEEDED = {
     **{name: name for name in ("numpy", "scipy", "h5py", "meshio", "pydantic", "rich", "pandas")},
     **{"yaml": "PyYAML", "jinja2": "Jinja2"},
 }
-_OPTIONAL = {**{name: name for name in ("matplotlib", "trimesh", "trame", "aiohttp")}, "PIL": "pillow"}
+_OPTIONAL = {**{name: name for name in ("matplotlib", "trimesh", "gsd", "trame", "aiohttp")}, "PIL": "pillow"}
 
 
 @dataclass(frozen=True, kw_only=True)

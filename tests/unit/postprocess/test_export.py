@@ -196,7 +196,7 @@ def test_a_kind_that_comes_or_goes_is_nothing_at_the_other_times(opened, tmp_pat
 def test_hostile_names_are_data(tmp_path, name):
     run = write_run(tmp_path / "run", SyntheticRun(count=2, frames_per_phase=1, name=name))
     before = sorted(path.name for path in tmp_path.iterdir())
-    for suffix in FORMATS:
+    for suffix in ("vtp", *SUFFIXES):
         export_run(run, to=suffix, unwanted=["local_packing_fraction"])
     assert sorted(path.name for path in tmp_path.iterdir()) == before
     (file,) = (run / "export-vtp" / "smarticles").glob("*.vtp")
