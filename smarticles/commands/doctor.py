@@ -49,7 +49,7 @@ print(f"{found}; a sphere falls")
 """
 _LINKS = """
 import sys, numba
-from dem.engine.links.compiler import folder
+from dem.engine.links.cache import folder
 if numba.njit(lambda a, b: a + b)(1, 2) != 3:
     sys.exit("Numba computes nonsense")
 kept = f"compiled code in {folder()}" if folder() else "compiled code cannot be kept"

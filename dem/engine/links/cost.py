@@ -40,6 +40,9 @@ MANY, LONGER, GROWTH = 5000, 0.3, 0.8
 # Contacts of two strands are fewer than twice those of one; pairs to look at are nearly four times as many.
 MORE_CONTACTS, MORE_PAIRS = 1.4, 1.75
 
+# Processor time to compile [s]: all kernels with the first kind of phase, and those of one more kind in one process.
+COMPILE_FIRST, COMPILE_MORE = 16.0, 9.0
+
 
 def seconds_per_second(scene: Demand, time_step: float, activity: Activity) -> float:
     """See `EngineKind.seconds_per_second`."""
