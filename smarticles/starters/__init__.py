@@ -12,7 +12,12 @@ def starter(kind: str) -> str:
     """Return the YAML text of the example scene of a kind; raise InputError for an unknown kind."""
     if kind not in KINDS:
         raise InputError(f"{kind!r} is no kind of scene; {nearest(kind, KINDS)}")
-    return Path(__file__).with_name(f"{kind}.yaml").read_text(encoding="utf-8")
+    return path_of(kind).read_text(encoding="utf-8")
+
+
+def path_of(kind: str) -> Path:
+    """Return the file of the example scene of a kind."""
+    return Path(__file__).with_name(f"{kind}.yaml")
 
 
 def about(kind: str) -> str:
