@@ -223,7 +223,7 @@ def announce(seconds: float = math.nan) -> None:
     if not _ANNOUNCED.is_set():
         _ANNOUNCED.set()
         about = "" if math.isnan(seconds) else f", about {seconds:.0f} s of processor time"
-        kept = "" if folder() is None else f", once; the code is kept in {folder()}"
+        kept = "" if folder() is None else f"; the code is kept in {folder()}"
         LOG.warning("compiling the links engine%s%s", about, kept)
 
 

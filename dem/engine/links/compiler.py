@@ -122,9 +122,14 @@ def inlined(function: F) -> F:
     return part(function, forceinline=True)
 
 
+def callable_from_python(function: Callable[..., Any]) -> Any:
+    """Compile a function, and all parts that it calls, at its first call from Python."""
+    return numba.njit(**OPTIONS, **NOT_FROM_C, pipeline_class=_KernelCompiler)(function)
+
+
 def kernel(function: F) -> F:
     """Compile a function at its first call from Python, and keep the code for later processes."""
-    compiled = numba.njit(**OPTIONS, **NOT_FROM_C, pipeline_class=_KernelCompiler)(function)
+    compiled = callable_from_python(function)
     compiled._cache, compile_now = KernelCache(function), compiled.compile
 
     def compile_in_turn(types_: Any) -> Any:
