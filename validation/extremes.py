@@ -1,4 +1,4 @@
-"""Run random extreme scenes and check them: `python -m validation.extremes --count 300 --jobs 2 --out DIR`.
+"""Run random extreme scenes and check them: `python -m validation.extremes --count 300 --out DIR`.
 
 Each scene is planned, run and checked. DIR gets the table `extremes.csv`, a scene file per scene, and the run
 directories of scenes that fail the check. Scenes with a row in the table are not run again. The checker uses NumPy
@@ -129,8 +129,7 @@ def surface(vertices: Array, thickness: float) -> tuple[Array, Array]:
     """Return points (M, 3) [m] on the axes of all links, and the radii of material around them (M,) [m].
 
     Points are the ends of each axis, with radius 0, and the points thickness/2 from the ends, with radius thickness/2.
-    These spheres are inside of a link, whether its ends are square or round. Vertices (N, 4, 3) and thickness are in
-    [m].
+    The spheres lie inside the link, whether its ends are square or round. Vertices (N, 4, 3) and thickness are in [m].
     """
     ends = segments(vertices)
     along = ends[:, 1] - ends[:, 0]
@@ -146,8 +145,8 @@ def crossings(before: Array, after: Array) -> list[tuple[int, int]]:
     """Find links of different smarticles whose axes passed through each other between two frames.
 
     Vertices (N, 4, 3) [m] are assumed to move along straight lines. When two axes pass through each other, the volume
-    of the tetrahedron of their four ends changes sign, and the common point lies within both axes. The pairs of links
-    have the indices of `segments`.
+    of the tetrahedron of their four ends changes sign, and the common point lies within both axes. The result
+    has pairs of indices of links in `segments`.
     """
     one, two = segments(before), segments(after)
     # Links without length (l/w = 0) cannot cross.

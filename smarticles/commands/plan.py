@@ -76,7 +76,7 @@ def plan_scene(arguments: argparse.Namespace) -> int:
 
 
 def _chosen(scene: Scene, arguments: argparse.Namespace) -> Choice | None:
-    """Return engine and fidelity within --max-error and --max-hours; None without these options."""
+    """Return the engine and fidelity that satisfy --max-error and --max-hours; None without these options."""
     from dem.plan.choice import PACKING, QUANTITIES, choose, read_table  # noqa: PLC0415
 
     if arguments.max_error is None and arguments.max_hours is None:

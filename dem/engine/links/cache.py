@@ -1,8 +1,9 @@
-"""Where compiled code is kept between processes, and how one process compiles while others wait.
+"""Keep compiled code for later processes, and let other processes wait while one compiles.
 
-Numba's own cache lies beside the source, which may be read-only, does not notice when a kernel's callee in another file
-has changed, runs whatever its files hold, and lets all processes of a sweep compile at once. Here the folder is named
-after everything that the code depends on; a checksum rejects damaged files; whatever is wrong, a run goes on without.
+Numba's own cache is beside the source, which may be read-only. It does not notice changes of a function in another file
+that a kernel calls, executes damaged files, and lets all processes of a sweep compile at once. This cache is a folder
+of the user, whose name is a hash of everything that the code depends on, so that another version of the package never
+loads the code. A checksum rejects damaged files. If the cache cannot be used, a run compiles without it.
 """
 
 from __future__ import annotations
@@ -50,7 +51,7 @@ DIGEST = hashlib.sha256().digest_size  # bytes
 
 @cache
 def stamp() -> str:
-    """Return the hash of what results depend on: these sources, the motor law, Numba, NumPy."""
+    """Return the hash of all that results depend on: sources, versions of Numba and NumPy."""
     digest = hashlib.sha256()
     for path in (*sorted(Path(__file__).parent.rglob("*.py")), Path(motor.__file__)):
         digest.update(path.name.encode() + b"\0" + path.read_bytes() + b"\0")
@@ -59,7 +60,7 @@ def stamp() -> str:
 
 
 def _folders() -> Iterator[Path]:
-    """Yield the folders in which compiled code may be kept, best first."""
+    """Yield the folders in which compiled code may be kept, the best one first."""
     if given := os.environ.get(FOLDER):
         yield Path(given)
         return
@@ -70,7 +71,7 @@ def _folders() -> Iterator[Path]:
 
 @cache
 def folder() -> Path | None:
-    """Return the folder of compiled code for this processor, made if need be; None where nothing can be written."""
+    """Return the folder of code for this processor, made if needed; log a warning and return None if that fails."""
     causes = []
     machine = repr((sys.implementation.cache_tag, cpu_target.target_context.codegen().magic_tuple()))
     for base in _folders():
@@ -94,7 +95,7 @@ def folder() -> Path | None:
 
 
 def is_kept(without: frozenset[str]) -> bool:
-    """Return whether there is compiled code for simulations without some groups of arrays."""
+    """Return whether the cache has code for simulations that lack some groups of arrays."""
     where = folder()
     return where is not None and any(where.glob(f"{_title(LONGEST, without)}.*.code"))
 
@@ -133,7 +134,7 @@ class KernelCache(NullCache):  # type: ignore[misc] # Numba has no types
 
     @contextmanager
     def turn(self, types_: Any) -> Iterator[None]:
-        """Let this process compile for some types while others that need the code wait."""
+        """Let this process compile for some types of arguments while other processes that need the code wait."""
         path = self.path(types_)
         if path is None or path.exists():
             yield
@@ -142,7 +143,7 @@ class KernelCache(NullCache):  # type: ignore[misc] # Numba has no types
                 yield
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
-        """Return compiled code for a signature; None where there is none, or none that is sound."""
+        """Return the compiled code for a signature; None if there is none, or it is damaged."""
         path = self.path(sig)
         found = None if path is None else self._read(path, target_context)
         if found is None and self._kernel == LONGEST:
@@ -164,7 +165,7 @@ class KernelCache(NullCache):  # type: ignore[misc] # Numba has no types
             return None
 
     def save_overload(self, sig: Any, data: Any) -> None:
-        """Keep compiled code for a signature."""
+        """Write compiled code into the cache; log a warning if that fails."""
         path = self.path(sig)
         if path is None or data.library.has_dynamic_globals:
             return
@@ -190,7 +191,7 @@ def _cause(error: Exception) -> str:
 
 @contextmanager
 def _locked(path: Path) -> Iterator[None]:
-    """Hold the lock of a file, which the system releases when its holder dies; go on without after `PATIENCE`."""
+    """Hold the lock of a file; the system releases it if this process dies. Go on without it after `PATIENCE`."""
     file = None
     try:
         if fcntl is not None:
@@ -219,7 +220,7 @@ def _wait_for(file: int) -> None:
 
 
 def announce(seconds: float = math.nan) -> None:
-    """Report once per process that it compiles, and for how long, in processor time [s], if that is known."""
+    """Report once per process that it compiles, and the expected processor time [s] if known."""
     if not _ANNOUNCED.is_set():
         _ANNOUNCED.set()
         about = "" if math.isnan(seconds) else f", about {seconds:.0f} s of processor time"

@@ -1,7 +1,7 @@
-"""How kernels are compiled.
+"""Compile kernels.
 
-Numba optimises and translates each function by itself, then links it into its callers, which are optimised again, level
-by level. Here functions are linked once into the kernels that call them, and optimised there alone.
+Numba optimises and translates each function separately, then links it into the functions that call it, and optimises
+those again, level by level. Here all functions that a kernel calls are linked into the kernel, which is optimised once.
 """
 
 from __future__ import annotations
@@ -25,13 +25,13 @@ F = TypeVar("F", bound=Callable[..., Any])
 # their last bits. A division by zero gives inf, as in NumPy, and costs no branch. Without reference counts nothing can
 # be allocated in a kernel, and passing arrays around costs nothing.
 OPTIONS: dict[str, Any] = {"fastmath": False, "error_model": "numpy", "_nrt": False}
-# What C needs to call a function, and what Python needs, takes long to compile. Nothing calls kernels from C.
+# Wrappers that C and Python need to call a function take long to compile; C calls no function, Python only kernels.
 NOT_FROM_C: dict[str, Any] = {"no_cfunc_wrapper": True}
 NOT_FROM_PYTHON: dict[str, Any] = {"no_cpython_wrapper": True, **NOT_FROM_C}
 
 
 class _PartLibrary(JITCodeLibrary):  # type: ignore[misc] # Numba has no types
-    """Code of a part, which is neither optimised as a whole nor translated by itself."""
+    """Code of a function that only kernels call: neither linked nor translated to machine code."""
 
     def finalize(self) -> None:
         self._raise_if_finalized()
@@ -39,7 +39,7 @@ class _PartLibrary(JITCodeLibrary):  # type: ignore[misc] # Numba has no types
 
 
 class _KernelLibrary(JITCodeLibrary):  # type: ignore[misc]
-    """Code of a kernel and of all parts that it calls, at any depth."""
+    """Code of a kernel and of all functions that it calls directly or indirectly."""
 
     def finalize(self) -> None:
         found: dict[Any, None] = {}
@@ -53,7 +53,7 @@ class _KernelLibrary(JITCodeLibrary):  # type: ignore[misc]
         super().finalize()
 
     def _optimize_final_module(self) -> None:
-        # Numba optimises twice, as counts of references are pruned in between; here are none.
+        # Numba optimises twice, to remove reference counts in between; kernels have none.
         passes, builder = self._codegen._module_pass_manager()
         passes.run(self._final_module, builder)
 
@@ -67,7 +67,7 @@ class _PartLowering(NativeLowering):  # type: ignore[misc]
         state.flags = Flags(state.flags)
         state.flags.no_compile = True
         super().run_pass(state)
-        # Numba finds a function's code by an object that Python could call, if there were code to call.
+        # Numba's key of compiled code is a function that Python can call; this one has no code.
         made = state.cr
         entry = _dynfunc.make_function(made.fndesc.lookup_module(), made.fndesc.qualname, "", 0, made.env, ())
         state.cr = made._replace(cfunc=entry)
@@ -101,12 +101,12 @@ class _KernelCompiler(_PartCompiler):
 
 
 def part(function: F, **options: Any) -> F:
-    """Compile a function as a part of the kernels that call it; Python cannot call it, and crashes if it tries."""
+    """Compile a function that only kernels call; a call from Python crashes the process."""
     compiled = numba.njit(**OPTIONS, **NOT_FROM_PYTHON, **options, pipeline_class=_PartCompiler)(function)
     template = compiled.get_call_template
 
     def for_types(arguments: Any, keywords: Any) -> Any:
-        # Once for all integers, not for each constant anew.
+        # Numba would compile the function again for each integer constant.
         return template(tuple(types.unliteral(one) for one in arguments), keywords)
 
     compiled.get_call_template = for_types
@@ -114,16 +114,16 @@ def part(function: F, **options: Any) -> F:
 
 
 def inlined(function: F) -> F:
-    """Compile a small function into those that call it.
+    """Compile a small function into the functions that call it.
 
-    Every array is some ten arguments to a call, and `Bodies` alone are fourteen arrays: a call costs more than most
-    small parts do.
+    An array counts as about ten arguments of a call, and `Bodies` alone has twelve arrays, so that a call would cost
+    more than most small functions.
     """
     return part(function, forceinline=True)
 
 
 def callable_from_python(function: Callable[..., Any]) -> Any:
-    """Compile a function, and all parts that it calls, at its first call from Python."""
+    """Compile a function and all functions that it calls at its first call from Python; the code is not stored."""
     return numba.njit(**OPTIONS, **NOT_FROM_C, pipeline_class=_KernelCompiler)(function)
 
 
@@ -134,7 +134,7 @@ def kernel(function: F) -> F:
 
     def compile_in_turn(types_: Any) -> Any:
         with compiled._cache.turn(types_):
-            # What Numba makes stays: a search for garbage among it takes a tenth of the time.
+            # Most objects that Numba makes stay; searching them for garbage takes a tenth of the time.
             collected = gc.isenabled()
             gc.disable()
             try:

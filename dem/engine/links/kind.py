@@ -1,4 +1,4 @@
-"""The links engine: what is asked of it before there is a simulation."""
+"""Facts about links as an engine, and the function that builds its simulations."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ OPTIONAL = frozenset({"channel", "cords", "hooks", "ledger", "motors", "rims"})
 
 
 class LinksKind:
-    """See `dem.engine.kinds.EngineKind`."""
+    """`dem.engine.kinds.EngineKind` of links."""
 
     name = "links"
     workers = "threads"
@@ -29,7 +29,7 @@ class LinksKind:
     order = ORDER
 
     def version(self) -> str:
-        """Return the hash of the sources, and the compiler."""
+        """Return the hash of the sources and the version of Numba."""
         return f"{stamp()} (Numba {numba.__version__})"
 
     def threads(self) -> int:
