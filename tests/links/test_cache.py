@@ -10,10 +10,19 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+import numba
 import pytest
 
-from dem.engine.links import cache
+from dem.engine.effect import EffectName
+from dem.engine.links import cache, world
 from dem.engine.links.compiler import kernel
+from dem.engine.links.cost import COMPILE_FIRST, COMPILE_MORE
+from dem.engine.links.kind import OPTIONAL, _present
+from dem.plan.outlook import plan
+from dem.run import warm
+from dem.scene.reading import load_scene
+from smarticles.commands import doctor
+from smarticles.starters import path_of
 
 # A small kernel, whose compilation is announced and takes until a file is there.
 PROGRAM = """
@@ -98,6 +107,41 @@ def test_a_process_that_has_waited_too_long_compiles_by_itself(tmp_path: Path) -
             out, said = other.communicate(timeout=MINUTE)
         assert out == "compiles\n7.0\n"
         assert "compiling here as well" in said
+
+
+# -- kinds of phases ---------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("kind", "example", "changes"), doctor._COMPILED)
+def test_the_kinds_of_code_that_a_scene_needs_are_known(
+    kind: str, example: str, changes: tuple[str, ...], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    called = set()
+
+    def advance(steps: int, clock: object, system: object, scratch: object, totals: object) -> int:
+        called.add(frozenset(cache._lacking(numba.typeof(system), "system")))
+        return steps
+
+    # Neither this kernel nor queries are compiled, which would take long.
+    monkeypatch.setattr(world, "advance", advance)
+    monkeypatch.setattr(warm, "_step_and_query", lambda engine: engine.advance(1))
+    scene = load_scene(path_of(example), changes)
+    warm.compile_for(scene)
+    needed = [OPTIONAL - present for present in _present(scene)]
+    lifted = [needed[0] - {"rims"}] if "lifted" in kind else []
+    assert called == {*needed, *lifted}
+
+    # What the cache holds decides what is planned.
+    kept: set[frozenset[str]] = set()
+    monkeypatch.setattr("dem.engine.links.kind.is_kept", kept.__contains__)
+    cold = plan(scene)
+    seconds = COMPILE_FIRST + COMPILE_MORE * (len(needed) - 1 + scene.calls_for(EffectName.WALL_REMOVAL))
+    assert cold.compile_s == seconds
+    assert f"compiling, once {seconds:.0f} s" in " ".join(cold.to_text().split())
+    kept.update(needed)
+    assert plan(scene).compile_s == 0.0
+    assert plan(scene).wall_s == cold.wall_s
+    assert "compiling" not in plan(scene).to_text()
 
 
 # -- in this process ---------------------------------------------------------------------------------------------------
