@@ -1,3 +1,4 @@
+# mypy: allow-untyped-calls
 """Keep compiled code for later processes, and let other processes wait while one compiles.
 
 Numba's own cache is beside the source, which may be read-only. It does not notice changes of a function in another file
@@ -104,7 +105,7 @@ def _title(kernel: str, without: frozenset[str]) -> str:
     return "-".join([kernel, *(["without", *sorted(without)] if without else [])])
 
 
-def _lacking(kind: types.Type, name: str) -> Iterator[str]:
+def _lacking(kind: Any, name: str) -> Iterator[str]:
     """Yield the name of an argument that is None, or those of its fields that are, at any depth."""
     if isinstance(kind, types.NoneType):
         yield name
@@ -113,7 +114,7 @@ def _lacking(kind: types.Type, name: str) -> Iterator[str]:
             yield from _lacking(of_field, field)
 
 
-class KernelCache(NullCache):  # type: ignore[misc] # Numba has no types
+class KernelCache(NullCache):
     """Compiled code of one kernel, a file for each signature; Numba's dispatcher calls the methods.
 
     A file holds the SHA-256 of its name and content, then the content, as Numba pickles it.

@@ -1,3 +1,4 @@
+# mypy: allow-untyped-calls
 """Compile kernels.
 
 Numba optimises and translates each function separately, then links it into the functions that call it, and optimises
@@ -11,10 +12,10 @@ from collections.abc import Callable
 from typing import Any, TypeVar
 
 import numba
-from numba import _dynfunc, types
+from numba import _dynfunc, types  # type: ignore[attr-defined] # an extension in C
 from numba.core.codegen import JITCodeLibrary
-from numba.core.compiler import Compiler, Flags, PassManager
-from numba.core.compiler_machinery import register_pass
+from numba.core.compiler import Compiler, Flags
+from numba.core.compiler_machinery import PassManager, register_pass
 from numba.core.typed_passes import NativeLowering
 
 from dem.engine.links.cache import KernelCache
@@ -30,7 +31,7 @@ NOT_FROM_C: dict[str, Any] = {"no_cfunc_wrapper": True}
 NOT_FROM_PYTHON: dict[str, Any] = {"no_cpython_wrapper": True, **NOT_FROM_C}
 
 
-class _PartLibrary(JITCodeLibrary):  # type: ignore[misc] # Numba has no types
+class _PartLibrary(JITCodeLibrary):
     """Code of a function that only kernels call: neither linked nor translated to machine code."""
 
     def finalize(self) -> None:
@@ -38,7 +39,7 @@ class _PartLibrary(JITCodeLibrary):  # type: ignore[misc] # Numba has no types
         self._finalized = True
 
 
-class _KernelLibrary(JITCodeLibrary):  # type: ignore[misc]
+class _KernelLibrary(JITCodeLibrary):
     """Code of a kernel and of all functions that it calls directly or indirectly."""
 
     def finalize(self) -> None:
@@ -59,7 +60,7 @@ class _KernelLibrary(JITCodeLibrary):  # type: ignore[misc]
 
 
 @register_pass(mutates_CFG=True, analysis_only=False)
-class _PartLowering(NativeLowering):  # type: ignore[misc]
+class _PartLowering(NativeLowering):
     _name = "links_part_lowering"
 
     def run_pass(self, state: Any) -> bool:
@@ -76,7 +77,7 @@ class _PartLowering(NativeLowering):  # type: ignore[misc]
 
 
 @register_pass(mutates_CFG=True, analysis_only=False)
-class _KernelLowering(NativeLowering):  # type: ignore[misc]
+class _KernelLowering(NativeLowering):
     _name = "links_kernel_lowering"
 
     def run_pass(self, state: Any) -> bool:
@@ -85,7 +86,7 @@ class _KernelLowering(NativeLowering):  # type: ignore[misc]
         return bool(super().run_pass(state))
 
 
-class _PartCompiler(Compiler):  # type: ignore[misc]
+class _PartCompiler(Compiler):
     lowering: type = _PartLowering
 
     def define_pipelines(self) -> list[PassManager]:
