@@ -13,6 +13,7 @@ from pydantic import ConfigDict, Field, ModelWrapValidatorHandler, ValidationInf
 from dem.arrays import Array, Numbers
 from dem.body.kinds import Kind, Mixture
 from dem.body.particle import Particle, SphereChain, chain_mean_width, mean_width
+from dem.engine.demand import Activity
 from dem.engine.effect import EffectName
 from dem.errors import nearest, shown
 from dem.phases.kinds import AnyPhase
@@ -274,6 +275,21 @@ class Scene(Part):
     def calls_for(self, effect: EffectName) -> bool:
         """Return whether any phase needs an effect."""
         return any(effect in phase.calls(self, index) for index, phase in enumerate(self.phases))
+
+    def activity(self, index: int) -> Activity:
+        """Return the activity of a phase, on which its cost per step depends."""
+        phase = self.phases[index]
+        if phase.pours:
+            return Activity.POUR
+        if phase.actuates:
+            return Activity.ACTUATE
+        return Activity.SHAKE if EffectName.CONTAINER_MOTION in phase.calls(self, index) else Activity.REST
+
+    @property
+    def activities(self) -> frozenset[Activity]:
+        """Activities of all phases that take simulated time."""
+        durations = [phase.expected_duration(self.count) for phase in self.phases]
+        return frozenset(self.activity(index) for index, duration in enumerate(durations) if duration > 0)
 
     @cached_property
     def particle(self) -> Particle:

@@ -47,13 +47,18 @@ def starter(kind: str) -> str:
     """Return the YAML text of the example scene of a kind; raise InputError for an unknown kind."""
     if kind not in KINDS:
         raise InputError(f"{kind!r} is no kind of scene; {nearest(kind, KINDS)}")
-    text = Path(__file__).with_name(f"{'body' if kind in BODIES else kind}.yaml").read_text(encoding="utf-8")
+    text = path_of("body" if kind in BODIES else kind).read_text(encoding="utf-8")
     if kind in BODIES:
         description, particle = BODIES[kind]
         values = {"ABOUT": f"{description}: pour, shake, take the wall away.", "NAME": kind, "PARTICLE": particle}
         for word, value in values.items():
             text = text.replace(word, value)
     return text
+
+
+def path_of(kind: str) -> Path:
+    """Return the file of the example scene of a kind."""
+    return Path(__file__).with_name(f"{kind}.yaml")
 
 
 def about(kind: str) -> str:

@@ -61,6 +61,8 @@ ALLOWED = (
     ("*.txt", r"(?<=(?:done|iled) after )[\d:]+", "wall time"),
     ("*.txt", r"^\d+ of \d+ runs ended.*", "printed twice a minute of wall time"),
     ("*-plan.*", r"(?<=table: )/\S*(?=/results/accuracy/)", "where the checkout lies"),
+    ("*-plan.*", r"^(compile_s: |compiling, once|total ).*", "time to compile, until the code is stored"),
+    ("*.txt", r"^(compiling|another process compiles) the links engine.*", "printed until the code is stored"),
     ("*/array.sh", r"(?<=[ (])/\S*(?=/)", "where the folder and the program lie"),
     ("*/array.sh", r"(?<=--job-name=).*", "contains a hash of where the folder lies"),
     ("*/job.json", r"^job_name: .*", "contains a hash of where the folder lies"),

@@ -56,6 +56,9 @@ class LammpsKind:
         steps = per_sphere * spheres * (1 + LONGER * min(1.0, spheres / MANY)) / time_step
         return steps + (SAMPLE[0] + SAMPLE[1] * scene.count) / scene.recording.series_interval_s
 
+    def seconds_to_compile(self, scene: Demand) -> float:
+        return 0.0
+
     def build(self, scene: Demand, time_step: float) -> LammpsEngine:
         return LammpsEngine(
             particle=scene.model,

@@ -41,6 +41,10 @@ MANY, LONGER, GROWTH = 5000, 0.3, 0.8
 # tries their strands.
 MORE_CONTACTS, MORE_PAIRS = 0.3, 1.2
 
+# Processor time to compile [s]: all kernels of the first kind of phase in a process, and those of one more kind.
+# `doctor --compile` with an empty cache on the machine above while other work used both cores: 11 to 16, and 4 to 9.
+COMPILE_FIRST, COMPILE_MORE = 13.0, 7.0
+
 
 def seconds_per_second(scene: Demand, time_step: float, activity: Activity) -> float:
     """Return the estimate of `dem.engine.kinds.EngineKind.seconds_per_second`."""

@@ -43,6 +43,9 @@ class YadeKind:
         per_step = COST_PER_SPHERE_STEP * each * scene.count
         return per_step / time_step * FACTORS.get(activity, 1.0)
 
+    def seconds_to_compile(self, scene: Demand) -> float:
+        return 0.0
+
     def build(self, scene: Demand, time_step: float) -> YadeEngine:
         return YadeEngine(
             particle=scene.model,
