@@ -12,12 +12,12 @@ from typing import TYPE_CHECKING, Any
 
 from dem.errors import InputError, RunError
 from dem.record.files import write_whole
-from dem.record.names import DONE, FAILED, FORCE, FRAME, MANIFEST, SCENE, SERIES, collection, folder
+from dem.record.names import DONE, FAILED, FORCE, FRAME, MANIFEST, SCENE, SERIES, VTKHDF, collection, folder
 
 if TYPE_CHECKING:
     import pandas as pd
 
-_READ = (SCENE, MANIFEST, DONE, FAILED, SERIES, collection(FRAME), collection(FORCE))
+_READ = (SCENE, MANIFEST, DONE, FAILED, SERIES, VTKHDF, collection(FRAME), collection(FORCE))
 
 
 def key_of(directory: Path) -> str:

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from dem.errors import InputError, nearest
-from dem.record.names import FRAME, OF_SWEEP, collection
+from dem.record.names import FRAME, OF_SWEEP, VTKHDF, collection
 from smarticles.kept_tables import keep, key_of, read_kept
 
 if TYPE_CHECKING:
@@ -28,7 +28,7 @@ PHASE = ("phase", "phase type")  #: Columns that identify a phase within a run
 
 def has_frames(directory: Path) -> bool:
     """Return whether a run directory contains frames."""
-    return (directory / collection(FRAME)).is_file()
+    return any((directory / name).is_file() for name in (collection(FRAME), VTKHDF))
 
 
 def sources(directories: Sequence[Path]) -> dict[Path, Mapping[str, Any]]:
@@ -76,6 +76,7 @@ def measured(
     *,
     frames: bool = False,
     costly: Costly = "phase-end",
+    also: Sequence[str] = (),
     measures: Sequence[FrameMeasure] = (),
     jobs: int = 1,
     progress: Callable[[int, int], None] = lambda _done, _runs: None,
@@ -85,6 +86,7 @@ def measured(
     Args:
         frames: return one row per frame instead of one row per run and phase.
         costly: when to compute the costly packing fractions, see `postprocess.measure_run`.
+        also: names of measures that tables have on request alone, such as "crossing-number".
         measures: further measures; tables with their columns are not kept.
         jobs: number of processes. More than 1 needs `if __name__ == "__main__":` in the calling script, since the
             processes import it.
@@ -100,11 +102,11 @@ def measured(
     import pandas as pd  # noqa: PLC0415
 
     # A further measure is a function whose source may be unknown, so that its tables are not kept.
-    found, kind = sources(directories), "" if measures else f"{'frames' if frames else 'phases'}-{costly}"
+    found, kind = sources(directories), "" if measures else "-".join(["frames" if frames else "phases", costly, *also])
     keys = {directory: key_of(directory) if kind else "" for directory in found}
     tables = {directory: read_kept(directory, kind, key) if kind else None for directory, key in keys.items()}
     missing = [directory for directory, table in tables.items() if table is None]
-    take = partial(_measure_and_keep, frames=frames, costly=costly, measures=measures, kind=kind)
+    take = partial(_measure_and_keep, frames=frames, costly=costly, also=also, measures=measures, kind=kind)
     if jobs == 1 or len(missing) < _MIN_RUNS_FOR_PROCESSES:
         _collect(map(take, missing, (keys[directory] for directory in missing)), missing, tables, progress)
     else:
@@ -129,12 +131,19 @@ def _collect(
 
 
 def _measure_and_keep(
-    directory: Path, key: str, *, frames: bool, costly: Costly, measures: Sequence[FrameMeasure], kind: str
+    directory: Path,
+    key: str,
+    *,
+    frames: bool,
+    costly: Costly,
+    also: Sequence[str],
+    measures: Sequence[FrameMeasure],
+    kind: str,
 ) -> pd.DataFrame:
     from dem.record.run import Run  # noqa: PLC0415
     from postprocess.measures.table import measure_run, summarise_run  # noqa: PLC0415
 
-    table = (measure_run if frames else summarise_run)(Run(directory), costly=costly, measures=measures)
+    table = (measure_run if frames else summarise_run)(Run(directory), costly=costly, also=also, measures=measures)
     if kind:
         keep(table, directory, kind, key)
     return table

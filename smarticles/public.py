@@ -148,12 +148,15 @@ def read(directory: Path | str) -> Run:
     return open_run(directory)
 
 
-def measure(run: Run | Path | str, *, frames: bool = False, measures: Sequence[OwnMeasure] = ()) -> pd.DataFrame:
+def measure(
+    run: Run | Path | str, *, frames: bool = False, also: Sequence[str] = (), measures: Sequence[OwnMeasure] = ()
+) -> pd.DataFrame:
     """Return the measures of a run as a table, as `smarticles measure` does.
 
     Args:
         run: run, or its directory.
         frames: return one row per frame.
+        also: names of measures that tables have on request alone, such as "crossing-number".
         measures: further measures; a function of a frame and its run returns a number. Its name ends with the unit:
             `top_m` makes the column `top [m]`.
 
@@ -162,10 +165,10 @@ def measure(run: Run | Path | str, *, frames: bool = False, measures: Sequence[O
         names contain the units.
 
     Raises:
-        InputError: the directory is not a run directory, or the run has no frames yet.
+        InputError: the directory is not a run directory, the run has no frames yet, or a name is unknown.
     """
     directory = run.path if isinstance(run, Run) else Path(run)
-    return measured([directory], frames=frames, measures=[measure_of(one) for one in measures])
+    return measured([directory], frames=frames, also=also, measures=[measure_of(one) for one in measures])
 
 
 def plot(run: Run | Path | str, *, time: float | None = None, color_by: str | None = None) -> Image:

@@ -45,6 +45,7 @@ def measure_run(
     definitions: Sequence[str] = tuple(DEFINITIONS),
     costly: Costly = "phase-end",
     measures: Sequence[FrameMeasure] = (),
+    also: Collection[str] = (),
 ) -> pd.DataFrame:
     """Measure every frame of a run, which may be finished, failed or still running.
 
@@ -52,6 +53,7 @@ def measure_run(
         definitions: Definitions of the packing fraction, keys of `packing.DEFINITIONS`.
         costly: Frames for which costly measures are computed: none, the last recorded frame of each phase, or all.
         measures: Further measures, whose columns follow those of the registered ones.
+        also: Names of measures that tables have on request alone, such as "crossing-number".
 
     Returns:
         A table with one row per frame and units in its column names. Columns of `series.h5`, if that file exists, have
@@ -59,12 +61,13 @@ def measure_run(
         smarticle, or if it is costly and not computed.
 
     Raises:
-        InputError: Unknown definition, or a file is missing or damaged.
+        InputError: Unknown definition or name, or a file is missing or damaged.
     """
     frames, series = _open(run, definitions)
     rows: list[dict[str, object]] = []
     for part in _frames_by_phase(run, frames):
-        rows += _rows(part, run, series, definitions, costly, further=measures, offset=len(rows))
+        known = (*frame_measures(definitions, also), *measures)
+        rows += _rows(part, run, series, known, costly, offset=len(rows))
     return pd.DataFrame(rows)
 
 
@@ -74,6 +77,7 @@ def summarise_run(
     last: int = LAST_FRAMES,
     definitions: Sequence[str] = tuple(DEFINITIONS),
     costly: Costly = "phase-end",
+    also: Collection[str] = (),
     phases: Collection[int] | None = None,
     measures: Sequence[FrameMeasure] = (),
 ) -> pd.DataFrame:
@@ -83,6 +87,7 @@ def summarise_run(
         last: Number of frames to average; a phase with fewer frames is averaged over all its frames.
         definitions: Definitions of the packing fraction, keys of `packing.DEFINITIONS`.
         costly: Frames for which costly measures are computed, see `measure_run`.
+        also: Names of measures that tables have on request alone, such as "crossing-number".
         phases: Indices of the phases to measure; all if not given.
         measures: Further measures, whose columns follow those of the registered ones.
 
@@ -92,7 +97,7 @@ def summarise_run(
         measures are computed for the last frame alone and have no error.
 
     Raises:
-        InputError: Unknown definition, `last` below 1, or a file is missing or damaged.
+        InputError: Unknown definition or name, `last` below 1, or a file is missing or damaged.
     """
     _check_last(last)
     frames, series = _open(run, definitions)
@@ -100,7 +105,8 @@ def summarise_run(
     for part in _frames_by_phase(run, frames):
         if phases is not None and part[0].phase not in phases:
             continue
-        table = pd.DataFrame(_rows(part[-last:], run, series, definitions, costly, further=measures))
+        known = (*frame_measures(definitions, also), *measures)
+        table = pd.DataFrame(_rows(part[-last:], run, series, known, costly))
         summary = {name: table[name].iloc[-1] for name in (*_LABELS, "phase", "phase type", "time [s]")}
         summary["frames averaged"] = len(table)
         for name in table.columns.difference([*summary, "frame"], sort=False):
@@ -183,15 +189,14 @@ def _rows(
     part: FrameSequence,
     run: Run,
     series: Series | None,
-    definitions: Sequence[str],
+    known: Sequence[FrameMeasure],
     costly: Costly,
     *,
-    further: Sequence[FrameMeasure],
     offset: int = 0,
 ) -> list[dict[str, object]]:
     """Return one row per frame of a part of one phase; `offset` is the number of the first frame."""
     rows: list[dict[str, object]] = []
-    measures = [measure for measure in (*frame_measures(definitions), *further) if measure.available_for(run)]
+    measures = [measure for measure in known if measure.available_for(run)]
     made = run.manifest
     values = (str(run.path), made.name, made.seed, made.aspect_ratio, made.count, made.fidelity, made.scene_sha256)
     labels = dict(zip(_LABELS, values, strict=True))

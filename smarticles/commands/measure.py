@@ -42,8 +42,9 @@ row per phase: means over the last frames of the phase, with standard errors (SE
 fraction φ is given by several definitions; the column names the definition. Phases that pull a hook
 or strain a chain have columns for forces. If DIR is a sweep, all its runs with frames are measured,
 and CSV and JSON have a column for each variable of the sweep. --by averages over all runs that have
-equal values in some columns, for example over seeds. Tables are kept in the run directories, so that
-runs which have not changed are not measured again.""",
+equal values in some columns, for example over seeds. --also adds measures that take long or that few
+need: crossing-number, closed-linking, orientation, caging. Tables are kept in the run directories, so
+that runs which have not changed are not measured again.""",
         examples="""\
   smarticles measure runs/a
   smarticles measure runs/a runs/b --table phases.csv
@@ -53,6 +54,7 @@ runs which have not changed are not measured again.""",
   smarticles measure friction --by friction                 means ± SE over the runs of each value
   smarticles measure friction --by friction --phase last    of the last phase of each run alone
   smarticles measure runs/a --profile profile.csv           φ(r, z) at the end of each phase
+  smarticles measure runs/a --also crossing-number,caging   measures on request
 """,
     )
     measure.add_argument("directories", nargs="+", type=Path, metavar="DIR", help="runs or sweeps")
@@ -66,6 +68,9 @@ runs which have not changed are not measured again.""",
         help="means and SE over runs with equal values in these columns; can be repeated",
     )
     measure.add_argument("--phase", metavar="NAME|last", help="only phases of this type, or the last phase of each run")
+    measure.add_argument(
+        "--also", type=names, default=(), metavar="NAME,…", help="measures on request, named in the description above"
+    )
     profile_help = "write φ(r, z) at the end of each phase, in rings and layers of the container, as CSV"
     measure.add_argument("--profile", type=Path, metavar="FILE.csv", help=profile_help)
     add_options(measure, "--jobs", help="number of processes; default: one per core")
@@ -92,7 +97,9 @@ def measure_runs(arguments: argparse.Namespace) -> int:
     for warning in filter(None, (open_run(directory).lost_series for directory in directories)):
         print(f"smarticles: warning: {warning}", file=sys.stderr)
     jobs = arguments.jobs or usable_cores()
-    table = measured(arguments.directories, frames=arguments.frames, jobs=jobs, progress=_Progress())
+    table = measured(
+        arguments.directories, frames=arguments.frames, also=arguments.also, jobs=jobs, progress=_Progress()
+    )
     if arguments.phase is not None:
         try:
             table = of_phase(table, arguments.phase)
@@ -232,6 +239,11 @@ def _legend(shown: Container[str], *, per_frame: bool, by: Sequence[str]) -> str
         lines.append(
             "⟨N⟩: mean number of links of others through a smarticle's plane; z: height of the centre of mass "
             "above the floor"
+        )
+    if "average crossing number mean [-]" in shown:
+        lines.append(
+            "⟨ACN⟩: average crossing number of a smarticle with all others, half the crossings that are seen from a "
+            "random direction"
         )
     if "hook work [J]" in shown:
         lines.append(

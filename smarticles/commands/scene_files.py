@@ -101,10 +101,21 @@ def _parts(schema: Mapping[str, Any]) -> Iterator[tuple[str, Mapping[str, Any]]]
             found = [option["$ref"] for option in entry.get("anyOf", [entry]) if "$ref" in option]
             if len(found) == 1:
                 yield key, definitions[found[0].rpartition("/")[2]]
+            elif kinds := _kinds(entry):
+                about = f"{entry.get('description', key)}. Each is one of: {', '.join(kinds)}"
+                yield key, {"description": about, "properties": {}}
     for definition in definitions.values():
         for entry in definition["properties"].values():
             if "const" in entry and isinstance(entry["const"], str):
                 yield entry["const"], definition
+
+
+def _kinds(entry: Mapping[str, Any]) -> list[str]:
+    """Return the tags of the mappings of which an entry, or each item of a list, is one."""
+    if "discriminator" in entry:
+        return list(entry["discriminator"]["mapping"])
+    options = [*entry.get("anyOf", ()), *([entry["items"]] if "items" in entry else [])]
+    return next(filter(None, map(_kinds, options)), [])
 
 
 def _described(definition: Mapping[str, Any]) -> Iterator[str]:
