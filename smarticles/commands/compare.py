@@ -230,8 +230,8 @@ def compare_bits(one: Run, other: Run) -> dict[str, Any]:
     alike = len(frames[0]) == len(frames[1]) and one.has_series == other.has_series
     if one.has_series and other.has_series:
         a, b = one.series, other.series
-        alike = alike and len(a) == len(b) and a.data.keys() == b.data.keys()
-        length = min(len(a), len(b))
+        alike = alike and len(a.time) == len(b.time) and a.data.keys() == b.data.keys()
+        length = min(len(a.time), len(b.time))
         differing = np.zeros(length, dtype=bool)
         for name in a.data.keys() & b.data.keys():
             pair = [np.ascontiguousarray(run[name][:length]) for run in (a, b)]
