@@ -1,6 +1,5 @@
 """Measures of bodies of any shape, in frames of a run on links."""
 
-
 import numpy as np
 import pytest
 from scenes import small

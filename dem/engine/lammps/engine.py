@@ -136,7 +136,9 @@ class LammpsEngine:
         self._contacts: Contacts | None = None
         self.boundaries: LammpsBoundaries = LammpsBoundaries(cylinder, self._send, lambda: (self.steps, self.time_step))
         self.motors, self.strings = NoMotors(), NoStrings()
-        self.ledger: LammpsLedger = LammpsLedger(lambda: self.boundaries.moving, lambda: self.contacts.elastic_energy(law))
+        self.ledger: LammpsLedger = LammpsLedger(
+            lambda: self.boundaries.moving, lambda: self.contacts.elastic_energy(law)
+        )
 
     def _send(self, commands: Iterator[str]) -> None:
         """Send commands, and have LAMMPS set up its next run anew.
