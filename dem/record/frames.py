@@ -15,7 +15,7 @@ import meshio
 import numpy as np
 
 from dem.arrays import Array
-from dem.errors import InputError
+from dem.errors import InputError, RunError
 from dem.record import names
 from dem.record.files import cannot_read, write_text, write_whole
 from dem.record.frame import Frame, read_frame
@@ -37,6 +37,17 @@ class FrameWriter:
         write_whole(self.folder / name, lambda path: mesh.write(path, file_format="vtu"))
         self.times.append(time)
         write_text(self.folder / names.collection(self.noun), self._collection(), make_folder=False)
+
+    def check(self) -> None:
+        """Raise RunError if a file that was written is gone."""
+        folder = self.folder / names.folder(self.noun)
+        present = {path.name for path in folder.iterdir()} if folder.is_dir() else set()
+        for number in range(len(self.times)):
+            path = self.folder / names.member(self.noun, number)
+            if path.name not in present:
+                raise RunError(
+                    f"{path}: is gone; put it back and continue with `smarticles resume`, or start the run anew"
+                )
 
     def truncate(self, times: Sequence[float]) -> None:
         """Keep the first frames, whose times [s] are given, and remove all later ones."""

@@ -71,9 +71,10 @@ class ProgressWriter:
         if self.show:
             self._draw(time, count, wall)
 
-    def finish(self) -> None:
-        """Remove `progress.json`, and clear the line on the terminal."""
-        (self.folder / PROGRESS).unlink(missing_ok=True)
+    def finish(self, *, remove: bool = True) -> None:
+        """Remove `progress.json` if `remove`, and clear the line on the terminal."""
+        if remove:
+            (self.folder / PROGRESS).unlink(missing_ok=True)
         if self.show:
             sys.stderr.write("\r\x1b[K")
             sys.stderr.flush()

@@ -113,8 +113,14 @@ class Recorder:
         self.samples, self.next_step = memory["samples"], memory["next_step"]
         self.truncate(memory)
         self.sampler.memory = dict(memory["series"])
+        self.check_files()
         self.series.restore(columns)
         self.series.write()
+
+    def check_files(self) -> None:
+        """Raise RunError if a frame, or a file of forces or spheres, that was written is gone."""
+        for _, writer in self._writers():
+            writer.check()
 
     def truncate(self, memory: Mapping[str, Any]) -> None:
         """Remove all frames that `memory` does not list; an empty mapping lists none."""

@@ -23,7 +23,7 @@ from dem.record.files import write_text
 from dem.record.names import DONE, FAILED, MANIFEST, SCENE
 from dem.record.progress import ProgressWriter
 from dem.record.run import Run
-from dem.record.rundir import claimed, log_of
+from dem.record.rundir import Claim, claimed, log_of
 from dem.run.build import Builders
 from dem.run.simulation import Simulation, StopRequestedError
 from dem.scene.reading import difference, dump_scene, load_scene, scene_hash
@@ -54,7 +54,7 @@ def run_scene(
     if not resume:
         _check_ready(scene)
     saved: tuple[Checkpoint, str | None] | None = None
-    with claimed(out, resume=resume):
+    with claimed(out, resume=resume) as claim:
         if resume:
             _check_scene(scene, out)
             if (out / DONE).exists():
@@ -79,7 +79,7 @@ def run_scene(
                     scene=scene,
                     engine=builders.engine(scene, min(steps)),
                     recorder=builders.recorder(scene, out, bar),
-                    folder=out,
+                    claim=claim,
                     log=log,
                     made_by=made_by,
                     time_steps=steps,
@@ -94,12 +94,12 @@ def run_scene(
                 done.mark(out)
                 return done
             except (Exception, KeyboardInterrupt) as error:
-                cause = _mark_ended(simulation, out, log, error)
+                cause = _mark_ended(simulation, claim, log, error)
                 if isinstance(error, RunError):
                     raise RunError(cause) from error
                 raise
             finally:
-                bar.finish()
+                bar.finish(remove=claim.held)
 
 
 def _check_ready(scene: Scene) -> None:
@@ -146,8 +146,11 @@ def _restore(simulation: Simulation, saved: tuple[Checkpoint, str | None] | None
     log.info("resumed from the checkpoint of t = %.4f s", simulation.engine.time)
 
 
-def _mark_ended(simulation: Simulation | None, out: Path, log: logging.Logger, error: BaseException) -> str:
-    """Write the series and `failed.json`; return the cause, for a failed run with the last checkpoint."""
+def _mark_ended(simulation: Simulation | None, claim: Claim, log: logging.Logger, error: BaseException) -> str:
+    """Write the series and `failed.json`; return the cause, for a failed run with the last checkpoint.
+
+    Nothing is written if the directory is no longer the run's own.
+    """
     status: Ended = "interrupted" if isinstance(error, StopRequestedError | KeyboardInterrupt) else "failed"
     cause = "interrupted by the user" if isinstance(error, KeyboardInterrupt) else str(error)
     if not isinstance(error, RunError | StopRequestedError | KeyboardInterrupt):
@@ -157,7 +160,7 @@ def _mark_ended(simulation: Simulation | None, out: Path, log: logging.Logger, e
     time, checkpoint = 0.0, None
     if simulation is not None:
         # Without samples this process has resumed nothing, and the series of the earlier one must stay.
-        if simulation.recorder.samples:
+        if simulation.recorder.samples and claim.held:
             with contextlib.suppress(RunError):  # a full disk: what was written before is whole
                 simulation.recorder.series.write()
         time, checkpoint = simulation.engine.time, simulation.checkpointed
@@ -165,7 +168,8 @@ def _mark_ended(simulation: Simulation | None, out: Path, log: logging.Logger, e
             good = "none" if checkpoint is None else f"t = {checkpoint:.4f} s"
             cause = f"{cause} (last good checkpoint: {good})"
     log.error("%s", cause)
-    Failed(status=status, cause=cause, time_s=time, checkpoint_s=checkpoint).mark(out)
+    if claim.held:
+        Failed(status=status, cause=cause, time_s=time, checkpoint_s=checkpoint).mark(claim.out)
     return cause
 
 

@@ -16,6 +16,7 @@ from dem.phases.phase import Stage
 from dem.record.checkpoint import Checkpoint, write_checkpoint
 from dem.record.document import Phase
 from dem.record.names import CHECKPOINT
+from dem.record.rundir import Claim
 from dem.run.recorder import Recorder
 from dem.scene.reading import scene_hash
 from dem.scene.scene import Scene
@@ -34,7 +35,7 @@ class Simulation:
     scene: Scene
     engine: Engine
     recorder: Recorder
-    folder: Path  #: The run directory
+    claim: Claim  #: The run directory, locked
     log: logging.Logger
     made_by: tuple[str, str]  #: Name and version of the engine
     time_steps: Sequence[float]  #: Time step of each phase [s]
@@ -48,6 +49,11 @@ class Simulation:
     _cpu_spent: float = 0.0
     _cpu_began: float = field(default_factory=time.process_time)
     _stop_requested: bool = False
+
+    @property
+    def folder(self) -> Path:
+        """The run directory."""
+        return self.claim.out
 
     def run(self) -> tuple[Phase, ...]:
         """Run from the present state to the end of the last phase; return the phases with their times."""
@@ -63,6 +69,7 @@ class Simulation:
             # At a checkpoint the state was checked; after it contacts are unknown until the next step.
             self.recorder.watch(self.engine)
         self.recorder.series.write()
+        self._check_files()
         if self.recorder.residual:
             self.warn(self.recorder.residual)
         return tuple(Phase(**entry) for entry in self._performed)
@@ -118,6 +125,7 @@ class Simulation:
     def _checkpoint(self) -> None:
         # Only a state without errors becomes a checkpoint.
         self.recorder.watch(self.engine)
+        self._check_files()
         self._check_space()
         saved = self.engine.save(self.folder)
         assert self._stage is not None  # a checkpoint is taken while a phase runs
@@ -145,6 +153,10 @@ class Simulation:
     def _note_checkpoint(self) -> None:
         self.checkpointed = self.engine.time
         self.recorder.progress.checkpointed(self.engine.time)
+
+    def _check_files(self) -> None:
+        self.claim.check()
+        self.recorder.check_files()
 
     def _check_space(self) -> None:
         # An engine may not notice a full disk when it saves, and would then load a truncated file.

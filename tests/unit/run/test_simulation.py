@@ -2,6 +2,7 @@
 
 import json
 import os
+import shutil
 import signal
 import subprocess
 from collections.abc import Callable
@@ -191,6 +192,46 @@ def test_an_engine_that_stops_fails_the_run_and_keeps_what_was_recorded(
     assert not (tmp_path / "done.json").exists()
     with h5py.File(tmp_path / "series.h5") as file:
         assert failed["time_s"] - file["time_s"][-1] <= 0.004
+
+
+# -- files that are lost while the run writes them ----------------------------------------------------------------
+
+
+def replaced(out: Path) -> None:
+    shutil.move(out, out.with_name("moved"))
+    shutil.copytree(out.with_name("moved"), out)
+
+
+LOSSES: dict[str, tuple[Callable[[Path], object], str]] = {
+    "directory deleted": (shutil.rmtree, "was deleted, moved or replaced|its folder is gone"),
+    "directory replaced": (replaced, "was deleted, moved or replaced"),
+    "lock": (lambda out: (out / ".lock").unlink(), "was deleted, moved or replaced"),
+    "manifest": (lambda out: (out / "run.json").unlink(), r"run\.json: is gone, and without it the run cannot be read"),
+    "frames": (lambda out: shutil.rmtree(out / "frames"), r"frame_000000\.vtu: is gone; put it back"),
+    "one frame": (lambda out: (out / "frames/frame_000001.vtu").unlink(), r"frame_000001\.vtu: is gone; put it back"),
+}
+
+
+@pytest.mark.parametrize("name", LOSSES)
+@pytest.mark.parametrize("step", [100, -1])
+def test_a_run_that_loses_its_files_fails_and_leaves_others_alone(
+    kind: KindDouble, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str, step: int
+) -> None:
+    scene, out, advance = scene_of("rested"), tmp_path / "run", EngineDouble._step
+    last = (run(scene, tmp_path / "whole") or Done(time_s=0, steps=0, wall_s=0, phases=())).steps
+    lose, stated = LOSSES[name]
+
+    def losing(engine: EngineDouble) -> None:
+        advance(engine)
+        if engine.steps == (step if step > 0 else last):
+            lose(out)
+
+    monkeypatch.setattr(EngineDouble, "_step", losing)
+    with pytest.raises(RunError, match=stated):
+        run(scene, out)
+    assert not (out / "done.json").exists()
+    own = name in ("manifest", "frames", "one frame")
+    assert (out / "failed.json").exists() == own
 
 
 # -- directories that are not a run's ----------------------------------------------------------------------------------
