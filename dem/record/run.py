@@ -17,6 +17,7 @@ from dem.record.frames import FrameSequence, read_frames
 from dem.record.names import CHECKPOINT, DONE, FAILED, MANIFEST, OF_SWEEP, PROGRESS, SCENE, SERIES
 from dem.record.rundir import in_use
 from dem.record.series import Series, read_series
+from dem.yaml_text import load_yaml, read_text
 
 State = Literal["done", "running", "queued", "failed", "interrupted", "stopped", "missing"]
 """`interrupted` closed its files when asked to stop; `stopped` was killed; `queued` waits for a job of a cluster."""
@@ -63,7 +64,7 @@ class Run:
         """The resolved scene, `scene.yaml`, as a mapping in which all defaults are filled in."""
         path = self.path / SCENE
         try:
-            content = yaml.load(path.read_text(encoding="utf-8"), yaml.CSafeLoader)
+            content = load_yaml(read_text(path), yaml.CSafeLoader)
         except (OSError, ValueError, yaml.YAMLError) as error:
             cannot_read("scene", path, error, REMEDY)
         if not isinstance(content, dict):
