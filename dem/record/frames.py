@@ -15,7 +15,7 @@ import meshio
 import numpy as np
 
 from dem.arrays import Array
-from dem.errors import InputError, RunError
+from dem.errors import InputError, RunError, shown
 from dem.record import names
 from dem.record.files import cannot_read, write_text, write_whole
 from dem.record.frame import Frame, read_frame
@@ -124,7 +124,10 @@ def read_frames(directory: Path | str) -> FrameSequence:
     try:
         for entry in ET.parse(path).getroot().iter("DataSet"):
             times.append(float(entry.attrib["timestep"]))
-            files.append(path.parent / entry.attrib["file"])
+            name = Path(entry.attrib["file"])
+            if name.is_absolute() or ".." in name.parts:
+                cause = f"{shown(str(name))} lies outside of the run directory"
+            files.append(path.parent / name)
     except (OSError, ET.ParseError) as error:
         cause = error
     except (KeyError, ValueError) as error:

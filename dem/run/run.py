@@ -25,13 +25,21 @@ from dem.record.progress import ProgressWriter
 from dem.record.run import Run
 from dem.record.rundir import Claim, claimed, log_of
 from dem.run.build import Builders
-from dem.run.simulation import Simulation, StopRequestedError
+from dem.run.simulation import Simulation
+from dem.run.stop import StopRequest, StopRequestedError
 from dem.scene.reading import difference, dump_scene, load_scene, scene_hash
 from dem.scene.scene import Scene
 
 
 def run_scene(
-    scene: Scene, out: Path, *, command: str, progress: bool, resume: bool = False, builders: Builders | None = None
+    scene: Scene,
+    out: Path,
+    *,
+    command: str,
+    progress: bool,
+    resume: bool = False,
+    builders: Builders | None = None,
+    stop: StopRequest | None = None,
 ) -> Done | None:
     """Simulate a scene into a run directory; return times and cost, or None if the run was done already.
 
@@ -42,11 +50,12 @@ def run_scene(
         progress: whether to draw a progress line on the terminal.
         resume: whether to continue from the newest undamaged checkpoint, or from the start if none was written.
         builders: functions that make the parts of the run; None: the default ones.
+        stop: whether SIGUSR1 has come, also before this call; None: it is noted from the first step on.
 
     Raises:
         InputError: `out` holds other files, or another process runs in it.
         RunError: the run failed; `failed.json` states the cause, and all files written before stay.
-        StopRequestedError: SIGUSR1 came; the run stopped at its next checkpoint and can be resumed.
+        StopRequestedError: SIGUSR1 came; the run stopped before its first step or at a checkpoint, and can be resumed.
         KeyboardInterrupt: the run was interrupted; all files are complete.
     """
     builders, kind = builders or Builders(), engine_kind(scene.engine)
@@ -83,6 +92,7 @@ def run_scene(
                     log=log,
                     made_by=made_by,
                     time_steps=steps,
+                    stop=stop or StopRequest(),
                 )
                 for warning in warnings_of(scene):
                     simulation.warn(warning)
@@ -135,7 +145,14 @@ def _restore(simulation: Simulation, saved: tuple[Checkpoint, str | None] | None
     checkpoint, warning = saved
     if warning:
         simulation.warn(warning)
-    simulation.restore(checkpoint)
+    try:
+        simulation.restore(checkpoint)
+    except (InputError, RunError):
+        raise
+    # Content that no run writes can fail anywhere.
+    except Exception as error:
+        msg = f"{out}: cannot be resumed, its checkpoint has other content than the run needs ({error!r}); start anew"
+        raise InputError(msg) from error
     earlier = Run(out).manifest.threads
     if earlier != threads:
         workers = engine_kind(simulation.scene.engine).workers
@@ -153,7 +170,7 @@ def _mark_ended(simulation: Simulation | None, claim: Claim, log: logging.Logger
     """
     status: Ended = "interrupted" if isinstance(error, StopRequestedError | KeyboardInterrupt) else "failed"
     cause = "interrupted by the user" if isinstance(error, KeyboardInterrupt) else str(error)
-    if not isinstance(error, RunError | StopRequestedError | KeyboardInterrupt):
+    if not isinstance(error, InputError | RunError | StopRequestedError | KeyboardInterrupt):
         # A bug in this program: the run directory must still state that the run has ended.
         log.error("unexpected error", exc_info=error)
         cause = f"unexpected {type(error).__name__}: {error}"

@@ -2,12 +2,10 @@
 
 import logging
 import shutil
-import signal
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from types import FrameType
 from typing import Any
 
 from dem.engine.interface import Engine, Saved
@@ -18,14 +16,11 @@ from dem.record.document import Phase
 from dem.record.names import CHECKPOINT
 from dem.record.rundir import Claim
 from dem.run.recorder import Recorder
+from dem.run.stop import StopRequest, StopRequestedError
 from dem.scene.reading import scene_hash
 from dem.scene.scene import Scene
 
 SMALLEST_CHECKPOINT = 2**20  # bytes; the container alone makes half of it
-
-
-class StopRequestedError(Exception):
-    """A run stopped at its next checkpoint after the signal SIGUSR1, e.g. of a batch system."""
 
 
 @dataclass
@@ -39,6 +34,7 @@ class Simulation:
     log: logging.Logger
     made_by: tuple[str, str]  #: Name and version of the engine
     time_steps: Sequence[float]  #: Time step of each phase [s]
+    stop: StopRequest = field(default_factory=StopRequest)
     checkpointed: float | None = None  #: Simulated time of the newest checkpoint [s]; None: no checkpoint yet
     _phase: int = 0
     _stage: Stage | None = None
@@ -48,7 +44,6 @@ class Simulation:
     _began: float = field(default_factory=time.monotonic)
     _cpu_spent: float = 0.0
     _cpu_began: float = field(default_factory=time.process_time)
-    _stop_requested: bool = False
 
     @property
     def folder(self) -> Path:
@@ -57,14 +52,13 @@ class Simulation:
 
     def run(self) -> tuple[Phase, ...]:
         """Run from the present state to the end of the last phase; return the phases with their times."""
-        before = signal.signal(signal.SIGUSR1, self._request_stop)
-        try:
+        with self.stop.listening():
+            if self.stop.came:
+                raise StopRequestedError(f"stopped as requested before it went on from t = {self.engine.time:.4f} s")
             if not self.engine.steps:
                 self.recorder.record(self.engine, 0)
             while self._phase < len(self.scene.phases):
                 self._run_phase()
-        finally:
-            signal.signal(signal.SIGUSR1, before)
         if self.checkpointed != self.engine.time:
             # At a checkpoint the state was checked; after it contacts are unknown until the next step.
             self.recorder.watch(self.engine)
@@ -147,7 +141,7 @@ class Simulation:
         )
         write_checkpoint(self.folder, checkpoint)
         self._note_checkpoint()
-        if self._stop_requested:
+        if self.stop.came:
             raise StopRequestedError(f"stopped as requested at the checkpoint of t = {self.engine.time:.4f} s")
 
     def _note_checkpoint(self) -> None:
@@ -192,6 +186,3 @@ class Simulation:
     def cpu(self) -> float:
         """Processor time spent on the run [s], including earlier processes and local processes of the engine."""
         return self._cpu_spent + time.process_time() - self._cpu_began + self.engine.cpu_elsewhere
-
-    def _request_stop(self, number: int, frame: FrameType | None) -> None:
-        self._stop_requested = True

@@ -19,7 +19,8 @@ from dem.plan.outlook import plan
 from dem.plan.steps import time_steps
 from dem.record.document import Done
 from dem.run.run import run_scene
-from dem.run.simulation import Simulation, StopRequestedError
+from dem.run.simulation import Simulation
+from dem.run.stop import StopRequest, StopRequestedError
 from dem.scene.reading import load_scene, parse_scene, scene_hash
 from dem.scene.scene import Scene
 
@@ -170,6 +171,27 @@ def test_a_run_asked_to_stop_does_so_at_its_next_checkpoint(
     failed = json.loads((tmp_path / "failed.json").read_text())
     assert failed["status"] == "interrupted"
     assert failed["checkpoint_s"] == failed["time_s"]
+
+
+def test_a_run_asked_to_stop_before_its_first_step_can_be_continued(
+    kind: KindDouble, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    scene, build = scene_of("rested"), kind.build
+
+    def signalled(scene: Scene, time_step: float) -> EngineDouble:
+        os.kill(os.getpid(), signal.SIGUSR1)
+        return build(scene, time_step)
+
+    before, stop = signal.getsignal(signal.SIGUSR1), StopRequest()
+    with monkeypatch.context() as patch, stop.listening():
+        patch.setattr(kind, "build", signalled)
+        with pytest.raises(StopRequestedError, match=r"stopped as requested before it went on from t = 0\.0000 s"):
+            run(scene, tmp_path / "run", stop=stop)
+    assert signal.getsignal(signal.SIGUSR1) is before
+    assert json.loads((tmp_path / "run/failed.json").read_text())["status"] == "interrupted"
+    run(scene, tmp_path / "run", resume=True)
+    run(scene, tmp_path / "straight")
+    assert series(tmp_path / "run") == series(tmp_path / "straight")
 
 
 def test_an_engine_that_stops_fails_the_run_and_keeps_what_was_recorded(
