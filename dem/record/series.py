@@ -145,20 +145,21 @@ def read_series(directory: Path | str) -> Series:
                 data = {name: frozen(np.atleast_1d(file[name][()])) for name in file}
                 texts = {key: {name: str(file[name].attrs[key]) for name in file} for key in ("unit", "description")}
                 cause = _wrong(attributes, data)
-        if not cause:
-            return Series(
-                path=path,
-                data=MappingProxyType(data),
-                units=MappingProxyType(texts["unit"]),
-                descriptions=MappingProxyType(texts["description"]),
-                scene_sha256=str(attributes["scene_sha256"]),
-                seed=int(attributes["seed"]),
-            )
+                seed = 0 if cause else int(attributes["seed"])
     # h5py fails with OSError, KeyError or RuntimeError, depending on where the damage lies.
     except Exception as error:
         checksum = "filter returned failure" in str(error)
         cause = "its content does not fit its checksums" if checksum else error
-    cannot_read("series", path, cause, _REMEDY)
+    if cause:
+        cannot_read("series", path, cause, _REMEDY)
+    return Series(
+        path=path,
+        data=MappingProxyType(data),
+        units=MappingProxyType(texts["unit"]),
+        descriptions=MappingProxyType(texts["description"]),
+        scene_sha256=str(attributes["scene_sha256"]),
+        seed=seed,
+    )
 
 
 def _foreign(file: h5py.File) -> str | None:
