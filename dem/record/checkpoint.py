@@ -111,6 +111,6 @@ def _read(path: Path) -> tuple[object, Checkpoint]:
             reject_inflated(columns.zip, len(content))
             series = {name: columns[name] for name in columns.files}
         engine = archive.read(_ENGINE)
-    scene, made_by = str(state.get("scene_sha256")), (state["made_by"]["engine"], state["made_by"]["version"])
+    scene, made_by = str(state.get("scene_sha256")), (str(state["made_by"]["engine"]), str(state["made_by"]["version"]))
     checkpoint = Checkpoint(scene_sha256=scene, made_by=made_by, state=state, series=series, engine=engine)
     return state.get("format"), checkpoint

@@ -9,7 +9,7 @@ from typing import Any, Literal, NoReturn
 
 import yaml
 
-from dem.errors import InputError
+from dem.errors import InputError, shown
 from dem.record.document import REMEDY, Done, Failed, Manifest, Phase, Progress
 from dem.record.files import cannot_read
 from dem.record.forces import RecordedForces, has_forces, read_forces
@@ -21,6 +21,8 @@ from dem.yaml_text import load_yaml, read_text
 
 State = Literal["done", "running", "queued", "failed", "interrupted", "stopped", "missing"]
 """`interrupted` closed its files when asked to stop; `stopped` was killed; `queued` waits for a job of a cluster."""
+
+_PARTS = ("smarticle", "container", "plane", "hooks", "contact", "motor", "fidelity", "recording")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -69,6 +71,12 @@ class Run:
             cannot_read("scene", path, error, REMEDY)
         if not isinstance(content, dict):
             cannot_read("scene", path, "it must be a mapping", REMEDY)
+        # A file that was cut may have half a word where a part was.
+        phases = content.get("phases") or []
+        parts = [content.get(key) or {} for key in _PARTS] + (phases if isinstance(phases, list) else [phases])
+        for part in parts:
+            if not isinstance(part, dict):
+                cannot_read("scene", path, f"{shown(part)} stands where a mapping must be", REMEDY)
         return SceneData(path, "", content)
 
     @cached_property

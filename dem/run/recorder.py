@@ -3,6 +3,7 @@
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from operator import index
 from typing import Any
 
 from numpy.typing import NDArray
@@ -110,7 +111,7 @@ class Recorder:
 
     def restore(self, memory: Mapping[str, Any], columns: Mapping[str, NDArray[Any]]) -> None:
         """Restore the state that `memory` returned: remove later frames, and write the series `columns`."""
-        self.samples, self.next_step = memory["samples"], memory["next_step"]
+        self.samples, self.next_step = index(memory["samples"]), index(memory["next_step"])
         self.truncate(memory)
         self.sampler.memory = dict(memory["series"])
         self.check_files()

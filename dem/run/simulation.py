@@ -5,6 +5,7 @@ import shutil
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from operator import index
 from pathlib import Path
 from typing import Any
 
@@ -169,7 +170,7 @@ class Simulation:
         self.engine.load(Saved(content=checkpoint.engine, memory=state["engine"]), self.folder)
         self._note_checkpoint()
         self.recorder.restore(state["recorder"], checkpoint.series)
-        self._phase, self._target = state["phase"], state["target"]
+        self._phase, self._target = index(state["phase"]), index(state["target"])
         self.engine.set_time_step(self.time_steps[self._phase])
         self._stage = self.scene.phases[self._phase].begin(self.scene, self._phase)
         self._stage.memory = dict(state["stage"])
