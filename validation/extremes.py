@@ -114,7 +114,9 @@ def draw_scene(number: int, engine: str = "links") -> dict[str, Any]:
 
 # -- the checker -------------------------------------------------------------------------------------------------------
 
-DEPTH = 0.1  # largest penetration of floor or wall, over the thickness of a link
+DEPTH = {"draft": 0.3, "standard": 0.22, "reference": 0.15}
+"""Largest penetration of floor or wall by fidelity, over the thickness of a link: what each name promises."""
+SOFTEST = 0.65  # of scenes that give a stiffness of their own: half of the mean width of a square section, 4/π thick
 ENERGY = 0.01  # largest excess of energy, over the supplied energy
 INSIDE = 1e-3  # least distance of a crossing from the ends of a segment, over the length of the segment
 
@@ -223,9 +225,12 @@ def check_run(path: Path, scene: Mapping[str, Any]) -> dict[str, Any]:
             crossed.update(pairs)
             first = first if first is not None or not pairs else frame.time
         last = vertices
-    if floor_depth > DEPTH:
+    fidelity = scene["fidelity"]
+    own = isinstance(fidelity, dict) and "stiffness_N_per_m" in fidelity
+    most = SOFTEST if own else DEPTH[fidelity["base"] if isinstance(fidelity, dict) else fidelity]
+    if floor_depth > most:
         wrong.append(f"{floor_depth:.2f} thicknesses below the floor")
-    if wall_depth > DEPTH:
+    if wall_depth > most:
         wrong.append(f"{wall_depth:.2f} thicknesses outside the wall")
     if crossed:
         wrong.append(f"{len(crossed)} pairs of axes crossed, first before {first:.4f} s")

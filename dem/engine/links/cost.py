@@ -4,9 +4,8 @@ Contacts are computed in every step, which costs time per step. Neighbours are s
 far enough, which costs time per simulated second, and more for more pairs of strands. The cost of a smarticle does not
 depend on depth and width of the pile. It is higher in large piles, which do not fit into a processor's cache.
 
-Source: results/bench/cost.md: the phases of the paper's studies at N = 168 … 494, l/w 0.4 … 1.1, time steps from 50 to
-125 us, and, for the level, N = 270 on an idle 2-core AMD EPYC virtual machine; results/scaling: N up to 10 000;
-results/accuracy-links: strands and stiffness.
+Source: results/accuracy-links/cost.csv: one to three strands, 500 to 4000 N/m, N = 270, on one core of an idle 2-core
+AMD EPYC virtual machine; results/scaling: N up to 10 000.
 """
 
 from __future__ import annotations
@@ -25,10 +24,10 @@ class Rates(NamedTuple):
 
 
 RATES: Mapping[Activity, Rates] = {
-    Activity.POUR: Rates(1.7e-7, 0.1e-3),
-    Activity.REST: Rates(3.6e-7, 0.0),
-    Activity.SHAKE: Rates(2.4e-7, 0.7e-3),
-    Activity.ACTUATE: Rates(3.8e-7, 0.8e-3),
+    Activity.POUR: Rates(1.35e-7, 1.3e-3),
+    Activity.REST: Rates(4.0e-7, 0.0),
+    Activity.SHAKE: Rates(1.5e-7, 2.6e-3),
+    Activity.ACTUATE: Rates(3.8e-7, 3.0e-3),
 }
 LOOK = 2.4e-7  # s per control update of a smarticle
 RIM = 1.1e-7  # s per edge of a wall of tiers, smarticle and step
@@ -38,14 +37,23 @@ SAMPLE, FRAME = (1e-4, 1e-6), (1.5e-3, 1.5e-5)
 # With MANY smarticles the cost of each is higher by LONGER than with few, since they do not fit into a processor's
 # cache; this addition grows with the power GROWTH of their number.
 MANY, LONGER, GROWTH = 5000, 0.3, 0.8
-# Contacts of two strands are fewer than twice those of one; pairs to look at are nearly four times as many.
-MORE_CONTACTS, MORE_PAIRS = 1.4, 1.75
+# Contacts of two strands are hardly more than those of one, since most links cross; the search finds links before it
+# tries their strands.
+MORE_CONTACTS, MORE_PAIRS = 0.3, 1.2
+
+# Processor time to compile [s]: all kernels of the first kind of phase in a process, and those of one more kind.
+# `doctor --compile` with an empty cache on the machine above while other work used both cores: 11 to 16, and 4 to 9.
+COMPILE_FIRST, COMPILE_MORE = 13.0, 7.0
 
 
 def seconds_per_second(scene: Demand, time_step: float, activity: Activity) -> float:
     """Return the estimate of `dem.engine.kinds.EngineKind.seconds_per_second`."""
     count, strands, recording = scene.count, scene.fidelity.rows, scene.recording
-    rates, links = RATES[activity], 1.0 if scene.smarticle.boxes.barb_length > 0 else 1 / 3
+    rates = RATES[activity]
+    if scene.mixture is None:
+        links = 1.0 if scene.smarticle.boxes.barb_length > 0 else 1 / 3
+    else:  # bars of a body, over a smarticle's three
+        links = scene.mixture.mean([len(kind.bars.points) / 3 for kind in scene.mixture.kinds])
     per_step = rates.step * (1 + MORE_CONTACTS * (1 - 1 / strands)) + RIM * strands * len(scene.cylinder.upper)
     each = links * (per_step / time_step + rates.second * strands**MORE_PAIRS)
     if activity is Activity.ACTUATE:
