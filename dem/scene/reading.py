@@ -15,6 +15,7 @@ from dem.errors import InputError, shown
 from dem.record.names import SCENE
 from dem.scene.scene import Scene
 from dem.scene.yaml_text import load_yaml, parse_yaml
+from dem.setting.contact import PRESET
 from dem.setting.fidelity import FIDELITIES
 from dem.strict import explained
 
@@ -205,6 +206,11 @@ def json_schema() -> dict[str, Any]:
     mapping = {"$ref": fidelity.pop("$ref")}
     fidelity["anyOf"] = [{"type": "string", "enum": list(FIDELITIES)}, mapping]
     schema["$defs"]["Fidelity"].pop("required")
+    schema["$defs"]["Contact"]["properties"][PRESET] = {
+        "type": "string",
+        "description": "file of contact parameters, relative to the scene file, such as `smarticles calibrate` writes; "
+        "keys beside it have priority; a resolved scene has the values instead",
+    }
     # Their defaults follow from the smarticle.
     schema["$defs"]["Hooks"].pop("required")
     schema["$defs"]["PullHook"]["required"] = ["type"]
