@@ -29,7 +29,7 @@ CANDIDATES = 13  #: Power of 2 of the number of points at which a region is exam
 WALKERS_PER_DIMENSION, CHUNK, MOST_STEPS = 8, 500, 8000
 ENOUGH_TIMES = 50  #: Steps over the autocorrelation time from which emcee's estimate of the latter is reliable
 DRAWS = 4000  #: Draws of the posterior that are kept, about
-NOT_IDENTIFIED = 0.75  #: Width of the posterior over that of the prior from which a parameter is not identified [-]
+NOT_IDENTIFIED, WEAKLY = 0.75, 0.5  #: Widths of the posterior over that of the prior above which verdicts hold [-]
 EDGE, EDGE_SHARE = 0.05, 0.15  #: Outer fraction of a prior's range, and share of the posterior in it, that is an edge
 _BANDS = (2.5, 50.0, 97.5)
 
@@ -84,7 +84,8 @@ class Result:
                 near = EDGE * (upper[k] - lower[k])
                 ends = {"lower": self.draws[:, k] < lower[k] + near, "upper": self.draws[:, k] > upper[k] - near}
                 edges = [end for end, there in ends.items() if there.mean() > EDGE_SHARE]
-                verdict = f"at the {edges[0]} end of its prior; widen it" if edges else "identified"
+                verdict = "weakly identified" if width > WEAKLY else "identified"
+                verdict = f"at the {edges[0]} end of its prior; widen it" if edges else verdict
                 verdict = "not identified" if width > NOT_IDENTIFIED else verdict
             row = {"parameter": name, "median": median[k], "low 95 %": low[k], "high 95 %": high[k]}
             rows.append({**row, "best": self.best[k], "width": width, "verdict": verdict})

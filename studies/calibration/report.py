@@ -16,7 +16,7 @@ from dem.setting.contact import Contact
 from postprocess.report import figures as style
 from postprocess.report.tables import table_lines, whole_file, write_table
 from studies.calibration.emulator import Array
-from studies.calibration.inference import CUTOFF, ENOUGH_TIMES, NOT_IDENTIFIED, Result
+from studies.calibration.inference import CUTOFF, ENOUGH_TIMES, NOT_IDENTIFIED, WEAKLY, Result
 from studies.calibration.problem import Problem
 from studies.framework.figures import panels
 from studies.framework.provenance import make_folder
@@ -70,12 +70,12 @@ def _statements(result: Result, posterior: pd.DataFrame, fit: pd.DataFrame) -> l
     time, steps = found["autocorrelation time"], found["steps over autocorrelation time"]
     return [
         *lines,
-        "Assumed: the model's discrepancy is normal and independent from datum to datum. Its standard deviation over the "
-        f"mean size of the measure has a half-normal prior of scale {content.discrepancy:g}. Emulators' errors are "
+        "Assumed: the model's discrepancy is normal and independent from datum to datum. Its standard deviation over "
+        f"the mean size of the measure has a half-normal prior of scale {content.discrepancy:g}. Emulators' errors are "
         f"independent. Points with an implausibility above {CUTOFF:g} are ruled out between waves.",
         f"Sampled by emcee: autocorrelation time {time:.0f} steps, {steps:.0f} of them ({ENOUGH_TIMES} are enough), "
-        f"acceptance {found['acceptance']:.2f}, {found['effective draws']:.0f} effective draws. A parameter is not "
-        f"identified if its 95 % interval is wider than {NOT_IDENTIFIED:g} times that of the prior.",
+        f"acceptance {found['acceptance']:.2f}, {found['effective draws']:.0f} effective draws. A parameter whose 95 % "
+        f"interval is wider than {WEAKLY:g} times that of its prior is weakly identified, from {NOT_IDENTIFIED:g} not.",
     ]
 
 
@@ -191,7 +191,6 @@ def _draw_fit(result: Result, fit: pd.DataFrame, path: Path) -> None:
             panel.errorbar(x[kept], part["value"][kept], yerr=1.96 * part["error"][kept], fmt="o", color=style.BLACK,
                            markerfacecolor=colour)  # fmt: skip
         panel.set(xlabel=first if numeric else "condition", ylabel=measure)
-    notes = ["Band: 95 % of what a measurement would give; line: its median. Points: data, ± 1.96 times their error;"
-             " open: predicted only."]  # fmt: skip
-    style.add_footer(figure, notes)
+    band = "Band: 95 % of what a measurement would give, error included; line: its median; open points: predicted only."
+    style.add_footer(figure, [band, "Error bars: 95 % confidence of the data, 1.96 times their error."])
     style.save(figure, path, formats=("png", "svg"))
