@@ -79,11 +79,16 @@ def add(commands: Commands) -> None:
 
 def run_calibrate(arguments: argparse.Namespace) -> int:
     """Compute the missing runs of a calibration, and analyse it when all are done; return the exit status."""
+    import numpy as np  # noqa: PLC0415
+
     from studies.calibration.inference import calibrate, require_extra  # noqa: PLC0415
     from studies.calibration.problem import load_problem  # noqa: PLC0415
     from studies.calibration.simulators import TableSimulator, read_runs  # noqa: PLC0415
 
     problem = load_problem(arguments.calibration)
+    if arguments.table is None:
+        # Scenes at both ends of all priors are checked before runs are spent on the values between them.
+        problem.sweep(1, np.stack(problem.bounds))
     for_cluster = sweeps.is_for_cluster(arguments)
     if arguments.dry_run:
         print(_listing(problem))

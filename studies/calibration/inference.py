@@ -175,6 +175,10 @@ def calibrate(problem: Problem, simulator: Simulator, say: Callable[[str], None]
     for datum, emulator in zip(problem.data, emulators, strict=True):
         if emulator is not None and np.mean(np.abs(emulator.loo) < 2) < 0.8:  # 95 % are expected
             warnings.append(f"the emulator of {datum.label(problem.conditions)} predicts left-out runs badly")
+        elif emulator is not None and emulator.explained < 0:
+            warnings.append(
+                f"no effect of any parameter on {datum.label(problem.conditions)} is seen beyond the scatter"
+            )
     return Result(
         problem=problem,
         runs=pd.concat(tables, ignore_index=True),
