@@ -24,7 +24,7 @@ from dem.record.frames import read_frames
 from dem.record.run import open_run
 from postprocess.bodies.colours import ColourScale, colour_field, scalars, span
 from postprocess.bodies.fields import IDENTITY, fields_of, link_values
-from postprocess.bodies.meshes import BOX_FACES, USUAL, Bodies
+from postprocess.bodies.meshes import USUAL, Bodies
 from postprocess.geometry.links import Floats
 from postprocess.pictures.canvas import VIEWS, add_bodies, axes_from, visible_meshes
 
@@ -149,10 +149,11 @@ class RunView:
         self.pick = None
         if "smarticles" in self._meshes:
             mesh = self._meshes["smarticles"]
-            _, faces = mesh.triangulate().ray_trace(ray[0], ray[1], first_point=True)
+            triangles = mesh.triangulate()
+            _, faces = triangles.ray_trace(ray[0], ray[1], first_point=True)
             if np.size(faces):
-                face = int(np.atleast_1d(faces)[0]) // (2 * BOX_FACES) * BOX_FACES
-                self.pick = Pick(*(int(mesh.cell_data[name][face]) for name in IDENTITY))
+                face = int(np.atleast_1d(faces)[0])
+                self.pick = Pick(*(int(triangles.cell_data[name][face]) for name in IDENTITY))
 
     def describe(self) -> list[dict[str, str]]:
         """Return name, unit, value and meaning of all fields of the selected link, as text."""

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from dem.errors import InputError, nearest
-from dem.record.names import FRAME, OF_SWEEP, collection
+from dem.record.names import FRAME, OF_SWEEP, VTKHDF, collection
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -26,7 +26,7 @@ PHASE = ("phase", "phase type")  #: Columns that identify a phase within a run
 
 def has_frames(directory: Path) -> bool:
     """Return whether a run directory contains frames."""
-    return (directory / collection(FRAME)).is_file()
+    return any((directory / name).is_file() for name in (collection(FRAME), VTKHDF))
 
 
 def sources(directories: Sequence[Path]) -> dict[Path, Mapping[str, Any]]:
@@ -70,13 +70,19 @@ def follows(name: str, other: str, points: Iterable[Mapping[str, object]]) -> bo
 
 
 def measured(
-    directories: Sequence[Path], *, frames: bool = False, costly: Costly = "phase-end", jobs: int = 1
+    directories: Sequence[Path],
+    *,
+    frames: bool = False,
+    costly: Costly = "phase-end",
+    also: Sequence[str] = (),
+    jobs: int = 1,
 ) -> pd.DataFrame:
     """Measure runs and sweeps.
 
     Args:
         frames: return one row per frame instead of one row per run and phase.
         costly: when to compute the costly packing fractions, see `postprocess.measure_run`.
+        also: names of measures that tables have on request alone, such as "crossing-number".
         jobs: number of processes. More than 1 needs `if __name__ == "__main__":` in the calling script, since the
             processes import it.
 
@@ -90,7 +96,7 @@ def measured(
     import pandas as pd  # noqa: PLC0415
 
     found = sources(directories)
-    take = partial(_table, frames=frames, costly=costly)
+    take = partial(_table, frames=frames, costly=costly, also=also)
     if jobs == 1 or len(found) < _MIN_RUNS_FOR_PROCESSES:
         tables = list(map(take, found, found.values()))
     else:
@@ -100,12 +106,14 @@ def measured(
     return pd.concat(tables, ignore_index=True)
 
 
-def _table(directory: Path, values: Mapping[str, Any], *, frames: bool, costly: Costly) -> pd.DataFrame:
+def _table(
+    directory: Path, values: Mapping[str, Any], *, frames: bool, costly: Costly, also: Sequence[str]
+) -> pd.DataFrame:
     """Return the measures of one run, with the variables of its sweep after the first column."""
     from dem.record.run import Run  # noqa: PLC0415
     from postprocess.measures.table import measure_run, summarise_run  # noqa: PLC0415
 
-    table = (measure_run if frames else summarise_run)(Run(directory), costly=costly)
+    table = (measure_run if frames else summarise_run)(Run(directory), costly=costly, also=also)
     for place, (name, value) in enumerate(values.items(), start=1):
         column = name
         if name in table.columns and (table[name] == value).all():

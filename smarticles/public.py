@@ -112,21 +112,22 @@ def read(directory: Path | str) -> Run:
     return open_run(directory)
 
 
-def measure(run: Run | Path | str, *, frames: bool = False) -> pd.DataFrame:
+def measure(run: Run | Path | str, *, frames: bool = False, also: Sequence[str] = ()) -> pd.DataFrame:
     """Return the measures of a run as a table, as `smarticles measure` does.
 
     Args:
         run: run, or its directory.
         frames: return one row per frame.
+        also: names of measures that tables have on request alone, such as "crossing-number".
 
     Returns:
         One row per phase, with means over its last frames and their standard errors, or one row per frame. Column
         names contain the units.
 
     Raises:
-        InputError: the directory is not a run directory, or the run has no frames yet.
+        InputError: the directory is not a run directory, the run has no frames yet, or a name is unknown.
     """
-    return measured([run.path if isinstance(run, Run) else Path(run)], frames=frames)
+    return measured([run.path if isinstance(run, Run) else Path(run)], frames=frames, also=also)
 
 
 def read_sweep(directory: Path | str) -> SweepDirectory:

@@ -17,6 +17,7 @@ from types import MappingProxyType
 import numpy as np
 import pandas as pd
 import yaml
+from matplotlib.ticker import LogLocator, NullLocator
 
 from dem.errors import InputError, nearest
 from dem.record.run import Run
@@ -29,7 +30,7 @@ from postprocess.measures.table import LAST_FRAMES, summarise_run
 from postprocess.report.figures import BLUE, GREY, ORANGE
 from postprocess.statistics.points import ASPECT, SEED, SEEDS, format_with_error, marked, seeds_of
 from postprocess.statistics.seeds import Scatter, mean_over_seeds, pooled_scatter, relative_difference
-from studies.framework.figures import POOLED, Analysis, Means, finish, one_by_one, panels
+from studies.framework.figures import POOLED, Analysis, Means, finish, marker, one_by_one, panels
 from studies.framework.findings import Finding, Outcome, Verdict, decide
 from studies.framework.provenance import Reference
 from studies.framework.runs import DEFINITION, ENGINE, Key, Quantity, Row, duration, last_columns
@@ -543,7 +544,7 @@ def advise(table: pd.DataFrame, knob: str) -> Outcome:
 
 
 def worst_errors(table: pd.DataFrame) -> pd.DataFrame:
-    """Return the named fidelities with their largest error over all compared quantities but hook forces.
+    """Return the largest error of each named fidelity: of packing, heights and ⟨N⟩, and in a row of its own of energy.
 
     The largest error is that with the largest bound: its absolute value plus its 95 % band. Columns: `engine`,
     `fidelity`, `COST`, `quantity` (its symbol), `error [%]` (absolute value), `bound [%]`, and the number of seeds.
@@ -551,14 +552,16 @@ def worst_errors(table: pd.DataFrame) -> pd.DataFrame:
     knob = "engine" if (table[KNOB] == "engine").any() else "fidelity"
     rows = []
     for _, row in table[(table[KNOB] == knob) & (table[SEEDS] > 1) & (table[VERDICT] != IS_REFERENCE)].iterrows():
-        errors = {
-            SYMBOLS[name]: (abs(row[f"{name} error [%]"]), row[f"{name} error 95 % [%]"])
-            for name in COMPARED
-            if name != "hook_force" and math.isfinite(row[f"{name} error [%]"])
-        }
-        symbol, (error, band) = max(errors.items(), key=lambda item: sum(item[1]))
         labels = {ENGINE: row[ENGINE], "fidelity": row[VALUE].split()[-1], COST: row[COST], SEEDS: row[SEEDS]}
-        rows.append({**labels, "quantity": symbol, "error [%]": error, "bound [%]": error + band})
+        for names in (("phi_0", "phi_f", "height", "crossings"), ("energy",)):
+            errors = {
+                SYMBOLS[name]: (abs(row[f"{name} error [%]"]), row[f"{name} error 95 % [%]"])
+                for name in names
+                if math.isfinite(row[f"{name} error [%]"])
+            }
+            if errors:
+                symbol, (error, band) = max(errors.items(), key=lambda item: sum(item[1]))
+                rows.append({**labels, "quantity": symbol, "error [%]": error, "bound [%]": error + band})
     return pd.DataFrame(rows)
 
 
@@ -577,21 +580,31 @@ class Promises:
         """Draw tables of work and precision by the name of their scene; return the files."""
         figure, axes = panels(len(tables), columns=3, height=3.0, sharey=True)
         for panel, (title, table) in zip(axes, tables.items(), strict=True):
-            panel.set(title=title, xscale="log", xlabel="processor time per simulated time [s/s]")
-            for promise in PROMISES.values():
+            for name, promise in PROMISES.items():
                 panel.axhline(promise, color=GREY, linewidth=0.6, linestyle=":")
+                panel.annotate(f"{name}: {promise:g} %", (0.01, promise), (0, 1), xycoords=("axes fraction", "data"),
+                               textcoords="offset points", color=GREY, fontsize=5.5)  # fmt: skip
             for _, row in worst_errors(table).iterrows():
                 colour = {"links": BLUE, "yade": ORANGE}[row[ENGINE]]
                 bar = [[0.0], [row["bound [%]"] - row["error [%]"]]]
-                panel.errorbar(row[COST], row["error [%]"], yerr=bar, color=colour, marker="o", label=row[ENGINE])
-                text = f"{row['fidelity']}\n{row['quantity']}"
+                of_energy = row["quantity"] == SYMBOLS["energy"]
+                panel.errorbar(row[COST], row["error [%]"], yerr=bar, label=row[ENGINE],
+                               **marker("o", colour, "white" if of_energy else colour))  # fmt: skip
+                text = row["quantity"] if of_energy else f"{row['fidelity']}: {row['quantity']}"
                 panel.annotate(text, (row[COST], row["bound [%]"]), (0, 3), textcoords="offset points", ha="center",
                                color=colour)  # fmt: skip
-            panel.margins(x=0.25, y=0.12)
+            low, high = table[COST].min() / 2, table[COST].max() * 1.5
+            panel.set(title=title, xscale="log", xlim=(low, high), xlabel="processor time per simulated time [s/s]")
+            panel.xaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
+            panel.xaxis.set_major_formatter("{x:g}")
+            panel.xaxis.set_minor_locator(NullLocator())
+            panel.margins(y=0.15)
             panel.set_ylim(bottom=0)
-        axes[0].set_ylabel("largest error of φ, height, ⟨N⟩, energy [%]")
-        limits = ", ".join(f"{name} {limit:g} %" for name, limit in PROMISES.items())
-        notes = [f"Point: error; end of the bar: what the seeds do not exclude (95 %). Dotted: promises, {limits}."]
+        axes[0].set_ylabel("error against the converged fidelity [%]")
+        notes = [
+            "Largest error of φ_0, φ_f, height and ⟨N⟩ (filled), and error of the energy put in (open, E). "
+            "End of the bar: what the seeds do not exclude (95 %)."
+        ]
         return finish(figure, path, notes, footer)
 
 

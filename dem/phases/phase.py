@@ -51,6 +51,7 @@ class Phase:
 
     actuates: ClassVar[bool] = False  #: Whether motors move or hold the barbs
     begins: ClassVar[bool] = False  #: Whether the phase adds the smarticles; a run begins with one such phase
+    of_smarticles: ClassVar[bool] = False  #: Whether the phase has no meaning for other bodies than smarticles
     sources: ClassVar[frozenset[str]] = frozenset()
     """Keys that say where content is found that another key fixes by its hash; the scene's hash omits them."""
     at_rest: ClassVar[bool] = False
@@ -147,6 +148,8 @@ class SceneView(Demand, Protocol):
     def container(self) -> Container: ...
     @property
     def plane(self) -> Plane | None: ...
+    @property
+    def protocol(self) -> str | None: ...
     @property
     def phases(self) -> Sequence[Phase]: ...
     @property

@@ -57,7 +57,7 @@ class RemoveContainer(Part, Phase):
                 memory["lifting"] = True
         left = time_left(engine, memory["end"])
         if memory["lifting"]:
-            top = engine.state().vertices[..., 2].max() + engine.particle.radius
+            top = engine.state().tops.max() + engine.particle.radius
             if engine.boundaries.wall_bottom > top:
                 engine.boundaries.remove_wall()
                 memory["lifting"] = False

@@ -91,13 +91,22 @@ class AccuracyTable:
     activity: str  #: Types of the scene's phases that are not at rest, separated by spaces
 
 
-def read_table(path: Path | None, *, of: Sequence[str] = PACKING, engine: str | None = None) -> AccuracyTable:
+def activity_of(scene: Scene) -> str:
+    """Return the types of the phases in which something drives the pile, separated by spaces."""
+    return " ".join(dict.fromkeys(phase.type for phase in scene.phases if not phase.at_rest))
+
+
+def read_table(
+    path: Path | None, *, of: Sequence[str] = PACKING, engine: str | None = None, activity: str = ""
+) -> AccuracyTable:
     """Read a table of `smarticles accuracy`.
 
     Args:
         path: the table; None: `SHIPPED`.
         of: keys of `QUANTITIES`; the errors of these quantities decide a choice.
         engine: the only engine that may be chosen; None: any.
+        activity: of the scene at hand, see `activity_of`. Of a table with several activities the rows of this one are
+            read, or of the first one if it has no such rows.
 
     Raises:
         InputError: the file is missing, is no table of work and precision, or has no named fidelities.
@@ -116,6 +125,9 @@ def read_table(path: Path | None, *, of: Sequence[str] = PACKING, engine: str | 
             msg = f"--table {file}: has no column {column!r}, so it is no table of work and precision; {_HOW}"
             raise InputError(msg)
     rows = list(reader)
+    measured = dict.fromkeys(row[_ACTIVITY] for row in rows if row[_ACTIVITY])
+    there_is = activity if activity in measured else next(iter(measured), "")
+    rows = [row for row in rows if row[_ACTIVITY] in ("", there_is)]
     named = _named_fidelities(rows)
     try:
         every = [_measured(*key, row, of) for key, row in named.items() if int(row[_SEEDS]) > 0]
@@ -315,9 +327,10 @@ def _notes(scene: Scene, table: AccuracyTable, measured: Measured, max_error: fl
             )
     if not table.reference.endswith(_FINEST):
         notes.append(f"errors are against {table.reference}: the table has no finished runs of {_FINEST[0]}")
-    activity = " ".join(dict.fromkeys(phase.type for phase in scene.phases if not phase.at_rest))
+    activity = activity_of(scene)
+    own_ratio = f"{scene.smarticle.aspect_ratio:g}" if scene.mixture is None else "that of no smarticle (key particle)"
     here = {
-        "l/w": (f"{scene.smarticle.aspect_ratio:g}", f"{table.aspect_ratio:g}"),
+        "l/w": (own_ratio, f"{table.aspect_ratio:g}"),
         "N": (str(scene.count), str(table.count)),
         "activity": (activity, table.activity),
     }

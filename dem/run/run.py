@@ -14,16 +14,18 @@ import h5py
 import meshio
 import numpy as np
 
+from dem.body.kinds import Mixture
 from dem.engine.kinds import engine_kind
 from dem.errors import InputError, RunError
 from dem.plan.outlook import warnings_of
 from dem.record.checkpoint import Checkpoint, has_checkpoint, read_checkpoint
-from dem.record.document import Done, Ended, Failed, Manifest, Phase
+from dem.record.document import Done, Ended, Failed, Kind, Manifest, Phase
 from dem.record.files import write_text
-from dem.record.names import DONE, FAILED, MANIFEST, SCENE
+from dem.record.names import DONE, FAILED, MANIFEST, SCENE, VTKHDF
 from dem.record.progress import ProgressWriter
 from dem.record.run import Run
 from dem.record.rundir import claimed, log_of
+from dem.record.vtkhdf import check_times
 from dem.run.build import Builders
 from dem.run.simulation import Simulation, StopRequestedError
 from dem.scene.reading import difference, dump_scene, load_scene, scene_hash
@@ -63,7 +65,7 @@ def run_scene(
                 _check_ready(scene)
             else:
                 # Read before anything is changed, since it may be rejected for its version.
-                saved = read_checkpoint(out, scene_sha256=scene_hash(scene), made_by=made_by)
+                saved = _saved(scene, out, made_by)
         else:
             made = manifest(scene, out, steps=steps, command=command, made_by=made_by, threads=threads)
             made.write(out / MANIFEST, make_folder=True)
@@ -126,6 +128,13 @@ def _check_scene(scene: Scene, out: Path) -> None:
     )
 
 
+def _saved(scene: Scene, out: Path, made_by: tuple[str, str]) -> tuple[Checkpoint, str | None]:
+    checkpoint, warning = read_checkpoint(out, scene_sha256=scene_hash(scene), made_by=made_by)
+    if scene.recording.frames == "vtkhdf":
+        check_times(out / VTKHDF, checkpoint.state["recorder"]["frames"])
+    return checkpoint, warning
+
+
 def _restore(simulation: Simulation, saved: tuple[Checkpoint, str | None] | None, threads: int) -> None:
     out, log = simulation.folder, simulation.log
     if saved is None:
@@ -178,7 +187,8 @@ def manifest(
         steps: time step of each phase [s].
         made_by: name and version of the engine.
     """
-    particle, boxes, origin = scene.particle, scene.smarticle.boxes, scene.phases[0].origin
+    model, origin = scene.model, scene.phases[0].origin
+    boxes = None if isinstance(model, Mixture) else model.boxes
     if origin is not None:  # a relative path stays right if both runs are moved together
         origin = {**origin, "run": os.path.relpath(origin["run"], out.resolve())}
     return Manifest(
@@ -192,19 +202,19 @@ def manifest(
         threads=threads,
         fidelity=scene.fidelity.base,
         count=scene.count,
-        aspect_ratio=scene.smarticle.aspect_ratio,
-        middle_length_m=boxes.middle_length,
-        barb_length_m=boxes.barb_length,
-        thickness_normal_m=boxes.thickness_normal,
-        thickness_in_plane_m=boxes.thickness_in_plane,
-        middle_thickness_in_plane_m=boxes.middle_thickness_in_plane,
-        smarticle_mass_kg=boxes.mass,
-        solid_volume_m3=boxes.volume,
+        aspect_ratio=0.0 if boxes is None else scene.smarticle.aspect_ratio,
+        middle_length_m=model.size,
+        barb_length_m=0.0 if boxes is None else boxes.barb_length,
+        thickness_normal_m=model.thicknesses[0],
+        thickness_in_plane_m=model.thicknesses[1],
+        middle_thickness_in_plane_m=None if boxes is None else boxes.middle_thickness_in_plane,
+        smarticle_mass_kg=model.mass,
+        solid_volume_m3=model.volume,
         container_radius_m=scene.container.radius_m,
         packing_radius_m=scene.container.packing_radius_m,
         container_tiers=1 + len(scene.cylinder.upper),
-        sphere_diameter_m=particle.chain.diameter,
-        spheres_per_smarticle=len(particle.centres),
+        sphere_diameter_m=model.diameter,
+        spheres_per_smarticle=max(len(body.centres) for body in scene.bodies),
         time_step_s=min(steps),
         phases=tuple(
             Phase(index=k, type=phase.kind, at_rest=phase.at_rest, time_step_s=dt)
@@ -212,7 +222,27 @@ def manifest(
         ),
         planar=scene.plane is not None,
         channel_width_m=None if scene.plane is None else scene.plane.width_m,
+        kinds=None if scene.mixture is None else _kinds(scene.mixture),
         taken_over=origin,
+    )
+
+
+def _kinds(mixture: Mixture) -> tuple[Kind, ...]:
+    numbers = np.bincount(mixture.of, minlength=len(mixture.kinds))
+    return tuple(
+        Kind(
+            shape=kind.name,
+            bodies=int(number),
+            bars=len(kind.bars.points),
+            mass_kg=kind.mass,
+            volume_m3=kind.volume,
+            length_m=float(kind.bars.lengths.sum()),
+            thickness_normal_m=kind.bars.thickness_normal,
+            thickness_in_plane_m=kind.bars.thickness_in_plane,
+            round=kind.bars.round,
+            sphere_diameter_m=kind.diameter,
+        )
+        for kind, number in zip(mixture.kinds, numbers, strict=True)
     )
 
 

@@ -127,11 +127,15 @@ def _plain(scene: Scene) -> dict[str, Any]:
     keys of `ADDED_KEYS`, since a protocol may have filled them in.
     """
     data = scene.model_dump(mode="json")
+    smarticle = data["smarticle"]
     optional: list[tuple[dict[str, Any], Mapping[str, Any]]] = [
-        (data, {"engine": DEFAULT_ENGINE}),
-        (data["recording"], {"contact_forces": False}),
-        (data["smarticle"], {"middle_thickness_in_plane_m": None}),
+        (data, {"engine": DEFAULT_ENGINE, "particle": None}),
+        (data["recording"], {"contact_forces": False, "frames": "vtu"}),
+        (smarticle, {"middle_thickness_in_plane_m": None}),
     ]
+    if scene.shapes is not None:
+        del data["smarticle"]
+        optional = [entry for entry in optional if entry[0] is not smarticle]
     if scene.hooks is not None:
         optional.append((data["hooks"], {"lower_length_m": scene.hooks.length_m, "lower_bars": 1}))
     if scene.protocol is None:
@@ -211,6 +215,10 @@ def json_schema() -> dict[str, Any]:
         "description": "file of contact parameters, relative to the scene file, such as `smarticles calibrate` writes; "
         "keys beside it have priority; a resolved scene has the values instead",
     }
+    # A file may give one shape without a list, or the default by its name.
+    particle = schema["properties"]["particle"]
+    shapes = particle["anyOf"][0]
+    particle["anyOf"] = [shapes["items"], shapes, {"type": "string", "enum": ["smarticle"]}, {"type": "null"}]
     # Their defaults follow from the smarticle.
     schema["$defs"]["Hooks"].pop("required")
     schema["$defs"]["PullHook"]["required"] = ["type"]

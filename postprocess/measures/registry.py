@@ -6,11 +6,12 @@ needs its module, a test, and a line in README.
 """
 
 import pkgutil
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass
 from functools import cache
 from importlib import import_module
 
+from dem.errors import InputError, nearest
 from dem.record.frame import Frame
 from dem.record.run import Run
 from dem.record.series import Series
@@ -58,6 +59,7 @@ class FrameMeasure:
     #: Whether it takes tens of milliseconds per frame or more; tables then have its values for the last frame of each
     #: phase alone, unless the user asks for every frame
     costly: bool = False
+    on_request: bool = False  #: Whether tables leave it out unless it is named
 
     def columns(self, frame: Frame | None, run: Run) -> dict[str, float]:
         """Return the values of a frame by column; all are NaN if the frame is None."""
@@ -83,9 +85,14 @@ class PhaseMeasure:
         return dict(zip((quantity.header for quantity in self.quantities), values, strict=True))
 
 
-def in_space(run: Run) -> bool:
-    """Return whether the smarticles of a run move in three dimensions, not in a plane."""
+def any_in_space(run: Run) -> bool:
+    """Return whether the bodies of a run, of any shape, move in three dimensions, not in a plane."""
     return not run.manifest.planar
+
+
+def in_space(run: Run) -> bool:
+    """Return whether the bodies of a run are smarticles and move in three dimensions, not in a plane."""
+    return any_in_space(run) and run.manifest.kinds is None
 
 
 def in_one_cylinder(run: Run) -> bool:
@@ -121,12 +128,23 @@ def shown_quantities() -> tuple[tuple[Quantity, Shown], ...]:
     return tuple(sorted(found, key=lambda pair: pair[1].place))
 
 
-def frame_measures(definitions: Sequence[str]) -> tuple[FrameMeasure, ...]:
+def frame_measures(definitions: Sequence[str], also: Collection[str] = ()) -> tuple[FrameMeasure, ...]:
     """Return the measures of frames in the order of their columns.
 
     Measures with a definition come last, in the order of `definitions`; measures with other definitions are left out.
+    So are measures `on_request`, unless their names are among `also`.
+
+    Raises:
+        InputError: There is no measure on request of a name.
     """
-    known = sorted((m for m in registered() if isinstance(m, FrameMeasure)), key=lambda measure: measure.place)
+    asked = {m.name: m for m in registered() if isinstance(m, FrameMeasure) and m.on_request}
+    for name in also:
+        if name not in asked:
+            raise InputError(f"also: {name!r} is no measure on request; {nearest(name, asked)}")
+    known = sorted(
+        (m for m in registered() if isinstance(m, FrameMeasure) and not (m.on_request and m.name not in also)),
+        key=lambda measure: measure.place,
+    )
     defined = {measure.definition: measure for measure in known}
     return (
         *(measure for measure in known if measure.definition is None),

@@ -196,12 +196,12 @@ def _listing(problem: Problem) -> str:
     from studies.calibration.inference import first_points  # noqa: PLC0415
 
     size, rows, total = problem.points_per_wave, [], 0.0
-    theta = first_points(problem, size)
+    theta = first_points(problem, size)[:1]
     for wave in range(1, problem.content.waves + 1):
-        # Points of later waves are not known yet; those of the first one cost about as much.
+        # Points of later waves are not known yet; all cost about as much as the first one.
         _, points = problem.sweep(wave, theta)
-        hours = sum(sweeps.expected_wall_s(point.scene) for point in points) / 3600
-        rows.append([wave, size, len(problem.conditions_of(wave)), problem.content.seeds, len(points), hours])
+        hours = size * sum(sweeps.expected_wall_s(point.scene) for point in points) / 3600
+        rows.append([wave, size, len(problem.conditions_of(wave)), problem.content.seeds, size * len(points), hours])
         total += hours
     header = ["wave", "points", "conditions", "seeds", "runs", "expected h"]
     runs = sum(row[4] for row in rows)

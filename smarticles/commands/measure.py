@@ -41,7 +41,8 @@ row per phase: means over the last frames of the phase, with standard errors (SE
 fraction φ is given by several definitions; the column names the definition. Phases that pull a hook
 or strain a chain have columns for forces. If DIR is a sweep, all its runs with frames are measured,
 and CSV and JSON have a column for each variable of the sweep. --by averages over all runs that have
-equal values in some columns, for example over seeds.""",
+equal values in some columns, for example over seeds. --also adds measures that take long or that few
+need: crossing-number, closed-linking, orientation, caging.""",
         examples="""\
   smarticles measure runs/a
   smarticles measure runs/a runs/b --table phases.csv
@@ -50,6 +51,7 @@ equal values in some columns, for example over seeds.""",
   smarticles measure friction --table runs.csv              a sweep: one column per variable
   smarticles measure friction --by friction                 means ± SE over the runs of each value
   smarticles measure runs/a --profile profile.csv           φ(r, z) at the end of each phase
+  smarticles measure runs/a --also crossing-number,caging   measures on request
 """,
     )
     measure.add_argument("directories", nargs="+", type=Path, metavar="DIR", help="runs or sweeps")
@@ -57,6 +59,9 @@ equal values in some columns, for example over seeds.""",
     measure.add_argument("--frames", action="store_true", help="one row per frame instead of one per phase")
     measure.add_argument(
         "--by", type=names, metavar="NAME,…", help="means and SE over runs with equal values in these columns"
+    )
+    measure.add_argument(
+        "--also", type=names, default=(), metavar="NAME,…", help="measures on request, named in the description above"
     )
     profile_help = "write φ(r, z) at the end of each phase, in rings and layers of the container, as CSV"
     measure.add_argument("--profile", type=Path, metavar="FILE.csv", help=profile_help)
@@ -81,7 +86,7 @@ def measure_runs(arguments: argparse.Namespace) -> int:
     directories = list(sources(arguments.directories))
     for warning in filter(None, (open_run(directory).lost_series for directory in directories)):
         print(f"smarticles: warning: {warning}", file=sys.stderr)
-    table = measured(arguments.directories, frames=arguments.frames)
+    table = measured(arguments.directories, frames=arguments.frames, also=arguments.also)
     if by:
         try:
             table = grouped(table, by)
@@ -197,6 +202,11 @@ def _legend(shown: Container[str], *, per_frame: bool, by: Sequence[str]) -> str
         lines.append(
             "⟨N⟩: mean number of links of others through a smarticle's plane; z: height of the centre of mass "
             "above the floor"
+        )
+    if "average crossing number mean [-]" in shown:
+        lines.append(
+            "⟨ACN⟩: average crossing number of a smarticle with all others, half the crossings that are seen from a "
+            "random direction"
         )
     if "hook work [J]" in shown:
         lines.append(

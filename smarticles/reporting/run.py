@@ -13,7 +13,7 @@ import pandas as pd
 from markupsafe import Markup
 
 from dem.errors import InputError, RunError
-from dem.plan.choice import QUANTITIES, Error, read_table
+from dem.plan.choice import QUANTITIES, Error, activity_of, read_table
 from dem.plan.effects import decide
 from dem.plan.outlook import plan
 from dem.record.columns import EVERY
@@ -57,8 +57,11 @@ def run_page(directory: Path, accuracy: Path | None) -> str:
     manifest, status = run.manifest, run.status
     lead = [
         ("status", status.state),
-        ("smarticles", str(manifest.count)),
-        ("l/w", f"{manifest.aspect_ratio:g}"),
+        *(
+            [("smarticles", str(manifest.count)), ("l/w", f"{manifest.aspect_ratio:g}")]
+            if manifest.kinds is None
+            else [("bodies", f"{manifest.count} ({', '.join(dict.fromkeys(kind.shape for kind in manifest.kinds))})")]
+        ),
         ("engine", manifest.engine),
         ("fidelity", manifest.fidelity),
         ("seed", str(manifest.seed)),
@@ -232,7 +235,7 @@ def accuracy_blocks(scene: Scene | None, path: Path | None) -> list[Markup]:
     rows = [[knob, value, named.get(knob)] for knob, value in knobs.items()]
     blocks = [table(caption, ["knob", "this scene", base], rows)]
     try:
-        known = read_table(path, of=tuple(QUANTITIES))
+        known = read_table(path, of=tuple(QUANTITIES), activity=activity_of(scene))
     except InputError as error:
         return [*blocks, words(f"The errors of this fidelity are unknown: {error}", tone="note")]
     here = [entry for entry in known.fidelities if (entry.engine, entry.fidelity) == (scene.engine, base)]

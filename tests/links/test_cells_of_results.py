@@ -33,7 +33,7 @@ CHANCE = 0.01
 """That a sound run is found out of its cell, all its columns together."""
 
 FORMER = {"base": "standard", "rows": 1, "stiffness_N_per_m": 500.0}
-"""The fidelity standard on links of the tables in results/, which the studies are run with until they are made again."""
+"""The fidelity `standard` on links when the tables in results/ were made."""
 
 NUMBERED = (SEED, "block")
 """Variables that tell runs of one point apart: `finite-size` has several blocks of its seeds."""

@@ -69,9 +69,9 @@ def calibrated(problem: Problem) -> Result:
 
 
 def exact(problem: Problem, count: int = 50) -> tuple[Array, Array]:
-    """Mean and standard deviation (2,) of the posterior by a sum over a grid, without emulator and chain."""
+    """The posterior by a sum over a grid of the model itself: parameters (n, 2) and weights (n,); no emulator, no chain."""
     axes = np.linspace(0.2, 1.0, count), np.linspace(0.2, 1.5, count), np.linspace(0.002, 0.25, count)
-    friction, wall, sigma = np.meshgrid(*axes, indexing="ij")
+    friction, wall, sigma = (grid.ravel() for grid in np.meshgrid(*axes, indexing="ij"))
     density = -0.5 * (sigma / DISCREPANCY) ** 2
     for datum, size in zip(problem.data, problem.sizes, strict=True):
         if datum.fitted:
@@ -80,9 +80,7 @@ def exact(problem: Problem, count: int = 50) -> tuple[Array, Array]:
             density -= 0.5 * (datum.value - model(friction, wall, aspect, datum.measure)) ** 2 / variance
             density -= 0.5 * np.log(variance)
     weights = np.exp(density - density.max())
-    moments = [(np.average(grid, weights=weights), grid) for grid in (friction, wall)]
-    deviations = [np.sqrt(np.average((grid - mean) ** 2, weights=weights)) for mean, grid in moments]
-    return np.array([mean for mean, _ in moments]), np.array(deviations)
+    return np.stack([friction, wall], axis=1), weights / weights.sum()
 
 
 @pytest.fixture(scope="module")
@@ -101,7 +99,9 @@ def test_known_parameters_are_found_as_by_a_grid_of_the_model_itself(result: Res
     table = result.posterior().set_index("parameter")
     assert table.loc["friction", "low 95 %"] < 0.5 < table.loc["friction", "high 95 %"]
     assert table.loc["wall", "low 95 %"] < 0.6 < table.loc["wall", "high 95 %"]
-    mean, deviation = exact(result.problem)
+    grid, weights = exact(result.problem)
+    mean = weights @ grid
+    deviation = np.sqrt(weights @ (grid - mean) ** 2)
     # Emulators of 28 runs with 2 % of scatter add to the deviation; the grid has none. An effect of one deviation of
     # the data would be seen, and a posterior as wide as the prior is rejected.
     assert np.all(np.abs(np.mean(result.theta, axis=0)[:2] - mean) < 0.5 * deviation)
@@ -262,17 +262,24 @@ def test_wrong_data_files_are_rejected(tmp_path: Path, row: str, stated: str) ->
     assert stated in str(caught.value)
 
 
-def _ranks(folder: Path, trials: int) -> Array:
-    """Ranks (trials, 2), from 0 to 1, of parameters from the prior among the draws of their posteriors."""
-    ranks = []
+def _ranks(folder: Path, trials: int) -> tuple[Array, Array]:
+    """Ranks (trials, 2), from 0 to 1, of parameters from the prior in their posteriors: calibrated, and by the grid."""
+    ranks, known = [], []
     for trial in range(trials):
         random = np.random.default_rng(1000 + trial)
         truth = random.uniform([0.2, 0.2], [1.0, 1.5])
         sigma = abs(random.normal(0.0, DISCREPANCY))
         keys = f"budget: 90\nfirst_seed: {10_000_000 * trial + 1}"
-        result = calibrated(written(folder, truth, sigma=sigma, random=random, keys=keys))
-        ranks.append(np.mean(result.theta < truth, axis=0))
-    return np.array(ranks)
+        problem = written(folder, truth, sigma=sigma, random=random, keys=keys)
+        ranks.append(np.mean(calibrated(problem).theta < truth, axis=0))
+        grid, weights = exact(problem)
+        known.append(weights @ (grid < truth))
+    return np.array(ranks), np.array(known)
+
+
+def _covered(ranks: Array) -> int:
+    """Number of parameters within their 95 % intervals."""
+    return int(np.sum((ranks > 0.025) & (ranks < 0.975)))
 
 
 def _chi_square(ranks: Array) -> float:
@@ -283,24 +290,29 @@ def _chi_square(ranks: Array) -> float:
 
 @pytest.mark.long
 def test_known_parameters_are_found_in_18_of_20_trials_with_uniform_ranks(tmp_path: Path) -> None:
-    """Simulation-based calibration (Talts et al., 2018): parameters and discrepancies are drawn from their priors."""
-    ranks = _ranks(tmp_path, 20)
-    assert (((ranks > 0.025) & (ranks < 0.975)).sum(axis=0) >= 18).all(), ranks
+    """Simulation-based calibration (Talts et al., 2018): parameters and discrepancies are drawn from their priors.
+
+    18 of 20 hold for both parameters together, 36 of 40 intervals: 38 ± 1.4 are expected. The grid has no emulator; over
+    150 of these trials it finds 285 of 300.
+    """
+    ranks, known = _ranks(tmp_path, 20)
+    assert _covered(ranks) >= 36, ranks
     assert _chi_square(ranks) > 0.01, ranks
+    # Emulators of 30 runs with scatter move ranks by less than posteriors without data would, whose ranks differ by 1/3.
+    assert np.mean(np.abs(ranks - known)) < 0.1, ranks - known
 
 
 @pytest.mark.long
 def test_ranks_reveal_intervals_that_are_too_narrow(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Broken on purpose: without noise in the emulators and without a discrepancy, intervals are too narrow."""
-    monkeypatch.setattr(emulator, "NOISE", (1e-9, 1e-8))
-    exact_model = inference.log_posterior
+    """Broken on purpose: without discrepancy of the model, intervals are too narrow."""
+    whole = inference.log_posterior
 
     def without_discrepancy(problem: Problem, emulators: Any, draws: Array) -> Array:
-        return exact_model(problem, emulators, draws * np.array([1.0, 1.0, 1e-3]))
+        return whole(problem, emulators, draws * np.array([1.0, 1.0, 1e-3]))
 
     monkeypatch.setattr(inference, "log_posterior", without_discrepancy)
-    ranks = _ranks(tmp_path, 20)
-    assert (((ranks > 0.025) & (ranks < 0.975)).sum(axis=0) < 18).any()
+    ranks, _ = _ranks(tmp_path, 20)
+    assert _covered(ranks) < 30, ranks
     assert _chi_square(ranks) < 0.01, ranks
 
 

@@ -13,14 +13,19 @@ import pytest
 from double import EngineDouble, KindDouble
 from scenes import CHAIN, SMALL, changed
 
+from dem.engine.effect import EffectName
 from dem.errors import InputError, RunError
+from dem.plan.effects import decide
 from dem.plan.outlook import plan
 from dem.plan.steps import time_steps
 from dem.record.document import Done
+from dem.record.run import Run
+from dem.record.vtkhdf import truncate
 from dem.run.run import run_scene
 from dem.run.simulation import Simulation, StopRequestedError
 from dem.scene.reading import load_scene, parse_scene, scene_hash
 from dem.scene.scene import Scene
+from smarticles.commands.compare import compare_bits
 
 SWING = {"type": "internal-oscillation", "theta_deg": 4, "duration_s": 0.05}
 DEPOSIT, RELAX = {"type": "deposit", "per_layer": 5}, {"type": "relax", "duration_s": 0.1}
@@ -191,6 +196,63 @@ def test_an_engine_that_stops_fails_the_run_and_keeps_what_was_recorded(
     assert not (tmp_path / "done.json").exists()
     with h5py.File(tmp_path / "series.h5") as file:
         assert failed["time_s"] - file["time_s"][-1] <= 0.004
+
+
+# -- frames in one file ------------------------------------------------------------------------------------------------
+
+ONE_FILE = {"recording.frames": "vtkhdf"}
+
+
+@pytest.mark.parametrize("name", ["rested", "shaken"])
+def test_frames_in_one_file_are_those_in_many_also_after_a_stop(
+    kind: KindDouble, interrupted: Callable[[int], None], tmp_path: Path, name: str
+) -> None:
+    many, one, resumed = (tmp_path / place for place in ("many", "one", "resumed"))
+    run(scene_of(name), many)
+    run(scene_of(name, **ONE_FILE), one)
+    interrupted(2)
+    with pytest.raises(KeyboardInterrupt):
+        run(scene_of(name, **ONE_FILE), resumed)
+    assert 0 < len(Run(resumed).frames) < len(Run(one).frames)
+    run(scene_of(name, **ONE_FILE), resumed, resume=True)
+    for other in (one, resumed):
+        assert [path.name for path in other.glob("frames*")] == ["frames.vtkhdf"]
+        bits = compare_bits(Run(many), Run(other))
+        assert bits["identical"], bits
+        assert bits["frames"] == bits["compared"] > 3
+    with h5py.File(one / "frames.vtkhdf", "r+") as file:
+        file["VTKHDF/Points"][-1, 2] += 1e-12
+    assert compare_bits(Run(many), Run(one))["frames"] == bits["frames"] - 1
+    files = [
+        {entry.name: entry for entry in decide(scene_of(name, **more))}[EffectName.FRAMES].adds.files
+        for more in ({}, ONE_FILE)
+    ]
+    assert files == [("frames.pvd", "frames"), ("frames.vtkhdf",)]
+    assert scene_hash(scene_of(name)) == scene_hash(scene_of(name, **{"recording.frames": "vtu"}))
+
+
+def test_a_run_whose_frames_are_damaged_is_not_continued_and_not_changed(
+    kind: KindDouble, interrupted: Callable[[int], None], tmp_path: Path
+) -> None:
+    scene, file = scene_of("rested", **ONE_FILE), tmp_path / "frames.vtkhdf"
+    interrupted(2)
+    with pytest.raises(KeyboardInterrupt):
+        run(scene, tmp_path)
+    whole = file.read_bytes()
+    before = {path.name: path.read_bytes() for path in tmp_path.iterdir() if path != file}
+    shorter = tmp_path.with_name("shorter.vtkhdf")
+    shorter.write_bytes(whole)
+    truncate(shorter, 1)
+    for damaged in (whole[:-200], whole[:2000] + b"x" * 500 + whole[2500:], shorter.read_bytes(), None):
+        file.unlink()
+        if damaged is not None:
+            file.write_bytes(damaged)
+        with pytest.raises(InputError, match=r"cannot read frames .*frames\.vtkhdf: .*; put the file back, or run"):
+            run(scene, tmp_path, resume=True)
+        assert {path.name: path.read_bytes() for path in tmp_path.iterdir() if path != file} == before
+        file.write_bytes(whole)
+    run(scene, tmp_path, resume=True)
+    assert (tmp_path / "done.json").exists()
 
 
 # -- directories that are not a run's ----------------------------------------------------------------------------------

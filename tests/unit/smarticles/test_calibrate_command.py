@@ -138,7 +138,7 @@ def test_a_cluster_gets_one_wave_at_a_time(calibration: Path, smarticles: Smarti
         (
             "high: 1.0",
             "high: 11.0",
-            "rendered for run p1_c0_r0: contact.friction_smarticle: 11 is out of range; use at most 10",
+            "rendered for run p1_c0_r0: contact.friction_smarticle: 11.0 is out of range; use at most 10",
         ),
         ("high: 1.0", "high: 0.1", "free.mu.high: 0.1 is not above low, 0.2; exchange them"),
     ],

@@ -43,6 +43,30 @@ def test_measure_gives_json_without_nan(tmp_path: Path, write_run: WriteRun, sma
     assert 0.05 < rows[0]["phi second-highest-com [-]"] < 0.2
 
 
+def test_measure_adds_measures_on_request_alone(tmp_path: Path, write_run: WriteRun, smarticles: Smarticles) -> None:
+    run = write_run(tmp_path / "a")
+    plain = json.loads(smarticles("measure", run, "--json").out)[-1]
+    more = json.loads(smarticles("measure", run, "--json", "--also", "crossing-number,closed-linking,orientation").out)[
+        -1
+    ]
+    assert {name: more[name] for name in plain} == plain
+    added = {name for name in set(more) - set(plain) if " SE " not in name}
+    assert added == {
+        "average crossing number mean [-]",
+        "nematic order of all links [-]",
+        "polar order of mouths [-]",
+        "mouths upwards [-]",
+        "closed linking number mean [-]",
+        "linked graph largest share [-]",
+    }
+    assert more["average crossing number mean [-]"] > 0.1
+    said = smarticles("measure", run, "--also", "crossing-number")
+    assert "⟨ACN⟩: average crossing number" in said.out
+    unknown = smarticles("measure", run, "--also", "caging,crossing")
+    assert unknown.status == 2
+    assert "also: 'crossing' is no measure on request; did you mean 'crossing-number'?" in unknown.err
+
+
 def test_measure_has_the_variables_of_a_sweep_and_means_by_them(
     tmp_path: Path, sweep_file: Path, write_run: WriteRun, smarticles: Smarticles
 ) -> None:
