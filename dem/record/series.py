@@ -5,7 +5,7 @@ from __future__ import annotations
 import io
 import math
 import time
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from types import MappingProxyType
@@ -89,8 +89,8 @@ class SeriesWriter:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Series:
-    """The recorded quantities of a run against time; all arrays are read-only."""
+class Series(Mapping[str, NDArray[Any]]):
+    """The recorded quantities of a run against time: a mapping of names to arrays, which are read-only."""
 
     path: Path  #: The file
     #: Arrays by name, e.g. "com_height_m": (n,), (n, 2) for barb 1 and barb 2, or (n, 3) for x, y, z. Their names
@@ -108,8 +108,22 @@ class Series:
         except KeyError:
             raise InputError(f"{self.path} holds no series '{name}'; choose one of: {', '.join(self.data)}") from None
 
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.data)
+
     def __len__(self) -> int:
-        return len(self.time)
+        return len(self.data)
+
+    # The mixin methods of Mapping expect KeyError of a missing name, and compare arrays.
+    def __contains__(self, name: object) -> bool:
+        return name in self.data
+
+    def get(self, name: str, default: Any = None) -> Any:
+        """Return the array of one quantity, or `default` if the series has none of that name."""
+        return self.data.get(name, default)
+
+    __eq__ = object.__eq__
+    __hash__ = object.__hash__
 
     @property
     def time(self) -> Array:

@@ -25,6 +25,7 @@ EXTRAS = {
     **dict.fromkeys(("matplotlib", "PIL", "pyvista", "vtk", "vtkmodules", "imageio_ffmpeg"), "viz"),
     **dict.fromkeys(("trame", "trame_vtk", "trame_client", "trame_server", "aiohttp", "wslink"), "view"),
     **dict.fromkeys(("trimesh", "gsd"), "export"),
+    **dict.fromkeys(("sklearn", "emcee", "SALib"), "calibrate"),
 }
 """Extra of the project that installs a module; other modules come with the project itself."""
 
@@ -201,7 +202,10 @@ def checks() -> Iterator[Check]:
         "links", *_run_script(_LINKS), f"only scenes with `engine: links` need it; {way_to_install('numba')}"
     )
     # YADE is optional if the links engine works.
-    way_out = "`make setup` installs it, see environment.md; scenes with `engine: links` run without it"
+    way_out = (
+        "scenes with `engine: yade`, or without the key engine, cannot run; `make setup` installs YADE, see "
+        "environment.md; scenes with `engine: links` run without it"
+    )
     yield _check("yade", *_run_script(_YADE), way_out, needed=not links.ok)
     yield links
     yield _check(

@@ -48,6 +48,7 @@ directory that contains other files is rejected and not changed.""",
     add_options(run, "--out", required=True, help="new run directory")
     resume_help = "continue the unfinished run of this scene in DIR from its last checkpoint"
     run.add_argument("--resume", action="store_true", help=resume_help)
+    run.add_argument("--recorded-as", metavar="COMMAND", help=argparse.SUPPRESS)  # for `smarticles.run` in Python
     add_options(
         run,
         "--threads",
@@ -151,10 +152,9 @@ def _run_until(
     from dem.run import run  # noqa: PLC0415
 
     quoted_out = shlex.quote(str(out))
+    command = getattr(arguments, "recorded_as", None) or arguments.command_line
     try:
-        outcome = run.run_scene(
-            scene, out, command=arguments.command_line, progress=sys.stderr.isatty(), resume=resume, stop=stop
-        )
+        outcome = run.run_scene(scene, out, command=command, progress=sys.stderr.isatty(), resume=resume, stop=stop)
     except StopRequestedError as stopped:
         print(f"smarticles: {stopped}; to be continued: smarticles resume {quoted_out}", file=sys.stderr)
         return TO_BE_CONTINUED

@@ -12,7 +12,7 @@ def test_series_holds_values_units_and_descriptions(run):
     np.testing.assert_allclose(series["container_force_N"][2], [0.2, 0.4, 0.6])
     assert series.units["kinetic_energy_J"] == "J"
     assert series.descriptions["phase"] == "index of the phase in the scene"
-    assert (series.scene_sha256, series.seed, len(series)) == ("abc", 7, 3)
+    assert (series.scene_sha256, series.seed, len(series.time)) == ("abc", 7, 3)
     assert series.nearest(0.14) == 1
     with pytest.raises(ValueError, match="read-only"):
         series.time[0] = 1
