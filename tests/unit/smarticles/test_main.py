@@ -41,7 +41,7 @@ def test_help_lists_the_commands_and_the_exit_status(smarticles: Smarticles) -> 
 @pytest.mark.parametrize(
     ("words", "wrong", "way_out"),
     [
-        ([], "command", "known: init, schema, run, plan, "),
+        ([], "command", "known: init, keys, schema, run, plan, "),
         (["stduy"], "COMMAND: 'stduy'", "'study'"),
         (["run"], "SCENE.yaml, --out", ""),
         (["run", "s.yaml", "--out", "d", "--sett", "a=1"], "--sett", "'--set'"),
