@@ -8,14 +8,22 @@ from itertools import pairwise
 from typing import Any, Literal, Self
 
 import numpy as np
-from pydantic import ConfigDict, Field, ModelWrapValidatorHandler, ValidationInfo, field_validator, model_validator
+from pydantic import (
+    ConfigDict,
+    Field,
+    ModelWrapValidatorHandler,
+    ValidationError,
+    ValidationInfo,
+    field_validator,
+    model_validator,
+)
 
 from dem.arrays import Array, Numbers
 from dem.body.kinds import Kind, Mixture
 from dem.body.particle import Particle, SphereChain, chain_mean_width, mean_width
 from dem.engine.demand import Activity
 from dem.engine.effect import EffectName
-from dem.errors import nearest, shown
+from dem.errors import InputError, nearest, shown
 from dem.phases.kinds import AnyPhase
 from dem.phases.pull_hook import with_pull_defaults
 from dem.scene.rules import problems
@@ -31,6 +39,7 @@ from dem.setting.protocol import Protocol, with_protocol
 from dem.setting.recording import Recording
 from dem.setting.shapes import AnyShape, Shaped, listed, numbers_of_shapes
 from dem.setting.smarticle import Smarticle
+from dem.strict import explained
 
 # Distance of neighbouring spheres, in diameters, of the chains that represent smooth links in pours and pictures. Where
 # such chains do not overlap, the links themselves overlap by a thirtieth of a diameter at most.
@@ -92,6 +101,16 @@ class Scene(Part):
     phases: tuple[AnyPhase, ...] = Field(..., min_length=1, description="phases of the run, in order")
     recording: Recording = Field(default_factory=Recording, description="frames and series")
 
+    def __init__(self, **keys: Any) -> None:
+        """Make a scene from its keys; raise InputError in one line if they are not valid."""
+        try:
+            super().__init__(**keys)
+        except ValidationError as error:
+            raise InputError(f"Scene: {explained(error, keys, described='`smarticles keys`')}") from None
+
+    # Tells pydantic that files are validated without this method, which would lose the folder of relative paths.
+    __init__.__pydantic_base_init__ = True  # type: ignore[attr-defined]
+
     @model_validator(mode="before")
     @classmethod
     def _filled_by_preset_and_protocol(cls, data: Any, info: ValidationInfo) -> Any:
@@ -108,6 +127,16 @@ class Scene(Part):
         if not isinstance(base, str) or base not in FIDELITIES:
             raise ValueError(f"unknown fidelity {shown(base)}; {nearest(str(base), FIDELITIES)}")
         return {"base": base, **_named(base, {**info.data, **value}), **value}
+
+    @field_validator("container", mode="before")
+    @classmethod
+    def _some_container(cls, value: Any) -> Any:
+        if value is None:
+            raise ValueError(
+                "got null, but there is no scene without a container; leave the key out, give a radius_m that is "
+                "never reached, or add the phase remove-container; see docs/limits.md"
+            )
+        return value
 
     @field_validator("gravity_m_per_s2")
     @classmethod

@@ -12,6 +12,16 @@ LONGEST_LENGTH = 1.0  # m; longer smarticles or containers are taken for lengths
 REFERENCE_ASPECT_RATIO = 0.7  # l/w of the smarticle for which the paper states torques and swings
 
 
+# Words that users try as keys, and what no scene can describe.
+_BEYOND = {
+    **dict.fromkeys(("shape", "shapes", "mesh", "mixture", "species", "types"), "such key, see `particle` for shapes"),
+    **dict.fromkeys(("cohesion", "adhesion", "capillary", "glue", "magnets"), "cohesion"),
+    **dict.fromkeys(("air", "drag", "fluid", "water", "wind"), "air or water"),
+    **dict.fromkeys(("material", "materials", "young_modulus", "poisson_ratio"), "materials by this key"),
+    **dict.fromkeys(("lid", "box", "walls", "periodic"), "containers by this key"),
+}
+
+
 class Part(Strict):
     """Base of all parts of a scene: a frozen mapping of keys."""
 
@@ -24,10 +34,12 @@ class Part(Strict):
         similar = similar or difflib.get_close_matches(key, known, n=1, cutoff=0.7)
         if similar:
             return f"did you mean {' or '.join(map(repr, similar))}?"
+        if key in _BEYOND:
+            return f"scenes have no {_BEYOND[key]}; docs/limits.md lists what the project cannot do and what there is"
         for part in Part.__subclasses__():
             if part.__subclasses__() or ("type" in part.model_fields and "type" in cls.model_fields):
                 continue  # a key of one phase does not belong in another phase; base classes are no part of a file
-            elsewhere = difflib.get_close_matches(key, part.model_fields, n=1, cutoff=0.65)
+            elsewhere = difflib.get_close_matches(key, part.known_keys(), n=1, cutoff=0.65)
             if elsewhere:
                 return f"{elsewhere[0]!r} belongs in {part.tag()}"
         return "known keys: " + ", ".join(known)

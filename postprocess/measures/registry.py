@@ -6,15 +6,19 @@ needs its module, a test, and a line in README.
 """
 
 import pkgutil
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cache
 from importlib import import_module
+from importlib.metadata import entry_points
 
 from dem.errors import InputError, nearest
 from dem.record.frame import Frame
 from dem.record.run import Run
 from dem.record.series import Series
+from dem.strict import unit_of
+
+ENTRY_POINTS = "smarticles.measures"  #: Group of the entry points by which installed packages add their `MEASURES`
 
 _PACKAGE = __name__.rpartition(".")[0]
 
@@ -67,6 +71,20 @@ class FrameMeasure:
         return dict(zip((quantity.header for quantity in self.quantities), values, strict=True))
 
 
+def measure_of(function: Callable[[Frame, Run], float] | FrameMeasure) -> FrameMeasure:
+    """Return a function of a frame and its run as a measure; its name ends with the unit: `top_m`, `speed_m_per_s`."""
+    if isinstance(function, FrameMeasure):
+        return function
+    label, unit = unit_of(function.__name__)
+    quantity = Quantity(label.replace("_", " "), unit or "-")
+    return FrameMeasure(
+        name=function.__name__,
+        place=900,
+        quantities=(quantity,),
+        take=lambda frame, run: (float(function(frame, run)),),
+    )
+
+
 @dataclass(frozen=True, kw_only=True)
 class PhaseMeasure:
     """A measure that is computed from a whole phase."""
@@ -102,19 +120,30 @@ def in_one_cylinder(run: Run) -> bool:
 
 @cache
 def registered() -> tuple[FrameMeasure | PhaseMeasure, ...]:
-    """Return all measures of this package, in alphabetical order of their modules.
+    """Return all measures of this package, in alphabetical order of their modules, and of installed packages.
 
     ValueError if two measures have one name, or two quantities one header.
     """
     package = import_module(_PACKAGE)
     modules = [import_module(f"{_PACKAGE}.{found.name}") for found in pkgutil.iter_modules(package.__path__)]
-    measures = tuple(measure for module in modules for measure in getattr(module, "MEASURES", ()))
+    measures = (*(measure for module in modules for measure in getattr(module, "MEASURES", ())), *_installed())
     names = [measure.name for measure in measures]
     headers = [quantity.header for measure in measures for quantity in measure.quantities]
     for kind, words in (("name", names), ("header", headers)):
         if repeated := {word for word in words if words.count(word) > 1}:
             raise ValueError(f"measures share a {kind}: {', '.join(sorted(repeated))}")
     return measures
+
+
+def _installed() -> Iterator[FrameMeasure | PhaseMeasure]:
+    for point in entry_points(group=ENTRY_POINTS):
+        try:
+            yield from point.load()
+        except Exception as error:  # of another package's code
+            raise InputError(
+                f"the measures of {point.value} cannot be loaded ({type(error).__name__}: {error}); repair or "
+                "uninstall that package"
+            ) from error
 
 
 def shown_quantities() -> tuple[tuple[Quantity, Shown], ...]:

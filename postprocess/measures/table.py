@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass
 from typing import Literal
@@ -43,6 +44,7 @@ def measure_run(
     *,
     definitions: Sequence[str] = tuple(DEFINITIONS),
     costly: Costly = "phase-end",
+    measures: Sequence[FrameMeasure] = (),
     also: Collection[str] = (),
 ) -> pd.DataFrame:
     """Measure every frame of a run, which may be finished, failed or still running.
@@ -50,6 +52,7 @@ def measure_run(
     Args:
         definitions: Definitions of the packing fraction, keys of `packing.DEFINITIONS`.
         costly: Frames for which costly measures are computed: none, the last recorded frame of each phase, or all.
+        measures: Further measures, whose columns follow those of the registered ones.
         also: Names of measures that tables have on request alone, such as "crossing-number".
 
     Returns:
@@ -63,7 +66,8 @@ def measure_run(
     frames, series = _open(run, definitions)
     rows: list[dict[str, object]] = []
     for part in _frames_by_phase(run, frames):
-        rows += _rows(part, run, series, frame_measures(definitions, also), costly, offset=len(rows))
+        known = (*frame_measures(definitions, also), *measures)
+        rows += _rows(part, run, series, known, costly, offset=len(rows))
     return pd.DataFrame(rows)
 
 
@@ -75,6 +79,7 @@ def summarise_run(
     costly: Costly = "phase-end",
     also: Collection[str] = (),
     phases: Collection[int] | None = None,
+    measures: Sequence[FrameMeasure] = (),
 ) -> pd.DataFrame:
     """Measure each phase of a run: means over its last frames, and measures of the whole phase.
 
@@ -84,6 +89,7 @@ def summarise_run(
         costly: Frames for which costly measures are computed, see `measure_run`.
         also: Names of measures that tables have on request alone, such as "crossing-number".
         phases: Indices of the phases to measure; all if not given.
+        measures: Further measures, whose columns follow those of the registered ones.
 
     Returns:
         A table with one row per phase and units in its column names. A column "… SE" follows each mean with its
@@ -99,7 +105,8 @@ def summarise_run(
     for part in _frames_by_phase(run, frames):
         if phases is not None and part[0].phase not in phases:
             continue
-        table = pd.DataFrame(_rows(part[-last:], run, series, frame_measures(definitions, also), costly))
+        known = (*frame_measures(definitions, also), *measures)
+        table = pd.DataFrame(_rows(part[-last:], run, series, known, costly))
         summary = {name: table[name].iloc[-1] for name in (*_LABELS, "phase", "phase type", "time [s]")}
         summary["frames averaged"] = len(table)
         for name in table.columns.difference([*summary, "frame"], sort=False):
@@ -218,11 +225,12 @@ def _series_columns(series: Series, time: float) -> dict[str, float]:
             continue
         # A newer version may have recorded a column that is unknown here.
         label = EVERY[name].label if name in EVERY else name
-        # Files write a pure number's unit as 1, tables as a dash.
-        unit = "-" if series.units[name] in {"1", ""} else series.units[name]
+        # Files write a pure number's unit as 1 and angles in radians; tables have a dash, and degrees as scenes do.
+        unit = {"1": "-", "": "-", "rad": "degree"}.get(series.units[name], series.units[name])
+        factor = math.degrees(1) if unit == "degree" else 1
         if values.ndim == 1:
-            columns[f"{label} [{unit}]"] = float(values[index])
+            columns[f"{label} [{unit}]"] = factor * float(values[index])
         else:
             for component, value in zip(_COMPONENTS[values.shape[1]], values[index], strict=True):
-                columns[f"{label} {component} [{unit}]"] = float(value)
+                columns[f"{label} {component} [{unit}]"] = factor * float(value)
     return columns

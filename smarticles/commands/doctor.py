@@ -202,7 +202,10 @@ def checks() -> Iterator[Check]:
         "links", *_run_script(_LINKS), f"only scenes with `engine: links` need it; {way_to_install('numba')}"
     )
     # YADE is optional if the links engine works.
-    way_out = "`make setup` installs it, see environment.md; scenes with `engine: links` run without it"
+    way_out = (
+        "scenes with `engine: yade`, or without the key engine, cannot run; `make setup` installs YADE, see "
+        "environment.md; scenes with `engine: links` run without it"
+    )
     yield _check("yade", *_run_script(_YADE), way_out, needed=not links.ok)
     yield links
     yield _check(

@@ -19,8 +19,8 @@ from scipy import stats
 
 from dem.errors import InputError, shown
 from dem.scene.reading import apply_override
-from dem.scene.yaml_text import parse_yaml
 from dem.strict import Strict, explained
+from dem.yaml_text import parse_yaml
 from templates.sweep.expand import Point, points_of
 from templates.sweep.render import Value
 from templates.sweep.sweep_file import SEED, Sweep, SweepFile, parse_table, read_text
