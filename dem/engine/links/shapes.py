@@ -9,13 +9,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from dem.body.bars import Bars, first_ends
+from dem.body.filament import Filament
 from dem.body.particle import Particle
+from dem.engine.links.compiler import inlined
 from dem.physics.contact import typical_effective_mass
 
 Array = NDArray[np.float64]
@@ -47,7 +49,8 @@ class Planar(NamedTuple):
 class Shape:
     """One kind of body, in its own frame about its centre of mass.
 
-    The frame of a smarticle is that of its middle link, that of a rigid body its principal axes.
+    The frame of a smarticle is that of its middle link, that of a rigid body its principal axes, that of a filament
+    the laboratory's.
     """
 
     mass: float  #: [kg]
@@ -56,7 +59,8 @@ class Shape:
     link: NDArray[np.int64]  #: (M,) link that each segment belongs to; of a smarticle 0 barb 1, 1 middle link, 2 barb 2
     shared: NDArray[np.uint8]  #: (M,) which ends of a segment are those of segments before it, see `AT_START`
     effective_mass: float  #: Harmonic mean of the mass felt by a push on it [kg], for the dashpots
-    planar: Planar | None = None  #: Of a smarticle; None: a rigid body
+    planar: Planar | None = None  #: Of a smarticle; None: another body
+    filament: Filament | None = None  #: Of a flexible body; None: a rigid body or a smarticle
 
     @property
     def reach(self) -> float:
@@ -76,10 +80,20 @@ class Shapes(NamedTuple):
     first: NDArray[np.int64]  #: (K + 1,) where each kind's segments begin
     lines: Array  #: (M, LINE) segments in the frame of the body
     link: NDArray[np.int64]  #: (M,) link of each segment
+    flexible: Any  #: (K,) whether `dem.engine.links.motion.bending` moves such bodies; None where it moves none
+
+
+@inlined
+def is_flexible(flexible: Any, kind: int) -> bool:
+    """Return whether bodies of a kind are flexible; takes `Shapes.flexible`."""
+    if flexible is None:
+        return False
+    return bool(flexible[kind] != 0)
 
 
 def table_of(shapes: Sequence[Shape]) -> Shapes:
     """Return the table of shapes for the kernels."""
+    flexible = np.array([shape.filament is not None for shape in shapes], dtype=np.uint8)
     return Shapes(
         mass=np.array([shape.mass for shape in shapes]),
         radius=np.array([shape.lines[:, RADIUS].min() for shape in shapes]),
@@ -89,6 +103,7 @@ def table_of(shapes: Sequence[Shape]) -> Shapes:
         first=np.cumsum([0, *(len(shape.lines) for shape in shapes)]),
         lines=np.concatenate([shape.lines for shape in shapes]),
         link=np.concatenate([shape.link for shape in shapes]),
+        flexible=flexible if flexible.any() else None,
     )
 
 
@@ -157,6 +172,23 @@ def rigid_shape(bars: Bars, rows: int = 1) -> Shape:
         # Strands of bars that are twisted against each other do not meet, and count apart.
         shared=(later @ [AT_START, AT_END]).astype(np.uint8),
         effective_mass=bars.effective_mass,
+    )
+
+
+def filament_shape(filament: Filament) -> Shape:
+    """Return the shape of a filament, straight along x."""
+    count, length = filament.nodes - 1, filament.segment_length
+    axes = np.zeros((count, 6))
+    axes[:, 0], axes[:, 3] = (np.arange(count) - count / 2) * length, length
+    return Shape(
+        mass=filament.mass,
+        inertia=np.zeros(4),  # nodes move by themselves
+        lines=_lines(axes, filament.diameter / 2),
+        link=np.arange(count),
+        shared=np.where(np.arange(count) > 0, AT_START, 0).astype(np.uint8),
+        # A push at s moves the two nodes by (1 - s)²/m and s²/m, 2/3 in the mean.
+        effective_mass=1.5 * filament.mass / count,
+        filament=filament,
     )
 
 
