@@ -312,8 +312,9 @@ class World:
         """Make the lists as long as so many bodies need, or for `capacity` pairs at least."""
         rows, links = len(self.segments.line), len(self.segments.first) - 1
         capacity = max(capacity, 12 * rows + 256, len(self.pairs.first))
-        if capacity > len(self.pairs.first):
-            self.pairs = self.pairs._replace(**{n: longer(getattr(self.pairs, n), capacity) for n in (*LISTS, *FRESH)})
+        # Those of a checkpoint are as long as what is in them, each of its own length.
+        short = [name for name in (*LISTS, *FRESH) if len(getattr(self.pairs, name)) < capacity]
+        self.pairs = self.pairs._replace(**{name: longer(getattr(self.pairs, name), capacity) for name in short})
         if len(self.cells.marks) != rows or len(self.cells.first) != capacity:
             self.cells = cells_for(self.count, links, rows, capacity)
         if self.ledger is not None:
