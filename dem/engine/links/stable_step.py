@@ -73,7 +73,7 @@ def filament_stable_time_step(filament: Filament, law: ContactLaw, effective_mas
     """
     length, mass = filament.segment_length, filament.mass / (filament.nodes - 1)
     stretching, bending, twisting = filament.stiffnesses
-    across, _, roll = filament.drags
+    across = filament.drags[0]
     share = math.sqrt(filament_shape(filament).effective_mass / effective_mass)
     cn = max(2 * law.normal_damping, law.wall_damping) * share / mass
     kn, ks, cs = 2 * law.normal_stiffness / mass, 2 * law.tangential_stiffness / mass, cn * law.tangential_damping
