@@ -31,7 +31,7 @@ def rod_of(filament: Filament) -> Array:
         [
             length, stretching / length, bend / length, twist / length, filament.stretching_time, filament.bending_time,
             filament.axial_inertia, across * length / 2, along * length / 2, roll * length, filament.weight_share,
-            stiffest,
+            stiffest, 4 * twist / length / filament.axial_inertia,
         ]
     )  # fmt: skip
 

@@ -41,10 +41,10 @@ from dem.engine.links.vectors import Vector, add, along, cross, dot, put, put_mo
 
 # Columns of a rod: length of a segment at rest ℓ [m]; EA/ℓ [N/m], EI/ℓ and GJ/ℓ [N m], times of Kelvin and Voigt of
 # stretching and of bending [s]; a segment's inertia about its axis [kg m²]; drag of half a segment across and along
-# [N s/m], of a segment's roll [N m s]; weight over mass and g [1]; the square of the greatest frequency of bending
-# [1/s²].
+# [N s/m], of a segment's roll [N m s]; weight over mass and g [1]; squares of the greatest frequencies of bending
+# and of twisting [1/s²].
 LENGTH, STRETCHING, BENDING, TWISTING, STRETCHING_TIME, BENDING_TIME = range(6)
-AXIAL, ACROSS, ALONG, ROLLING, WEIGHT, STIFFEST, ROD = range(6, 13)
+AXIAL, ACROSS, ALONG, ROLLING, WEIGHT, STIFFEST, STIFFEST_TWIST, ROD = range(6, 14)
 # Columns of a gait: ψ [rad], its rate [rad/s], sense ±1, mean reversals per second, time to the next one [s], reversals
 # that were drawn, seed and number of the filament; a factor on the preferred angles, its target, and the rate at which
 # it gets there [1/s].
@@ -219,8 +219,10 @@ def _push_node(filaments: Filaments, i: int, rod: Array, angle: Vector, step: St
         moments = time * stiffness * rate1, time * stiffness * rate2, time * rod[TWISTING] * rate3
         _bend(filaments.damping, i, moments, (k1, k2), one, two, binormal, middle)
     # The energy stiffens as the angle θ grows: κ = 2 tan(θ/2), κ'² + κ κ'' = (1 + q) (1 + 3 q) with q = tan²(θ/2).
-    q = 0.25 * dot(binormal, binormal)
-    stiffest = step.whole * step.whole * rod[STIFFEST] * (1 + q) * (1 + 3 * q)
+    # The twist likewise, and what bends resists rolls that are not alike.
+    q, p = 0.25 * dot(binormal, binormal), slope - 1
+    twisted = rod[STIFFEST_TWIST] * (1 + p) * (1 + 3 * p) + 4 * q * stiffness / rod[AXIAL]
+    stiffest = step.whole * step.whole * max(rod[STIFFEST] * (1 + q) * (1 + 3 * q), twisted)
     if stiffest > RESOLVED * RESOLVED:
         step.need[0] = max(step.need[0], math.sqrt(stiffest) / RESOLVED)
     return work
