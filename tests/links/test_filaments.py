@@ -205,7 +205,7 @@ def test_free_motion_keeps_momentum_and_angular_momentum() -> None:
 
 def test_twisting_and_rolling_keep_angular_momentum_to_first_order_in_the_step() -> None:
     filament, errors = rod(10), []
-    for share in (0.4, 0.2, 0.1):
+    for share in (0.2, 0.1, 0.05):
         made = world(filament)
         made.set_time_step(share * made.time_step)
         points, velocities = crumpled(filament)
@@ -218,13 +218,13 @@ def test_twisting_and_rolling_keep_angular_momentum_to_first_order_in_the_step()
             made.advance(round(100 / share))
             worst = max(worst, np.abs(momenta(made, filament)[1] - before).max())
         errors.append(worst / np.abs(before).max())
-    assert errors[0] < 1e-4
-    assert errors[2] < 0.4 * errors[0], errors
+    assert errors[0] < 2e-3, errors
+    assert errors[2] < 0.3 * errors[0], errors
 
 
 def test_free_motion_keeps_its_energy_to_second_order_in_the_step() -> None:
     filament, means = rod(10), []
-    for share in (0.8, 0.4):
+    for share in (0.4, 0.2):
         made = world(filament)
         made.set_time_step(share * made.time_step)
         points, velocities = crumpled(filament)
@@ -237,8 +237,8 @@ def test_free_motion_keeps_its_energy_to_second_order_in_the_step() -> None:
             found.append(held.energies.stored)
         means.append(np.mean(found) / start.stored - 1)
     # Kinetic energies are those of half a step before, which averages out; what is left is leapfrog's.
-    assert abs(means[0]) < 0.02
-    assert abs(means[1]) < 0.4 * abs(means[0]) + 1e-3, means
+    assert abs(means[0]) < 0.03, means
+    assert abs(means[1]) < 0.4 * abs(means[0]), means
 
 
 @pytest.mark.parametrize("direction", ["across", "along"])
@@ -411,15 +411,18 @@ def test_a_pile_is_stable_up_to_its_step_and_blows_up_at_twice_that(times: tuple
     held, step = LinksFilaments(made), made.time_step / 0.9
     made.advance(6000)
     arrays, memory = {name: array.copy() for name, array in made.arrays.items()}, dict(made.memory)
-    kinetic = []
+    found = []
     for share in (0.5, 1.0, 2.0):
         made.restore({name: array.copy() for name, array in arrays.items()}, memory)
         made.set_time_step(share * step)
+        made.totals[4] = 1.0
         with np.errstate(all="ignore"):
-            made.advance(round(1000 / share))
-        kinetic.append(held.energies.kinetic)
-    assert kinetic[1] < 3 * kinetic[0], kinetic
-    assert not kinetic[2] < 10 * kinetic[0], kinetic
+            made.advance(round(2000 / share))
+        found.append((held.energies.kinetic, made.totals[4]))
+    # What shakes beyond its step is caught by sub-steps at first, or grows.
+    assert found[1][0] < 3 * found[0][0], found
+    assert found[1][1] < 1.5, found
+    assert found[2][1] > 2 or not found[2][0] < 10 * found[0][0], found
 
 
 @pytest.mark.parametrize(

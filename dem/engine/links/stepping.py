@@ -114,7 +114,7 @@ def act(
         pulling = pull(bodies, parts, cords, motors, step)
     gather(bodies, parts)
     resolve_speeds(shapes, bodies, parts, segments, system.gravity, step)
-    push_nodes(system.filaments, parts, system.gravity, step)
+    push_nodes(system.filaments, parts, system.gravity, ledger, step)
     resolve_nodes(system.filaments, shapes.radius, bodies, step)
     if motors is not None and tick == 0 and motors.due[1] == 0:
         # After the forces, whose velocities are those of before, as in the kick: so that work and dissipation agree.

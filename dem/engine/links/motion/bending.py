@@ -16,7 +16,7 @@ Leapfrog, as for rigid bodies: velocities belong to the middles of sub-steps.
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -128,99 +128,120 @@ def pose_filaments_from_python(filaments: Filaments, bodies: Bodies, parts: Part
 # -- forces ------------------------------------------------------------------------------------------------------
 
 
-@inlined
-def _two(row: Array, angle: Vector) -> tuple[float, float]:
-    """Return the preferred angles at a node [rad], from its wave and cosine, sine and factor of the filament's."""
-    c, s, factor = angle
-    return factor * row[0] * (c * row[1] - s * row[2]), factor * row[0] * (s * row[1] + c * row[2])
+class Piece(NamedTuple):
+    """One segment."""
+
+    t: Vector  #: Tangent [1]
+    d: Vector  #: First director [1]
+    e: Vector  #: Second one, t × d [1]
+    inverse: float  #: 1 over its length [1/m]
+    opening: Vector  #: Velocity of its end against its start, over its length [1/s]
+    spin: float  #: Rate of its roll [rad/s]
+
+
+class Bend(NamedTuple):
+    """The angles between two segments."""
+
+    k1: float  #: κ1
+    k2: float  #: κ2
+    twist: float  #: ν
+    binormal: Vector  #: b
+    tangent: Vector  #: Sum of both tangents over 1 + t·t'
+    first: Vector  #: Sum of both first directors over 1 + t·t'
+    second: Vector  #: Sum of both second directors over 1 + t·t'
+    #: Both directors of the first and of the second segment along b
+    along: tuple[float, float, float, float]
 
 
 @inlined
-def _bend(
-    out: Array, i: int, moments: Vector, angles: tuple[float, float], one: tuple[Vector, Vector, float],
-    two: tuple[Vector, Vector, float], binormal: Vector, middle: tuple[Vector, Vector, Vector],
-) -> None:  # fmt: skip
+def _piece(filaments: Filaments, i: int) -> Piece:
+    """Return a segment."""
+    t, d, inverse = vector(filaments.tangent[i], 0), vector(filaments.director[i], 0), 1 / filaments.extent[i]
+    opening = sub(vector(filaments.velocity[i + 1], 0), vector(filaments.velocity[i], 0))
+    return Piece(t, d, cross(t, d), inverse, scale(inverse, opening), filaments.spin[i])
+
+
+@inlined
+def _bend_of(one: Piece, two: Piece) -> Bend:
+    """Return the angles between two segments."""
+    inverse = 1 / (1 + dot(one.t, two.t))
+    binormal, d, e = scale(2 * inverse, cross(one.t, two.t)), add(one.d, two.d), add(one.e, two.e)
+    d1, e1, d2, e2 = dot(one.d, binormal), dot(one.e, binormal), dot(two.d, binormal), dot(two.e, binormal)
+    # The first director, carried to the second segment without twist, in that segment's frame.
+    off = dot(one.d, two.t) * inverse
+    sine = off * dot(one.t, two.e) - dot(one.d, two.e)
+    cosine = dot(one.d, two.d) - off * dot(one.t, two.d)
+    return Bend(
+        0.5 * (e1 + e2), -0.5 * (d1 + d2), 2 * sine / (1 + cosine), binormal, scale(inverse, add(one.t, two.t)),
+        scale(inverse, d), scale(inverse, e), (d1, e1, d2, e2),
+    )  # fmt: skip
+
+
+@inlined
+def _push_bend(out: Array, i: int, moments: Vector, one: Piece, two: Piece, bend: Bend) -> None:
     """Add forces and torques of moments between the segments i - 1 and i.
 
     Args:
         out: (n, 4) added to.
         moments: derivatives of the energy by κ1, κ2 and the twist [N m].
-        angles: κ1 and κ2 [rad].
-        one: tangent, director [1] and length [m] of the first segment.
-        two: those of the second one.
-        binormal: b [1].
-        middle: sums of both tangents, of both first and of both second directors, over 1 + t·t' [1].
     """
     m1, m2, twist = moments
-    (t, d, length), (t2, d2, length2), (tangent, first, second) = one, two, middle
-    c = sub(scale(m1, second), scale(m2, first))
-    rest = sub(scale(0.5 * twist, binormal), scale(m1 * angles[0] + m2 * angles[1], tangent))
-    a = scale(1 / length, add(cross(t2, c), rest))
-    b = scale(1 / length2, sub(rest, cross(t, c)))
+    d1, e1, d2, e2 = bend.along
+    c = sub(scale(m1, bend.second), scale(m2, bend.first))
+    rest = sub(scale(0.5 * twist, bend.binormal), scale(m1 * bend.k1 + m2 * bend.k2, bend.tangent))
+    a = scale(one.inverse, add(cross(two.t, c), rest))
+    b = scale(two.inverse, sub(rest, cross(one.t, c)))
     put_more(out[i - 1], 0, a)
     put_more(out[i], 0, sub(b, a))
     put_more(out[i + 1], 0, scale(-1.0, b))
-    out[i - 1, 3] += 0.5 * dot(along(scale(m1, d), m2, cross(t, d)), binormal) + twist
-    out[i, 3] += 0.5 * dot(along(scale(m1, d2), m2, cross(t2, d2)), binormal) - twist
+    out[i - 1, 3] += 0.5 * (m1 * d1 + m2 * e1) + twist
+    out[i, 3] += 0.5 * (m1 * d2 + m2 * e2) - twist
 
 
 @inlined
-def _angles(
-    one: tuple[Vector, Vector, float], two: tuple[Vector, Vector, float]
-) -> tuple[Vector, Vector, tuple[Vector, Vector, Vector]]:
-    """Return κ1, κ2, ν [rad], the binormal b and the middle frame of two segments; see `_bend`."""
-    (t, d, _), (t2, d2, _) = one, two
-    inverse = 1 / (1 + dot(t, t2))
-    binormal = scale(2 * inverse, cross(t, t2))
-    e, e2 = cross(t, d), cross(t2, d2)
-    middle = scale(inverse, add(t, t2)), scale(inverse, add(d, d2)), scale(inverse, add(e, e2))
-    k1, k2 = 0.5 * dot(add(e, e2), binormal), -0.5 * dot(add(d, d2), binormal)
-    carried = along(d, -dot(d, t2), middle[0])
-    twist = -2 * dot(carried, e2) / (1 + dot(carried, d2))
-    return (k1, k2, twist), binormal, middle
+def _rates(one: Piece, two: Piece, bend: Bend, slope: float) -> Vector:
+    """Return the rates of κ1 and κ2, and that of ν times its slope by the twist [1/s]."""
+    d1, e1, d2, e2 = bend.along
+    both = add(one.opening, two.opening)
+    g, growth = sub(cross(one.opening, two.t), cross(two.opening, one.t)), dot(both, bend.tangent)
+    return (
+        dot(bend.second, g) - bend.k1 * growth - 0.5 * (one.spin * d1 + two.spin * d2),
+        -dot(bend.first, g) - bend.k2 * growth - 0.5 * (one.spin * e1 + two.spin * e2),
+        slope * slope * (0.5 * dot(bend.binormal, both) + two.spin - one.spin),
+    )
 
 
 @inlined
-def _segment(filaments: Filaments, i: int) -> tuple[Vector, Vector, float]:
-    """Return tangent, director [1] and length [m] of a segment."""
-    return vector(filaments.tangent[i], 0), vector(filaments.director[i], 0), filaments.extent[i]
-
-
-@part
-def _push_node(filaments: Filaments, i: int, rod: Array, angle: Vector, step: Step) -> float:
+def _push_node(
+    filaments: Filaments, i: int, rod: Array, angle: Vector, one: Piece, two: Piece, ledger: Any, step: Step
+) -> float:
     """Add forces and torques of bending and twist at an inner node; the work of a change of its preferred angles [J].
 
     Args:
         angle: cosine and sine of ψ, and the factor on the preferred angles.
+        one: the segment before.
+        two: the segment after.
     """
-    one, two = _segment(filaments, i - 1), _segment(filaments, i)
-    (k1, k2, twist), binormal, middle = _angles(one, two)
-    stiffness, preferred = rod[BENDING], filaments.preferred[i]
-    u1, u2 = k1 - preferred[0], k2 - preferred[1]
-    preferred[0], preferred[1] = _two(filaments.wave[i], angle)
-    v1, v2 = k1 - preferred[0], k2 - preferred[1]
+    bend = _bend_of(one, two)
+    stiffness, twisting, time = rod[BENDING], rod[TWISTING], rod[BENDING_TIME]
+    preferred, wave, (c, s, factor) = filaments.preferred[i], filaments.wave[i], angle
+    u1, u2 = bend.k1 - preferred[0], bend.k2 - preferred[1]
+    preferred[0] = factor * wave[0] * (c * wave[1] - s * wave[2])
+    preferred[1] = factor * wave[0] * (s * wave[1] + c * wave[2])
+    v1, v2 = bend.k1 - preferred[0], bend.k2 - preferred[1]
     work = 0.5 * stiffness * (v1 * v1 + v2 * v2 - u1 * u1 - u2 * u2)
-    slope = 1 + 0.25 * twist * twist  # of ν by the twist
-    moments = stiffness * v1, stiffness * v2, rod[TWISTING] * twist * slope
-    _bend(filaments.force, i, moments, (k1, k2), one, two, binormal, middle)
-    if rod[BENDING_TIME] > 0.0:
-        velocity = vector(filaments.velocity[i], 0)
-        a = scale(1 / one[2], sub(velocity, vector(filaments.velocity[i - 1], 0)))
-        b = scale(1 / two[2], sub(vector(filaments.velocity[i + 1], 0), velocity))
-        both = add(a, b)
-        g, growth = sub(cross(a, two[0]), cross(b, one[0])), dot(both, middle[0])
-        roll, roll2 = filaments.spin[i - 1], filaments.spin[i]
-        turning = along(scale(0.5 * roll, one[1]), 0.5 * roll2, two[1])
-        across = along(scale(0.5 * roll, cross(one[0], one[1])), 0.5 * roll2, cross(two[0], two[1]))
-        rate1 = dot(middle[2], g) - k1 * growth - dot(turning, binormal)
-        rate2 = -dot(middle[1], g) - k2 * growth - dot(across, binormal)
-        rate3 = slope * slope * (0.5 * dot(binormal, both) + roll2 - roll)
-        time = rod[BENDING_TIME]
-        moments = time * stiffness * rate1, time * stiffness * rate2, time * rod[TWISTING] * rate3
-        _bend(filaments.damping, i, moments, (k1, k2), one, two, binormal, middle)
+    slope = 1 + 0.25 * bend.twist * bend.twist  # of ν by the twist
+    moments = stiffness * v1, stiffness * v2, twisting * bend.twist * slope
+    r1, r2, r3 = _rates(one, two, bend, slope)
+    damping = time * stiffness * r1, time * stiffness * r2, time * twisting * r3
+    if ledger is None:
+        moments = add(moments, damping)
+    else:
+        _push_bend(filaments.damping, i, damping, one, two, bend)
+    _push_bend(filaments.force, i, moments, one, two, bend)
     # The energy stiffens as the angle θ grows: κ = 2 tan(θ/2), κ'² + κ κ'' = (1 + q) (1 + 3 q) with q = tan²(θ/2).
     # The twist likewise, and what bends resists rolls that are not alike.
-    q, p = 0.25 * dot(binormal, binormal), slope - 1
+    q, p = 0.25 * dot(bend.binormal, bend.binormal), slope - 1
     twisted = rod[STIFFEST_TWIST] * (1 + p) * (1 + 3 * p) + 4 * q * stiffness / rod[AXIAL]
     stiffest = step.whole * step.whole * max(rod[STIFFEST] * (1 + q) * (1 + 3 * q), twisted)
     if stiffest > RESOLVED * RESOLVED:
@@ -228,45 +249,62 @@ def _push_node(filaments: Filaments, i: int, rod: Array, angle: Vector, step: St
     return work
 
 
-@part
-def _push_segment(filaments: Filaments, i: int, rod: Array, stretch: float, load: Array) -> None:
+@inlined
+def _push_segment(
+    filaments: Filaments, i: int, rod: Array, own: Piece, stretch: float, load: Array, out: Array
+) -> None:
     """Add forces and torques on a segment: of contacts, stretching and drag, and what keeps its spin along its axis.
 
     Args:
         stretch: first moment of axial forces of contacts [N m].
         load: (6,) of contacts.
+        out: (n, 4) to which forces of internal damping are added.
     """
-    t, extent, spin = vector(filaments.tangent[i], 0), filaments.extent[i], filaments.spin[i]
-    start, end = vector(filaments.velocity[i], 0), vector(filaments.velocity[i + 1], 0)
-    opening, half, torque = sub(end, start), scale(0.5, vector(load, 0)), vector(load, 3)
-    rate = dot(opening, t)
+    t, half, torque = own.t, scale(0.5, vector(load, 0)), vector(load, 3)
     # Of forces ± at both nodes: the couple of contacts, the spin that turns with the axis, the axial spring.
-    pair = add(cross(torque, t), scale(rod[AXIAL] * spin / extent, cross(t, opening)))
-    pair = along(scale(1 / extent, pair), stretch / extent - rod[STRETCHING] * (extent - rod[LENGTH]), t)
+    pair = add(cross(torque, t), scale(rod[AXIAL] * own.spin, cross(t, own.opening)))
+    pair = along(scale(own.inverse, pair), stretch * own.inverse - rod[STRETCHING] * _stretched(filaments, i, rod), t)
     put_more(filaments.force[i], 0, sub(half, pair))
     put_more(filaments.force[i + 1], 0, add(half, pair))
     filaments.force[i, 3] += dot(torque, t)
-    resisting = rod[STRETCHING] * rod[STRETCHING_TIME] * rate
-    put_more(filaments.damping[i], 0, scale(resisting, t))
-    put_more(filaments.damping[i + 1], 0, scale(-resisting, t))
+    resisting = rod[STRETCHING] * rod[STRETCHING_TIME] * filaments.extent[i] * dot(own.opening, t)
+    put_more(out[i], 0, scale(resisting, t))
+    put_more(out[i + 1], 0, scale(-resisting, t))
     if rod[ACROSS] > 0.0:
         more = rod[ACROSS] - rod[ALONG]
-        put_more(filaments.drag[i], 0, along(scale(-rod[ACROSS], start), more * dot(start, t), t))
-        put_more(filaments.drag[i + 1], 0, along(scale(-rod[ACROSS], end), more * dot(end, t), t))
+        for k in range(i, i + 2):
+            velocity = vector(filaments.velocity[k], 0)
+            put_more(filaments.drag[k], 0, along(scale(-rod[ACROSS], velocity), more * dot(velocity, t), t))
+
+
+@inlined
+def _stretched(filaments: Filaments, i: int, rod: Array) -> float:
+    """Return by how much a segment is longer than at rest [m]."""
+    return filaments.extent[i] - rod[LENGTH]
+
+
+@inlined
+def _damping_of(ledger: Any, force: Array, damping: Array) -> Array:
+    """Return where forces of internal damping go: apart where a ledger is kept, otherwise to all others."""
+    if ledger is None:
+        return force
+    return damping
 
 
 @part
-def push_nodes(filaments: Any, parts: Parts, gravity: float, step: Step) -> None:
+def push_nodes(filaments: Any, parts: Parts, gravity: float, ledger: Any, step: Step) -> None:
     """Write all forces on nodes and all torques about the axes of segments.
 
     Args:
         filaments: `force`, `damping`, `drag`, `preferred` and `sums` are written.
         parts: with the loads of contacts.
         gravity: g [m/s²].
+        ledger: None where nothing reads it.
         step: `need` is written.
     """
     if filaments is None:
         return
+    out = _damping_of(ledger, filaments.force, filaments.damping)
     for f in range(filaments.body.shape[0]):
         first, last, rod, gait = filaments.begin[f], filaments.begin[f + 1] - 1, filaments.rod[f], filaments.gait[f]
         to_part = parts.begin[filaments.body[f]] - first
@@ -274,11 +312,15 @@ def push_nodes(filaments: Any, parts: Parts, gravity: float, step: Step) -> None
             for d in range(4):
                 filaments.force[i, d] = filaments.damping[i, d] = filaments.drag[i, d] = 0.0
             filaments.force[i, 2] = -gravity * rod[WEIGHT] * filaments.mass[i]
-        for i in range(first, last):
-            _push_segment(filaments, i, rod, parts.stretch[to_part + i, MOMENT], parts.load[to_part + i])
         c, s = direction(gait[PSI])
-        for i in range(first + 1, last):
-            filaments.sums[ACTIVE] += _push_node(filaments, i, rod, (c, s, gait[FACTOR]), step)
+        before, work = _piece(filaments, first), 0.0
+        for i in range(first, last):
+            own = _piece(filaments, i)
+            _push_segment(filaments, i, rod, own, parts.stretch[to_part + i, MOMENT], parts.load[to_part + i], out)
+            if i > first:
+                work += _push_node(filaments, i, rod, (c, s, gait[FACTOR]), before, own, ledger, step)
+            before = own
+        filaments.sums[ACTIVE] += work
 
 
 @part
@@ -413,8 +455,9 @@ def drift_nodes(filaments: Any, dt: float) -> None:
             half = 0.5 * dt * filaments.spin[i]
             per = 1 / (1 + half * half)
             d = along(scale((1 - half * half) * per, d), 2 * half * per, cross(new, d))
-            d = along(d, -dot(d, new), new)  # against rounding
-            put(filaments.director[i], 0, scale(1 / math.sqrt(dot(d, d)), d))
+            # Against rounding: across the axis, and of unit length by one step of Newton's.
+            d = along(d, -dot(d, new), new)
+            put(filaments.director[i], 0, scale(1.5 - 0.5 * dot(d, d), d))
             put(filaments.tangent[i], 0, new)
             filaments.extent[i] = extent
 
@@ -439,9 +482,9 @@ def measure(filaments: Filaments, gravity: float, found: Array) -> None:
             found[1] += gravity * rod[WEIGHT] * mass * filaments.position[i, 2]
             if i < last:
                 found[0] += 0.5 * rod[AXIAL] * filaments.spin[i] ** 2
-                found[2] += 0.5 * rod[STRETCHING] * (filaments.extent[i] - rod[LENGTH]) ** 2
+                found[2] += 0.5 * rod[STRETCHING] * _stretched(filaments, i, rod) ** 2
             if first < i < last:
-                (k1, k2, twist), _, _ = _angles(_segment(filaments, i - 1), _segment(filaments, i))
-                k1, k2 = k1 - filaments.preferred[i, 0], k2 - filaments.preferred[i, 1]
+                bend = _bend_of(_piece(filaments, i - 1), _piece(filaments, i))
+                k1, k2 = bend.k1 - filaments.preferred[i, 0], bend.k2 - filaments.preferred[i, 1]
                 found[3] += 0.5 * rod[BENDING] * (k1 * k1 + k2 * k2)
-                found[4] += 0.5 * rod[TWISTING] * twist * twist
+                found[4] += 0.5 * rod[TWISTING] * bend.twist**2
