@@ -420,9 +420,9 @@ def test_a_pile_is_stable_up_to_its_step_and_blows_up_at_twice_that(times: tuple
             made.advance(round(2000 / share))
         found.append((held.energies.kinetic, made.totals[4]))
     # What shakes beyond its step is caught by sub-steps at first, or grows.
-    assert found[1][0] < 3 * found[0][0], found
+    assert found[1][0] < 1.5 * found[0][0], found
     assert found[1][1] < 1.5, found
-    assert found[2][1] > 2 or not found[2][0] < 10 * found[0][0], found
+    assert found[2][1] > 2 or not found[2][0] < 3 * found[0][0], found
 
 
 @pytest.mark.parametrize(
