@@ -1,1 +1,1 @@
-"""Benchmarks: what a simulated second costs, and how the cost grows."""
+"""Measure what a simulated second costs, and how the cost grows."""

@@ -23,9 +23,10 @@ MEASURED = 1  # index of the compared phase; phase 0 is the pour
 
 
 def pairs(seconds: float, hinged_step: float) -> list[tuple[str, str, Changes, Changes]]:
-    """Return name, cause of the cost, and changed keys of the scenes without and with the effect, for each effect.
+    """Return name, cause of the cost, and two sets of changed keys of a scene, for each effect.
 
-    The compared phase takes `seconds` [s]; `hinged_step` is the time step of a scene with hinges [s].
+    The first set is that of the scene without the effect, the second that of the scene with it. The compared phase
+    takes `seconds` [s]; `hinged_step` is the time step of a scene with hinges [s].
     """
     rest = {"type": "relax", "duration_s": seconds}
     still = {"type": "shake", "duration_s": seconds, "peak_acceleration_g": 0}
@@ -73,7 +74,7 @@ def pairs(seconds: float, hinged_step: float) -> list[tuple[str, str, Changes, C
 
 
 def scene_data(changes: Changes, *, count: int, seed: int) -> Changes:
-    """Return a scene as a dictionary: a pile of the paper's smarticles (l/w = 0.7, draft), with changed keys."""
+    """Return a scene as a dictionary: a pile of the paper's smarticles at draft, with changed keys."""
     data: Changes = {"schema_version": 1, "seed": seed, "count": count, "fidelity": "draft", **changes}
     recording = {"checkpoint_interval_s": None, **changes.get("recording", {})}
     phases = [{"type": "deposit"}, *changes["phases"]]
@@ -81,7 +82,10 @@ def scene_data(changes: Changes, *, count: int, seed: int) -> Changes:
 
 
 def row(effect: str, cause: str, costs: list[tuple[float, float]]) -> dict[str, Any]:
-    """Return a row of the table: median and quartiles over pairs of costs without and with the effect [s/s]."""
+    """Return a row of the table: median and quartiles over pairs of the relative cost of an effect [%].
+
+    `costs` has, for each pair, the cost without and with the effect [s/s].
+    """
     shares = [100 * (after / before - 1) for before, after in costs]
     low, _, high = statistics.quantiles(shares, n=4, method="inclusive") if len(shares) > 1 else [shares[0]] * 3
     return {

@@ -1,9 +1,9 @@
-"""Compare the cost of each activity on links and YADE, from 50 to 20 000 smarticles: `python -m benchmarks.engines`.
+"""Compare the cost of each activity on links and YADE: `python -m benchmarks.engines`.
 
-The radius of the container grows with N, so that all piles are as high as the paper's pile of 270. Every run is a
-process on one thread. The processor time of the activity alone is compared, recording included. `engines.csv` has one
-row per run; a later call with the same `--out` continues the table. A run that is expected to exceed the allowed wall
-time is skipped and reported.
+Piles have 50 to 20 000 smarticles. The radius of the container grows with N, so that all piles are as high as the
+paper's pile of 270. Every run is a process on one thread. The processor time of the activity alone is compared,
+recording included. `engines.csv` has one row per run; a later call with the same `--out` continues the table. A run
+that is expected to exceed the allowed wall time is skipped and reported.
 """
 
 import argparse

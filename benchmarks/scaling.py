@@ -1,8 +1,8 @@
-"""Measure the cost per step and smarticle on links for growing piles of equal height: `python -m benchmarks.scaling`.
+"""Measure the cost per step and smarticle on links: `python -m benchmarks.scaling`.
 
-Piles are poured once, into `OUT/pours`. Each pile is then shaken at Γ = 2 for one period, several times in separate
-processes. All repetitions compute equal bits, so that the smallest time of each interval of four steps is used, which
-approximates an idle machine.
+Piles have growing numbers of smarticles and equal heights. They are poured once, into `OUT/pours`. Each pile is then
+shaken at Γ = 2 for one period, several times in separate processes. All repetitions compute equal bits, so the smallest
+time of each interval of four steps is used. It approximates the time on an idle machine.
 """
 
 import argparse
@@ -65,7 +65,7 @@ def time_intervals(run: Path) -> dict[str, Any]:
 
 
 def row_of(run: Path, count: int, repeats: int) -> dict[str, Any]:
-    """Repeat the timing of a pile in separate processes; return a row of the table with the smallest times."""
+    """Repeat the timing of a pile in separate processes; return a row with the smallest times."""
     command = [sys.executable, "-m", "benchmarks.scaling", "--time-pile", str(run)]
     found = [
         json.loads(subprocess.run(command, stdout=subprocess.PIPE, text=True, check=True).stdout)

@@ -1,8 +1,9 @@
-"""A scene as an input deck of LAMMPS: `in.lammps`, `spheres.data`, `bodies.txt`.
+"""Write a scene as an input deck of LAMMPS: `in.lammps`, `spheres.data`, `bodies.txt`.
 
-Decks are possible for passive scenes that begin with a take-over: the pile rests, is shaken, and loses its wall.
-Smarticles are rigid bodies of spheres (`fix rigid/small`) with spring, dashpot and Coulomb friction with a tangential
-spring (`gran/hooke/history`), as on YADE. Keywords are those of `dem.engine.lammps.text`.
+A deck can describe a scene without motors whose first phase takes over the pile of another run, and whose other phases
+are relax, shake or remove-container. Smarticles are rigid bodies of spheres (`fix rigid/small`) with spring, dashpot
+and Coulomb friction with a tangential spring (`gran/hooke/history`), as on YADE. `dem.engine.lammps.text` writes the
+LAMMPS commands that decks and the engine share.
 """
 
 import math
@@ -37,11 +38,11 @@ DEEPEST = 0.05
 
 
 def passive(scene: Scene) -> State:
-    """Return the smarticles with which a scene begins, at rest, if a deck can describe the scene.
+    """Return the initial state of a scene, at rest, after checking that a deck can describe the scene.
 
     Raises:
-        InputError: the scene has parts that LAMMPS cannot compute, all of which the message names; or its poses overlap
-            as spheres, since they are from another engine or fidelity.
+        InputError: LAMMPS cannot compute parts of the scene, which the message lists; or spheres of different
+            smarticles overlap, since their poses are from another engine or fidelity.
     """
     found = list(_foreign(scene))
     if found:
@@ -82,10 +83,10 @@ def _foreign(scene: Scene) -> Iterator[str]:
 
 
 def write_deck(scene: Scene, folder: Path) -> None:
-    """Write the deck of a scene into a folder of its own.
+    """Make a folder and write the deck of a scene into it.
 
     Raises:
-        InputError: as in `passive`, or the folder exists already.
+        InputError: as in `passive`, or the folder exists already or cannot be made.
         RunError: a file cannot be written.
     """
     state = passive(scene)

@@ -14,7 +14,14 @@ class RunError(RuntimeError):
 
 
 def reject(failing: Any, time: float, cause: str, way_out: str) -> None:
-    """Raise RunError about the smarticles for which `failing` (N,) is true, at a simulated time [s]."""
+    """Raise RunError that names the failing smarticles; do nothing if none fails.
+
+    Args:
+        failing: (N,) whether each smarticle fails.
+        time: simulated time [s].
+        cause: what is wrong with these smarticles.
+        way_out: what the user can do.
+    """
     if failing.any():
         ids = failing.nonzero()[0]
         shown = ", ".join(str(k) for k in ids[:5]) + (", …" if len(ids) > 5 else "")
@@ -22,7 +29,7 @@ def reject(failing: Any, time: float, cause: str, way_out: str) -> None:
 
 
 def shown(value: object) -> str:
-    """Return a value as YAML writes it, in one line of at most 60 characters and an ellipsis."""
+    """Return a value as YAML writes it, in one line, cut after 60 characters with an ellipsis."""
     constants = {None: "null", True: "true", False: "false"}
     try:
         text = constants[value] if value is None or isinstance(value, bool) else repr(value)

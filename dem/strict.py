@@ -18,7 +18,7 @@ _UNITS = {
     **{word: word for word in ("m", "s", "g", "w", "N", "J", "kg", "rad", "deg")},
     **{"hz": "Hz", "m3": "m³", "s2": "s²", "per": "/"},
 }
-_OF_A_KEY = "[key]"  # pydantic's last step of a place where the key itself is wrong
+_OF_A_KEY = "[key]"  # last step of pydantic's path if the key itself is wrong
 # A message that begins with a key is about that key, within the place that pydantic reports.
 _OWN_KEY = re.compile(r"\w[\w.]*(?=: )")
 _LONGEST_KEY = 60  # characters of a key that are shown
@@ -53,7 +53,7 @@ _TEXTS = {
     "union_tag_not_found": "type: missing in {shown}; write which one it is, see `smarticles schema`",
     "union_tag_invalid": "type: {shown_tag} is not known; {choice}",
 }
-"""Texts by pydantic's type of error; fields in braces are pydantic's context and what `_text` adds."""
+"""Message for each of pydantic's types of error; `_text` fills in the fields in braces."""
 
 
 class Strict(BaseModel):
@@ -63,12 +63,12 @@ class Strict(BaseModel):
 
     @classmethod
     def known_keys(cls) -> dict[str, FieldInfo]:
-        """Return the fields by their keys in a file, in order."""
+        """Return the fields of the model by their key in a file, in the order of their declaration."""
         return {field.alias or name: field for name, field in cls.model_fields.items()}
 
     @classmethod
     def nearest_key(cls, key: str) -> str:
-        """Return what to do about an unknown key."""
+        """Return what to do about an unknown key: use the nearest known key, or one of all known keys."""
         return nearest(key, sorted(cls.known_keys()))
 
     @model_validator(mode="before")
@@ -105,7 +105,7 @@ def _as_a_number(text: str) -> str:
 
 
 def _kind(annotation: Any) -> str:
-    """Return in words which values a field of a type takes."""
+    """Describe in words the values that a field with this annotation accepts."""
     parts = [annotation] if get_origin(annotation) is None else [*get_args(annotation)]
     parts = [get_args(part)[0] if get_origin(part) is Annotated else part for part in parts]
     if any(part in (int, float) for part in parts) and all(part in (int, float, type(None), ...) for part in parts):
@@ -120,6 +120,7 @@ def explained(error: ValidationError, data: Any, *, described: str) -> str:
     """Return pydantic's first errors in one line, each as `key: value and what is wrong; what to do`.
 
     Args:
+        data: the mapping that was validated.
         described: where users find a description of the keys.
     """
     texts: dict[str, str] = {}

@@ -50,7 +50,7 @@ def export_run(
     Args:
         output: Path that must not exist: a folder for vtp and for all frames, else a file with this suffix;
             `export-TO` or `export.TO` in the run directory if not given.
-        time: Simulated time [s], of which the nearest frame is exported; that of the last frame if not given.
+        time: Simulated time [s]; the frame nearest to it is exported. If not given, the last frame is exported.
         wanted: Kinds of bodies besides `postprocess.bodies.meshes.USUAL`.
         unwanted: Kinds of bodies and fields to leave out.
         color_by: Name or short name of a field, for formats with colours, see `colour_field`.

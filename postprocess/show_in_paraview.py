@@ -41,7 +41,7 @@ def rgb(colour: str) -> list[float]:
 
 
 def folder_of_export(given: str | None) -> Path:
-    """Return the folder with the .pvd files: the given one, or that of the open file, or of this script."""
+    """Return the given folder, else the folder of the open .pvd file, else the folder of this script."""
     source = simple.GetActiveSource()
     places = [Path(given)] if given else []
     if source is not None and hasattr(source, "FileName"):
@@ -96,7 +96,7 @@ def times(source: Any) -> list[float]:
 
 
 def data_at(source: Any, time: float) -> Any:
-    """Return the data of a collection at a time [s]; ParaView's own summaries may be of another time."""
+    """Return the data of a collection at a time [s], since ParaView's summaries may be of another time."""
     source.UpdatePipeline(time)
     found = simple.servermanager.Fetch(source)
     return found.GetBlock(0) if found.IsA("vtkMultiBlockDataSet") else found

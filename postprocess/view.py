@@ -111,7 +111,7 @@ class RunView:
         return len(self.frames) > before
 
     def go_to(self, index: int) -> None:
-        """Show the frame with an index; InputError if its file is damaged, the shown frame does not change."""
+        """Show the frame with an index; if its file is damaged, raise InputError and keep the shown frame."""
         index = min(max(index, 0), len(self.frames) - 1)
         frame = self.frames[index]
         self._bodies.hold([frame])
@@ -173,7 +173,7 @@ class RunView:
         return sorted({round(place) for place in np.linspace(0, len(self.frames) - 1, number)})
 
     def _widened(self, values: Floats) -> tuple[float, float]:
-        """Return the bounds of the colour scale, by some frames of the run and by all shown frames."""
+        """Return the extremes of a field in all frames shown so far and in some frames of the run."""
         name = self.field.name
         samples = [np.array(self._bounds.get(name, ())), values]
         if name not in self._bounds:
@@ -364,8 +364,8 @@ class Viewer:
 def view_run(directory: Path | str, *, port: int = 0, opened: Callable[[str], None]) -> None:
     """Serve the page of a run to browsers on this machine, until the page is closed.
 
-    The run may be unfinished. `opened` is called with the address of the page once the server listens on the port; 0 is
-    any free port. InputError if there is no frame, a file is damaged, or the port is taken.
+    The run may be unfinished. `opened` is called with the address of the page once the server listens on the port. The
+    port 0 stands for any free port. InputError if there is no frame, a file is damaged, or the port is taken.
     """
     # The page needs no display, of whose absence VTK would warn.
     vtkLogger.SetStderrVerbosity(vtkLogger.VERBOSITY_ERROR)

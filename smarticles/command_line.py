@@ -16,7 +16,7 @@ Handler = Callable[[argparse.Namespace], int]  #: Function that runs a subcomman
 
 
 class Parser(argparse.ArgumentParser):
-    """Argument parser that raises InputError with the nearest known word instead of printing its usage."""
+    """Argument parser that raises InputError, which names the nearest known word, instead of exiting."""
 
     def __init__(self, **options: Any) -> None:
         options.setdefault("formatter_class", argparse.RawDescriptionHelpFormatter)
@@ -68,7 +68,10 @@ Read = TypeVar("Read")
 
 
 def reader(convert: Callable[[str], Read], what: str, valid: Callable[[Read], bool]) -> Callable[[str], Read]:
-    """Return a `type` for argparse that converts and checks an argument; `what` describes valid values."""
+    """Return a `type` for argparse that reads an argument by `convert` and checks its value by `valid`.
+
+    `what` describes valid values in the message of the error.
+    """
 
     def read(text: str) -> Read:
         with suppress(ValueError):
@@ -134,7 +137,7 @@ def add_options(parser: argparse._ActionsContainer, *options: str, **settings: A
 
 
 def scene_settings(arguments: argparse.Namespace) -> list[str]:
-    """Return --set and --engine as a list of `KEY=VALUE`; raise InputError if they name different engines."""
+    """Return --set and --engine as a list of `KEY=VALUE`; InputError if they name different engines."""
     settings: list[str] = list(arguments.set)
     if arguments.engine is None:
         return settings
@@ -146,7 +149,7 @@ def scene_settings(arguments: argparse.Namespace) -> list[str]:
 
 
 def reject_existing(option: str, path: Path | None, *, overwrite: bool) -> None:
-    """Raise InputError if an output file exists and may not be replaced; called before the computation."""
+    """Raise InputError if an output file exists and may not be replaced; call it before the computation."""
     if path is not None and path.exists() and not overwrite:
         raise InputError(f"{option} {path}: exists; choose another name or give --overwrite")
 

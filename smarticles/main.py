@@ -1,4 +1,4 @@
-"""Console command `smarticles`; its help has the exit statuses."""
+"""Define the console command `smarticles`; its help lists the exit statuses."""
 
 import argparse
 import os
@@ -38,7 +38,7 @@ COMMANDS = (
 )
 """Functions that add the commands, in the order of `smarticles --help`; add a new command here."""
 
-FAILED, BAD_INPUT, STOPPED, BROKEN_PIPE = 1, 2, 130, 141  #: The last: the reader of the output closed the pipe
+FAILED, BAD_INPUT, STOPPED, BROKEN_PIPE = 1, 2, 130, 141  #: Exit statuses; 141: the output's reader closed it
 
 _SHELLS = ("bash", "zsh")
 _SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)

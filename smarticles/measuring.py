@@ -1,4 +1,4 @@
-"""Tables of the measures of runs and sweeps, with the variables of a sweep as columns."""
+"""Make tables of the measures of runs and sweeps, with the variables of a sweep as columns."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def has_frames(directory: Path) -> bool:
 
 
 def sources(directories: Sequence[Path]) -> dict[Path, Mapping[str, Any]]:
-    """Find the runs to measure in directories of runs and sweeps; raise InputError if a sweep has none.
+    """Find the runs to measure in directories of runs and sweeps; InputError if a sweep has no frames.
 
     Returns:
         Values of the sweep's variables by run directory, empty for runs without a sweep. Runs of a sweep that have no
@@ -64,7 +64,7 @@ def values_in(folder: Folder) -> dict[str, list[Any]]:
 
 
 def follows(name: str, other: str, points: Iterable[Mapping[str, object]]) -> bool:
-    """Return whether the variable `name` is a function of the variable `other` at these points."""
+    """Return whether equal values of the variable `other` imply equal values of `name` at these points."""
     seen: dict[str, object] = {}
     return all(seen.setdefault(str(point.get(other)), point.get(name)) == point.get(name) for point in points)
 
@@ -82,7 +82,7 @@ def measured(
 
     Returns:
         A table with units in the column names. Variables of a sweep are columns after the first one. A variable is
-        called "NAME (swept)" if a measured column NAME has other values.
+        called "NAME (swept)" if there is a measured column NAME with other values.
 
     Raises:
         InputError: a sweep has no run with frames yet, or a file is missing or damaged.
@@ -118,7 +118,7 @@ def _table(directory: Path, values: Mapping[str, Any], *, frames: bool, costly: 
 
 
 def grouped(table: pd.DataFrame, by: Sequence[str]) -> pd.DataFrame:
-    """Average a table of `measured` over runs of equal values in `by`: means and standard errors by phase."""
+    """Average a table of `measured` over runs with equal values in `by`, with standard errors, by phase."""
     from postprocess.statistics.points import means_by  # noqa: PLC0415
 
     for name in by:

@@ -108,7 +108,7 @@ def run(
 
 
 def read(directory: Path | str) -> Run:
-    """Open the run directory of a finished or unfinished run; raise InputError if it is none."""
+    """Open the directory of a finished or unfinished run; raise InputError for any other directory."""
     return open_run(directory)
 
 
@@ -130,7 +130,7 @@ def measure(run: Run | Path | str, *, frames: bool = False) -> pd.DataFrame:
 
 
 def read_sweep(directory: Path | str) -> SweepDirectory:
-    """Open the directory of a sweep or a study, finished or not; raise InputError if it is none."""
+    """Open the directory of a sweep or a study, finished or not; raise InputError for any other directory."""
     return SweepDirectory(open_folder(Path(directory)))
 
 
@@ -207,7 +207,7 @@ def write_sweep(scene: Scene | Path | str, vary: Mapping[str, Sequence[Any]], fo
 
 
 def _explicit_keys(scene: Scene) -> dict[str, Any]:
-    """Return the keys that were set explicitly; derived keys are left out, since they depend on the varied keys."""
+    """Return the keys that were set explicitly, without derived keys, which may depend on varied keys."""
     data = scene.model_dump(mode="json", exclude_unset=True)
     if "fidelity" in data:
         named = fidelities(scene.engine)[scene.fidelity.base]
@@ -217,7 +217,7 @@ def _explicit_keys(scene: Scene) -> dict[str, Any]:
 
 
 def _read_scene_file(path: Path) -> dict[str, Any]:
-    """Return the content of a scene file, with absolute paths of runs to take over."""
+    """Return the content of a scene file, in which paths of runs to take over are absolute."""
     try:
         data = load_yaml(path.read_text(encoding="utf-8"))
     except (OSError, ValueError, yaml.YAMLError) as error:

@@ -1,4 +1,4 @@
-"""Create or continue directories of sweeps; compute their runs on this machine or submit them to Slurm."""
+"""Create or continue directories of sweeps; compute their runs here or submit them to Slurm."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 
 def make_folder(file: Path, out: Path, command: str) -> Folder:
-    """Write the scenes of a sweep file to a directory, which may contain this sweep already; return the directory.
+    """Write the scenes of a sweep file to a directory that may hold this sweep already; return it.
 
     Args:
         file: sweep file.
@@ -61,7 +61,7 @@ def folder_of(sweep: Sweep, points: Sequence[Point], out: Path, command: str, *,
 
 
 def expected_wall_s(scene: Scene) -> float:
-    """Return the expected wall time of a scene [s] on one core of the machine that costs were measured on."""
+    """Return the expected wall time of a scene [s] on one core of the machine of the cost measurements."""
     from dem.plan.outlook import plan  # noqa: PLC0415
 
     return plan(scene).wall_s
@@ -104,7 +104,7 @@ def raise_failures(folder: Folder, outcomes: Sequence[Outcome]) -> None:
 
 
 def complete_here(folder: Folder, arguments: argparse.Namespace) -> int:
-    """Compute the missing runs of a sweep on this machine, and print the next command; return the exit status."""
+    """Compute the missing runs of a sweep here, print the next command, and return the exit status."""
     raise_failures(folder, compute(folder, jobs=arguments.jobs, command=arguments.command_line))
     print(f"{folder.path}: all {len(folder.entries)} runs are done; next: smarticles measure {folder.path}")
     return 0
@@ -163,7 +163,7 @@ def is_for_cluster(arguments: argparse.Namespace, *, allow_ranks: bool = False) 
 
 
 def draft_of(path: Path, name: str, entries: Sequence[Entry], arguments: argparse.Namespace) -> Draft:
-    """Render the job of some runs by the cluster options of a command, see `templates.slurm.submission.draft`."""
+    """Render a job for runs by the cluster options of a command; see `templates.slurm.submission.draft`."""
     from templates.slurm.cluster import shipped_clusters  # noqa: PLC0415
     from templates.slurm.job import Wishes  # noqa: PLC0415
     from templates.slurm.submission import draft, submissions  # noqa: PLC0415
@@ -187,7 +187,7 @@ def draft_of(path: Path, name: str, entries: Sequence[Entry], arguments: argpars
 
 
 def enqueue(folder: Folder, arguments: argparse.Namespace) -> int:
-    """Write a job for the missing runs of a sweep that are not in the queue, and submit the job with --submit slurm."""
+    """Write a job for runs that are missing and not in the queue; submit the job with --submit slurm."""
     from templates.slurm.submission import submissions, submit, tasks_of_runs, to_submit, write  # noqa: PLC0415
 
     quoted = shlex.quote(str(folder.path))

@@ -17,6 +17,7 @@ from types import MappingProxyType
 import numpy as np
 import pandas as pd
 import yaml
+from matplotlib.ticker import LogLocator, NullLocator
 
 from dem.errors import InputError, nearest
 from dem.record.run import Run
@@ -26,9 +27,10 @@ from dem.setting.fidelity import Fidelity, fidelities
 from postprocess.measures.packing import DEFINITIONS
 from postprocess.measures.pull import PULL, has_pull, peak, read_pull, weight_of_one
 from postprocess.measures.table import LAST_FRAMES, summarise_run
+from postprocess.report.figures import BLUE, GREY, ORANGE
 from postprocess.statistics.points import ASPECT, SEED, SEEDS, format_with_error, marked, seeds_of
 from postprocess.statistics.seeds import Scatter, mean_over_seeds, pooled_scatter, relative_difference
-from studies.framework.figures import POOLED, Means, one_by_one
+from studies.framework.figures import POOLED, Analysis, Means, finish, marker, one_by_one, panels
 from studies.framework.findings import Finding, Outcome, Verdict, decide
 from studies.framework.provenance import Reference
 from studies.framework.runs import DEFINITION, ENGINE, Key, Quantity, Row, duration, last_columns
@@ -48,12 +50,14 @@ ACTIVITIES = ACTUATED | {"shake"}
 
 _OF_MOTORS = frozenset({"control", "hinge"})
 _ENGINES = ("yade", "links")
-"""From coarse to fine: links have smooth bodies and walls, so that their converged results are the reference."""
+"""Engines from coarse to fine; links have smooth bodies and walls, so their converged results are the reference."""
 # Fields of the fidelity that no knob changes; a scene with its own time step is rejected.
 _FIXED = frozenset({"wall_facets", "time_step_s"})
 _STIFFNESSES = (125.0, 250.0, 500.0, 1000.0, 2000.0, 4000.0)
-_CONVERGED = {"rows": 3, "stiffness_N_per_m": 4000.0}
+_CONVERGED = {"stiffness_N_per_m": 4000.0}
 """Changes to the finest named fidelity on links that make the reference of the knobs `fidelity` and `engine`."""
+PROMISES = {"draft": 8.0, "standard": 3.0, "reference": 1.5}
+"""Largest error [%] of each named fidelity on links, with 95 % confidence, in all compared quantities."""
 _ROWS = {2: "two", 3: "three", 4: "four"}
 _MOST_SEEDS = 1000
 _TEMPLATE = Path("accuracy.yaml.j2")
@@ -64,8 +68,8 @@ class Rung:
     """One value of a knob."""
 
     knob: str
-    value: str  #: As text
-    unit: str  #: Empty for a pure number or a name
+    value: str  #: Value of the knob, as text
+    unit: str  #: Unit of the value; empty for a pure number or a name
     setting: str  #: Name of the variant of the scene; its runs are named SETTING_seedN
 
     @property
@@ -83,7 +87,7 @@ class Rung:
 class Ladder:
     """Rungs of all knobs, and the variants of the scene that they need."""
 
-    rungs: tuple[Rung, ...]  #: By knob, from coarse to fine
+    rungs: tuple[Rung, ...]  #: Rungs by knob, from coarse to fine
     settings: Mapping[str, Mapping[str, Value]] = field(repr=False)  #: Variables of the template by variant
     left_out: tuple[str, ...] = ()  #: Rungs that the scene cannot have, with the reason, as text
     scenes: Mapping[str, Scene] = field(repr=False)  #: Scenes by variant
@@ -101,7 +105,7 @@ class Ladder:
 VARIANT, KNOB, VALUE, UNIT, REFERENCE, VERDICT = "variant", "knob", "value", "unit", "reference", "verdict"
 ACTIVITY, COUNT = "activity", "smarticles [-]"
 COST, WALL = "processor time per simulated time of the last activity [s/s]", "wall time [s]"
-"""Cost is given as processor time, which other processes change less than wall time; a run has one thread."""
+"""The cost is a processor time, which other processes change less than the wall time; a run has one thread."""
 
 EXPECTED = "processor time over expected wall time [-]"
 RESIDUAL, GAP = "energy residual over dissipated [-]", "largest joint gap [m]"
@@ -133,14 +137,14 @@ _NAMED = re.compile(r"(?P<variant>.+)_seed(?P<seed>\d+)")
 
 
 def default_seeds(scene: Scene) -> tuple[int, ...]:
-    """Return the default seeds: 1 to 20 on links, where runs are cheap, 1 to 3 on YADE."""
+    """Return the default seeds: 1 to 20 on links, where runs are cheap, otherwise 1 to 3."""
     return tuple(range(1, 21 if scene.smooth else 4))
 
 
 def parse_seeds(text: str) -> tuple[int, ...]:
     """Parse seeds from a text such as `1,2,3` or `1-20`.
 
-    InputError if there is no seed, one is not a whole number from 0, or one is given twice.
+    InputError if there is no seed, a seed is not a whole number from 0, or a seed is given twice.
     """
     words = [word.strip() for word in text.split(",") if word.strip()]
     if not words or not all(re.fullmatch(r"[0-9]{1,9}(-[0-9]{1,9})?", word) for word in words):
@@ -288,7 +292,7 @@ _Point = tuple[str, str, str, dict[str, Value]]
 
 
 def _rungs(knob: str, base: Mapping[str, Value], *, smooth: bool) -> list[_Point]:
-    """Return all rungs of a knob, from coarse to fine; `smooth`: links are smooth, not chains of spheres."""
+    """Return all rungs of a knob, from coarse to fine; `smooth`: links are swept bars, not sphere chains."""
     if knob == "section":
         return _strands(base) if smooth else _sections(base)
     if knob == "fidelity":
@@ -358,9 +362,9 @@ def _shaped(name: str, shape: dict[str, Value]) -> _Point:
 
 
 def measure(run: Run, expected_s: Mapping[str, float]) -> Row:
-    """Measure cost and compared quantities of a run, named SETTING_seedN; return its row.
+    """Measure cost and compared quantities of a run, whose directory is SETTING_seedN; return its row.
 
-    `expected_s` has expected wall times [s] by name of the run directory, as far as known.
+    `expected_s` has the known expected wall times [s] by name of the run directory.
     """
     active = [phase for phase in run.phases if phase.type in ACTIVITIES]
     if not active or active[0].index == 0:
@@ -412,9 +416,9 @@ def _or_nan(number: float | None) -> float:
 
 
 def _of_series(run: Run, active: Sequence[int]) -> dict[str, float]:
-    """Return the cells peak hook force, energies and joint gap of a run; NaN if not recorded.
+    """Return peak hook force, energies and joint gap of a run, by column; NaN if not recorded.
 
-    `active` has the indices of the phases whose work is added up.
+    `active` are the indices of the phases whose work is added up.
     """
     names = (COMPARED["hook_force"], COMPARED["energy"], RESIDUAL, GAP)
     found = dict.fromkeys(names, math.nan)
@@ -427,7 +431,7 @@ def _of_series(run: Run, active: Sequence[int]) -> dict[str, float]:
         found[COMPARED["hook_force"]] = highest / (run.manifest.count * weight_of_one(run))
     data = series.data
     if "container_work_J" in data:
-        work, phases = data["container_work_J"] + data["motor_work_J"], data["phase"]
+        work, phases = data["container_work_J"] + data.get("motor_work_J", 0.0), data["phase"]
         found[COMPARED["energy"]] = math.fsum(work[phases == one][-1] - work[phases < one][-1] for one in active)
     if "energy_residual_J" in data and "dissipated_energy_J" in data:
         residual, dissipated = data["energy_residual_J"], data["dissipated_energy_J"]
@@ -444,9 +448,9 @@ def work_precision(runs: pd.DataFrame, rungs: Sequence[Rung]) -> pd.DataFrame:
 
     The table has one row per rung, from coarse to fine within a knob; NaN for a rung without runs. Columns: cost and
     means over seeds with their standard errors `… SE`; `… error [%]`, relative to the mean of the reference; `… error
-    95 % [%]`, the band of the error, which is half of its 95 % interval by Student's t, with the scatter pooled over
-    all variants; `… resolved`, whether the error is beyond its band; `verdict`, whether any error of the rung is. The
-    reference has the error 0 and the band of its own mean.
+    95 % [%]`, the band of the error; `… resolved`, whether the error is beyond its band; `verdict`, whether any error
+    of the rung is resolved. The band is half of the 95 % interval by Student's t, with the scatter pooled over all
+    variants. The reference has the error 0 and the band of its own mean.
     """
     groups = {rung.setting: runs[runs[VARIANT] == rung.setting] for rung in rungs}
     scatters = {name: pooled_scatter(group[column] for group in groups.values()) for name, column in COMPARED.items()}
@@ -539,6 +543,71 @@ def advise(table: pd.DataFrame, knob: str) -> Outcome:
     )
 
 
+def worst_errors(table: pd.DataFrame) -> pd.DataFrame:
+    """Return the largest error of each named fidelity: of packing, heights and ⟨N⟩, and in a row of its own of energy.
+
+    The largest error is that with the largest bound: its absolute value plus its 95 % band. Columns: `engine`,
+    `fidelity`, `COST`, `quantity` (its symbol), `error [%]` (absolute value), `bound [%]`, and the number of seeds.
+    """
+    knob = "engine" if (table[KNOB] == "engine").any() else "fidelity"
+    rows = []
+    for _, row in table[(table[KNOB] == knob) & (table[SEEDS] > 1) & (table[VERDICT] != IS_REFERENCE)].iterrows():
+        labels = {ENGINE: row[ENGINE], "fidelity": row[VALUE].split()[-1], COST: row[COST], SEEDS: row[SEEDS]}
+        for names in (("phi_0", "phi_f", "height", "crossings"), ("energy",)):
+            errors = {
+                SYMBOLS[name]: (abs(row[f"{name} error [%]"]), row[f"{name} error 95 % [%]"])
+                for name in names
+                if math.isfinite(row[f"{name} error [%]"])
+            }
+            if errors:
+                symbol, (error, band) = max(errors.items(), key=lambda item: sum(item[1]))
+                rows.append({**labels, "quantity": symbol, "error [%]": error, "bound [%]": error + band})
+    return pd.DataFrame(rows)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Promises:
+    """Largest error of each named fidelity against its cost, one panel for each scene."""
+
+    name: str = "fidelities"
+
+    def draw(self, path: Path, analysis: Analysis) -> list[Path]:
+        """Draw the ladder of one scene; return the files."""
+        table = analysis.tables["work_precision"]
+        return self.compare(path, {str(table[ACTIVITY].dropna().iloc[0]): table}, analysis.footer)
+
+    def compare(self, path: Path, tables: Mapping[str, pd.DataFrame], footer: Sequence[str]) -> list[Path]:
+        """Draw tables of work and precision by the name of their scene; return the files."""
+        figure, axes = panels(len(tables), columns=3, height=3.0, sharey=True)
+        for panel, (title, table) in zip(axes, tables.items(), strict=True):
+            for name, promise in PROMISES.items():
+                panel.axhline(promise, color=GREY, linewidth=0.6, linestyle=":")
+                panel.annotate(f"{name}: {promise:g} %", (0.01, promise), (0, 1), xycoords=("axes fraction", "data"),
+                               textcoords="offset points", color=GREY, fontsize=5.5)  # fmt: skip
+            for _, row in worst_errors(table).iterrows():
+                colour = {"links": BLUE, "yade": ORANGE}[row[ENGINE]]
+                bar = [[0.0], [row["bound [%]"] - row["error [%]"]]]
+                of_energy = row["quantity"] == SYMBOLS["energy"]
+                panel.errorbar(row[COST], row["error [%]"], yerr=bar, label=row[ENGINE],
+                               **marker("o", colour, "white" if of_energy else colour))  # fmt: skip
+                text = row["quantity"] if of_energy else f"{row['fidelity']}: {row['quantity']}"
+                panel.annotate(text, (row[COST], row["bound [%]"]), (0, 3), textcoords="offset points", ha="center",
+                               color=colour)  # fmt: skip
+            low, high = table[COST].min() / 2, table[COST].max() * 1.5
+            panel.set(title=title, xscale="log", xlim=(low, high), xlabel="processor time per simulated time [s/s]")
+            panel.xaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
+            panel.xaxis.set_major_formatter("{x:g}")
+            panel.xaxis.set_minor_locator(NullLocator())
+            panel.margins(y=0.15)
+            panel.set_ylim(bottom=0)
+        axes[0].set_ylabel("error against the converged fidelity [%]")
+        notes = [
+            "Largest error of φ_0, φ_f, height and ⟨N⟩ (filled), and error of the energy put in (open, E). "
+            "End of the bar: what the seeds do not exclude (95 %)."
+        ]
+        return finish(figure, path, notes, footer)
+
+
 def _finding(knob: str, *, sensitivity: bool) -> Finding:
     return Finding(
         id=knob,
@@ -587,6 +656,7 @@ def study(rungs: Sequence[Rung], expected_s: Mapping[str, float] = MappingProxyT
         ),
         findings=[_finding(knob, sensitivity=sensitivity) for knob, sensitivity in knobs.items()],
         figures=(
+            *([Promises()] if {"fidelity", "engine"} & set(knobs) else []),
             Means(
                 name="accuracy",
                 table="work_precision",

@@ -1,8 +1,8 @@
 """Smarticles of l/w = 0.8 are poured into a mould of three tiers, narrower from tier to tier.
 
-After an activity, or none, all walls are removed at once. Measured are how much of each tier is filled before, and how
-much of that is filled 1 s after. Compared with Savoie, Tuazon, Bhamla and Goldman, "Amorphous Entangled Active Matter",
-Soft Matter 2023, section "Casting". Procedures are compared seed by seed.
+After an activity, or none, all walls are removed at once. The study measures which fraction of each tier is filled
+before, and which part of it is still filled 1 s after. It compares them with Savoie, Tuazon, Bhamla and Goldman,
+"Amorphous Entangled Active Matter", Soft Matter 2023, section "Casting". Procedures are compared seed by seed.
 """
 
 import math

@@ -1,9 +1,9 @@
 """Strain test of a chain of two or six robots between two walls, at several distances of the walls.
 
-Measured are force, yield, width and fracture against confinement h/H. Compared with Savoie, Tuazon, Bhamla and Goldman,
-"Amorphous Entangled Active Matter", Soft Matter 2023, section "Robophysical experiment". The paper omits friction,
-servos and strings; variants of the sweep show their influence. In `chain-bodies` robots have bodies 2.1 cm thick. Runs
-of one seed have equal servos. --quick takes minutes.
+The study measures force, yield, width and fracture against confinement h/H. It compares them with Savoie, Tuazon,
+Bhamla and Goldman, "Amorphous Entangled Active Matter", Soft Matter 2023, section "Robophysical experiment". The paper
+omits friction, servos and strings; variants of the sweep show their influence. In `chain-bodies` robots have bodies 2.1
+cm thick. Runs of one seed have equal servos. --quick takes minutes.
 """
 
 from functools import partial
@@ -117,7 +117,7 @@ def in_range(runs: pd.DataFrame) -> pd.DataFrame:
 def by_trial(part: pd.DataFrame, quantity: str) -> SeedMean:
     """Average a quantity over h/H, then over seeds.
 
-    Runs with equal servos are identical until the chain touches a wall: values at several h/H are not independent.
+    Runs with equal servos are identical until the chain touches a wall, so values at several h/H are not independent.
     """
     return mean_over_seeds(part.groupby(SEED)[quantity].mean().tolist())
 
@@ -227,7 +227,10 @@ FINDINGS = (
 
 
 def history(run: Run, *, width: bool = False) -> History:
-    """Read the string's force [N], or the width over that at the start [-], against strain to fracture."""
+    """Read the force of the pulled string [N] against strain [-], up to the fracture.
+
+    With `width` read the width of the chain over its width at the start [-] instead.
+    """
     pull = read_strain_test(run)
     end = pull.fracture + 1
     values = pull.widths / pull.widths[0] if width else pull.forces

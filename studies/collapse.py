@@ -126,7 +126,7 @@ def activations(runs: pd.DataFrame) -> pd.DataFrame:
 
     Δ is fitted for each seed over those accelerations at which all runs collapsed, then averaged over seeds. A seed
     that lacks a run at one of these accelerations is left out, since its slope would belong to other accelerations.
-    If there is no such acceleration, Δ is NaN, and the row has a lower bound only.
+    If all runs collapsed at no acceleration, Δ is NaN, and the row has a lower bound only.
     """
     found = []
     every, gravish = times(runs), _GRAVISH.set_index("l_over_w")["delta"]

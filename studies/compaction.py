@@ -61,11 +61,11 @@ _MEANINGS = {
 
 
 class Fit(NamedTuple):
-    """A law fitted to φ against time; the end is uncertain if φ has not come near it."""
+    """A law fitted to φ against time; its end is uncertain if φ is still far from it."""
 
     law: str  #: Key of `LAWS`
-    begin: float  #: φ_b, when shaking begins [-]
-    end: float  #: φ_∞, after infinite time [-]
+    begin: float  #: φ_b, φ when shaking begins [-]
+    end: float  #: φ_∞, φ after infinite time [-]
     tau: float  #: τ [s]
     power: float  #: β of the stretched exponential, B of the inverse logarithm [-]
     residual: float  #: Root mean square of the residuals [-]
@@ -79,7 +79,7 @@ class Fit(NamedTuple):
 def fit(law: str, times: Array, packing: Array) -> Fit:
     """Fit a law to φ (n,) [-] at times (n,) [s] by least squares.
 
-    φ depends linearly on begin and end, so that these are solved for exactly at every τ and power.
+    φ is linear in begin and end, so that both follow exactly from τ and power.
     """
 
     def solved(parameters: Array) -> tuple[Array, Array]:
@@ -99,7 +99,7 @@ def fit(law: str, times: Array, packing: Array) -> Fit:
 
 
 def spread_out(times: Array, packing: Array) -> tuple[Array, Array]:
-    """Average φ (n,) [-] at times (n,) [s] over logarithmic intervals; empty ones are left out.
+    """Average φ (n,) [-] at times (n,) [s] over logarithmic intervals; empty intervals are left out.
 
     Returns the geometric centres of the intervals (m,) [s], and means of φ (m,) [-].
     """

@@ -42,7 +42,7 @@ from studies.framework.study import Study
 MARGIN = 5.0  # %, accepted deviation from Gravish's points
 WALL, RESTITUTION = "friction at the container [-]", "restitution [-]"
 FACTORS: dict[str, tuple[float, float]] = {FRICTION: (0.4, 0.8), WALL: (0.4, 0.8), RESTITUTION: (0.7, 0.3)}
-"""First value, that of Savoie et al., and second value of each factor [-]."""
+"""First value (of Savoie et al.) and second value of each factor [-]."""
 
 CALLED = {FRICTION: "friction between smarticles", WALL: "friction at the container", RESTITUTION: "restitution"}
 RISEN, CROSSED = "lowest tenth after less before shaking [w]", "crossings after [-]"
@@ -112,7 +112,7 @@ def points(runs: pd.DataFrame) -> pd.DataFrame:
 
 
 def by_seed(runs: pd.DataFrame, quantity: str, *changed: str) -> pd.DataFrame:
-    """Return the change of a quantity with one factor, or the interaction of two, by l/w and seed."""
+    """Return the change of a quantity with one factor, or the interaction of two factors, by l/w and seed."""
     table, left = runs, [*FACTORS, ASPECT, SEED]
     for factor in changed:
         left = [name for name in left if name != factor]
@@ -138,8 +138,8 @@ def effects(runs: pd.DataFrame) -> pd.DataFrame:
 def lowers(name: str, says: str, quantity: str, *changed: str, sign: int = -1, less: str = "") -> Finding:
     """Make the finding that a change of a factor, or the interaction of two, lowers a quantity.
 
-    The sign is −1 if the statement says lowers, +1 if raises. `less` is a factor whose effect is subtracted, if the
-    statement says lowers more than that factor.
+    `sign` is −1 if the statement says that it lowers, +1 if it says that it raises the quantity. `less` is a factor
+    whose effect is subtracted, for a statement that the change lowers more than this factor does.
     """
 
     def outcome(runs: pd.DataFrame) -> Outcome:

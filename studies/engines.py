@@ -65,9 +65,9 @@ class Compared(NamedTuple):
     """A quantity in which the engines are compared."""
 
     label: str  #: Name in tables and texts
-    #: Cases whose runs have the quantity; several if all start with one pile, whose mean over cases is one sample
+    #: Cases whose runs have the quantity; several cases that start with one pile give one sample, their mean
     cases: tuple[str, ...]
-    column: str  #: Of the table of runs
+    column: str  #: Column in the table of runs
     margin: float  #: Accepted difference [% of YADE's mean], chosen before the first run
     why: str  #: Reason for this margin
 
@@ -149,7 +149,7 @@ def by_seed(runs: pd.DataFrame, one: Compared, variant: str) -> pd.Series:
 
 
 def equivalence(runs: pd.DataFrame) -> pd.DataFrame:
-    """Compare the engines, paired by seed: a row for each quantity that was measured on one of them."""
+    """Compare the engines, paired by seed: a row for each quantity that at least one of them measured."""
     rows = []
     for one in COMPARED:
         links, yade = (by_seed(runs, one, variant) for variant in (LINKS, YADE))

@@ -1,7 +1,7 @@
 """Finite size: packing, entanglement and percolation in piles of 100 to 10 000 smarticles.
 
-Measured are φ and ⟨N⟩ against N^(-1/3), where N is the number of smarticles, and the l/w from which entangled clusters
-span piles of each size. A run is a pour, a rest, a shake and a rest.
+The study measures φ and ⟨N⟩ against N^(-1/3), where N is the number of smarticles, and the l/w above which entangled
+clusters span piles of each size. A run is a pour, a rest, a shake and a rest.
 
 A pile is spanned if one cluster joins floor and top, and one joins opposite sides of the wall. The height alone is not
 enough: a pile of 100 thin smarticles is lower than a single smarticle is long.
@@ -47,8 +47,9 @@ PAPER_ASPECT, PAPER_COUNT = 0.7, 270  #: l/w and number of smarticles of the pap
 LARGEST = 0.2  #: Greatest l/w of the runs that the percolation threshold is fitted to
 
 AT_THRESHOLD = -0.155
-"""Power of N with which the largest cluster's share falls just at the threshold of percolation in three dimensions,
-β/(νd) with β = 0.41 and ν = 0.88: Stauffer & Aharony, Introduction to Percolation Theory (1994), table 2."""
+"""Power of N with which the largest cluster's share of the pile falls at the percolation threshold in three dimensions.
+
+It is β/(νd) with β = 0.41 and ν = 0.88: Stauffer & Aharony, Introduction to Percolation Theory (1994), table 2."""
 
 _REJECTED = 0.05  # greatest p-value at which a law is rejected
 _DISTINCT = (1 / 6, 2 / 3)  # half and twice the power 1/3; an interval within them supports this power
@@ -184,12 +185,12 @@ def laws(runs: pd.DataFrame) -> pd.DataFrame:
 
 
 def _column(stage: str, axis: str) -> str:
-    """Return the column that belongs to an axis of the table of thresholds: "l/w" or "⟨N⟩"."""
+    """Return the column of the runs that belongs to an axis of the table of thresholds, "l/w" or "⟨N⟩"."""
     return ASPECT if axis == "l/w" else crossings(stage)
 
 
 def _profiles(runs: pd.DataFrame, stage: str, axis: str) -> dict[int, Profile]:
-    """Fit the threshold from which piles are spanned along an axis ("l/w" or "⟨N⟩"), by size."""
+    """Fit, by size, the threshold in l/w or ⟨N⟩ (`axis`) above which piles are spanned."""
     column = _column(stage, axis)
     part = runs[(runs[ASPECT] <= LARGEST) & np.isfinite(runs[column])]
     if part.empty:

@@ -1,8 +1,8 @@
 """A hook is pulled out of piles that were prepared by each procedure, at several θ and l/w.
 
-Measured are force against time, peak force and work, and their correlation with entanglement. They are compared with
-Savoie, Tuazon, Bhamla and Goldman, "Amorphous Entangled Active Matter", Soft Matter 2023, section "Tensile loading and
-fracture". Runs of one l/w and seed are poured from equal poses and compared pair by pair. If the hook stops at its
+The study measures force against time, peak force and work, and their correlation with entanglement, and compares them
+with Savoie, Tuazon, Bhamla and Goldman, "Amorphous Entangled Active Matter", Soft Matter 2023, section "Tensile loading
+and fracture". Runs of one l/w and seed are poured from equal poses and compared pair by pair. If the hook stops at its
 force limit ("held fast"), the peak force is a lower bound.
 """
 
@@ -137,7 +137,7 @@ def measure(run: Run) -> Row:
 
 
 def force_history(run: Run, *, net: bool = False) -> History:
-    """Read the force on the upper hook over n W_s [-] against time; `net` subtracts the lower hook's."""
+    """Read the force on the upper hook over n W_s [-] against time; `net`: less that on the lower hook."""
     pull = read_pull(run, run.series, run.phases[-1].index)
     force = (pull.net if net else pull).force / run.manifest.count / weight_of_one(run)
     return History(times=pull.times, values=force)
@@ -149,7 +149,7 @@ def at_shown_aspect(table: pd.DataFrame) -> pd.DataFrame:
 
 
 def at_one_theta(table: pd.DataFrame) -> pd.DataFrame:
-    """Return the rows at `SHOWN_ASPECT`, of the internal oscillation only those with θ = `AMPLITUDE`."""
+    """Return the rows at `SHOWN_ASPECT`; for the internal oscillation only rows with θ = `AMPLITUDE`."""
     return compared(at_shown_aspect(table))
 
 
@@ -176,13 +176,13 @@ _BY_ASPECT = one_by_one(ASPECT, lambda aspect: rf"$l/w$ = {aspect:g}")
 
 
 def _line(rows: Rows) -> Split:
-    """Return a split into one series, the internal oscillation."""
+    """Return a split with one series, the points of the internal oscillation that `rows` selects."""
     properties = {**procedure_marker(INTERNAL), "linestyle": (0, (2, 1.5))}
     return lambda points: [Series(rows=rows(points), label="internal oscillation", properties=properties)]
 
 
 def _all_points(table: pd.DataFrame) -> list[Series]:
-    """Return a series of each procedure, and of the internal oscillation at each other θ and l/w."""
+    """Return one series per procedure, and one per other θ and other l/w of the internal oscillation."""
     others = amplitudes(table), aspects(table)
     return [
         *by_procedure(line=False)(at_shown_aspect(table)),

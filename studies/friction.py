@@ -63,7 +63,7 @@ COMPARED = {
     "phi 10 s": "phi_f",
     "phi_f": "phi_f",
     "phi_f relaxed": "phi_f relaxed",
-}  #: Stage of Gravish's that each of our stages is compared with: φ after 5 and 10 s too is compared with their φ_f
+}  #: Stage of Gravish that each of our stages is compared with; φ after 5 s and after 10 s is compared with φ_f
 
 # Sets of stages that a finding asks to be near Gravish's at one friction, by their name.
 JUDGED: dict[str, Sequence[str]] = {
@@ -92,7 +92,7 @@ class Curve:
 
     friction: Array  #: (n,) coefficients, ascending [-]
     packing: Array  #: (n,) means of φ [-]
-    half_widths: Array  #: (n,) of the 95 % intervals of these means [-]; NaN where unknown
+    half_widths: Array  #: (n,) half-widths of the 95 % intervals of the means [-]; NaN where unknown
     reference: float  #: Gravish's φ [-], with the error `DIGITISING_ERROR`
     scatter: Scatter  #: Relative scatter over seeds, pooled over the stage
 
@@ -101,7 +101,7 @@ class Curve:
         return np.asarray(np.interp(friction, self.friction, self.packing) - self.reference, dtype=np.float64)
 
     def error(self, friction: Array) -> Array:
-        """Return the 95 % half-width (m,) [-] of the deviation, by the errors of both means and of reading."""
+        """Return the 95 % half-width (m,) [-] of `deviation`, from errors of the means and of Gravish's point."""
         if len(self.friction) == 1:
             return np.asarray(np.hypot(np.full(friction.shape, self.half_widths[0]), DIGITISING_ERROR))
         right = np.clip(np.searchsorted(self.friction, friction), 1, len(self.friction) - 1)
@@ -111,17 +111,18 @@ class Curve:
         return np.asarray(np.hypot(of_mean, DIGITISING_ERROR), dtype=np.float64)
 
     def grid(self) -> Array:
-        """Return all measured coefficients of friction, with steps of `STEP` between them (m,) [-]."""
+        """Return all measured coefficients of friction, and steps of `STEP` over their range: (m,) [-]."""
         steps = np.arange(self.friction[0], self.friction[-1] + STEP / 2, STEP)
         return np.unique(np.concatenate([np.clip(steps, None, self.friction[-1]), self.friction]))
 
     def crossing(self) -> tuple[float, float, float, str]:
         """Find the friction at which φ is Gravish's φ.
 
-        Returns that friction [-], both ends of its 95 % interval [-], and "within", "above" or "below the range"
-        measured. If scatter makes φ cross Gravish's φ several times, the friction is the middle between the first and
-        the last crossing. The interval covers all friction at which φ does not clearly differ; its ends are ±inf beyond
-        the measured range, NaN without errors.
+        Returns the friction [-], both ends of its 95 % interval [-], and its place: "within", "above" or "below the
+        range" of measured friction. If scatter makes φ cross Gravish's φ several times, the friction is the middle
+        between the first and the last crossing; outside the range it is ±inf. The interval covers all friction at
+        which φ does not clearly differ from Gravish's φ. Its ends are ±inf beyond the measured range, NaN without
+        errors.
         """
         off = self.packing - self.reference
         left = np.nonzero(off[:-1] * off[1:] < 0)[0]
@@ -152,7 +153,7 @@ class Curve:
         return float(upper - lower)
 
 
-Curves = Mapping[tuple[str, float], Curve]  #: By stage and l/w, only where Gravish has a point
+Curves = Mapping[tuple[str, float], Curve]  #: Curves by stage and l/w, only where Gravish has a point
 
 
 def measure(run: Run) -> Row:
@@ -205,7 +206,7 @@ def points(runs: pd.DataFrame, scatters: Mapping[str, Scatter]) -> pd.DataFrame:
 
 
 def curves(table: pd.DataFrame, scatters: Mapping[str, Scatter]) -> Curves:
-    """Make a curve of φ against friction for each stage and l/w with a point of Gravish's, from the means."""
+    """Make a curve of φ against friction for each stage and l/w at which Gravish has a point."""
     found = {}
     for (stage, aspect), group in table[table[REFERENCE].notna()].groupby([STAGE, ASPECT], sort=False):
         rows = group.sort_values(FRICTION)
@@ -232,8 +233,8 @@ def crossings(found: Curves) -> pd.DataFrame:
 def nearness(found: Curves, friction: float) -> dict[str, float | int | str]:
     """Compute deviations of all curves from Gravish's φ at a friction, and the confidence of being near.
 
-    The cells by column are mean and largest deviation, the confidence that all points are within `MARGIN`, and that of
-    the worst point.
+    Returns by column: mean and largest deviation, the confidence that all points are within `MARGIN`, and the
+    confidence of the worst point.
     """
     at = np.array([friction])
     deviations = {
@@ -267,7 +268,7 @@ def verdict(near: Mapping[str, float | int | str], *, whole: bool) -> str:
 
 
 def verdicts(found: Curves) -> pd.DataFrame:
-    """Tabulate `nearness` and `verdict` for each set of stages in `JUDGED` and each measured friction."""
+    """Tabulate `nearness` and `verdict` for each set of stages in `JUDGED` at each measured friction."""
     rows = []
     for what, stages in JUDGED.items():
         wanted = {key: curve for key, curve in found.items() if key[0] in stages}

@@ -101,7 +101,7 @@ def deviations(runs: pd.DataFrame) -> pd.DataFrame:
 def steps(runs: pd.DataFrame) -> pd.DataFrame:
     """Tabulate the difference of φ between neighbouring l/w: a row per stage and pair.
 
-    Its 95 % half-width is the root of the sum of squares of those of both means.
+    The 95 % half-width of the difference is the root of the sum of the squared half-widths of both means.
     """
     rows = []
     for stage in STAGES:

@@ -1,7 +1,8 @@
-"""Planned and spent hours of studies: `python -m studies.hours FOLDER [STUDY ...]` prints and writes FOLDER/hours.csv.
+"""Print planned and spent hours of studies: `python -m studies.hours FOLDER [STUDY ...]`.
 
-Planned hours are the wall times on one core that were estimated when the sweep's folder was made. Spent hours are the
-processor times of finished runs; runs without a directory do not count as finished.
+The table is also written to FOLDER/hours.csv. Planned hours are the wall times on one core that were estimated when the
+sweep's folder was made. Spent hours are the processor times of finished runs; runs without a directory do not count as
+finished.
 """
 
 import argparse
@@ -20,7 +21,10 @@ PLANNED, EXPECTED, TAKEN = "planned [h]", "planned of these [h]", "processor tim
 
 
 def hours(folder: Path, studies: Sequence[str] = ()) -> pd.DataFrame:
-    """Sum planned and spent hours of one core [h] by study, by default all in a folder, and engine; total last."""
+    """Sum planned and spent hours of one core [h] by study and engine; the last row is the total.
+
+    `studies` are names of folders of sweeps in `folder`; all if empty. InputError if there is none.
+    """
     rows = []
     for name in studies or sorted(one.parent.name for one in folder.glob(f"*/{OF_SWEEP}")):
         sweep = open_folder(folder / name)

@@ -180,7 +180,7 @@ FIRST, OTHER, VERDICT = "first in resamples [-]", "other", "verdict"
 LEAD = "rank correlation of the best less the other's, in size [-]"
 ALL, WITHIN = "over all l/w", "within l/w"
 EVERY, FREE, SWUNG = "all", "none held fast", "static and internal alone"
-"""Parts of the runs: all, those whose strength is no lower bound, and those of the internal oscillation."""
+"""Parts of the runs: all; those whose strength is no lower bound; the static state and the internal oscillation."""
 
 
 def trajectories(runs: pd.DataFrame) -> pd.Series:
@@ -191,9 +191,9 @@ def trajectories(runs: pd.DataFrame) -> pd.Series:
 def predicted(runs: pd.DataFrame) -> tuple[pd.DataFrame, pd.DataFrame]:
     """Correlate both strengths with all measures.
 
-    The table `predictors` has rank correlation and slope with 95 % intervals, a row per strength, part of the runs,
-    scope (over all l/w, within l/w, or one l/w) and measure, best measure first. The table `comparisons` has the
-    difference of the best measure's rank correlation to that of each other measure.
+    Returns two tables. The table `predictors` has rank correlation and slope with 95 % intervals: a row per strength,
+    part of the runs, scope (over all l/w, within l/w, or one l/w) and measure; the best measure comes first. The table
+    `comparisons` has the best measure's rank correlation less that of each other measure.
     """
     each: list[dict[str, object]] = []
     against: list[dict[str, object]] = []
@@ -284,16 +284,16 @@ def gains(runs: pd.DataFrame) -> pd.DataFrame:
 
 
 def common_aspects(runs: pd.DataFrame) -> list[float]:
-    """Return the aspect ratios with the greatest number of combinations of procedure, θ and planned time."""
+    """Return the l/w that have the greatest number of combinations of procedure, θ and planned time."""
     counts = runs.drop_duplicates([ASPECT, *_POINT]).groupby(ASPECT).size()
     return [float(ratio) for ratio in counts.index[counts == counts.max()]]
 
 
 def costs(runs: pd.DataFrame) -> pd.DataFrame:
-    """Average gain and energy over pairs of l/w and seed, at the `common_aspects` and at each l/w.
+    """Average gain and energy over l/w and seeds: over all l/w in `common_aspects`, and at each l/w.
 
-    The table has a row per scope, procedure, θ and planned time: means with errors, the gain per energy with its 95 %
-    interval, and 1 in `FRONTIER` if no other row of the scope gains as much for less energy.
+    The table has a row per scope, procedure, θ and planned time: means with errors, and the gain per energy with its
+    95 % interval. `FRONTIER` is 1 if the gain is above 0 and no other row of the scope gains as much for less energy.
     """
     gained = gains(runs)
     scopes = {COMMON: gained[gained[ASPECT].isin(common_aspects(runs))]}
@@ -317,9 +317,10 @@ def costs(runs: pd.DataFrame) -> pd.DataFrame:
 
 
 def _drawn_ratio(values: Floats) -> Interval:
-    """Return the mean gain over the mean energy with its 95 % interval; NaN ends below 3 pairs.
+    """Return the mean gain over the mean energy with its 95 % interval, whose ends are NaN below 3 rows.
 
-    Values are gains and energies (n, 2), or those of two procedures (n, 4), whose gains per energy are divided.
+    `values` (n, 2) are gains and energies. For two procedures they are (n, 4), and the result is the ratio of the two
+    gains per energy.
     """
 
     def ratio(rows: Whole) -> Floats:
@@ -338,7 +339,7 @@ def _drawn_ratio(values: Floats) -> Interval:
 def best_points(table: pd.DataFrame) -> pd.DataFrame:
     """Return for each procedure the row of `costs` with the greatest gain per energy, at the common l/w.
 
-    Rows whose 95 % interval of the gain per energy reaches 0 are left out.
+    Rows whose 95 % interval of the gain per energy is unknown or reaches 0 are left out.
     """
     known = table[(table[SCOPE] == COMMON) & (table[LOW] > 0)] if len(table) else table
     if known.empty:

@@ -1,8 +1,9 @@
 """The container's wall is removed, at once or by lifting it, from piles of each procedure.
 
-Measured within 2 s are the largest cluster, height and radius of the pile, smarticles that come off, and whether the
-pile falls over. Compared with Savoie, Tuazon, Bhamla and Goldman, "Amorphous Entangled Active Matter", Soft Matter
-2023, section "Melting behavior". Runs of one l/w and seed are poured from equal poses and compared pair by pair.
+The study measures, for 2 s, the largest cluster, height and radius of the pile, the smarticles that come off, and
+whether the pile falls over. It compares them with Savoie, Tuazon, Bhamla and Goldman, "Amorphous Entangled Active
+Matter", Soft Matter 2023, section "Melting behavior". Runs of one l/w and seed are poured from equal poses and compared
+pair by pair.
 """
 
 from functools import partial

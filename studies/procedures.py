@@ -91,7 +91,7 @@ QUANTITIES = declare(
 
 
 def only(procedure: str, drop: str | None = None) -> Rows:
-    """Return a function that selects one procedure, and rows with a value in the column `drop`."""
+    """Return a function that selects the rows of a procedure, without rows whose column `drop` is NaN."""
     return lambda table: of_procedure(table, procedure).dropna(subset=[drop] if drop else [])
 
 
@@ -106,7 +106,7 @@ def pairs_of(table: pd.DataFrame, quantity: str, one: str, other: str) -> pd.Dat
 
 
 def gains(procedure: str) -> Rows:
-    """Return a function that computes φ_f of a procedure less that of the static state, pair by pair."""
+    """Return a function that computes φ_f of a procedure less φ_f of the static state, per l/w and seed."""
 
     def rows(table: pd.DataFrame) -> pd.DataFrame:
         both = pairs_of(table, PHI_ACTIVE, procedure, STATIC)
@@ -116,12 +116,18 @@ def gains(procedure: str) -> Rows:
 
 
 def with_aspect(name: str, says: str, rows: Rows, quantity: str, sign: int = 1) -> Finding:
-    """Make the finding that a quantity rises (sign +1) or falls (−1) with the aspect ratio."""
+    """Make the finding that a quantity rises (sign +1) or falls (−1) with l/w.
+
+    `name` is the id of the finding, `says` its statement; the function `rows` selects the rows of the samples.
+    """
     return slope(name, says, quantity, ASPECT, sign=sign, rows=rows)
 
 
 def with_amplitude(name: str, says: str, quantity: str, sign: int = 1, rows: Rows = amplitudes) -> Finding:
-    """Make the finding that a quantity rises (sign +1) or falls (−1) with θ, within l/w and seed."""
+    """Make the finding that a quantity rises (sign +1) or falls (−1) with θ at equal l/w and seed.
+
+    `name` is the id of the finding, `says` its statement; the function `rows` selects the rows of the samples.
+    """
     return slope(name, says, quantity, THETA, sign=sign, within=(ASPECT, SEED), rows=rows)
 
 
@@ -143,7 +149,10 @@ def _largest_gains_little(table: pd.DataFrame) -> list[Effect]:
 
 
 def _logarithms(table: pd.DataFrame, one: str, other: str) -> pd.Series:
-    """Return log10 of the ratio of energies of pairs in which both are above 0, indexed by l/w."""
+    """Return log10 of the energy of `one` over that of `other`, for pairs with both above 0.
+
+    The index is l/w.
+    """
     both = pairs_of(table, ENERGY, one, other)
     both = both[(both["one"] > 0) & (both["other"] > 0)].set_index(ASPECT)
     return np.log10(both["one"] / both["other"])
@@ -209,7 +218,7 @@ def _static_flat(table: pd.DataFrame) -> Outcome:
 
 
 def _near_one(table: pd.DataFrame) -> Outcome:
-    """Judge whether ⟨N⟩ is greatest near l/w = 1.0, by a parabola if that describes the means."""
+    """Judge whether ⟨N⟩ is greatest near l/w = 1.0: by a parabola if it fits, otherwise by the means."""
     before, after = (parabola(table[ASPECT], table[CROSSINGS], at=place) for place in (1 - NEAR, 1 + NEAR))
     by = f"by l/w {means_by(table, CROSSINGS, ASPECT, '.2f')}"
     beyond = bool((table[ASPECT] > 1.0).any())
@@ -252,7 +261,10 @@ def _peaks_with_amplitude(table: pd.DataFrame) -> list[Effect]:
 
 
 def _energies(suffix: str, how: str, quantity: str) -> tuple[Finding, Finding, Finding]:
-    """Make the findings on the energy of the internal oscillation, from the column integrated or sampled."""
+    """Make three findings on the energy of the internal oscillation, which is the column `quantity`.
+
+    `suffix` ends the ids of the findings, `how` ends their statements.
+    """
     part, says = only(INTERNAL), "Internal oscillation: "
     return (
         with_amplitude(f"energy-grows-with-theta{suffix}", f"{says}energy grows with θ{how}", quantity),

@@ -30,9 +30,9 @@ QUICK = "quick"
 class Script:
     """A shipped study before it is loaded: its script, sweep file and variants of the sweep."""
 
-    name: str  #: Such as `strength-code`
-    module: str  #: Such as `strength`
-    variants: tuple[str, ...] = ()  #: Such as `("code",)`
+    name: str  #: Name of the study, such as `strength-code`
+    module: str  #: Name of the script, such as `strength`
+    variants: tuple[str, ...] = ()  #: Variants of the sweep, such as `("code",)`
     quick: bool = True  #: Whether there is a quick variant
 
     @cached_property
@@ -72,7 +72,7 @@ def _scripts() -> list[Script]:
     return found
 
 
-STUDIES: Mapping[str, Script] = MappingProxyType({study.name: study for study in _scripts()})  #: By name
+STUDIES: Mapping[str, Script] = MappingProxyType({study.name: study for study in _scripts()})  #: By name of the study
 
 
 def shipped(name: str) -> Script:

@@ -3,8 +3,8 @@
 In the paper's own test (study `fracture`) a single smarticle may hold both hooks, or the hook lifts the whole pile,
 which rubs on the wall. Here a grid of bars 2.5 mm above the floor holds the pile, the wall is removed before the pull,
 and the hook is farther from the grid than a smarticle is long. So the force beyond the lifted weight is transmitted
-through the pile. Measured are force against displacement, peak force, work and the share that is torn off. They are
-compared with the findings of Savoie et al. (Soft Matter 2023).
+through the pile. The study measures force against displacement, peak force, work and the share of the pile that is torn
+off. It compares them with the findings of Savoie et al. (Soft Matter 2023).
 
 All procedures start from equal poses at each seed, and both heights of the hook from nearly equal ones. Procedures are
 compared by means over both heights, seed by seed, so that the number of samples is that of the seeds. If the hook
@@ -126,7 +126,7 @@ def measure(run: Run) -> Row:
 
 
 def force_history(run: Run) -> History:
-    """Read the force over n W_s [-] against the displacement of the hook [mm]."""
+    """Read the force on the hook over n W_s [-] against the displacement of the hook [mm]."""
     pull = read_pull(run, run.series, run.phases[-1].index)
     times, force = moving_mean(pull)
     displacement = 1e3 * np.interp(times, pull.edges, pull.raised)
@@ -136,7 +136,7 @@ def force_history(run: Run) -> History:
 def over_heights(runs: pd.DataFrame) -> pd.DataFrame:
     """Average runs over the heights of the hook: a row per procedure, l/w and seed.
 
-    A procedure, l/w and seed without a run at every height is left out.
+    A row is left out if it lacks a run at any height.
     """
     columns = [PEAK, RAISED, WORK, THROUGH, CARRIED, ABOVE, CROSSINGS, HELD_FAST]
     grouped = compared(runs).groupby([PROCEDURE, ASPECT, SEED])
@@ -144,7 +144,7 @@ def over_heights(runs: pd.DataFrame) -> pd.DataFrame:
 
 
 def order_findings(rows: Rows) -> tuple[Finding, Finding]:
-    """Make the findings that peak force and ⟨N⟩ differ in order, and that shape change is brittle."""
+    """Make the findings that peak force and ⟨N⟩ rank procedures differently, and shape change is brittle."""
     return (
         Finding(
             id="other-order-than-crossings",
@@ -200,9 +200,10 @@ def strongest(rows: Rows, suffix: str = "") -> tuple[Finding, Finding]:
 def with_crossings(
     rows: Rows, within: Sequence[str], theta: Rows, within_theta: Sequence[str]
 ) -> tuple[Finding, Finding]:
-    """Make the findings that peak force rises with ⟨N⟩, over all procedures and over the amplitudes θ.
+    """Make the findings that peak force rises with ⟨N⟩: over all procedures, and over the amplitudes θ.
 
-    The columns `within` and `within_theta` make the blocks of the two findings.
+    `rows` and `theta` select the runs of the first and of the second finding; `within` and `within_theta` are the
+    columns whose values make their blocks.
     """
     keys: dict[str, Any] = {"bounds": HELD_FAST, "unit": "n W_s per link"}
     where, where_theta = (", ".join(map(symbol, columns)) for columns in (within, within_theta))
@@ -231,7 +232,7 @@ def with_crossings(
 
 
 def several_amplitudes(runs: pd.DataFrame) -> pd.DataFrame:
-    """Return the internal oscillation at those l/w and heights of the hook that have several θ."""
+    """Return the runs of internal oscillation at those l/w and heights of the hook that have several θ."""
     internal = runs[runs[PROCEDURE] == INTERNAL]
     return internal[internal.groupby([ASPECT, UPPER])[THETA].transform("nunique") > 1]
 

@@ -29,7 +29,7 @@ from dem.record.run import Run
 from templates.sweep.folder import Entry, Folder
 
 RunCommand = Callable[[Path, Path, bool], Sequence[str]]
-"""Returns the command of a run from scene file, run directory and whether to resume, for the sweep's directory."""
+"""Returns the command that computes a run, as words; arguments: scene file, run directory, whether to resume."""
 
 # More threads than cores would slow down all runs.
 _ONE_THREAD = {name: "1" for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")}
@@ -63,7 +63,7 @@ class Snapshot:
     total: int  #: Number of runs
     ended: int  #: Number of runs that ended, with or without a result
     failed: int  #: Number of runs that ended without a result
-    running: tuple[tuple[str, float, Progress], ...]  #: Name, wall time [s] and progress of the running ones
+    running: tuple[tuple[str, float, Progress], ...]  #: Name, wall time [s] and progress of each running run
     left_s: float  #: Expected wall time left [s]
 
     def __str__(self) -> str:
@@ -90,7 +90,7 @@ def duration(seconds: float) -> str:
 
 
 class Display:
-    """Shows the progress of a sweep: at a terminal a table that is redrawn, else a line at intervals [s]."""
+    """Shows the progress of a sweep: at a terminal a redrawn table, else a line every `interval_s` [s]."""
 
     def __init__(self, console: Console, interval_s: float = 30.0) -> None:
         self._console = console
@@ -146,7 +146,7 @@ def smarticles_command(scene: Path, directory: Path, resume: bool) -> tuple[str,
 
 
 def environment() -> dict[str, str]:
-    """Return the environment variables of a run's process: one thread, and the modules of this process."""
+    """Return the environment variables of a run's process: one thread, and this process's import paths."""
     environment = {**os.environ, **_ONE_THREAD}
     # Runs start in another directory, where relative paths would be wrong.
     paths = [os.path.abspath(path) for path in environment.get("PYTHONPATH", "").split(os.pathsep) if path]  # noqa: PTH100
@@ -267,7 +267,7 @@ class _Runner:
         return Outcome(name=entry.name, status="failed", cause=status.cause or _cause(log, returncode), wall_s=wall_s)
 
     def _stop(self, waiting: set[Future[Outcome | None]]) -> None:
-        """Stop all runs by ever stronger signals; a second Ctrl-C skips the waiting."""
+        """Stop all runs by SIGINT, SIGTERM and SIGKILL, one after the other; Ctrl-C skips a wait."""
         with self.guard:
             self.stopping = True
         for future in waiting:
@@ -299,7 +299,7 @@ class _Runner:
         )
 
     def _left(self, running: dict[str, float]) -> float:
-        """Return the expected wall time left [s], by the ratio of true to expected time of finished runs."""
+        """Return the expected wall time left [s], scaled by true over expected time of the finished runs."""
         expected = {entry.name: entry.expected_s for entry in self.folder.entries}
         done = [outcome for outcome in self.outcomes.values() if outcome.status == "done"]
         planned = sum(expected[outcome.name] for outcome in done)
@@ -313,7 +313,7 @@ class _Runner:
 
 
 def _cause(log: Path, returncode: int) -> str:
-    """Return why a process without `failed.json` ended: its error, else its exit status and last line."""
+    """Return why a process that wrote no `failed.json` ended: its error, else exit status and last line."""
     try:
         lines = [
             line.strip() for line in log.read_text(encoding="utf-8", errors="replace").splitlines() if line.strip()

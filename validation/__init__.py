@@ -1,4 +1,4 @@
-"""Validation against theory and on difficult cases, as pytest suites; not part of the installed packages.
+"""Validate the engines against theory and on difficult cases, as pytest suites; not installed.
 
 - `known`: simulations with analytic or independently integrated answers, and convergence orders.
 - `hard`: difficult scenes, which must finish or stop with an error that names the cause; runs that are killed and

@@ -42,7 +42,7 @@ STIFFNESS = 500.0  # N/m
 
 
 class _Access:
-    """Test access that both engines share; without state, so that it can be sent to another process."""
+    """Test access that both engines share; it has no state, so that it can be sent to another process."""
 
     engine: ClassVar[type[Any]]
 
@@ -58,7 +58,8 @@ class _Access:
     ) -> Engine:
         """Build an engine with a floor at z = 0 and a wall of radius 0.5 m, which no body reaches.
 
-        Time step [s], gravity [m/s²] and height of the wall [m]; `motors`: arguments of the engine, see `motors_of`.
+        `dt` is the time step [s]; gravity is in [m/s²], the height of the wall in [m]. `motors` are keyword arguments
+        of the engine, see `motors_of`.
         """
         cylinder = Cylinder(radius=0.5, height=height, facets=16)
         keys = {"particle": particle, "cylinder": cylinder, "law": law, "gravity": gravity, "time_step": dt}
@@ -70,7 +71,7 @@ class _Access:
         raise NotImplementedError
 
     def build_hinged(self, scene: Scene, *, gravity: float, dt: float | None = None) -> Engine:
-        """Build an engine for articulated smarticles of a scene; `dt` [s] is by default the scene's time step."""
+        """Build an engine for articulated smarticles of a scene; None for `dt` [s]: the scene's time step."""
         law, dt = contact_law_of(scene), dt or time_step(scene)
         height, motors = scene.cylinder.height, self.motors_of(scene)
         return self.build(scene.particle, law, dt=dt, gravity=gravity, height=height, **motors)
@@ -89,7 +90,7 @@ def _bar(length: float, thickness: float, radius: float, kind: type[Particle] = 
 
 
 def _spoilt_place(engine: Engine, what: str, place: Iterable[float]) -> tuple[float, float, float]:
-    """Return the position [m] to which `LinksAccess.spoil` moves a body from `place` (3,) [m]."""
+    """Return the position [m] to which `LinksAccess.spoil` moves a body at `place` (3,) [m]."""
     (x, y, z), reach, radius = place, engine.particle.reach, engine.particle.radius
     return {
         "position": (x, y, math.nan),
@@ -169,12 +170,12 @@ class LinksAccess(_Access):
         return {"motor_law": motor_law_of(scene)}
 
     def ball(self) -> Particle:
-        """Return a particle that, rotated by `ball_turn`, hits the floor like a ball of BALL_RADIUS and BALL_MASS."""
+        """Return a particle that, turned by `ball_turn`, hits the floor like a ball (BALL_RADIUS, BALL_MASS)."""
         # The engine has no balls: an upright stub touches the floor with its round end.
         return _bar(2 * BALL_RADIUS, STUB_THICKNESS, BALL_RADIUS / 2)
 
     def roller(self) -> Particle:
-        """Return a particle that, without rotation, rolls along y like a solid ball of BALL_RADIUS and BALL_MASS."""
+        """Return a particle that, unrotated, rolls along y like a solid ball of BALL_RADIUS and BALL_MASS."""
         # A bar across the direction of motion, with the moment of the ball about its axis, I = m t²/6.
         return _bar(5 * BALL_RADIUS, BALL_RADIUS * math.sqrt(12 / 5), BALL_RADIUS)
 
@@ -192,7 +193,7 @@ class LinksAccess(_Access):
         return applied(particle.boxes.link_rotations[1], np.concatenate(points))
 
     def pin_stiffness(self, scene: Scene) -> float:
-        """Return force over gap of a hinge [N/m]; inf if hinges cannot open."""
+        """Return the stiffness of a hinge, force over gap [N/m]; inf if hinges cannot open."""
         return math.inf
 
     def push(self, engine: Engine, k: int, velocity: ArrayLike = (0, 0, 0), spin: ArrayLike = (0, 0, 0)) -> None:
@@ -229,8 +230,8 @@ class LinksAccess(_Access):
     def swing(self, engine: Engine, links: Iterable[tuple[float, float, float]]) -> None:
         """Set velocities in the plane for smarticle 0, which must be articulated and unrotated.
 
-        Links are velocity along x and y [m/s] and angular velocity about z [rad/s] of barb 1, middle link and barb 2;
-        they must be consistent with the hinges.
+        `links` has, for barb 1, middle link and barb 2, the velocities along x and y [m/s] and the angular velocity
+        about z [rad/s]; they must be consistent with the hinges.
         """
         world = _links(engine)._world
         motors, (first, middle, second) = world.motors, np.array(list(links))
@@ -245,7 +246,7 @@ class LinksAccess(_Access):
         motors.momentum[0] = row[18:20] * middle[2] + np.array([[row[20], row[21]], [row[21], row[20]]]) @ rates
 
     def burden(self, engine: Engine, k: int, ratio: float, *, rise: float) -> None:
-        """Multiply the weight of smarticle `k` by `ratio`; on links the weight grows within the time `rise` [s]."""
+        """Multiply the weight of smarticle `k` by `ratio`; on links it grows during the time `rise` [s]."""
         # All smarticles on links have one mass, so that an external force is added.
         own = _links(engine)
         if not isinstance(own, Pushed):
@@ -268,7 +269,10 @@ class LinksAccess(_Access):
         return np.array(readings.torques[0])
 
     def spoil(self, engine: Engine, what: str) -> None:
-        """Set an invalid state for the second smarticle, or its last link; `what`: a key of `hard.broken.SPOILT`."""
+        """Set an invalid state of the second smarticle, or of its last link.
+
+        `what` is a key of `hard.broken.SPOILT`.
+        """
         bodies = _links(engine)._world.bodies
         if what == "velocity":
             bodies.velocity[1, 1] = math.nan
@@ -280,7 +284,7 @@ class LinksAccess(_Access):
             bodies.position[1] = _spoilt_place(engine, what, bodies.position[1])
 
     def heat(self, engine: Engine, share: float) -> None:
-        """Multiply the damping coefficients of all normal dashpots by −`share`, so that dashpots supply energy."""
+        """Multiply all normal damping coefficients by −`share`, so that dashpots supply energy; tangential: 0."""
         world = _links(engine)._world
         world.laws = tuple(law._replace(damping=-share * law.damping, shear_damping=0.0) for law in world.laws)
 

@@ -45,7 +45,10 @@ def scene_of(data: Mapping[str, Any]) -> Scene:
 
 
 def scene_data(access: EngineAccess, *phases: Mapping[str, Any], per_layer: int = 6, **keys: Any) -> dict[str, Any]:
-    """Return a scene as a dictionary: a deposit, then the given phases; by default six smarticles, fidelity draft."""
+    """Return a scene as a dictionary: a deposit of smarticles, by default six, then the given phases.
+
+    The fidelity is draft unless `keys` names another one.
+    """
     given = {"schema_version": 1, "engine": access.name, "name": "hard", "seed": 1, "count": 6, "fidelity": "draft"}
     return {**given, "phases": [{"type": "deposit", "per_layer": per_layer}, *phases], **keys}
 
@@ -81,7 +84,7 @@ def ball_law(
 ) -> ContactLaw:
     """Return a contact law for the ball, with dashpots that give the restitution [1] at its mass.
 
-    `tangential` is tangential over normal stiffness, `dashpot` tangential over normal damping [1].
+    `tangential` is the tangential over the normal stiffness, `dashpot` the tangential over the normal damping [1].
     """
     critical = 2 * damping_ratio(restitution) * math.sqrt(STIFFNESS * BALL_MASS)
     return ContactLaw(
@@ -127,7 +130,7 @@ def drive(
 ) -> Iterator[float]:
     """Actuate the motors for a duration [s], and yield after each control period.
 
-    Yields the time since the start [s], at which `targets` returns the angles of all barbs [rad]. `each` is called
+    Yields the time since the start [s]. `targets` returns the angles of all barbs [rad] at this time. `each` is called
     after every step. The control period [s] is that of the scene unless `interval` is given.
     """
     interval = interval or scene.fidelity.control_interval_s

@@ -98,8 +98,8 @@ def case(
 ) -> Callable[[Function], Function]:
     """Register a function `(access, **options) -> list[Answer]` as a case with a known answer.
 
-    `about` describes the simulation, `theory` is the formula or source of the answer. `absent` has reasons why the case
-    does not apply to an engine, by engine.
+    `about` describes the simulation, `theory` is the formula or source of the answer. `absent` has, by engine, the
+    reason why the case does not apply to it.
     """
     return _register(CASES, name, options, about, theory, absent or {})
 
@@ -119,10 +119,10 @@ def ladder(  # noqa: PLR0917 # a row of a table
 
     Args:
         quantity: quantity whose error is returned, with its unit.
-        size: size of the motion, in this unit.
+        size: size of the motion, in the unit of the quantity.
         steps: time steps [s], in decreasing order.
         scheme: expected order of convergence [1] and its reason, for all engines or by engine.
-        phases: argument `phases` of the function in the short form of the test; None: the function has no `phases`.
+        phases: value of the function's argument `phases` in the short form of the test; None: it has no such argument.
     """
     by_engine = scheme if isinstance(scheme, dict) else dict.fromkeys(ENGINES, scheme)
     return _register(LADDERS, name, options, about, quantity, size, steps, by_engine, phases)
@@ -136,7 +136,7 @@ def hard(
 ) -> Callable[[Function], Function]:
     """Register a function `(access, folder, **options) -> list[Check]` as a hard case.
 
-    `short` has the keyword arguments in continuous integration, or is None if the case has a long form only; `long` has
-    those that differ in the long form. `absent` has reasons why the case does not apply to an engine, by engine.
+    `short` has the keyword arguments in continuous integration, or is None if the case has a long form only. `long` has
+    the arguments that differ in the long form. `absent` has, by engine, the reason why the case does not apply to it.
     """
     return _register(HARD, name, {}, short, long or {}, absent or {})

@@ -47,7 +47,7 @@ def yade() -> Iterator[ProcessPoolExecutor]:
 
 @pytest.fixture
 def call(request: pytest.FixtureRequest) -> Callable[..., Any]:
-    """Return `run(engine, function, ...)`, which calls a function in this process (links) or in the process of YADE."""
+    """Return `run(engine, function, ...)`, which calls a function here (links) or in YADE's process."""
 
     def run(engine: str, function: Callable[..., Any], /, *arguments: Any, **options: Any) -> Any:
         if engine == "links":
@@ -75,7 +75,7 @@ class Tables:
         self.folder = folder
 
     def write(self, engine: str, name: str, rows: Sequence[dict[str, Any]], keys: Sequence[str]) -> None:
-        """Write rows to DIR/ENGINE/NAME.csv and .md; they replace rows with equal values in the columns `keys`."""
+        """Write rows to DIR/ENGINE/NAME.csv and .md; they replace rows that have equal values of `keys`."""
         if self.folder is None or not rows:
             return
         new, old = pd.DataFrame(rows).assign(commit=_git_revision()), self.read(engine, name)
@@ -91,7 +91,7 @@ class Tables:
         write_text(path.with_suffix(".md"), "\n".join(f"| {line} |" for line in lines) + "\n")
 
     def skip_recorded(self, engine: str, name: str, **keys: Any) -> None:
-        """Skip the test if the table has rows with the values `keys` by column, and none of them failed."""
+        """Skip the test if the table has rows with these values of `keys`, and none of these rows failed."""
         table = self.read(engine, name)
         if table is not None and all(key in table for key in keys):
             matches = [table[key].astype(str) == str(value) for key, value in keys.items()]

@@ -1,4 +1,4 @@
-"""Run random extreme scenes and check them: `python -m validation.extremes --count 300 --jobs 2 --out DIR`.
+"""Run random extreme scenes and check them: `python -m validation.extremes --count 300 --out DIR`.
 
 Each scene is planned, run and checked. DIR gets the table `extremes.csv`, a scene file per scene, and the run
 directories of scenes that fail the check. Scenes with a row in the table are not run again. The checker uses NumPy
@@ -114,7 +114,9 @@ def draw_scene(number: int, engine: str = "links") -> dict[str, Any]:
 
 # -- the checker -------------------------------------------------------------------------------------------------------
 
-DEPTH = 0.1  # largest penetration of floor or wall, over the thickness of a link
+DEPTH = {"draft": 0.3, "standard": 0.22, "reference": 0.15}
+"""Largest penetration of floor or wall by fidelity, over the thickness of a link: what each name promises."""
+SOFTEST = 0.65  # of scenes that give a stiffness of their own: half of the mean width of a square section, 4/π thick
 ENERGY = 0.01  # largest excess of energy, over the supplied energy
 INSIDE = 1e-3  # least distance of a crossing from the ends of a segment, over the length of the segment
 
@@ -129,8 +131,7 @@ def surface(vertices: Array, thickness: float) -> tuple[Array, Array]:
     """Return points (M, 3) [m] on the axes of all links, and the radii of material around them (M,) [m].
 
     Points are the ends of each axis, with radius 0, and the points thickness/2 from the ends, with radius thickness/2.
-    These spheres are inside of a link, whether its ends are square or round. Vertices (N, 4, 3) and thickness are in
-    [m].
+    The spheres lie inside the link, whether its ends are square or round. Vertices (N, 4, 3) and thickness are in [m].
     """
     ends = segments(vertices)
     along = ends[:, 1] - ends[:, 0]
@@ -146,8 +147,8 @@ def crossings(before: Array, after: Array) -> list[tuple[int, int]]:
     """Find links of different smarticles whose axes passed through each other between two frames.
 
     Vertices (N, 4, 3) [m] are assumed to move along straight lines. When two axes pass through each other, the volume
-    of the tetrahedron of their four ends changes sign, and the common point lies within both axes. The pairs of links
-    have the indices of `segments`.
+    of the tetrahedron of their four ends changes sign, and the common point lies within both axes. The result
+    has pairs of indices of links in `segments`.
     """
     one, two = segments(before), segments(after)
     # Links without length (l/w = 0) cannot cross.
@@ -224,9 +225,12 @@ def check_run(path: Path, scene: Mapping[str, Any]) -> dict[str, Any]:
             crossed.update(pairs)
             first = first if first is not None or not pairs else frame.time
         last = vertices
-    if floor_depth > DEPTH:
+    fidelity = scene["fidelity"]
+    own = isinstance(fidelity, dict) and "stiffness_N_per_m" in fidelity
+    most = SOFTEST if own else DEPTH[fidelity["base"] if isinstance(fidelity, dict) else fidelity]
+    if floor_depth > most:
         wrong.append(f"{floor_depth:.2f} thicknesses below the floor")
-    if wall_depth > DEPTH:
+    if wall_depth > most:
         wrong.append(f"{wall_depth:.2f} thicknesses outside the wall")
     if crossed:
         wrong.append(f"{len(crossed)} pairs of axes crossed, first before {first:.4f} s")

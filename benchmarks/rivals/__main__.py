@@ -114,7 +114,7 @@ def run(folder: Path, setting: Setting, activity: str, seed: int, given: argpars
 def measured(scene: Scene, shape: str, positions: Array, frames: Array) -> dict[str, float]:
     """Measure overlaps and packing fractions of a simulation.
 
-    `shape` is that which the engine uses, see `solid_of`; `Outcome` describes positions and frames.
+    `shape` is the shape that the engine uses for contacts, see `solid_of`; `Outcome` describes positions and frames.
     """
     before, rested, *acting = zip(positions, frames, strict=True)
     depths = np.array(
@@ -149,7 +149,8 @@ def planned(engines: Sequence[str], given: argparse.Namespace) -> Iterator[tuple
 def medians(rows: pd.DataFrame) -> pd.DataFrame:
     """Return medians over seeds per activity, engine and setting, and the cost relative to links.
 
-    The last columns divide the cost by the lowest cost of links at the same or smaller overlap, and at a tenth of it.
+    The last two columns divide the cost by the lowest cost of links whose overlap is at most that of the row, and at
+    most a tenth of that of the row.
     """
     columns = [COST, STEP, DEPTH, MEAN_DEPTH, BOX_DEPTH, PHI_REST, PHI_END, SINKING, MEMORY]
     groups = rows.groupby(KEYS, sort=False)

@@ -16,7 +16,10 @@ SCALE = 100.0
 
 
 def simulate(task: Task, knobs: Knobs) -> Outcome:
-    """Simulate a task. Knobs: `time_step` [s], solver `iterations`, `recovery` (share of overlap undone per step)."""
+    """Simulate a task.
+
+    Knobs: `time_step` [s], solver `iterations`, and `recovery`, the share of the overlap that a step undoes.
+    """
     return simulated(task, InBullet(task, **knobs))
 
 

@@ -18,7 +18,7 @@ SHARE = re.compile(r"^(\S+)% CPU use", re.MULTILINE)
 
 
 def simulate(task: Task, knobs: Knobs) -> Outcome:
-    """Simulate a task; there are no knobs outside of the scene. The last run of the deck is the activity."""
+    """Simulate a task; there are no knobs besides the scene. The last run of the deck is the activity."""
     folder, scene = Path(task.folder) / "deck", task.scene
     write_deck(scene, folder)
     subprocess.run([shutil.which("lmp") or "lmp", "-in", DECK], cwd=folder, check=True, stdout=subprocess.DEVNULL)
@@ -43,7 +43,10 @@ def simulate(task: Task, knobs: Knobs) -> Outcome:
 
 
 def _dumped(path: Path, task: Task) -> tuple[Array, Array, Array]:
-    """Read a dump: times (F,) [s], centres of mass (F, N, 3) [m], rotations body to laboratory frame (F, N, 3, 3)."""
+    """Read times (F,) [s], centres of mass (F, N, 3) [m] and rotations (F, N, 3, 3) from a dump.
+
+    Rotations are from body frame to laboratory frame.
+    """
     times, rows = zip(*_blocks(path), strict=True)
     table = np.array(rows)
     quaternions = Rotation.from_quat(table[:, :, [8, 9, 10, 7]].reshape(-1, 4)).as_matrix()

@@ -113,7 +113,7 @@ class InMujoco(World):
             self._data.qvel[free + 2] += speed
 
     def step(self, gravity: float, time_s: float) -> None:
-        """Take one step: welded smarticles with `gravity` [m/s²], hinged ones with the targets at `time_s` [s]."""
+        """Take one step: welded bodies with `gravity` [m/s²], hinged bodies with targets at `time_s` [s]."""
         if not self._hinged:
             self._model.opt.gravity[2] = -gravity
         elif time_s:

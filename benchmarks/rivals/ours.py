@@ -9,7 +9,7 @@ from dem.plan.steps import time_steps
 
 
 def simulate(task: Task, knobs: Knobs) -> Outcome:
-    """Simulate a task; there are no knobs outside of the scene."""
+    """Simulate a task; there are no knobs besides the scene."""
     return simulated(task, OnEngine(task))
 
 

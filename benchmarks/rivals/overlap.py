@@ -108,7 +108,7 @@ def _boxes(particle: Particle, positions: Array, frames: Array) -> Bars:
 
 
 def _strands(particle: Particle, positions: Array, frames: Array) -> Swept:
-    """Return the strands of `dem.engine.links.shapes`: barbs begin at the hinge and end a radius before the tip."""
+    """Return strands as in `dem.engine.links.shapes`: barbs from the hinge to a radius before the tip."""
     planar = planar_of(particle)
     barb = (-planar.arm, planar.tip - planar.arm)
     spans = {0: barb, 1: (-planar.end, planar.end), 2: barb}

@@ -15,7 +15,10 @@ SCALE = 100.0
 
 
 def simulate(task: Task, knobs: Knobs) -> Outcome:
-    """Simulate a task; knobs: `time_step` [s], solver `iterations`, `frequency` [Hz] and `damping` of contacts."""
+    """Simulate a task.
+
+    Knobs: `time_step` [s], solver `iterations`, and `frequency` [Hz] and `damping` of contacts.
+    """
     return simulated(task, InRapier(task, **knobs))
 
 

@@ -68,7 +68,10 @@ def _links(name: str, fidelity: Any, *, costly: bool = False) -> Setting:
 
 
 def _mujoco(name: str, time_step: float, contact: float) -> Setting:
-    """Return a setting of MuJoCo; `contact`: time constant of contacts [s], default 0.02, at least 2 dt."""
+    """Return a setting of MuJoCo with a time step [s]; `contact` is the time constant of contacts [s].
+
+    MuJoCo's default is 0.02 s; the least value is twice the time step.
+    """
     solver = {"time_step": time_step, "solver": "CG", "iterations": 50, "cone": "pyramidal"}
     return Setting("mujoco", name, activities=BOTH, knobs={**solver, "solref": [contact, 1.0]}, costly=True)
 

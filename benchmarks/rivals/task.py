@@ -84,7 +84,7 @@ class Task:
         return phase.amplitude(self.scene.gravity_m_per_s2) * math.sin(omega * time_s)
 
     def gravity(self, time_s: float) -> float:
-        """Return the downward gravity in the container's frame [m/s²] at a time since the start of the activity [s]."""
+        """Return the downward gravity [m/s²] in the container's frame at a time [s] in the activity."""
         phase = self.scene.phases[ACTIVITY]
         omega = 2 * math.pi * phase.frequency_hz if isinstance(phase, Shake) else 0.0
         return self.scene.gravity_m_per_s2 - omega**2 * self.floor(time_s)
@@ -124,7 +124,7 @@ class Outcome:
 
 
 class World:
-    """Base class of simulations in the frame of the container; subclasses define `kick`, `step` and `links`."""
+    """Base class of simulations in the container's frame; subclasses define `kick`, `step` and `links`."""
 
     def __init__(self, task: Task, time_step: float, version: str) -> None:
         self.task, self.time_step, self.version = task, time_step, version
@@ -135,11 +135,11 @@ class World:
         raise NotImplementedError
 
     def step(self, gravity: float, time_s: float) -> None:
-        """Take one step with a downward gravity [m/s²]; `time_s` after it, since the start of the activity."""
+        """Take one step with a downward gravity [m/s²] to the time `time_s` [s] since the activity began."""
         raise NotImplementedError
 
     def begin(self) -> None:
-        """Begin the activity: relative to the container, all smarticles get the opposite of its velocity."""
+        """Begin the activity: give all smarticles the opposite of the container's velocity."""
         self._since = 0.0
         self.kick(-self.task.kick)
 

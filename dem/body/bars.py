@@ -1,4 +1,4 @@
-"""A rigid body of straight flat bars that are joined at their ends: staples, crosses, rings and other shapes."""
+"""Rigid bodies of straight flat bars that are joined at their ends: staples, crosses or rings."""
 
 import math
 from dataclasses import dataclass
@@ -16,7 +16,11 @@ JOINED = 1e-9  # of the longest bar: ends that are nearer are one joint
 
 
 def first_ends(points: Array) -> Numbers:
-    """Return for each end of segments (S, 2, 3) [m] the number of the first end at its place, (2 S,)."""
+    """Return for each end of S segments the number of the first end at the same place, (2 S,).
+
+    Args:
+        points: (S, 2, 3) ends of the segments [m]. End e of segment s has the number 2 s + e.
+    """
     places = points.reshape(-1, 3)
     longest = np.abs(points[:, 1] - points[:, 0]).max()
     return np.asarray((np.abs(places[:, None] - places).max(axis=-1) <= JOINED * longest).argmax(axis=1))
@@ -24,7 +28,10 @@ def first_ends(points: Array) -> Numbers:
 
 @dataclass(frozen=True, kw_only=True)
 class Bars:
-    """Bars of one section, S of them. Mass and inertia are those of boxes that overlap at joints, as in the paper.
+    """S straight bars of one cross-section that form a rigid body.
+
+    Mass and inertia are the sums over one box per bar. Boxes overlap at joints, where mass counts twice, as in the
+    paper.
 
     Raises:
         InputError: a bar is too short for its thickness, or its normal is along it.
@@ -46,7 +53,7 @@ class Bars:
 
     @cached_property
     def lengths(self) -> Array:
-        """(S,) [m]."""
+        """(S,) lengths of the bars [m]."""
         return np.asarray(np.sqrt(((self.points[:, 1] - self.points[:, 0]) ** 2).sum(axis=1)))
 
     @cached_property
@@ -56,17 +63,17 @@ class Bars:
 
     @property
     def masses(self) -> Array:
-        """(S,) of the bars [kg]."""
+        """(S,) masses of the bars [kg]."""
         return self.density * self.thickness_normal * self.thickness_in_plane * self.lengths
 
     @property
     def mass(self) -> float:
-        """[kg]."""
+        """Mass of the body [kg]."""
         return float(self.masses.sum())
 
     @cached_property
     def _frames(self) -> Array:
-        """(S, 3, 3) along, across and normal to each bar, in columns."""
+        """(S, 3, 3) unit vectors along, across and normal to each bar in columns, in the frame of `points`."""
         u = self.directions
         n = self.normals - (self.normals * u).sum(axis=1)[:, None] * u
         n = n / np.sqrt((n**2).sum(axis=1))[:, None]
@@ -78,7 +85,10 @@ class Bars:
 
     @cached_property
     def _principal(self) -> tuple[Array, Array]:
-        """Principal moments (3,) [kg m²] and axes (3, 3) in columns, in the order that turns the frame least."""
+        """Principal moments (3,) [kg m²] and principal axes (3, 3) in columns, in the frame of `points`.
+
+        Axes are right-handed, and ordered such that they are as near as possible to the axes of that frame.
+        """
         squares = np.array([self.thickness_in_plane**2, self.thickness_normal**2])
         tensor = np.zeros((3, 3))
         for mass, length, frame, ends in zip(self.masses, self.lengths, self._frames, self.points, strict=True):
@@ -104,33 +114,37 @@ class Bars:
 
     @property
     def frames(self) -> Array:
-        """(S, 3, 3) along, across and normal to each bar in columns, in the body's frame."""
+        """(S, 3, 3) unit vectors along, across and normal to each bar in columns, in the body's frame."""
         return matrix_product(self.rotation.T, self._frames)
 
     @cached_property
     def ends(self) -> Array:
-        """(S, 2, 3) both ends of each bar in the body's frame [m]: from the centre of mass, along principal axes."""
+        """(S, 2, 3) both ends of each bar in the body's frame: centre of mass, principal axes [m]."""
         return applied(self.rotation.T, self.points - self._centre_of_mass)
 
     @property
     def free(self) -> Array:
-        """(S, 2) whether an end of a bar is the end of no other one."""
+        """(S, 2) whether each end of a bar is free: not the end of another bar."""
         first = first_ends(self.points)
         return np.asarray((np.bincount(first, minlength=len(first))[first] == 1).reshape(-1, 2))
 
     def radius(self, rows: int) -> float:
-        """Return the radius of the spheres that sweep the bars in so many strands [m].
+        """Return the radius [m] of the `rows` strands, swept spheres side by side, that represent a bar.
 
-        One strand is as thick as the section is wide in the mean, several are as thick as the bar is in the plane.
+        The diameter of a single strand is the mean width of the section. The diameter of several strands is the bar's
+        thickness in the plane.
         """
         one = mean_width(self.thickness_normal, self.thickness_in_plane)
         return (one if rows == 1 else self.thickness_in_plane) / 2
 
     def axes(self, radius: float) -> tuple[Array, Array]:
-        """Return starts and ends (S, 3) of the bars' axes in the body's frame [m], free ends pulled in by a radius [m].
+        """Return the starts and the ends of the bars' axes, each (S, 3), in the body's frame [m].
+
+        Args:
+            radius: radius of a strand [m], by which free ends are moved inwards.
 
         Raises:
-            InputError: a bar is shorter than its spheres are wide.
+            InputError: nothing of a bar is left between its ends.
         """
         pulled = radius * self.free
         if not (self.lengths > pulled.sum(axis=1)).all():
@@ -143,10 +157,11 @@ class Bars:
 
     @property
     def effective_mass(self) -> float:
-        """Harmonic mean [kg] of the mass that a push feels, over the bars' axes and all directions.
+        """Effective mass [kg] at a contact: the harmonic mean over the bars' axes and all directions.
 
-        The mobility of a point r is 1/m + (r × n)·I⁻¹(r × n); averaged over directions n it is a third of its trace, a
-        square along each bar, which two points of Gauss integrate exactly.
+        The inverse of the effective mass at a point r in the direction n is the mobility 1/m + (r × n)·I⁻¹(r × n). Its
+        mean over n is a third of the trace of the mobility tensor. The trace is a quadratic function of the position
+        along a bar, which two Gauss points integrate exactly.
         """
         inverse, place = 1.0 / self.inertia, 0.5 / math.sqrt(3)
         starts, ends = self.ends[:, 0], self.ends[:, 1]

@@ -16,18 +16,18 @@ from dem.body.particle import LINKS
 Number = TypeVar("Number", int, Numbers)
 
 BOUNDARIES = ("floor", "wall", "lower hook", "upper hook", "channel's lower wall", "channel's upper wall")
-"""Names of the rigid boundaries; recorded files hold places in this tuple."""
-FLOOR, WALL, LOWER_HOOK, UPPER_HOOK, CHANNEL = range(5)  # the channel has two
+"""Names of the rigid boundaries; recorded files hold indices of this tuple."""
+FLOOR, WALL, LOWER_HOOK, UPPER_HOOK, CHANNEL = range(5)  # indices of `BOUNDARIES`; CHANNEL: the first of two walls
 NONE = -1
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class ContactForces:
-    """The M contacts at one instant that carry a force."""
+    """The M contacts that carry a force at one instant."""
 
     smarticles: Numbers  #: (M, 2) the two smarticles, the lower number first; the second one is -1 for a boundary
     links: Numbers  #: (M, 2) their links: 0 barb 1, 1 middle link, 2 barb 2; -1 for a boundary
-    boundaries: Numbers  #: (M,) place in `BOUNDARIES`; -1 between smarticles
+    boundaries: Numbers  #: (M,) index of the boundary in `BOUNDARIES`; -1 for a contact between smarticles
     points: Array  #: (M, 3) mean of the points of contact, weighted by their normal forces [m]
     normal: Array  #: (M,) sum of the normal forces at the points, positive [N]
     tangential: Array  #: (M,) size of the sum of the tangential forces at the points [N]
@@ -35,12 +35,12 @@ class ContactForces:
 
 
 def at_links(smarticle: Number, link: Number) -> Number:
-    """Return the codes of links, 0 or above, for `contacts_of_points`."""
+    """Return the codes of links for `contacts_of_points`, 0 or above, from smarticles and links."""
     return LINKS * smarticle + link
 
 
 def at_boundaries(part: Number) -> Number:
-    """Return the codes of boundaries, below 0, for `contacts_of_points`, from places in `BOUNDARIES`."""
+    """Return the codes of boundaries, below 0, for `contacts_of_points`, from indices of `BOUNDARIES`."""
     return -1 - part
 
 
@@ -51,7 +51,7 @@ def contacts_of_points(
 
     Args:
         first: (P,) codes of links, from `at_links`.
-        second: (P,) codes of the links or boundaries that they touch, from `at_links` or `at_boundaries`.
+        second: (P,) codes of what the links of `first` touch: links from `at_links`, boundaries from `at_boundaries`.
         loads: (P,) normal forces, 0 or above [N]; a contact whose points all have 0 is left out.
         points: (P, 3) positions [m].
         friction: (P, 3) tangential forces on the links of `first` [N].

@@ -20,7 +20,7 @@ def matrix_product(a: Array, b: Array) -> Array:
 
 
 def applied(matrix: Array, points: Array) -> Array:
-    """Return the products (…, n, i) of matrices (…, i, j) with points (n, j)."""
+    """Multiply matrices (…, i, j) with points (…, n, j), or the same points (n, j); return (…, n, i)."""
     return matrix_product(points, np.swapaxes(matrix, -1, -2))
 
 

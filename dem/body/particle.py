@@ -45,12 +45,12 @@ def mean_width(thickness_normal: float, thickness_in_plane: float) -> float:
 def chain_mean_width(pitch: float) -> float:
     """Return the mean distance between the axes of two touching sphere chains, in sphere diameters [1].
 
-    Two smooth bars of this width have the excluded volume of two long chains. It is below 1, since spheres of one chain
-    sit partly in the gaps of the other. Two chains that cross at an angle γ touch at those two spheres that lie nearest
-    to each other in a view along the common normal. If their distance in this view is r diameters, the axes are
-    √(1 - r²) diameters apart. The mean is taken over the positions of both chains along their axes (uniform over a
-    period) and over isotropic directions (density sin γ), weighted by sin γ, the area of the parallelogram in the
-    excluded volume.
+    Two smooth bars of this width have the excluded volume of two long chains. The distance is below 1, since spheres of
+    one chain sit partly in the gaps of the other. Two chains that cross at an angle γ touch at the two spheres that are
+    nearest to each other in a view along the common normal. If these spheres are r diameters apart in this view, the
+    axes are √(1 - r²) diameters apart. The mean is taken over the positions of both chains along their axes (uniform
+    over a period) and over isotropic directions (density sin γ), weighted by sin γ, the area of the parallelogram in
+    the excluded volume.
 
     Args:
         pitch: distance of neighbouring sphere centres over the diameter [1]; below √2, from which on chains pass
@@ -123,7 +123,10 @@ class Boxes:
 
     @cached_property
     def directions(self) -> Array:
-        """(3, 3) float64: unit vectors hinge to tip, hinge 1 to 2, hinge to tip, in the middle link's frame."""
+        """(3, 3) float64: unit vectors along barb 1, middle link and barb 2, in the middle link's frame.
+
+        Barbs point from hinge to tip, the middle link points from hinge 1 to hinge 2.
+        """
         a1, a2 = self.angles
         barbs = [-math.cos(a1), math.sin(a1), 0.0], [math.cos(a2), math.sin(a2), 0.0]
         return np.array([barbs[0], [1.0, 0.0, 0.0], barbs[1]])
@@ -149,7 +152,7 @@ class Boxes:
 
     @cached_property
     def _principal(self) -> tuple[Array, Array]:
-        """Principal moments (3,) [kg m²] and rotation (3, 3): columns are body axes in the middle link's frame."""
+        """Principal moments (3,) [kg m²], and body axes in the middle link's frame, as columns (3, 3)."""
         tensor = np.zeros((3, 3))
         for length, in_plane, direction, centre in zip(
             self.lengths, self.thicknesses_in_plane, self.directions, self._plain_centres, strict=True
@@ -207,7 +210,7 @@ class Boxes:
         return self._principal[0]
 
     def to_body(self, points: Array) -> Array:
-        """Return points (n, 3) [m] of the middle link's frame in the body frame."""
+        """Transform points (n, 3) [m] from the middle link's frame to the body frame."""
         return matrix_product(points - self.plain_centre_of_mass, self._principal[1])
 
     @cached_property
@@ -221,7 +224,7 @@ class SphereChain:
     """Arrangement of spheres along the links."""
 
     rows: int  #: Rows of spheres side by side across t1, the thickness along the normal
-    diameter: float  #: Of a sphere [m]
+    diameter: float  #: Sphere diameter [m]
     pitch: float  #: Largest distance between neighbouring centres along a link [m]
 
 
@@ -254,9 +257,9 @@ class Particle:
 
     @cached_property
     def _sides(self) -> Array:
-        """(sides,) [m]: offsets of the middle link's rows across it in the plane, at most a diameter apart.
+        """(sides,) [m]: offsets of the rows of spheres from the middle link's axis, in the smarticle's plane.
 
-        The outermost spheres lie further out than those of the barbs by `Boxes.bulge`.
+        Rows are at most a diameter apart. The outermost offsets are ±`Boxes.bulge`.
         """
         bulge = self.boxes.bulge
         if not bulge:
@@ -267,8 +270,9 @@ class Particle:
     def barb_start(self) -> float:
         """Distance from the hinge to the centre of a barb's first sphere [m].
 
-        It keeps the sphere a diameter and `HINGE_CLEARANCE` away from the sphere at the hinge. With a thicker middle
-        link it does so for the row at its face, at angles up to `INWARDS` beyond 90°.
+        At this distance the first sphere is at least `HINGE_CLEARANCE` diameters away from the surface of the sphere at
+        the hinge. If the middle link is thicker than the barbs, the first sphere is as far away from the middle link's
+        outermost row of spheres, for barb angles of 90° to 90° + `INWARDS`.
         """
         start = self.chain.diameter * (1 + HINGE_CLEARANCE)
         return (self.boxes.bulge + start) / math.cos(INWARDS) if self.boxes.bulge else start

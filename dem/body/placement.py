@@ -96,16 +96,16 @@ def place_layer(
 
 
 def fitted_poses(boxes: Boxes, vertices: Array) -> tuple[Poses, Array]:
-    """Return the poses in which the vertices of a shape lie nearest to given vertices, by least squares.
+    """Fit the pose of one shape to the given vertices of each smarticle, by least squares.
 
-    Vertices do not tell how a straight shape is rotated about its length; that angle is then arbitrary, but depends on
-    the vertices alone.
+    Vertices do not determine the rotation of a straight shape about its length. The angle of this rotation is then
+    arbitrary, but equal vertices give equal angles.
 
     Args:
         vertices: (N, 4, 3) barb tip, hinge, hinge, barb tip of each smarticle [m].
 
     Returns:
-        The poses, and (N,) the largest distance between a given and a fitted vertex of each smarticle [m].
+        The poses, and for each smarticle the largest distance between a given and a fitted vertex, (N,) [m].
 
     Source: Horn, J. Opt. Soc. Am. A 4, 629 (1987).
     """

@@ -20,7 +20,7 @@ class State:
     boxes: Boxes
     link_positions: Array  #: (N, 3, 3) centres of the links [m]
     link_rotations: Array  #: (N, 3, 3, 3) link frames, see `Boxes.link_rotations` [1]
-    link_velocities: Array  #: (N, 3, 3) of the links' centres [m/s]
+    link_velocities: Array  #: (N, 3, 3) velocities of the links' centres [m/s]
     link_spins: Array  #: (N, 3, 3) angular velocities of the links [rad/s]
 
     @classmethod
@@ -38,8 +38,8 @@ class State:
 
         Args:
             positions: (N, 3) centres of mass [m].
-            rotations: (N, 3, 3) body frame to laboratory frame [1].
-            velocities: (N, 3) of the centres of mass [m/s].
+            rotations: (N, 3, 3) rotations from the body frame to the laboratory frame [1].
+            velocities: (N, 3) velocities of the centres of mass [m/s].
             spins: (N, 3) angular velocities [rad/s].
             shapes: centres (N, 3, 3) [m] and frames (N, 3, 3, 3) of the links of each smarticle in its body frame;
                 None: those of `boxes` for all smarticles.
@@ -70,7 +70,7 @@ class State:
 
     @cached_property
     def vertices(self) -> Array:
-        """(N, 4, 3) barb tip, hinge, hinge, barb tip of each smarticle [m]; hinges end the middle link."""
+        """(N, 4, 3) barb tip, hinge, hinge, barb tip of each smarticle [m]; hinges are the middle link's ends."""
         half = self.link_rotations[..., 0] * (self.boxes.lengths / 2)[None, :, None]
         starts, ends = self.link_positions - half, self.link_positions + half
         return np.stack([ends[:, 0], starts[:, 1], ends[:, 1], ends[:, 2]], axis=1)

@@ -57,7 +57,7 @@ class Adds:
         return Adds(**lists, python="; ".join(part.python for part in each if part.python))
 
     def to_text(self) -> str:
-        """Return one line with the names in short lists and the lengths of long lists; "" if nothing is added."""
+        """Return one line that names engines, materials, bodies and files and counts the rest; "" for nothing."""
         named = {"engines": self.engines, "materials": self.materials, "bodies": self.shapes, "files": self.files}
         counted = {"functors": self.functors, "datasets": self.series, "arrays per frame": self.arrays}
         parts = [f"{what} {', '.join(names)}" for what, names in named.items() if names]

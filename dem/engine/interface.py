@@ -28,8 +28,8 @@ from dem.setting.container import Cylinder
 class Saved:
     """A saved simulation."""
 
-    content: bytes  #: In the engine's own format
-    memory: Mapping[str, Any]  #: Plain data that JSON stores without loss
+    content: bytes  #: State of the engine, in the engine's own format
+    memory: Mapping[str, Any]  #: The rest of the state, as plain data that JSON stores without loss
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -40,7 +40,7 @@ class MotorReadings:
     commands: Array  #: Angles that the motors hold [rad]; those of halted motors lag behind the schedule
     torques: Array  #: Torques on the barbs since the last control update [N m]; positive ones raise the angle
     work: Array  #: Work on the links since the start, ∫ τ dα up to the last control update [J]
-    halted: Flags  #: Whether a motor did not advance at the last control update although the schedule did
+    halted: Flags  #: Whether a motor was stopped at the last control update; for "slip" and "servo": was at its limit
 
 
 class Boundaries(Protocol):
@@ -54,11 +54,11 @@ class Boundaries(Protocol):
 
     @property
     def velocity(self) -> float:
-        """Vertical velocity of the container, or of its floor where the wall is gone [m/s]."""
+        """Vertical velocity of the container's floor [m/s]."""
 
     @property
     def walled(self) -> bool:
-        """Whether the wall exists, lifted or not."""
+        """Whether the container's wall exists, lifted or not."""
 
     @property
     def wall_bottom(self) -> float:
@@ -70,7 +70,11 @@ class Boundaries(Protocol):
 
     @property
     def raised(self) -> float | None:
-        """Height by which a hook may have raised the pile [m]; None once the pile is no longer enclosed."""
+        """Rise of the upper hook above the floor since the start [m], 0 or more; 0 without hooks.
+
+        None if the wall does not enclose the pile: the wall is removed, its lower edge is above the floor, the upper
+        hook is above its top, or the scene is in a plane.
+        """
 
     @property
     def upper_height(self) -> float:
@@ -110,11 +114,14 @@ class Boundaries(Protocol):
 
     @property
     def channel_sums(self) -> Array:
-        """(2, 3) forces on the channel's lower and upper wall [N], summed over steps; (0, 3) without walls."""
+        """(2, 3) forces on the channel's lower and upper wall [N], summed over all steps; (0, 3): no walls."""
 
 
 class Motors(Protocol):
-    """Motors of the barbs; smarticles are welded (rigid) at first, and can be articulated and welded."""
+    """Motors at the hinges.
+
+    Smarticles are welded (rigid) at first; they can be articulated and welded again.
+    """
 
     @property
     def present(self) -> bool:
@@ -135,7 +142,7 @@ class Motors(Protocol):
         """Largest number of control updates that one call of `actuate` takes."""
 
     def actuate(self, targets: Array, interval: float) -> None:
-        """Make a control update now, and schedule further ones at the ends of the following control periods.
+        """Make a control update now, and plan further ones at the ends of the following control periods.
 
         Args:
             targets: (U, N, 2) angles of the schedule at the ends of U control periods [rad]; U is at most
@@ -152,7 +159,7 @@ class Motors(Protocol):
         """Work of all motors on the links since the start, up to now [J]."""
 
     def gaps(self) -> Array:
-        """Return (N, 2) the gaps of the hinges, distances between the ends of two links [m]; 0 while welded."""
+        """Return the gaps of the hinges (N, 2), distances between joined ends of links [m]; 0 while welded."""
 
 
 class Strings(Protocol):
@@ -163,7 +170,12 @@ class Strings(Protocol):
         """Whether strings are tied to smarticles at present."""
 
     def tie(self, ties: Sequence[Tie], law: StringLaw, speeds: Sequence[float]) -> None:
-        """Tie taut strings; their far ends, on the chain's axis, move outwards along x at `speeds` [m/s]."""
+        """Tie taut strings to links; the other ends of the strings lie on the chain's axis.
+
+        Args:
+            ties: points at which the two strings are tied.
+            speeds: speeds at which the other ends move outwards along x [m/s].
+        """
 
     def untie(self) -> None:
         """Remove all strings."""
@@ -174,7 +186,7 @@ class Strings(Protocol):
 
     @property
     def pulled(self) -> float:
-        """Distance by which the far ends have moved apart since the strings were tied [m]."""
+        """Distance by which the strings' other ends have moved apart since the strings were tied [m]."""
 
     @property
     def ties(self) -> Array:
@@ -190,18 +202,18 @@ class EnergyLedger(Protocol):
 
     @property
     def added(self) -> float:
-        """Energy of smarticles when added [J]: kinetic, gravitational above z = 0, and from `take_in`."""
+        """Energy of smarticles when added [J]: kinetic, gravitational above z = 0, elastic by `take_in`."""
 
     @property
     def dissipated(self) -> float:
-        """Energy dissipated since the start, by contacts, hinges and welding [J]."""
+        """Energy dissipated since the start, by contacts, hinges, welding and `Engine.still` [J]."""
 
     @property
     def given(self) -> float:
-        """Energy added and work of boundaries since the start [J]; NaN while that work is not recorded."""
+        """Sum of `added` and `container_work` [J]; NaN while boundaries move whose work is not recorded."""
 
     def elastic(self) -> tuple[float, float]:
-        """Return the energies in the springs of contacts and of hinges [J]."""
+        """Return the energy in the springs of all contacts and the energy in those of all hinges [J]."""
 
     def take_in(self) -> None:
         """Add the present elastic energy of contacts to `added`, for smarticles that overlap when added."""
@@ -274,7 +286,10 @@ class Engine(Protocol):
         """Downward momentum that gravity and throwing have given to all smarticles since the start [N s]."""
 
     def unbalanced_force(self) -> float:
-        """Return the mean net force on a smarticle over its weight [1]: 0 at rest, 1 in free fall, inf for N = 0."""
+        """Return the mean net force on a smarticle over its weight [1]: 0 at rest, 1 in free fall.
+
+        The value is inf without smarticles or without gravity.
+        """
 
     def neighbours(self) -> Numbers:
         """Return (N,) the number of other smarticles that each smarticle touches."""
@@ -283,18 +298,32 @@ class Engine(Protocol):
         """Return (N,) the number of contacts of each smarticle with other smarticles and boundaries."""
 
     def overlaps(self, limit: float) -> Overlaps:
-        """Return the present overlaps; smarticles with an overlap above `limit` [m] are marked."""
+        """Return the present overlaps; `Overlaps.deep` marks smarticles with an overlap above `limit` [m]."""
 
     def contact_forces(self) -> ContactForces:
-        """Return the forces at all contacts, at present or in the last step, as one contact per pair of links."""
+        """Return the forces at all contacts, one contact per pair of links or of a link and a boundary.
+
+        Forces are present ones or, on some engines, those of the last step.
+        """
 
     def extremes(self, state: State) -> Extremes | None:
-        """Return extremes over all smarticles at present; None if a full check is needed or no slower."""
+        """Return extremes over all smarticles in their present `state`, faster than a full check.
+
+        None: the engine has no faster way, or a full check is needed in any case.
+        """
 
     # -- checkpoints -------------------------------------------------------------------------------------------
 
     def save(self, scratch: Path) -> Saved:
-        """Return the state, from which `load` continues with identical bits; temporary files are in `scratch`."""
+        """Return the state, from which `load` continues with identical bits.
+
+        Args:
+            scratch: folder for temporary files.
+        """
 
     def load(self, saved: Saved, scratch: Path) -> None:
-        """Replace the state by one that `save` returned for an engine of this scene; arguments as in `save`."""
+        """Replace the state by one that `save` returned for an engine of this scene.
+
+        Args:
+            scratch: folder for temporary files.
+        """

@@ -33,10 +33,14 @@ class EngineKind(Protocol):
         """Return the largest stable time step [s]; `articulated`: whether barbs can turn or have turned."""
 
     def seconds_per_second(self, scene: Demand, time_step: float, activity: Activity) -> float:
-        """Return an estimate of the wall time per simulated time [1] on one core, with a time step [s]."""
+        """Return an estimate of the wall time per simulated time [1] on one core, for a time step [s]."""
 
     def build(self, scene: Demand, time_step: float) -> Engine:
-        """Return an empty simulation; the time step of phases with motors [s] is not checked."""
+        """Return a simulation without smarticles.
+
+        Args:
+            time_step: shortest time step of all phases [s]; whether it is stable is not checked.
+        """
 
 
 def engine_kind(name: str) -> EngineKind:

@@ -1,7 +1,7 @@
 """Phases in which motors move or hold the barbs: gait, target angles, checks and control updates.
 
 Each of these phases defines a `Gait`, from which `drive` computes target angles over time. The smarticles that move are
-drawn from the scene's seed; starting angles follow from the phases before.
+drawn from the scene's seed; starting angles follow from the previous phases.
 """
 
 from __future__ import annotations
@@ -35,8 +35,8 @@ MOST_OVERSHOOT = 0.5
 class Gait:
     """Motions of the barbs in a phase, and the smarticles that make them."""
 
-    motions: tuple[Motion, Motion]  #: Of barb 1 and barb 2
-    keys: tuple[str, str] = ("barbs", "barbs")  #: Keys of the motions in messages
+    motions: tuple[Motion, Motion]  #: Motions of barb 1 and barb 2
+    keys: tuple[str, str] = ("barbs", "barbs")  #: Keys by which `ActuatedPhase.source_of` names the two motions
     duration: float  #: Length of the phase [s]
     active_fraction: float = 1.0  #: Fraction of the smarticles that move [1]
     offsets: Literal["none", "random"] = "none"  #: "random": each smarticle begins at a random point of the period
@@ -61,7 +61,11 @@ class ActuatedPhase(Phase):
         raise NotImplementedError
 
     def source_of(self, key: str) -> tuple[str, float | None]:
-        """Return the key of this phase that decides the value of `key` in the gait, and that key's value."""
+        """Return the key of this phase that sets a key of the gait's motions, and its value.
+
+        Args:
+            key: key in the motions with dots for nesting, such as `barbs.steps.0.duration_s`.
+        """
         raise NotImplementedError
 
     def check(self, scene: SceneView, index: int) -> Iterator[str]:
@@ -96,10 +100,13 @@ class ActuatedPhase(Phase):
         return self.follow(stage, engine)
 
     def follow(self, stage: Stage, engine: Engine, check_every: int | None = None) -> float:
-        """Articulate smarticles, and make the control updates that are due; return the time to the next call [s].
+        """Articulate smarticles, and make the control updates that are due.
 
         Args:
             check_every: number of updates after which the caller wants to check the pile; None: no checks.
+
+        Returns:
+            The simulated time until the next call [s]; 0 at the end of the phase.
         """
         update: int = stage.memory["look"]
         if update == 0:
@@ -204,14 +211,17 @@ def _starting_angles(scene: SceneView, index: int) -> Array:
 
 
 def overshoot(scene: SceneView) -> float:
-    """Return the torque over τ_max [1] that a motor can gain between control updates; 0 if it is capped."""
+    """Return the torque, in units of τ_max [1], that a motor can gain between two control updates.
+
+    It is 0 for the laws "slip" and "servo", which cap the torque.
+    """
     motor = scene.motor
     added = motor.stiffness_N_m_per_rad * motor.speed_limit_rad_per_s * scene.fidelity.control_interval_s
     return 0.0 if motor.law in ("slip", "servo") else added / scene.torque_limit
 
 
 def actuation_warnings(scene: SceneView) -> tuple[str, ...]:
-    """Return a warning if motors can exceed their torque limit by more than `MOST_OVERSHOOT`, in one line.
+    """Return a warning if motors can exceed τ_max by more than `MOST_OVERSHOOT` τ_max; else none.
 
     Such a scene is not rejected: a motor halts at the next control update, and motors too weak to move anything are
     worth studying.
@@ -268,7 +278,7 @@ def _of_control(scene: SceneView) -> Iterator[str]:
 
 
 def _whole_fraction(whole: float, parts: int) -> str:
-    """Return a time [s] divided by `parts` or a slightly higher number, such that it has few digits."""
+    """Return as text a time [s] divided by `parts`, or by a slightly higher number that gives few digits."""
     for more in range(parts, min(10 * parts, parts + MOST_PARTS) + 1):
         text = f"{whole / more:.3g}"
         if math.isclose(float(text) * more, whole, rel_tol=TOLERANCE):
@@ -277,7 +287,10 @@ def _whole_fraction(whole: float, parts: int) -> str:
 
 
 def _of_motions(scene: SceneView, index: int) -> Generator[str, None, tuple[float, float]]:
-    """Check range and speed of the motions; return the highest angle [deg] of either barb, moving or not."""
+    """Yield errors of the motions' range and speed; return the highest angles of barb 1 and barb 2 [deg].
+
+    The highest angles are those of all smarticles, whether they move or not.
+    """
     phase, gait, driven = scene.phases[index], _gait(scene, index), drive(scene, index)
     assert isinstance(phase, ActuatedPhase)
     # With random offsets the motion covers up to one more period than the phase is long.
@@ -303,7 +316,13 @@ def _of_motions(scene: SceneView, index: int) -> Generator[str, None, tuple[floa
 
 
 def _of_range(place: str, present: float, swing: Sine | Triangle, reached: tuple[float, float]) -> Iterator[str]:
-    """Reject a swing that leaves the range of the hinges; `present` [deg] is the value of the key `place`."""
+    """Yield an error if a swing leaves the range of the hinges.
+
+    Args:
+        place: key that sets the amplitude of the swing.
+        present: value of this key [deg].
+        reached: lowest and highest angle of the swing [deg].
+    """
     lowest, highest = HINGE_RANGE
     too_low, too_high = lowest - reached[0], reached[1] - highest
     beyond = max(too_low, too_high)
@@ -331,7 +350,7 @@ def _of_speed(place: str, motion: SimpleMotion, speed: float, limit: float) -> I
 
 
 def _of_first_spheres(scene: SceneView, index: int, angle: float) -> Iterator[str]:
-    """Check that the first sphere of a barb beyond 90° does not touch the spheres of the middle link.
+    """Yield an error if the first sphere of a barb at `angle` [deg] touches spheres of the middle link.
 
     At the angle α a barb's sphere at the distance s from the hinge is √(s² + m² + 2 s m cos α) from the middle link's
     sphere at m, so that they are clear of each other while -cos α ≤ (s² + m² - d²) / (2 s m).

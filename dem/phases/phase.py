@@ -34,7 +34,7 @@ class Stage:
 
     phase: Phase
     scene: SceneView
-    index: int  #: Of the phase in the scene
+    index: int  #: Index of the phase in the scene
     memory: Memory  #: Plain data for JSON; its key `warning` is reported at the end of the phase
 
     @cached_property
@@ -52,9 +52,9 @@ class Phase:
     actuates: ClassVar[bool] = False  #: Whether motors move or hold the barbs
     begins: ClassVar[bool] = False  #: Whether the phase adds the smarticles; a run begins with one such phase
     sources: ClassVar[frozenset[str]] = frozenset()
-    """Keys that name the source of content whose hash is another key; a scene's hash omits them."""
+    """Keys that say where content is found that another key fixes by its hash; the scene's hash omits them."""
     at_rest: ClassVar[bool] = False
-    """Whether nothing drives the smarticles; all other phases count as activity, around which φ is measured."""
+    """Whether nothing drives the smarticles; φ_0 and φ_f are measured before and after phases that drive them."""
     pours: ClassVar[bool] = False  #: Whether the phase pours the smarticles
     frees: ClassVar[bool] = False  #: Whether the phase takes the container away
     planar: ClassVar[bool | None] = False
@@ -66,7 +66,7 @@ class Phase:
         return str(getattr(self, "type"))  # noqa: B009 - a field of the part that this is mixed into
 
     def check(self, scene: SceneView, index: int) -> Iterator[str]:
-        """Yield the errors of the phase, number `index` of a scene: a line each with key, value, what to do.
+        """Yield the errors of this phase, `scene.phases[index]`, one line each: key, value and what to do.
 
         Only the first error is reported: later checks may assume that earlier ones found none.
         """
@@ -90,7 +90,7 @@ class Phase:
         return getattr(self, "duration_s", None)
 
     def expected_duration(self, count: int) -> float:
-        """Return the simulated time that the phase takes [s], estimated from N if a criterion ends it."""
+        """Return the simulated time of the phase [s]; if a criterion ends it, an estimate from `count`."""
         return self.known_duration or 0.0
 
     @property
@@ -99,7 +99,11 @@ class Phase:
         return 0.0
 
     def peak_speed(self, gravity: float) -> float:
-        """Return the greatest speed [m/s] that the phase gives to smarticles, without falls; gravity in m/s²."""
+        """Return the greatest speed [m/s] that the phase itself gives to smarticles; falls do not count.
+
+        Args:
+            gravity: acceleration of gravity [m/s²].
+        """
         return self.pushing_speed
 
     @property
@@ -125,7 +129,7 @@ class Phase:
         return {}
 
     def prepare(self, scene: SceneView, index: int) -> Any:
-        """Return data for `Stage.prepared`, which follow from the scene alone."""
+        """Return data that follow from the scene alone, for `Stage.prepared`."""
 
     def proceed(self, stage: Stage, engine: Engine) -> float:
         """Do what is due; return the simulated time [s] until the next call, or 0 when the phase is over.
@@ -168,7 +172,7 @@ class Settle(Part):
     unbalanced_force: float = Field(
         0.05, ge=1e-9, le=1e6, description="mean net force on a smarticle over its weight [1]"
     )
-    hold_s: float = Field(0.05, ge=0, le=1e6, description="how long both must hold [s]")
+    hold_s: float = Field(0.05, ge=0, le=1e6, description="time for which both limits must hold [s]")
     timeout_s: Duration = Field(5.0, description="longest wait [s]; then the run fails with the residuals")
 
 

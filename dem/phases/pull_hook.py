@@ -125,12 +125,12 @@ _DEFAULTS = {"distance_m": (2, 0), "speed_m_per_s": (1, 0)}
 
 
 def with_pull_defaults(phase: Any, smarticle: Smarticle) -> Any:
-    """Return data of a phase; in a pull-hook, missing keys that follow from the smarticle are filled in."""
+    """Return data of a phase; in a pull-hook, missing keys are computed from the smarticle's sizes."""
     pulls = isinstance(phase, Mapping) and phase.get("type") == "pull-hook"
     return with_defaults(phase, _DEFAULTS, smarticle) if pulls else phase
 
 
 def _force_sum(engine: Engine) -> list[float]:
-    """Return (3,) the force on the upper hook, summed over steps [N]; constant while nothing touches it."""
+    """Return the force on the upper hook, summed over all steps (3,) [N]; constant without contacts."""
     total: list[float] = engine.boundaries.hook_sums[1].tolist()
     return total

@@ -29,7 +29,7 @@ class Strain(Part, ActuatedPhase):
     type: Literal["strain"]
     speed_m_per_s: Speed = Field(0.005, description="speed of the moving end [m/s]")
     distance_m: Length = Field(
-        ..., description="largest distance by which that end moves [m]; the phase ends earlier when the chain parts"
+        ..., description="largest distance by which this end moves [m]; the phase ends earlier when the chain parts"
     )
     tied_at: Literal["tip", "axis"] = Field(
         "tip",

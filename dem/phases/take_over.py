@@ -330,7 +330,7 @@ def _mismatches(scene: SceneView, taken: Taken) -> Iterator[str]:
 
 
 def _within_tips(vertices: Array, radius: float) -> Array:
-    """Return vertices (N, 4, 3) with both tips a radius [m] further in, at the last spheres' centres."""
+    """Return vertices (N, 4, 3) with both tips moved inwards by a radius [m], to centres of spheres."""
     moved = vertices.copy()
     for tip, hinge, far in ((0, 1, 2), (3, 2, 1)):
         # Without barbs the middle link ends at the tips.
@@ -344,7 +344,10 @@ def _within_tips(vertices: Array, radius: float) -> Array:
 
 
 def _in_cross(cross: Cross, vertices: Array) -> Flags:
-    """Return (N,) whether a link's axis passes through a bar, at points a quarter of the side apart."""
+    """Return (N,) whether the axis of a link of each smarticle passes through a bar of a hook.
+
+    Axes are sampled at points that are at most a quarter of the bars' side apart.
+    """
     ends = np.stack([vertices[:, :-1], vertices[:, 1:]], axis=2)  # (N, 3, 2, 3)
     longest = float(np.linalg.norm(ends[:, :, 1] - ends[:, :, 0], axis=-1).max())
     shares = np.linspace(0, 1, 2 + int(4 * longest / cross.side))[:, None]
@@ -355,7 +358,7 @@ def _in_cross(cross: Cross, vertices: Array) -> Flags:
 
 
 def _angles(taken: Taken) -> Array:
-    """Return (N, 2) angles of the barbs [deg]; where the frame holds no angles, their absolute values."""
+    """Return (N, 2) angles of the barbs [deg]; absolute values if the frame holds vertices but no angles."""
     recorded = taken.frame.cell_data.get("angle_rad")
     if recorded is not None:
         return np.asarray(np.degrees(recorded[:, [0, 2]]))

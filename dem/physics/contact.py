@@ -26,8 +26,8 @@ class ContactLaw:
 def typical_effective_mass(particle: Particle) -> float:
     """Return the effective mass [kg] of a smarticle at a contact, averaged over spheres and directions.
 
-    The average is a harmonic mean. A force in the direction n at a point r from the centre of mass moves that point
-    with the mobility, the inverse effective mass, 1/m + (r × n)·I⁻¹(r × n); its mean over n is a third of its trace.
+    The average is a harmonic mean. The inverse of the effective mass at a point r from the centre of mass in the
+    direction n is the mobility 1/m + (r × n)·I⁻¹(r × n). Its mean over n is a third of the trace of its tensor.
     """
     inverse = 1.0 / particle.boxes.inertia
     x, y, z = particle.centres.T

@@ -12,7 +12,7 @@ Law = Literal["halt", "stall", "ease", "slip", "servo"]
 LAWS: tuple[Law, ...] = get_args(Law)
 HALT, STALL, EASE, SLIP, SERVO = range(len(LAWS))
 EASED = 0.5  # factor on the speed limit of a motor at its torque limit, law "ease"
-# Law "ease": a motor stops when so many barbs in a row were found at the torque limit, barb 1 and barb 2 in turn.
+# Law "ease": a motor stops after this many barbs in a row at the torque limit, barb 1 and barb 2 counted in turn.
 PATIENCE = 20
 
 
@@ -20,7 +20,7 @@ PATIENCE = 20
 class MotorLaw:
     """Parameters that all motors of a scene share."""
 
-    torque_limit: float  #: Τ_max [N m]
+    torque_limit: float  #: Torque limit τ_max [N m]
     speed_limit: float  #: ω, the greatest speed of a command [rad/s]
     stiffness: float  #: Twist stiffness of the shaft between motor and barb [N m/rad]
     law: Law  #: What a motor does when its torque reaches τ_max, as `dem.setting.motor.Motor.law` describes it
@@ -37,14 +37,15 @@ def speed_factor(law: int, over: Any) -> Any:
 
 
 def halts(law: int, over: Any, advance: Any, torque: Any, findings: Any) -> Any:
-    """Return whether a motor stops advancing.
+    """Return whether a motor stops advancing; for "slip" and "servo", which never stop, return `over`.
 
     Args:
         law: number of the law in `LAWS`.
         over: whether the torque has reached its limit.
         advance: change of the command that the schedule wants [rad], or its rate [rad/s]; only the sign matters.
         torque: torque on the barb since the last control update [N m].
-        findings: number of the smarticle's barbs in a row, this barb included, that were found at the limit.
+        findings: number of barbs in a row found at the limit, this barb included; barb 1 and barb 2 of the smarticle
+            are counted in turn.
     """
     if law == HALT:
         return over & (advance * torque > 0.0)
@@ -81,7 +82,7 @@ class Motors:
         self.angles: Array = angles.copy()  #: (N, 2) actual angles at the last control update [rad]
         self.torques: Array = np.zeros_like(angles)  #: (N, 2) torques since that update [N m]; above 0: angles rise
         self.halted: Flags = np.zeros(angles.shape, dtype=bool)
-        """(N, 2) whether a motor wanted to advance at the last control update and did not."""
+        """(N, 2) whether a motor was stopped at the last control update; for "slip" and "servo": was at its limit."""
         self._begun: Array = angles.copy()
         self._rates: Array = np.zeros_like(angles)
 

@@ -11,7 +11,7 @@ APART = 0.1  # of the limit for overlaps: boundaries that have moved apart by le
 
 @dataclass(frozen=True)
 class Held:
-    """A smarticle that touches two boundaries which have moved apart: only its contacts can give way."""
+    """A smarticle that touches two boundaries whose distance has changed: only contacts can give way."""
 
     smarticle: int  #: Number of the smarticle
     between: tuple[str, str]  #: Names of the boundaries
@@ -25,7 +25,7 @@ class Overlaps:
     deepest: float  #: Overlap of the deepest contact [m]
     deep: Flags  #: (N,) whether a smarticle has a contact deeper than the limit given to `Engine.overlaps`
     elastic_energy: float  #: Upper bound of the energy in the springs of all contacts and hinges [J]
-    held: tuple[Held, ...] = ()  #: Smarticles of `deep` that are held between two boundaries
+    held: tuple[Held, ...] = ()  #: Smarticles with a deep contact that are held between two boundaries
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -42,11 +42,11 @@ class Extremes:
 
 
 def held_between(touched: Mapping[int, Collection[str]], raised: Mapping[str, float], least: float) -> tuple[Held, ...]:
-    """Return the smarticles that touch two boundaries which have moved apart by more than `least` [m].
+    """Return the smarticles that touch two boundaries whose distance has changed by more than `least` [m].
 
     Args:
         touched: names of the boundaries that a smarticle touches, by the smarticle's number.
-        raised: height by which each boundary was raised since the start [m], by its name.
+        raised: rise of each boundary since the start [m], by its name.
         least: smallest change of distance that counts [m].
     """
     return tuple(

@@ -1,8 +1,9 @@
-"""Choice of engine and fidelity for a scene, from a table of measured errors and costs.
+"""Choose engine and fidelity for a scene, from a table of measured errors and costs.
 
-`smarticles accuracy` measures the table on one scene. It has the error of each named fidelity, and the ratio of
-measured processor times to planned wall times, by which the hours planned for another scene are corrected. Rows of the
-knob `engine` compare engines with one reference, rows of the knob `fidelity` the fidelities of one engine.
+`smarticles accuracy` measures the table on one scene. A row has the errors of one named fidelity, and the ratio of the
+measured processor time to the planned wall time. This ratio corrects the wall times planned for other scenes. Rows
+whose knob is `engine` compare all engines with one reference; rows whose knob is `fidelity` compare the fidelities of
+one engine.
 """
 
 import csv
@@ -59,9 +60,9 @@ class Measured:
     """Errors and cost of one named fidelity of an engine, from the table."""
 
     fidelity: str
-    errors: tuple[Error, ...]  #: Of the quantities that were asked for
+    errors: tuple[Error, ...]  #: Errors of the quantities that were asked for
     engine: str = "yade"
-    others: tuple[Error, ...] = ()  #: Of all other quantities
+    others: tuple[Error, ...] = ()  #: Errors of all other quantities
     seeds: int  #: Number of seeds
     ratio: float  #: Measured processor time over the planned wall time [1]
     is_reference: bool  #: Whether errors are relative to this fidelity
@@ -85,18 +86,27 @@ class AccuracyTable:
     path: Path
     fidelities: tuple[Measured, ...]  #: Fidelities with finished runs, engine by engine, coarse to fine
     reference: str  #: Name of the reference of all errors
-    aspect_ratio: float  #: L/w of the scene [1]
-    count: int  #: N of the scene
-    activity: str  #: Types of phase, separated by spaces
+    aspect_ratio: float  #: Barb length over middle length, l/w, in the scene [1]
+    count: int  #: Number of smarticles in the scene
+    activity: str  #: Types of the scene's phases that are not at rest, separated by spaces
 
 
-def read_table(path: Path | None, *, of: Sequence[str] = PACKING, engine: str | None = None) -> AccuracyTable:
+def activity_of(scene: Scene) -> str:
+    """Return the types of the phases in which something drives the pile, separated by spaces."""
+    return " ".join(dict.fromkeys(phase.type for phase in scene.phases if not phase.at_rest))
+
+
+def read_table(
+    path: Path | None, *, of: Sequence[str] = PACKING, engine: str | None = None, activity: str = ""
+) -> AccuracyTable:
     """Read a table of `smarticles accuracy`.
 
     Args:
         path: the table; None: `SHIPPED`.
-        of: keys of `QUANTITIES` whose errors decide.
+        of: keys of `QUANTITIES`; the errors of these quantities decide a choice.
         engine: the only engine that may be chosen; None: any.
+        activity: of the scene at hand, see `activity_of`. Of a table with several activities the rows of this one are
+            read, or of the first one if it has no such rows.
 
     Raises:
         InputError: the file is missing, is no table of work and precision, or has no named fidelities.
@@ -115,6 +125,9 @@ def read_table(path: Path | None, *, of: Sequence[str] = PACKING, engine: str | 
             msg = f"--table {file}: has no column {column!r}, so it is no table of work and precision; {_HOW}"
             raise InputError(msg)
     rows = list(reader)
+    measured = dict.fromkeys(row[_ACTIVITY] for row in rows if row[_ACTIVITY])
+    there_is = activity if activity in measured else next(iter(measured), "")
+    rows = [row for row in rows if row[_ACTIVITY] in ("", there_is)]
     named = _named_fidelities(rows)
     try:
         every = [_measured(*key, row, of) for key, row in named.items() if int(row[_SEEDS]) > 0]
@@ -200,7 +213,7 @@ class Choice:
         }
 
     def to_text(self) -> str:
-        """Return a few lines for the terminal."""
+        """Return the choice in words, for the terminal."""
         found = self.expected
         errors = "none by definition" if found.is_reference else ", ".join(map(str, found.errors))
         lines = [
@@ -214,7 +227,7 @@ class Choice:
 def choose(
     scene: Scene, table: AccuracyTable, *, max_error: float | None = None, max_hours: float | None = None
 ) -> Choice:
-    """Return the cheapest engine and fidelity within the error, or else the most exact within the hours.
+    """Choose the cheapest fidelity within `max_error`, or without it the most exact within `max_hours`.
 
     Args:
         scene: the scene; its own engine and fidelity are ignored.
@@ -244,11 +257,17 @@ def choose(
 
 
 def pick(expected: Sequence[Measured], *, max_error: float | None, max_hours: float | None) -> tuple[Measured, str]:
-    """Return the fidelity that `choose` takes, and the limit that decided in words.
+    """Return the fidelity that `choose` takes, and in words the limit that decided.
 
-    With a limit of the error it is the cheapest fidelity within the limit. With a limit of the hours alone it is the
-    most exact fidelity within the limit: the reference, or else, among the finest ones of all engines, the one with the
-    least known error. For each engine `expected` is ordered from coarse to fine.
+    If `max_error` is given, this is the cheapest fidelity within it. Otherwise it is the most exact fidelity within
+    `max_hours`: the reference, or if that takes longer, the fidelity with the least known error among each engine's
+    finest one within `max_hours`.
+
+    Args:
+        expected: fidelities of all engines, those of one engine from coarse to fine.
+
+    Raises:
+        InputError: no fidelity keeps the limits.
     """
     quick = [one for one in expected if max_hours is None or one.hours <= max_hours]
     if max_error is None:
@@ -308,7 +327,7 @@ def _notes(scene: Scene, table: AccuracyTable, measured: Measured, max_error: fl
             )
     if not table.reference.endswith(_FINEST):
         notes.append(f"errors are against {table.reference}: the table has no finished runs of {_FINEST[0]}")
-    activity = " ".join(dict.fromkeys(phase.type for phase in scene.phases if not phase.at_rest))
+    activity = activity_of(scene)
     here = {
         "l/w": (f"{scene.smarticle.aspect_ratio:g}", f"{table.aspect_ratio:g}"),
         "N": (str(scene.count), str(table.count)),

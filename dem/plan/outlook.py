@@ -65,7 +65,7 @@ class Plan:
         return replace(self, phases=phases, wall_s=factor * self.wall_s, correction=factor * self.correction)
 
     def to_text(self) -> str:
-        """Return a table for the terminal."""
+        """Return the plan as tables for the terminal."""
         corrected = "" if self.correction == 1 else f", corrected by {self.correction:.3g} as measured at this fidelity"
         section = f"smooth links of {self._strands}" if self.strands else f"{self.spheres_per_smarticle} spheres"
         wall = "in a plane" if self.planar else f"wall {1e3 * self.container_height_m:.0f} mm high"
@@ -101,7 +101,7 @@ class Plan:
         return f"{self.strands} strand{'' if self.strands == 1 else 's'}"
 
     def _engine_to_text(self) -> list[str]:
-        """Return the lines for engines other than YADE: knobs without meaning, and the fidelity of links."""
+        """Return lines about the engine: knobs that it ignores, and on links the fidelity; none on YADE."""
         idle = ", ".join(engine_kind(self.engine).idle_knobs)
         if not self.strands:
             return [f"engine {self.engine}: {idle} have no meaning here"] if idle else []
@@ -130,7 +130,7 @@ def _wall_time(wall: float) -> str:
 
 
 def plan(scene: Scene) -> Plan:
-    """Return the plan of a scene."""
+    """Compute the plan of a scene: phases, effects, time steps and cost."""
     kind = engine_kind(scene.engine)
     steps = time_steps(scene)
     particle = scene.particle
@@ -213,7 +213,7 @@ def recording_warnings(scene: Scene) -> tuple[str, ...]:
 
 
 def protocol_lines(scene: Scene) -> tuple[str, ...]:
-    """Return a line of the keys that equal the protocol's and one of those that differ, if any."""
+    """Return lines about keys with the protocol's values and with others; () without a protocol."""
     if scene.protocol is None:
         return ()
     kept, other = [], []

@@ -54,10 +54,10 @@ def time_step(scene: Scene) -> float:
 def time_steps(scene: Scene) -> tuple[float, ...]:
     """Return the time step [s] of each phase.
 
-    Until motors act for the first time, smarticles are rigid in their initial shape, and phases have the step of a
-    scene without motors, and therefore bitwise equal results. Later a welded smarticle has the shape in which its
-    motors left it, for which only the step of hinges is known to be stable. `fidelity.time_step_s` is the step of all
-    phases.
+    Until motors act for the first time, smarticles are rigid in their initial shape. Phases until then have the time
+    step of a scene without motors, and therefore results that are bitwise equal to those of such a scene. Later a
+    welded smarticle has the shape in which its motors left it, for which only the step with hinges is known to be
+    stable. In a plane, or if `fidelity.time_step_s` is given, all phases have one step.
 
     Raises:
         InputError: as in `time_step`, or a wall, hook or string moves too fast for the step of its phase.

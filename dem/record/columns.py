@@ -20,8 +20,8 @@ Columns = Mapping[str, Column]  #: Datasets by name, in the order of the file
 def _columns(*, whole_names: bool = False, **described: str | tuple[str, str]) -> Columns:
     """Return columns by name, from descriptions or pairs of label and description.
 
-    Units follow from the ends of the names. Default labels are the names without units, or, with `whole_names`, the
-    names.
+    Units follow from the ends of the names. A label that is not given is the name without its unit, or with
+    `whole_names` the whole name.
     """
     found = {}
     for name, text in described.items():
@@ -121,10 +121,11 @@ FIELDS = _columns(
 # Cell data of the files of forces: one value per contact; with `recording.contact_forces`.
 FORCE_FIELDS = _columns(
     first_smarticle=("first", "number of the smarticle on which the force acts"),
-    first_link="0 barb 1, 1 middle link, 2 barb 2",
+    first_link="link on which the force acts: 0 barb 1, 1 middle link, 2 barb 2",
     second_smarticle=("second", "number of the smarticle that exerts the force, the higher one; -1 for a boundary"),
-    second_link="0 barb 1, 1 middle link, 2 barb 2; -1 for a boundary",
-    fixture="-1 none, 0 floor, 1 wall, 2 lower hook, 3 upper hook, 4 and 5 the channel's walls",
+    second_link="link that exerts the force: 0 barb 1, 1 middle link, 2 barb 2; -1 for a boundary",
+    fixture="boundary that exerts the force: 0 floor, 1 wall, 2 lower hook, 3 upper hook, 4 and 5 the channel's walls; "
+    "-1 between smarticles",
     normal_force_N="sum of the normal forces at the points of contact, above 0",
     tangential_force_N="magnitude of the sum of the tangential forces at the points of contact",
     force_N="total force on the first smarticle (x, y, z), summed over the points of contact",

@@ -46,7 +46,7 @@ class Phase(Document):
 
     index: NonNegativeInt
     type: str
-    #: Whether nothing drives the smarticles in it; absent in files written before the key was added
+    #: Whether nothing drives the smarticles during the phase; absent in files written before the key was added
     at_rest: bool = Field(default_factory=lambda data: data.get("type") in ("deposit", "take-over", "relax"))
     time_step_s: PositiveFloat | None = None
     start_s: NonNegativeFloat | None = None
@@ -68,18 +68,18 @@ class Manifest(Document):
     #: Absent in manifests written before the key was added
     engine: str = Field(default_factory=lambda data: "links" if "links" in data["versions"] else "yade")
     threads: NonNegativeInt  #: Threads of the engine; ranks on lammps
-    fidelity: str  #: Name of the fidelity that the scene's is based on
+    fidelity: str  #: Named fidelity that gives the defaults of the scene's knobs
     count: PositiveInt
-    aspect_ratio: NonNegativeFloat  #: L/w [-]
+    aspect_ratio: NonNegativeFloat  #: Barb length over middle length, l/w [1]
     middle_length_m: PositiveFloat
     barb_length_m: NonNegativeFloat
-    thickness_normal_m: PositiveFloat  #: T1, along the normal of the smarticle's plane
-    thickness_in_plane_m: PositiveFloat  #: T2, in the smarticle's plane
-    middle_thickness_in_plane_m: PositiveFloat | None = None  #: That of the middle link, where it differs
+    thickness_normal_m: PositiveFloat  #: Thickness t1 along the normal of the smarticle's plane
+    thickness_in_plane_m: PositiveFloat  #: Thickness t2 in the smarticle's plane
+    middle_thickness_in_plane_m: PositiveFloat | None = None  #: t2 of the middle link; None: that of the barbs
     smarticle_mass_kg: PositiveFloat
     solid_volume_m3: PositiveFloat  #: Volume of one smarticle, t1 t2 (w + 2l), each link with its own t2
-    container_radius_m: PositiveFloat  #: Of the widest tier
-    #: Radius for packing fractions, where it is not the container's
+    container_radius_m: PositiveFloat  #: Inner radius, of the widest tier if there are several
+    #: Radius for packing fractions; None: the container's
     packing_radius_m: PositiveFloat | None = None
     container_tiers: PositiveInt = 1  #: Cylinders of different radii that stand on each other
     planar: bool = False  #: Whether all motion is confined to a plane, without a container
@@ -113,7 +113,7 @@ class Manifest(Document):
         return self.container_radius_m if self.packing_radius_m is None else self.packing_radius_m
 
     def walled(self, phase: int) -> bool:
-        """Return whether the container has its wall in a phase, which is given by its index."""
+        """Return whether the container has a wall throughout a phase, given by its index."""
         return not self.planar and all(record.type != "remove-container" for record in self.phases[: phase + 1])
 
     def fills_cylinder(self, phase: int) -> bool:
@@ -157,10 +157,10 @@ class Failed(Document):
 class Progress(Document):
     """Progress of a running run, `progress.json`, at most a second old."""
 
-    phase: str | None = None
-    time_s: float | None = None
-    end_s: float | None = None
-    phi: float | None = None
-    count: int | None = None
-    wall_s: float | None = None
-    checkpoint_s: float | None = None
+    phase: str | None = None  #: Type of the current phase
+    time_s: float | None = None  #: Simulated time
+    end_s: float | None = None  #: Simulated time at which the current phase ends; None: unknown
+    phi: float | None = None  #: Packing fraction [1]
+    count: int | None = None  #: Number of smarticles added so far
+    wall_s: float | None = None  #: Wall time of the process
+    checkpoint_s: float | None = None  #: Simulated time of the newest checkpoint

@@ -1,4 +1,4 @@
-"""Writing of files that appear complete or not at all, and the error about a file that cannot be read."""
+"""Write files that appear complete or not at all, and report files that cannot be read."""
 
 import contextlib
 import os
@@ -15,7 +15,7 @@ def whole(path: Path, *, before: Path | None = None, shared: bool = False) -> It
     """Yield a temporary path, which is renamed to `path` if the block succeeds, and removed otherwise.
 
     Args:
-        before: new path of the file that is replaced; None: it is removed.
+        before: path to which an existing file is moved; None: it is overwritten.
         shared: whether several processes may write the file at once.
     """
     name = f"{path.stem}.{os.getpid()}{path.suffix}" if shared else path.name
@@ -33,7 +33,11 @@ def whole(path: Path, *, before: Path | None = None, shared: bool = False) -> It
 
 
 def write_whole(path: Path, write: Callable[[Path], object], *, make_folder: bool = True) -> None:
-    """Write or replace a file by a function of a temporary path, complete or not at all.
+    """Write or replace a file, completely or not at all.
+
+    Args:
+        write: function that writes the content to the temporary path that it is given.
+        make_folder: whether to make the file's folder if it is missing.
 
     Raises:
         RunError: the disk is full or the folder cannot be written; an existing file is unchanged.
@@ -61,7 +65,12 @@ def write_text(path: Path, text: str, *, make_folder: bool = True) -> None:
 
 
 def cannot_read(what: str, path: Path, cause: BaseException | str, remedy: str) -> NoReturn:
-    """Raise InputError about a file that is missing, truncated or wrong."""
+    """Raise InputError about a file that is missing, truncated or wrong.
+
+    Args:
+        what: kind of the file, for the message.
+        remedy: what to do.
+    """
     if isinstance(cause, BaseException):
         lines = str(cause).strip().splitlines()
         named = ": ".join([type(cause).__name__, *lines[:1]])

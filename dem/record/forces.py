@@ -28,6 +28,8 @@ def force_mesh(found: ContactForces, positions: Array, *, time: float, phase: in
 
     Args:
         positions: (N, 3) centres of mass of the smarticles [m].
+        time: simulated time [s].
+        phase: index of the phase in the scene.
     """
     number, between = len(found.forces), found.boundaries == NONE
     ends = np.empty((number, 2, 3))
@@ -57,7 +59,8 @@ class RecordedForces:
 
     path: Path  #: The file
     contacts: ContactForces = field(repr=False)  #: The contacts
-    #: (M, 2, 3) ends of the lines: the first smarticle's centre of mass, and the second's or a boundary's point [m]
+    #: (M, 2, 3) ends of the lines [m]: the first smarticle's centre of mass, and that of the second, or the point of
+    #: contact at a boundary
     ends: Array = field(repr=False)
 
     @property

@@ -125,9 +125,11 @@ class Frame:
     phase: int  #: Index into `Run.phases`
     #: (N, 4, 3) float64 [m], barb tip, hinge, hinge, barb tip of each smarticle, in its shape at that time
     vertices: Array = field(repr=False)
-    smarticle_ids: Numbers = field(repr=False)  #: (N,) int64
-    link_velocity: Array = field(repr=False)  #: (N, 3, 3) float64 [m/s], of the centres of barb 1, middle link, barb 2
-    link_angular_velocity: Array = field(repr=False)  #: (N, 3, 3) float64 [rad/s]
+    smarticle_ids: Numbers = field(repr=False)  #: (N,) int64, numbers of the smarticles
+    #: (N, 3, 3) float64 [m/s], velocities of the centres of barb 1, middle link and barb 2
+    link_velocity: Array = field(repr=False)
+    #: (N, 3, 3) float64 [rad/s], angular velocities of barb 1, middle link and barb 2
+    link_angular_velocity: Array = field(repr=False)
     contacts: Numbers = field(repr=False)  #: (N,) int64, number of other smarticles that each smarticle touches
     #: Further data of the file, (N, 3, …) one value per link, by name. Frames of scenes that actuate have `angle_rad`,
     #: `motor_torque_N_m` and `motor_work_J`, NaN on the middle link and on welded smarticles, and `halted`.
@@ -200,7 +202,12 @@ def read_frame(path: Path | str) -> Frame:
 
 
 def read_mesh(path: Path, what: str = "frame", remedy: str | None = None) -> Any:
-    """Return the mesh of a VTK file; raise InputError with `remedy`, what to do (None: advice for frames)."""
+    """Return the mesh of a VTK file; raise InputError if it cannot be read.
+
+    Args:
+        what: kind of the file, for the message.
+        remedy: what to do, for the message; None: advice for frames.
+    """
     # `meshio.read` prints and exits on damaged files. The reader of the format raises any exception, or prints a
     # warning and continues, which the callers' checks of shapes find.
     noise = io.StringIO()

@@ -18,8 +18,8 @@ class ProgressWriter:
     """Writer of a run's progress, at most once per second."""
 
     folder: Path  #: The run directory
-    total: int  #: Smarticles of the scene
-    show: bool  #: Whether to write to the terminal
+    total: int  #: Number of smarticles in the scene
+    show: bool  #: Whether to draw a progress line on the terminal
     _progress: Progress = field(default_factory=Progress)
     _begun: float = field(init=False)
     _start: float = 0.0

@@ -1,4 +1,4 @@
-"""Functions that make the parts of a run from its scene: engine, recorder, watchdog."""
+"""Make the parts of a run from its scene: engine, recorder, watchdog."""
 
 import math
 from collections.abc import Callable, Sequence
@@ -42,7 +42,11 @@ KEPT_WITHIN = 0.01
 
 
 def build_engine(scene: Scene, dt: float) -> Engine:
-    """Return an empty simulation of a scene; the time step dt [s] of phases with motors is not checked."""
+    """Return a simulation of a scene that has no smarticles yet.
+
+    Args:
+        dt: shortest time step of all phases [s]; whether it is stable is not checked.
+    """
     return engine_kind(scene.engine).build(scene, dt)
 
 

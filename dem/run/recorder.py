@@ -1,4 +1,4 @@
-"""Writing of a run's files while time advances, and checks by the watchdog."""
+"""Write the files of a run while time advances, and let the watchdog check the run."""
 
 import math
 from collections.abc import Callable, Mapping
@@ -24,7 +24,7 @@ WATCH_STEPS = 500
 
 @dataclass
 class Recorder:
-    """Recorder of a run: samples at a fixed interval, other records at whole multiples of it."""
+    """Record a run: take samples at a fixed interval, and write other files at whole multiples of it."""
 
     sampler: Sampler
     series: SeriesWriter

@@ -1,4 +1,4 @@
-"""Simulation of one scene into a run directory, and the manifest of the run."""
+"""Simulate one scene into a run directory, and write the manifest of the run."""
 
 import contextlib
 import logging
@@ -36,7 +36,10 @@ def run_scene(
     """Simulate a scene into a run directory; return times and cost, or None if the run was done already.
 
     Args:
-        out: the run directory; it must not exist, or be empty, or with `resume` hold an unfinished run of this scene.
+        out: the run directory; without `resume` it must be new or empty, with `resume` it must hold a run of this
+            scene.
+        command: command line that started the run, for the manifest.
+        progress: whether to draw a progress line on the terminal.
         resume: whether to continue from the newest undamaged checkpoint, or from the start if none was written.
         builders: functions that make the parts of the run; None: the default ones.
 
@@ -144,7 +147,7 @@ def _restore(simulation: Simulation, saved: tuple[Checkpoint, str | None] | None
 
 
 def _mark_ended(simulation: Simulation | None, out: Path, log: logging.Logger, error: BaseException) -> str:
-    """Write the series and `failed.json`; return the cause, for a failed run with its last checkpoint."""
+    """Write the series and `failed.json`; return the cause, for a failed run with the last checkpoint."""
     status: Ended = "interrupted" if isinstance(error, StopRequestedError | KeyboardInterrupt) else "failed"
     cause = "interrupted by the user" if isinstance(error, KeyboardInterrupt) else str(error)
     if not isinstance(error, RunError | StopRequestedError | KeyboardInterrupt):
@@ -214,7 +217,7 @@ def manifest(
 
 
 def versions(made_by: tuple[str, str]) -> dict[str, str]:
-    """Return the versions of all software on which results depend; `made_by` is the engine's."""
+    """Return the versions of all software on which results depend; `made_by`: engine and its version."""
     try:
         own = version("smarticles")
     except PackageNotFoundError:

@@ -1,4 +1,4 @@
-"""Rows of the series, computed from the engine at each sample."""
+"""Compute the rows of the series from the engine, one row per sample."""
 
 import math
 from collections.abc import Mapping, Set
@@ -19,7 +19,7 @@ from dem.record.packing import packing_fraction
 
 @dataclass
 class Sampler:
-    """Computes rows of the series, and keeps values of the previous sample for means over time."""
+    """Compute rows of the series, and keep values of the previous sample for means over time."""
 
     radius: float  #: Radius for packing fractions [m]; NaN: they have no meaning
     effects: Set[EffectName] = frozenset()  #: Effects of the scene
@@ -94,7 +94,12 @@ class Sampler:
         return np.asarray(lost / (time - previous[0]))
 
     def _mean_since(self, name: str, steps: int, sums: Array) -> Array:
-        """Return the mean over the steps since the previous sample, of forces summed over all steps."""
+        """Return mean forces [N] over the steps since the previous sample; NaN for the first sample.
+
+        Args:
+            name: key of `memory` under which the sums of the previous sample are kept.
+            sums: forces summed over all steps [N].
+        """
         previous = self.memory[name]
         self.memory[name] = [steps, sums.tolist()]
         if previous is None or steps <= previous[0]:

@@ -37,7 +37,7 @@ class Simulation:
     folder: Path  #: The run directory
     log: logging.Logger
     made_by: tuple[str, str]  #: Name and version of the engine
-    time_steps: Sequence[float]  #: Of each phase [s]
+    time_steps: Sequence[float]  #: Time step of each phase [s]
     checkpointed: float | None = None  #: Simulated time of the newest checkpoint [s]; None: no checkpoint yet
     _phase: int = 0
     _stage: Stage | None = None

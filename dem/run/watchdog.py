@@ -1,4 +1,4 @@
-"""Checks that stop a run whose result would have no meaning."""
+"""Stop a run whose result would have no meaning."""
 
 import math
 from dataclasses import dataclass
@@ -34,9 +34,10 @@ class Watchdog:
     _ceiling: float = math.inf  # limit of kinetic and potential energy less the work done [J]
 
     def within_limits(self, extremes: Extremes, *, floor: float, raised: float | None = 0.0) -> bool:
-        """Return whether extremes of all smarticles prove that all limits hold, except that of the energy.
+        """Return whether extremes over all smarticles prove that all limits hold, except that of the energy.
 
-        If not, `check` and `check_depths` decide. `floor` and `raised` are as in `check`.
+        If the result is false, all limits may hold nevertheless: `check` and `check_depths` must decide. `floor` and
+        `raised` are as in `check`.
         """
         inside = extremes.lowest >= floor
         if raised is not None:
@@ -62,7 +63,8 @@ class Watchdog:
             floor: height of the floor [m].
             points: (N, P, 3) centres of the spheres, or points of the links' axes [m]; None: centres of mass. They are
                 needed beside overlaps, which YADE underestimates where a centre is beyond wall or floor.
-            raised: distance by which a hook may have raised smarticles [m]; None: nothing encloses them.
+            raised: rise of the upper hook above the floor [m], by which it may have lifted smarticles; None: the wall
+                does not enclose the pile.
             gaps: (N, 2) distances between the links of each hinge [m]; None while welded.
         """
         positions = state.positions

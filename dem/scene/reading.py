@@ -1,4 +1,4 @@
-"""Reading scenes from files, changing them by `--set`, and writing, hashing and comparing them."""
+"""Read scenes from files, change their keys by `--set`, and write, hash and compare scenes."""
 
 import hashlib
 import json
@@ -120,10 +120,10 @@ def apply_override(data: Any, override: str) -> None:
 
 
 def _plain(scene: Scene) -> dict[str, Any]:
-    """Return the resolved scene as plain data, without later added keys that have their defaults.
+    """Return the resolved scene as plain data, without keys that were added later and have their defaults.
 
-    Leaving them out keeps the hashes of older scenes. A protocol could fill them in with other values, so that scenes
-    with a protocol keep theirs.
+    Leaving these keys out keeps the hashes of older scenes. A scene with a protocol keeps `packing_radius_m` and the
+    keys of `ADDED_KEYS`, since a protocol may have filled them in.
     """
     data = scene.model_dump(mode="json")
     optional: list[tuple[dict[str, Any], Mapping[str, Any]]] = [
@@ -144,7 +144,11 @@ def _plain(scene: Scene) -> dict[str, Any]:
 
 
 def dump_scene(scene: Scene, folder: Path | None = None) -> str:
-    """Return the resolved scene as YAML with all defaults, and paths of other runs relative to `folder`."""
+    """Return the resolved scene as YAML, without the keys that `_plain` leaves out.
+
+    Args:
+        folder: folder to which paths of other runs are made relative; None: they are not changed.
+    """
     data = _plain(scene)
     if folder is not None:
         for phase in data["phases"]:
@@ -156,7 +160,7 @@ def dump_scene(scene: Scene, folder: Path | None = None) -> str:
 def scene_hash(scene: Scene) -> str:
     """Return the SHA-256 hash of a resolved scene, from its canonical JSON.
 
-    Keys that only name the source of content which another key pins (`Phase.sources`) do not count.
+    Keys in `Phase.sources` do not count: they only say where content is found that another key fixes.
     """
     data = _plain(scene)
     for dumped, phase in zip(data["phases"], scene.phases, strict=True):
@@ -176,7 +180,10 @@ def difference(there: Scene, here: Scene) -> str:
 
 
 def flattened(value: Any, place: str = "") -> dict[str, Any]:
-    """Return all leaves of nested mappings and lists, by keys with dots that begin with `place`."""
+    """Return the leaves of nested data by their dotted keys, such as `phases.0.type`.
+
+    A list of plain values is one leaf. `place` is put before all keys.
+    """
     if isinstance(value, list) and any(isinstance(item, Mapping | list) for item in value):
         value = {str(index): item for index, item in enumerate(value)}
     if not isinstance(value, Mapping):

@@ -1,4 +1,4 @@
-"""Checks of several parts of a scene together: what engines can compute, and what has a meaning."""
+"""Check parts of a scene against each other and against what the engine can compute."""
 
 import math
 from collections.abc import Iterator
@@ -12,7 +12,7 @@ from dem.setting.hooks import TOLERANCE, Hooks
 
 
 def problems(scene: SceneView, engine: str) -> Iterator[str]:
-    """Yield the errors of a scene on an engine: one line each with key, value and what to do."""
+    """Yield an error message for each problem of a scene on an engine: key, value and what to do."""
     if scene.plane is None:
         yield from _of_order(scene)
         yield from _of_container(scene)

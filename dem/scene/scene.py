@@ -35,6 +35,17 @@ SMOOTH_PITCH = 0.35
 _LEAST_GRAVITY = 1e-6  # m/s²; below it motors, whose torque limit is proportional to gravity, cannot move anything
 
 
+def _named(base: str, given: Mapping[str, Any]) -> Mapping[str, Any]:
+    """Return the knobs of the named fidelity `base`, adapted to given keys of a scene and its fidelity.
+
+    On the engine links `rows` is 1 if `given` has a plane or a `diameter_m`, or if t1 is at most t2.
+    """
+    engine, smarticle = given.get("engine", ""), given.get("smarticle") or Smarticle()
+    narrow = smarticle.thickness_normal_m <= smarticle.thickness_in_plane_m
+    single = given.get("plane") is not None or narrow or given.get("diameter_m") is not None
+    return {**fidelities(engine)[base], **({"rows": 1} if engine == "links" and single else {})}
+
+
 class Scene(Part):
     """Description of one run: everything that its result depends on."""
 
@@ -62,7 +73,7 @@ class Scene(Part):
     motor: Motor = Field(default_factory=Motor, description="the motors of the hinges, for phases that actuate")
     gravity_m_per_s2: float = Field(9.81, ge=0, le=1000, description="g, downwards [m/s²]; 0 or from 1e-6")
     fidelity: Fidelity = Field(
-        default_factory=lambda given: Fidelity(base="standard", **fidelities(given.get("engine", ""))["standard"]),
+        default_factory=lambda given: Fidelity(base="standard", **_named("standard", given)),
         description="a name (draft, standard, reference) or a mapping: base and the knobs that differ from it",
     )
     phases: tuple[AnyPhase, ...] = Field(..., min_length=1, description="phases of the run, in order")
@@ -83,7 +94,7 @@ class Scene(Part):
         base = value.get("base", "standard")
         if not isinstance(base, str) or base not in FIDELITIES:
             raise ValueError(f"unknown fidelity {shown(base)}; {nearest(str(base), FIDELITIES)}")
-        return {"base": base, **fidelities(info.data.get("engine", ""))[base], **value}
+        return {"base": base, **_named(base, {**info.data, **value}), **value}
 
     @field_validator("gravity_m_per_s2")
     @classmethod
@@ -107,7 +118,7 @@ class Scene(Part):
     @model_validator(mode="wrap")
     @classmethod
     def _stiff_enough(cls, data: Any, handler: ModelWrapValidatorHandler[Self]) -> Self:
-        """Raise the stiffness of a named fidelity where the scene's loads and speeds need more."""
+        """On links, raise the stiffness of a named fidelity if the scene's loads and speeds need more."""
         scene = handler(data)
         given = data.get("fidelity") if isinstance(data, Mapping) else scene.fidelity
         chosen = given is not None and not isinstance(given, str | Mapping)
@@ -143,11 +154,14 @@ class Scene(Part):
         )
 
     def ample_height(self, hooks_top: float = 0.0) -> float:
-        """Return a height of the wall [m] for the loosest pile, or hooks up to `hooks_top` [m], and a layer.
+        """Return a wall height [m] that leaves room for a layer above the loosest pile and above the hooks.
 
         A loose random packing of thin bars has the packing fraction φ ≈ 2.4 d/L, with d the mean width of the section
         and L the length of all three links (Gravish's φ_0 at l/w = 0, 0.7 and 1.4). The loosest pile is assumed to have
         half this packing fraction.
+
+        Args:
+            hooks_top: height of the highest point of the hooks [m].
         """
         # Smarticles may come to lie on a hook.
         pile = self._height_at(1.2)

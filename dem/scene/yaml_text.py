@@ -26,7 +26,7 @@ class StrictLoader(yaml.SafeLoader):  # type: ignore[misc]  # PyYAML ships no ty
     """SafeLoader that rejects a key given twice and reads `1e-3` as a number."""
 
     def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Any, Any]:
-        """Return a node's mapping; raise ConstructorError if a key is given twice, or is no text or number."""
+        """Return a node's mapping; raise ConstructorError if a key is given twice, or is a list or mapping."""
         if isinstance(node, yaml.MappingNode):
             self.flatten_mapping(node)
             seen: set[Any] = set()

@@ -26,8 +26,8 @@ class Container(Part):
     height_m: Length | None = Field(None, description="height of the wall [m]; by default high enough for the pour")
     packing_radius_m: Length | None = Field(
         None,
-        description="radius for packing fractions [m]; default: radius_m; the paper's own code takes another one than "
-        "its wall's",
+        description="radius for packing fractions [m]; default: radius_m; the paper's own code uses a radius other "
+        "than that of its wall",
     )
 
     tiers: tuple[Tier, ...] | None = Field(
@@ -80,10 +80,10 @@ class Container(Part):
 class Cylinder:
     """The container of a simulation, its wall made of flat facets. Lengths in m."""
 
-    radius: float  #: Of the lowest tier
-    height: float  #: Of the wall's top above the floor
+    radius: float  #: Inner radius, of the lowest tier if there are several
+    height: float  #: Height of the wall's top above the floor
     facets: int  #: Flat facets around the wall
-    #: (bottom, radius) of the tiers above the lowest, from below; each tier ends where the next begins
+    #: (height of the lower end above the floor, radius) of each tier above the lowest one, from below
     upper: tuple[tuple[float, float], ...] = ()
 
     @property
@@ -92,7 +92,7 @@ class Cylinder:
         return self.corner_radius_of(self.radius)
 
     def corner_radius_of(self, radius: float) -> float:
-        """Return the distance [m] of the wall's vertical edges from the axis in a tier of a radius [m]."""
+        """Return the distance [m] of the wall's vertical edges from the axis, for a tier with this radius [m]."""
         turn = 2 * math.pi / self.facets
         return radius * math.sqrt(turn / math.sin(turn))
 
@@ -103,7 +103,7 @@ class Cylinder:
 
     @property
     def bottom(self) -> float:
-        """Height [m] of the wall's lower edge at the start, below the floor."""
+        """Height [m] of the wall's lower edge above the floor at the start; negative, so below the floor."""
         return -0.1 * self.radius
 
     def radii(self, heights: Array) -> Array:

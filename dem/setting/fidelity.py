@@ -70,12 +70,12 @@ FIDELITIES: Mapping[str, Mapping[str, Any]] = {
 
 # For the engine links, from results/accuracy-links; it ignores pitch and hinge stiffness. Its stable step is safe
 # (results/stability); at l/w = 0.7 the fraction 0.92 gives two steps per control period, where 0.9 gives three.
-_LINKS = {**_STANDARD, "rows": 2, "time_step_fraction": 0.92}
+_LINKS = {**_STANDARD, "time_step_fraction": 0.92}
 _BY_ENGINE: Mapping[str, Mapping[str, Mapping[str, Any]]] = {
     "links": {
-        "draft": {**_LINKS, "stiffness_N_per_m": 250.0},
-        "standard": {**_LINKS, "stiffness_N_per_m": 1000.0},
-        "reference": {**_LINKS, "stiffness_N_per_m": 2000.0},
+        "draft": _LINKS,
+        "standard": {**_LINKS, "rows": 2, "stiffness_N_per_m": 1000.0},
+        "reference": {**_LINKS, "rows": 3, "stiffness_N_per_m": 2000.0},
     }
 }
 

@@ -1,4 +1,4 @@
-"""Hooks in the pile, which a phase pulls."""
+"""Two hooks in the pile; the phase pull-hook pulls the upper one."""
 
 from __future__ import annotations
 
@@ -55,13 +55,17 @@ _HOOK_DEFAULTS = {"side_m": (0, 1), "length_m": (1, 0), "lower_height_m": (0, 10
 
 
 def with_hook_defaults(hooks: Any, smarticle: Smarticle) -> Any:
-    """Return data of `Hooks`, not yet validated, with the missing keys that follow from the smarticle."""
+    """Return unvalidated data of `Hooks`, with missing lengths computed from those of the smarticle."""
     filled = with_defaults(hooks, _HOOK_DEFAULTS, smarticle)
     return {"lower_length_m": filled["length_m"]} | filled if isinstance(filled, dict) else filled
 
 
 def with_defaults(data: Any, defaults: Mapping[str, tuple[int, int]], smarticle: Smarticle) -> Any:
-    """Return a mapping with missing keys at their defaults, a w + b t2 for (a, b); other data as they are."""
+    """Return a mapping with its missing keys filled in; data that are no mapping are returned unchanged.
+
+    Args:
+        defaults: numbers (a, b) by key; the key's default is a w + b t2 [m].
+    """
     if not isinstance(data, Mapping):
         return data
     w, t2 = smarticle.middle_length_m, smarticle.thickness_in_plane_m
@@ -79,14 +83,14 @@ class Bar(NamedTuple):
 class Cross:
     """One hook of a simulation. Lengths in m."""
 
-    height: float  #: Of the centre above the floor
-    side: float  #: Of the bars' square section
-    length: float  #: Length of the two bars; of more bars, diameter of the disc at whose edge they end
-    count: int = 1  #: Number of bars along x, and of bars along y, evenly spaced
+    height: float  #: Height of the centre above the floor
+    side: float  #: Side of the bars' square section
+    length: float  #: With one bar along each axis: its length; with more: diameter of the disc at whose edge bars end
+    count: int = 1  #: Number of bars along x, which is also the number of bars along y; bars are evenly spaced
 
     @property
     def bars(self) -> tuple[Bar, ...]:
-        """The bars: one along x and one along y in turn."""
+        """The 2 `count` bars, alternately along x and along y."""
         found: list[Bar] = []
         for k in range(self.count):
             place = self.length * ((k + 1) / (self.count + 1) - 0.5)

@@ -57,13 +57,18 @@ class BaseMotion(Part):
         return None
 
     def course(self, start: Array, home: Array) -> Course:
-        """Return the angles over time [rad] of a motion that begins at `start`, in a phase begun at `home`."""
+        """Return the function from times [s] since the beginning of the motion to angles [rad].
+
+        Args:
+            start: angles at the beginning of the motion [rad].
+            home: angles at the beginning of the phase [rad], in the shape of `start`.
+        """
         raise NotImplementedError
 
     def legs(self, start: Array, home: Array, until: float) -> Iterator[Leg]:
         """Yield the simple motions within the motion in order, up to the time `until` [s].
 
-        Of a sequence that is repeated only two repetitions are yielded, since further ones are equal to the second.
+        A repeated sequence yields its first two repetitions only, since all others are equal to the second.
         """
         raise NotImplementedError
 
@@ -158,7 +163,7 @@ class Return(_Straight):
 
 
 class _Wave(_Endless):
-    """Swing about an angle, upwards first; the barb jumps to the first angle of the swing."""
+    """Swing about an angle, at `cycles_offset` 0 upwards first; the barb jumps to the swing's first angle."""
 
     centre_deg: HingeAngle = Field(..., description="angle that the barb swings about [deg]")
     amplitude_deg: float = Field(
@@ -183,7 +188,7 @@ class _Wave(_Endless):
         raise NotImplementedError
 
     def swing(self, cycles: Array) -> Array:
-        """Return the deviation from the centre over the amplitude [1], -1 to 1, after a number of cycles."""
+        """Return the deviation from the centre in amplitudes [1], from -1 to 1, after numbers of cycles [1]."""
         raise NotImplementedError
 
     def course(self, start: Array, home: Array) -> Course:

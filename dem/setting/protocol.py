@@ -30,13 +30,16 @@ PROTOCOLS: Mapping[str, Mapping[str, Mapping[str, Any]]] = MappingProxyType(
         },
     }
 )
-"""Values of keys by protocol and by part of the scene or type of phase."""
+"""Values by protocol, then by part of the scene or type of phase, then by key."""
 
 PARTS = ("motor", "contact", "container")
 
 
 def applies(part: str, *, plane: bool, tiers: bool) -> bool:
-    """Return whether a protocol sets keys of a part; it leaves out the container in a plane or with tiers."""
+    """Return whether a protocol sets keys of a part of the scene.
+
+    It sets no keys of the container if the scene has a plane or the container has tiers.
+    """
     return part != "container" or not (plane or tiers)
 
 

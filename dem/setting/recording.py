@@ -41,7 +41,7 @@ class Recording(Part):
     )
 
     def samples_in(self, interval_s: float | None) -> int:
-        """Return the number of samples of the series in another interval [s]; 0 for None."""
+        """Return the number of samples of the series within an interval [s], rounded; 0 for None."""
         return round((interval_s or 0.0) / self.series_interval_s)
 
     @property

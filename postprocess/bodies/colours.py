@@ -100,9 +100,10 @@ class ColourScale:
 
 
 def colour_field(name: str | None, run: Run) -> Field:
-    """Return the field of a run by name or short name; None: crossings, for planar runs smarticle_id.
+    """Return the field of a run by name or short name.
 
-    InputError if the name is unknown, or the run lacks the field.
+    None stands for crossings, or for smarticle_id if the run is planar. InputError if the name is unknown, or the run
+    lacks the field.
     """
     usual = "smarticle_id" if run.manifest.planar else "crossings"
     field = checked_field(usual if name is None else name, ALIASES)
@@ -113,7 +114,7 @@ def colour_field(name: str | None, run: Run) -> Field:
 
 
 def scalars(field: Field, frame: Frame, run: Run) -> Floats:
-    """Return one value of a field per link, (N, 3): of vectors the length; NaN if the frame lacks it."""
+    """Return one value per link, (N, 3): a field's value or its length; NaN if the frame lacks the field."""
     values = link_values(field, frame, run)
     if values is None:
         return np.full((frame.count, 3), np.nan)
@@ -121,7 +122,7 @@ def scalars(field: Field, frame: Frame, run: Run) -> Floats:
 
 
 def span(values: Iterable[Floats]) -> Span:
-    """Return the least and the greatest finite value of several arrays; 0 and 1 if no value is finite."""
+    """Return the least and the greatest of all finite values in several arrays; (0, 1) if there are none."""
     finite = [each[np.isfinite(each)] for each in values]
     joined = np.concatenate([np.empty(0), *finite])
     return (float(joined.min()), float(joined.max())) if joined.size else (0.0, 1.0)

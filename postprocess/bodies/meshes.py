@@ -55,16 +55,16 @@ class ChainStrings:
 
 
 class RunBoundaries:
-    """Walls and strings of a run, and their motion, by its scene and its series."""
+    """Walls and strings of a run and their motion, read from the scene and the series of the run."""
 
     def __init__(self, run: Run) -> None:
         scene, phases = run.scene, run.scene.get("phases", ())
         series = run.series if run.has_series else None
         #: Radius and top of each tier of a mould, from the lowest [m]; empty for one cylinder
         self.tiers = tuple((tier.radius, tier.top) for tier in read_tiers(run))
-        #: Height of the cylinder's wall [m]; None: as high as the pile needs
+        #: Height of the cylinder's wall [m]; None: the wall ends above the highest smarticle
         self.height: float | None = (scene.get("container") or {}).get("height_m")
-        #: Indices of phases that move the floor and leave the wall at rest, at z = 0
+        #: Indices of phases that move the floor alone; the lower edge of the wall stays at z = 0
         self.floor_alone = frozenset(index for index, phase in enumerate(phases) if phase.get("moves") == "floor")
         #: Index of the phase that removes the wall; None if no phase does
         self.removal = next((phase.index for phase in run.phases if phase.type == "remove-container"), None)
@@ -84,7 +84,7 @@ class RunBoundaries:
     def raised(self, time: float, phase: int, top: float) -> float | None:
         """Return the height by which the wall has been lifted [m]; None if there is no wall any more.
 
-        A wall that has been lifted above the top of the pile, a height above the floor [m], counts as removed.
+        `top` is the height of the pile's top above the floor [m]; a wall that has been lifted higher counts as removed.
         """
         if self.removal is None or phase < self.removal:
             return 0.0
@@ -96,7 +96,7 @@ class RunBoundaries:
 
 
 def _start(run: Run, index: int, series: Series | None) -> float | None:
-    """Return the start of a phase [s]; of an unfinished run the time of the last sample before the phase."""
+    """Return the start of a phase [s]; if not recorded, the time of the last sample before the phase."""
     start = run.phases[index].start_s
     if start is None and series is not None:
         start = float(series.time[series["phase"] < index].max(initial=0.0))
@@ -123,7 +123,8 @@ def _cross(length: float, side: float, count: int, height: float) -> pv.PolyData
 def knots(vertices: Floats, from_hinge: float) -> Floats:
     """Return the points (2, 3) [m] at which strings are tied to the outer barbs of a chain.
 
-    They are at a distance [m] from the hinges. Every second smarticle of a chain is rotated by 180°.
+    A knot lies on a barb at the distance `from_hinge` [m] from its hinge. Every second smarticle of a chain is rotated
+    by 180°.
 
     Source:
         `dem.body.chain.Chain.ties`.
@@ -209,8 +210,8 @@ def checked_kinds(wanted: Sequence[str], unwanted: Sequence[str], *, also: Seque
 class Bodies:
     """Makes the meshes of a run's bodies in its frames.
 
-    Kinds are keys of `KINDS`; the mesh of the smarticles has the given fields; `cut` ends walls a little above the
-    pile, as in pictures. InputError if forces are wanted and not recorded.
+    `kinds` are keys of `KINDS`; the mesh of the smarticles has the given fields. With `cut` walls end a little above
+    the pile, as in pictures. InputError if forces are wanted and not recorded.
     """
 
     def __init__(
@@ -400,9 +401,9 @@ def link_boxes(
 
 
 def owners(mesh: pv.PolyData, frame: Frame) -> tuple[Whole, Whole]:
-    """Return the owners of the B boxes of a mesh, which must have the fields `IDENTITY`.
+    """Return smarticle and link of each of the B boxes of a mesh, which must have the fields `IDENTITY`.
 
-    Owners are indices of the smarticles in the arrays of the frame (B,), and links (B,), 0 to 2.
+    Smarticles (B,) are indices into the arrays of the frame; links (B,) are numbers from 0 to 2.
     """
     owner, link = (np.asarray(mesh.cell_data[name])[::BOX_FACES] for name in ("smarticle_id", "link"))
     order = np.argsort(frame.smarticle_ids)
@@ -412,8 +413,8 @@ def owners(mesh: pv.PolyData, frame: Frame) -> tuple[Whole, Whole]:
 def force_lines(forces: RecordedForces) -> pv.PolyData:
     """Return a mesh [m] of lines from the smarticles' centres of mass to their contacts.
 
-    A contact between smarticles has two lines, a contact with a boundary one. Lines share no points, because tubes
-    around a sharp bend would be torn. The cell data `contact` are the indices of the contacts.
+    A contact between smarticles has two lines, a contact with a boundary has one line. Lines share no points, because
+    tubes around a sharp bend would be torn. The cell data `contact` are the indices of the contacts.
     """
     halves = [np.stack([forces.ends[:, k], forces.contacts.points], axis=1) for k in (0, 1)]
     segments = np.concatenate([halves[0], halves[1][forces.between]])
@@ -427,8 +428,9 @@ def force_lines(forces: RecordedForces) -> pv.PolyData:
 def solid(kind: str, mesh: pv.PolyData, run: Run, *, largest: float | None = None) -> pv.PolyData:
     """Return the mesh of a kind of body as triangles, with solids in place of lines and points.
 
-    Strings become tubes, a fifth as thick as a link; crossings become arrows of length w/3; forces become tubes, with a
-    thickness proportional to the normal force: that of a link for the `largest` one [N], by default that of the mesh.
+    Strings become tubes a fifth as thick as a link, and crossings become arrows of length w/3. Forces become tubes with
+    a thickness proportional to the normal force. The tube of the force `largest` [N], by default the largest force in
+    the mesh, is as thick as a link.
     """
     thin = min(run.manifest.thickness_in_plane_m, run.manifest.thickness_normal_m)
     if kind == "strings":

@@ -90,8 +90,9 @@ def close_pairs(vertices: Floats) -> tuple[Whole, Whole]:
 def swept_axes(vertices: Floats, diameter: float) -> Floats:
     """Return the axes (N, 4, 3) [m] of the bodies that a sphere sweeps along each smarticle.
 
-    An axis is the centrelines with both tips moved inwards by the sphere's radius, so that the body ends at the tips. A
-    barb shorter than the radius shrinks to its hinge; without barbs the ends of the middle link move inwards.
+    An axis consists of the three centrelines, with both tips moved inwards by the sphere's radius, so that the body
+    ends at the tips. A barb shorter than the radius shrinks to its hinge; without barbs the ends of the middle link
+    move inwards.
 
     Source:
         `dem.engine.links.shapes`; the sphere chains of `dem.body.particle` lie along these axes too.
@@ -141,7 +142,7 @@ def spheres(vertices: Floats, chain: Chain) -> Floats:
     """Return the centres (N, S, 3) [m] of the S spheres of each smarticle.
 
     The spheres at the hinges belong to the middle link. The first sphere of a barb is a little more than a diameter
-    from the hinge, the surface of its last sphere touches the tip.
+    from the hinge. The surface of its last sphere touches the tip.
 
     Source:
         `dem.body.particle`.
@@ -163,7 +164,7 @@ def spheres(vertices: Floats, chain: Chain) -> Floats:
 
 
 def _side_by_side(points: Floats, vertices: Floats, chain: Chain) -> Floats:
-    """Repeat points (N, P, 3) of smarticles in each of R rows, shifted along the normal: (N, R, P, 3)."""
+    """Repeat points (N, P, 3) of smarticles in R rows shifted along each smarticle's normal: (N, R, P, 3)."""
     if chain.rows == 1:
         return points[:, None]
     reach = (chain.width - chain.diameter) / 2
@@ -173,7 +174,10 @@ def _side_by_side(points: Floats, vertices: Floats, chain: Chain) -> Floats:
 
 
 def _stations(length: float, chain: Chain, *, middle: bool, barbs: bool) -> Floats:
-    """Return the distances (S,) [m] of the sphere centres of a link from its hinge."""
+    """Return the distances (S,) [m] of the sphere centres of a link from its first hinge.
+
+    `middle`: the link is the middle link; `barbs`: the smarticle has barbs.
+    """
     if middle:
         inset = 0.0 if barbs else chain.diameter / 2
         start, end = inset, length - inset

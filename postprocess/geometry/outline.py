@@ -1,7 +1,7 @@
 """Find the region inside the outline of a pile: the morphological closing of its links by a ball.
 
 The ball may be at every position at which it overlaps neither a link nor the floor. All space that no such ball covers
-belongs to the pile. A gap narrower than the ball is thus part of the pile, a wider one that is open to the outside is
+belongs to the pile. A gap narrower than the ball is thus part of the pile; a wider gap that is open to the outside is
 not. Flat faces keep their position, so that a pile that fills a box has the volume of the box.
 """
 
@@ -20,9 +20,9 @@ from postprocess.geometry.voxel import Region
 BALL = 0.25
 """Radius of the ball over w [-].
 
-The ball must not fit between the links of a poured pile. Among random straight lines, 0.158 mm of length per mm³ as in
-U-shapes at φ = 0.1, a ball of radius 3.5 mm (with half a link's thickness) fits at a random point with probability
-exp(-0.158 π r²) = 0.2 %; at half of that density with 5 %."""
+The ball must not fit between the links of a poured pile. Random straight lines with 0.158 mm of length per
+mm³, as U-shapes have at φ = 0.1, leave room for a ball of radius r = 3.5 mm (half a link's thickness included) at a
+random point with the probability exp(-0.158 π r²) = 0.2 %. At half of that density the probability is 5 %."""
 
 FINENESS = 4  #: Number of voxels per radius of the ball
 
@@ -58,9 +58,9 @@ def outlines(
 ) -> Outlines:
     """Find the regions inside the outlines of piles, on a grid that also contains the given regions.
 
-    The position of a flat face is accurate to half a voxel. Piles are vertices (N, 4, 3) with heights above the floor
-    [m]; links are round with the given thickness [m]; the radius of the ball is in [m], see `BALL`; `pitch` is the side
-    of a voxel [m], a fourth of that radius if not given.
+    The position of a flat face is accurate to half a voxel. Each pile is an array of vertices (N, 4, 3) [m] with z
+    above the floor. Links are round with the diameter `thickness` [m]. `ball` is the radius of the ball [m], see
+    `BALL`. `pitch` is the side of a voxel [m]; a fourth of the ball's radius if not given.
     """
     checked = [checked_vertices(vertices) for vertices in piles]
     pitch = ball / FINENESS if pitch is None else pitch
@@ -89,9 +89,10 @@ def outlines(
 
 
 def _closed(vertices: Floats, axes: Sequence[Floats], *, ball: float, thickness: float) -> Flags:
-    """Return which voxels no ball covers that overlaps neither links nor floor: (X, Y, Z) bool.
+    """Return which voxels belong to the closed pile, (X, Y, Z) bool.
 
-    Axes are the coordinates of the voxels' centres along x, y and z [m].
+    These are the voxels that the ball cannot cover without overlapping a link or the floor. `ball` is its radius [m],
+    `thickness` the diameter of the links [m]. Axes are the coordinates of the voxels' centres along x, y and z [m].
     """
     first, pitch = np.array([axis[0] for axis in axes]), float(axes[0][1] - axes[0][0])
     # Voxels at which the ball's centre cannot be.
@@ -111,7 +112,7 @@ def _closed(vertices: Floats, axes: Sequence[Floats], *, ball: float, thickness:
 
 
 def _near_link(axes: tuple[Floats, ...], start: Floats, end: Floats, reach: float) -> Flags:
-    """Return which points of a grid, given by its axes, lie within a distance [m] of a link's centreline."""
+    """Return which points of the grid on `axes` are nearer than `reach` [m] to the centreline of a link."""
     along = end - start
     square = float(along @ along)
     x, y, z = (axis - place for axis, place in zip(axes, start, strict=True))

@@ -26,8 +26,8 @@ def local_packing(
 ) -> tuple[float, Floats]:
     """Compute the packing fraction in a region by the set-Voronoi cells of its smarticles.
 
-    It is their total solid volume over their total cell volume [-]. The volumes of the cells of all smarticles (N,)
-    [m³] are returned, too; they are infinite or 0 for a smarticle without a cell.
+    The packing fraction is the total solid volume of these smarticles over the total volume of their cells [-]. The
+    function also returns the cell volumes of all smarticles, (N,) [m³]; infinite or 0 for a smarticle without a cell.
 
     The set-Voronoi cell of a smarticle is the volume that is nearer to it than to any other smarticle. Here it is the
     union of the Voronoi cells of points along its centrelines. Mirror images of the points bound the cells at floor,
@@ -38,8 +38,8 @@ def local_packing(
         container: The container from its floor to the pile's height.
         region: Region in which the centres of mass of the counted smarticles lie.
         solid_volume: Volume of one smarticle [m³].
-        spacing: Largest distance of points along a link [m]; w/8 if not given, which is within 0.5 % of the limit of
-            small spacings in piles of 270.
+        spacing: Largest distance of points along a link [m]; w/8 if not given. In piles of 270 the result for w/8
+            deviates by at most 0.5 % from the limit of small spacings.
 
     Source:
         Schaller et al., Philosophical Magazine 93 (2013) 3993 (set Voronoi diagrams).
@@ -78,7 +78,7 @@ def local_packing(
 
 
 def _sample(vertices: Floats, spacing: float) -> tuple[Floats, Whole]:
-    """Place points evenly along each link, none at a hinge: points (n, 3) [m], indices of smarticles (n,)."""
+    """Return points (n, 3) [m] at equal distances along links, not at hinges, and their smarticles (n,)."""
     # Rounding of lengths must not give one of several equal links an extra point.
     cuts = np.ceil(link_lengths(vertices) / spacing - 1e-6).astype(int).ravel()
     link = np.repeat(np.arange(len(cuts)), cuts)
@@ -108,9 +108,10 @@ def _cell_volumes(points: Floats, count: int, *, reach: float, together: int = T
     """Compute the Voronoi volumes (count,) [m³] of the first `count` points among points (n, 3) [m].
 
     The points are divided into slabs along x; the cells of a slab are computed among all points within a reach [m] of
-    the slab. A cell is final if the spheres around its corners that pass through its point lie inside this region: they
-    must hold no other point. The remaining cells are computed again among all points within twice the reach of them,
-    and so on, until the reach is twice the distance of their farthest corner. Open cells are infinite.
+    the slab. The sphere around a corner of a cell through the point of the cell contains no other point. A cell is
+    therefore final if the spheres of all its corners lie inside the searched region. The remaining cells are computed
+    again with twice the reach, until the reach exceeds twice the distance from the point to its farthest corner. The
+    volume of an open cell is infinite.
     """
     if count <= together:
         return _cells(points)[0][:count]
@@ -137,9 +138,9 @@ def _cells(points: Floats) -> tuple[Floats, Floats, Floats, Floats]:
     """Compute the Voronoi cells of points (n, 3) [m].
 
     A cell is the union of pyramids with their apex at its point and a face as base; the height of a pyramid is half the
-    distance to the neighbour behind the face. Returns volumes (n,) [m³], infinite for open cells; distances (n,) of the
-    farthest corner from the point [m]; least and greatest x (n,) of the spheres around the corners through the point
-    [m].
+    distance to the neighbour behind the face. Returns volumes (n,) [m³], infinite for open cells, and distances (n,)
+    from the point to the farthest corner [m]. Also returns the least and the greatest x (n,) [m] that the spheres
+    around the corners of a cell through its point reach.
     """
     diagram = Voronoi(points)
     pairs = np.asarray(diagram.ridge_points)

@@ -111,7 +111,7 @@ def solid_points(
 def _grid_points(
     vertices: Floats, normal: float, in_plane: float, pitch: float, region: Region | None
 ) -> Iterator[Whole]:
-    """Yield indices (n, 3) of points of the rotated grid inside the links' boxes, perhaps repeated.
+    """Yield indices (n, 3) of points of the rotated grid inside the boxes; an index may be repeated.
 
     Each box is cut into pieces about as long as thick, so that few grid points must be tested for each piece.
     """

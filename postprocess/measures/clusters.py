@@ -65,10 +65,11 @@ def spans_height(clusters: Clusters, vertices: Vertices, *, diameter: float, flo
 
 
 def spans_width(clusters: Clusters, vertices: Vertices, *, diameter: float, wall_radius: float) -> bool:
-    """Return whether one cluster spans the container: no half of the wall has all its contacts.
+    """Return whether one cluster spans the container from one side of the round wall to the other.
 
-    A cluster that touches a round wall on one half alone is not wedged between opposite sides. Vertices (N, 4, 3),
-    diameter of the spheres along the links, and radius of the wall are in [m]; the wall is centred at x = y = 0.
+    A cluster spans the container if its contacts with the wall do not all lie on one half of the wall. Vertices
+    (N, 4, 3), diameter of the spheres along the links, and radius of the wall are in [m]; the wall is centred at
+    x = y = 0.
     """
     vertices = checked_vertices(vertices)
     smarticle, vertex = np.nonzero(at_wall(vertices, diameter=diameter, wall_radius=wall_radius))

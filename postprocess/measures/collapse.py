@@ -34,8 +34,10 @@ HEIGHTS: Mapping[str, str] = MappingProxyType(
 )  #: Definitions of a column's height by name, each relative to the height before vibration
 
 _KNOWN_ENDS: Mapping[str, Mapping[str, float]] = MappingProxyType({REMAINING: {"start": 1.0, "end": 0.0}})
-"""Start and end of the fitted curve [-] for heights of which they are known: in the end all smarticles have left. The
-other heights need a fit, because smarticles bounce at the start and hop in the end."""
+"""Known start and end of the fitted curve [-], by the definition of the height.
+
+By `REMAINING` the curve starts at 1 and ends at 0, since all smarticles leave in the end. By the other definitions
+start and end are fitted, because smarticles bounce at the start and hop in the end."""
 
 REST = 0.1  #: Time before vibration over which the reference height is averaged [s]
 LEAST_FALL = 0.25  #: A column that has lost less than this fraction of its height still stands [-]
@@ -72,8 +74,8 @@ class CollapseTime:
     #: its error too large; "standing": the column has lost less than `LEAST_FALL` of its height
     outcome: Literal["collapsed", "collapsing", "standing"]
     time: float  #: τ [s]; NaN unless collapsed
-    #: Standard error of τ [s], enlarged by the correlation of successive residuals; the time of the first sample if τ
-    #: is shorter than that; NaN unless collapsed
+    #: Standard error of τ [s], which allows for the correlation of successive residuals. If τ is shorter than the time
+    #: of the first sample, the error is that time. NaN unless collapsed
     error: float
     bound: float  #: Lower bound of τ [s]: the observation time; NaN if collapsed
     exponent: float  #: β [-]
@@ -159,9 +161,10 @@ def collapse_of(history: ColumnHistory, definition: str, shaken: Vibration) -> C
 
 
 def period_means(times: Floats, values: Floats, frequency: float) -> tuple[Floats, Floats]:
-    """Average values (n,) over each period of a vibration that begins at time 0, of a frequency [Hz].
+    """Average values (n,) over each period of a vibration with a frequency [Hz] that begins at time 0.
 
-    Samples up to time 0 are left out. Returns mean times (m,) [s] and mean values (m,) of the m periods with a sample.
+    Values belong to times (n,) [s]; samples at or before time 0 are left out. Returns mean times (m,) [s]
+    and mean values (m,) of the m periods with a sample.
     """
     # A sample at the end of a period belongs to this period.
     period = np.ceil(times * frequency - 1e-6).astype(np.int64)
@@ -244,9 +247,9 @@ def _check(times: Floats, heights: Floats) -> None:
 
 
 def _named(free: Floats, start: float | None, end: float | None) -> tuple[float, float, float, float]:
-    """Return τ, β, h_start and h_end from the free parameters.
+    """Return τ [s], β, h_start and h_end from the free parameters of the fit.
 
-    These are ln τ, β and, unless they are given, h_start and h_end/h_start.
+    The free parameters are ln τ, β, h_start unless `start` is given, and h_end/h_start unless `end` is given.
     """
     rest = list(free[2:])
     start = float(rest.pop(0)) if start is None else start
@@ -261,7 +264,7 @@ def _curve(free: Floats, times: Floats, start: float | None, end: float | None) 
 
 
 def _fit(times: Floats, heights: Floats, start: float | None, end: float | None) -> Any:
-    """Return the best of fits from several starting points: the sum of squares may have several minima."""
+    """Return the best of several fits from different starting points, since there may be several minima."""
     low, high = [math.log(times[0] / 10), _EXPONENTS[0]], [math.log(_LONGEST), _EXPONENTS[1]]
     guess: list[float] = []
     if start is None:

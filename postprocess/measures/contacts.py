@@ -1,7 +1,7 @@
 """Find pairs of smarticles that touch or are close to each other, and smarticles that touch nothing.
 
-A frame holds the number of contacts of each smarticle as counted by the engine, not the pairs; these are found from the
-vertices. Recorded forces at contacts are the subject of `force_chains`.
+A frame holds the number of contacts of each smarticle as counted by the engine, not the pairs. The pairs are found
+from the vertices. Recorded forces at contacts are the subject of `force_chains`.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ class ContactPairs(NamedTuple):
 
     i: Whole  #: (P,) int64, the lower index of each pair
     j: Whole  #: (P,) int64, the higher index of each pair
-    distance: Floats  #: (P,) float64 [m], least distance between the axes or sphere centres of the two
+    distance: Floats  #: (P,) float64 [m], least distance between axes or sphere centres
 
 
 def contact_pairs(vertices: Vertices, distance: float) -> ContactPairs:
@@ -68,12 +68,12 @@ def contact_pairs(vertices: Vertices, distance: float) -> ContactPairs:
 def pairs_in_contact(frame: Frame, run: Run) -> ContactPairs:
     """Find the pairs of smarticles that touch in the run's engine, sorted by i, then j.
 
-    Two smarticles touch if two of their spheres or strands touch, which represent them in the engine.
+    Two smarticles touch if a sphere or strand of one touches a sphere or strand of the other.
 
-    The number of pairs agrees with the engine's own: on the engine links exactly, in all phases; on YADE exactly at
-    rest after pouring, within 1.4 % while pouring and 0.7 % at rest after shaking, and 6 to 11 % too high while shaken,
-    when contacts that open carry no force (runs of 40 smarticles of draft, 60 of standard and 30 of reference
-    fidelity).
+    On links the number of pairs is exactly that of the engine, in all phases. On YADE it is exact at rest after
+    pouring; it deviates by at most 1.4 % while pouring and 0.7 % at rest after shaking. While a pile is shaken it is
+    6 to 11 % too high, because contacts that open carry no force. These numbers are from runs of 40 smarticles at
+    draft, 60 at standard and 30 at reference fidelity.
 
     Returns:
         The pairs, with the least distance of two sphere centres or of two strands' axes.
@@ -112,7 +112,10 @@ def pairs_of_spheres(centres: Floats, diameter: float) -> ContactPairs:
 
 
 def _merged(a: Whole, b: Whole, gaps: Floats, count: int) -> ContactPairs:
-    """Merge the contacts of two smarticles into one pair with the least distance; drop a == b."""
+    """Merge all contacts a[k], b[k] of two smarticles into one pair with the least gap; drop a[k] == b[k].
+
+    `a`, `b` and `gaps` [m] have the shape (n,); `count` is the number of smarticles.
+    """
     apart = a != b
     a, b, gaps = a[apart], b[apart], gaps[apart]
     keys, which = np.unique(np.minimum(a, b) * count + np.maximum(a, b), return_inverse=True)
@@ -162,7 +165,10 @@ def _close_links(starts: Floats, ends: Floats, lengths: Floats, distance: float)
 
 
 def _point_distances(points: Floats, origins: Floats, along: Floats) -> Floats:
-    """Compute the distances (n,) [m] of points from line segments, given by origin and vector."""
+    """Compute the distances (n,) [m] of points (n, 3) from segments with one end at `origins` (n, 3) [m].
+
+    The other ends are at `origins + along`.
+    """
     offset = points - origins
     fraction = np.clip(_dot(offset, along) / np.maximum(_dot(along, along), 1e-300), 0, 1)
     distances: Floats = np.linalg.norm(offset - fraction[:, None] * along, axis=1)
@@ -177,9 +183,10 @@ def _dot(a: Floats, b: Floats) -> Floats:
 def without_support(
     vertices: Vertices, contacts: ArrayLike, *, diameter: float, floor_z: float, wall_radius: float | None
 ) -> Flags:
-    """Return which of N smarticles are rattlers, which touch no smarticle, floor or wall: (N,) bool.
+    """Return which of N smarticles touch no other smarticle, no floor and no wall (rattlers): (N,) bool.
 
-    More smarticles than the rattlers may be without force: frames do not record whether a contact carries a force.
+    Smarticles whose contacts carry no force are not found, because frames do not record whether a contact carries a
+    force.
 
     Args:
         vertices: (N, 4, 3) [m].

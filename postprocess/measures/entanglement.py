@@ -1,10 +1,10 @@
 """Find the links that pass through the planes of other smarticles.
 
 The quadrilateral of a smarticle has the corners barb tip, hinge, hinge, barb tip; its fourth side closes the mouth. A
-link of another smarticle passes through this plane if the link's ends lie strictly on opposite sides of the plane and
-the link meets the plane strictly inside the quadrilateral. A link that ends in the plane, lies in the plane, or meets
-an edge does not pass, within 1e-9 of the smarticle's size. Barbs at unequal angles make the quadrilateral concave or
-self-intersecting; its inside is then where its winding number is not zero.
+link of another smarticle passes through the plane of the smarticle if the link's ends lie strictly on opposite sides
+of the plane and the link meets the plane strictly inside the quadrilateral. A link that ends in the plane, lies in the
+plane, or meets an edge does not pass, within 1e-9 of the smarticle's size. Barbs at unequal angles make the
+quadrilateral concave or self-intersecting; its inside is then where its winding number is not zero.
 """
 
 from __future__ import annotations
@@ -122,8 +122,8 @@ def link_passages(vertices: Vertices) -> LinkPassages:
 def has_plane(vertices: Vertices) -> Flags:
     """Return which of N smarticles are bent enough to span a plane: (N,) bool.
 
-    A smarticle has no plane if its tips are farther apart than `STRAIGHT` (2l + w), or if all four vertices lie on one
-    line.
+    A smarticle has no plane if its tips are farther apart than `STRAIGHT` times 2l + w, or if all four vertices lie on
+    one line.
     """
     vertices = checked_vertices(vertices)
     unfolded = link_lengths(vertices).sum(axis=1)
@@ -134,7 +134,7 @@ def has_plane(vertices: Vertices) -> Flags:
 
 
 def _close_pairs(vertices: Floats, planes: Flags) -> tuple[Whole, Whole]:
-    """Find ordered pairs (i, j) whose bounding spheres overlap, where i has a plane."""
+    """Find ordered pairs (i, j) of smarticles whose bounding spheres overlap and whose i has a plane."""
     low, high = close_pairs(vertices)
     i, j = np.concatenate([low, high]), np.concatenate([high, low])
     return i[planes[i]], j[planes[i]]

@@ -45,7 +45,7 @@ def heights(vertices: Vertices, *, floor_z: float = 0.0) -> Heights:
 def least_reaching(growing: Callable[[float], float], level: float, low: float, high: float) -> float:
     """Return the least argument at which a non-decreasing function reaches a level.
 
-    The function may have steps. It must be below the level at `low`, or just reach it, and have reached it at `high`.
+    The function may have steps. At `low` it must be at or below the level, at `high` at or above the level.
     """
     for _ in range(60):  # more than the 52 bits of a float
         middle = (low + high) / 2

@@ -39,8 +39,8 @@ class Linking:
 def linking(vertices: Vertices) -> Linking:
     """Compute the linking numbers of all pairs of smarticles whose bounding spheres overlap.
 
-    A smarticle is the open chain tip, hinge, hinge, tip. Other pairs cannot hook; their linking numbers fall only with
-    the square of the distance, so that a sum over all pairs would grow with the size of the pile.
+    A smarticle is the open chain tip, hinge, hinge, tip. Pairs whose bounding spheres do not overlap cannot hook. Their
+    linking numbers fall only with the square of the distance, so that a sum over all pairs would grow with the pile.
 
     Source:
         See `gauss_integral`. The integral of open chains as a measure of entanglement: Panagiotou, Kröger & Millett,

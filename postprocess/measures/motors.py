@@ -60,7 +60,7 @@ def sampled(frames: FrameSequence) -> list[int]:
 
 
 def _sampled_work_of(run: Run, series: Series, phase: int) -> tuple[float, ...]:
-    """Return the sampled work [J] from the first frame on, and its extremes over all first frames."""
+    """Return the sampled work [J] from the first frame on, its minimum and maximum over all first frames."""
     frames = run.frames.in_phase(phase)
     firsts = int((frames.times - frames.times[:1] < APART * (1 - _NEAR)).sum())
     works = [_work_of([frames[first + k] for k in sampled(frames[first:])]) for first in range(firsts)]

@@ -16,7 +16,7 @@ _SAMPLES = 50  # number of points along a link
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Cast:
-    """Comparison of a pile in a mould of T tiers ("before") with that pile without the mould ("after").
+    """Comparison of a pile in a mould of T tiers ("before") and without the mould ("after").
 
     A pile takes the space inside its outline, see `postprocess.geometry.outline`. The Jaccard index of two regions is
     the volume of their intersection over the volume of their union: 1 if they are identical, 0 if they are disjoint.
@@ -33,10 +33,10 @@ class Cast:
 
 
 def cast(before: ArrayLike, after: ArrayLike, tiers: Sequence[Region], *, thickness: float, ball: float) -> Cast:
-    """Compare a pile in a mould with that pile after the mould was removed.
+    """Compare a pile in a mould with the pile after the mould was removed.
 
-    Vertices (N, 4, 3) before and after [m], and the T tiers from the lowest, have heights above the floor. Links are
-    round with the given thickness [m]; a ball of a radius `ball` [m] finds the outlines.
+    `before` and `after` are vertices (N, 4, 3) [m]; `tiers` are the T tiers, from the lowest. Heights count from the
+    floor. Links are round with the diameter `thickness` [m]. A ball of the radius `ball` [m] finds the outlines.
     """
     grid = outlines([before, after], thickness=thickness, ball=ball, regions=tiers)
     with_mould, without_mould = grid.inside
@@ -72,7 +72,7 @@ def _fraction(part: Flags, whole: Flags) -> float:
 
 
 def _material(vertices: Vertices, tiers: Sequence[Region]) -> Floats:
-    """Return the fractions (T,) of the total length of links in each tier, by points along each link."""
+    """Return the fraction of the total length of links in each tier, (T,), by points along each link."""
     vertices = checked_vertices(vertices)
     shares = (np.arange(_SAMPLES) + 0.5) / _SAMPLES
     along = np.diff(vertices, axis=1)[:, :, None]

@@ -31,10 +31,10 @@ END = 0.1  #: Time at the end of the pull over which the remaining force is aver
 class HookPull:
     """Forces and heights of the two hooks during a pull of the upper hook, at n samples."""
 
-    edges: Floats = field(repr=False)  #: (n + 1,) times of the last sample before the pull, 0, and of the n samples [s]
+    edges: Floats = field(repr=False)  #: (n + 1,) times [s]: 0 at the last sample before the pull, then the n samples
     raised: Floats = field(repr=False)  #: (n + 1,) distance by which the hook has been raised at these times [m]
     force: Floats = field(repr=False)  #: (n,) force that raises the hook, mean between two times [N]
-    #: (n,) upward force of the smarticles on the lower hook, mean between two times [N]: the load passed on to it
+    #: (n,) upward force of the smarticles on the lower hook, mean between two times [N]: the load that it bears
     held: Floats = field(repr=False)
     before: float  #: Mean force on the hook before the pull [N]: weight resting on it; negative if it is pushed up
     engine_work: float  #: Work of the hook on the smarticles by the engine's energy ledger [J]; NaN if not recorded
@@ -52,12 +52,12 @@ class HookPull:
 
     @property
     def net(self) -> HookPull:
-        """The pull with `force` less `held`: the force that pile and container bear, not the lower hook."""
+        """The pull with `force` less `held`: the force on the upper hook that the lower hook does not bear."""
         return replace(self, force=self.force - self.held)
 
     @property
     def left(self) -> float:
-        """Mean force over the last `END` seconds of the pull [N]: weight still on the hook, and friction."""
+        """Mean force over the last `END` seconds of the pull [N]: friction and the weight still on the hook."""
         return float(self.force[self.times > self.edges[-1] - END].mean())
 
 
@@ -134,9 +134,9 @@ def freed(pull: HookPull) -> float:
 
 
 def held_fast(pull: HookPull, asked: SceneData) -> bool:
-    """Return whether the force limit stopped the hook of a finished pull: the peak is a lower bound then.
+    """Return whether the force limit stopped the hook of a finished pull.
 
-    `asked` is the phase in the scene.
+    The peak force is then a lower bound. `asked` is the data of the phase in the scene.
     """
     if asked.get("force_limit_N") is None:
         return False  # nothing else stops a hook

@@ -20,7 +20,7 @@ _PACKAGE = __name__.rpartition(".")[0]
 
 @dataclass(frozen=True, kw_only=True)
 class Shown:
-    """Format of a quantity in the short tables of the terminal, which have few of all columns."""
+    """Format of a quantity in the short tables that commands print, which have some of the columns."""
 
     heading: str  #: Heading of the column, with the unit of its numbers
     place: int  #: Order of the columns: lower numbers come first
@@ -49,12 +49,12 @@ class FrameMeasure:
 
     name: str  #: Unique name of the measure
     place: int  #: Order of its columns in a table: lower numbers come first
-    quantities: tuple[Quantity, ...]  #: Its columns
+    quantities: tuple[Quantity, ...]  #: Columns that the measure fills
     #: Returns the values of a frame of a run, one per column; NaN for a value that is undefined in this frame
     take: Callable[[Frame, Run], Sequence[float]]
     #: Returns whether the measure applies to a run; tables of other runs lack its columns
     available_for: Callable[[Run], bool] = lambda _: True
-    definition: str | None = None  #: Key of the definition if the quantity has several, as the packing fraction has
+    definition: str | None = None  #: Key of the definition, for a quantity with several (packing fraction)
     #: Whether it takes tens of milliseconds per frame or more; tables then have its values for the last frame of each
     #: phase alone, unless the user asks for every frame
     costly: bool = False
@@ -71,12 +71,12 @@ class PhaseMeasure:
 
     name: str  #: Unique name of the measure
     phases: tuple[str, ...]  #: Types of phase to which the measure applies
-    quantities: tuple[Quantity, ...]  #: Its columns
+    quantities: tuple[Quantity, ...]  #: Columns that the measure fills
     take: Callable[[Run, Series, int], Sequence[float]]  #: Returns the values of a phase by its index, one per column
     available_for: Callable[[Series, int], bool]  #: Returns whether the series holds enough samples of a phase
 
     def columns(self, run: Run, series: Series, phase: int) -> dict[str, float]:
-        """Return the values of a phase by column; empty if the measure does not apply or samples are few."""
+        """Return the values of a phase by column; empty if the measure does not apply or has too few samples."""
         if run.phases[phase].type not in self.phases or not self.available_for(series, phase):
             return {}
         values = self.take(run, series, phase)

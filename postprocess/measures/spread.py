@@ -24,8 +24,9 @@ from postprocess.measures.registry import FrameMeasure, Quantity, Shown, in_spac
 TOUCHING = 1.05
 """Largest distance of two centrelines at which smarticles count as neighbours, over the diameter of the spheres [-].
 
-The 5 % keep contacts that open and close while a pile settles. Neighbours need not touch: on YADE this finds 1.4 times
-as many pairs as touch at rest after pouring, 1.9 to 2.1 times at rest after shaking, 6 times while shaken.
+The 5 % keep contacts that open and close while a pile settles. Neighbours need not touch: on YADE there are 1.4 times
+as many neighbours as touching pairs at rest after pouring, 1.9 to 2.1 times at rest after shaking, and 6 times while
+shaken.
 `contacts.pairs_in_contact` finds the pairs that touch."""
 
 OUTSIDE = 0.5
@@ -87,7 +88,7 @@ def spread_radius(vertices: Vertices, *, share: float, axis: tuple[float, float]
     """Return the radius [m] around a vertical axis that holds a fraction of the material.
 
     The material is spread evenly along each link's centreline. The part of each centreline inside a circle, seen from
-    above, is exact; the radius is found by bisection. The axis, x and y [m], is that through the pile's centre of mass
+    above, is exact; the radius is found by bisection. The axis, x and y [m], passes through the pile's centre of mass
     if not given. InputError unless the fraction `share` is above 0 and up to 1.
     """
     vertices = checked_vertices(vertices)
@@ -129,7 +130,10 @@ def tilt(vertices: Vertices, *, foot: tuple[float, float] = (0.0, 0.0), floor_z:
 
 
 def _shares_within(start: Floats, along: Floats, radius: float) -> Floats:
-    """Return the fractions (n,) of line segments inside a circle at the origin; start, along: (n, 2)."""
+    """Return the fraction of each line segment inside a circle around the origin, (n,).
+
+    `start` (n, 2) are the first ends [m], `along` (n, 2) the vectors to the other ends [m].
+    """
     square, mixed = (along**2).sum(axis=1), (start * along).sum(axis=1)
     inside = radius**2 - (start**2).sum(axis=1)
     # A vertical link is a point seen from above.

@@ -85,7 +85,7 @@ class StrainTest:
 
 
 def has_strain(series: Series) -> bool:
-    """Return whether a series holds a strain test: samples enough, and a force on the pulled string."""
+    """Return whether a series has `LEAST_SAMPLES` samples with tied strings, and a force above 0 in one."""
     if "string_pulled_force_N" not in series.data:
         return False
     force = series["string_pulled_force_N"][:, 0]
@@ -122,7 +122,7 @@ def read_strain_test(run: Run) -> StrainTest:
 
 
 def measured(pull: StrainTest) -> dict[str, float]:
-    """Compute the quantities of a strain test, by their names in `QUANTITIES`."""
+    """Compute the quantities of a strain test; the keys of the result are those of `QUANTITIES`."""
     end = pull.fracture + 1
     strains, forces = pull.strains[:end], pull.forces[:end]
     peak = int(np.argmax(forces))
@@ -148,18 +148,18 @@ def measured(pull: StrainTest) -> dict[str, float]:
 
 
 def _mean_over(values: Floats, samples: float) -> Floats:
-    """Return the moving mean (n,) of values (n,) over a number of samples; fewer are averaged at the ends."""
+    """Return the moving mean (n,) of values (n,) over `samples` samples, and over fewer at the ends."""
     window = np.ones(max(1, round(samples)))
     means: Floats = np.convolve(values, window, "same") / np.convolve(np.ones_like(values), window, "same")
     return means
 
 
 def first_drop(forces: Floats) -> tuple[int, float]:
-    """Find the first maximum of forces (n,) [N] that is followed by a loss of a tenth or more.
+    """Find the first maximum of forces (n,) [N] that is followed by a loss of more than a tenth.
 
-    Losses that begin below three tenths of the largest force do not count. Returns the index of this maximum, and the
-    fraction of its force that is lost before the force exceeds it again [-]; without such a loss the index of the
-    largest force, and 0.
+    Losses that begin at less than three tenths of the largest force do not count. Returns the index of the maximum, and
+    the fraction of its force that is lost before the force exceeds it again [-]. Without such a loss it returns the
+    index of the largest force, and 0.
     """
     highest = np.maximum.accumulate(forces)
     lost = np.flatnonzero((forces < (1 - LOSS) * highest) & (highest > _TAUT * forces.max()))
@@ -172,7 +172,11 @@ def first_drop(forces: Floats) -> tuple[int, float]:
 
 
 def _slopes(strains: Floats, forces: Floats) -> tuple[float, float]:
-    """Return the slope of force against strain [N], and upper over lower slope, see `QUANTITIES` [-]."""
+    """Return the slope of force (n,) [N] against strain (n,) [-] at the start of a pull, and its change.
+
+    The slope [N] is from 20 % to 80 % of the last force. The change [-] is the slope from 50 % to 80 % over the slope
+    from 20 % to 50 %. Both are NaN if a range has fewer than three samples.
+    """
     top = forces[-1]
     ranges = ((0.2, 0.8), (0.2, 0.5), (0.5, 0.8))
     slopes = []

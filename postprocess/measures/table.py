@@ -73,7 +73,7 @@ def summarise_run(
     """Measure each phase of a run: means over its last frames, and measures of the whole phase.
 
     Args:
-        last: Number of frames to average; a phase with fewer frames is averaged over these.
+        last: Number of frames to average; a phase with fewer frames is averaged over all its frames.
         definitions: Definitions of the packing fraction, keys of `packing.DEFINITIONS`.
         costly: Frames for which costly measures are computed, see `measure_run`.
         phases: Indices of the phases to measure; all if not given.
@@ -116,7 +116,7 @@ def packing_change(
 
     Args:
         definition: Key of `packing.DEFINITIONS`.
-        last: Number of frames to average; a phase with fewer frames is averaged over these.
+        last: Number of frames to average; a phase with fewer frames is averaged over all its frames.
         activity: Types of phase that count as activity; if not given, all phases that are not at rest.
 
     Raises:
@@ -174,7 +174,7 @@ def _frames_by_phase(run: Run, frames: FrameSequence) -> list[FrameSequence]:
 def _rows(
     part: FrameSequence, run: Run, series: Series | None, definitions: Sequence[str], costly: Costly, *, offset: int = 0
 ) -> list[dict[str, object]]:
-    """Return one row for each of some frames of one phase; `offset` is the number of the first of them."""
+    """Return one row per frame of a part of one phase; `offset` is the number of the first frame."""
     rows: list[dict[str, object]] = []
     measures = [measure for measure in frame_measures(definitions) if measure.available_for(run)]
     made = run.manifest

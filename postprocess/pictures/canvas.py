@@ -37,7 +37,7 @@ VIEWS: Mapping[str, tuple[float, float]] = MappingProxyType(
     {"front": (-90.0, 14.0), "oblique": (-62.0, 34.0), "top": (-90.0, 90.0)}
 )  #: Named views: azimuth and elevation of the camera from the centre of the pile [degree]
 
-MILLIMETRE = 1e3  #: Factor from m to mm, the unit of all drawing: VTK's tolerances do not suit centimetres in m
+MILLIMETRE = 1e3  #: Factor from m to mm, the unit of all drawing: VTK's tolerances do not suit a few cm given in m
 
 _OVERSAMPLING = 2
 _LEAST_SIZE, _LARGEST_SIZE = 200, 8000  # of a picture [pixel]
@@ -63,9 +63,9 @@ class Style:
     def of(cls, runs: Sequence[Run], *, color_by: str | None, size: tuple[int, int], view: str | None) -> Self:
         """Return the style of a picture of runs side by side, with panels of a width and a height [pixel].
 
-        `color_by` is the name or short name of a field, see `colour_field`; `view` is a key of `VIEWS`, by default
-        "front", for planar runs "top". InputError for an unknown field or view, a bad size, or planar runs beside
-        others.
+        `color_by` is the name or short name of a field, see `colour_field`. `view` is a key of `VIEWS`; by default
+        "front", or "top" if the runs are planar. InputError for an unknown field or view, a bad size, or if only some
+        of the runs are planar.
         """
         if len({run.manifest.planar for run in runs}) > 1:
             raise InputError("a run in a plane and one in space have no view in common; compare runs of one kind")
@@ -79,11 +79,11 @@ class Style:
 
     @property
     def unit(self) -> float:
-        """Unit of text sizes and margins: a hundredth of the shorter side, at least `_LEAST_UNIT` [pixel]."""
+        """Unit of text sizes and margins [pixel]: a hundredth of the shorter side, at least `_LEAST_UNIT`."""
         return max(min(self.size) / 100, _LEAST_UNIT)
 
     def pixel(self, extent: Floats) -> float:
-        """Return the length that a pixel stands for [mm] in a picture that shows an extent (2, 2) [mm]."""
+        """Return the side of a pixel [mm] in a picture that shows an extent (2, 2) [mm]."""
         width, height = np.diff(extent, axis=0)[0]
         free = self.size[1] - (_HEAD + _FOOT) * self.unit
         return float(max(width / (_FILL * self.size[0]), height / (_FILL * free))) or 1.0
@@ -103,7 +103,7 @@ class Subject:
         self.frames = read_frames(directory)
 
     def extent(self, indices: Iterable[int], axes: Floats) -> Floats:
-        """Return the extent (2, 2) [mm] of some frames in the plane of the picture, see `extent`."""
+        """Return the lower left and upper right (2, 2) [mm] of some frames in the plane of the picture."""
         return union([extent(visible_meshes(self.bodies, self.frames[i], axes[2]).values(), axes) for i in indices])
 
     def values(self, indices: Iterable[int], style: Style) -> list[Floats]:
@@ -188,7 +188,7 @@ class Canvas:
 
     Args:
         extent: (2, 2) extent in the camera's view [mm].
-        run: Run by whose sizes corners are shaded.
+        run: Run whose smarticles set the range of the shading of corners.
         columns: Number of panels.
         scale: Colour scale; None: no colour bar.
         quick: Whether to leave out the shading of corners, which takes most of the time of a picture.
@@ -247,7 +247,7 @@ class Canvas:
 
     @property
     def _bar(self) -> tuple[float, float, float, float]:
-        """Left, top, right and bottom of the scale bar, from the lower left of the picture [pixel]."""
+        """Left, top, right and bottom of the scale bar [pixel], measured from the lower left of the picture."""
         unit = self._style.unit
         return _MARGIN * unit, (_FOOT / 2 + 0.9) * unit, _MARGIN * unit + self._length / self.pixel, _FOOT / 2 * unit
 

@@ -49,7 +49,7 @@ class FilmTimes:
         rate: float = RATE,
         most: int = MOST,
     ) -> Self:
-        """Choose the times of a film's pictures by the times (m,) of the recorded frames [s], ascending.
+        """Choose the times of a film's pictures from the ascending times (m,) [s] of the recorded frames.
 
         InputError if there are fewer than two frames or pictures, or an argument is out of its range.
         """

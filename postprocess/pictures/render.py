@@ -33,10 +33,10 @@ from postprocess.report import figures
 from postprocess.report.tables import reject_existing, whole_file
 
 DEFINITION = "second-highest-com"
-"""Definition of the packing fraction in captions, as in the first column of `smarticles measure`."""
+"""Definition of the packing fraction in captions; it is also the first one that `smarticles measure` prints."""
 
 Limits = Span | Literal["run"] | None
-"""Ends of the colour scale: two values; "run": those of all frames of the runs; None: those of the drawn frames."""
+"""Ends of the colour scale: two values; "run": extremes of all frames of the runs; None: of the drawn frames."""
 
 Track = Callable[[Iterable[Image.Image], int], Iterable[Image.Image]]
 """Shows the progress of a film: takes its pictures and their number, returns the pictures."""
@@ -67,13 +67,13 @@ def render_run(
         directory: A run directory with at least one frame; the run may be unfinished.
         compare: Further runs, drawn side by side at one time, with one scale and one colour scale.
         output: File to write, `.png`; `render.png` in the run directory if not given.
-        time: Simulated time [s], of which the nearest frame is drawn; the last time common to all runs if not given.
-        color_by: Name or short name of a field; None: crossings, for planar runs smarticle_id.
-        limits: Ends of the colour scale; those of this picture if not given.
+        time: Simulated time [s]; the nearest frame of each run is drawn. The last time common to all runs if not given.
+        color_by: Name or short name of a field; None: crossings, or smarticle_id if the run is planar.
+        limits: Ends of the colour scale, see `Limits`; the extremes in this picture if not given.
         smarticle: Number of a smarticle, which is drawn alone with the smarticles that pass through its plane; the
             camera points into its mouth.
         size: Width and height of the picture of one run [pixel].
-        view: Key of `VIEWS`; None: "front", for planar runs "top".
+        view: Key of `VIEWS`; None: "front", or "top" if the run is planar.
         forces: Whether to draw contact forces as lines, with a thickness proportional to the normal force, in front of
             pale smarticles.
 
@@ -224,9 +224,9 @@ def _span(subjects: Sequence[Subject], values: Sequence[dict[int, Floats]], styl
 
 
 def common_times(subjects: Sequence[Subject]) -> Floats:
-    """Return the times [s] of one run's frames in the interval common to all runs.
+    """Return the frame times (n,) [s] of one run within the time interval that all runs share.
 
-    This run has the fewest frames in the interval. InputError if the runs have no common interval.
+    The run is the one with the fewest frames in this interval. InputError if the runs have no common interval.
     """
     low = max(float(subject.frames.times[0]) for subject in subjects)
     high = min(float(subject.frames.times[-1]) for subject in subjects)
@@ -245,7 +245,7 @@ def _checked_output(directory: Path | str, output: Path | str | None, default: s
 
 
 def _focused(subject: Subject, index: int, smarticle: int, style: Style) -> Image.Image:
-    """Draw one smarticle and all that pass through its plane, seen obliquely through its mouth.
+    """Draw one smarticle and all smarticles that pass through its plane, seen obliquely through its mouth.
 
     The smarticle and its plane are orange, links that pass through the plane blue, other links grey.
     """

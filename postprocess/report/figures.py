@@ -37,7 +37,7 @@ SKY = "#56b4e9"
 ORANGE = "#d55e00"
 GREEN = "#009e73"
 GREY = "#6e6e6e"
-"""Okabe and Ito's colours, distinct with common colour blindness and in grey print."""
+"""The colours above are of Okabe and Ito: distinct with common colour blindness and in grey print."""
 
 _STYLE: dict[Any, Any] = {
     "axes.edgecolor": BLACK,
@@ -114,7 +114,7 @@ def add_footer(figure: Figure, lines: Sequence[str]) -> None:
 
 
 def _fitting(lines: Sequence[str], columns: int, most: int) -> list[str]:
-    """Wrap statements at a number of columns; cut them to `most` lines, but keep the last statement."""
+    """Wrap statements at `columns` characters; cut the text to `most` lines, but keep the last statement."""
     broken = [textwrap.wrap(line, columns, break_on_hyphens=False) or [""] for line in lines]
     text = [part for parts in broken for part in parts]
     if len(text) <= most:
@@ -157,8 +157,8 @@ _MARGIN = 0.03  # space between the data and a widened limit, over the length of
 def hold_everything(figure: Figure) -> list[str]:
     """Widen the limits of axes that would cut lines, error bars or bands; call this before `add_footer`.
 
-    A logarithmic axis cannot show values at or below 0: error bars that reach there are cut. Statements about them for
-    the footer are returned.
+    A logarithmic axis cannot show values at or below 0, so error bars that reach there are cut. Returns statements for
+    the footer about cut error bars.
     """
     cut = 0
     for axes in figure.axes:
@@ -190,7 +190,7 @@ def _hold(axes: Axes, place: int, *, log: bool) -> None:
 def _drawn(axes: Axes) -> list[NDArray[np.float64]]:
     """Return points (n, 2) of all lines, error bars and bands in data coordinates.
 
-    `Axes.dataLim` does not suffice: it lacks the least end above 0 of error bars.
+    `Axes.dataLim` does not suffice: for error bars it lacks the least end that is above 0.
     """
     lines = [line for line in axes.lines if line.get_transform() == axes.transData]
     bands = [band for band in axes.collections if isinstance(band, FillBetweenPolyCollection)]

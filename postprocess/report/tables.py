@@ -1,4 +1,4 @@
-"""Write files that are never incomplete, tables among them, and format tables as Markdown."""
+"""Write tables and other files so that no incomplete file is left, and format tables as Markdown."""
 
 from __future__ import annotations
 
@@ -39,7 +39,10 @@ def reject_existing(path: Path, *, overwrite: bool) -> None:
 
 
 def write_table(table: pd.DataFrame, path: Path | str, *, overwrite: bool = False) -> Path:
-    """Write a table as CSV, and return its path; InputError unless the path ends in `.csv`; see `whole_file`."""
+    """Write a table as CSV, and return its path.
+
+    InputError unless the path ends in `.csv`; `whole_file` states the other errors.
+    """
     path = Path(path)
     if path.suffix != ".csv":
         raise InputError(f"cannot write table {path}: tables are CSV; let its name end in .csv")

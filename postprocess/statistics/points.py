@@ -34,7 +34,7 @@ def mean_columns(quantity: str, mean: SeedMean) -> dict[str, float]:
 
 
 def averaged(group: pd.DataFrame, quantities: Iterable[str]) -> dict[str, float]:
-    """Average quantities over the rows of a table, one row per seed: columns of means and errors.
+    """Average quantities over the rows of a table, one row per seed; return the columns of their means.
 
     `mean_columns` describes the columns.
     """
@@ -74,7 +74,7 @@ def means_by(table: pd.DataFrame, by: Sequence[str]) -> pd.DataFrame:
 
 
 def seeds_of(group: pd.DataFrame) -> dict[str, object]:
-    """Return two columns of a point: the number of its seeds, and the seeds as text."""
+    """Return two columns of a row per point: the number of seeds in the group, and the seeds as text."""
     return {SEEDS: len(group), "seeds": " ".join(map(str, sorted(group[SEED])))}
 
 
@@ -107,9 +107,9 @@ def paired_differences(
 ) -> pd.DataFrame:
     """Compute the change of a quantity between two levels of a factor, for each pair of runs.
 
-    The function applied to its own result with another factor gives interactions. `others` are the columns of all other
-    factors in which runs differ, and the seed; they are equal in both runs of a pair. Returns one row per pair: the
-    columns `others`, and the quantity at the second level less that at the first. Runs without a partner are left out.
+    `others` are the seed and the columns of all other factors in which runs differ; the two runs of a pair agree in
+    them. Returns one row per pair: the columns `others`, and the quantity at the second level less that at the first.
+    Runs without a partner are left out. To get an interaction, apply the function to its result with another factor.
 
     Example:
         >>> runs = pd.DataFrame({"mu": [0.4, 0.8, 0.4, 0.8], "seed": [1, 1, 2, 2], "N": [5.0, 6.0, 5.5, 7.5]})

@@ -32,9 +32,9 @@ class Interval:
 
 
 def rank_correlations(x: Floats, y: Floats, strata: Whole) -> Floats:
-    """Compute Spearman's rank correlations (m,) of columns x (n, m) with y (n,), within strata (n,).
+    """Compute Spearman's rank correlation of each column of x (n, m) with y (n,), within strata (n,).
 
-    A correlation is NaN if its column, or y, is constant in every stratum.
+    Returns (m,) values. A correlation is NaN if its column, or y, is constant in every stratum.
     """
     ranks = ranks_within(np.column_stack([x, y]), strata)
     squares = np.einsum("nm,nm->m", ranks, ranks)
@@ -44,9 +44,9 @@ def rank_correlations(x: Floats, y: Floats, strata: Whole) -> Floats:
 
 
 def ranks_within(values: Floats, strata: Whole) -> Floats:
-    """Return ranks (n, m) of columns within strata (n,), from -1/2 to 1/2: rank over (rows + 1), less 1/2.
+    """Return the ranks of each column of `values` (n, m) within strata (n,), between -1/2 and 1/2: (n, m).
 
-    Equal values have their mean rank.
+    It is the rank over (number of rows of the stratum + 1), less 1/2. Equal values get the mean of their ranks.
     """
     found = np.empty(values.shape)
     for stratum in np.unique(strata):
@@ -58,9 +58,9 @@ def ranks_within(values: Floats, strata: Whole) -> Floats:
 def correlation_within(x: Sequence[float], y: Sequence[float], blocks: Sequence[Hashable]) -> SeedMean:
     """Average Spearman's rank correlation of y (n,) with x (n,) over blocks (n,) in which both vary.
 
-    A y of which only a lower bound is known counts as `inf`, the highest rank. Points with NaN are left out. The
-    standard error is that of the scatter over blocks. It is NaN for fewer than six blocks: five correlations have one
-    sign by chance in more than 5 % of all cases.
+    Give a y of which only a lower bound is known as `inf`, which has the highest rank. Points with NaN are left out.
+    The standard error follows from the scatter over blocks. It is NaN for fewer than six blocks, because five
+    correlations all have the same sign by chance in more than 5 % of all cases.
     """
     parts: dict[Hashable, list[tuple[float, float]]] = {}
     for across, up, block in zip(x, y, blocks, strict=True):
@@ -74,7 +74,7 @@ def correlation_within(x: Sequence[float], y: Sequence[float], blocks: Sequence[
 
 
 def common_slopes(x: Floats, y: Floats, strata: Whole) -> Floats:
-    """Fit slopes (m,) of y (n,) against columns x (n, m), with an intercept for each of the strata (n,).
+    """Fit the slope of y (n,) against each column of x (n, m), with one intercept per stratum (n,): (m,).
 
     A slope is NaN if its column is constant in every stratum.
     """
@@ -107,8 +107,9 @@ def few_blocks(blocks: Whole, strata: Whole) -> bool:
 def resampled(measures: Callable[[Whole], Floats], blocks: Whole, strata: Whole, *, count: int, seed: int) -> Floats:
     """Return the m values of `measures` for each of `count` bootstrap resamples of a table, (count, m).
 
-    A resample has as many blocks of each stratum as the table, drawn with replacement; `measures` takes its indices of
-    rows and returns values (m,). Each row has a block (n,) and a stratum (n,); a block lies in one stratum.
+    A resample has as many blocks of each stratum as the table, drawn with replacement. `measures` takes the indices of
+    the rows of a resample and returns values (m,). `blocks` (n,) and `strata` (n,) are those of each row; a block lies
+    in one stratum. `seed` is that of the random numbers.
     """
     random = np.random.default_rng(seed)
     rows = {block: np.nonzero(blocks == block)[0] for block in np.unique(blocks)}

@@ -67,8 +67,8 @@ def mean_with_error(samples: ArrayLike) -> Mean:
     """Average successive samples (n,) in time order, with an error that allows for their correlation.
 
     The error is s/√n times the square root of the integrated correlation time, which is summed until a pair of
-    successive correlations turns negative. From 20 samples this time is known only to tens of per cent and rather too
-    short, so that the error is a lower bound if the samples drift slowly. Samples of NaN are left out.
+    successive correlations turns negative. From 20 samples this time has an error of tens of per cent and is rather too
+    short. The error of the mean is therefore a lower bound if the samples drift slowly. NaN are left out.
 
     Source:
         Geyer, Statistical Science 7 (1992) 473 (initial positive sequence).
@@ -199,7 +199,7 @@ def parabola(x: Sequence[float], y: Sequence[float], *, at: float) -> Parabola:
     """Fit a parabola of y (n,) against x (n,), described by its bend and its slope at x = `at`.
 
     The sign of the slope says on which side of `at` the extremum lies, and its error stays finite if the bend is small.
-    Errors are by the residuals, with n − 3 degrees of freedom. Points with NaN are left out.
+    Errors follow from the residuals, with n − 3 degrees of freedom. Points with NaN are left out.
     """
     across, up = np.asarray(x, dtype=np.float64) - at, np.asarray(y, dtype=np.float64)
     known = np.isfinite(across) & np.isfinite(up)
@@ -230,5 +230,5 @@ def _lack_of_fit(x: Floats, residuals: Floats) -> float:
 
 
 def _quantile(freedom: float) -> float:
-    """Return the half-width of the 95 % interval over the standard error, Student's t."""
+    """Return the ratio of the 95 % half-width to the standard error, by Student's t."""
     return float(stdtrit(freedom, (1 + CONFIDENCE) / 2))

@@ -2,7 +2,7 @@
 
 N^(-1/3) is proportional to the surface of a pile over its volume. The variance from seed to seed is fitted as a power
 of N, by the differences of seeds at equal N. If the means deviate from the law by more than this variance explains,
-errors are multiplied by the square root of the ratio (Birge, Phys. Rev. 40, 207, 1932); the law is rejected at 95 %.
+errors are multiplied by the square root of the ratio (Birge, Phys. Rev. 40, 207, 1932). The law is rejected at 95 %.
 
 A threshold is the x_c at which half of all runs have a property. The fraction of runs with the property rises with x as
 a logistic function 1/(1 + exp(-(x - x_c)/s)). The 95 % interval of x_c is by profile likelihood over all widths s; it
@@ -40,9 +40,9 @@ class SizeLaw:
 
     bulk: float  #: q_∞
     slope: float  #: a
-    covariance: Floats  #: (2, 2) covariance of q_∞ and a, enlarged by `excess` above 1; NaN without scatter
+    covariance: Floats  #: (2, 2) covariance of q_∞ and a, times `excess` if above 1; NaN without scatter
     scatter: Scatter  #: Variance from seed to seed
-    excess: float  #: Variance of the means about the law over that from the scatter [-]; NaN below three sizes
+    excess: float  #: Variance of the means about the law over that expected from the scatter [-]; NaN below three sizes
     p_value: float  #: Probability of an excess as large or larger, if the law holds [-]; NaN below three sizes
     powers: tuple[float, float, float]  #: Best power of N and its 95 % interval [-]; NaN below three sizes
     sizes: int  #: Number of distinct N
@@ -131,7 +131,7 @@ def _fit(counts: Floats, values: Floats, scatter: Scatter, power: float) -> tupl
 
 
 def _powers(counts: Floats, values: Floats, scatter: Scatter) -> tuple[float, float, float]:
-    """Return the best power of N and its 95 % interval, with errors enlarged as those of the law."""
+    """Return the best power of N and its 95 % interval, with errors enlarged if the residuals exceed them."""
     left = np.array([_fit(counts, values, scatter, float(power))[2] for power in POWERS]) / scatter.variance
     free = len(np.unique(counts)) - 3
     larger = max(left.min() / free, 1.0) if free > 0 else 1.0
@@ -159,7 +159,7 @@ class Profile:
 
     @property
     def best(self) -> float:
-        """Estimate of x_c, the middle of a range of equal likelihood; NaN if x_c is not known."""
+        """Estimate of x_c, the mean of the values with the greatest likelihood; NaN if x_c is not known."""
         if not self.known:
             return math.nan
         return float(self.places[self.likelihood >= self.likelihood.max() - 1e-3].mean())
@@ -180,7 +180,8 @@ class Profile:
 def profiles(x: Floats, having: Floats, groups: NDArray[np.int64]) -> dict[int, Profile]:
     """Compute the profile likelihood of the threshold x_c for each group of runs, at common values of x_c.
 
-    Runs have a finite x (n,), 1 in `having` (n,) if a run has the property, else 0, and a group (n,), such as its size.
+    `x` (n,) is finite; `having` (n,) is 1 for a run with the property, else 0; `groups` (n,) is, for example, the size
+    of the pile.
     """
     span = float(np.ptp(x)) or 1.0
     places = np.linspace(x.min() - span / 2, x.max() + span / 2, _PLACES)
@@ -204,8 +205,7 @@ def profiles(x: Floats, having: Floats, groups: NDArray[np.int64]) -> dict[int, 
 def alike(found: Collection[Profile]) -> float:
     """Return the p-value of the hypothesis that all groups have one threshold x_c [-].
 
-    The test is by the likelihood ratio.
-    It is NaN if x_c is known for fewer than two groups.
+    The test is the likelihood-ratio test. The p-value is NaN if x_c is known for fewer than two groups.
     """
     known = [one.likelihood for one in found if one.known]
     if len(known) < 2:

@@ -1,1 +1,4 @@
-"""Commands of `smarticles`, one module each; `run` has `resume` too, `scene_files` has `init` and `schema`."""
+"""Commands of `smarticles`, one module each.
+
+The module `run` also has the command `resume`; `scene_files` has `init` and `schema`.
+"""

@@ -115,7 +115,7 @@ def compare(one: Path, other: Path) -> dict[str, Any]:
 
     Returns:
         kind: "run" or "sweep".
-        identical: whether A and B have equal runs whose series and frames agree bit by bit.
+        identical: whether A and B have equal sets of runs, whose series and frames agree bit by bit.
         scene: `Differences` of the scenes, with dots for nested keys; for sweeps, of constants and variables.
         versions: `Differences` of engine, package versions and number of threads.
         only: names of runs that only A or only B has; empty for runs.
@@ -185,12 +185,12 @@ def _compare_sweeps(one: Folder, other: Folder) -> dict[str, Any]:
 
 
 def _listed(values: Mapping[str, Sequence[Any]]) -> dict[str, Any]:
-    """Return each single value as it is, and several values as one text."""
+    """Return for each name its value, or several values joined in one text."""
     return {name: some[0] if len(some) == 1 else ", ".join(map(str, some)) for name, some in values.items()}
 
 
 def _versions(runs: Iterable[Run]) -> dict[str, Any]:
-    """Return engine and package versions of the runs of a sweep that have started."""
+    """Return the engine and the package versions of the started runs of a sweep."""
     found: dict[str, dict[Any, None]] = {}
     for run in runs:
         for name, value in _made_by(run).items() if (run.path / MANIFEST).is_file() else ():
@@ -199,7 +199,7 @@ def _versions(runs: Iterable[Run]) -> dict[str, Any]:
 
 
 def differences(one: Mapping[str, Any], other: Mapping[str, Any]) -> Differences:
-    """Return the keys whose values differ, with dots for nested keys."""
+    """Return the values of A and B by key, for keys whose values differ; nested keys are joined by dots."""
     from dem.scene.reading import flattened  # noqa: PLC0415
 
     first, second = flattened(one), flattened(other)
@@ -245,7 +245,7 @@ def compare_bits(one: Run, other: Run) -> dict[str, Any]:
 
 
 def _pair_up(one: pd.DataFrame | None, other: pd.DataFrame | None, *, keys: Sequence[str]) -> list[dict[str, Any]]:
-    """Return the quantities of tables A and B, one row per combination of `keys` and quantity."""
+    """Return rows with a quantity in tables A and B, one per combination of `keys` and quantity."""
     from postprocess.statistics.points import marked  # noqa: PLC0415
 
     def records(table: pd.DataFrame | None) -> dict[str, dict[Any, Any]]:

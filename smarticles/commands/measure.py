@@ -134,7 +134,7 @@ def _shown(table: pd.DataFrame, *, per_frame: bool) -> list[_Column]:
 
 
 def _text(table: pd.DataFrame, by: Sequence[str], shown: Sequence[_Column]) -> str:
-    """Return the printed table: one row per group with `by`, otherwise one block of rows per run below its name."""
+    """Return the printed table: one row per group with `by`, otherwise a block of rows per run."""
     named = [*by, _RUNS] if by else []
     rows = [
         [
@@ -158,7 +158,7 @@ def _text(table: pd.DataFrame, by: Sequence[str], shown: Sequence[_Column]) -> s
 
 
 def _notes(table: pd.DataFrame) -> list[str]:
-    """Return notes on forces of hooks that must not be read as results."""
+    """Return notes on hook forces that are no results: an untouched hook, or one stopped by its limit."""
     notes = []
     for row in table.to_dict("records") if "hook work [J]" in table.columns else ():
         where = f"{row['run']}: phase {row['phase']} ({row['phase type']})"
@@ -176,7 +176,7 @@ def _notes(table: pd.DataFrame) -> list[str]:
 
 
 def _legend(shown: Container[str], *, per_frame: bool, by: Sequence[str]) -> str:
-    """Return the legend of the printed columns, and the frames or runs that the means are taken over."""
+    """Return the legend of the printed columns, and the frames or runs over which means are taken."""
     from postprocess.measures.packing import COSTLY_DEFINITIONS, DEFINITIONS  # noqa: PLC0415
     from postprocess.measures.pull import WINDOW  # noqa: PLC0415
     from postprocess.measures.strain import FRACTURE, PEAK, QUANTITIES, WIDENING, YIELD  # noqa: PLC0415

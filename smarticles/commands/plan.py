@@ -76,8 +76,8 @@ def plan_scene(arguments: argparse.Namespace) -> int:
 
 
 def _chosen(scene: Scene, arguments: argparse.Namespace) -> Choice | None:
-    """Return engine and fidelity within --max-error and --max-hours; None without these options."""
-    from dem.plan.choice import PACKING, QUANTITIES, choose, read_table  # noqa: PLC0415
+    """Return the engine and fidelity that satisfy --max-error and --max-hours; None without these options."""
+    from dem.plan.choice import PACKING, QUANTITIES, activity_of, choose, read_table  # noqa: PLC0415
 
     if arguments.max_error is None and arguments.max_hours is None:
         for option, value in (("--table", arguments.table), ("--of", arguments.of)):
@@ -91,7 +91,7 @@ def _chosen(scene: Scene, arguments: argparse.Namespace) -> Choice | None:
             raise InputError(f"--of {','.join(of)}: {name!r} is not measured; known: {', '.join(QUANTITIES)}")
     return choose(
         scene,
-        read_table(arguments.table, of=of, engine=arguments.engine),
+        read_table(arguments.table, of=of, engine=arguments.engine, activity=activity_of(scene)),
         max_error=arguments.max_error,
         max_hours=arguments.max_hours,
     )

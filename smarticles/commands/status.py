@@ -81,7 +81,7 @@ def show_status(arguments: argparse.Namespace) -> int:
 
 @dataclass(frozen=True)
 class _Status:
-    name: str  #: Of the sweep, or of the run directory
+    name: str  #: Name of the sweep, or of the run directory
     runs: Sequence[RunStatus]
     queue: dict[str, Any] | None = None  #: Jobs, error and task counts of Slurm's queue; None: never submitted
 
@@ -162,7 +162,7 @@ def _watch(directory: Path, interval: float) -> None:
 
 
 def _table(runs: Sequence[RunStatus]) -> str:
-    """Return a table with one row per run; the columns `job` and `checkpoint s` appear where any run needs them."""
+    """Return a table with one row per run; columns `job` and `checkpoint s` only if a run has a value."""
     any_ended_early = any(run.state in _ENDED_EARLY for run in runs)
     any_job = any(run.job for run in runs)
     header = ["run", "state", *(["job"] if any_job else []), "phase", "simulated s"]

@@ -105,7 +105,7 @@ def compute_and_analyse(
         arguments: parsed command line with --analyse and --jobs.
         load: returns the study that analyses the runs; called late, since it imports large libraries.
         note: how the runs differ from the full study.
-        pictured: values of variables that select the run to draw.
+        pictured: values of variables; the first finished run that has them is drawn.
         earlier: measured runs of an earlier analysis by name; these runs are not computed.
     """
     missing = folder.only([entry for entry in folder.entries if entry.name not in earlier])
@@ -140,7 +140,7 @@ def _draw(folder: Folder, finished: Sequence[Entry], values: Mapping[str, object
 
 
 def _earlier(results: Path, folder: Folder, study: Study) -> Mapping[str, MeasuredRun]:
-    """Return the runs of a sweep that are in the tables of an earlier analysis, by name."""
+    """Read those runs of a sweep, by name, that are in the tables of an earlier analysis."""
     from studies.framework.runs import Wanted, earlier_runs  # noqa: PLC0415
 
     if not study.from_tables:

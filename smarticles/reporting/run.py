@@ -13,7 +13,7 @@ import pandas as pd
 from markupsafe import Markup
 
 from dem.errors import InputError, RunError
-from dem.plan.choice import QUANTITIES, Error, read_table
+from dem.plan.choice import QUANTITIES, Error, activity_of, read_table
 from dem.plan.effects import decide
 from dem.plan.outlook import plan
 from dem.record.columns import EVERY
@@ -43,7 +43,10 @@ _MAX_WARNINGS = 30
 
 
 def run_page(directory: Path, accuracy: Path | None) -> str:
-    """Return the HTML page of a finished or unfinished run; `accuracy`: table of measured errors (None: shipped)."""
+    """Return the HTML page of a finished or unfinished run.
+
+    `accuracy` is the path of a table of measured errors; None: the table that ships.
+    """
     directory = directory.resolve()
     run, scene = open_run(directory), None
     scene_error = ""
@@ -155,7 +158,7 @@ def picture_blocks(directory: Path, *, name: str = "", turn: bool = True) -> lis
 
 
 def _curves(run: Run) -> list[Markup]:
-    """Return charts of the recorded series against time, without series that are zero throughout."""
+    """Return charts of the recorded series against time; series that are always 0 are left out."""
     if not run.has_series:
         return []
     series = run.series
@@ -181,7 +184,7 @@ def _curves(run: Run) -> list[Markup]:
 
 
 def scene_blocks(directory: Path, scene: Scene | None, scene_error: str) -> list[Markup]:
-    """Return planned phases, warnings and the scene file; without a scene `scene_error` and the file."""
+    """Return planned phases, warnings and scene file; if there is no scene, `scene_error` and scene file."""
     blocks = [words(scene_error, tone="warning")] if scene is None else []
     if scene is not None:
         planned = plan(scene)
@@ -203,7 +206,7 @@ def scene_blocks(directory: Path, scene: Scene | None, scene_error: str) -> list
 
 
 def effect_blocks(scenes: Sequence[Scene]) -> list[Markup]:
-    """Return a table of effects: the number of scenes that need each effect, and the reason in the first such scene."""
+    """Return a table of effects: the number of scenes that need each, and why the first of them needs it."""
     rows = []
     for decisions in zip(*map(decide, scenes), strict=True):
         on = [effect for effect in decisions if effect.on]
@@ -229,7 +232,7 @@ def accuracy_blocks(scene: Scene | None, path: Path | None) -> list[Markup]:
     rows = [[knob, value, named.get(knob)] for knob, value in knobs.items()]
     blocks = [table(caption, ["knob", "this scene", base], rows)]
     try:
-        known = read_table(path, of=tuple(QUANTITIES))
+        known = read_table(path, of=tuple(QUANTITIES), activity=activity_of(scene))
     except InputError as error:
         return [*blocks, words(f"The errors of this fidelity are unknown: {error}", tone="note")]
     here = [entry for entry in known.fidelities if (entry.engine, entry.fidelity) == (scene.engine, base)]

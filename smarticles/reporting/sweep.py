@@ -44,7 +44,10 @@ _MAX_STILLS, _MAX_CURVES, _MAX_CHARTS = 4, 5, 4
 
 
 def sweep_page(folder: Folder, accuracy: Path | None, *, jobs: int) -> str:
-    """Return the HTML page of a sweep or a study; `accuracy`: table of measured errors (None: shipped)."""
+    """Return the HTML page of a sweep or a study.
+
+    `accuracy` is the path of a table of measured errors; None: the table that ships.
+    """
     states = folder.status()
     study = folder.name.removesuffix("-quick")
     results = folder.path / "results"
@@ -137,7 +140,7 @@ def _measured(folder: Folder, varied: Mapping[str, Sequence[Any]], *, jobs: int)
 
 
 def _figures(final: pd.DataFrame, by: Sequence[str], varied: Mapping[str, Sequence[Any]], kind: str) -> list[Markup]:
-    """Return charts against the variable with the most values, with one curve per value of a second variable."""
+    """Return charts against the variable with most values, with one curve per value of a second one."""
     if not by:
         return []
     x_name, *others = sorted(by, key=lambda name: -len(varied[name]))
@@ -163,7 +166,7 @@ def _figures(final: pd.DataFrame, by: Sequence[str], varied: Mapping[str, Sequen
 
 
 def _pictures(folder: Folder) -> list[Markup]:
-    """Return pictures of finished runs with one seed, evenly chosen from the sweep, and views of the last one."""
+    """Return pictures of evenly chosen finished runs with one seed, and views all around the last run."""
     done = [entry for entry in folder.entries if folder.is_done(entry)]
     one_seed = [entry for entry in done if entry.values.get(SEED) == done[0].values.get(SEED)]
     count = min(_MAX_STILLS, len(one_seed))
@@ -242,7 +245,7 @@ def _origin(folder: Path) -> list[Markup]:
 
 
 def _csv(file: Path) -> tuple[list[str], list[list[str]]] | None:
-    """Return header and rows of a CSV file without the comment lines at its end; None if the file is empty."""
+    """Return header and rows of a CSV file without the comments at its end; None if the file is empty."""
     lines = file.read_text(encoding="utf-8", errors="replace").splitlines(keepends=True)
     while lines and lines[-1].startswith("#"):
         lines.pop()

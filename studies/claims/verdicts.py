@@ -43,7 +43,7 @@ class Tested:
 
     @property
     def settled(self) -> str:
-        """Verdict by the paper's test; by our own test if the paper's test does not resolve the claim."""
+        """Verdict of the paper's test, or of our own test if the paper's test does not resolve the claim."""
         unsettled = self.verdict in ("not resolved", "no data")
         return self.instead.verdict if unsettled and self.instead is not None else self.verdict
 
@@ -52,7 +52,7 @@ class Tested:
 class Claim:
     """One claim of the paper, with the verdicts of the studies that tested it."""
 
-    number: int  #: In the paper's order, from 1
+    number: int  #: Number in the order of the paper, from 1
     part: str  #: Section of the paper
     says: str  #: The claim
     #: Verdicts under the protocols `text` and `code`, and in the results `text on YADE` and `code on YADE`; None if not
@@ -64,7 +64,9 @@ class Claim:
     def verdict(self) -> str:
         """Verdict under both protocols together.
 
-        It is their common verdict if they agree; otherwise `partly` if one reproduces the claim, `not` if none does.
+        A protocol without data does not count. If the protocols agree, it is their common verdict. Otherwise it is
+        `partly` if one reproduces the claim, else `not`. Without data it is `no data`, or `not testable` if no study
+        tested the claim.
         """
         settled = [one.settled for one in (self.tested["text"], self.tested["code"]) if one is not None]
         known = set(settled) - {"no data"}
@@ -76,7 +78,7 @@ class Claim:
     def engines(self) -> dict[str, str]:
         """Agreement of both engines by protocol: `alike`, `opposite`, `links alone`, or `YADE alone`.
 
-        `alone` is the engine that resolves the claim. Protocols not tested on both engines are left out.
+        "alone" means that only this engine resolves the claim. Protocols not tested on both engines are left out.
         """
         found = {}
         for name in ("text", "code"):
@@ -126,7 +128,10 @@ def _tested(
     *,
     optional: bool = False,
 ) -> Tested | None:
-    """Read the verdict of the finding [STUDY, ID] and of its substitute `instead`; None if there is none."""
+    """Read the verdict of a finding [STUDY, ID], and of the finding `instead`; None if `named` is None.
+
+    With `optional` a finding that the study lacks gives None, otherwise InputError.
+    """
     if named is None:
         return None
     study, finding = named
@@ -148,7 +153,7 @@ def _tested(
 
 
 def _findings(folder: Path) -> _Findings:
-    """Read the findings of a study by id; tables without ids by the text of the finding."""
+    """Read the findings of a study by id (by statement if the table has no ids), and `Tested.basis`."""
     for name in ("findings.csv", "verdicts.csv"):
         path = folder / name
         if path.is_file():

@@ -48,7 +48,7 @@ Select = Callable[[pd.DataFrame], pd.DataFrame]  #: Selects the rows of a table 
 class Analysis:
     """Tables and runs that the figures of a study are drawn from."""
 
-    tables: Mapping[str, pd.DataFrame] = field(repr=False)  #: By name
+    tables: Mapping[str, pd.DataFrame] = field(repr=False)  #: Tables by name
     runs: Mapping[str, Run] = field(repr=False)  #: Measured runs by the name of their directory
     footer: Sequence[str]  #: Statements about the origin of the results
 
@@ -62,8 +62,8 @@ class Series:
     """Rows of a table that are drawn with one marker and one entry in the legend."""
 
     rows: pd.DataFrame = field(repr=False)  #: Points or runs, in the order of the line through them
-    label: str  #: In the legend
-    properties: Mapping[str, Any]  #: Of marker and line, by Matplotlib's names, see `marker`
+    label: str  #: Text in the legend
+    properties: Mapping[str, Any]  #: Properties of marker and line by Matplotlib's names, see `marker`
     shift: float = 0.0  #: Added to x, so that error bars of neighbouring series do not overlap
 
 
@@ -71,9 +71,9 @@ class Series:
 class History:
     """Values of a quantity of one run over time, from the phase before its activity to the end."""
 
-    times: NDArray[np.float64]  #: (n,) since the activity began [s], or another variable that increases
-    values: NDArray[np.float64]  #: (n,) in the unit of the quantity
-    active: float = 0.0  #: Duration of the activity [s]; 0 if the figure is not to mark its beginning and end
+    times: NDArray[np.float64]  #: (n,) times since the activity began [s], or another increasing variable
+    values: NDArray[np.float64]  #: (n,) values in the unit of the quantity
+    active: float = 0.0  #: Duration of the activity, whose ends are marked [s]; 0: no marks
 
 
 Split = Callable[[pd.DataFrame], list[Series]]  #: Makes the series of a table of points or runs
@@ -83,7 +83,7 @@ Split = Callable[[pd.DataFrame], list[Series]]  #: Makes the series of a table o
 class SplitBy:
     """Splits a table of points or runs into series by the values of one column."""
 
-    column: str  #: `Study` checks that it is a key
+    column: str  #: Column whose values make series; `Study` checks that it is a key
     series: Split
 
     def __call__(self, table: pd.DataFrame) -> list[Series]:
@@ -94,8 +94,10 @@ class SplitBy:
 Fit = Callable[
     [Mapping[str, pd.DataFrame], pd.DataFrame, str, NDArray[np.float64]], Mapping[str, tuple[ArrayLike, ArrayLike]]
 ]
-"""Computes curves fitted to a series from the study's tables, the rows of the series, the column that is drawn and
-places x (n,): values (n,) and their 95 % half-widths (n,), NaN where unknown, by the label of each curve."""
+"""Computes the curves fitted to a series.
+
+Arguments: the study's tables, the rows of the series, the column that is drawn, and places x (n,). Returns values (n,)
+and their 95 % half-widths (n,), NaN where unknown, by the label of each curve."""
 
 
 class Figure(Protocol):
@@ -113,7 +115,7 @@ class Figure(Protocol):
 class Means:
     """Means with error bars against a variable: a panel for each quantity and each value of a column."""
 
-    name: str  #: Of the files
+    name: str  #: Name of the files without suffix
     quantities: Sequence[Quantity]  #: Drawn along y, in a panel each
     x: str  #: Column that is drawn along x
     x_label: str
@@ -123,19 +125,20 @@ class Means:
     panels: str = ""  #: Column whose values have a panel each; empty: one panel for each quantity
     panel: str = "l/w = {:g}"  #: Title of a panel, with `{}` for the value of the column `panels`
     transform: Callable[[Any], Any] = lambda x: x  #: Computes the place along x from the value in the column
-    log: bool = False  #: Whether y is logarithmic, unless a value is 0 or less
+    log: bool = False  #: Whether y is logarithmic; it stays linear if a value is 0 or less
     log_x: bool = False  #: Whether x is logarithmic
     marks: Sequence[float] = ()  #: Places of vertical broken lines, in the unit of the x axis
     ticks: bool = False  #: Whether the x axis has ticks only where there are values
     share_y: bool = False  #: Whether all panels of one quantity, or of one line of panels, have one y axis
-    #: Computes horizontal lines from the rows of a panel: places on the y axis by label, NaN for a line left out
+    #: Computes the horizontal lines of a panel from its rows: y by label; a line at NaN is left out
     levels: Callable[[pd.DataFrame], Mapping[str, float]] = lambda _: {}
-    #: Column with the lower bound of a quantity where it has no mean, by the column of the quantity
+    #: By column of a quantity: column with its lower bound, which is drawn where the quantity has no mean
     bounds: Mapping[str, str] = field(default_factory=dict)
     #: Published values: places along x and values, by the column of the quantity
     reference: Mapping[str, tuple[pd.Series, pd.Series]] = field(default_factory=dict)
     fit: Fit | None = None  #: Computes curves from x = 0 to the last point of each series
-    #: Selects crosses from the study's tables and a panel's value: columns `x`, `low` and `high` (95 % interval), `y`
+    #: Returns the crosses of a panel from the study's tables and the panel's value: columns `x`, `y`, and `low` and
+    #: `high`, the 95 % interval of x
     crosses: Callable[[Mapping[str, pd.DataFrame], Any], pd.DataFrame] | None = None
     notes: Sequence[str] = ()  #: Sentences for the footer
     bars: str = BARS  #: Explains the error bars in the footer
@@ -218,7 +221,7 @@ class Means:
 class Rows:
     """Means with horizontal error bars: a line for each name, and a panel for each quantity."""
 
-    name: str  #: Of the files
+    name: str  #: Name of the files without suffix
     quantities: Sequence[Quantity]  #: Drawn along x, in a panel each
     row: str | Callable[[pd.Series], str]  #: Column with the name of the line, or a function of a row of the table
     table: str = "points"  #: Name of the study's table that is drawn
@@ -226,9 +229,9 @@ class Rows:
         Series(rows=table, label="mean over seeds", properties=marker("o", style.BLUE, style.BLUE))
     ]
     rows: Select = lambda table: table  #: Selects the rows that are drawn, in the order of the lines
-    ends: Sequence[str] = ()  #: Columns with both ends of the 95 % interval; empty: half-widths as in all tables
+    ends: Sequence[str] = ()  #: Columns with both ends of the 95 % interval; empty: the half-widths in the table
     margin: str = ""  #: Column with the half-width of a band about 0; empty: no band
-    levels: Mapping[str, float] = field(default_factory=dict)  #: Place of a vertical line, by column of the quantity
+    levels: Mapping[str, float] = field(default_factory=dict)  #: Place of a vertical line by the quantity's column
     columns: int = 2  #: Panels beside each other
     notes: Sequence[str] = ()  #: Sentences for the footer
     bars: str = BARS  #: Explains the error bars in the footer
@@ -272,7 +275,7 @@ class Heatmap:
     Points at x = 0, which a logarithmic axis cannot show, are drawn left of a broken line in all panels.
     """
 
-    name: str  #: Of the files
+    name: str  #: Name of the files without suffix
     quantities: Sequence[Quantity]
     x: Quantity  #: Drawn along x, on a logarithmic axis
     y: Quantity
@@ -316,20 +319,20 @@ class Heatmap:
 class Histories:
     """Quantities against time or another variable: means over seeds, with a band of all seeds."""
 
-    name: str  #: Of the files
-    #: Label of the y axis, by column of the table `times`; by "" if `history` reads the values
+    name: str  #: Name of the files without suffix
+    #: Label of the y axis by column of the table `times`; the key is "" if `history` reads the values
     quantities: Mapping[str, str]
     x_label: str
     split: Split  #: Makes the series of the runs; their properties have a colour
-    #: Reads the history of a run; an InputError leaves the run out. None: the table `times` has the histories
+    #: Reads the history of a run; if it raises InputError, the run is left out. None: the table `times` is drawn
     history: Callable[[Run], History] | None = None
     x: str = ""  #: Column of the table `times` that is drawn along x
     rows: Select = lambda runs: runs
     panels: str = ""  #: Column whose values have a panel each; empty: one panel
     panel: str = "l/w = {:g}"  #: Title of a panel, with `{}` for its value times `panel_scale`
     panel_scale: float = 1.0
-    width: float = 0.0  #: Of the intervals of x that are averaged over; 0: a hundredth of the longest activity
-    unit: str = "s"  #: Of `width`
+    width: float = 0.0  #: Width of the averaged intervals of x; 0: a hundredth of the longest activity or range of x
+    unit: str = "s"  #: Unit of `width`
     log: bool = False  #: Whether x and the intervals are logarithmic
     level: float | None = None  #: Place of a horizontal line
     marks: Sequence[float] = ()  #: Places of vertical broken lines, in the unit of the x axis
@@ -390,9 +393,9 @@ class Histories:
 
 @dataclass(frozen=True, kw_only=True)
 class Scatter:
-    """A quantity against others in a panel each: small markers for runs, large ones for means over seeds."""
+    """A quantity against several others, one per panel: runs as small markers, means over seeds as large."""
 
-    name: str  #: Of the files
+    name: str  #: Name of the files without suffix
     xs: Sequence[Quantity]  #: Drawn along x, in a panel each
     y: Quantity  #: Drawn along y in all panels
     split: Split  #: Makes the series of runs and of points; their properties have a marker and a colour
@@ -400,7 +403,7 @@ class Scatter:
     means: bool = True  #: Whether means over seeds are drawn
 
     def draw(self, path: Path, analysis: Analysis) -> list[Path]:
-        """Draw all runs, then means with error bars along x and y."""
+        """Draw all runs, and then the means with error bars along x and y."""
         figure, grid = panels(len(self.xs), columns=3, sharey=True)
         runs, y = analysis.table("runs"), self.y.column
         length = 0.08 * float(runs[y].max())
@@ -427,7 +430,10 @@ class Scatter:
 
 
 def one_by_one(column: str, label: Callable[[Any], str], *, last: float = 0.85) -> SplitBy:
-    """Make a series for each value of a column, in colours from dark to light; `last` is the lightest."""
+    """Return a split into one series per value of a column, in colours from dark to light.
+
+    `label` makes the text in the legend from a value; `last` is the place of the lightest colour in the map, up to 1.
+    """
 
     def split(table: pd.DataFrame) -> list[Series]:
         values = sorted(table[column].dropna().unique())
@@ -453,9 +459,10 @@ PROCEDURE_LABELS: Mapping[str, str] = MappingProxyType(
 
 
 def by_procedure(labels: Mapping[str, str] = PROCEDURE_LABELS, *, apart: float = 0.0, line: bool = True) -> SplitBy:
-    """Make a series for each procedure, of the internal oscillation only at θ = `AMPLITUDE`.
+    """Return a split into one series per procedure; for the internal oscillation only θ = `AMPLITUDE`.
 
-    Labels are in the order of the legend; neighbouring series are `apart` along x, in the unit of the x axis.
+    `labels` are texts in the legend by procedure, in the order of the legend. Neighbouring series are shifted by
+    `apart` along x, in the unit of the x axis. `line`: whether a line joins the points.
     """
 
     def split(table: pd.DataFrame) -> list[Series]:
@@ -474,7 +481,7 @@ def by_procedure(labels: Mapping[str, str] = PROCEDURE_LABELS, *, apart: float =
 
 
 def marker(shape: str, colour: str, face: str) -> dict[str, Any]:
-    """Return the properties of a marker with a line and error bars of its colour, by Matplotlib's names."""
+    """Return properties, by Matplotlib's names, of a marker with a line and error bars of the same colour."""
     edges = {"markeredgewidth": 0.9, "elinewidth": 0.8, "capthick": 0.8}
     return {"marker": shape, "color": colour, "markerfacecolor": face, **edges}
 
@@ -488,7 +495,10 @@ def procedure_marker(procedure: str) -> dict[str, Any]:
 def panels(
     count: int, *, columns: int, width: float | None = None, height: float | None = None, **shared: Any
 ) -> tuple[Canvas, list[Axes]]:
-    """Make a figure and its panels, line by line; its width, and the height of a line, are in inch."""
+    """Make a figure and its panels, which fill line by line.
+
+    `columns` is the largest number of panels in a line, `width` that of the figure, `height` that of a line [inch].
+    """
     columns = min(count, columns)
     lines = -(-count // columns)
     size = width or min(columns * style.COLUMN_WIDTH, _PAGE), height or 2.8
@@ -502,9 +512,9 @@ def panels(
 def binned(
     histories: Sequence[History], width: float, *, log: bool = False
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Average each history over intervals of a width [s], or over 50 logarithmic intervals.
+    """Average each history over intervals of a width [s], or over 49 logarithmic intervals.
 
-    Intervals meet at the beginning of the activity, time 0. Those in which a history has no sample are left out.
+    Two intervals meet at time 0, when the activity begins. An interval is left out if a history has no sample in it.
     Returns the centres of the intervals (n,) [s] and the means of each history (histories, n).
     """
     first, last = (edge(one.times[at] for one in histories) for edge, at in ((min, 0), (max, -1)))
@@ -530,7 +540,7 @@ def binned(
 def draw_history(
     axes: Axes, histories: Sequence[History], width: float, *, log: bool = False, **properties: Any
 ) -> NDArray[np.float64]:
-    """Draw mean (line) and range (band) of histories, and return the times (n,) [s] that are drawn."""
+    """Draw mean (line) and range (band) of histories; return the times (n,) [s] of the drawn points."""
     centres, means = binned(histories, width, log=log)
     axes.plot(centres, means.mean(axis=0), **properties)
     if len(means) > 1:
@@ -566,8 +576,8 @@ def draw_means(
 ) -> None:
     """Draw means y (n,) at places x (n,) with their error bars.
 
-    Half-widths of the 95 % intervals of y (n,) and of x (`across`, (n,), or (2, n) downwards and upwards) are NaN where
-    they are unknown; None draws no error bars.
+    `half_widths` (n,) are those of the 95 % intervals of y. `across` are those of x: (n,), or (2, n) for the lower and
+    the upper side. They are NaN where unknown; None draws no error bars.
     """
     bars = axes.errorbar(
         x, y, yerr=half_widths, xerr=across, **{"markersize": 3.4, "linewidth": 0.7, **properties}, label=label
@@ -582,7 +592,7 @@ def draw_bounds(
 ) -> None:
     """Draw lower bounds (n,) as markers with arrows upwards; NaN are left out.
 
-    The lengths of the arrows (n,), in the unit of y, have no meaning.
+    The lengths of the arrows (n,), in the unit of y, have no physical meaning.
     """
     at, from_, long = np.broadcast_arrays(*(np.asarray(part, dtype=np.float64) for part in (x, least, lengths)))
     known = np.isfinite(from_)

@@ -52,9 +52,10 @@ def judge(effect: SeedMean, *, threshold: float = 0.0) -> Verdict:
 
 
 def more_runs(effect: SeedMean, *, threshold: float = 0.0) -> float:
-    """Return the factor in the number of runs that would resolve an effect, if effect and scatter stay.
+    """Return the factor by which the number of runs must grow to resolve an effect of this size.
 
-    It is infinite above a million runs, and NaN if the scatter is unknown.
+    The scatter is assumed to stay. The factor is infinite if more than a million runs are needed, and NaN if the
+    scatter is unknown.
     """
     size, scatter = abs(effect.value - threshold), effect.standard_error * math.sqrt(effect.count)
     if not math.isfinite(scatter):
@@ -84,7 +85,7 @@ class Effect:
     value: SeedMean | Slope  #: Estimate with its error
     #: +1 if the statement asks for more than the threshold, −1 if for less, 0 if the number is shown but not judged
     sign: int = 1
-    threshold: float = 0.0  #: In the unit of the estimate
+    threshold: float = 0.0  #: Threshold in the unit of the estimate
     unit: str = ""  #: Unit of the number in texts, with a space before it
     text: str = ""  #: Number in texts, if it is not the estimate itself but, for example, its exponential
     note: str = ""  #: Text after the number
@@ -93,7 +94,7 @@ class Effect:
 
     @property
     def verdict(self) -> Verdict:
-        """Verdict on whether the estimate lies beyond its threshold on the side of its sign.
+        """Verdict on whether the estimate lies above its threshold (sign +1) or below it (sign −1).
 
         It is not resolved if the estimate is a bound and the true value may lie on the other side.
         """
@@ -105,7 +106,7 @@ class Effect:
 
     @property
     def more(self) -> float:
-        """Factor in the number of runs that would resolve the effect; NaN if it is resolved or unknown."""
+        """Factor by which the number of runs must grow to resolve the effect; NaN if resolved or unknown."""
         unresolved = self._judged == Verdict.NOT_RESOLVED
         return more_runs(self.value, threshold=self.threshold) if unresolved else math.nan
 
@@ -169,7 +170,7 @@ class Judged:
 
     @property
     def needed(self) -> str:
-        """Text on how many more runs would resolve the finding; empty if it is resolved or that is unknown."""
+        """Text on how many more runs would resolve the finding; empty if resolved, or if that is unknown."""
         if math.isnan(self.more):
             return ""
         times = f"more than {_MOST_TIMES}" if self.more > _MOST_TIMES else f"{self.more:.2g}"
@@ -177,28 +178,28 @@ class Judged:
 
 
 def _verdict(effects: Sequence[Effect]) -> tuple[Verdict, float]:
-    """Combine the verdicts of all effects; returns also the largest `Effect.more` of those not resolved."""
+    """Return the combined verdict of all effects, and the largest `Effect.more` of effects not resolved."""
     verdict = all_of(effect.verdict for effect in effects)
     needed = [effect.more for effect in effects if effect.verdict == verdict == Verdict.NOT_RESOLVED]
     return verdict, float(np.max(needed)) if needed else math.nan
 
 
 def all_of(verdicts: Iterable[Verdict]) -> Verdict:
-    """Combine verdicts on the parts of a statement: a part that is not found refutes the whole statement."""
+    """Combine verdicts on the parts of a statement; if one part is not found, the statement is not found."""
     found = list(verdicts)
     order = (Verdict.NOT_FOUND, Verdict.NO_DATA, Verdict.NOT_RESOLVED, Verdict.FOUND)
     return next((verdict for verdict in order if verdict in found), Verdict.NO_DATA)
 
 
 def decide(found: bool, wrong: bool = False, *, data: bool = True) -> Verdict:
-    """Return the verdict: found, not found (the opposite was found, `wrong`), not resolved, or no data."""
+    """Return no data without `data`, else found if `found`, else not found if `wrong`, else not resolved."""
     if not data:
         return Verdict.NO_DATA
     return Verdict.FOUND if found else Verdict.NOT_FOUND if wrong else Verdict.NOT_RESOLVED
 
 
 def within(value: float, half_width: float, margin: float) -> Verdict:
-    """Return found if the interval value ± half_width lies within ±margin, not found if outside of it."""
+    """Return found if value ± half_width lies within ±margin, not found if outside, else not resolved."""
     size = abs(value)
     return decide(size + half_width <= margin, size - half_width > margin, data=not math.isnan(value))
 
@@ -228,8 +229,10 @@ def above(
 
     Args:
         quantities: column, or several columns with a sign each: +1 if the statement says above, −1 if below.
+        one, others: the procedure, and the procedures that it is compared with.
+        sign: sign of a single column.
         beside: procedures whose difference from `one` is shown but not judged.
-        beside_quantity: column of that difference; None: the column that is judged.
+        beside_quantity: column of the difference that is shown; None: the column that is judged.
         bounds: column that is above 0 if the first of the quantities is a lower bound and the others are unknown.
         shown: columns whose means are shown but not judged.
     """
@@ -281,7 +284,7 @@ def slope(
     """Make the finding that a quantity rises (sign +1) or falls (−1) with a variable, on straight lines.
 
     Args:
-        within: columns whose values make blocks; lines of all blocks have one slope and levels of their own.
+        within: columns whose values make blocks; the lines of all blocks have one slope, each its own intercept.
         label: name of the quantity in texts; empty: its symbol.
     """
     label = f"{label or symbol(quantity)} against {symbol(against)}"
@@ -368,13 +371,13 @@ def symbol(column: str) -> str:
 
 
 def unit_of(column: str) -> str:
-    """Return the unit in the name of a column, with a space before it; empty for a pure number."""
+    """Return the unit in the name of a column, with a space before the unit; empty for a pure number."""
     unit = column.rpartition(" [")[2].removesuffix("]") if column.endswith("]") else "-"
     return "" if unit == "-" else f" {unit}"
 
 
 def blocks(table: pd.DataFrame, columns: Sequence[str]) -> Sequence[Hashable]:
-    """Return the block of each row, the values of some columns; without columns, one block for all rows."""
+    """Return the block of each row: its values of some columns; without columns all rows are one block."""
     return list(map(tuple, table[list(columns)].to_numpy().tolist())) if columns else ["all"] * len(table)
 
 

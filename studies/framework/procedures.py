@@ -48,10 +48,10 @@ _WINDOW = 0.1  # s, of moving means of heights: longer than a swing at θ = 10°
 
 
 def prepared_by(run: Run, *then: str) -> dict[str, object]:
-    """Return the cells procedure, θ [deg], those of `run_columns`, and time of the activity [s].
+    """Return procedure, θ [deg], `run_columns`, and duration of the activity [s] of a run, by column.
 
-    InputError unless the run consists of a pour, a rest, one activity with a rest or none, and phases of the types
-    `then`.
+    InputError unless the phases are a pour, a rest, optionally one activity and another rest, and then phases of the
+    types `then`.
     """
     types = [phase.type for phase in run.phases]
     active = [kind for kind in types if kind in PROCEDURES]
@@ -68,13 +68,13 @@ def prepared_by(run: Run, *then: str) -> dict[str, object]:
 
 
 def of_procedure(table: pd.DataFrame, procedure: str) -> pd.DataFrame:
-    """Return the rows of one procedure; of the internal oscillation only those with θ = `AMPLITUDE`."""
+    """Return the rows of a procedure; for the internal oscillation only rows with θ = `AMPLITUDE`."""
     chosen = table[table[PROCEDURE] == procedure]
     return chosen[np.isclose(chosen[THETA], AMPLITUDE)] if procedure == INTERNAL and THETA in chosen else chosen
 
 
 def compared(table: pd.DataFrame) -> pd.DataFrame:
-    """Return the rows of all procedures; of the internal oscillation only those with θ = `AMPLITUDE`."""
+    """Return the rows of all procedures; for the internal oscillation only rows with θ = `AMPLITUDE`."""
     return pd.concat([of_procedure(table, name) for name in table[PROCEDURE].unique()]) if len(table) else table
 
 
@@ -87,7 +87,7 @@ def paired(table: pd.DataFrame, quantity: str, one: str, other: str) -> SeedMean
 
 
 def activity(run: Run) -> Phase:
-    """Return the only activity of a run; InputError unless there is exactly one, between two rests."""
+    """Return the activity of a run; InputError unless it has exactly one, between two rests."""
     active = [phase for phase in run.phases if not phase.at_rest]
     around = run.phases[active[0].index - 1 : active[0].index + 2] if active else ()
     if len(active) != 1 or active[0].type not in PROCEDURES or len(around) != 3 or not around[2].at_rest:
@@ -129,10 +129,10 @@ def procedure_row(run: Run) -> dict[str, object]:
 
 
 def height_history(run: Run) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Read heights over h0 (n,) [-] and times since the activity began (n,) [s].
+    """Read the height of the centre of mass over h0 (n,) [-], and times since the activity began (n,) [s].
 
-    Both begin with the rest before the activity; h0 is the mean height of the centre of mass over that rest. InputError
-    if the height was not recorded.
+    The samples begin with the rest before the activity; h0 is the mean height over that rest. InputError if the height
+    was not recorded.
     """
     series, active = run.series, activity(run)
     height = np.asarray(series["com_height_m"], dtype=np.float64)
@@ -147,7 +147,8 @@ def height_history(run: Run) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
 def _of_series(run: Run, active: Phase, straight_until: float | None) -> dict[str, float]:
     """Measure heights [-] and energy per smarticle [J] from the series, by column; NaN if not recorded.
 
-    In a shape change barbs start to close again `straight_until` [s] after the activity began; None: another activity.
+    `straight_until` is the time since a shape change began at which barbs start to close again [s]; None for other
+    activities.
     """
     found = {STRAIGHT: math.nan, LOWEST: math.nan, HALF: math.nan, ENERGY: math.nan}
     if not (run.path / "series.h5").exists():
@@ -169,7 +170,7 @@ def _of_series(run: Run, active: Phase, straight_until: float | None) -> dict[st
 
 
 def _smooth(values: NDArray[np.float64], time: NDArray[np.float64], chosen: NDArray[np.bool_]) -> NDArray[np.float64]:
-    """Return the moving mean of the chosen values over `_WINDOW`; empty if they cover less than that."""
+    """Return the moving mean over `_WINDOW` of the chosen values; empty if they cover less time."""
     if chosen.sum() < 2:
         return np.empty(0)
     samples = max(round(_WINDOW / float(np.median(np.diff(time[chosen])))), 1)
@@ -178,7 +179,7 @@ def _smooth(values: NDArray[np.float64], time: NDArray[np.float64], chosen: NDAr
 
 
 def gained(work: NDArray[np.float64], before: NDArray[np.bool_]) -> float:
-    """Return the increase [J] of a cumulative work (n,) [J] from the last sample in `before` (n,) on.
+    """Return the increase [J] of a cumulative work (n,) [J] since the last sample in `before` (n,).
 
     NaN if the work was not recorded.
     """
@@ -192,8 +193,9 @@ def gained(work: NDArray[np.float64], before: NDArray[np.bool_]) -> float:
 def half_compaction(time: NDArray[np.float64], height: NDArray[np.float64], duration: float) -> float:
     """Return the time at which half of the compaction is reached, over the duration of the activity [-].
 
-    Times (n,) since the activity began [s] and heights (n,) over that in the rest before [-] include the rests before
-    and after the activity. NaN if the centre of mass is not lower in the rest after it.
+    Times (n,) count from the start of the activity [s]; heights (n,) are over the height in the rest before [-]. Both
+    include the rests before and after the activity. The result is 1 if half is not reached during the activity, NaN if
+    the centre of mass is not lower in the rest after the activity.
     """
     final = height[time > duration]
     moving = (time >= 0) & (time <= duration)
@@ -217,10 +219,11 @@ def half_compaction(time: NDArray[np.float64], height: NDArray[np.float64], dura
 
 
 def samples(runs: pd.DataFrame) -> pd.DataFrame:
-    """Make the samples, a row per procedure, aspect ratio, θ and seed; static is a procedure too.
+    """Make the table of samples: a row per procedure (static included), aspect ratio, θ and seed.
 
-    Runs of equal aspect ratio and seed are poured from equal poses. So the static state is one sample: the mean over
-    these runs, whose number is "runs [-]". Quantities that a procedure lacks are NaN.
+    The static state has one row per aspect ratio and seed (θ is NaN): the mean over the runs that share both, since
+    these are poured from equal poses. "runs [-]" is the number of runs of a row. Quantities that a procedure lacks are
+    NaN.
     """
     columns = {f"{STATIC} {quantity}": quantity for quantity in (PHI_ACTIVE, PHI, CROSSINGS)}
     static = runs.groupby([ASPECT, SEED], as_index=False)[list(columns)].mean().rename(columns=columns)

@@ -20,8 +20,8 @@ from studies.framework.runs import DEFINITION, Collected
 class Reference:
     """Published numbers or statements that a study is compared with."""
 
-    statement: str  #: For footers, without a full stop
-    facts: Mapping[str, object]  #: For `provenance.json`
+    statement: str  #: Statement for footers, without a full stop
+    facts: Mapping[str, object]  #: Entries for `provenance.json`
 
 
 SAVOIE = Reference(
@@ -43,7 +43,7 @@ class Origin:
 
     @property
     def whole_note(self) -> str:
-        """How the measured runs differ from the full study, with the number of missing runs."""
+        """Text on how the measured runs differ from the full study, with the number of missing runs."""
         used, missing = len(self.found.runs), len(self.found.missing)
         return f"only {used} of {used + missing} runs of what is planned: {self.note}" if missing else self.note
 

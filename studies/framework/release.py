@@ -20,7 +20,7 @@ _REMOVAL = "remove-container"
 
 
 def removal(run: Run) -> Phase:
-    """Return the phase that removes the wall; InputError unless it is the last one and follows a rest."""
+    """Return the phase that removes the wall; InputError unless it is the last phase and follows a rest."""
     last = run.phases[-1]
     if last.type != _REMOVAL or len(run.phases) < 3 or not run.phases[-2].at_rest:
         types = ", ".join(phase.type for phase in run.phases)
@@ -38,9 +38,9 @@ def removal_frames(run: Run) -> tuple[Frame, FrameSequence]:
 
 
 def named_columns(run: Run) -> dict[str, object]:
-    """Return the cells procedure, aspect ratio, seed, count and fidelity of a run's row.
+    """Return procedure, aspect ratio, seed, count and fidelity of a run, by column.
 
-    InputError if the run has several activities, or one of an unknown type.
+    InputError if the run has several activities, or an activity of an unknown type.
     """
     active = [phase.type for phase in run.phases if not phase.at_rest and phase.type != _REMOVAL]
     if len(active) > 1 or not set(active) <= set(PROCEDURES):
@@ -57,7 +57,7 @@ class Pictures:
     labels: Mapping[str, str]  #: Label of each procedure
     after: float | None = None  #: Time of the last picture since the removal began [s]; None: the end of the run
     select: Sequence[str] = ()  #: Columns that must be 0 in the runs that are drawn
-    name: str = "pictures"  #: Of the file
+    name: str = "pictures"  #: Name of the file without suffix
 
     def draw(self, path: Path, analysis: Analysis) -> list[Path]:
         """Draw the pictures and return the path of the file; none if no run directory exists."""

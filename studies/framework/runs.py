@@ -32,7 +32,7 @@ _REMEDY = "give the results folder of an earlier analysis of this study, with ru
 ENGINE = "engine"  #: Column of tables of runs of several engines
 
 ENGINE_NAMES: Mapping[str, str] = MappingProxyType({"links": "links", "yade": "YADE"})
-"""Names of engines in texts, in the order of tables and figures; findings are judged by the runs of the first one."""
+"""Names of engines in texts, in the order of tables and figures; the runs of the first engine judge findings."""
 
 DEFINITION = "second-highest-com"  #: Definition of the packing fraction, as in the papers that are compared with
 
@@ -43,8 +43,8 @@ PAIRS = "pairs [-]"
 class Quantity:
     """A column that is measured, averaged over seeds and shown."""
 
-    column: str  #: Name with unit
-    meaning: str = ""  #: Explanation for readers of the tables
+    column: str  #: Name of the column, with unit
+    meaning: str = ""  #: Explanation of the quantity for readers of the tables
     label: str = ""  #: Header in the short table; empty: the quantity is in the CSV files only
     form: str = ".3g"  #: Format in the short table
     scale: float = 1.0  #: Factor in the short table and in figures, such as 1e3 for millimetres
@@ -52,7 +52,7 @@ class Quantity:
     bar: str = "SE"  #: Error that is shown in the short table: `SE` (standard error) or `95 %` (half-width)
 
     def cell(self, point: Mapping[str, float]) -> str:
-        """Format the mean over seeds of a point for the short table, with its error unless that is NaN."""
+        """Format the mean over seeds of a point for the short table, with its error if the error is known."""
         error = point.get(marked(self.column, self.bar), math.nan)
         return format_with_error(self.scale * point[self.column], self.form, self.scale * error)
 
@@ -63,7 +63,11 @@ def declare(
     axes: Mapping[str, str] = MappingProxyType({}),
     scales: Mapping[str, float] = MappingProxyType({}),
 ) -> dict[str, Quantity]:
-    """Make quantities by column from label, format (empty: `.3g`) and meaning of each."""
+    """Make quantities by column.
+
+    `rows` has label, format (empty: `.3g`) and meaning of each quantity, `axes` labels of axes, `scales` factors for
+    short tables and figures.
+    """
     return {
         column: Quantity(
             column=column,
@@ -81,7 +85,7 @@ def declare(
 class Key:
     """A column that names points; a point is one combination of a sweep's variables."""
 
-    column: str  #: Name in tables
+    column: str  #: Name of the column in tables
     label: str  #: Header in the short table, and name in texts
     form: str = ""  #: Format of numbers; empty for words
     unit: str = ""  #: Text after the number
@@ -123,7 +127,7 @@ def of_engine(table: pd.DataFrame, engine: str) -> pd.DataFrame:
 
 
 def judging(table: pd.DataFrame) -> pd.DataFrame:
-    """Return the rows of the judging engine without the column `engine`; all rows if that is missing."""
+    """Return the rows of the judging engine without the column `engine`; all rows if it has none."""
     several = engines_of(table)
     return of_engine(table, several[0]) if several else table
 
@@ -144,9 +148,9 @@ def compared_engines(runs: pd.DataFrame, keys: Sequence[str], quantities: Iterab
     """Compare the judging engine with the other engines: differences at each point, paired by seed.
 
     Runs with equal point and seed were poured from equal poses. Piles are chaotic and soon forget their poses, so
-    pairing reduces the scatter only a little. The table has one row per point, other engine and quantity: mean of each
-    engine over the pairs, their difference with its 95 % half-width by Student's t, and the last two in per cent of the
-    other engine's mean.
+    pairing reduces the scatter only a little. The table has one row per point, other engine and quantity. A row has the
+    mean of each engine over the pairs, and their difference with its 95 % half-width by Student's t, also in per cent
+    of the other engine's mean.
     """
     first, *others = engines_of(runs)
     rows = []
@@ -173,13 +177,13 @@ def compared_engines(runs: pd.DataFrame, keys: Sequence[str], quantities: Iterab
 class MissingRun:
     """A run that is not in the tables of its study."""
 
-    directory: str  #: Path as given
+    directory: str  #: Path of the run directory, as given
     status: str  #: "not started", "unfinished", "failed", "interrupted", or "unusable" if it cannot be measured
     cause: str  #: Reason as a text
 
     @property
     def common_cause(self) -> str:
-        """The cause with RUN for the path of the directory, so that equal causes can be counted."""
+        """Cause in which RUN stands for the path of the directory, so that equal causes can be counted."""
         return self.cause.removeprefix(f"{self.directory}: ").replace(self.directory, "RUN")
 
 
@@ -188,7 +192,7 @@ class MeasuredRun:
     """A finished run with its rows of the table of runs."""
 
     run: Run
-    rows: Sequence[Row] = field(repr=False)  #: One, unless a study measures a run by several definitions
+    rows: Sequence[Row] = field(repr=False)  #: Rows of the run: one, or one per definition
     #: Columns of the table `times`, (n,) each: a time and quantities at that time; empty if a study has no such table
     history: Mapping[str, NDArray[Any]] = field(default_factory=dict, repr=False)
 
@@ -295,9 +299,9 @@ class Wanted:
 def earlier_runs(results: Path | str, wanted: Mapping[str, Wanted]) -> dict[str, MeasuredRun]:
     """Read planned runs from the results of an earlier analysis, so that they need not be computed again.
 
-    Rows come from `runs.csv`, with its six digits; versions and command come from `provenance.json`. A run is only read
-    if name and hash of its scene are those of a planned run. InputError if a file is missing or damaged, or none of its
-    runs is planned.
+    Rows come from `runs.csv`, whose numbers have six digits; versions and command come from `provenance.json`. A run is
+    read only if its name and the hash of its scene are those of a planned run. InputError if a file is missing or
+    damaged, or no run in it is planned.
     """
     results = Path(results)
     table = read_runs(results)
@@ -334,7 +338,7 @@ def read_runs(results: Path) -> pd.DataFrame:
 
 
 def _manifest(run: Wanted, origin: Mapping[str, Any]) -> Run:
-    """Make a run whose directory does not exist from its scene and its entry in `provenance.json`."""
+    """Make the `Run` of an absent directory from its scene and its entry in `provenance.json`."""
     scene = load_scene(run.scene)
     versions = dict(origin["versions"])
     made = manifest(
@@ -359,7 +363,7 @@ def duration(phase: Phase) -> float:
 
 
 def run_columns(run: Run) -> dict[str, object]:
-    """Return the cells aspect ratio, seed, count and fidelity of a run's row."""
+    """Return aspect ratio, seed, count and fidelity of a run, by column."""
     return {
         ASPECT: round(run.manifest.aspect_ratio, 6),
         SEED: run.manifest.seed,
@@ -369,5 +373,5 @@ def run_columns(run: Run) -> dict[str, object]:
 
 
 def last_columns(run: Run) -> dict[str, object]:
-    """Return the last cells of a run's row: hash of its scene and name of its directory."""
+    """Return the hash of a run's scene and the name of its directory, by column."""
     return {"scene_sha256": run.manifest.scene_sha256, "run": run.path.name}

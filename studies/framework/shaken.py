@@ -88,7 +88,7 @@ def phi(stage: str, definition: str = DEFINITION) -> str:
 
 
 def at_time(time: float) -> str:
-    """Return the name of the stage after some time of shaking [s], an argument of `phi`."""
+    """Return the name, for `phi`, of the stage after some time of shaking [s]."""
     return f"phi {time:g} s"
 
 
@@ -101,7 +101,7 @@ def contact_of(run: Run) -> SceneData:
 
 
 def common_friction(run: Run) -> float:
-    """Return the coefficient of friction of a run [-]; InputError if that of its walls differs."""
+    """Return the coefficient of friction of a run [-]; InputError if it differs at walls."""
     contact = contact_of(run)
     between, wall = contact["friction_smarticle"], contact["friction_wall"]
     if between != wall:
@@ -113,7 +113,7 @@ def common_friction(run: Run) -> float:
 
 
 def timed_row(run: Run, known: Mapping[str, object]) -> dict[str, object]:
-    """Measure φ at each stage and at `TIMES` during shaking; return the row, which includes `known`."""
+    """Measure φ at each stage and at `TIMES` during shaking; return the run's row, which includes `known`."""
     history = packing_history(run)
     row = {**known, **measured_row(run, [DEFINITION])}
     for time in TIMES:

@@ -40,8 +40,8 @@ _MEANS = "Means over seeds ± standard error."
 class Report:
     """Results of a study."""
 
-    header: Sequence[str]  #: Of the short table of points
-    rows: Sequence[Sequence[str]] = field(repr=False)  #: Of the short table of points
+    header: Sequence[str]  #: Header of the short table of points
+    rows: Sequence[Sequence[str]] = field(repr=False)  #: Rows of the short table of points
     lines: Sequence[str]  #: Text for the terminal after the short table: every finding with its verdict
     tables: Mapping[str, pd.DataFrame] = field(repr=False)  #: All tables by name, such as `runs` and `points`
     judged: Sequence[Judged]  #: Findings with their verdicts
@@ -55,14 +55,14 @@ class Report:
 class Study:
     """A study: how runs are measured, which columns are averaged, what is judged, and what is drawn."""
 
-    name: str  #: On the command line and in the provenance
+    name: str  #: Name of the study on the command line and in the provenance
     title: str  #: Heading of the text
-    #: Measures one finished run and returns its row of the table of runs, several rows, or a `MeasuredRun` with a
-    #: history. An InputError lists the run as missing
+    #: Measures one finished run and returns its row or rows of the table of runs, or a `MeasuredRun` with a history.
+    #: If it raises InputError, the run is listed as missing
     measure: Callable[[Run], Row | Sequence[Row] | MeasuredRun]
     keys: Sequence[Key]  #: Columns that name a point: one combination of the sweep's variables
     quantities: Sequence[Quantity]  #: Columns that are averaged over seeds
-    findings: Sequence[Finding]  #: In the order of the paper
+    findings: Sequence[Finding]  #: Findings, in the order of the paper
     figures: Sequence[Figure] = ()
     #: Makes the samples, the table that is averaged and judged, from the table of runs of one engine
     samples: Callable[[pd.DataFrame], pd.DataFrame] = lambda runs: runs
@@ -72,9 +72,9 @@ class Study:
     same_count: Sequence[str] = (ASPECT,)  #: Runs that agree in these columns must have equal numbers of smarticles
     same_fidelity: Sequence[str] = ()  #: Runs that agree in these columns must have one fidelity
     order: Sequence[str]  #: Columns that the table of runs is sorted by; empty: in the order of the runs given
-    #: Columns that must be equal in all runs that agree in other columns: those other columns by column
+    #: Other columns by column: runs that agree in the other columns must agree in the column, too
     constant: Mapping[str, Sequence[str]] = field(default_factory=dict)
-    #: Column that is above 0 if the quantities of a run are lower bounds, and the word for such runs in texts
+    #: Column that is above 0 for a run whose quantities are lower bounds, and the word for such runs in texts
     bounds: tuple[str, str] | None = None
     count_values: bool = False  #: Whether points have, for each quantity, the number of seeds that gave a value
     one_engine: bool = False  #: Whether runs of several engines are rejected
@@ -87,7 +87,7 @@ class Study:
     pictured: Mapping[str, object] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        """Reject figures of points or runs that are split by a column that is no key, by an InputError."""
+        """Raise InputError if a figure is split by a column that is no key."""
         keys = [key.column for key in self.keys]
         for figure in self.figures:
             if getattr(figure, "table", "points") == "points":
@@ -110,7 +110,7 @@ class Study:
     ) -> Report:
         """Measure runs and write tables, text, provenance and figures; existing files are replaced.
 
-        InputError if no run is done, runs must not be averaged or compared, or the output is no folder.
+        InputError if no run is done, the runs must not be averaged or compared, or the output is no folder.
 
         Args:
             run_dirs: directories of the runs; runs that are not done or cannot be read are listed as missing.
@@ -179,8 +179,8 @@ class Study:
     def tabulate(self, runs: pd.DataFrame, times: pd.DataFrame | None = None) -> dict[str, pd.DataFrame]:
         """Make all tables from the table of runs and the histories.
 
-        Their names are `runs`, `points`, `engines` if there are several, `times` if there are histories, and those of
-        `extra`.
+        The tables are `runs`, `points`, `engines` if there are several engines, `times` if there are histories, and the
+        tables of `extra`.
         """
         runs = sort_rows(runs, self.order, self.keys) if self.order else runs
         extra = self.extra(runs)

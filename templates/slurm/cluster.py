@@ -64,7 +64,7 @@ class Partition(Strict):
     """One partition (queue) of a cluster; "here" stands for the value of the submitting machine."""
 
     cores_per_node: int | Literal["here"]
-    memory_per_node_mib: int | Literal["here"]  #: [MiB]
+    memory_per_node_mib: int | Literal["here"]  #: Memory of one node [MiB]
     max_time: str  #: Longest wall time of a job, in Slurm's notation
     named: bool = Field(default=True, description="false: leave --partition out, Slurm takes its default")
 
@@ -133,7 +133,7 @@ class Cluster(Strict):
         return self
 
     def partition(self, name: str | None) -> tuple[str, Partition]:
-        """Return name and data of a partition, None: the default one; raise InputError for an unknown name."""
+        """Return name and data of a partition (None: the default); raise InputError for an unknown name."""
         wanted = name or self.default_partition
         if wanted not in self.partitions:
             advice = nearest(wanted, sorted(self.partitions))
@@ -147,7 +147,7 @@ def shipped_clusters() -> list[str]:
 
 
 def load_cluster(reference: str) -> Cluster:
-    """Read a cluster by its name in this package, or from a file .toml; raise InputError if invalid."""
+    """Read a cluster by its name in this package, or from a `.toml` file; raise InputError if invalid."""
     own = reference.endswith(".toml")
     if not own and reference not in shipped_clusters():
         advice = nearest(reference, shipped_clusters())

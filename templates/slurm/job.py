@@ -19,10 +19,10 @@ SCRIPT, RUN_LIST = "array.sh", "runs.txt"
 
 # Factor from expected to requested time: machines differ by a factor of two, and runs on a node share its memory bus.
 TIME_MARGIN = 3.0
-LEAST_TIME_S = 600  #: Least requested time without the lead [s]
+LEAST_TIME_S = 600  #: Least requested wall time, to which `Request.lead_s` is added [s]
 MEMORY_PER_RUN_MIB = 1024  #: Default memory of a run [MiB]; 1000 smarticles take less than half (`make bench`)
 LEAST_REQUEUES = 3  #: Least number of times that a task may return to the queue
-CLOSING_S = 30  #: Time between the signal TERM and the time limit [s], at most half of the lead
+CLOSING_S = 30  #: Time between the signal TERM and the time limit [s], at most half of `Request.lead_s`
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -39,9 +39,9 @@ class Wishes:
 
 @dataclass(frozen=True, kw_only=True)
 class Request:
-    """Request for an array job; a task computes several runs on a core each, or one on several ranks."""
+    """Request for an array job; a task computes several runs, one per core, or one run on several ranks."""
 
-    partition: str | None  #: None: Slurm's default
+    partition: str | None  #: Name of the partition; None: Slurm's default
     account: str | None
     tasks: int  #: Number of tasks
     runs_per_task: int  #: Number of runs, and of cores, of a task; 1 if a run has several ranks
@@ -64,7 +64,7 @@ class Request:
 
 
 def plan_request(expected_s: Sequence[float], cluster: Cluster, wishes: Wishes) -> Request:
-    """Return the request for runs of expected wall times [s]; raise InputError beyond a cluster's limits."""
+    """Return the request for runs with expected wall times [s]; InputError if it exceeds a limit."""
     name, partition = cluster.partition(wishes.partition)
     where = f"partition {name} of {cluster.name}"
     memory, ranks = wishes.memory_mib or MEMORY_PER_RUN_MIB, wishes.ranks or 1
@@ -113,7 +113,7 @@ def plan_request(expected_s: Sequence[float], cluster: Cluster, wishes: Wishes) 
 
 
 def _runs_per_task(count: int, partition: Partition, wanted: int | None, memory: int) -> int:
-    """Return the runs per task: at most all runs; by default a full node, with tasks of equal size."""
+    """Return the number of runs per task, at most all; by default equal tasks that fill a node."""
     if wanted is not None:
         return wanted if wanted > partition.cores else min(wanted, count)
     most = max(1, min(partition.cores, partition.memory_mib // memory))
@@ -121,7 +121,7 @@ def _runs_per_task(count: int, partition: Partition, wanted: int | None, memory:
 
 
 def _time(longest: float, cluster: Cluster, partition: Partition, wanted: str | None, where: str) -> int:
-    """Return the wall time to request [s], in whole minutes, as Slurm counts."""
+    """Return the wall time to request [s], a whole number of minutes, because Slurm counts minutes."""
     if wanted is None:
         needed = max(LEAST_TIME_S, longest) + cluster.signal_lead_s
         time_s = min(60 * math.ceil(needed / 60), partition.max_time_s)

@@ -46,7 +46,7 @@ class Submission(Document):
         "the runs in the queue are unknown; list them with `squeue --me`, cancel them, and remove the file's folder"
     )
     format: Literal[1] = 1
-    job_name: str  #: Name of the job, unique, which finds the job in the queue even if its number was lost
+    job_name: str  #: Unique name of the job, which finds the job if its number was lost
     job_id: int | None = None  #: Number of the job; None if the script was only written
     cluster: str  #: Value of --cluster
     runs_per_task: int
@@ -162,7 +162,7 @@ def _store(folder: Folder, submission: Submission) -> None:
 
 
 def tasks_of_runs(found: Sequence[Submission]) -> dict[str, Task]:
-    """Return the task of each run by the run's name: the newest task that has not ended, else the newest.
+    """Return the task of each run by the run's name: the newest unended task, else the newest task.
 
     Raises:
         QueueError: Slurm's queue cannot be queried.
@@ -175,7 +175,7 @@ def tasks_of_runs(found: Sequence[Submission]) -> dict[str, Task]:
 
 
 def merged(status: RunStatus, task: Task | None) -> RunStatus:
-    """Combine the status of a run by its directory with the state of its task in the queue.
+    """Combine the status of a run in its directory with the state of its task in the queue.
 
     The states `done` and `failed` of the directory take precedence.
     """
@@ -283,7 +283,7 @@ def parse_job_id(answer: str, script: Path) -> int:
 
 
 def _ask_queue(names: Sequence[str]) -> list[Task]:
-    """Return the tasks of jobs by the names of the jobs, because Slurm reports an old number as an error."""
+    """Query the tasks of jobs by job name, because Slurm reports the number of an old job as an error."""
     if not names:
         return []
     asked = ("--noheader", "--array", "--states=all", f"--name={','.join(names)}", "--format=%j|%F|%K|%T|%r")

@@ -66,7 +66,7 @@ def _check_count(sweep: Sweep, count: int, most: int) -> None:
 
 
 def _sources(sweep: Sweep) -> list[Sequence[Mapping[str, Value]]]:
-    """Return lists of values whose combinations are the points; values of later lists vary faster."""
+    """Return lists of values, whose combinations are the points; values of later lists vary faster."""
     points = sweep.content.points
     zipped = points.zip_ or {}
     sources: dict[str, Sequence[Sequence[Mapping[str, Value]]]] = {
@@ -134,6 +134,6 @@ def _reject_twins(sweep: Sweep, points: list[Point]) -> None:
 
 
 def difference(one: Mapping[str, Value], other: Mapping[str, Value]) -> str:
-    """Return the variables in which two points differ, as `friction 0.2 and 0.4, seed 1 and 2`; "" where equal."""
+    """Return the variables in which two points differ, as `friction 0.2 and 0.4, seed 1 and 2`."""
     texts = [(name, str(one.get(name, "absent")), str(other.get(name, "absent"))) for name in {**one, **other}]
     return ", ".join(f"{name} {first} and {second}" for name, first, second in texts if first != second)

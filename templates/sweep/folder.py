@@ -110,7 +110,7 @@ class Folder:
         return self.path / "runs" / entry.name
 
     def runs(self) -> list[Run]:
-        """Return all runs in the order of the sweep, also those whose directory does not exist yet."""
+        """Return all runs in the order of the sweep, including runs whose directory does not exist yet."""
         return [Run(self.run(entry)) for entry in self.entries]
 
     def log(self, entry: Entry) -> Path:
@@ -122,7 +122,7 @@ class Folder:
         return Run(self.run(entry)).status.state == "done" and self._is_of_scene(entry)
 
     def can_resume(self, entry: Entry) -> bool:
-        """Return whether a run can continue from a checkpoint, with the scene of the manifest."""
+        """Return whether an entry's run has a checkpoint from which it can continue with this entry's scene."""
         return Run(self.run(entry)).can_resume and self._is_of_scene(entry)
 
     def _is_of_scene(self, entry: Entry) -> bool:
@@ -247,13 +247,13 @@ def create_folder(
 
 
 def _some(what: str, names: Sequence[str], most: int = 8) -> str:
-    """Return `what` and at most the first `most` names as text; an empty text if there is no name."""
+    """Return `what` and the first `most` names as text; an empty text if there is no name."""
     more = f" and {len(names) - most} more" if len(names) > most else ""
     return f"{what}{', '.join(names[:most])}{more}" if names else ""
 
 
 def open_folder(path: Path) -> Folder:
-    """Open the directory of a sweep; raise InputError if it is none, or its manifest is damaged."""
+    """Open the directory of a sweep; raise InputError if it has no manifest, or a damaged one."""
     if (path / MANIFEST).is_file():
         return Folder(path, SweepManifest.read(path / MANIFEST))
     if (path / RUN).is_file():

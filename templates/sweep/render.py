@@ -87,7 +87,7 @@ def render_text(template: str, values: Mapping[str, Value], source: str) -> str:
 
 
 def render_yaml(template: str, values: Mapping[str, Value], source: str) -> Any:
-    """Render a template of YAML and return its data; raise InputError that names the line of an error."""
+    """Render a template of YAML and return its data; on an error raise InputError with its line."""
     prefix = "value"
     while prefix in template or prefix in repr(values):
         prefix += "x"

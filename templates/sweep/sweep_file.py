@@ -167,7 +167,7 @@ class SweepFile(Strict):
 
 @dataclass(frozen=True, kw_only=True)
 class Sweep:
-    """A sweep file with its scene template and its table; `table` are the rows that `only` keeps."""
+    """A sweep file with its scene template and its table; `table` has the rows that `only` selects."""
 
     path: Path
     text: str
@@ -179,7 +179,7 @@ class Sweep:
 
 
 def load_sweep(path: Path) -> Sweep:
-    """Read FILE or FILE@VARIANT,VARIANT, a sweep with its template and table; raise InputError if invalid."""
+    """Read a sweep, FILE or FILE@VARIANT,VARIANT, with its template and table; InputError if invalid."""
     name, _, variants = path.name.partition("@")
     text = read_text(path.with_name(name), "sweep file")
     data = parse_yaml(text, str(path))

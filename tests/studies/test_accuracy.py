@@ -61,6 +61,7 @@ def table_of(
             **{COMPARED["phi_0"]: (phi_0 or {}).get(setting, 0.1) + 1e-3 * seed, COMPARED["phi_f"]: value},
             COMPARED["height"]: 3e-3 + 1e-4 * seed,
             COMPARED["crossings"]: 3.0 + 0.1 * seed,
+            COMPARED["energy"]: math.nan,
             COMPARED["hook_force"]: math.nan,
         }
         for setting, values in phi_f.items()

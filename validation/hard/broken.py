@@ -134,7 +134,7 @@ def _too_long(scene: Scene, factor: float) -> float:
 # A long case: welded smarticles chatter and never settle, so that the pour waits until its time limit.
 @hard("spoilt: time step 4 of the stable one", None, {"factor": 4.0, "count": 6, "seconds": 0.3})
 def wrong_step(access: EngineAccess, out: Path, *, factor: float, count: int, seconds: float) -> list[Check]:
-    """Run at a time step above the stable one; the run must fail with a message that names its last checkpoint."""
+    """Run at a time step above the stable one; the error message must name the last checkpoint."""
     fidelity = "draft" if access.name == "yade" else {"base": "draft", "control_interval_s": LONG_CONTROL}
     recording = {"checkpoint_interval_s": 0.02}
     data = scene_data(access, swing(seconds), count=count, fidelity=fidelity, recording=recording)
@@ -145,7 +145,7 @@ def wrong_step(access: EngineAccess, out: Path, *, factor: float, count: int, se
 
 @hard("spoilt: late in a run", {})
 def late(access: EngineAccess, out: Path) -> list[Check]:
-    """Give a smarticle a speed of 100 m/s at 0.55 s; message and `failed.json` must name the last checkpoint."""
+    """Give a smarticle 100 m/s at 0.55 s; message and `failed.json` must name the last checkpoint."""
     relax, recording = {"type": "relax", "duration_s": 0.4}, {"checkpoint_interval_s": 0.1}
 
     def throw(engine: Engine) -> None:

@@ -69,7 +69,7 @@ def one(access: EngineAccess, out: Path) -> list[Check]:
 
 @hard("checkpoint at the last step", {})
 def checkpoint_last(access: EngineAccess, out: Path) -> list[Check]:
-    """End a run at a checkpoint: the reloaded engine has no contacts yet when the last check reads them."""
+    """End a run at a checkpoint, whose reloaded engine has no contacts yet when the last check reads them."""
     recording = {"series_interval_s": 0.01, "frame_interval_s": 0.04, "checkpoint_interval_s": 0.01}
     run = whole(scene_data(access, RELAX, count=2, recording=recording), out)
     return run.sound() + run.weight_on_floor(0.02)
@@ -99,7 +99,7 @@ def friction(access: EngineAccess, out: Path, *, value: float, count: int) -> li
 
 
 def _with_step(data: dict[str, Any], share: float) -> tuple[dict[str, Any], float, float]:
-    """Set the time step of a scene to `share` times the stable step; return scene, step [s] and stable step [s]."""
+    """Set a scene's time step to `share` times the stable step; return scene, step and stable step [s]."""
     stable = stable_step(scene_of(data))
     return {**data, "fidelity": {"base": "draft", "time_step_s": share * stable}}, share * stable, stable
 

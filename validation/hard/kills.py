@@ -82,7 +82,8 @@ def results(out: Path) -> dict[str, bytes]:
 def row_of(whole: Path, out: Path, *, seconds: float, killed: str) -> dict[str, Any]:
     """Compare a resumed run with the uninterrupted run; return a row of the table.
 
-    `seconds` of processor time passed before the kill, in the phase `killed`. RunError if there are too few files.
+    `seconds` is the processor time before the kill [s], `killed` the phase of the kill. RunError if there are too few
+    files.
     """
     log = (out / "log.txt").read_text(encoding="utf-8")
     from_where = re.search(r"resumed from (?:the checkpoint of t = ([\d.]+) s|the start)", log)

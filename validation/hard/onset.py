@@ -146,7 +146,7 @@ def let_go(access: EngineAccess, setting: Setting, seed: int, factor: float) -> 
 
 
 def _energies(engine: Engine, scene: Scene) -> Iterator[tuple[float, float, float]]:
-    """Advance in intervals of about 1 ms; yield time [s], kinetic energy, and total energy less motor work [J]."""
+    """Advance in steps of about 1 ms; yield time [s], kinetic energy and total energy less motor work [J]."""
     dt = engine.time_step
     interval = dt * max(1, round(scene.fidelity.control_interval_s / dt))
     held, updates = engine.state().angles, max(1, round(1e-3 / interval))
@@ -161,7 +161,7 @@ def _energies(engine: Engine, scene: Scene) -> Iterator[tuple[float, float, floa
 
 
 def climb(engine: str, name: str, seed: int) -> list[dict[str, Any]]:
-    """Run a setting with one seed at increasing time steps, until the second blow-up; return rows of the table."""
+    """Run a setting with one seed at increasing time steps, up to the second blow-up; return the rows."""
     rows: list[dict[str, Any]] = []
     for factor in FACTORS:
         rows.append(let_go(engine_access(engine), SETTINGS[name], seed, factor))
@@ -171,7 +171,7 @@ def climb(engine: str, name: str, seed: int) -> list[dict[str, Any]]:
 
 
 def onset(name: str, runs: pd.DataFrame) -> dict[str, Any]:
-    """Return the smallest factors at which a setting chatters and blows up: minimum and maximum over seeds.
+    """Return the smallest factors at which a setting chatters and blows up: extremes over the seeds.
 
     A factor is inf if no run chattered or blew up. Chatter is NaN for smarticles that are not at rest at half the
     stable step, and for crossed or random smarticles, which may rock at any time step.

@@ -1,4 +1,4 @@
-"""Run scenes under a watchdog that records the largest fraction of each limit."""
+"""Run scenes under a watchdog that records the largest fraction of each limit that a run reaches."""
 
 import time
 from collections.abc import Callable, Sequence
@@ -25,7 +25,7 @@ from validation.cases import Check, below, near
 
 @dataclass(kw_only=True)
 class Noting(Watchdog):
-    """Watchdog that records the largest fraction of each limit."""
+    """Watchdog that records the largest fraction of each limit that a run reaches."""
 
     nearest: dict[str, float] = field(default_factory=dict)  #: Largest fraction of each limit [1]
 
@@ -84,8 +84,8 @@ class Watched:
     def sound(self, *, rest: float | None = 0.02, depth: float = 0.5) -> list[Check]:
         """Return the checks of every successful run.
 
-        Limits are the speed at the end, `rest` [m/s], None if it is not checked, and the overlap `depth` over the
-        sphere diameter [1].
+        `rest` is the limit of the speed at the end [m/s]; None: not checked. `depth` is the limit of the overlap over
+        the sphere diameter [1].
         """
         checks = [Check("ends", "done" if self.error is None else ": ".join(self.error), "done", self.error is None)]
         if self.error is not None:
@@ -109,7 +109,7 @@ class Watched:
         return checks
 
     def weight_on_floor(self, error: float) -> list[Check]:
-        """Return a check that the force on the container at the end equals the weight, within a relative error [1]."""
+        """Return a check that the final force on the container is the weight, within a relative error [1]."""
         if self.error is not None:
             return []
         force = float(self.series["container_force_N"][-5:, 2].mean())
@@ -126,7 +126,7 @@ def whole(
 ) -> Watched:
     """Run a scene, given as a dictionary, and return the outcome.
 
-    `note` uses the watchdog `Noting`; `steps` returns the time step of each phase [s]; `spoil` changes the engine
+    With `note` the watchdog is `Noting`. `steps` returns the time step of each phase [s]. `spoil` changes the engine
     before each record.
     """
     nearest: dict[str, float] = {}

@@ -52,7 +52,10 @@ def drop(access: EngineAccess, out: Path, *, articulated: bool, time: float) -> 
 
 @hard("articulated smarticles land", {"time": 0.2})
 def landing(access: EngineAccess, out: Path, *, time: float) -> list[Check]:
-    """Drop articulated smarticles on each other. Torques reach 10 τ_max; the watchdog must not stop the run."""
+    """Drop articulated smarticles on each other.
+
+    Torques reach 10 τ_max, and the watchdog must not stop the run.
+    """
     scene, engine, recorder = watched(scene_data(access, shape_change(), count=4), out)
     limits = recorder.watchdog
     noting = Noting(cylinder=limits.cylinder, speed=limits.speed, gap=limits.gap, energy=limits.energy)
@@ -76,9 +79,9 @@ def landing(access: EngineAccess, out: Path, *, time: float) -> list[Check]:
 
 @hard("tip through the floor", {"speed": 2.0})
 def tip(access: EngineAccess, out: Path, *, speed: float) -> list[Check]:
-    """Throw the tip of a barb at the floor so fast that on YADE the centre of a sphere passes through the floor.
+    """Throw the tip of a barb at the floor, so fast that on YADE a sphere's centre goes through the floor.
 
-    Below that depth YADE's contact force decreases. On links the barrier stops the tip above the floor.
+    From that depth on YADE's contact force decreases. On links the barrier stops the tip above the floor.
     """
     scene, engine, recorder = watched(scene_data(access, count=1), out)
     add(engine, (0, 0, 0.02), Rotation.random(random_state=1))

@@ -206,7 +206,7 @@ REASON = "residual vibration after 0.4 s"
 
 
 def _level(found: ContactForces, level: int, each: int) -> Array:
-    """Return the forces from below on a level of a stack with `each` bodies per level, (contacts, 3) [N]."""
+    """Return the forces (contacts, 3) [N] from below on a level of a stack with `each` bodies per level."""
     bodies = found.smarticles // each
     if level:
         upwards: Array = -found.forces[(bodies == (level - 1, level)).all(axis=1)]
@@ -298,7 +298,7 @@ def _thrown(access: EngineAccess, one: Scene, dt: float) -> tuple[float, float]:
 
 
 def _sunk(access: EngineAccess, one: Scene, dt: float, *, time: float) -> float:
-    """Simulate a smarticle lying flat for a `time` [s]; return the depth by which its centre of mass has sunk [m]."""
+    """Simulate a smarticle lying flat for a `time` [s]; return how far its centre of mass sinks [m]."""
     engine = access.build(one.particle, law_of(one), dt=dt, gravity=G)
     add(engine, (0, 0, lying(one)))
     engine.advance(round(time / dt))
@@ -361,6 +361,6 @@ def flat_checks(access: EngineAccess, *, rows: int, pitch: float) -> list[Answer
 
 
 def flat_impacts(access: EngineAccess) -> list[dict[str, float]]:
-    """Return rows of the table `clumps` for several numbers of contact points: spheres on YADE, strands on links."""
+    """Return rows of the table `clumps` for several numbers of contact points (spheres or strands)."""
     settings = ROWS_AND_PITCHES if access.name == "yade" else STRANDS
     return [flat_impact(access, rows=rows, pitch=pitch) for rows, pitch in settings]

@@ -50,7 +50,7 @@ def upright(access: EngineAccess, one: Scene, *, gravity: float, dt: float | Non
 
 
 def _barb(one: Scene) -> tuple[float, float, float]:
-    """Return mass [kg], moment of inertia about the normal [kg m²] and distance centre to hinge [m] of a barb."""
+    """Return mass [kg], inertia about the normal [kg m²] and centre-to-hinge distance [m] of a barb."""
     boxes = one.smarticle.boxes
     return float(boxes.link_masses[0]), float(boxes.link_inertias[0, 2]), boxes.barb_length / 2
 
@@ -64,7 +64,7 @@ def _barb(one: Scene) -> tuple[float, float, float]:
 def pull(
     access: EngineAccess, *, aspect_ratio: float = 0.7, fidelity: str = "standard", largest: float = 0.01
 ) -> list[Answer]:
-    """Pull a straight smarticle at both ends with a hundred times its weight; the force grows, then is constant."""
+    """Pull a straight smarticle at both ends, with a force that rises to a hundred times its weight."""
     one, duration = hinged(access, aspect_ratio=aspect_ratio, fidelity=fidelity, angles=(0, 0)), 0.02
     engine = access.build_hinged(one, gravity=0.0)
     add(engine, (0, 0, 0.05), Rotation.from_rotvec([0.4, 0.2, -0.7]))
@@ -119,7 +119,7 @@ def droop(access: EngineAccess, *, aspect_ratio: float = 0.7, fidelity: str = "s
     absent=NO_TILT,
 )
 def tilt(access: EngineAccess, *, sweeps: int = 1) -> list[Answer]:
-    """Turn the barbs of a horizontal smarticle with fixed middle link by 105°, `sweeps` times; measure their tilt.
+    """Turn the barbs of a horizontal, held smarticle by 105°, `sweeps` times, and measure their tilt.
 
     YADE's bonds accumulate moments step by step and rotate them with half of the twist. A tilt computed by bonds would
     have an error of 100 % after one sweep.
@@ -214,7 +214,7 @@ def shaft_mode(one: Scene, pin: float, *, held: bool) -> tuple[float, Array]:
 
 
 def floating(access: EngineAccess, one: Scene, *, held: bool, dt: float | None = None) -> Engine:
-    """Build an engine with a U without gravity, whose barbs vibrate on their shafts with amplitude 0.01 rad."""
+    """Build an engine without gravity and with a U whose barbs vibrate on their shafts by 0.01 rad."""
     engine = access.build_hinged(one, gravity=0.0, dt=dt)
     add(engine, (0, 0, 0.05))
     engine.motors.articulate()

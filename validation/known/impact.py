@@ -1,4 +1,4 @@
-"""Known answers for single impacts: rebounds, oblique impacts, bars, tips of smarticles; errors over the step."""
+"""Known answers for single impacts (balls, bars, tips of smarticles), and errors over the time step."""
 
 import dataclasses
 import math
@@ -128,9 +128,10 @@ def pair_rebound(access: EngineAccess, restitution: float = 0.5) -> list[Answer]
     f"spring and dashpot at the bar's mass; {DASHPOT}, integrated",
 )
 def bar_rebound(access: EngineAccess, restitution: float = 0.5, *, resized: bool = False) -> list[Answer]:
-    """Throw an upright bar at the floor with the contact law of a scene. The force passes through its centre.
+    """Throw an upright bar at the floor with the contact law of a scene.
 
-    With `resized` the dashpot is adapted to the mass of the bar, so that the nominal restitution is reached.
+    The force passes through the bar's centre. With `resized` the dashpot is adapted to the mass of the bar, so that the
+    nominal restitution is reached.
     """
     one = scene(access, smarticle={"aspect_ratio": 0}, contact={"restitution": restitution})
     law, mass, speed, length = law_of(one), one.smarticle.boxes.mass, 0.5, one.smarticle.middle_length_m
@@ -234,11 +235,12 @@ FRICTION = 0.4
     steps=22,
 )
 def sliding_impact(access: EngineAccess, restitution: float, *, dashpot: float, steps: int = RESOLVED) -> list[Answer]:
-    """Throw a ball that slides throughout the contact; the tangential impulse is μ times the normal impulse.
+    """Throw a ball that slides throughout the contact: tangential impulse is μ times normal impulse.
 
     A tangential dashpot adds to the impulse: its force is not limited by friction until the tangential spring reaches
     Coulomb's limit. With slip speed s and approach speed v this happens at t* = μ cn v / (ks s − μ kn v). Until then
-    the impulse exceeds Coulomb's by (cs s − μ cn v/2) t*. Time steps longer than t* do not resolve this.
+    the impulse exceeds Coulomb's by (cs s − μ cn v/2) t*. Stiffnesses and dampings are kn, cn (normal) and ks, cs
+    (tangential). Time steps longer than t* do not resolve this.
     """
     speed, slip, dt = 0.2, 1.5, CONTACT_TIME / steps
     law = ball_law(restitution=restitution, friction=FRICTION, dashpot=dashpot)
@@ -305,7 +307,7 @@ SPREAD = 8e-5  # m
 
 
 def _spread(law: ContactLaw, number: int) -> tuple[ContactLaw, float]:
-    """Return a contact law with stiffnesses increased by up to 10 %, and an initial gap [m], for sample `number`."""
+    """Return for sample `number` a law with stiffnesses up to 10 % higher, and an initial gap [m]."""
     factor = 1 + 0.1 * (0.569840 * number % 1)
     springs = {key: factor * getattr(law, key) for key in ("normal_stiffness", "tangential_stiffness")}
     return dataclasses.replace(law, **springs), 1e-4 + SPREAD * (0.754878 * number % 1)
@@ -332,7 +334,7 @@ def _spread(law: ContactLaw, number: int) -> tuple[ContactLaw, float]:
     restitution=1.0,
 )
 def bounce_errors(access: EngineAccess, steps: Sequence[float], *, restitution: float, phases: int = 24) -> list[float]:
-    """Return the root-mean-square errors of the height of a ball after one bounce, over `phases` samples [m]."""
+    """Return the root-mean-square errors [m] of a ball's height after one bounce, over `phases` samples."""
     speed, time, squares = 0.2, 5.12e-3, np.zeros(len(steps))
     for number in range(phases):
         law, gap = _spread(ball_law(restitution=restitution), number)
@@ -348,7 +350,7 @@ def bounce_errors(access: EngineAccess, steps: Sequence[float], *, restitution: 
 
 
 def _collided(access: EngineAccess, law: ContactLaw, dt: float, gap: float, *, tilted: bool) -> Array:
-    """Simulate a collision of two smarticles at a `gap` [m]; return the centres of all spheres, (S, 3) [m]."""
+    """Simulate a collision of two smarticles with a `gap` [m]; return all sphere centres, (S, 3) [m]."""
     one = scene(access)
     engine = access.build(one.particle, law, dt=dt)
     add(engine, (0, 0, 0.1))

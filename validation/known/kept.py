@@ -33,9 +33,9 @@ VELOCITIES = np.array([[0.1, -0.2, 0.3], [0.0, 0.1, 0.0]])  # m/s
 
 
 def free_pair(access: EngineAccess, law: str, damping: float) -> tuple[Engine, Iterator[float]]:
-    """Build two distant smarticles that spin and drift; return the engine and an iterator.
+    """Build two distant smarticles that spin and drift; return engine, and iterator that swings barbs.
 
-    The iterator swings their barbs. The motors have a law and a damping [N m s/rad], 0 for the default.
+    The motors have the law `law` and the damping `damping` [N m s/rad]; 0 stands for the default damping.
     """
     motor = {"law": law, "torque_limit_N_m": 1e-4} | ({"damping_N_m_s_per_rad": damping} if damping else {})
     one = scene(access, shape_change(), motor=motor)

@@ -60,8 +60,8 @@ def dashpot_impact(*, stiffness: float, damping: float, mass: float) -> Impact:
 def bounced(*, gap: float, speed: float, time: float, gravity: float, **springs: float) -> float:
     """Return the height above first touch [m] of a body that has bounced once on a spring and a dashpot.
 
-    At t = 0 the body is at a height `gap` above first touch [m] and has a downward speed [m/s]. `time` [s] is after the
-    bounce; `springs` are stiffness [N/m], damping [N s/m] and mass [kg].
+    At t = 0 the body is at a height `gap` above first touch [m] and has a downward speed [m/s]. `time` [s] lies after
+    the bounce. `springs` are stiffness [N/m], damping [N s/m] and mass [kg].
     """
     touch = (math.sqrt(speed**2 + 2 * gravity * gap) - speed) / gravity
     # Starts just below first touch, so that the end of the contact is not found at its beginning.

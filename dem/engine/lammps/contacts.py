@@ -1,4 +1,4 @@
-"""Contacts and overlaps, computed here from the positions of the spheres."""
+"""Contacts and overlaps on LAMMPS, computed in this process from the positions of the spheres."""
 
 from dataclasses import dataclass
 from typing import Self
@@ -19,12 +19,17 @@ class Contacts:
     count: int  #: Number of smarticles, N
     pairs: Numbers  #: (C, 2) the two smarticles of each pair of touching spheres
     depths: Array  #: (C,) overlaps of these pairs [m]
-    fixed: Numbers  #: (F,) smarticle of each sphere that touches floor or wall
-    fixed_depths: Array  #: (F,) overlaps of these spheres [m]
+    fixed: Numbers  #: (F,) the smarticle at each contact of a sphere with floor or wall
+    fixed_depths: Array  #: (F,) overlaps at these contacts [m]
 
     @classmethod
     def of(cls, spheres: Array, radius: float, boundaries: LammpsBoundaries) -> Self:
-        """Return the contacts of spheres, centres (N, S, 3) [m], with each other, floor and wall; radius in m."""
+        """Find the contacts of spheres of different smarticles, and of spheres with floor and wall.
+
+        Args:
+            spheres: (N, S, 3) centres of the spheres of N smarticles [m].
+            radius: radius of the spheres [m].
+        """
         count, each = spheres.shape[:2]
         centres = spheres.reshape(-1, 3)
         owners = np.repeat(np.arange(count), each)

@@ -76,7 +76,12 @@ class NoStrings:
 
 
 class LammpsLedger:
-    """`dem.engine.interface.EnergyLedger` without the work of boundaries and the dissipation of contacts."""
+    """`dem.engine.interface.EnergyLedger` without the work of boundaries and the dissipation of contacts.
+
+    Args:
+        moving: function that returns whether a boundary moves.
+        stored: function that returns the elastic energy of contacts [J].
+    """
 
     container_work = 0.0
 
@@ -117,7 +122,7 @@ class LammpsEngine:
         self.gravity = gravity
         self.time, self.steps, self.time_step = 0.0, 0, time_step
         self._law = law
-        self.child = Child(ranks)  #: LAMMPS
+        self.child = Child(ranks)  #: The process of LAMMPS
         self._cpu_before = 0.0  # processor time of earlier LAMMPS processes [s]
         self._moving = Moving.none()
         # (N, 3, 3) rotations from the body frame to LAMMPS's principal frame, known after the first dump.
@@ -132,7 +137,10 @@ class LammpsEngine:
         self.ledger = LammpsLedger(lambda: self.boundaries.moving, lambda: self.contacts.elastic_energy(law))
 
     def _send(self, commands: Iterator[str]) -> None:
-        """Send commands, after which the next run must be set up; before there is a box `_scene` yields them."""
+        """Send commands, and have LAMMPS set up its next run anew.
+
+        Before LAMMPS has a simulation box nothing is sent, since `_scene` will yield these commands.
+        """
         self._contacts = None
         if self._box:
             self.child.send(*commands)
@@ -162,7 +170,7 @@ class LammpsEngine:
         yield from text.body_dump("bodies.*.dump", when="v_when")
 
     def _balanced(self) -> Iterator[str]:
-        """Yield the command that balances spheres over ranks; two have equal halves of a round pile anyway."""
+        """Yield the command that balances spheres among ranks; up to two ranks need none."""
         if self.child.ranks > 2:
             yield "balance 1.02 shift xy 20 1.01"
 
@@ -364,5 +372,5 @@ class LammpsEngine:
 
 
 def _turns(rows: Array) -> Array:
-    """Return (N, 3, 3) rotations of rows whose quaternions (w, x, y, z) begin at column 7."""
+    """Return rotation matrices (N, 3, 3) from rows whose quaternions (w, x, y, z) begin at column 7."""
     return np.asarray(Rotation.from_quat(rows[:, [8, 9, 10, 7]]).as_matrix())

@@ -27,8 +27,8 @@ class Moving:
     """N bodies at one instant, in the laboratory frame."""
 
     positions: Array  #: (N, 3) centres of mass [m]
-    turns: Array  #: (N, 3, 3) body frame to laboratory frame [1]
-    velocities: Array  #: (N, 3) of the centres of mass [m/s]
+    turns: Array  #: (N, 3, 3) rotations from the body frame to the laboratory frame [1]
+    velocities: Array  #: (N, 3) velocities of the centres of mass [m/s]
     spins: Array  #: (N, 3) angular velocities [rad/s]
     momenta: Array  #: (N, 3) angular momenta about the centres of mass [kg m²/s]
     forces: Array  #: (N, 3) forces of contacts and weight [N]
@@ -146,7 +146,12 @@ def container(cylinder: Cylinder, at_wall: str, *, walled: bool = True) -> Itera
 
 
 def body_dump(dump: str, *, when: str) -> Iterator[str]:
-    """Yield the commands that write all bodies to files `dump`, `when` as in `dump_modify every`."""
+    """Yield the commands that write all bodies to files.
+
+    Args:
+        dump: name of the files, in which `*` is replaced by the step.
+        when: steps at which files are written, as an argument of `dump_modify every`.
+    """
     count = len(WRITTEN.split())
     yield f"compute          where all rigid/local bodies {WRITTEN}"
     yield f"dump             bodies all local 1 {dump} {' '.join(f'c_where[{k + 1}]' for k in range(count))}"

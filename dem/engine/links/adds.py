@@ -1,4 +1,7 @@
-"""What each effect adds on the links engine: kernels and arguments by name; what is not called for is not compiled."""
+"""Additions of each effect on the engine links, by names of kernels.
+
+A kernel that no effect needs is not compiled.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""The arrays that kernels work on, and how they grow. Everything is contiguous; nothing is allocated in a step."""
+"""Arrays that kernels read and write, and functions that make them.
+
+All arrays are contiguous, and none is made in a step.
+"""
 
 from __future__ import annotations
 
@@ -24,30 +27,36 @@ AXIS, STRAIN_RATE, MOMENT, STRETCH = 0, 3, 4, 5
 
 
 class Bodies(NamedTuple):
-    """N bodies. The first group is their state, the rest follows from it at the beginning of every step.
+    """N bodies. The fields from `position` to `shape` are their state.
 
-    Velocities and momenta belong to the middle of the step before, as in all leapfrog schemes.
+    Velocities and momenta are those at the middle of the previous step, as in all leapfrog schemes.
     """
 
     position: Array  #: (N, 3) centres of mass [m]
-    turn: Array  #: (N, 4) unit quaternions (w, x, y, z), frame of the body to laboratory [1]
-    velocity: Array  #: (N, 3) of the centres of mass [m/s]
+    turn: Array  #: (N, 4) unit quaternions (w, x, y, z) from the frame of the body to the laboratory frame [1]
+    velocity: Array  #: (N, 3) velocities of the centres of mass [m/s]
     momentum: Array  #: (N, 3) angular momenta about the centres of mass, in the laboratory frame [kg m²/s]
-    alpha: Array  #: (N, 2) angles of a smarticle's barbs [rad]
-    rate: Array  #: (N, 2) their rates [rad/s]; 0 while welded
-    shape: Indices  #: (N,) which kind of body each is
-    plane: Array  #: (N, PLANE) plane geometry, see `dem.engine.links.motion.planar.lay_out`; of all bodies the inertia
-    spin: Array  #: (N, 3) angular velocities of the bodies' frames, laboratory frame [rad/s]
-    axes: Array  #: (N, 3, 3) rotation matrices, frame of the body to laboratory [1]
+    alpha: Array  #: (N, 2) angles of a smarticle's barbs [rad]; of no meaning for rigid bodies
+    rate: Array  #: (N, 2) rates of these angles [rad/s]; 0 while welded
+    shape: Indices  #: (N,) number of each body's shape in `Shapes`
+    #: (N, PLANE) plane geometry of smarticles, see `dem.engine.links.motion.planar.lay_out`; of rigid bodies only the
+    #: inertia, in columns 14 to 17
+    plane: Array
+    spin: Array  #: (N, 3) angular velocities of the bodies' frames, in the laboratory frame [rad/s]
+    axes: Array  #: (N, 3, 3) rotation matrices from the frame of the body to the laboratory frame [1]
     load: Array  #: (N, 6) force [N] and torque about the centre of mass [N m] of contacts in this step, without weight
-    deepest: Array  #: (N,) deepest contact since the last query, over the overlap at which axes meet [1]
+    deepest: Array  #: (N,) largest overlap since the last query, over the overlap at which axes meet [1]
 
 
 class Parts(NamedTuple):
-    """Rigid parts of bodies, R of them: three of a smarticle, of which the first is all of it while welded."""
+    """R rigid parts of bodies: one of a rigid body, three of a smarticle.
 
-    begin: Indices  #: (N + 1,) where the parts of each body begin
-    motion: Array  #: (R, MOTION) how each part moves, see `VELOCITY`
+    While smarticles are welded, the first part of a smarticle stands for the whole smarticle.
+    """
+
+    begin: Indices  #: (N + 1,) number of the first part of each body, then R
+    #: (R, MOTION) velocity at a point, angular velocity and this point, in the columns from `VELOCITY` on
+    motion: Array
     load: Array  #: (R, 6) force [N] and torque about `ORIGIN` [N m] of contacts in this step
     #: (R, STRETCH) of parts that stretch along an axis: the axis [1], rate of strain [1/s], first moment along the axis
     #: of the axial forces of contacts [N m]; None where no body is flexible
@@ -55,14 +64,14 @@ class Parts(NamedTuple):
 
 
 class Segments(NamedTuple):
-    """Segments of all bodies, Q of them, and links, L of them, whose strands they are."""
+    """Q segments of all bodies. The segments are the strands of L links."""
 
-    line: Array  #: (Q, LINE) in the laboratory frame, see `dem.engine.links.shapes`
-    begin: Indices  #: (N + 1,) where the segments of each body begin
-    body: Indices  #: (Q,) body that each belongs to
-    part: Indices  #: (Q,) rigid part that each moves with
-    shared: NDArray[np.uint8]  #: (Q,) see `dem.engine.links.shapes.AT_START`
-    first: Indices  #: (L + 1,) where the segments of each link begin
+    line: Array  #: (Q, LINE) segments in the laboratory frame; for the columns see `dem.engine.links.shapes.START`
+    begin: Indices  #: (N + 1,) number of the first segment of each body, then Q
+    body: Indices  #: (Q,) number of the body to which each segment belongs
+    part: Indices  #: (Q,) number of the rigid part with which each segment moves
+    shared: NDArray[np.uint8]  #: (Q,) which ends are ends of earlier segments, as bits `shapes.AT_START` and `AT_END`
+    first: Indices  #: (L + 1,) number of the first segment of each link, then Q
     bends: Any  #: `Bends`; None where no body is flexible
 
 
@@ -74,44 +83,48 @@ class Bends(NamedTuple):
 
 
 class Pairs(NamedTuple):
-    """Pairs of segments that are near each other, P of them, in rows by the first one."""
+    """Lists of near segments: the wide list, and the tight list of those pairs that can touch soon.
 
-    first: Indices  #: (P,) the segment with the lower number
-    second: Indices  #: (P,) the other one
-    slip: Array  #: (P, SLOTS, 4) stretch of the tangential springs at each point [m], and their energy [J]
+    Arrays have room for P pairs, of which `counts` are in use. Pairs with equal `first` stand one after the other.
+    """
+
+    first: Indices  #: (P,) number of the segment with the lower number
+    second: Indices  #: (P,) number of the other segment
+    slip: Array  #: (P, SLOTS, 4) stretch of the tangential spring at each point of contact [m], and its energy [J]
     used: NDArray[np.uint8]  #: (P,) which of the points touched in the last step, as bits
-    near: Indices  #: (P,) places in this list of the pairs that are so near that they can touch soon; the tight list
-    touching: Indices  #: (P,) places of the pairs that touch or did so in the last step
-    nearest: Array  #: (P, 2) where these are nearest to each other, in lengths of either segment
-    counts: NDArray[np.int64]  #: (4,) pairs, near pairs, times the list was built, times the tight one was
-    wide_marks: Array  #: (Q, 7) ends of all segments when the list was built and their skins [m]
-    near_marks: Array  #: (Q, 7) the same for the tight list
-    wide_centres: Array  #: (N, 3) centres of mass when the list was built [m]
-    near_centres: Array  #: (N, 3) the same for the tight list [m]
+    near: Indices  #: (P,) tight list: indices of pairs that can touch soon
+    touching: Indices  #: (P,) indices of the pairs that touch or did so in the last step
+    #: (P, 2) places s and t (0 to 1) of the nearest points along both segments of the pairs in `touching`
+    nearest: Array
+    counts: NDArray[np.int64]  #: (4,) pairs of the wide list, pairs of the tight list, number of times each was built
+    wide_marks: Array  #: (Q, 7) starts and ends of all segments when the wide list was built, and their skins [m]
+    near_marks: Array  #: (Q, 7) starts and ends of all segments when the tight list was built, and their skins [m]
+    wide_centres: Array  #: (N, 3) centres of mass when the wide list was built [m]
+    near_centres: Array  #: (N, 3) centres of mass when the tight list was built [m]
 
 
 class Cells(NamedTuple):
-    """Arrays of the search for neighbours."""
+    """Arrays of the search for neighbours. A group is all pairs of the list that have one first segment."""
 
     keys: Indices  #: (L,) bin of each link
-    order: Indices  #: (L,) links by bin, in order within each
-    starts: Indices  #: (bins + 2,) where each bin begins in `order`, from the second number on
-    marks: Array  #: (Q, 7) as in `Pairs`
-    centres: Array  #: (N, 3) as in `Pairs`
-    own: Array  #: (L, 6) lower and upper corners of the box about each link [m]
-    boxes: Array  #: (6, L) the same by bin; one coordinate of many is read at once
-    strands: Indices  #: (L + 1,) where the segments of each link begin in `lines`
-    lines: Array  #: (Q, LINE + 1) segments and their skins [m], by bin
-    numbers: Indices  #: (Q,) segment of each of these rows
-    close: Indices  #: (2 L,) places in `order` of links whose boxes overlap that of one link; then scratch
-    places: Indices  #: (Q,) which row of the list each segment's pairs are in
-    rows: Indices  #: (Q + 2,) where the list's rows begin
-    lower: Indices  #: (P,) segments with the lower numbers, as pairs are found
-    upper: Indices  #: (P,) the others
-    first: Indices  #: (P,) the same by rows
-    second: Indices  #: (P,) the same by rows
-    slip: Array  #: (P, SLOTS, 4) that of the list before
-    used: NDArray[np.uint8]  #: (P,) that of the list before
+    order: Indices  #: (L,) numbers of the links sorted by bin, and within a bin by number
+    starts: Indices  #: (bins + 2,) index in `order` of the first link of bin k, at k + 1
+    marks: Array  #: (Q, 7) starts and ends of all segments at the search, and their skins [m]
+    centres: Array  #: (N, 3) centres of mass at the search [m]
+    own: Array  #: (L, 6) lower and upper corner of the box about each link [m]
+    boxes: Array  #: (6, L) these corners in the order of `order`; a row has one coordinate of all boxes [m]
+    strands: Indices  #: (L + 1,) index in `lines` of the first segment of each link, in the order of `order`
+    lines: Array  #: (Q, LINE + 1) segments and their skins [m], in the order of `order`
+    numbers: Indices  #: (Q,) number of the segment in each row of `lines`
+    close: Indices  #: (2 L,) indices in `order` of links whose boxes overlap the box of one link; second half: scratch
+    places: Indices  #: (Q,) number of the group of each segment
+    rows: Indices  #: (Q + 2,) index of the first pair of each group
+    lower: Indices  #: (P,) segment with the lower number of each pair, in the order in which pairs are found
+    upper: Indices  #: (P,) segment with the higher number of each pair, in the order in which pairs are found
+    first: Indices  #: (P,) segment with the lower number of each pair, group by group
+    second: Indices  #: (P,) segment with the higher number of each pair, group by group
+    slip: Array  #: (P, SLOTS, 4) `Pairs.slip` of the contacts in the previous list
+    used: NDArray[np.uint8]  #: (P,) `Pairs.used` of the contacts in the previous list
 
 
 class Law(NamedTuple):
@@ -119,102 +132,113 @@ class Law(NamedTuple):
 
     stiffness: float  #: kn [N/m]
     shear: float  #: ks [N/m]
-    damping: Array  #: (K, K) cn by the shapes of both bodies, (K, 1) against boundaries [N s/m]
-    shear_damping: float  #: cs over cn [1], while it sticks
+    damping: Array  #: (K, K) cn by the shapes of both bodies, or (K, 1) by the shape at boundaries [N s/m]
+    shear_damping: float  #: cs over cn while the contact sticks [1]
     friction: float  #: Coulomb coefficient [1]
 
 
 class Kept(NamedTuple):
-    """Memory of contacts with boundaries, see `dem.engine.links.contact.boundaries`."""
+    """Memory of contacts with boundaries; for the slots of a segment see `contact.boundaries.SLOT`."""
 
-    slip: Array  #: (Q, slots, 4) stretch of the tangential springs [m], and their energy [J]
-    used: NDArray[np.uint8]  #: (Q, slots) whether a contact was there in the last step
-    contacts: NDArray[np.uint8]  #: (Q,) contacts of a segment in the last step
+    slip: Array  #: (Q, slots, 4) stretch of the tangential spring [m], and its energy [J]
+    used: NDArray[np.uint8]  #: (Q, slots) whether there was a contact in the last step
+    contacts: NDArray[np.uint8]  #: (Q,) number of contacts of each segment in the last step
 
 
 class Ground(NamedTuple):
-    """Boundaries that ends of links meet, and how they all move. Parts: floor, wall, lower hook, upper hook."""
+    """Floor and wall, and the motion of all boundaries.
 
-    bottoms: Array  #: (tiers,) where each tier of the wall begins, from the lowest up, above the wall's place [m]
-    radii: Array  #: (tiers,) of the tiers [m]
-    top: float  #: Where the wall ends, above its place [m]
-    flags: NDArray[np.int64]  #: (2,) whether the wall is there, and whether it was lifted: then it has an outside
-    place: Array  #: (4,) heights of the parts [m]
-    speed: Array  #: (4,) their velocities [m/s]
-    base: Array  #: (4,) heights that shaking began at [m]
-    shaken: NDArray[np.int64]  #: (4,) whether a part is shaken
-    wave: Array  #: (3,) amplitude [m], 2πf [rad/s] and begin [s] of the shaking
-    force: Array  #: (6, 3) of the bodies on the parts and on a channel's lower and upper wall in the last step [N]
-    sums: Array  #: (6, 3) the same, summed over all steps [N]
+    Arrays of 4 hold values for floor, wall, lower hook and upper hook, arrays of 6 also for a channel's lower and upper
+    wall.
+    """
+
+    #: (tiers,) heights of the lower ends of the wall's tiers above `place` of the wall, lowest first [m]
+    bottoms: Array
+    radii: Array  #: (tiers,) radii of the tiers [m]
+    top: float  #: Height of the wall's upper end above `place` of the wall [m]
+    flags: NDArray[
+        np.int64
+    ]  #: (2,) whether the wall exists; whether it was lifted, so that links can touch its outside
+    place: Array  #: (4,) heights [m]; of the wall: its rise since the start
+    speed: Array  #: (4,) vertical velocities [m/s]
+    base: Array  #: (4,) heights at which the shaking began [m]
+    shaken: NDArray[np.int64]  #: (4,) whether a boundary is shaken
+    wave: Array  #: (3,) amplitude [m], angular frequency 2πf [rad/s] and time of the beginning [s] of the shaking
+    force: Array  #: (6, 3) forces of the bodies on the boundaries in the last step [N]
+    sums: Array  #: (6, 3) these forces, summed over all steps [N]
 
 
 class Hooks(NamedTuple):
-    """Two hooks of two bars or more each, lying along x and y; their heights are in `Ground.place`."""
+    """Two hooks of two or more bars each, which lie along x and y; their heights are in `Ground.place`."""
 
-    #: (2,) bars of the lower and the upper hook; the arrays have room for B, those of the one with more
-    counts: NDArray[np.int64]
-    #: (2, B, LINE) each bar's axis, from the vertical axis; heights, which are in `Ground.place`, are written where
-    #: they are needed
+    counts: NDArray[np.int64]  #: (2,) number of bars of the lower and of the upper hook; the larger number is B
+    #: (2, B, LINE) segments of the bars; for the columns see `shapes.START`. x and y are from the container's axis.
+    #: z is set from `Ground.place` before use
     bars: Array
-    radius: float  #: Of the bars [m]
+    radius: float  #: Radius of the bars [m]
 
 
 class Rims(NamedTuple):
-    """Round edges of the wall that links can bend around: between tiers, and below a wall that is lifted."""
+    """Round edges of the wall that links can touch, between tiers and below a lifted wall."""
 
-    heights: Array  #: (rims,) above the wall's place [m]
-    radii: Array  #: (rims,) [m]
+    heights: Array  #: (rims,) heights above `place` of the wall [m]
+    radii: Array  #: (rims,) radii [m]
 
 
 class Boundaries(NamedTuple):
-    """All boundaries. Where a scene has none of a sort it is None, and kernels are compiled without it."""
+    """All boundaries. Kernels are compiled without the boundaries that are None."""
 
-    ground: Ground  #: Floor and wall, and how all boundaries move
-    channel: Any  #: (1,) half the distance of the walls that stand in for the container [m]; None for a container
-    hooks: Any  #: None where there are none
-    rims: Any  #: None where the wall has no edges that links can reach
+    ground: Ground  #: Floor and wall, and the motion of all boundaries
+    channel: Any  #: (1,) half the distance of a channel's walls [m], inf without walls; None in a container
+    hooks: Any  #: `Hooks`; None: no hooks
+    rims: Any  #: `Rims`; None: the wall has no edges that links can reach
 
 
 class Cords(NamedTuple):
-    """Strings tied to links of smarticles, k of them."""
+    """k strings. One end of each, the knot, is tied to a link; the other end is the anchor."""
 
-    owner: NDArray[np.int64]  #: (k, 2) smarticle and link
-    along: Array  #: (k,) place of the knot along the link's axis from the link's centre [m]
-    anchor: Array  #: (k, 3) where the other ends are [m]
-    start: Array  #: (k, 3) where they were when the strings were tied [m]
-    speed: Array  #: (k,) of the other ends, along x [m/s]
-    law: Array  #: (3,) length when slack [m], stiffness [N/m], damping [N s/m]
+    owner: NDArray[np.int64]  #: (k, 2) smarticle and link of each knot
+    along: Array  #: (k,) distance of the knot from the link's centre towards the link's end [m]
+    anchor: Array  #: (k, 3) positions of the anchors [m]
+    start: Array  #: (k, 3) positions of the anchors when the strings were tied [m]
+    speed: Array  #: (k,) velocities of the anchors along x [m/s]
+    law: Array  #: (3,) unstretched length [m], stiffness [N/m], damping [N s/m]
     sums: Array  #: (k, 3) forces on the links, summed over all steps [N]
-    knot: Array  #: (k, 3) where the strings are tied [m]
+    knot: Array  #: (k, 3) positions of the knots [m]
 
 
 class Motoring(NamedTuple):
-    """Two motors on each of N bodies; those of rigid bodies do nothing."""
+    """Two motors of each of N bodies; the motors of rigid bodies do nothing."""
 
     law: int  #: 0 halt, 1 stall, 2 ease, 3 slip, 4 servo
     speed: float  #: ω, the greatest speed [rad/s]
-    limit: Array  #: (N, 2) τ_max [N m]
-    stiffness: Array  #: (N, 2) of the shaft of a slip or servo motor [N m/rad]
-    damping: float  #: Of a servo [N m s/rad]
-    acceleration: Array  #: (N, 2) the greatest change of a prescribed rate [rad/s²]
+    limit: Array  #: (N, 2) torque limits τ_max [N m]
+    stiffness: Array  #: (N, 2) twist stiffness of the shafts of slip and servo motors [N m/rad]
+    damping: float  #: Derivative gain of servos [N m s/rad]
+    acceleration: Array  #: (N, 2) greatest change of a prescribed rate at a control update over the period [rad/s²]
     command: Array  #: (N, 2) angles that the motors hold [rad]
-    schedule: Array  #: (N, 2) angles of the schedule [rad]
+    schedule: Array  #: (N, 2) angles of the schedule at the last control update [rad]
     torque: Array  #: (N, 2) mean torques on the barbs between the last two control updates [N m]
-    work: Array  #: (N, 2) done on the links up to the last control update, and for slip and servo up to now [J]
-    halted: NDArray[np.bool_]  #: (N, 2) whether a motor wanted to advance at the last control update and did not
+    work: Array  #: (N, 2) work on the links up to the last control update; for slip and servo up to now [J]
+    halted: NDArray[
+        np.bool_
+    ]  #: (N, 2) whether a motor was stopped at the last update; slip and servo: was at its limit
     begun: Array  #: (N, 2) angles at the last control update [rad]
-    momentum: Array  #: (N, 2) p after the last control update; for slip and servo p now [kg m²/s]
-    #: (N, 2) ∫ of all torques but the motors' since the last control update; for slip and servo of the motors' [N m s]
+    #: (N, 2) momenta p of the angles (see `motion.planar`) after the last control update; for slip and servo now
+    #: [kg m²/s]
+    momentum: Array
+    #: (N, 2) time integral since the last control update of all torques on an angle but the motor's; for slip and servo
+    #: of the motor's torque [N m s]
     impulse: Array
     elapsed: Array  #: (1,) time since the last control update [s]
-    interval: float  #: Time between two control updates [s]
-    period: int  #: That time in steps
-    targets: Array  #: (updates, N, 2) angles at the ends of the periods to come according to the schedule [rad]
-    #: (2,) the row of `targets` of the next control update, and the steps until then; -1: none is due
+    interval: float  #: Time between two control updates, the control period [s]
+    period: int  #: Number of steps in a control period
+    targets: Array  #: (updates, N, 2) angles of the schedule at the ends of the next control periods [rad]
+    #: (2,) row of `targets` for the next control update, and number of steps until then; below 0: no update is planned
     due: NDArray[np.int64]
-    #: (N, 2) by how much the prescribed rates have changed at a control update before the next kick [rad/s]
+    #: (N, 2) changes of the prescribed rates at a control update, until the kick that follows [rad/s]
     jump: Array
-    #: (N,) how often in a row a barb of each smarticle was found at τ_max, one after the other, for ease
+    #: (N,) number of barbs in a row found at τ_max, barb 1 and barb 2 of a smarticle in turn; for ease
     over: NDArray[np.int64]
 
 
@@ -247,38 +271,38 @@ class Filaments(NamedTuple):
 
 
 class System(NamedTuple):
-    """One simulation, as kernels get it."""
+    """All data of one simulation that kernels read or write."""
 
-    shapes: Shapes  #: The kinds of bodies
-    law: Law  #: Of their contacts
-    wall_law: Law  #: Of their contacts with boundaries
+    shapes: Shapes  #: Shapes of the bodies
+    law: Law  #: Law of contacts between bodies
+    wall_law: Law  #: Law of contacts with boundaries
     bodies: Bodies  #: The bodies
-    parts: Parts  #: How their rigid parts move, and what acts on these
-    segments: Segments  #: Where their segments are
-    pairs: Pairs  #: Which segments are near each other
+    parts: Parts  #: Rigid parts of the bodies, with motion and loads
+    segments: Segments  #: Segments of the bodies
+    pairs: Pairs  #: Lists of near segments
     kept: Kept  #: Memory of contacts with boundaries
     boundaries: Boundaries  #: Floor, wall, hooks, channel
     gravity: float  #: g, downwards [m/s²]
     planar: bool  #: Whether all motion is confined to a horizontal plane
-    skins: Array  #: See `dem.engine.links.neighbours.lists.update_lists`
-    motors: Any  #: None while welded
-    cords: Any  #: None where no string is tied
-    #: (n, LEDGER) forces that dissipate, see `dem.engine.links.contact.pairs.enter`; None where nothing reads it
+    skins: Array  #: (7,) limits of skins, see `dem.engine.links.neighbours.lists.update_lists`
+    motors: Any  #: `Motoring`; None while smarticles are welded
+    cords: Any  #: `Cords`; None if no string is tied
+    #: (n, LEDGER) forces that dissipate energy, see `contact.pairs.enter`; None if dissipation is not recorded
     ledger: Any
     filaments: Any  #: `Filaments`; None where no body is flexible
 
 
 class Scratch(NamedTuple):
-    """Arrays that are written before they are read."""
+    """Scratch arrays, whose content does not outlive a step."""
 
-    cells: Cells  #: Of the search for neighbours
-    met: Array  #: (ROWS, COLUMNS) of `dem.engine.links.contact.meeting.meet`
-    contacts: Array  #: (slots, COLUMNS) of `dem.engine.links.contact.boundaries.contacts_of_segment`
-    plane: Array  #: (PLANE,) plane geometry of a smarticle
+    cells: Cells  #: Scratch of the search for neighbours
+    met: Array  #: (ROWS, COLUMNS) scratch of `dem.engine.links.contact.meeting.meet`
+    contacts: Array  #: (slots, COLUMNS) scratch of `dem.engine.links.contact.boundaries.contacts_of_segment`
+    plane: Array  #: (PLANE,) scratch for the plane geometry of a smarticle
 
 
 def bodies_for(count: int) -> Bodies:
-    """Return arrays for so many bodies."""
+    """Return arrays of zeros for `count` bodies."""
     f = np.zeros
     return Bodies(
         f((count, 3)), f((count, 4)), f((count, 3)), f((count, 3)), f((count, 2)), f((count, 2)), f(count, np.int32),
@@ -287,12 +311,12 @@ def bodies_for(count: int) -> Bodies:
 
 
 def joined(one: Bodies, other: Bodies) -> Bodies:
-    """Return the bodies of both, those of `one` first."""
+    """Return the bodies of `one` followed by those of `other`."""
     return Bodies(*(np.concatenate([a, b]) for a, b in zip(one, other, strict=True)))
 
 
 def pairs_for(bodies: int, segments: int, capacity: int) -> Pairs:
-    """Return an empty list with room for `capacity` pairs of the segments of some bodies."""
+    """Return empty lists with room for `capacity` pairs; `bodies` and `segments` are the numbers of these."""
     return Pairs(
         np.zeros(capacity, np.int32),
         np.zeros(capacity, np.int32),
@@ -310,7 +334,7 @@ def pairs_for(bodies: int, segments: int, capacity: int) -> Pairs:
 
 
 def cells_for(bodies: int, links: int, segments: int, capacity: int) -> Cells:
-    """Return room for a search among the links of some bodies, and for so many pairs."""
+    """Return arrays for a search among so many bodies, links and segments, for up to `capacity` pairs."""
     return Cells(
         np.zeros(links, np.int32),
         np.zeros(links, np.int32),

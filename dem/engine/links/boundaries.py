@@ -1,4 +1,4 @@
-"""What does not give way to smarticles on the links engine: an exact cylinder or its tiers, hooks, or a channel."""
+"""Rigid boundaries on the engine links: an exact cylinder or several tiers, hooks, or a channel."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ Array = NDArray[np.float64]
 
 
 def ground_for(cylinder: Cylinder, hooks: tuple[Cross, Cross] | None, channel: Channel | None) -> Ground:
-    """The boundaries at the start: floor at z = 0, or the table of a plane."""
+    """Return the boundaries at the start: floor at z = 0, or the table of a plane."""
     place = np.zeros(4)
     if channel is not None:
         place[FLOOR] = channel.table
@@ -41,12 +41,12 @@ def ground_for(cylinder: Cylinder, hooks: tuple[Cross, Cross] | None, channel: C
 
 
 class LinksBoundaries:
-    """See `dem.engine.interface.Boundaries`.
+    """`dem.engine.interface.Boundaries` on links.
 
     Args:
         cylinder: the container.
-        shaken: whether the scene shakes it.
-        removed: called with what takes contacts away, to keep the energy ledger.
+        shaken: whether the scene shakes the container.
+        removed: function of the energy ledger that calls its argument, a function that removes contacts.
     """
 
     def __init__(
@@ -152,9 +152,9 @@ class LinksBoundaries:
         return force
 
     def parts(self) -> dict[str, tuple[int, float]]:
-        """What smarticles can hold on to, in scenes with hooks: its part, and how far it was raised [m].
+        """Return the boundaries between which smarticles can be held, by name; none without hooks.
 
-        Raised against the floor, since the start.
+        A value has the boundary's index in `Ground.place`, and its rise above the floor since the start [m].
         """
         if self._world.hooks is None:
             return {}

@@ -1,9 +1,8 @@
-"""How kernels are compiled, and where compiled code is kept.
+"""Compile kernels, and keep compiled code in a cache.
 
-Numba's own cache lies beside the source, which may be read-only, and does not notice when a kernel's callee in another
-file has changed. This one lies in a folder of the user's, named after everything that the code depends on, so that
-neither an update of the package nor another processor meets code that is not its own; and whatever is wrong with it, a
-run goes on without.
+Numba's own cache is beside the source, which may be read-only, and it does not notice changes of a function in another
+file that a kernel calls. This cache is a folder of the user, whose name is a hash of everything that the code depends
+on, so that another version of the package never loads the code. If the cache cannot be used, a run compiles without it.
 """
 
 from __future__ import annotations
@@ -38,15 +37,15 @@ NOT_FROM_PYTHON: dict[str, Any] = {"no_cpython_wrapper": True, "no_cfunc_wrapper
 
 
 def part(function: F) -> F:
-    """Compile a function as a part of the kernels that call it; Python cannot call it, and crashes if it tries."""
+    """Compile a function that only kernels call; a call from Python crashes the process."""
     return numba.njit(**OPTIONS, **NOT_FROM_PYTHON)(function)  # type: ignore[no-any-return]
 
 
 def inlined(function: F) -> F:
-    """Compile a small function into those that call it.
+    """Compile a small function into the functions that call it.
 
-    Every array is some ten arguments to a call, and `Bodies` alone are fourteen arrays: a call costs more than most
-    small parts do.
+    An array counts as about ten arguments of a call, and `Bodies` alone has twelve arrays, so that a call would cost
+    more than most small functions.
     """
     return numba.njit(forceinline=True, **OPTIONS, **NOT_FROM_PYTHON)(function)  # type: ignore[no-any-return]
 
@@ -60,7 +59,7 @@ def kernel(function: F) -> F:
 
 @cache
 def stamp() -> str:
-    """Return the hash of all that compiled code depends on: these sources, the motor law, the options, Numba, NumPy."""
+    """Return the hash of all that compiled code depends on: sources, options, versions of Numba and NumPy."""
     digest = hashlib.sha256()
     for path in (*sorted(Path(__file__).parent.rglob("*.py")), Path(motor.__file__)):
         digest.update(path.name.encode() + b"\0" + path.read_bytes() + b"\0")
@@ -69,7 +68,7 @@ def stamp() -> str:
 
 
 def _folders() -> Iterator[Path]:
-    """Where compiled code may be kept, best first."""
+    """Yield the folders in which compiled code may be kept, the best one first."""
     if given := os.environ.get(FOLDER):
         yield Path(given)
         return
@@ -80,7 +79,7 @@ def _folders() -> Iterator[Path]:
 
 @cache
 def folder() -> Path | None:
-    """The folder of compiled code, made if need be; None where nothing can be written."""
+    """Return the folder of compiled code, made if needed; log a warning and return None if that fails."""
     causes = []
     for base in _folders():
         path = base / f"links-{stamp()}"
@@ -110,7 +109,7 @@ def _announce() -> None:
 
 
 class _Locator(_CacheLocator):
-    """Tells Numba's cache where to keep what."""
+    """Names of folder and files for Numba's cache."""
 
     def __init__(self, line: int) -> None:
         self._line = line
@@ -134,7 +133,7 @@ class _Implementation(CompileResultCacheImpl):
 
 
 class _Cache(NumbaCache):
-    """Numba's cache, in our folder, and never a reason to fail."""
+    """Numba's cache in `folder`; if the cache fails, code is compiled and a warning is logged."""
 
     _impl_class = _Implementation
 
@@ -154,7 +153,7 @@ class _Cache(NumbaCache):
         return self._ready and self._enabled
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
-        """Compiled code for a signature; None where there is none, or none that can be read."""
+        """Return the compiled code for a signature; None if there is none, or it cannot be read."""
         found = None
         try:
             if self._prepare():
@@ -166,7 +165,7 @@ class _Cache(NumbaCache):
         return found
 
     def save_overload(self, sig: Any, data: Any) -> None:
-        """Keep compiled code."""
+        """Write compiled code into the cache; log a warning if that fails."""
         try:
             if self._prepare():
                 super().save_overload(sig, data)  # type: ignore[no-untyped-call]

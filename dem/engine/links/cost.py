@@ -1,12 +1,11 @@
-"""What a simulated second costs on the links engine, from measurement.
+"""Estimate the wall time of a simulated second on the engine links, from measurements.
 
-A step looks at contacts; what moves has to be looked for anew, by the second and not by the step, among as many pairs
-as there are strands against strands. Neither how deep nor how wide a pile is shows in what a smarticle costs; in large
-ones memory does.
+Contacts are computed in every step, which costs time per step. Neighbours are searched again whenever links have moved
+far enough, which costs time per simulated second, and more for more pairs of strands. The cost of a smarticle does not
+depend on depth and width of the pile. It is higher in large piles, which do not fit into a processor's cache.
 
-Source: results/bench/cost.md: the phases of the paper's studies at N = 168 … 494, l/w 0.4 … 1.1, time steps from 50 to
-125 us, and, for the level, N = 270 on an idle 2-core AMD EPYC virtual machine; results/scaling: N up to 10 000;
-results/accuracy-links: strands and stiffness.
+Source: results/accuracy-links/cost.csv: one to three strands, 500 to 4000 N/m, N = 270, on one core of an idle 2-core
+AMD EPYC virtual machine; results/scaling: N up to 10 000.
 """
 
 from __future__ import annotations
@@ -18,31 +17,33 @@ from dem.engine.demand import Activity, Demand
 
 
 class Rates(NamedTuple):
-    """What a smarticle of three links of one strand costs, per step and per second."""
+    """Cost of a smarticle with three links of one strand each, on one core."""
 
-    step: float
-    second: float
+    step: float  #: Wall time per step [s]
+    second: float  #: Wall time per simulated second [1]
 
 
 RATES: Mapping[Activity, Rates] = {
-    Activity.POUR: Rates(1.7e-7, 0.1e-3),
-    Activity.REST: Rates(3.6e-7, 0.0),
-    Activity.SHAKE: Rates(2.4e-7, 0.7e-3),
-    Activity.ACTUATE: Rates(3.8e-7, 0.8e-3),
+    Activity.POUR: Rates(1.35e-7, 1.3e-3),
+    Activity.REST: Rates(4.0e-7, 0.0),
+    Activity.SHAKE: Rates(1.5e-7, 2.6e-3),
+    Activity.ACTUATE: Rates(3.8e-7, 3.0e-3),
 }
-LOOK = 2.4e-7  # s, of the motors of a smarticle once
-RIM = 1.1e-7  # s, of one edge of a wall of tiers, per smarticle and step
-# What is recorded: s, once and for each smarticle.
+LOOK = 2.4e-7  # s per control update of a smarticle
+RIM = 1.1e-7  # s per edge of a wall of tiers, smarticle and step
+# Cost of a sample and of a frame [s]: a constant, and an addition per smarticle.
 SAMPLE, FRAME = (1e-4, 1e-6), (1.5e-3, 1.5e-5)
 
-# Of so many smarticles a step takes so much longer each than of a few, as they do not fit into a processor's cache.
+# With MANY smarticles the cost of each is higher by LONGER than with few, since they do not fit into a processor's
+# cache; this addition grows with the power GROWTH of their number.
 MANY, LONGER, GROWTH = 5000, 0.3, 0.8
-# Contacts of two strands are fewer than twice those of one; pairs to look at are nearly four times as many.
-MORE_CONTACTS, MORE_PAIRS = 1.4, 1.75
+# Contacts of two strands are hardly more than those of one, since most links cross; the search finds links before it
+# tries their strands.
+MORE_CONTACTS, MORE_PAIRS = 0.3, 1.2
 
 
 def seconds_per_second(scene: Demand, time_step: float, activity: Activity) -> float:
-    """See `EngineKind.seconds_per_second`."""
+    """Return the estimate of `dem.engine.kinds.EngineKind.seconds_per_second`."""
     count, strands, recording = scene.count, scene.fidelity.rows, scene.recording
     rates, links = RATES[activity], 1.0 if scene.smarticle.boxes.barb_length > 0 else 1 / 3
     per_step = rates.step * (1 + MORE_CONTACTS * (1 - 1 / strands)) + RIM * strands * len(scene.cylinder.upper)

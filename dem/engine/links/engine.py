@@ -1,4 +1,4 @@
-"""The links engine behind the interface."""
+"""A running simulation on the engine links, behind the interface of all engines."""
 
 from __future__ import annotations
 
@@ -44,19 +44,20 @@ FORMAT = "links-4"
 
 
 class LinksEngine:
-    """See `dem.engine.interface.Engine`.
+    """`dem.engine.interface.Engine` on links.
 
     Args:
         particle: one smarticle.
         cylinder: the container; its floor is at z = 0 at the start.
         law: contact law.
-        time_step: dt [s], until another is set.
-        shaken: whether the container will move.
-        motor_law: what all motors have in common; None where smarticles stay welded.
-        keep_ledger: whether to add up what contacts dissipate.
-        hooks: the lower and the upper hook; None: nothing of a hook exists.
+        gravity: g, downwards [m/s²].
+        time_step: dt of the first steps [s].
+        shaken: whether the container will be shaken.
+        motor_law: law of the motors; None if smarticles stay welded.
+        keep_ledger: whether to sum the energy that contacts dissipate.
+        hooks: the lower and the upper hook; None: no hooks.
         channel: table and walls instead of the container; all motion is then confined to a plane.
-        strengths: (N, 2) factors on what the motors can do [1]; None: all are alike.
+        strengths: (N, 2) factors on torque limit and stiffness of the motors [1]; None: 1 for all motors.
     """
 
     def __init__(
@@ -115,10 +116,10 @@ class LinksEngine:
         return self._world.time_step
 
     def set_time_step(self, time_step: float) -> None:
-        """Set the time step.
+        """Set the length of all further steps [s].
 
-        Velocities belong to the middles of steps: a change of the length by Δ puts them in error by Δ/2 times the
-        acceleration at this moment, next to nothing in a pile at rest.
+        Velocities are those at the middles of steps. A change of the length by Δ causes an error of Δ/2 times the
+        present acceleration, which is negligible in a pile at rest.
         """
         if time_step != self.time_step:
             self._world.set_time_step(time_step)
@@ -171,10 +172,10 @@ class LinksEngine:
         return self._world.contacts().touches
 
     def overlaps(self, limit: float) -> Overlaps:
-        """Return the deepest overlap, which smarticles exceed `limit` [m] or are held, and the energy.
+        """Return the present overlaps; `Overlaps.deep` marks smarticles with an overlap above `limit` [m].
 
-        Contacts that may have let links pass since the last check count as well. A smarticle that two boundaries hold
-        counts as too deep from `HOLDS` on.
+        Overlaps since the last check count as well if links may have passed through each other (`PASSES`). A smarticle
+        that is held between two boundaries is marked from an overlap of `HOLDS` diameters on.
         """
         found, world = self._world.contacts(), self._world
         between = world.bodies.deepest.copy()
@@ -188,7 +189,7 @@ class LinksEngine:
         return Overlaps(float(depths.max(initial=0.0)), deep, found.elastic_energy, held)
 
     def contact_forces(self) -> ContactForces:
-        """Return the forces that the next step begins with."""
+        """Return the forces with which the next step begins."""
         rows = self._world.forces()
         first, second = rows[:, : queries.PRESSED].astype(np.int64).T
         return contacts_of_points(
@@ -201,7 +202,7 @@ class LinksEngine:
         )
 
     def extremes(self, state: State) -> Extremes | None:
-        """Return the extremes; hinges do not give way."""
+        """Return the extremes; None if an overlap needs a full check. The gap is 0, since hinges are rigid."""
         found, bodies = self._world.extremes(state.link_velocities), self._world.bodies
         if not (found[BETWEEN] <= PASSES and found[DEEPEST] <= HOLDS):
             return None
@@ -217,7 +218,13 @@ class LinksEngine:
         )
 
     def _held(self, held: NDArray[np.bool_], deep: NDArray[np.bool_], least: float) -> tuple[Held, ...]:
-        """Smarticles among the `deep` ones (N,) that touch two boundaries which have moved apart by `least` [m]."""
+        """Return the deep smarticles that touch two boundaries whose distance has changed.
+
+        Args:
+            held: (N, 6) whether each smarticle touches each boundary.
+            deep: (N,) whether each smarticle has a deep contact.
+            least: smallest change of distance that counts [m].
+        """
         parts = self.boundaries.parts() if deep.any() else {}
         touched = {int(k): [name for name, (part, _) in parts.items() if held[k, part]] for k in np.flatnonzero(deep)}
         return held_between(touched, {name: raised for name, (_, raised) in parts.items()}, least)
@@ -238,10 +245,10 @@ class LinksEngine:
         return Saved(content=content.getvalue(), memory=json.loads(json.dumps(memory)))
 
     def load(self, saved: Saved, scratch: Path) -> None:
-        """Go on from what `save` gave.
+        """Replace the state by a saved one.
 
         Raises:
-            InputError: it was not saved by this engine.
+            InputError: another engine or version saved the state, or it is damaged.
         """
         if saved.memory.get("format") != FORMAT:
             raise InputError(

@@ -1,4 +1,4 @@
-"""The links engine: what is asked of it before there is a simulation."""
+"""Facts about links as an engine, and the function that builds its simulations."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from dem.engine.links.stable_step import links_stable_time_step
 
 
 class LinksKind:
-    """See `dem.engine.kinds.EngineKind`."""
+    """`dem.engine.kinds.EngineKind` of links."""
 
     name = "links"
     workers = "threads"
@@ -24,7 +24,7 @@ class LinksKind:
     order = ORDER
 
     def version(self) -> str:
-        """Return the hash of the sources, and the compiler."""
+        """Return the hash of the sources and the version of Numba."""
         return f"{stamp()} (Numba {numba.__version__})"
 
     def threads(self) -> int:

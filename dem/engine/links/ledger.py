@@ -1,4 +1,4 @@
-"""The energy ledger on the links engine: kernels add up, exactly and in every step."""
+"""The energy ledger on the engine links, which kernels sum exactly, in every step."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from dem.engine.links.world import World
 
 
 class LinksLedger:
-    """See `dem.engine.interface.EnergyLedger`."""
+    """`dem.engine.interface.EnergyLedger` on links."""
 
     def __init__(self, world: World) -> None:
         self._world = world
@@ -21,7 +21,7 @@ class LinksLedger:
 
     @property
     def dissipated(self) -> float:
-        """By contacts where the scene asks for it, and by welding [J]."""
+        """Energy dissipated since the start [J], by welding and stopping, and by contacts if recorded."""
         return float(self._world.totals[LOST])
 
     @property
@@ -29,14 +29,14 @@ class LinksLedger:
         return self.added + self.container_work
 
     def elastic(self) -> tuple[float, float]:
-        """Return the energies; hinges have no springs."""
+        """Return the energy in the springs of all contacts [J], and 0, since hinges have no springs."""
         return self._world.contacts().elastic_energy, 0.0
 
     def take_in(self) -> None:
         self.added += self.elastic()[0]
 
     def removed(self, remove: Callable[[], None]) -> None:
-        """Do something that takes contacts away; what their springs held is dissipated."""
+        """Call a function that removes contacts; if the ledger is kept, their energy counts as dissipated."""
         counted = self._world.ledger is not None
         stored = self.elastic()[0] if counted else 0.0
         remove()

@@ -1,4 +1,4 @@
-"""The barbs' motors on the links engine: prescribed rates, or free angles; see `dem.engine.links.motion.motoring`."""
+"""Motors on the engine links; `dem.engine.links.motion.motoring` describes how they act."""
 
 from __future__ import annotations
 
@@ -17,15 +17,15 @@ from dem.physics.motor import LAWS, MotorLaw
 
 Array = NDArray[np.float64]
 
-UPDATES = 64  # control updates scheduled at once: so many that a call of the kernel costs nothing beside them
+UPDATES = 64  # control updates planned at once, so many that the cost of a kernel's call is negligible
 
 
 class LinksMotors:
-    """See `dem.engine.interface.Motors`.
+    """`dem.engine.interface.Motors` on links.
 
     Args:
-        law: what all motors have in common; None in scenes without.
-        strengths: (N, 2) factors on what each can do [1]; None: all are alike.
+        law: law of the motors; None if smarticles stay welded.
+        strengths: (N, 2) factors on torque limit and stiffness [1]; None: 1 for all motors.
 
     Raises:
         InputError: the engine does not know the law.
@@ -70,7 +70,7 @@ class LinksMotors:
             world.set_articulated(False)
 
     def actuate(self, targets: Array, interval: float) -> None:
-        """Set the schedule; its first control update is in the next step, between forces and kick."""
+        """Set the schedule; its first control update is made in the next step, between forces and kick."""
         world = self._world
         assert world.motors is not None  # only articulated smarticles are actuated
         world.motors = world.motors._replace(
@@ -103,7 +103,7 @@ class LinksMotors:
         return float(work_so_far(world.shapes, world.bodies, world.motors))
 
     def gaps(self) -> Array:
-        """Return zeros: hinges do not give way."""
+        """Return zeros (N, 2), since hinges are rigid."""
         return np.zeros((self._world.count, 2))
 
     def _made(self, law: MotorLaw) -> Motoring:
@@ -139,7 +139,7 @@ class LinksMotors:
 
     @property
     def arrays(self) -> dict[str, Array]:
-        """What `restore` needs."""
+        """Arrays of the motors by name, for `restore`; none before the first articulation."""
         motors, found = self._world.motors, {}
         if motors is not None:
             found = {name: value for name, value in motors._asdict().items() if isinstance(value, np.ndarray)}
@@ -147,7 +147,7 @@ class LinksMotors:
         return found
 
     def restore(self, arrays: dict[str, Array]) -> None:
-        """Go on from where `arrays` were taken; the smarticles are there already."""
+        """Restore the state that `arrays` returned; the smarticles must have been restored before."""
         world = self._world
         world.motors = None
         if "command" in arrays:

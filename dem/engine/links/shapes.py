@@ -1,8 +1,8 @@
-"""Bodies as this engine sees them: tables of segments, each swept by a sphere, with masses and inertias.
+"""Shapes of bodies on the engine links: segments that are swept by spheres, with masses and inertias.
 
-A flat link is swept along several parallel segments, its strands. That is the limit of the sphere chains of
-`dem.body.particle` as their pitch goes to zero: same section, same tips. A smarticle is the shape whose barbs turn
-about two hinges; all other shapes are rigid.
+A flat link consists of several parallel swept segments, its strands. Strands are the limit of the sphere chains of
+`dem.body.particle` at a pitch of zero, with equal sections and tips. A smarticle is the shape whose barbs turn about
+two hinges; all other shapes are rigid.
 """
 
 from __future__ import annotations
@@ -24,61 +24,62 @@ Array = NDArray[np.float64]
 
 # Columns of a segment: start of its axis and vector to its end [m], inverse squared length [1/m²], radius [m].
 START, VECTOR, INVERSE, RADIUS, LINE = 0, 3, 6, 7, 8
-AT_START, AT_END = 1, 2  # bits: the segment starts, or ends, where another segment of the body has an end already
+AT_START, AT_END = 1, 2  # bits: the segment's start, or its end, is also an end of an earlier segment of the body
 
 
 class Planar(NamedTuple):
     """Three hinged links in a plane. Lengths in m, masses in kg, inertias in kg m²."""
 
-    mass: float  #: Of a smarticle
-    middle_mass: float  #: Of the middle link
-    barb_mass: float  #: Of one barb
-    half: float  #: Half the length of the middle link: the hinges are this far from its centre
-    arm: float  #: Half the length of a barb: its centre of mass is this far from the hinge
-    end: float  #: How far the middle link's axis reaches from its centre: the hinges, but for a bar without barbs
-    tip: float  #: How far a barb's axis reaches from the hinge: its tip less the radius
-    middle_xx: float  #: Inertia of the middle link about its centre, along it
-    middle_yy: float  #: in the plane, across it
-    middle_zz: float  #: along the normal
-    barb_xx: float  #: Inertia of a barb about its centre, along it
-    barb_yy: float  #: in the plane, across it
-    barb_zz: float  #: along the normal
+    mass: float  #: Mass of a smarticle
+    middle_mass: float  #: Mass of the middle link
+    barb_mass: float  #: Mass of one barb
+    half: float  #: Half the length of the middle link: distance of the hinges from its centre
+    arm: float  #: Half the length of a barb: distance of its centre of mass from the hinge
+    end: float  #: Distance of the ends of the middle link's axis from its centre: `half`, less a radius without barbs
+    tip: float  #: Distance of the end of a barb's axis from the hinge: the barb's length less the radius
+    middle_xx: float  #: Inertia of the middle link about its centre, about the axis along the link
+    middle_yy: float  #: Inertia of the middle link about the axis across the link in the plane
+    middle_zz: float  #: Inertia of the middle link about the normal
+    barb_xx: float  #: Inertia of a barb about its centre, about the axis along the barb
+    barb_yy: float  #: Inertia of a barb about the axis across the barb in the plane
+    barb_zz: float  #: Inertia of a barb about the normal
 
 
 @dataclass(frozen=True, kw_only=True)
 class Shape:
-    """One kind of body, in its own frame about its centre of mass.
+    """Shape of a body, in a frame with its origin at the centre of mass.
 
-    The frame of a smarticle is that of its middle link, that of a rigid body its principal axes, that of a filament
-    the laboratory's.
+    The axes of the frame are those of the middle link of a smarticle, the principal axes of a
+    rigid body, or those of the laboratory for a filament.
     """
 
-    mass: float  #: [kg]
-    inertia: Array  #: (4,) xx, yy, zz and xy [kg m²] of a rigid body; that of a smarticle follows from its angles
-    lines: Array  #: (M, LINE) segments, strands of a link one after the other, see `START`
-    link: NDArray[np.int64]  #: (M,) link that each segment belongs to; of a smarticle 0 barb 1, 1 middle link, 2 barb 2
-    shared: NDArray[np.uint8]  #: (M,) which ends of a segment are those of segments before it, see `AT_START`
-    effective_mass: float  #: Harmonic mean of the mass felt by a push on it [kg], for the dashpots
-    planar: Planar | None = None  #: Of a smarticle; None: another body
+    mass: float  #: Mass of the body [kg]
+    #: (4,) xx, yy, zz and xy of a rigid body [kg m²]; 0 for a smarticle, whose inertia depends on angles
+    inertia: Array
+    lines: Array  #: (M, LINE) segments, the strands of a link one after the other; for the columns see `START`
+    link: NDArray[np.int64]  #: (M,) link of each segment; for a smarticle 0 barb 1, 1 middle link, 2 barb 2
+    shared: NDArray[np.uint8]  #: (M,) which ends are also ends of earlier segments, as bits `AT_START` and `AT_END`
+    effective_mass: float  #: Harmonic mean of the effective mass over points and directions [kg], for the dashpots
+    planar: Planar | None = None  #: Geometry of a smarticle; None: another body
     filament: Filament | None = None  #: Of a flexible body; None: a rigid body or a smarticle
 
     @property
     def reach(self) -> float:
-        """How far the axes of the links reach from the centre of mass [m], in the shape that it is poured in."""
+        """Largest distance of the links' axes from the centre of mass [m], at a smarticle's initial angles."""
         starts, ends = self.lines[:, :3], self.lines[:, :3] + self.lines[:, 3:6]
         return float(np.linalg.norm(np.concatenate([starts, ends]), axis=1).max(initial=0.0))
 
 
 class Shapes(NamedTuple):
-    """All kinds of bodies of a pile, K of them with M segments, for the kernels."""
+    """All K shapes of a pile with their M segments, as arrays for the kernels."""
 
-    mass: Array  #: (K,) [kg]
-    radius: Array  #: (K,) of the thinnest segment [m]
-    reach: Array  #: (K,) how far axes of links reach from the centre of mass [m]
+    mass: Array  #: (K,) masses of the bodies [kg]
+    radius: Array  #: (K,) radii of the thinnest segments [m]
+    reach: Array  #: (K,) largest distances of the links' axes from the centre of mass [m]
     hinged: NDArray[np.uint8]  #: (K,) whether barbs can turn
-    planar: Array  #: (K, 13) fields of `Planar`; zeros of rigid bodies
-    first: NDArray[np.int64]  #: (K + 1,) where each kind's segments begin
-    lines: Array  #: (M, LINE) segments in the frame of the body
+    planar: Array  #: (K, 13) fields of `Planar`; 0 for rigid bodies
+    first: NDArray[np.int64]  #: (K + 1,) index in `lines` of the first segment of each shape, then M
+    lines: Array  #: (M, LINE) segments in the frame of the body; for the columns see `START`
     link: NDArray[np.int64]  #: (M,) link of each segment
     flexible: Any  #: (K,) whether `dem.engine.links.motion.bending` moves such bodies; None where it moves none
 
@@ -92,7 +93,7 @@ def is_flexible(flexible: Any, kind: int) -> bool:
 
 
 def table_of(shapes: Sequence[Shape]) -> Shapes:
-    """Return the table of shapes for the kernels."""
+    """Return shapes as arrays for the kernels."""
     flexible = np.array([shape.filament is not None for shape in shapes], dtype=np.uint8)
     return Shapes(
         mass=np.array([shape.mass for shape in shapes]),
@@ -110,7 +111,8 @@ def table_of(shapes: Sequence[Shape]) -> Shapes:
 def planar_of(particle: Particle) -> Planar:
     """Return the planar geometry of a smarticle.
 
-    Sources: tips pulled in by the radius, hinges inside the middle link: as spheres are put in `dem.body.particle`.
+    Like the spheres of `dem.body.particle`, axes of barbs end a radius before the tip, and the axis of the middle link
+    ends at the hinges.
     """
     boxes, radius = particle.boxes, particle.radius
     length, barb = boxes.middle_length, boxes.barb_length
@@ -122,7 +124,7 @@ def planar_of(particle: Particle) -> Planar:
 
 
 def smarticle_shape(particle: Particle) -> Shape:
-    """Return the shape of a smarticle, with its barbs at the angles that it is poured with."""
+    """Return the shape of a smarticle, with its barbs at their initial angles."""
     boxes, planar, strands = particle.boxes, planar_of(particle), offsets_of(particle)
     directions, (x, y, _) = boxes.directions, boxes.plain_centre_of_mass
     axes = [(1, -planar.end, 2 * planar.end)]
@@ -143,7 +145,7 @@ def smarticle_shape(particle: Particle) -> Shape:
 
 
 def offsets_of(particle: Particle) -> Array:
-    """Return offsets (S,) of a link's strands along its normal [m]; the outermost ones reach its edges."""
+    """Return the offsets (S,) of a link's strands along the normal [m]; several reach to both faces."""
     reach = (particle.boxes.thickness_normal - particle.chain.diameter) / 2
     return np.zeros(1) if particle.chain.rows == 1 else np.linspace(-reach, reach, particle.chain.rows)
 
@@ -152,8 +154,8 @@ def rigid_shape(bars: Bars, rows: int = 1) -> Shape:
     """Return the shape of a rigid body of flat bars.
 
     Args:
-        rows: strands of each bar; one is as thick as the section's mean width, more are as thick as the bar is in
-            the plane.
+        rows: number of strands of each bar. The diameter of a single strand is the mean width of the section; that of
+            several strands is the bar's thickness in the plane.
     """
     radius = bars.radius(rows)
     reach = 0.0 if rows == 1 else bars.thickness_normal / 2 - radius
@@ -193,7 +195,7 @@ def filament_shape(filament: Filament) -> Shape:
 
 
 def _lines(axes: Array, radius: float) -> Array:
-    """Return segments (M, LINE) of axes (M, 6) [m] and a radius [m]."""
+    """Return segments (M, LINE) from axes (M, 6), start and vector to the end [m], and a radius [m]."""
     squares = (axes[:, 3:6] ** 2).sum(axis=1)
     inverses = np.divide(1.0, squares, out=np.zeros(len(axes)), where=squares > 0)
     return np.column_stack([axes, inverses, np.full(len(axes), radius)])

@@ -1,7 +1,7 @@
-"""The stable time step on the links engine, from its stiffest modes.
+"""The stable time step on the engine links, from the stiffest modes.
 
-Leapfrog takes the dashpots' velocity half a step late: with M, K and C the matrices of mass, stiffness and damping of a
-mode's smarticle, it is stable while K dt² + 2 C dt - 4 M has no positive eigenvalue.
+Leapfrog takes the velocities of dashpots half a step late. With the matrices M of mass, K of stiffness and C of damping
+of a smarticle in a mode, a step dt is stable while K dt² + 2 C dt - 4 M has no positive eigenvalue.
 """
 
 from __future__ import annotations
@@ -41,16 +41,22 @@ def links_stable_time_step(
     free: bool = False,
     strings: Sequence[tuple[float, float]] = (),
 ) -> float:
-    """Return the largest stable time step [s] over the stiffest modes of a smarticle among others.
+    """Return the largest time step [s] that is stable for the stiffest modes of a smarticle in a pile.
 
-    A barb's tip against another such tip, and against a boundary; a pile of smarticles that lie flat on each other,
-    with contacts at all ends of all links, which move against those above and below, or roll against them; and a
-    string at a tip. Prescribed rates add no stiffness, whatever the motor does; free angles make tips lighter.
+    The modes are:
+
+    - a barb's tip against another tip, or against a boundary;
+    - a pile of smarticles that lie flat on each other, with contacts at all ends of all links, which move in the
+      opposite direction of those above and below;
+    - such a pile in which links roll against those above and below;
+    - a tip with a string.
+
+    Prescribed rates of angles add no stiffness. Free angles reduce the effective mass of a tip.
 
     Args:
         articulated: whether barbs may have other angles than those of the particle.
-        free: whether angles are free: motors that slip.
-        strings: stiffness [N/m] and damping [N s/m] of each.
+        free: whether angles are free, under the laws slip and servo.
+        strings: stiffness [N/m] and damping [N s/m] of each string.
     """
     boxes = particle.boxes
     angles = [boxes.angles]
@@ -129,7 +135,10 @@ def _step_of(
 
 
 def _mass(shape: Shape, row: Array, free: bool) -> Array:
-    """Return the mass matrix: velocity, angular velocity in the middle link's axes, and rates of free angles."""
+    """Return the mass matrix (6, 6), with free angles (8, 8), of a smarticle with plane geometry `row`.
+
+    Its rows are for velocity, angular velocity in the middle link's axes, and rates of free angles.
+    """
     mass = np.zeros((8, 8))
     mass[:3, :3] = shape.mass * np.eye(3)
     xx, yy, zz, xy, b1, b2, a, c = row[14:22]
@@ -140,7 +149,7 @@ def _mass(shape: Shape, row: Array, free: bool) -> Array:
 
 
 def _ends(shape: Shape) -> list[tuple[int, tuple[float, float, float]]]:
-    """Return link and place from the centre of mass [m] of all ends of segments, joints once."""
+    """Return link and position from the centre of mass [m] of all ends of segments, joints once."""
     ends = []
     for line, link, shared in zip(shape.lines, shape.link, shape.shared, strict=True):
         for bit, place in ((AT_END, line[:3] + line[3:6]), (AT_START, line[:3])):
@@ -151,13 +160,19 @@ def _ends(shape: Shape) -> list[tuple[int, tuple[float, float, float]]]:
 
 
 def _tip_of(ends: list[tuple[int, tuple[float, float, float]]]) -> tuple[int, float, float]:
-    """Return link and place in the plane [m] of the first tip, a barb's where there are barbs."""
+    """Return link, x and y [m] of the first tip, which is that of barb 1 if there are barbs."""
     link, (x, y, _) = ends[0]
     return link, x, y
 
 
 def _motion_of(shape: Shape, row: Array, link: int, place: tuple[float, float, float], free: bool) -> Array:
-    """Return (3, n): velocity of a point of a link from those of the smarticle."""
+    """Return the matrix (3, 6), with free angles (3, 8), that gives the velocity of a point of a link.
+
+    Args:
+        row: plane geometry of the smarticle.
+        link: link of the point.
+        place: position of the point from the centre of mass [m].
+    """
     planar, (x, y, z) = shape.planar, place
     assert planar is not None
     motion = np.zeros((3, 8))
@@ -173,7 +188,13 @@ def _motion_of(shape: Shape, row: Array, link: int, place: tuple[float, float, f
 
 
 def _stable_step(mass: Array, stiffness: Array, damping: Array) -> float:
-    """Largest step [s] up to which 4 M - K dt² - 2 C dt is positive definite for all modes (n, k, k), by bisection."""
+    """Return the largest step [s] up to which 4 M - K dt² - 2 C dt is positive definite for all modes.
+
+    Args:
+        mass: (k, k) M.
+        stiffness: (n, k, k) K of each mode.
+        damping: (n, k, k) C of each mode.
+    """
     # Degrees of freedom of one scale each: elimination then loses no digits.
     scale = 1 / np.sqrt(np.diag(mass))
     mass, stiffness, damping = (each * scale[:, None] * scale for each in (mass, stiffness, damping))

@@ -1,4 +1,4 @@
-"""Many steps in one call: everything that happens in a step, in order."""
+"""Make many time steps in one call; `advance` and `act` show all that happens in a step, in order."""
 
 from __future__ import annotations
 
@@ -28,22 +28,22 @@ from dem.engine.links.vectors import dot, vector
 
 
 class Clock(NamedTuple):
-    """Time of the steps of one length."""
+    """Time in terms of steps of equal length: begin + made dt."""
 
-    begin: float  #: When they began [s]
-    made: int  #: How many were made since
-    dt: float  #: Their length [s]
+    begin: float  #: Time at which steps of this length began [s]
+    made: int  #: Number of steps of this length made before the call
+    dt: float  #: Length of a step [s]
 
 
-# Places in `totals`: energy dissipated and work of the boundaries [J], length of the last sub-step [s], sub-steps per
-# step that were needed last, the most that were, and ticks of the present step that have passed.
+# Indices of `totals`: energy dissipated and work of the boundaries [J], length of the last sub-step [s], sub-steps per
+# step that were needed last, the most that were ever needed, and ticks of the present step that have passed.
 LOST, WORK, PAST, NEED, MOST, TICK = range(6)
 TOTALS = 6
 
 
 @part
 def shaken_to(ground: Ground, time: float) -> None:
-    """Put what is shaken where it is at a time [s]; `place` and `speed` are written."""
+    """Move the shaken boundaries to their heights at a time [s]; `place` and `speed` are written."""
     if ground.wave[1] > 0.0:
         phase = ground.wave[1] * (time - ground.wave[2])
         for k in range(4):
@@ -57,14 +57,15 @@ def settle(
     shapes: Shapes, bodies: Bodies, parts: Parts, segments: Segments, ledger: Array, motors: Any, filaments: Any,
     dt: float,
 ) -> float:  # fmt: skip
-    """Return the energy that the forces in the ledger dissipated [J], now that velocities after the kick are known.
+    """Return the energy that the forces in the ledger dissipated in a kick [J]; called after the kick.
 
-    A force takes from the kinetic energy the work that it does along the mean of the velocities before and after.
+    A force changes the kinetic energy by its work along the mean of the velocities before and after the kick.
 
     Args:
         bodies: `spin` is written.
         parts: `motion` is written.
-        ledger: see `dem.engine.links.contact.pairs.enter`; emptied.
+        ledger: forces, see `dem.engine.links.contact.pairs.enter`; it is emptied.
+        motors: the motors; None while smarticles are welded.
         dt: time over which the forces acted [s].
     """
     total = 0.0
@@ -90,13 +91,16 @@ def act(
     """Make one sub-step, whose length follows from the forces at its beginning.
 
     Args:
-        system: the simulation, posed, with lists up to date.
-        totals: (TOTALS,) see `LOST`; brought up to date.
-        tick: ticks of the step that have passed.
-        dt: an undivided time step [s].
+        system: the simulation, posed, with valid lists.
+        totals: (TOTALS,) sums and state of the sub-steps, which are updated; for the indices see `LOST`.
+        tick: ticks of the time step that have passed.
+        dt: length of an undivided time step [s].
+        motors: `system.motors`.
+        cords: `system.cords`.
+        ledger: `system.ledger`.
 
     Returns:
-        Its length in ticks.
+        Length of the sub-step in ticks.
     """
     shapes, bodies, parts, segments = system.shapes, system.bodies, system.parts, system.segments
     known, ground, need = system.boundaries, system.boundaries.ground, totals[NEED : NEED + 1]
@@ -160,11 +164,12 @@ def advance(steps: int, clock: Clock, system: System, scratch: Scratch, totals: 
     """Make steps.
 
     Args:
-        clock: when these steps are.
-        totals: (TOTALS,) see `LOST`; brought up to date.
+        steps: number of steps.
+        clock: time at the beginning of the first step, and length of the steps.
+        totals: (TOTALS,) sums and state of the sub-steps, which are updated; for the indices see `LOST`.
 
     Returns:
-        Steps that were made; fewer where a list is full.
+        Number of steps that were made, less than `steps` if the list of pairs is full.
     """
     ground, dt = system.boundaries.ground, clock.dt
     for made_now in range(steps):

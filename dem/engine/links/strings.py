@@ -1,4 +1,4 @@
-"""The two strings of a chain on the links engine."""
+"""The two strings of a chain on the engine links."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ Array = NDArray[np.float64]
 
 
 class LinksStrings:
-    """See `dem.engine.interface.Strings`."""
+    """`dem.engine.interface.Strings` on links."""
 
     def __init__(self, world: World) -> None:
         self._world = world

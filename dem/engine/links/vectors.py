@@ -1,4 +1,4 @@
-"""Vectors of three numbers as tuples, which the compiler dissolves, and nearest points of two segments."""
+"""Vectors as tuples of three numbers, which cost no memory, and nearest points of two segments."""
 
 from __future__ import annotations
 
@@ -15,19 +15,19 @@ PARALLEL = 1e-12  # sin² of the angle below which a solution for crossing lines
 
 @inlined
 def vector(row: Array, begin: int) -> Vector:
-    """Read three numbers of a row from a place on."""
+    """Return three numbers of a row, from index `begin` on."""
     return row[begin], row[begin + 1], row[begin + 2]
 
 
 @inlined
 def put(row: Array, begin: int, a: Vector) -> None:
-    """Write three numbers into a row from a place on."""
+    """Write a vector into a row, from index `begin` on."""
     row[begin], row[begin + 1], row[begin + 2] = a
 
 
 @inlined
 def put_more(row: Array, begin: int, a: Vector) -> None:
-    """Add three numbers to those of a row from a place on."""
+    """Add a vector to three numbers of a row, from index `begin` on."""
     row[begin] += a[0]
     row[begin + 1] += a[1]
     row[begin + 2] += a[2]
@@ -71,7 +71,13 @@ def cross(a: Vector, b: Vector) -> Vector:
 
 @inlined
 def moving(v: Vector, w: Vector, r: Vector) -> Vector:
-    """Return v + w × r: the velocity at r from a point that moves with v, of a body that turns with w."""
+    """Return v + w × r, the velocity at a point of a rigid body.
+
+    Args:
+        v: velocity of a reference point of the body.
+        w: angular velocity of the body.
+        r: vector from the reference point to the point.
+    """
     return (
         v[0] + w[1] * r[2] - w[2] * r[1],
         v[1] + w[2] * r[0] - w[0] * r[2],
@@ -81,7 +87,7 @@ def moving(v: Vector, w: Vector, r: Vector) -> Vector:
 
 @inlined
 def turned(bodies: Bodies, i: int, x: float, y: float, z: float) -> Vector:
-    """Turn a vector from the frame of a body to the laboratory."""
+    """Transform a vector from the frame of body `i` to the laboratory frame."""
     axes = bodies.axes
     return (
         axes[i, 0, 0] * x + axes[i, 0, 1] * y + axes[i, 0, 2] * z,
@@ -92,7 +98,7 @@ def turned(bodies: Bodies, i: int, x: float, y: float, z: float) -> Vector:
 
 @inlined
 def turned_back(bodies: Bodies, i: int, a: Vector) -> Vector:
-    """Turn a vector from the laboratory to the frame of a body."""
+    """Transform a vector from the laboratory frame to the frame of body `i`."""
     axes = bodies.axes
     return (
         axes[i, 0, 0] * a[0] + axes[i, 1, 0] * a[1] + axes[i, 2, 0] * a[2],
@@ -102,7 +108,7 @@ def turned_back(bodies: Bodies, i: int, a: Vector) -> Vector:
 
 
 class Lines(NamedTuple):
-    """Two segments p + s u and q + t v, s and t from 0 to 1, and products of their vectors."""
+    """Two segments p + s u and q + t v, with s and t from 0 to 1, and products of their vectors."""
 
     p: Vector  #: Start of the first one [m]
     q: Vector  #: Start of the second one [m]
@@ -114,7 +120,7 @@ class Lines(NamedTuple):
     c: float  #: v · v [m²]
     d: float  #: u · w [m²]
     e: float  #: v · w [m²]
-    inverse_a: float  #: 1/a, kept with the segment: divisions would take half the time [1/m²]
+    inverse_a: float  #: 1/a [1/m²], from the segment's row, since divisions would take half of the time
     inverse_c: float  #: 1/c [1/m²]
 
 
@@ -136,13 +142,13 @@ def between(both: Lines, s: float, t: float) -> Vector:
 
 @inlined
 def clamp(value: float) -> float:
-    """Return the number of [0, 1] that is nearest."""
+    """Return the number from 0 to 1 that is nearest to a value."""
     return min(1.0, max(0.0, value))
 
 
 @inlined
 def nearest(both: Lines) -> tuple[float, float]:
-    """Return s and t of the nearest points of two segments.
+    """Return the places s and t of the nearest points of two segments.
 
     Source: Ericson, Real-Time Collision Detection (2005), section 5.1.9.
     """

@@ -1,4 +1,4 @@
-"""All arrays of one simulation, and how they change between calls of the kernels."""
+"""All arrays of one simulation, and their changes between calls of the kernels."""
 
 from __future__ import annotations
 
@@ -63,33 +63,33 @@ from dem.setting.hooks import Bar
 
 Array = NDArray[np.float64]
 
-# Skins and the width of a strip of the search, in diameters of the thickest segment. Measured on a shaken pile of 270,
-# see `benchmarks/`.
+# Thinnest and thickest skins of both lists, and the width of a strip of the search, in diameters of the thickest
+# segment. Measured on a shaken pile of 270, see `benchmarks/`.
 NEAR_SKINS, WIDE_SKINS, STRIP = (0.04, 0.15), (0.05, 2.0), 4.0
-NEAR_STEPS, WIDE_STEPS = 6, 40  # that they are to last, about
-FAR = 1e30  # m; where a link is marked that was not there when the list was built
-LISTS = ("first", "second", "slip", "used", "near")  # of pairs
-FRESH = ("touching", "nearest")  # of pairs, made anew in every step
-GROWTH = 1.5  # of a list that is full
+NEAR_STEPS, WIDE_STEPS = 6, 40  # steps that a skin of the tight and of the wide list should last
+FAR = 1e30  # m; recorded coordinate of segments that did not exist when the list was built
+LISTS = ("first", "second", "slip", "used", "near")  # fields of `Pairs` that are kept
+FRESH = ("touching", "nearest")  # fields of `Pairs` that every step writes anew
+GROWTH = 1.5  # factor on the length of a list that is full
 
 
 @dataclass(frozen=True)
 class Contacts:
     """All contacts at one instant."""
 
-    #: (M, 2) bodies that touch, the lower number first; a pair may be there more than once
+    #: (M, 2) numbers of two bodies that touch, the lower number first; a pair may occur more than once
     pairs: NDArray[np.int64]
-    touches: NDArray[np.int64]  #: (N,) points of contact of each body
-    depths: Array  #: (N,) deepest contact of each, over the overlap at which axes, or axis and surface, meet [1]
-    held: NDArray[np.bool_]  #: (N, 6) whether each touches each part of the boundaries, see `Ground`
-    elastic_energy: float  #: In all springs [J]
+    touches: NDArray[np.int64]  #: (N,) number of points of contact of each body
+    depths: Array  #: (N,) largest overlap of each body, over that at which axes, or an axis and a surface, meet [1]
+    held: NDArray[np.bool_]  #: (N, 6) whether each body touches each boundary, in the order of `Ground.force`
+    elastic_energy: float  #: Energy in the springs of all contacts [J]
 
 
 @dataclass
 class World:
-    """The simulation: all that kernels get.
+    """All data of a simulation, and methods that change it between calls of the kernels.
 
-    Bodies of the first shape, which `add` pours, are smarticles; `add_bodies` adds those of all shapes.
+    Bodies of the first shape are smarticles, which `add` adds; `add_bodies` adds bodies of any shape.
     """
 
     particle: Particle  #: One smarticle
@@ -97,14 +97,15 @@ class World:
     ground: Ground  #: The boundaries
     gravity: float  #: g, downwards [m/s²]
     planar: bool  #: Whether all motion is confined to the plane z = 0
-    keep_ledger: bool  #: Whether to add up what contacts dissipate
-    more: tuple[Shape, ...] = ()  #: Shapes of other bodies than smarticles
-    steps: int = 0
-    time_step: float = math.nan
-    motors: Motoring | None = None
-    articulated: bool = False
-    begin: float = 0.0  #: When steps of the present length began [s]
-    made: int = 0  #: Steps of the present length so far
+    keep_ledger: bool  #: Whether to sum the energy that contacts dissipate
+    more: tuple[Shape, ...] = ()  #: Shapes of bodies that are not smarticles
+    steps: int = 0  #: Number of steps made since the start
+    time_step: float = math.nan  #: dt [s]
+    motors: Motoring | None = None  #: The motors; None before the first articulation
+    articulated: bool = False  #: Whether barbs can turn at present
+    begin: float = 0.0  #: Time at which steps of the present length began [s]
+    made: int = 0  #: Number of steps of the present length so far
+    #: (TOTALS,) sums and state of the sub-steps; for the indices see `stepping.LOST`
     totals: Array = field(default_factory=lambda: np.array([0.0, 0.0, math.nan, 1.0, 1.0, 0.0]))
     hooks: Hooks | None = None
     rims: Rims | None = None
@@ -140,7 +141,7 @@ class World:
 
     @property
     def count(self) -> int:
-        """Bodies."""
+        """Number of bodies."""
         return len(self.bodies.position)
 
     @property
@@ -150,11 +151,11 @@ class World:
 
     @property
     def hinged(self) -> Motoring | None:
-        """The motors while smarticles are articulated, None while they are welded: as kernels want it."""
+        """The motors as argument of kernels: None while smarticles are welded."""
         return self.motors if self.articulated else None
 
     def set_time_step(self, time_step: float) -> None:
-        """Take steps of another length [s] from now on."""
+        """Set the length of all further steps [s]."""
         if self.made:
             self.begin, self.made = self.time, 0
         if not self.totals[PAST] < self.time_step:  # no sub-step, which would have to be kept
@@ -163,7 +164,7 @@ class World:
         self.skins[[2, 5]] = NEAR_STEPS * time_step, WIDE_STEPS * time_step
 
     def add(self, poses: Poses, *, speed: float = 0.0) -> None:
-        """See `Engine.add`."""
+        """Add welded smarticles that fall at a speed [m/s] without rotation."""
         # Poses are those of the principal axes; here the axes are the middle link's.
         middle = self.particle.boxes.link_rotations[1]
         turns = np.array([matrix_product(rotation.as_matrix(), middle) for rotation in poses.rotations])
@@ -173,10 +174,10 @@ class World:
         """Add bodies of one shape.
 
         Args:
-            shape: number of the shape: 0 the smarticle, then those of `more`.
+            shape: number of the shape: 0 for the smarticle, from 1 on the shapes of `more`.
             positions: (n, 3) centres of mass [m].
-            turns: (n, 3, 3) rotations, frame of the body to laboratory.
-            speed: downwards [m/s].
+            turns: (n, 3, 3) rotations from the frame of the body to the laboratory frame.
+            speed: downward speed of the bodies [m/s].
         """
         kind, fresh = self.kinds[shape], bodies_for(len(positions))
         fresh.position[:] = positions
@@ -221,7 +222,7 @@ class World:
         self.filaments = filaments_at(self.filaments, filament, bodies, points, velocities, starts, seed)
 
     def _lay_out_parts(self) -> None:
-        """Number parts and segments of all bodies."""
+        """Make the arrays of parts and segments for the present bodies."""
         shapes, kinds = self.bodies.shape, self.kinds
         flexible = np.array([kind.filament is not None for kind in kinds])
         sizes = np.array([len(kind.lines) for kind in kinds])
@@ -237,7 +238,8 @@ class World:
         fresh = np.append(True, (np.diff(own) != 0) | (np.diff(body) != 0)) if len(own) else np.zeros(0, np.bool_)
         hinged, bent = np.repeat(self.shapes.hinged[shapes], sizes), np.repeat(flexible, sizes)
         moved = hinged if self.articulated else 0  # links that move by themselves
-        self.links = (3 * body + np.where(hinged, own, 0)).astype(np.int32)  #: as records number them
+        #: (Q,) code of each segment's link in recorded contacts
+        self.links = (3 * body + np.where(hinged, own, 0)).astype(np.int32)
         self.segments = Segments(
             line=np.concatenate([np.zeros((0, LINE)), *(kinds[k].lines for k in shapes)]),
             begin=np.cumsum([0, *sizes]).astype(np.int32),
@@ -255,14 +257,14 @@ class World:
         return Bends(np.repeat(least[self.bodies.shape], sizes), np.zeros((int(sizes.sum()), 6)))
 
     def _make_room_at_boundaries(self) -> None:
-        """Remember contacts of as many segments as there are now, and as many of each as there can be."""
+        """Enlarge the memory of contacts with boundaries for the present segments and boundaries."""
         old, new = self.kept, no_contacts(len(self.segments.line), slots_for(self.hooks, self.rims))
         rows, slots = old.used.shape
         new.slip[:rows, :slots], new.used[:rows, :slots], new.contacts[:rows] = old.slip, old.used, old.contacts
         self.kept = new
 
     def add_hooks(self, hooks: Sequence[Sequence[Bar]]) -> None:
-        """Add the bars of the lower and the upper hook, before there are smarticles or rims."""
+        """Add the bars of the lower and the upper hook; must be called before bodies and rims are added."""
         assert not self.count
         counts = np.array([len(bars) for bars in hooks])
         most = int(counts.max())
@@ -280,13 +282,13 @@ class World:
         self._make_room_at_boundaries()
 
     def add_rim(self, height: float, radius: float) -> None:
-        """Add an edge of the wall at a height above its place [m], of a radius [m]."""
+        """Add a round edge of the wall, with its height above the wall's `place` [m] and its radius [m]."""
         old = self.rims or Rims(np.zeros(0), np.zeros(0))
         self.rims = Rims(np.append(old.heights, height), np.append(old.radii, radius))
         self._make_room_at_boundaries()
 
     def remove_wall(self) -> None:
-        """Take the wall away, and with it what links remember of it."""
+        """Remove the wall and the memory of contacts with it."""
         first = slots_for(self.hooks, None)
         walls = [slot for slot in range(END_SLOTS) if slot % boundaries.SURFACES] + list(
             range(first, slots_for(self.hooks, self.rims))
@@ -299,17 +301,17 @@ class World:
         self.kept = Kept(self.kept.slip[:, :first].copy(), self.kept.used[:, :first].copy(), self.kept.contacts)
 
     def set_articulated(self, articulated: bool) -> None:
-        """Have velocities for each link of a smarticle, or for whole smarticles."""
+        """Let each link of a smarticle move as a part of its own, or the whole smarticle as one part."""
         self.articulated = articulated
         self._lay_out_parts()
 
     def forget_places(self) -> None:
-        """Have neighbours looked for anew at the next step."""
+        """Make the next step rebuild both lists of near segments."""
         for marks in (self.pairs.wide_marks, self.pairs.near_marks):
             marks[:, :6], marks[:, 6] = FAR, 0.0
 
     def make_room(self, capacity: int = 0) -> None:
-        """Make the lists as long as so many bodies need, or for `capacity` pairs at least."""
+        """Enlarge all lists for the present bodies, and for at least `capacity` pairs."""
         rows, links = len(self.segments.line), len(self.segments.first) - 1
         capacity = max(capacity, 12 * rows + 256, len(self.pairs.first))
         # Those of a checkpoint are as long as what is in them, each of its own length.
@@ -323,7 +325,7 @@ class World:
                 self.ledger = np.zeros((entries, LEDGER))
 
     def advance(self, steps: int) -> None:
-        """Make whole steps, however many calls that takes."""
+        """Make steps, with as many calls of the kernel as they need."""
         target = self.made + steps
         while self.made < target:
             made = self._call(target - self.made)
@@ -339,7 +341,7 @@ class World:
 
     @property
     def system(self) -> System:
-        """Everything that kernels read and change."""
+        """All data that kernels read or write, except scratch arrays."""
         law, wall_law = self.laws
         return System(
             self.shapes, law, wall_law, self.bodies, self.parts, self.segments, self.pairs, self.kept, self._known,
@@ -352,12 +354,12 @@ class World:
 
     @property
     def scratch(self) -> Scratch:
-        """Arrays that kernels write before they read them."""
+        """Scratch arrays of the kernels."""
         rows = np.zeros((self.kept.used.shape[1], boundaries.COLUMNS))
         return Scratch(self.cells, self.meeting, rows, self.plane)
 
     def posed(self) -> Bodies:
-        """Return the bodies with everything brought up to this instant that follows from their state."""
+        """Return the bodies, after computing all that follows from their state."""
         pose_all(self.shapes, self.bodies, self.parts, self.segments, self.hinged)
         if self.filaments is not None:
             pose_filaments_from_python(self.filaments, self.bodies, self.parts, self.segments)
@@ -367,7 +369,7 @@ class World:
         """Return poses and velocities of all links of a pile of smarticles.
 
         Raises:
-            RunError: the simulation has blown up.
+            RunError: a position or velocity is not finite.
         """
         bodies, boxes, n = self.posed(), self.particle.boxes, self.count
         states = (bodies.position, bodies.velocity, bodies.spin)
@@ -384,9 +386,9 @@ class World:
         return State(boxes, places, frames, velocities, spins)
 
     def contacts(self) -> Contacts:
-        """Return all contacts at this instant; nothing of the simulation is changed.
+        """Return all contacts at this instant, without a change of the simulation.
 
-        The wide list has room for what the last step has moved, but does not have smarticles that were added since.
+        The wide list is still valid after the last step; contacts of bodies that were added since are missing.
         """
         self.posed()
         found, count, energy = self._query()
@@ -407,17 +409,17 @@ class World:
         )  # fmt: skip
 
     def extremes(self, velocities: Array) -> list[float]:
-        """Return the extremes of all smarticles at the instant of the last `state`, see `queries.find_extremes`.
+        """Return the 7 extremes of `queries.find_extremes`, at the instant of the last call of `state`.
 
         Args:
-            velocities: (N, 3, 3) of the links' centres, from that state [m/s].
+            velocities: (N, 3, 3) velocities of the links' centres in this state [m/s].
         """
         found, (query, _, energy) = np.empty(7), self._query()
         find_extremes(self.bodies, self.segments, query.depth, velocities, energy, found)
         return [float(value) for value in found]
 
     def forces(self) -> Array:
-        """Return the forces at all points of contact, (P, WIDTH) as `queries` has the columns."""
+        """Return the forces at all P points of contact, (P, WIDTH); for the columns see `queries.FIRST`."""
         self.posed()
         slip, contacts, (law, wall_law) = np.zeros(4), self.scratch.contacts, self.laws
         bodies, parts, segments, known = self.bodies, self.parts, self.segments, self._known
@@ -441,7 +443,7 @@ class World:
 
     @property
     def arrays(self) -> dict[str, NDArray[Any]]:
-        """All arrays that `restore` needs."""
+        """All arrays that `restore` needs, by name."""
         found: dict[str, NDArray[Any]] = {"totals": self.totals, "fast": self.skins}
         pairs, near = int(self.pairs.counts[0]), int(self.pairs.counts[1])
         for group, values in self._groups().items():
@@ -479,7 +481,7 @@ class World:
         }
 
     def restore(self, arrays: dict[str, NDArray[Any]], memory: Mapping[str, Any]) -> None:
-        """Go on from where `arrays` and `memory` were taken."""
+        """Restore the state that `arrays` and `memory` returned."""
 
         def group(kind: Any, name: str) -> Any:
             return kind(**{field: arrays[f"{name}.{field}"] for field in kind._fields})
@@ -500,7 +502,7 @@ class World:
 
 
 def quaternion_of(matrix: Array) -> Array:
-    """(4,) unit quaternion (w, x, y, z) of a rotation matrix (3, 3)."""
+    """Return the unit quaternion (w, x, y, z) of a rotation matrix (3, 3)."""
     m = matrix
     squares = np.array([m.trace(), *np.diag(m)])
     k = int(squares.argmax())
@@ -518,18 +520,22 @@ def quaternion_of(matrix: Array) -> Array:
 
 
 def no_contacts(segments: int, slots: int) -> Kept:
-    """Return the memory of segments that have touched no boundary."""
+    """Return the memory of segments that touch no boundary, with `slots` contacts of each at most."""
     return Kept(np.zeros((segments, slots, 4)), np.zeros((segments, slots), np.uint8), np.zeros(segments, np.uint8))
 
 
 def longer(array: NDArray[Any], length: int) -> NDArray[Any]:
-    """The array with zeros appended up to a length."""
+    """Return the array with zeros appended up to a length."""
     more = np.zeros((length - len(array), *array.shape[1:]), array.dtype)
     return np.concatenate([array, more])
 
 
 def _rows(write: Callable[[Array], int]) -> Array:
-    """Return what a kernel writes, with as much room as it needs."""
+    """Return the rows that a kernel writes, after making room for all.
+
+    Args:
+        write: function that writes as many rows as fit into its argument, and returns the number of rows needed.
+    """
     rows = np.zeros((256, WIDTH))
     while (count := write(rows)) > len(rows):
         rows = np.zeros((count, WIDTH))

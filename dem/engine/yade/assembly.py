@@ -1,4 +1,4 @@
-"""Smarticles as rigid bodies of spheres: one body if welded, three links and two hinges if articulated.
+"""Smarticles as rigid bodies of spheres: one body if welded, three bodies and two hinges otherwise.
 
 Welding and articulating conserve positions, momentum and angular momentum up to rounding. Articulating also conserves
 the kinetic energy; welding dissipates the energy of the links' relative motion.
@@ -42,7 +42,7 @@ class Assembly:
         self._ids: list[int] = []
         self._to_body: list[Any] = []
         self._states: list[Any] = []
-        self.smarticle_of: dict[int, int] = {}  #: Smarticle by id of sphere
+        self.smarticle_of: dict[int, int] = {}  #: Number of the smarticle by the id of a sphere
         # Link poses in the frames of welded bodies; of no meaning while articulated.
         self._arms: Array = np.empty((0, LINKS, 3))
         self._turns: Array = np.empty((0, LINKS, 3, 3))
@@ -67,7 +67,7 @@ class Assembly:
         }
 
     def bind(self) -> None:
-        """Look up YADE's objects, all of which loading replaces."""
+        """Look up YADE's objects again, after loading has replaced them."""
         bodies = self._yade.omega.bodies
         self._states = [bodies[body].state for body in self._ids]
 
@@ -204,7 +204,11 @@ class Assembly:
         return before - self.state().kinetic_energy
 
     def anchor(self, smarticle: int, link: int, point: Array) -> tuple[int, Array]:
-        """Return the body of an articulated link, and in its frame a point (3,) of the link's frame [m]."""
+        """Return the id of an articulated link's body, and a point of the link in the frame of this body.
+
+        Args:
+            point: (3,) the point in the link's frame [m].
+        """
         number = LINKS * smarticle + link
         arm = self._to_body[number] * self._yade.vector(*point)
         return self._ids[number], np.array([arm[0], arm[1], arm[2]])
@@ -282,12 +286,12 @@ def clump(
     Args:
         members: ids of the spheres.
         local: (k, 3) centres of the spheres in the body's principal frame [m].
-        mass: [kg].
-        inertia: (3,) principal moments [kg m²].
+        mass: mass of the body [kg].
+        inertia: (3,) principal moments of inertia of the body [kg m²].
         position: (3,) centre of mass [m].
-        rotation: (3, 3) from the principal frame to the laboratory frame.
-        velocity: (3,) of the centre of mass [m/s].
-        angular_momentum: (3,) about the centre of mass [kg m²/s].
+        rotation: (3, 3) rotation from the principal frame to the laboratory frame.
+        velocity: (3,) velocity of the centre of mass [m/s].
+        angular_momentum: (3,) angular momentum about the centre of mass [kg m²/s].
         planar: whether the body moves along x and y and turns about z only; z is then its third principal axis.
 
     Returns:

@@ -39,10 +39,10 @@ class YadeBoundaries:
         self.moving: list[int] = []  #: Ids of the bodies that move at present, all at one velocity
         self._sums = [yade.vector(0, 0, 0) for _ in self.measured]
         self.book_removal: Callable[[Callable[[], None]], None] = lambda remove: remove()
-        """Calls a function that removes contacts; replaced by the energy ledger's method."""
+        """Function that calls its argument, which removes contacts; replaced by the energy ledger's method."""
 
     def bind(self) -> None:
-        """Look up YADE's objects, all of which loading replaces."""
+        """Look up YADE's objects again, after loading has replaced them."""
         bodies = self._yade.omega.bodies
         # The loaded simulation may have no wall.
         self.container = [body for body in self.container if bodies[body] is not None]
@@ -100,10 +100,9 @@ class YadeBoundaries:
         return float(self._upper.pos[2])
 
     def parts(self) -> Mapping[str, tuple[Sequence[int], float]]:
-        """Return the boundaries that can hold smarticles, by name; none without hooks.
+        """Return the boundaries between which smarticles can be held, by name; none without hooks.
 
-        The values are the ids of the boundary's bodies, and the height by which it was raised relative to the floor
-        since the start [m].
+        A value has the ids of a boundary's bodies, and the rise of the boundary above the floor since the start [m].
         """
         if not self.hooks:
             return {}

@@ -61,7 +61,7 @@ def contact_forces(yade: Yade, assembly: Assembly, boundaries: YadeBoundaries) -
 def measure_overlaps(
     yade: Yade, assembly: Assembly, boundaries: YadeBoundaries, law: ContactLaw, limit: float
 ) -> Overlaps:
-    """Return the overlaps of all contacts, with the smarticles that have one deeper than a limit [m]."""
+    """Return the overlaps; `Overlaps.deep` marks smarticles with an overlap above `limit` [m]."""
     hinges = assembly.hinges
     # Called often: without hinges all interactions are contacts, so that their bodies need not be looked up.
     contacts = contacts_of(yade, assembly) if hinges is not None else (c for c in yade.omega.interactions if c.isReal)
@@ -83,7 +83,7 @@ def measure_overlaps(
 
 
 def _held(yade: Yade, assembly: Assembly, boundaries: YadeBoundaries, deep: Flags, least: float) -> tuple[Held, ...]:
-    """Return the smarticles of `deep` (N,) between two boundaries which moved apart by over `least` [m]."""
+    """Return the smarticles of `deep` (N,) between boundaries whose distance changed by over `least` [m]."""
     parts = boundaries.parts()
     part_of = {body: name for name, (bodies, _) in parts.items() for body in bodies}
     touched: dict[int, set[str]] = defaultdict(set)

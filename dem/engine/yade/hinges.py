@@ -36,11 +36,11 @@ BARBS = (0, 2)  # links that hinge 1 and hinge 2 join to the middle link
 class HingeLaw:
     """Stiffness and damping of the hinges."""
 
-    pin_stiffness: float  #: Against a gap between the links [N/m]
-    tilt_stiffness: float  #: Against rotation of a link out of the common plane [N m/rad]
+    pin_stiffness: float  #: Stiffness against a gap between the links [N/m]
+    tilt_stiffness: float  #: Stiffness against rotation of a link out of the common plane [N m/rad]
     shaft_stiffness: float  #: Twist stiffness of the motor's shaft [N m/rad]
     torque_cap: float | None  #: Torque at which a shaft slips [N m]; None: it does not slip
-    shaft_damping: float = 0.0  #: Derivative gain of the motors [N m s/rad], which the stable time step depends on
+    shaft_damping: float = 0.0  #: Derivative gain of the motors [N m s/rad]; only the stable time step uses it
     damper_time: float = DAMPER_TIME  #: Least relaxation time of the dampers [s], at least a time step
 
     @property

@@ -60,7 +60,11 @@ class YadeKind:
 
 
 def hinge_law(scene: Demand, time_step: float = 0.0) -> HingeLaw:
-    """Return the law of the hinges of a scene with motors; dampers relax in `DAMPER_TIME` or longer."""
+    """Return the law of the hinges of a scene with motors.
+
+    Args:
+        time_step: time step [s]; the dampers' relaxation time is not shorter than this, nor than `DAMPER_TIME`.
+    """
     motor, pin = scene.motor, scene.fidelity.hinge_stiffness_N_per_m
     return HingeLaw(
         pin_stiffness=pin,

@@ -26,15 +26,15 @@ _SUMS = ("container_work", "added", "dissipated")
 class Contacts:
     """M contacts in one step."""
 
-    normals: Array  #: (M, 3) from the first body to the second [1]
-    before: Array  #: (M, 3) velocity of the second body relative to the first at the contact, before the step [m/s]
-    after: Array  #: (M, 3) that relative velocity after the step, with which the bodies move [m/s]
-    overlaps: Array  #: (M,) [m]
-    viscous: Array  #: (M,) normal viscous force of the step, positive where bodies approach [N]
-    shear: Array  #: (M, 3) elastic shear force [N]
-    stiffness: Array  #: (M, 2) normal and tangential [N/m]
-    damping: Array  #: (M, 2) normal and tangential [N s/m]
-    friction: Array  #: (M,) Coulomb coefficient [1]
+    normals: Array  #: (M, 3) unit vectors from the first body to the second [1]
+    before: Array  #: (M, 3) velocities of second bodies relative to first bodies at the contacts before the step [m/s]
+    after: Array  #: (M, 3) relative velocities at the contacts after the step, with which the bodies move [m/s]
+    overlaps: Array  #: (M,) overlaps [m]
+    viscous: Array  #: (M,) normal viscous forces of the step, positive where bodies approach [N]
+    shear: Array  #: (M, 3) elastic tangential forces [N]
+    stiffness: Array  #: (M, 2) normal and tangential stiffness [N/m]
+    damping: Array  #: (M, 2) normal and tangential damping [N s/m]
+    friction: Array  #: (M,) Coulomb coefficients [1]
 
     @property
     def elastic_energy(self) -> float:
@@ -66,13 +66,22 @@ class Contacts:
         return float(normal.sum() + shear.sum())
 
     def _split(self, velocities: Array) -> tuple[Array, Array]:
-        """Return speeds of approach (M,) and tangential velocities of the first body to the second (M, 3)."""
+        """Split relative velocities (M, 3) into approach speeds (M,) and tangential velocities (M, 3) [m/s].
+
+        Velocities to split are those of the second body relative to the first; the tangential velocities are those of
+        the first body relative to the second.
+        """
         closing = -np.einsum("mi,mi->m", velocities, self.normals)
         return closing, -(velocities + closing[:, None] * self.normals)
 
 
 class YadeLedger:
-    """`dem.engine.interface.EnergyLedger` on YADE; `dissipation_interval` in s, None: no samples."""
+    """`dem.engine.interface.EnergyLedger` on YADE.
+
+    Args:
+        works: whether to sum the work of moving boundaries.
+        dissipation_interval: time between samples of the dissipation [s]; None: no samples.
+    """
 
     def __init__(
         self,
@@ -97,7 +106,7 @@ class YadeLedger:
         self._every = max(1, round(self._interval / time_step)) if self._interval else 0
 
     def step(self, number: int, advance: Callable[[], None]) -> None:
-        """Make the step of a number by calling `advance`, and add its work and dissipation to the sums."""
+        """Make the step numbered `number` by calling `advance`, and add its work and dissipation to the sums."""
         if not self._every or number % self._every:
             advance()
         else:

@@ -15,7 +15,12 @@ from dem.physics.motor import MotorLaw, Motors
 
 
 class YadeMotors:
-    """`dem.engine.interface.Motors` on YADE, with factors (N, 2) on torque limit and stiffness [1]."""
+    """`dem.engine.interface.Motors` on YADE.
+
+    Args:
+        law: law of the motors; None if smarticles stay welded.
+        strengths: (N, 2) factors on torque limit and stiffness [1]; None: 1 for all motors.
+    """
 
     updates_at_once = 1  # YADE returns to Python after every step anyway
 

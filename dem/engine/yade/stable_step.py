@@ -62,7 +62,7 @@ def stable_time_step(particle: Particle, law: ContactLaw) -> float:
 def hinged_stable_time_step(particle: Particle, law: ContactLaw, hinges: HingeLaw) -> float:
     """Return the largest stable time step [s] of an articulated smarticle with its hinges and contacts.
 
-    The smarticle is three links with 18 degrees of freedom, joined by the hinges' springs, with the contacts of
+    The smarticle has three links with 18 degrees of freedom, joined by the hinges' springs. Its contacts are those of
     `stable_time_step`: a barb's tip at another tip or at the container, a flat pile, and a rolling one. With matrices M
     of mass, K of stiffness and C of damping, a step is stable while K dt² + 2 C dt - 4 M has no positive eigenvalue.
     """
@@ -95,9 +95,15 @@ def planar_stable_time_step(
 ) -> float:
     """Return the largest stable time step [s] of articulated smarticles that lie side by side in a plane.
 
-    The stiffest modes are a barb along another barb that moves against it, where each sphere touches
-    `CONTACTS_IN_A_ROW` spheres; a middle link along a wall, which all spheres of its outer row touch; and a barb with a
-    string at its tip; `strings` have a stiffness [N/m] and a damping [N s/m] each.
+    The step is the least over the stiffest modes:
+
+    - a barb that lies along another barb, which moves in the opposite direction; each sphere touches
+      `CONTACTS_IN_A_ROW` spheres;
+    - a middle link that lies along a wall, which all spheres of its outer row touch;
+    - a barb with a string at its tip.
+
+    Args:
+        strings: stiffness [N/m] and damping [N s/m] of each string.
     """
     boxes = particle.boxes
     mass, pins = _mass_matrix(boxes), _hinge_stiffness(boxes, hinges)
@@ -116,7 +122,7 @@ def planar_stable_time_step(
 
 
 def _roll_shape(particle: Particle) -> Array:
-    """Return (18, 18) the stiffness matrix of tangential springs of 1 N/m at all spheres' highest points."""
+    """Return the stiffness matrix (18, 18) of tangential springs of 1 N/m at all spheres' highest points."""
     shape = np.zeros((6 * LINKS, 6 * LINKS))
     for link, height in zip(particle.links, particle.centres[:, 2] + particle.radius, strict=True):
         about = slice(6 * int(link) + 3, 6 * int(link) + 5)
@@ -133,7 +139,7 @@ def _stable_step(mass: Array, stiffness: Array, damping: Array) -> float:
 
 
 def _mass_matrix(boxes: Boxes) -> Array:
-    """Return (18, 18) the mass matrix for velocity and angular velocity of each link, in the body frame."""
+    """Return the mass matrix (18, 18) for velocity and angular velocity of each link, in the body frame."""
     blocks = []
     for moved, moments, rotation in zip(boxes.link_masses, boxes.link_inertias, boxes.link_rotations, strict=True):
         blocks += [moved * np.eye(3), rotation @ np.diag(moments) @ rotation.T]
@@ -141,7 +147,11 @@ def _mass_matrix(boxes: Boxes) -> Array:
 
 
 def _velocity_of(boxes: Boxes, link: int, point: Array) -> Array:
-    """Return the matrix (3, 18) from all links' velocities to that of a point (3,) [m], in the body frame."""
+    """Return the matrix (3, 18) that maps the velocities of all links to that of a point of `link`.
+
+    Args:
+        point: (3,) the point in the body frame [m].
+    """
     x, y, z = point - boxes.link_centres[link]
     rows = np.zeros((3, 6 * LINKS))
     rows[:, 6 * link : 6 * link + 3] = np.eye(3)
@@ -150,7 +160,7 @@ def _velocity_of(boxes: Boxes, link: int, point: Array) -> Array:
 
 
 def _hinge_stiffness(boxes: Boxes, law: HingeLaw) -> Array:
-    """Return (18, 18) the stiffness matrix of both hinges."""
+    """Return the stiffness matrix (18, 18) of both hinges."""
     stiffness = np.zeros((6 * LINKS, 6 * LINKS))
     plane = np.eye(3)[:2]
     # The damper acts half way between the centre and the end of the axis (see `dem.engine.yade.hinges`).
@@ -169,19 +179,19 @@ def _hinge_stiffness(boxes: Boxes, law: HingeLaw) -> Array:
 
 
 def _twist(barb: int) -> Array:
-    """Return the matrix (1, 18) from the velocities of all links to the rate of a barb's angle."""
+    """Return the matrix (1, 18) that maps the velocities of all links to the rate of a barb's angle."""
     row = np.zeros((1, 6 * LINKS))
     row[0, 6 * barb + 5], row[0, 11] = 1, -1
     return row
 
 
 def _twist_shape() -> Array:
-    """Return (18, 18) the stiffness matrix of twist springs of 1 N m/rad at both hinges."""
+    """Return the stiffness matrix (18, 18) of twist springs of 1 N m/rad at both hinges."""
     return np.asarray(sum(_twist(barb).T @ _twist(barb) for barb in (0, 2)))
 
 
 def _push_shape(particle: Particle, spheres: Iterable[int], directions: Array) -> Array:
-    """Return (18, 18) the stiffness matrix of springs of 1 N/m at some spheres, along directions (k, 3)."""
+    """Return the stiffness matrix (18, 18) of springs of 1 N/m at some spheres, along directions (k, 3)."""
     shape = np.zeros((6 * LINKS, 6 * LINKS))
     for sphere in spheres:
         rows = directions @ _velocity_of(particle.boxes, int(particle.links[sphere]), particle.centres[sphere])

@@ -20,7 +20,7 @@ from dem.physics.contact import StringLaw
 
 @dataclass(frozen=True, kw_only=True)
 class End:
-    """One string."""
+    """One string: the point at which it is tied to a link, and its anchor."""
 
     body: int  #: Id of the link's body
     arm: Sequence[float]  #: (3,) tied point in YADE's frame of the body [m]

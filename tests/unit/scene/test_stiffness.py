@@ -23,17 +23,21 @@ def deepest(scene: Scene) -> float:
     return max(overlap.widths for overlap in expected_overlaps(scene))
 
 
-def test_ordinary_scenes_keep_the_stiffness_of_their_name() -> None:
-    assert links().fidelity.stiffness_N_per_m == 250.0
-    assert deepest(links()) < WANTED
+@pytest.mark.parametrize(("base", "stiffness"), [("draft", 500.0), ("standard", 1000.0), ("reference", 2000.0)])
+def test_ordinary_scenes_keep_the_stiffness_of_their_name(base: str, stiffness: float) -> None:
+    for ratio in (0.0, 0.4, 1.1):
+        scene = links(fidelity=base, smarticle={"aspect_ratio": ratio})
+        assert scene.fidelity.stiffness_N_per_m == stiffness
+        assert deepest(scene) < WANTED[base]
 
 
+@pytest.mark.parametrize("base", WANTED)
 @pytest.mark.parametrize("changes", [{"phases": [THROWN]}, {"gravity_m_per_s2": 100.0}])
-def test_hard_scenes_get_what_they_need(changes: dict[str, Any]) -> None:
-    scene = links(**changes)
+def test_hard_scenes_get_what_they_need(changes: dict[str, Any], base: str) -> None:
+    scene = links(fidelity=base, **changes)
     assert scene.fidelity.stiffness_N_per_m > 1000.0
-    assert 0.9 * WANTED < deepest(scene) <= WANTED
-    assert scene.fidelity.base == "draft"
+    assert 0.9 * WANTED[base] < deepest(scene) <= WANTED[base]
+    assert scene.fidelity.base == base
     # A resolved scene says its stiffness, and stays as it is when it is read again.
     again = Scene.model_validate(scene.model_dump(mode="json"))
     assert again.fidelity == scene.fidelity

@@ -1,1 +1,1 @@
-"""Kernels of forces: links on links, boundaries and strings on links."""
+"""Kernels of forces on links: from other links, boundaries and strings."""

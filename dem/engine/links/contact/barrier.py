@@ -1,17 +1,17 @@
 """The barrier that keeps axes apart, and the sub-steps that resolve it.
 
-A contact's energy is kn/2 u(δ)², u the stretched overlap. Up to a quarter of the room, u = δ: ordinary contacts are
-linear. Beyond it u grows without bound as the overlap fills the room, in which the axes of two links, or an axis and a
-surface, would meet:
+A contact's energy is kn/2 u(δ)², with the overlap δ and the stretched overlap u. The room is the overlap at which the
+axes of two links, or an axis and a surface, would meet. Up to a quarter of the room u = δ, so that ordinary contacts
+are linear. Beyond it u grows without bound as δ approaches the room:
 
     u = δ + room x³ / (1 - x),   x = (δ - room/4) / (3/4 room),
 
 which has two continuous derivatives. The force is kn u u', the stiffness kn h² with h² = u'² + u u''. Dashpots are
-scaled by the hardening h, so that their ratio to critical damping stays, and restitution with it (Tsuji et al., Powder
-Technol. 71, 239 (1992)). No load passes, in the spirit of incremental potential contact (Li et al., ACM Trans. Graph.
-39, 49 (2020)), whose logarithm it replaces by a rational function that joins a linear spring.
+scaled by the hardening h, which keeps the damping ratio and the restitution constant (Tsuji et al., Powder Technol. 71,
+239 (1992)). No load can push axes through each other, as in incremental potential contact (Li et al., ACM Trans. Graph.
+39, 49 (2020)); its logarithm is replaced by a rational function that joins a linear spring.
 
-Time steps are stable for the linear spring. Where a contact is stiffer, or closes fast, the step is divided.
+Time steps are stable for the linear spring. A step is divided into sub-steps if a contact is stiffer or closes fast.
 """
 
 from __future__ import annotations
@@ -27,18 +27,18 @@ LAST = 0.95  # x from which on u follows its tangent, so that a pile that is tak
 APPROACH = 0.25  # of the room that is left, which a contact may close in a sub-step
 STRIDE, LONGEST = 0.25, 0.5  # radii that a link moves in a sub-step, and from which on a step is divided
 FINEST = 1024  # sub-steps of a step, a power of two
-SLACK = 1.2  # of what is asked for: a step is a tenth shorter than the stable one
+SLACK = 1.2  # factor by which sub-steps may be longer than needed, since a step is a tenth shorter than the stable one
 
 
 class Step(NamedTuple):
-    """Lengths of time around one evaluation of forces [s].
+    """Times at one evaluation of forces, and the number of sub-steps that the forces need.
 
-    The forces themselves decide how long the next sub-step is, and so how long they act.
+    The length of the next sub-step, for which the forces act, follows from `need`.
     """
 
-    past: float  #: Since the last evaluation, over which tangential springs have stretched
-    whole: float  #: An undivided time step
-    need: Array  #: (1,) sub-steps per step that contacts and speeds ask for; written
+    past: float  #: Time since the last evaluation, over which tangential springs have stretched [s]
+    whole: float  #: Length of an undivided time step [s]
+    need: Array  #: (1,) number of sub-steps per time step that contacts and speeds need; kernels raise it
 
 
 @inlined
@@ -67,7 +67,14 @@ def stretch(depth: float, room: float) -> tuple[float, float, float]:
 
 @part
 def _demand(depth: float, room: float, closing: float, whole: float) -> float:
-    """Sub-steps per step that a contact beyond the linear range asks for."""
+    """Return the number of sub-steps per time step that a contact beyond the linear range needs.
+
+    Args:
+        depth: overlap [m].
+        room: overlap at which axes meet [m].
+        closing: rate at which the overlap grows [m/s].
+        whole: length of an undivided time step [s].
+    """
     left = max(room - depth, 1e-6 * room)
     ahead = min(depth + max(0.0, min(whole * closing, APPROACH * left)), room)
     _, _, hardening = stretch(ahead, room)
@@ -77,10 +84,10 @@ def _demand(depth: float, room: float, closing: float, whole: float) -> float:
 
 @inlined
 def resolve(step: Step, depth: float, room: float, closing: float) -> None:
-    """Ask for sub-steps where a contact leaves the linear range within a step.
+    """Raise `step.need` if a contact is beyond the linear range, or gets there within a time step.
 
     Args:
-        step: `need` is written.
+        step: `need` is raised.
         depth: overlap [m].
         room: overlap at which axes meet [m].
         closing: rate at which the overlap grows [m/s].
@@ -91,10 +98,10 @@ def resolve(step: Step, depth: float, room: float, closing: float) -> None:
 
 @inlined
 def ticks_for(need: float, tick: int) -> int:
-    """Length of the next sub-step in ticks, of which a step has `FINEST`.
+    """Return the length of the next sub-step in ticks; a time step has `FINEST` ticks.
 
     Args:
-        need: sub-steps per step that are asked for.
+        need: number of sub-steps per time step that are needed.
         tick: ticks of the step that have passed; sub-steps begin at multiples of their own length.
     """
     ticks = FINEST

@@ -1,11 +1,12 @@
 """Contacts of links with boundaries: floor, round wall, its edges, the walls of a channel, and hooks.
 
-`contacts_of_segment` is the only place that knows their geometry. Forces, queries and recorded contacts read its rows.
+`contacts_of_segment` alone computes the geometry of these contacts. Forces, queries and recorded contacts read the rows
+that it writes.
 
-A plane, and the inside of a round wall, are met by a straight link with its ends: no other point is nearer. Joints
-count once, as ends of the first segment that has them. A link meets a round edge with one point. The bars of hooks are
-swept segments, as links are, and meet them as other links do; the force along a link that slides off the end of a bar
-is left out, less than a hundredth of the normal one.
+A straight link touches a plane, and the inside of a round wall, with its ends: no other point is nearer. A joint counts
+once, as an end of the first segment that has it. A link touches a round edge with one point. The bars of hooks are
+swept segments, so that links touch them as they touch other links. The force along a link that slides off the end of a
+bar is left out; it is less than a hundredth of the normal force.
 """
 
 from __future__ import annotations
@@ -38,9 +39,9 @@ from dem.engine.links.contact.pairs import enter, push, velocity_at
 from dem.engine.links.shapes import AT_START, RADIUS
 from dem.engine.links.vectors import Vector, add, along, dot, put, scale, sub, vector
 
-# Columns of a row that `contacts_of_segment` writes: slot in the memory of contacts; the boundary; overlap [m]; share
-# of a whole contact [1]; energy over kn/2 u² [1]; the point on the link's axis [m]; normal, from the boundary [1];
-# overlap at which axes meet, or an axis and a surface [m].
+# Columns of a row that `contacts_of_segment` writes: slot in the memory of contacts; index of the boundary; overlap
+# [m]; fraction of a full contact's springs and dashpots that acts here [1]; energy over kn/2 u² [1]; the point on the
+# link's axis [m]; normal, from the boundary [1]; overlap at which axes, or an axis and a surface, would meet [m].
 SLOT, PART, DEPTH, SHARE, FACTOR, AXIS, NORMAL, ROOM, COLUMNS = 0, 1, 2, 3, 4, 5, 8, 11, 12
 SURFACES = 3  # of an end of a link
 END_SLOTS = 2 * SURFACES
@@ -53,7 +54,7 @@ MET_PLACE, MET_NORMAL, MET_SHARE, MET_DISTANCE = meeting.PLACE, meeting.NORMAL, 
 
 
 def slots_for(hooks: Hooks | None, rims: Rims | None) -> int:
-    """Return the number of contacts with boundaries that a link can have."""
+    """Return the largest number of contacts that a segment can have with boundaries."""
     bars = 0 if hooks is None else 2 * hooks.bars.shape[1]
     return END_SLOTS + POINTS * bars + (0 if rims is None else len(rims.radii))
 
@@ -62,7 +63,7 @@ def slots_for(hooks: Hooks | None, rims: Rims | None) -> int:
 def _note(
     rows: Array, count: int, slot: int, part_of: int, depth: float, room: float, point: Vector, normal: Vector
 ) -> int:
-    """Write a whole contact at a point of an axis; the number of rows."""
+    """Write a full contact (SHARE 1) at a point of a link's axis; return the new number of rows."""
     row = rows[count]
     row[SLOT], row[PART], row[DEPTH], row[SHARE], row[FACTOR], row[ROOM] = slot, part_of, depth, 1.0, 1.0, room
     put(row, AXIS, point)
@@ -77,16 +78,17 @@ def contacts_of_segment(
     """Find the contacts of a segment with all boundaries.
 
     Args:
-        segments: where all segments are.
-        ground: floor and wall, and where all boundaries are.
-        channel: (1,) half the distance of the walls that stand in for the container [m]; None for a container.
-        hooks: None where there are none.
-        rims: None where the wall has no edges that links can reach.
-        p: the segment; joints at its ends are contacts of the segments that have them first.
-        rows: (slots, COLUMNS) written, see `SLOT`.
+        segments: all segments, with their positions.
+        ground: floor and wall, and the heights of all boundaries.
+        channel: (1,) half the distance of a channel's walls [m]; None in a container.
+        hooks: the hooks; None: no hooks.
+        rims: edges of the wall that links can reach; None: no such edges.
+        p: number of the segment; contacts at a joint belong to the first segment that has the joint.
+        rows: (slots, COLUMNS) written; for the columns see `SLOT`.
+        met: scratch of `meeting.meet`.
 
     Returns:
-        Rows that were written.
+        Number of rows that were written.
     """
     link, shared, count = segments.line[p], segments.shared[p], 0
     radius = link[RADIUS]
@@ -123,7 +125,7 @@ def contacts_of_segment(
 
 @inlined
 def _contacts_with_wall(radius: float, ground: Ground, slot: int, point: Vector, rows: Array, count: int) -> int:
-    """Find the contacts of an end with wall and ceilings; the number of rows."""
+    """Find the contacts of a link's end with wall and ceilings; return the new number of rows."""
     x, y, z = point
     height, r, tiers = z - ground.place[WALL], math.sqrt(x * x + y * y), ground.radii.shape[0]
     lifted = ground.flags[1] != 0
@@ -157,7 +159,7 @@ def _contacts_with_wall(radius: float, ground: Ground, slot: int, point: Vector,
 
 @inlined
 def _contacts_with_rims(link: Array, ground: Ground, rims: Rims, first: int, rows: Array, count: int) -> int:
-    """Find the contacts of a link, but for its ends, with round edges of the wall; the number of rows."""
+    """Find the contacts of a link, without its ends, with the wall's edges; return the new number of rows."""
     if ground.flags[0] == 0:
         return count
     z, uz, radius = link[2], link[5], link[RADIUS]
@@ -178,7 +180,7 @@ def _contacts_with_rims(link: Array, ground: Ground, rims: Rims, first: int, row
 
 @inlined
 def _contacts_with_hooks(link: Array, ground: Ground, hooks: Hooks, rows: Array, count: int, met: Array) -> int:
-    """Find the contacts of a segment with the bars of both hooks; the number of rows."""
+    """Find the contacts of a segment with the bars of both hooks; return the new number of rows."""
     reach = link[RADIUS] + hooks.radius
     for hook in range(2):
         height = ground.place[LOWER + hook]
@@ -217,7 +219,7 @@ def _contacts_with_hooks(link: Array, ground: Ground, hooks: Hooks, rows: Array,
 def contacts_with_boundaries(
     segments: Segments, ground: Ground, channel: Any, hooks: Any, rims: Any, p: int, rows: Array, met: Array
 ) -> int:
-    """Call `contacts_of_segment`, compiled apart and not inlined: for queries, where speed matters less."""
+    """Call `contacts_of_segment` without inlining it, for queries, in which speed matters less."""
     return contacts_of_segment(segments, ground, channel, hooks, rims, p, rows, met)
 
 
@@ -228,12 +230,16 @@ def contacts_with_boundaries(
 def place_and_motion(
     radius: float, parts: Parts, ground: Ground, row: int, contact: Array
 ) -> tuple[Vector, Vector, float, float]:
-    """Return where a contact is [m], the part's velocity there [m/s], the boundary's [m/s], the part's turn [rad/s].
+    """Return position and motion at a contact of a segment with a boundary.
 
     Args:
-        radius: of the segment [m].
-        row: part that the segment moves with.
-        contact: (COLUMNS,) see `SLOT`.
+        radius: radius of the segment [m].
+        row: number of the part with which the segment moves.
+        contact: (COLUMNS,) the contact; for the columns see `SLOT`.
+
+    Returns:
+        Position [m]; velocity of the part there [m/s]; vertical velocity of the boundary [m/s]; angular velocity of the
+        part about the normal [rad/s].
     """
     normal, part_of = vector(contact, NORMAL), int(contact[PART])
     place = sub(vector(contact, AXIS), scale(radius - 0.5 * contact[DEPTH], normal))
@@ -249,11 +255,13 @@ def push_boundaries(
     """Add the forces of all boundaries on all segments.
 
     Args:
-        law: of contacts with boundaries.
-        bodies: `deepest` is written.
-        parts: `load` is written.
-        kept: memory of the contacts; brought up to date.
-        ground: `force` is written.
+        law: law of contacts with boundaries.
+        bodies: `deepest` is raised.
+        parts: forces are added to `load`.
+        kept: memory of the contacts, which is updated.
+        ground: forces of the bodies on boundaries are added to `force`.
+        rows: scratch of `contacts_of_segment`.
+        met: scratch of `meeting.meet`.
 
     Returns:
         Energy of tangential springs whose contacts have ended [J].
@@ -283,7 +291,7 @@ def _rub(
     law: Law, bodies: Bodies, parts: Parts, segments: Segments, p: int, ground: Ground, ledger: Any, step: Step,
     contact: Array, slip: Array,
 ) -> None:  # fmt: skip
-    """Let a boundary push a segment at a contact."""
+    """Add the force of a boundary on segment `p` at a contact, and update the tangential spring `slip`."""
     i, row, damping = segments.body[p], segments.part[p], law.damping[bodies.shape[segments.body[p]], 0]
     depth, share, room, normal = contact[DEPTH], contact[SHARE], contact[ROOM], vector(contact, NORMAL)
     place, velocity, speed, turning = place_and_motion(segments.line[p, RADIUS], parts, ground, row, contact)
@@ -310,7 +318,7 @@ def _rub(
 
 @part
 def _squared(link: Array, s: float, radius: float, height: float) -> float:
-    """Return the squared distance of a point of a link's axis from a horizontal circle about the z-axis [m²]."""
+    """Return the squared distance [m²] of a point of an axis from a horizontal circle about the z-axis."""
     x, y, z = along(vector(link, 0), s, vector(link, 3))
     out, up = math.sqrt(x * x + y * y) - radius, z - height
     return float(out * out + up * up)
@@ -318,12 +326,12 @@ def _squared(link: Array, s: float, radius: float, height: float) -> float:
 
 @part
 def nearest_to_circle(link: Array, radius: float, height: float) -> float:
-    """Return where along a link's axis, from 0 to 1, it is nearest to a horizontal circle about the z-axis.
+    """Return the place on a link's axis, 0 to 1, that is nearest to a horizontal circle about the z-axis.
 
     Args:
         link: (6,) start of the axis and vector to its end [m].
-        radius: of the circle [m].
-        height: of the circle [m].
+        radius: radius of the circle [m].
+        height: height of the circle [m].
     """
     # A line can come near a circle twice: the best of some points says about which.
     best, least = 0, math.inf

@@ -1,4 +1,4 @@
-"""Forces of strings: springs with a dashpot that pull and never push, as `dem.physics.contact.StringLaw` says."""
+"""Forces of strings by `dem.physics.contact.StringLaw`: springs with a dashpot that never push."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from dem.engine.links.vectors import add, dot, put, put_more, scale, sub, turned
 
 @part
 def find_knot(bodies: Bodies, cords: Cords, k: int) -> None:
-    """Write where a string is tied into `knot`; needs `plane` and `axes`."""
+    """Write the position of a knot into `cords.knot[k]`, from `plane`, `axes` and `position` of `bodies`."""
     i, kind = cords.owner[k, 0], cords.owner[k, 1]
     row = bodies.plane[i]
     if kind == 1:
@@ -28,7 +28,7 @@ def find_knot(bodies: Bodies, cords: Cords, k: int) -> None:
 
 @kernel
 def find_knots(bodies: Bodies, cords: Cords) -> None:
-    """Write where all strings are tied into `knot`; needs smarticles that are posed."""
+    """Write the positions of all knots into `cords.knot`; bodies must be posed before."""
     for k in range(cords.along.shape[0]):
         find_knot(bodies, cords, k)
 
@@ -38,8 +38,9 @@ def pull(bodies: Bodies, parts: Parts, cords: Cords, hinged: Any, step: Step) ->
     """Add the forces of the strings.
 
     Args:
-        parts: `load` is written.
+        parts: forces are added to `load`.
         cords: the strings; `sums` and `knot` are written.
+        hinged: the motors; None while smarticles are welded.
 
     Returns:
         Power of the strings on the links [W].

@@ -1,4 +1,4 @@
-"""The contact law: a linear spring and a dashpot that never pull, and a tangential spring with Coulomb friction."""
+"""The contact law: normal spring and dashpot that never pull, tangential spring with Coulomb friction."""
 
 from __future__ import annotations
 
@@ -11,15 +11,15 @@ from dem.engine.links.vectors import Vector, add, along, cross, dot, put, scale,
 
 @inlined
 def share_of_step(depth: float, closing: float, dt: float) -> float:
-    """Return the share of the spring's force that acts where a contact begins or ends within a step [1].
+    """Return a factor on the spring's force [1], below 1 in the first and the last step of a contact.
 
-    The leapfrog scheme keeps kn/2 δ_n δ_n+1 of consecutive overlaps. With this share, 1 inside of a contact, the sum of
-    a contact's work is zero however its first and last overlap lie between 0 and a step's way; with the whole force a
-    contact takes (ω dt)²/12 of its energy away, ω its frequency.
+    In these steps the bodies are in contact for a part of the step only. The leapfrog scheme conserves kn/2 δ_n δ_n+1
+    of consecutive overlaps. With this factor a contact does no work in total, whatever its first and last overlap are.
+    With the factor 1 in all steps it would dissipate (ω dt)²/12 of its energy, ω being its angular frequency.
 
     Args:
         depth: overlap [m].
-        closing: rate at which it grows [m/s].
+        closing: rate at which the overlap grows [m/s].
         dt: time step [s].
     """
     way = abs(closing) * dt
@@ -31,21 +31,22 @@ def resist(
     law: Law, cn: float, load: float, share: float, hardening: float, normal: Vector, velocity: Vector, twist: float,
     dt: float, slip: Array,
 ) -> Vector:  # fmt: skip
-    """Return the force on the first body at a point beyond the spring's [N].
+    """Return the force on the first body at a point of contact [N], without that of the normal spring.
 
-    The tangential spring keeps its direction in the tangent plane and turns with the two bodies about the normal. Where
-    it would exceed friction it is cut to it, and the tangential dashpot is silent: as YADE's `ViscElPhys` does.
+    The tangential spring keeps its direction in the tangent plane and turns with the two bodies about the normal. If
+    its force would exceed the friction limit, the force is reduced to the limit and the tangential dashpot does not
+    act, as in YADE's `ViscElPhys`.
 
     Args:
-        cn: of the normal dashpot [N s/m].
-        load: of the normal spring here [N], not negative.
-        share: of a whole contact's springs and dashpots that acts here [1].
-        hardening: of the normal dashpot, see `barrier.stretch` [1].
-        normal: from the second body to the first [1].
-        velocity: of the first body against the second [m/s].
-        twist: mean turn of both bodies about the normal in a step [rad].
+        cn: damping coefficient of the normal dashpot [N s/m].
+        load: force of the normal spring at this point [N], 0 or more.
+        share: fraction of a full contact's springs and dashpots that acts at this point [1].
+        hardening: factor on the normal dashpot, see `barrier.stretch` [1].
+        normal: unit vector from the second body to the first [1].
+        velocity: velocity of the first body relative to the second [m/s].
+        twist: mean rotation of both bodies about the normal in the step [rad].
         dt: time step [s].
-        slip: (4,) stretch of the tangential spring [m], of a whole contact, and its energy [J]; brought up to date.
+        slip: (4,) stretch of the tangential spring of a full contact [m], and its energy [J]; both are updated.
     """
     approach = dot(velocity, normal)
     pressed = load - cn * share * hardening * approach

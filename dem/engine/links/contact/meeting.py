@@ -1,25 +1,26 @@
-"""How two segments push each other apart: where, and with what springs, derived from one energy.
+"""Compute where two segments push each other apart, and with which forces, from one energy.
 
-For two swept segments with the greatest overlap δ0, at their nearest points, and overlaps δ1 and δ2 at the two ends of
-the stretch over which they lie along each other (at the end of one link and the nearest point of the other; 0 where
-these do not touch), of length ℓ, and with u(δ) the stretched overlap of `dem.engine.links.contact.barrier`,
+Two swept segments have their greatest overlap δ0 at their nearest points. They lie along each other over a stretch of
+length ℓ. δ1 and δ2 are the overlaps at the two ends of this stretch, between the end of one link and the nearest point
+of the other; they are 0 if these points do not touch. With the stretched overlap u(δ) of
+`dem.engine.links.contact.barrier` the energy is
 
     E = kn/2 (u0² + g(ℓ) (u1 u2 / u0)²),   g from 0 to 1 as ℓ grows from 0 to a diameter.
 
-Ordinary contacts have u = δ. Links that cross have δ1 δ2 = 0 and one contact. Links that lie on each other have
-δ0 = δ1 = δ2 and two contacts, at the ends; tilted ones have δ0 = δ1 and again two, of δ1 and δ2, so that a bar rests on
-a bar and resists tilting. Between these the energy is smooth: there is no angle at which links change from one to two
-contacts, and nothing jumps. The
-forces are its derivatives. Nearest points and ends are extremal or fixed, so that forces act along the normals of the
-three pairs of points alone, and along the first link where ℓ changes:
+Ordinary contacts have u = δ. Links that cross have δ1 δ2 = 0 and one contact. Parallel links have δ0 = δ1 = δ2 and two
+contacts, at the ends of the stretch. Tilted links have δ0 = δ1 and two contacts, with δ1 and δ2, so that a bar that
+rests on a bar resists tilting. Between these cases the energy is smooth: at no angle does a force jump. The forces are
+the derivatives of the energy. Since nearest points and ends are extremal or fixed, the forces act along the normals of
+the three pairs of points, and along the first link if ℓ changes:
 
     f0 = kn u0 u0' (1 - g x1² x2²),  f1 = kn g u1 u1' x2²,  f2 = kn g u2 u2' x1²,  x = u/u0,
     f_ℓ = kn/2 (u1 u2/u0)² g'.
 
-A segment that starts or ends at a joint, where another one of its body has an end already, would count the overlap
-there twice. Its E is therefore less by kn/2 u_h², of the overlap of the joint itself with the other segment, which the
-segment before has in its own E; for two joints that meet less by both and more by that of joint against joint. What
-remains goes to zero as the point of contact moves to the joint, and a bend is as stiff as a bar.
+At a joint two segments of a body have a common end. If both touch another segment, the overlap at the joint would count
+twice. From the energy E of the later segment therefore kn/2 u_h² is subtracted, with the overlap of the joint itself
+and the other segment, which is in the energy of the earlier segment. If joints of both bodies are near each other, this
+is done for both, and the energy of joint against joint is added. The rest of E goes to zero as the point of contact
+moves to the joint, so that a bend is as stiff as a straight bar.
 """
 
 from __future__ import annotations
@@ -46,31 +47,32 @@ from dem.engine.links.vectors import (
     vector,
 )  # fmt: skip
 
-# Rows of what `meet` writes: three points that can rub, then forces without friction, each with its place.
+# Rows that `meet` writes: three points of contact, then bare forces: forces without friction and dashpot.
 POINTS, BARE = 3, 10
 ENERGY = POINTS + BARE  # row whose first number is E
 ROWS = ENERGY + 1
-# Columns of a point: place [m], normal from the second link to the first [1], load of the spring [N], the part of it
-# that friction and dashpot go with [N], share of a whole contact [1] (0: there is no contact), hardening of the dashpot
-# [1], distance of the axes [m]. Of a bare force: place [m], force on the first link [N]. Of the energy: E [J], and the
-# greatest overlap [m].
+# Columns of a point of contact: position [m], normal from the second link to the first [1], load of the normal spring
+# [N], the part of the load that friction and dashpot follow [N], fraction of a full contact's springs and dashpots that
+# acts here [1] (0: no contact), hardening of the dashpot [1], distance of the axes [m]. Of a bare force: position [m],
+# force on the first link [N]. Of the energy: E [J], and the greatest overlap [m].
 PLACE, NORMAL, LOAD, CARRIED, SHARE, HARDENING, DISTANCE, COLUMNS = 0, 3, 6, 7, 8, 9, 10, 11
 FORCE = 3
 
 
 @part
 def meet(p: Array, q: Array, stiffness: float, shared_p: int, shared_q: int, out: Array) -> int:
-    """Find the points of contact of two segments, and the springs there.
+    """Find the points of contact of two segments, and the forces there.
 
     Args:
         p: (LINE,) the first segment.
-        q: (LINE,) the second one.
-        shared_p: ends of the first segment that are joints of segments before it, see `shapes.AT_START`.
-        shared_q: those of the second one.
-        out: (ROWS, COLUMNS) written.
+        q: (LINE,) the second segment.
+        stiffness: kn [N/m].
+        shared_p: ends of the first segment that are ends of earlier segments of its body, see `shapes.AT_START`.
+        shared_q: such ends of the second segment.
+        out: (ROWS, COLUMNS) written; for the columns see `PLACE`.
 
     Returns:
-        0 where the segments are apart, otherwise 1 + the number of rows with bare forces.
+        0 if the segments are apart, otherwise 1 + the number of rows with bare forces.
     """
     both, diameter = lines(p, q), p[RADIUS] + q[RADIUS]
     s, t = nearest(both)
@@ -86,16 +88,17 @@ def meet_at(
     both: Lines, s: float, t: float, gap: Vector, distance: float, diameter: float, stiffness: float,
     shared_p: int, shared_q: int, out: Array,
 ) -> int:  # fmt: skip
-    """Write what `meet` does of segments that touch, whose nearest points are known; the number of bare forces.
+    """Do what `meet` does for segments that touch; return the number of bare forces.
 
     Args:
-        s: of the nearest point of the first segment.
-        t: of the nearest point of the second one.
-        gap: from the second nearest point to the first [m].
-        distance: of the two [m].
+        s: place of the nearest point along the first segment, 0 to 1.
+        t: place of the nearest point along the second segment, 0 to 1.
+        gap: vector from the second segment's nearest point to that of the first [m].
+        distance: length of `gap` [m].
         diameter: sum of both radii [m].
+        stiffness: kn [N/m].
         shared_p: joints of the first segment, as in `meet`.
-        shared_q: joints of the second one.
+        shared_q: joints of the second segment, as in `meet`.
         out: (ROWS, COLUMNS) written.
     """
     deepest = diameter - distance
@@ -121,16 +124,16 @@ def meet_at(
 
 @inlined
 def meets_elsewhere(both: Lines, reach: float, shared_p: int, shared_q: int) -> int:
-    """Count places besides the nearest points at which `meet_at` may find forces; 0 for most segments that touch.
+    """Count places besides the nearest points at which `meet_at` may find forces.
 
-    Without a branch: what segments do at their ends and joints cannot be predicted, and a branch that is mispredicted
-    takes as long as all of this. The numbers are those of `_lie_along` and `_joint`, bit for bit; a joint at an end,
-    which is rare, always counts.
+    Most segments that touch have no such place. The code has no branches, since a mispredicted branch takes as long as
+    the whole function. Numbers are bitwise equal to those of `_lie_along` and `_joint`. A joint at the end of a
+    segment, which is rare, always counts.
 
     Args:
         reach: square of the sum of both radii [m²].
         shared_p: joints of the first segment, as in `meet`.
-        shared_q: joints of the second one.
+        shared_q: joints of the second segment, as in `meet`.
     """
     b, d, e = both.b, both.d, both.e
     start, end = -d * both.inverse_a, (b - d) * both.inverse_a
@@ -168,7 +171,7 @@ def _note(
     out: Array, k: int, both: Lines, s: float, t: float, gap: Vector, distance: float, load: float, share: float,
     hardening: float,
 ) -> None:  # fmt: skip
-    """Write a point: half way between the two axes."""
+    """Write a point of contact, half way between the two axes, into row `k` of `out`."""
     row = out[k]
     put(row, PLACE, _halfway(both, s, t))
     put(row, NORMAL, scale(1 / distance, gap))
@@ -180,7 +183,11 @@ def _note(
 def _lie_along(
     both: Lines, deepest: float, u: float, slope: float, diameter: float, stiffness: float, out: Array
 ) -> int:
-    """Add what the two ends of the stretch carry over which links lie along each other; the number of bare forces."""
+    """Write the contacts at both ends of the stretch over which links lie along each other.
+
+    Returns:
+        Number of bare forces.
+    """
     b, d, e = both.b, both.d, both.e
     # Where on the first link, in its lengths, are the second one's ends?
     start, end = -d * both.inverse_a, (b - d) * both.inverse_a
@@ -233,7 +240,16 @@ def _lie_along(
 def _joint(
     both: Lines, diameter: float, stiffness: float, s: float, t: float, sign: float, bare: int, out: Array
 ) -> int:
-    """Take off (sign -1) or add the contact of a joint with a point of the other segment; the number of bare forces."""
+    """Subtract (sign -1) or add (sign 1) the contact of a joint with a point of the other segment.
+
+    Args:
+        s: place of the joint or the point along the first segment, 0 to 1.
+        t: place of the joint or the point along the second segment, 0 to 1.
+        bare: number of bare forces so far.
+
+    Returns:
+        New number of bare forces.
+    """
     gap = sub(sub(along(both.p, s, both.u), both.q), scale(t, both.v))
     squared = dot(gap, gap)
     if squared >= diameter * diameter:

@@ -52,8 +52,8 @@ from dem.engine.links.vectors import (
     vector,
 )
 
-# Columns of the ledger: both parts (-1: a boundary), point of contact [m], force on the first one [N], half of its
-# power with the velocities before [W], energy that its spring took up [J].
+# Columns of the ledger: both parts (-1: a boundary), point of contact [m], force on the first part [N], half of its
+# power with the velocities before the kick [W], energy that the tangential spring took up [J].
 ROWS, POINT, PUSH, POWER, GAIN = 0, 2, 5, 8, 9
 
 
@@ -77,13 +77,13 @@ def _extend(stretch: Any, row: int, arm: Vector, force: Vector) -> None:
 
 @inlined
 def push(parts: Parts, row: int, place: Vector, force: Vector) -> None:
-    """Let a force act on a point of a part.
+    """Add a force at a point of a part to the part's load.
 
     Args:
-        parts: `load` is added to.
-        row: the part.
+        parts: `load` is written.
+        row: number of the part.
         place: the point [m].
-        force: on it [N].
+        force: force on the part [N].
     """
     load = parts.load[row]
     put_more(load, 0, force)
@@ -94,15 +94,15 @@ def push(parts: Parts, row: int, place: Vector, force: Vector) -> None:
 
 @inlined
 def enter(ledger: Array, rows: tuple[int, int], place: Vector, force: Vector, power: float, gain: float) -> None:
-    """Append a contact force, without the normal spring's part, to the ledger.
+    """Append a contact force, without the force of the normal spring, to the ledger.
 
     Args:
         ledger: (n, LEDGER); row 0 begins with the number of rows in use.
-        rows: both parts; -1 for a boundary.
+        rows: numbers of both parts; -1 for a boundary.
         place: point of contact [m].
-        force: on the first one [N].
-        power: half of its power with the velocities before [W].
-        gain: energy that its spring took up [J].
+        force: force on the first part [N].
+        power: half of the power of this force with the velocities before the kick [W].
+        gain: energy that the tangential spring took up [J].
     """
     n = int(ledger[0, 0]) + 1
     ledger[0, 0] = n
@@ -123,12 +123,15 @@ def velocity_at(parts: Parts, row: int, place: Vector) -> Vector:
 
 @inlined
 def motion_at(parts: Parts, rows: tuple[int, int], place: Vector, normal: Vector) -> tuple[Vector, float]:
-    """Return the velocity of one part against another at a point [m/s], and the sum of their turns [rad/s].
+    """Return the relative velocity of two parts at a point, and the sum of their rotations about a normal.
 
     Args:
-        rows: both parts.
+        rows: numbers of both parts.
         place: the point [m].
-        normal: that turns are about [1].
+        normal: unit vector [1].
+
+    Returns:
+        Velocity of the first part relative to the second [m/s]; sum of both angular velocities about `normal` [rad/s].
     """
     velocity = sub(velocity_at(parts, rows[0], place), velocity_at(parts, rows[1], place))
     one, other = parts.motion[rows[0]], parts.motion[rows[1]]
@@ -147,20 +150,23 @@ def _rub(
     place: Vector, normal: Vector, depth: float, load: float, carried: float, share: float, hardening: float,
     slip: Array,
 ) -> float:  # fmt: skip
-    """Let two segments push each other apart at a point; the rate at which they close [m/s].
+    """Add the forces of two segments on each other at a point of contact.
 
     Args:
-        damping: cn of both bodies [N s/m].
-        parts: `load` is written.
-        rows: both parts.
+        damping: cn of a contact of these bodies [N s/m].
+        parts: forces are added to `load`.
+        rows: numbers of both parts.
         place: the point [m].
-        normal: from the second segment to the first [1].
+        normal: unit vector from the second segment to the first [1].
         depth: overlap [m].
-        load: of the normal spring [N].
-        carried: the part of it that friction and dashpot go with [N].
-        share: of a whole contact [1].
-        hardening: of the dashpot [1].
-        slip: (4,) of the tangential spring; brought up to date.
+        load: force of the normal spring [N].
+        carried: the part of `load` that friction and dashpot follow [N].
+        share: fraction of a full contact's springs and dashpots that acts here [1].
+        hardening: factor on the dashpot [1].
+        slip: (4,) stretch [m] and energy [J] of the tangential spring, which are updated.
+
+    Returns:
+        Rate at which the overlap grows [m/s].
     """
     velocity, turning = motion_at(parts, rows, place, normal)
     closing = -dot(velocity, normal)
@@ -183,9 +189,9 @@ def push_apart(
     """Add the forces of all pairs that touch.
 
     Args:
-        bodies: `deepest` is written.
-        parts: `load` is written.
-        pairs: pairs that may touch; `slip` and `used` are brought up to date.
+        bodies: `deepest` is raised.
+        parts: forces are added to `load`.
+        pairs: pairs that may touch; `slip` and `used` are updated.
         out: (ROWS, COLUMNS) scratch.
 
     Returns:
@@ -250,9 +256,9 @@ def push_apart(
 
 @inlined
 def _find_touching(line: Array, pairs: Pairs) -> int:
-    """Write which of the near pairs touch, or did so in the last step, into `touching` and `nearest`; their number.
+    """Find the near pairs that touch or did so in the last step; return their number.
 
-    Without a branch, which would be mispredicted.
+    `touching` and `nearest` of `pairs` are written, without a branch, which would be mispredicted.
     """
     count = 0
     for k in range(pairs.counts[1]):
@@ -268,10 +274,14 @@ def _find_touching(line: Array, pairs: Pairs) -> int:
 
 @inlined
 def _forget(pairs: Pairs, pair: int, points: int) -> float:
-    """End the contacts at some points of a pair, given as bits.
+    """End contacts of a pair: reset their tangential springs.
+
+    Args:
+        pair: index of the pair.
+        points: bits of the points at which contacts end.
 
     Returns:
-        What their tangential springs held [J].
+        Energy that these springs had [J].
     """
     energy = 0.0
     for slot in range(POINTS):

@@ -1,9 +1,8 @@
-"""What is asked of the contacts at one instant: which smarticles touch, extremes, energies, and forces for output.
+"""Query the contacts at one instant: which bodies touch, extremes, energies, and forces for output.
 
-Nothing of the simulation changes. The wide list must be good for the instant. Forces are those that the next step
-begins with, but for the stretch that tangential springs gain in that step: the same geometry and the same law, over no
-time and on copies of the springs. What acts without friction along a link, or takes back what a hinge has twice, goes
-with the points of its pair.
+A query changes nothing in the simulation. The wide list must be valid at this instant. Forces are computed like those
+at the beginning of the next step, but with a time step of 0 and on copies of the tangential springs, so that springs
+are not stretched. Bare forces (see `meeting`) are recorded as points of the contact of their pair.
 """
 
 from __future__ import annotations
@@ -48,17 +47,21 @@ SLOT, PART, DEPTH, FACTOR, ROOM, AT, PARTLY = (
 class Found(NamedTuple):
     """Results of a query of all contacts."""
 
-    met: Indices  #: (P, 2) numbers of the bodies whose segments touch, in order
-    touches: Any  #: (N,) points of contact of each body; added to
-    held: Any  #: (N, 6) whether each body touches each boundary
-    depth: Array  #: (N,) deepest contact of each body, over the overlap at which axes, or axis and surface, meet [1]
+    met: Indices  #: (P, 2) numbers of the two bodies of each pair of segments that touch
+    touches: Any  #: (N,) number of points of contact of each body
+    held: Any  #: (N, 6) whether each body touches each boundary, in the order of `Ground.force`
+    depth: Array  #: (N,) largest overlap of each body, over that at which axes, or an axis and a surface, meet [1]
     out: Array  #: Scratch of `meet`
     rows: Array  #: Scratch of `contacts_of_segment`
 
 
 @part
 def _query_pairs(segments: Segments, pairs: Pairs, stiffness: float, found: Found) -> tuple[int, float]:
-    """Query all pairs of the wide list; rows of `met` that were written, and the energy of all normal springs [J]."""
+    """Query all pairs of the wide list.
+
+    Returns:
+        Number of rows of `met` that were written, and energy of all normal springs [J].
+    """
     line, count, energy, out = segments.line, 0, 0.0, found.out
     for k in range(pairs.counts[0]):
         p, q = pairs.first[k], pairs.second[k]
@@ -83,7 +86,7 @@ def _query_pairs(segments: Segments, pairs: Pairs, stiffness: float, found: Foun
 def _query_boundaries(
     segments: Segments, ground: Ground, channel: Any, hooks: Any, rims: Any, stiffness: float, found: Found
 ) -> float:
-    """Query all contacts with boundaries; the energy of all normal springs [J]."""
+    """Query all contacts with boundaries; return the energy of their normal springs [J]."""
     squares = 0.0
     for p in range(segments.line.shape[0]):
         i = segments.body[p]
@@ -106,12 +109,12 @@ def query_all(
     """Query all contacts.
 
     Args:
-        stiffness: of contacts between bodies [N/m].
-        wall_stiffness: of contacts with boundaries [N/m].
-        found: written; depths and counts are zero.
+        stiffness: kn of contacts between bodies [N/m].
+        wall_stiffness: kn of contacts with boundaries [N/m].
+        found: results; `touches`, `held` and `depth` must be zero before the call.
 
     Returns:
-        Rows of `met` that were written, and the energy of all springs [J].
+        Number of rows of `met` that were written, and energy of all springs [J].
     """
     count, energy = _query_pairs(segments, pairs, stiffness, found)
     energy += _query_boundaries(
@@ -124,16 +127,15 @@ def query_all(
 def find_extremes(
     bodies: Bodies, segments: Segments, depths: Array, velocities: Array, energy: float, extremes: Array
 ) -> None:
-    """Find the extremes of all bodies in one call: enough for a watchdog as long as all is well.
+    """Find extremes over all bodies, which prove in most cases that no limit of the watchdog is exceeded.
 
     Args:
         depths: (N,) see `Found.depth`.
-        velocities: (N, 3, 3) of the links' centres [m/s].
-        energy: of all springs of contacts [J].
-        extremes: (7,) written: largest speed of a link [m/s]; height of the lowest and of the highest end of an axis
-            [m]; distance of the farthest one from the vertical axis [m]; deepest contact now and between two queries,
-            over the overlap at which axes meet [1]; energy of all springs of contacts [J]. A speed that is no number
-            makes the first one no number.
+        velocities: (N, 3, 3) velocities of the links' centres [m/s].
+        energy: energy of all springs of contacts [J].
+        extremes: (7,) written: largest speed of a link [m/s], NaN if any speed or overlap is not finite; heights of the
+            lowest and of the highest end of an axis [m]; largest distance of such an end from the container's axis [m];
+            largest overlap now, and since the last query, over that at which axes meet [1]; `energy`.
     """
     line = segments.line
     fastest, total = 0.0, 0.0
@@ -182,18 +184,18 @@ def _write(
     rows: Array, count: int, first: float, second: float, load: float, carried: float, place: Vector, normal: Vector,
     force: Vector,
 ) -> int:  # fmt: skip
-    """Write one point where there is room; `count` + 1.
+    """Write one point of contact if there is room; return `count` + 1.
 
     Args:
-        rows: (…, WIDTH).
-        count: place.
-        first: what touches.
-        second: what is touched.
-        load: of the spring [N].
-        carried: the part of it that dashpot and friction go with [N].
+        rows: (…, WIDTH) written; for the columns see `FIRST`.
+        count: number of the row.
+        first: code of the first link, see `dem.body.forces.at_links`.
+        second: code of the second link or of the boundary.
+        load: force of the normal spring [N].
+        carried: the part of `load` that dashpot and friction follow [N].
         place: the point [m].
-        normal: of the contact [1].
-        force: beyond the spring's [N].
+        normal: normal of the contact, towards the first link [1].
+        force: force on the first link without that of the normal spring [N].
     """
     if count < rows.shape[0]:
         row, pressing = rows[count], dot(force, normal)
@@ -215,15 +217,16 @@ def forces_of_pairs(
     law: Law, bodies: Bodies, parts: Parts, segments: Segments, pairs: Pairs, links: Indices, out: Array, slip: Array,
     rows: Array,
 ) -> int:  # fmt: skip
-    """Write the forces of bodies on each other.
+    """Write the forces of bodies on each other, one row per point of contact and per bare force.
 
     Args:
-        links: (Q,) number that each segment's link is recorded with.
+        links: (Q,) code of each segment's link, see `dem.body.forces.at_links`.
+        out: scratch of `meet`.
         slip: (4,) scratch.
-        rows: (…, WIDTH) written.
+        rows: (…, WIDTH) written; for the columns see `FIRST`.
 
     Returns:
-        Rows that were written, or would have been: there may be more than there is room for.
+        Number of rows that are needed; rows that do not fit into `rows` are not written.
     """
     line, count = segments.line, 0
     for k in range(pairs.counts[0]):
@@ -259,13 +262,17 @@ def forces_of_boundaries(
     law: Law, bodies: Bodies, parts: Parts, segments: Segments, kept: Kept, known: Boundaries, links: Indices,
     out: Array, contacts: Array, slip: Array, rows: Array,
 ) -> int:  # fmt: skip
-    """Write a row per contact with a boundary; return the rows needed, see `forces_of_pairs`.
+    """Write the forces of boundaries on bodies, one row per contact.
 
     Args:
-        links: (Q,) number that each segment's link is recorded with.
+        links: (Q,) code of each segment's link, see `dem.body.forces.at_links`.
+        out: scratch of `meet`.
         contacts: scratch of `contacts_of_segment`.
         slip: (4,) scratch.
-        rows: (…, WIDTH) written.
+        rows: (…, WIDTH) written; for the columns see `FIRST`.
+
+    Returns:
+        Number of rows that are needed; rows that do not fit into `rows` are not written.
     """
     count = 0
     for p in range(segments.line.shape[0]):

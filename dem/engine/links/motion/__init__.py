@@ -1,1 +1,1 @@
-"""Kernels of motion: the plane geometry of a smarticle, its pose, its motors, its steps."""
+"""Kernels of motion: the plane geometry of a smarticle, poses, motors, and the motion in a step."""

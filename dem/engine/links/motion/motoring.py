@@ -1,17 +1,18 @@
-"""Motors in the kernels: what they measure, what they prescribe, and what they exert.
+"""Kernels of the motors: torques and work, prescribed rates, and torques at free angles.
 
-Halt, stall and ease are the limit of a stiff shaft: the rate of an angle is prescribed, constant between two looks. The
-mean torque that a motor needed for it since the last look follows from the momentum p that belongs to its angle:
-τ = dp/dt - ∂T/∂α - Q, Q the generalised force of contacts; weight has none, as angles move no centre of mass. At a look
-the rate jumps at once, by no more than what τ_max alone would give to a free barb in the period (`acceleration`): a
-motor turns round at a pace that it has the torque for. It stops at once: a gear that holds needs no torque of the
-motor. What a jump takes is in the work, exactly, and not in the torque that the law looks at, which is the load.
+Under the laws halt, stall and ease a motor is the limit of a stiff shaft: it prescribes the rate of an angle, which is
+constant between two control updates. The mean torque of the motor since the last control update follows from the
+momentum p that belongs to the angle (see `planar`): τ = dp/dt - ∂T/∂α - Q, with the generalised force Q of contacts.
+Weight has no such force, since angles do not move the centre of mass. At a control update the rate jumps by at most
+the change that τ_max would cause in a control period at a free barb (`Motoring.acceleration`), so that a motor reverses
+only as fast as its torque allows. A motor stops at once, since a gear holds without torque of the motor. The work
+includes the energy of a jump, exactly; the torque that the law compares with τ_max does not, since it is the load.
 
-Slip and servo let the angle be free: p is a state of its own, and τ a spring to the command, capped, and for a servo
-damped. The spring is taken at the mean of the angles half a step before and after, the damper at the rate after, so
-that no stiffness and no damping is unstable.
+Under the laws slip and servo the angle is free: p is part of the state. The torque τ is that of a spring to the
+command, capped at τ_max, and for a servo also of a damper. The spring acts at the mean of the angles half a step before
+and half a step after, the damper at the rate after, so that both are stable at any stiffness and damping.
 
-Work and kinetic energy agree to the second order in the time step, in kicks and in jumps exactly.
+Work and change of kinetic energy agree to second order in the time step; in kicks and jumps they agree exactly.
 """
 
 from __future__ import annotations
@@ -44,7 +45,7 @@ ITERATIONS = 3  # of the implicit midpoint rule; each gains the factor of the tu
 
 @kernel
 def engage(shapes: Shapes, bodies: Bodies, motors: Motoring) -> None:
-    """Take hold of the barbs where they are, without torque; `motors` and `rate` are written."""
+    """Start all motors at the present angles, without torque; `motors` and `bodies.rate` are written."""
     for i in range(bodies.position.shape[0]):
         if not shapes.hinged[bodies.shape[i]]:
             continue
@@ -63,10 +64,10 @@ def engage(shapes: Shapes, bodies: Bodies, motors: Motoring) -> None:
 
 @kernel
 def release(shapes: Shapes, bodies: Bodies, motors: Motoring) -> float:
-    """Stop all barbs at once: smarticles become rigid. `rate` is written, work up to now is counted.
+    """Stop all barbs, which makes smarticles rigid; `bodies.rate` is written, and `motors` as by `note`.
 
     Returns:
-        Kinetic energy of the links' motion against each other [J], which is lost.
+        Lost kinetic energy of the links' relative motion [J].
     """
     lost = 0.0
     note(shapes, bodies, motors)
@@ -83,7 +84,7 @@ def release(shapes: Shapes, bodies: Bodies, motors: Motoring) -> float:
 
 @kernel
 def note(shapes: Shapes, bodies: Bodies, motors: Motoring) -> None:
-    """Count torque and work since the last control update; `motors` is written, poses are brought up to date."""
+    """Compute torques and work since the last control update; `motors` and `bodies.axes` are written."""
     _note(shapes, bodies, motors)
 
 
@@ -115,7 +116,7 @@ def _note(shapes: Shapes, bodies: Bodies, motors: Motoring) -> None:
 
 @kernel
 def work_so_far(shapes: Shapes, bodies: Bodies, motors: Motoring) -> float:
-    """Work of all motors up to now [J]; poses are brought up, nothing else is written."""
+    """Return the work of all motors up to now [J]; only `bodies.axes` is written."""
     total = 0.0
     for i in range(bodies.position.shape[0]):
         if not shapes.hinged[bodies.shape[i]]:
@@ -133,12 +134,13 @@ def work_so_far(shapes: Shapes, bodies: Bodies, motors: Motoring) -> float:
 
 @part
 def update(shapes: Shapes, bodies: Bodies, motors: Motoring) -> None:
-    """What the motors do in the control period that begins now, by the row of `targets` that is due.
+    """Make a control update: compute rates or commands for the control period that begins.
 
-    Where nobody has told what comes after the last row they go on by it.
+    The targets are the row of `motors.targets` that is due; after the last row this row is used again.
 
     Args:
         bodies: the smarticles; `rate` is written.
+        motors: the motors; written.
     """
     now, interval = min(motors.due[0], motors.targets.shape[0] - 1), motors.interval
     motors.due[0], motors.due[1] = now + 1, motors.period
@@ -169,7 +171,16 @@ def update(shapes: Shapes, bodies: Bodies, motors: Motoring) -> None:
 
 @inlined
 def _prescribed(bodies: Bodies, motors: Motoring, i: int, k: int, target: float, interval: float) -> float:
-    """Rate of an angle in the period that begins, for motors that halt, stall or ease; `halted` is written."""
+    """Return the rate of an angle [rad/s] in the control period that begins: laws halt, stall and ease.
+
+    `halted` and `over` of `motors` are written.
+
+    Args:
+        i: number of the smarticle.
+        k: 0 for barb 1, 1 for barb 2.
+        target: scheduled angle at the end of the period [rad].
+        interval: length of the period [s].
+    """
     before, most = bodies.rate[i, k], motors.acceleration[i, k]
     behind = motors.schedule[i, k] - bodies.alpha[i, k]
     # Catch up as fast as can be braked in time; what the schedule does meanwhile comes on top.
@@ -188,9 +199,9 @@ def _prescribed(bodies: Bodies, motors: Motoring, i: int, k: int, target: float,
 
 @inlined
 def contact_torques(planar: Planar, bodies: Bodies, parts: Parts, i: int) -> tuple[float, float]:
-    """Return the generalised forces of contacts on the angles [N m].
+    """Return the generalised forces of contacts on both angles of smarticle `i` [N m].
 
-    All points of a smarticle move as an angle turns, since the centre of mass does not.
+    Forces on all links contribute: when an angle changes, all links move, since the centre of mass stays.
     """
     row, share, first = bodies.plane[i], planar.barb_mass / planar.mass, parts.begin[i]
     fx, fy, _ = turned_back(bodies, i, vector(bodies.load[i], 0))
@@ -205,9 +216,9 @@ def _about_hinge(bodies: Bodies, parts: Parts, i: int, row: int, x: float, y: fl
     """Return the torque of contacts on a barb about its hinge, along the normal [N m].
 
     Args:
-        row: part that the barb is.
-        x: of the hinge, from the centre of mass [m].
-        y: of the hinge, from the centre of mass [m].
+        row: number of the barb's part.
+        x: position of the hinge from the centre of mass, in the frame of the body [m].
+        y: position of the hinge from the centre of mass, in the frame of the body [m].
     """
     fx, fy, _ = turned_back(bodies, i, vector(parts.load[row], 0))
     _, _, torque = turned_back(bodies, i, vector(parts.load[row], 3))
@@ -216,12 +227,14 @@ def _about_hinge(bodies: Bodies, parts: Parts, i: int, row: int, x: float, y: fl
 
 @inlined
 def free_torques(bodies: Bodies, motors: Motoring, i: int, r1: float, r2: float, dt: float) -> tuple[float, float]:
-    """Torques of slipping motors [N m], with what they do to the rates in the step taken into account.
+    """Return the torques of both motors of smarticle `i` under the laws slip and servo [N m].
+
+    The equations are implicit: torques depend on the rates after the step, which the torques change.
 
     Args:
         bodies: the smarticles; `rate` is that before the step.
-        r1: rate of angle 1 after the step without the motors [rad/s].
-        r2: the same of angle 2.
+        r1: rate that angle 1 would have after the step without motors [rad/s].
+        r2: rate that angle 2 would have after the step without motors [rad/s].
         dt: time step [s].
     """
     m1, m2, m12 = mobility(bodies.plane[i])
@@ -252,16 +265,16 @@ def free_torques(bodies: Bodies, motors: Motoring, i: int, r1: float, r2: float,
 def middle_of_step(
     planar: Planar, bodies: Bodies, motors: Motoring, i: int, dt: float, row: Array
 ) -> tuple[float, float, float]:
-    """Let a smarticle turn and its angles change for a step, its momentum constant; the implicit midpoint rule.
+    """Change the angles of smarticle `i` by a step at constant momentum, by the implicit midpoint rule.
 
     Args:
-        bodies: the smarticles; `alpha` and `plane` are written, and `rate` of free angles.
-        motors: `impulse`, or `momentum` of free angles, is written.
+        bodies: the smarticles; `alpha` and `plane` are written, and for free angles `rate`.
+        motors: `impulse` is written, for free angles `momentum` instead.
         dt: time step [s].
         row: (PLANE,) scratch.
 
     Returns:
-        ω at the middle of the step, in the middle link's axes [rad/s].
+        Angular velocity at the middle of the step, in the middle link's axes [rad/s].
     """
     l0, l1, l2 = turned_back(bodies, i, vector(bodies.momentum[i], 0))
     free = motors.law >= SLIP

@@ -1,9 +1,9 @@
-"""One step of the bodies: momenta change by the forces of this instant, then everything moves.
+"""Move the bodies by one step: a kick changes momenta, then a drift moves and turns all bodies.
 
-Leapfrog: momenta of the middle of a step, positions of its ends. Between kicks a body keeps its angular momentum
-in the laboratory exactly; it turns by the implicit midpoint rule for L' = L × ω, which keeps L² and the kinetic energy
-L·I⁻¹L/2 as well, both being quadratic: free spins keep their energy for ever. The turn is Cayley's, which moves L in
-the body frame by just that rule.
+The scheme is leapfrog: momenta are at the middles of steps, positions at their ends. Between kicks a body keeps its
+angular momentum L in the laboratory exactly. It turns by the implicit midpoint rule for L' = L × ω in the body frame,
+which conserves L² and the kinetic energy L·I⁻¹L/2, since both are quadratic. The rotation matrix is Cayley's, which
+turns L in the body frame by this rule.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from dem.engine.links.vectors import along, dot, turned_back, vector
 
 @inlined
 def gather(bodies: Bodies, parts: Parts) -> None:
-    """Write the sum of the loads on each body's parts into its `load`."""
+    """Write the sum of the loads on each body's parts into `bodies.load`."""
     for i in range(bodies.position.shape[0]):
         for d in range(6):
             bodies.load[i, d] = 0.0
@@ -41,10 +41,11 @@ def kick(
 
     Args:
         bodies: `velocity` and `momentum` are written.
-        parts: loads on barbs.
-        motors: None while welded; `impulse`, and for free angles `momentum` and `work`, are written.
+        parts: loads on the parts, of which those on barbs change angles.
+        motors: the motors, of which `impulse` and `work`, and for free angles `momentum`, are written; None while
+            smarticles are welded.
         past: length of the last sub-step [s].
-        dt: time over which they act [s], half of the last and half of the next sub-step.
+        dt: time for which the forces act [s]: half of the last and half of the next sub-step.
     """
     velocity, momentum, load, across = bodies.velocity, bodies.momentum, bodies.load, 0.0 if planar else 1.0
     for i in range(velocity.shape[0]):
@@ -85,11 +86,11 @@ def kick(
 def resolve_speeds(
     shapes: Shapes, bodies: Bodies, parts: Parts, segments: Segments, gravity: float, step: Step
 ) -> None:
-    """Ask for sub-steps where a segment would move far in a step, and enter another one too deep at once.
+    """Raise `step.need` if a segment moves so far in a step that it could enter another one too deeply.
 
     Args:
-        bodies: with the loads of this instant.
-        step: `need` is written.
+        bodies: the bodies, with the present forces in `load`.
+        step: `need` is raised.
     """
     velocity, spin, load = bodies.velocity, bodies.spin, bodies.load
     for i in range(velocity.shape[0]):
@@ -109,7 +110,10 @@ def resolve_speeds(
 
 @part
 def _fastest_end(parts: Parts, segments: Segments, i: int) -> float:
-    """Greatest speed of an end of a segment's axis [m/s] as the step began: a rod that rolls moves no axis by it."""
+    """Return the greatest speed of an end of an axis of body `i` [m/s] at the beginning of the step.
+
+    The rotation of a link about its own axis does not count, since it moves no end.
+    """
     most = 0.0
     for p in range(segments.begin[i], segments.begin[i + 1]):
         for end in range(2):
@@ -124,7 +128,8 @@ def drift(shapes: Shapes, bodies: Bodies, motors: Any, dt: float, row: Array) ->
     """Move and turn all bodies by a step.
 
     Args:
-        bodies: `position`, `turn` and, while articulated, `alpha` are written.
+        bodies: `position` and `turn` are written, and while articulated what `middle_of_step` writes.
+        motors: the motors; None while smarticles are welded.
         dt: time step [s].
         row: (PLANE,) scratch.
     """
@@ -150,7 +155,7 @@ def drift(shapes: Shapes, bodies: Bodies, motors: Any, dt: float, row: Array) ->
 
 @inlined
 def _rigid(bodies: Bodies, i: int, dt: float) -> tuple[float, float, float]:
-    """Return ω of a rigid body at the middle of the step, in the frame of the body [rad/s]."""
+    """Return the angular velocity of rigid body `i` at the middle of the step, in its own frame [rad/s]."""
     row, half = bodies.plane[i], 0.5 * dt
     l0, l1, l2 = turned_back(bodies, i, vector(bodies.momentum[i], 0))
     x, y, z = l0, l1, l2

@@ -1,4 +1,4 @@
-"""Three hinged links in their plane: centre of mass, inertia and generalised momenta in closed form.
+"""Centre of mass, inertia and generalised momenta of three hinged links in a plane, in closed form.
 
 Frame: origin at the centre of mass, x along the middle link from hinge 1 to hinge 2, y towards the mouth, z along the
 normal: the middle link's axes. With the angular velocity ω of the middle link and the rates α̇ of the two angles
@@ -24,7 +24,7 @@ from dem.engine.links.shapes import Planar, Shapes
 
 Array = NDArray[np.float64]
 
-# Of `direction`: π/2, its inverse, coefficients of the two series.
+# Constants of `direction`: 2/π, π/2 in two parts, coefficients of the series of sine and cosine.
 QUARTERS, QUARTER, QUARTER_REST = 2 / math.pi, 1.5707963267341256, 6.077100506506192e-11
 S1, S2, S3 = -1.66666666666666324348e-01, 8.33333333332248946124e-03, -1.98412698298579493134e-04
 S4, S5, S6 = 2.75573137070700676789e-06, -2.50507602534068634195e-08, 1.58969099521155010221e-10
@@ -36,7 +36,7 @@ SMALL = 1e-4  # rad²; up to this square of an angle the series used here are ex
 
 @inlined
 def planar_at(shapes: Shapes, k: int) -> Planar:
-    """Return the planar geometry of a shape of smarticles."""
+    """Return the fields of `Planar` for shape `k`, which must be a smarticle."""
     row = shapes.planar[k]
     return Planar(
         row[0], row[1], row[2], row[3], row[4], row[5], row[6], row[7], row[8], row[9], row[10], row[11], row[12]
@@ -45,21 +45,21 @@ def planar_at(shapes: Shapes, k: int) -> Planar:
 
 @kernel
 def lay_out(planar: Planar, alpha1: float, alpha2: float, row: Array) -> None:
-    """Work out the plane geometry of one smarticle.
+    """Compute the plane geometry of one smarticle.
 
     Args:
         alpha1: angle of barb 1 [rad]; 0: straight, π/2: the U.
         alpha2: angle of barb 2 [rad].
-        row: (PLANE,) written: centre of mass from the middle link's centre; then about the centre of mass the
-            centres of the barbs, u_k, the barbs' directions [m, m, 1]; inertia xx, yy, zz, xy [kg m²]; b [kg m²]; A_11
-            (= A_22) and A_12 [kg m²].
+        row: (PLANE,) written. 0 to 1: centre of mass from the middle link's centre [m]; 2 to 5: centres of barb 1 and
+            barb 2 from the centre of mass [m]; 6 to 9: u_1 and u_2 [m]; 10 to 13: directions of barb 1 and barb 2 [1];
+            14 to 17: inertia xx, yy, zz, xy [kg m²]; 18 to 19: b [kg m²]; 20: A_11 = A_22, 21: A_12 [kg m²].
     """
     lay_out_at(planar, alpha1, alpha2, row)
 
 
 @inlined
 def lay_out_at(planar: Planar, alpha1: float, alpha2: float, row: Array) -> None:
-    """Work out the plane geometry; `lay_out` for other kernels."""
+    """Compute the plane geometry like `lay_out`, inlined into other kernels."""
     c1, s1 = direction(alpha1)
     c2, s2 = direction(alpha2)
     lay_out_directions(planar, c1, s1, c2, s2, row)
@@ -67,9 +67,9 @@ def lay_out_at(planar: Planar, alpha1: float, alpha2: float, row: Array) -> None
 
 @inlined
 def direction(angle: float) -> tuple[float, float]:
-    """Cosine and sine of an angle [rad] of a few turns at most.
+    """Return the cosine and the sine of an angle [rad] of a few turns at most.
 
-    Source: the kernels of fdlibm (k_sin.c, k_cos.c) after a reduction to ±π/4 in two parts.
+    Source: kernels of fdlibm (k_sin.c, k_cos.c), after a reduction of the angle to ±π/4 with π/2 in two parts.
     """
     turns = math.floor(angle * QUARTERS + 0.5)
     x = (angle - turns * QUARTER) - turns * QUARTER_REST
@@ -84,7 +84,7 @@ def direction(angle: float) -> tuple[float, float]:
 
 @inlined
 def lay_out_directions(planar: Planar, c1: float, s1: float, c2: float, s2: float, row: Array) -> None:
-    """See `lay_out`; the cosines and sines of the angles are given."""
+    """Compute the plane geometry like `lay_out`, from the cosines and sines of both angles."""
     arm, mb, mm = planar.arm, planar.barb_mass, planar.middle_mass
     share = mb / planar.mass
     x1, y1, x2, y2 = -planar.half - c1 * arm, s1 * arm, planar.half + c2 * arm, s2 * arm
@@ -113,13 +113,15 @@ def lay_out_directions(planar: Planar, c1: float, s1: float, c2: float, s2: floa
 
 @inlined
 def lay_out_near(planar: Planar, by1: float, by2: float, from_: Array, row: Array) -> None:
-    """The same for angles that differ little from those of another row, without sines of the whole angles.
+    """Compute the plane geometry for angles that differ little from those of a known plane geometry.
+
+    Only cosines and sines of the differences are needed, which are cheap.
 
     Args:
-        by1: by how much angle 1 is greater [rad].
-        by2: by how much angle 2 is greater [rad].
-        from_: (PLANE,) the other row.
-        row: (PLANE,) written.
+        by1: angle 1 less the known angle 1 [rad].
+        by2: angle 2 less the known angle 2 [rad].
+        from_: (PLANE,) known plane geometry.
+        row: (PLANE,) written, see `lay_out`.
     """
     x1, x2 = by1 * by1, by2 * by2
     if x1 > SMALL or x2 > SMALL:
@@ -133,13 +135,13 @@ def lay_out_near(planar: Planar, by1: float, by2: float, from_: Array, row: Arra
 
 @inlined
 def spin_of(row: Array, lx: float, ly: float, lz: float, internal: float) -> tuple[float, float, float]:
-    """ω = I⁻¹(L - h z) [rad/s], all in the middle link's axes.
+    """Return the angular velocity ω = I⁻¹(L - h z) [rad/s]; vectors are in the middle link's axes.
 
     Args:
         row: plane geometry, see `lay_out`.
-        lx: angular momentum [kg m²/s].
-        ly: the same.
-        lz: the same.
+        lx: x component of the angular momentum L [kg m²/s].
+        ly: y component of L [kg m²/s].
+        lz: z component of L [kg m²/s].
         internal: h = b·α̇ [kg m²/s].
     """
     flat, normal = inverses(row)
@@ -148,7 +150,7 @@ def spin_of(row: Array, lx: float, ly: float, lz: float, internal: float) -> tup
 
 @inlined
 def inverses(row: Array) -> tuple[float, float]:
-    """Inverse determinant of the inertia in the plane, and inverse inertia about the normal."""
+    """Return the inverse determinant of the in-plane inertia [1/(kg² m⁴)] and 1/I_zz [1/(kg m²)]."""
     return 1 / (row[14] * row[15] - row[17] * row[17]), 1 / row[16]
 
 
@@ -156,21 +158,31 @@ def inverses(row: Array) -> tuple[float, float]:
 def spin_by(
     row: Array, flat: float, normal: float, lx: float, ly: float, lz: float, internal: float
 ) -> tuple[float, float, float]:
-    """`spin_of` with the two `inverses` of the row."""
+    """Return the result of `spin_of` from the results `flat` and `normal` of `inverses`."""
     xx, yy, xy = row[14], row[15], row[17]
     return (yy * lx - xy * ly) * flat, (xx * ly - xy * lx) * flat, (lz - internal) * normal
 
 
 @inlined
 def momenta(row: Array, normal: float, rate1: float, rate2: float) -> tuple[float, float]:
-    """P = b ω_z + A α̇ [kg m²/s], at an angular momentum along the normal [kg m²/s] and rates [rad/s]."""
+    """Return the momenta p = b ω_z + A α̇ that belong to the angles [kg m²/s].
+
+    Args:
+        row: plane geometry, see `lay_out`.
+        normal: angular momentum along the normal [kg m²/s].
+        rate1: α̇_1 [rad/s].
+        rate2: α̇_2 [rad/s].
+    """
     wz = (normal - row[18] * rate1 - row[19] * rate2) / row[16]
     return row[18] * wz + row[20] * rate1 + row[21] * rate2, row[19] * wz + row[21] * rate1 + row[20] * rate2
 
 
 @inlined
 def mobility(row: Array) -> tuple[float, float, float]:
-    """(A - b bᵀ/I_zz)⁻¹: 11, 22, 12 [1/(kg m²)]: how impulses of the motors change the rates of a free smarticle."""
+    """Return the elements 11, 22 and 12 of the mobility (A - b bᵀ/I_zz)⁻¹ [1/(kg m²)].
+
+    Multiplied with impulses of the motors, the mobility gives the changes of the rates of a free smarticle.
+    """
     a, b, c = row[20] - row[18] ** 2 / row[16], row[20] - row[19] ** 2 / row[16], row[21] - row[18] * row[19] / row[16]
     determinant = a * b - c * c
     return b / determinant, a / determinant, -c / determinant
@@ -178,7 +190,7 @@ def mobility(row: Array) -> tuple[float, float, float]:
 
 @inlined
 def rates(row: Array, normal: float, p1: float, p2: float) -> tuple[float, float]:
-    """α̇ [rad/s] that belongs to p [kg m²/s], the inverse of `momenta`."""
+    """Return the rates α̇ [rad/s] for momenta p1 and p2 [kg m²/s]; inverse of `momenta`."""
     m1, m2, m12 = mobility(row)
     q1, q2 = p1 - row[18] * normal / row[16], p2 - row[19] * normal / row[16]
     return m1 * q1 + m12 * q2, m12 * q1 + m2 * q2
@@ -188,14 +200,14 @@ def rates(row: Array, normal: float, p1: float, p2: float) -> tuple[float, float
 def lagrange_force(
     planar: Planar, row: Array, k: int, wx: float, wy: float, wz: float, rate1: float, rate2: float
 ) -> float:
-    """∂T/∂α_k at fixed ω and α̇ [N m]: centrifugal and Coriolis torque on a barb.
+    """Return ∂T/∂α_k at fixed ω and α̇ [N m], the centrifugal and Coriolis torque on a barb.
 
     Args:
         row: plane geometry, see `lay_out`.
         k: 0 for barb 1, 1 for barb 2.
-        wx: ω in the middle link's axes [rad/s].
-        wy: the same.
-        wz: the same.
+        wx: x component of ω in the middle link's axes [rad/s].
+        wy: y component of ω [rad/s].
+        wz: z component of ω [rad/s].
         rate1: α̇_1 [rad/s].
         rate2: α̇_2 [rad/s].
     """

@@ -1,4 +1,4 @@
-"""From the state of bodies to where their segments are and how their parts move."""
+"""Compute the positions of segments and the velocities of parts from the state of the bodies."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ SLIP = 3  # laws of motors from here on leave the angles free
 
 @inlined
 def turn_axes(bodies: Bodies, i: int) -> None:
-    """Write the rotation matrix of a body's quaternion into `axes`."""
+    """Compute the rotation matrix of body `i` from its quaternion, and write it into `bodies.axes`."""
     a, b, c, d = bodies.turn[i, 0], bodies.turn[i, 1], bodies.turn[i, 2], bodies.turn[i, 3]
     axes = bodies.axes
     axes[i, 0, 0] = 1 - 2 * (c * c + d * d)
@@ -37,7 +37,10 @@ def along_normal(bodies: Bodies, i: int) -> float:
 
 @inlined
 def find_spin(bodies: Bodies, i: int, hinged: Any) -> None:
-    """Write ω of a body into `spin`, from its angular momentum less the share of its barbs."""
+    """Compute the angular velocity of body `i` from its angular momentum, and write it into `bodies.spin`.
+
+    While smarticles are articulated (`hinged` is not None), the angular momentum of turning barbs is subtracted.
+    """
     row, internal = bodies.plane[i], 0.0
     if hinged is not None:
         internal = row[18] * bodies.rate[i, 0] + row[19] * bodies.rate[i, 1]
@@ -56,7 +59,7 @@ def _move(parts: Parts, row: int, velocity: Vector, spin: Vector, origin: Vector
 
 @inlined
 def find_motion(shapes: Shapes, bodies: Bodies, parts: Parts, i: int, hinged: Any) -> None:
-    """Write how the parts of a body move into `motion`, as seen at the centre of mass."""
+    """Write the motion of the parts of body `i` into `parts.motion`, for points at its centre of mass."""
     row, position = parts.begin[i], vector(bodies.position[i], 0)
     velocity, spin = vector(bodies.velocity[i], 0), vector(bodies.spin[i], 0)
     if hinged is not None and shapes.hinged[bodies.shape[i]]:
@@ -78,7 +81,7 @@ def find_motion(shapes: Shapes, bodies: Bodies, parts: Parts, i: int, hinged: An
 
 @inlined
 def _planar_line(planar: Planar, plane: Array, link: int) -> tuple[float, float, float, float]:
-    """Return start and vector of a link of a smarticle in its plane, from the centre of mass [m]."""
+    """Return x and y of a link's start, from the centre of mass, and of the vector to its end [m]."""
     x, y, ux, uy = -planar.end - plane[0], -plane[1], 2 * planar.end, 0.0
     if link == 0:
         x, ux, uy = -planar.half - plane[0], planar.tip * plane[10], planar.tip * plane[11]
@@ -89,7 +92,7 @@ def _planar_line(planar: Planar, plane: Array, link: int) -> tuple[float, float,
 
 @inlined
 def place_segments(shapes: Shapes, bodies: Bodies, segments: Segments, i: int) -> None:
-    """Write where the segments of a body are into `line`."""
+    """Write the positions of the segments of body `i` into `segments.line`."""
     k, position = bodies.shape[i], vector(bodies.position[i], 0)
     first = shapes.first[k]
     for p in range(segments.begin[i], segments.begin[i + 1]):
@@ -105,7 +108,7 @@ def place_segments(shapes: Shapes, bodies: Bodies, segments: Segments, i: int) -
 
 @inlined
 def find_motions(shapes: Shapes, bodies: Bodies, parts: Parts, hinged: Any) -> None:
-    """Write ω of all bodies and how all parts move."""
+    """Write the angular velocities of all bodies and the motion of all parts."""
     for i in range(bodies.position.shape[0]):
         if is_flexible(shapes.flexible, bodies.shape[i]):
             continue
@@ -115,13 +118,13 @@ def find_motions(shapes: Shapes, bodies: Bodies, parts: Parts, hinged: Any) -> N
 
 @part
 def pose(shapes: Shapes, bodies: Bodies, parts: Parts, segments: Segments, hinged: Any) -> None:
-    """Bring everything up to date that follows from the state of the bodies that are not flexible.
+    """Compute everything that follows from the state of the bodies that are not flexible.
 
     Args:
-        bodies: `axes` and `spin` are written, and `rate` where angles are free.
+        bodies: `axes` and `spin` are written, and `rate` if angles are free.
         parts: `motion` is written.
         segments: `line` is written.
-        hinged: the motors; None while welded: then no barb moves by itself.
+        hinged: the motors; None while smarticles are welded.
     """
     for i in range(bodies.position.shape[0]):
         if is_flexible(shapes.flexible, bodies.shape[i]):
@@ -137,7 +140,7 @@ def pose(shapes: Shapes, bodies: Bodies, parts: Parts, segments: Segments, hinge
 
 @kernel
 def pose_all(shapes: Shapes, bodies: Bodies, parts: Parts, segments: Segments, hinged: Any) -> None:
-    """Bring everything up to date, called from Python; see `pose`."""
+    """Do what `pose` does, for calls from Python."""
     pose(shapes, bodies, parts, segments, hinged)
 
 
@@ -145,16 +148,16 @@ def pose_all(shapes: Shapes, bodies: Bodies, parts: Parts, segments: Segments, h
 def find_links(
     bodies: Bodies, parts: Parts, each: int, places: Array, frames: Array, velocities: Array, spins: Array
 ) -> None:
-    """Write where all links of smarticles are and how they move.
+    """Write positions, frames and velocities of all links of smarticles.
 
     Args:
-        bodies: smarticles, posed.
-        parts: how their parts move.
-        each: parts of a smarticle that move: 3 while articulated, 1 while welded.
+        bodies: the smarticles, posed.
+        parts: the parts, with their motion.
+        each: number of parts of a smarticle that move separately: 3 while articulated, 1 while welded.
         places: (N, 3, 3) written: centres of the links [m].
-        frames: (N, 3, 3, 3) written: along, across and normal to each link, in columns [1].
-        velocities: (N, 3, 3) written: of the centres [m/s].
-        spins: (N, 3, 3) written: angular velocities [rad/s].
+        frames: (N, 3, 3, 3) written: unit vectors along, across and normal to each link, in columns [1].
+        velocities: (N, 3, 3) written: velocities of the centres [m/s].
+        spins: (N, 3, 3) written: angular velocities of the links [rad/s].
     """
     plane = bodies.plane
     for i in range(bodies.position.shape[0]):

@@ -1,1 +1,1 @@
-"""Which links are near each other."""
+"""Search for links that are near each other, and lists of them."""

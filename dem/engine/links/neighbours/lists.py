@@ -1,7 +1,7 @@
-"""Which links are near each other: a wide list, rebuilt seldom, and a tight one inside it, which steps read.
+"""Lists of near segments: a wide list, rebuilt seldom, and within it a tight list, which steps read.
 
-A list holds every pair of segments whose axes are nearer than their radii and both skins. Both lists are in an order
-that depends on the positions alone, and the memory of a contact goes with its pair.
+A list holds every pair of segments whose axes are nearer than the sum of their radii and skins. The order of both lists
+depends on positions only. The memory of a contact stays with its pair when a list is rebuilt.
 """
 
 from __future__ import annotations
@@ -18,11 +18,14 @@ NEAR_LEAST, NEAR_MOST, NEAR_TIME, WIDE_LEAST, WIDE_MOST, WIDE_TIME, STRIP = rang
 
 @part
 def update_lists(bodies: Bodies, segments: Segments, pairs: Pairs, cells: Cells, skins: Array) -> int:
-    """Bring the lists up to date where links have moved too far; GOOD, or FULL where there is no room for all pairs.
+    """Rebuild the lists that are no longer valid since links have moved too far.
 
     Args:
-        skins: (7,) of the tight and of the wide list: thinnest and thickest skin [m], time that skins are to be good
-            for [s]; then the width of a strip of the search [m].
+        skins: (7,) thinnest skin [m], thickest skin [m] and time that a skin should last [s], for the tight list, then
+            for the wide list; then the width of a strip of the search [m].
+
+    Returns:
+        GOOD, or FULL if there is no room for all pairs.
     """
     if not moved(bodies, segments, pairs.near_marks, pairs.near_centres):
         return GOOD
@@ -37,7 +40,7 @@ def update_lists(bodies: Bodies, segments: Segments, pairs: Pairs, cells: Cells,
 
 @part
 def _tighten(bodies: Bodies, segments: Segments, pairs: Pairs, skins: Array) -> None:
-    """Make the tight list from the wide one."""
+    """Rebuild the tight list from the wide list."""
     mark(bodies, segments, pairs.near_marks, pairs.near_centres, skins[NEAR_LEAST], skins[NEAR_MOST], skins[NEAR_TIME])
     marks, first, second, used, near = pairs.near_marks, pairs.first, pairs.second, pairs.used, pairs.near
     line, count = segments.line, 0
@@ -61,14 +64,14 @@ def _tighten(bodies: Bodies, segments: Segments, pairs: Pairs, skins: Array) -> 
 
 @part
 def build(bodies: Bodies, segments: Segments, pairs: Pairs, cells: Cells, skins: Array) -> int:
-    """Make the wide list anew, and carry over what contacts remember.
+    """Rebuild the wide list, and keep the memory of contacts.
 
     Args:
-        pairs: the list; all but the tight list is written.
+        pairs: the lists; all but the tight list is written.
         skins: see `update_lists`.
 
     Returns:
-        GOOD, or FULL where there is no room for all pairs: then the list is as it was.
+        GOOD, or FULL if there is no room for all pairs; the wide list is then unchanged.
     """
     mark(bodies, segments, cells.marks, cells.centres, skins[WIDE_LEAST], skins[WIDE_MOST], skins[WIDE_TIME])
     # The tight list is good for less than its thickest skin, which the wide one leaves room for.
@@ -92,7 +95,7 @@ def _copy(to: Array, source: Array) -> None:
 
 @part
 def _replace(pairs: Pairs, cells: Cells, found: int) -> None:
-    """Put the new list of `cells` in the place of the old one, with what contacts remember."""
+    """Replace the wide list by the first `found` pairs in `cells`, and keep the memory of contacts."""
     kept = 0
     for k in range(pairs.counts[0]):
         if pairs.used[k]:

@@ -1,12 +1,12 @@
-"""All pairs of segments that are nearer than their radii and skins, found anew.
+"""Find all pairs of segments that are nearer than the sum of their radii, skins and a bare reach.
 
-Every link has a box about all its segments, with their radii, their skins and half of what a pair needs besides. Boxes
-are sorted into strips along y and, within a strip, into short bins along x, by their lower corners: all that can
-overlap a box are in a few runs of neighbours in memory, from its own bin up to that of its upper corner. Segments are
-copied in that order.
+Every link has a box about all its segments, enlarged by their radii, their skins and half the bare reach. Boxes are
+sorted by their lower corners into strips along y and, within a strip, into short bins along x. All boxes that can
+overlap a given box then lie in a few contiguous ranges of memory, from the bin of its lower corner to the bin of its
+upper corner. Boxes and segments are copied in this order.
 
-The list is in the order of the segments' numbers; that of many in the order of the bins, so that a step meets segments
-that are near each other one after the other, since all of them do not fit into a processor's cache.
+Up to `FEW` segments, the list of pairs is in the order of the segments' numbers. More segments do not fit into a
+processor's cache; their list is in the order of the bins, so that a step reads near segments one after the other.
 """
 
 from __future__ import annotations
@@ -24,21 +24,21 @@ SKIN = LINE  # place in a row of `Cells.lines`
 
 
 class Grid(NamedTuple):
-    """The bins."""
+    """Strips along y, divided into bins along x."""
 
-    bare: float  #: Reach of a pair besides radii and skins [m]
-    x: float  #: Where bins begin along x [m]
-    y: float  #: Where strips begin along y [m]
-    tallest: float  #: Extent of the largest box along y [m]
-    size: float  #: Of a bin along x [m]
-    width: float  #: Of a strip, along y [m]
-    columns: int  #: Bins along x
-    strips: int  #: Along y
+    bare: float  #: Bare reach of a pair: distance that is added to radii and skins [m]
+    x: float  #: Lower end of the bins along x [m]
+    y: float  #: Lower end of the strips along y [m]
+    tallest: float  #: Largest extent of a box along y [m]
+    size: float  #: Size of a bin along x [m]
+    width: float  #: Width of a strip along y [m]
+    columns: int  #: Number of bins of a strip
+    strips: int  #: Number of strips
 
 
 @inlined
 def off_lines(line: Array, p: int, q: int, reach: float) -> bool:
-    """Return whether the lines that two axes are on are farther apart than `reach` [m]; without a division."""
+    """Return whether the infinite lines through two axes are farther apart than `reach` [m]."""
     one, other = line[p], line[q]
     normal = cross(vector(one, 3), vector(other, 3))
     across = dot(sub(vector(one, 0), vector(other, 0)), normal)
@@ -64,16 +64,16 @@ def _cannot_touch(bends: Any, p: int, q: int) -> bool:
 
 @part
 def search(segments: Segments, cells: Cells, bare: float, piece: float) -> int:
-    """Write all pairs into the scratch list of `cells`, in rows by the first segment.
+    """Write all near pairs into `cells.first` and `cells.second`, grouped by the first segment.
 
     Args:
-        segments: where segments are, and which link and body they belong to.
-        cells: `marks` are filled; the rest is written.
-        bare: reach of a pair besides radii and skins [m].
+        segments: positions of segments, and the link and body of each.
+        cells: `marks` must be filled; the rest is written.
+        bare: distance that is added to radii and skins of a pair [m].
         piece: width of a strip [m].
 
     Returns:
-        Their number, or -1 where there is no room.
+        Number of pairs, or -1 if there is no room for all.
     """
     count = cells.marks.shape[0]
     find_boxes(segments, cells, bare)
@@ -102,13 +102,13 @@ def search(segments: Segments, cells: Cells, bare: float, piece: float) -> int:
 
 @inlined
 def _bin(offset: float, size: float, last: int) -> int:
-    """Which bin an offset is in; what lies beyond the last one is in it, and so is what is no number."""
+    """Return the bin of an offset [m]; `last` beyond the last bin, 0 for negative offsets and NaN."""
     return int(min(offset / size, float(last))) if offset > 0.0 else 0
 
 
 @inlined
 def find_boxes(segments: Segments, cells: Cells, bare: float) -> None:
-    """Write the boxes of all links, with radii, skins and half the bare reach, into `own`."""
+    """Write the boxes of all links, enlarged by radii, skins and half the bare reach, into `cells.own`."""
     for link in range(cells.keys.shape[0]):
         box = cells.own[link]
         for d in range(3):
@@ -122,7 +122,7 @@ def find_boxes(segments: Segments, cells: Cells, bare: float) -> None:
 
 @inlined
 def grid_over(cells: Cells, bare: float, piece: float) -> Grid:
-    """Return bins for the boxes of all links."""
+    """Return strips and bins for the boxes of all links; `piece` is the width of a strip [m]."""
     x0, y0, x1, y1, tallest = math.inf, math.inf, -math.inf, -math.inf, 0.0
     for link in range(cells.keys.shape[0]):
         box = cells.own[link]
@@ -137,7 +137,7 @@ def grid_over(cells: Cells, bare: float, piece: float) -> Grid:
 
 @inlined
 def sort_bins(cells: Cells, grid: Grid) -> None:
-    """Write bins of links into `keys`, links bin by bin into `order`, and where each bin begins into `starts`."""
+    """Sort links into bins; `keys`, `order` and `starts` of `cells` are written."""
     keys, starts, order = cells.keys, cells.starts, cells.order
     count, total = keys.shape[0], grid.columns * grid.strips
     for link in range(count):
@@ -160,7 +160,7 @@ def sort_bins(cells: Cells, grid: Grid) -> None:
 
 @inlined
 def copy_by_bin(segments: Segments, cells: Cells) -> None:
-    """Write boxes of links and their segments in `order`, and which rows of the list the segments get."""
+    """Copy boxes and segments of links in the order of the bins, and number the groups of the list."""
     few, n = cells.marks.shape[0] <= FEW, 0
     for m in range(cells.keys.shape[0]):
         link = cells.order[m]
@@ -180,13 +180,22 @@ def _boxed(
     boxes: Array, close: Indices, count: int, start: int, stop: int,
     ly: float, lz: float, hx: float, hy: float, hz: float,
 ) -> int:  # fmt: skip
-    """Write places from `start` up to `stop` whose boxes overlap one into `close`, from place `count` on.
+    """Append to `close` the indices of boxes from `start` to before `stop` that may overlap a given box.
 
-    Two loops: the first one is done for several boxes at once by the processor, as it has no order to keep; in the
-    second every place is written down, and the next one over it unless it counts, without a branch.
+    The first loop is vectorised by the compiler. In the second loop every index is written, and overwritten by the next
+    one if its box does not overlap, so that no branch is needed.
+
+    Args:
+        boxes: (6, L) lower x, y, z and upper x, y, z of all boxes [m].
+        count: number of indices in `close` before.
+        ly: lower y of the given box [m].
+        lz: lower z of the given box [m].
+        hx: upper x of the given box [m].
+        hy: upper y of the given box [m].
+        hz: upper z of the given box [m].
 
     Returns:
-        The place after the last.
+        New number of indices in `close`.
     """
     number, room = stop - start, close.shape[0] // 2
     if number <= 0:
@@ -204,15 +213,15 @@ def _boxed(
 
 @part
 def find_pairs(segments: Segments, cells: Cells, grid: Grid) -> int:
-    """Write all pairs of segments that can touch into `lower` and `upper`.
+    """Write all near pairs of segments that can touch into `cells.lower` and `cells.upper`.
 
     Args:
-        segments: which body each segment belongs to.
-        cells: sorted, and boxes drawn.
+        segments: the body of each segment.
+        cells: links sorted into bins, with copied boxes and segments.
         grid: the bins.
 
     Returns:
-        Their number, or -1 where there is no room.
+        Number of pairs, or -1 if there is no room for all.
     """
     number, capacity = 0, cells.lower.shape[0]
     rows, starts, keys, boxes, strands = cells.lines, cells.starts, cells.keys, cells.boxes, cells.strands

@@ -1,8 +1,8 @@
-"""How far links may move until a list of pairs is made anew.
+"""Skins: distances by which segments may move before a list of pairs is rebuilt.
 
-Every link has a skin of its own: how far its ends, and so all of it, may move until the list is made anew, apart from
-what all have moved on average, since a shaken pile moves as a whole. Links that are fast have thick skins and those
-that lie still thin ones, so that all are used up at about the same time.
+Every segment has a skin: the distance by which its ends, and so all its points, may move relative to the mean motion of
+all bodies. The mean motion does not count, since a shaken pile moves as a whole. Fast segments have thick skins and
+slow ones thin skins, so that all skins are used up at about the same time.
 """
 
 from __future__ import annotations
@@ -17,11 +17,11 @@ from dem.engine.links.vectors import Vector, add, dot, moving, put, sub, vector
 
 @part
 def moved(bodies: Bodies, segments: Segments, marks: Array, centres: Array) -> bool:
-    """Return whether an end of a segment has moved by more than its skin since `marks` were taken.
+    """Return whether an end of any segment has moved by more than its skin since `marks` were recorded.
 
     Args:
-        marks: (Q, 7) starts and ends of all segments then, and their skins [m].
-        centres: (N, 3) centres of mass then [m]; their mean move does not count.
+        marks: (Q, 7) recorded starts and ends of all segments, and their skins [m].
+        centres: (N, 3) recorded centres of mass [m], from which the mean motion follows.
     """
     mean, line = (0.0, 0.0, 0.0), segments.line
     n, over = bodies.position.shape[0], False
@@ -53,14 +53,14 @@ def _at_end(bends: Any, p: int, end: int, mean: Vector, rigid: Vector) -> Vector
 def mark(
     bodies: Bodies, segments: Segments, marks: Array, centres: Array, least: float, most: float, time: float
 ) -> None:
-    """Write down where all segments are, and give each a skin.
+    """Record the positions of all segments and bodies, and give each segment a skin.
 
     Args:
         marks: (Q, 7) written, see `moved`.
         centres: (N, 3) written.
         least: the thinnest skin [m].
         most: the thickest skin [m].
-        time: for which a skin is to be good at the present speed [s].
+        time: time that a skin should last at the present speed [s].
     """
     line = segments.line
     n, mean = bodies.position.shape[0], (0.0, 0.0, 0.0)
