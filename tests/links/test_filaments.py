@@ -372,6 +372,16 @@ def test_worms_repeat_their_bits_also_after_a_checkpoint() -> None:
         np.testing.assert_array_equal(a, c)
 
 
+def test_lists_of_a_checkpoint_have_room_however_long_they_are() -> None:
+    made = worms(2)
+    made.make_room(30 * len(made.segments.line))
+    made.pairs.counts[0] = len(made.pairs.first)
+    made.restore(dict(made.arrays), dict(made.memory))
+    assert {len(getattr(made.pairs, name)) for name in ("slip", "used", "near", "touching", "nearest")} == {
+        len(made.pairs.first)
+    }
+
+
 def test_reversals_come_at_the_given_rate_and_do_not_depend_on_the_step() -> None:
     drawn, rate = [], 40.0
     for share in (1.0, 0.5):
