@@ -222,6 +222,34 @@ def test_twisting_and_rolling_keep_angular_momentum_to_first_order_in_the_step()
     assert errors[2] < 0.3 * errors[0], errors
 
 
+def test_a_filament_and_a_smarticle_that_collide_with_friction_keep_their_momenta() -> None:
+    filament, turned = rod(20), []
+    for share in (0.4, 0.1):
+        made = world(filament, law=builds.LAW)
+        made.set_time_step(share * made.time_step)
+        made.add_filaments(1, straight(filament, 0.505))
+        made.add_bodies(0, np.array([[0.04, 0.0, 0.5]]), np.eye(3)[None])
+        made.bodies.velocity[1] = 0.1, 0.05, 0.3
+        mass = float(made.shapes.mass[0])
+
+        def both() -> tuple[np.ndarray, np.ndarray]:
+            linear, angular = momenta(made, filament)  # noqa: B023 - called in this turn of the loop
+            body = made.bodies  # noqa: B023
+            own = mass * body.velocity[1]  # noqa: B023
+            return linear + own, angular + np.cross(body.position[1] - [0, 0, 0.5], own) + body.momentum[1]
+
+        before = both()
+        made.advance(round(0.04 / made.time_step))
+        assert made.filaments is not None
+        assert np.abs(made.filaments.velocity).max() > 0.05  # they have met
+        assert np.abs(made.filaments.spin).max() > 1.0  # and rubbed
+        after = both()
+        np.testing.assert_allclose(after[0], before[0], rtol=0, atol=1e-12 * np.abs(before[0]).max())
+        turned.append(np.abs(after[1] - before[1]).max() / np.abs(before[1]).max())
+    assert turned[0] < 1e-3, turned
+    assert turned[1] < 0.5 * turned[0], turned
+
+
 def test_free_motion_keeps_its_energy_to_second_order_in_the_step() -> None:
     filament, means = rod(10), []
     for share in (0.4, 0.2):

@@ -89,7 +89,8 @@ class LinksFilaments:
 
     def force(self, grip: int) -> Array:
         """Return the force (3,) of a grip on its nodes in the last step [N]."""
-        return self._all.grip_force[grip].copy()
+        force: Array = self._all.grip_force[grip].copy()
+        return force
 
     def act(
         self, factor: float, *, rate: float | None = None, reversal_rate: float | None = None, ramp: float = 0.0

@@ -246,7 +246,7 @@ def _push_node(
     stiffest = step.whole * step.whole * max(rod[STIFFEST] * (1 + q) * (1 + 3 * q), twisted)
     if stiffest > RESOLVED * RESOLVED:
         step.need[0] = max(step.need[0], math.sqrt(stiffest) / RESOLVED)
-    return work
+    return float(work)
 
 
 @inlined
@@ -280,7 +280,7 @@ def _push_segment(
 @inlined
 def _stretched(filaments: Filaments, i: int, rod: Array) -> float:
     """Return by how much a segment is longer than at rest [m]."""
-    return filaments.extent[i] - rod[LENGTH]
+    return float(filaments.extent[i] - rod[LENGTH])
 
 
 @inlined
@@ -411,7 +411,7 @@ def _uniform(seed: int, number: int, event: int) -> float:
 def _wait(gait: Array) -> float:
     """Draw the time to the next reversal [s]."""
     gait[DRAWN] += 1
-    return -math.log(_uniform(int(gait[SEED]), int(gait[NUMBER]), int(gait[DRAWN]))) / gait[REVERSALS]
+    return float(-math.log(_uniform(int(gait[SEED]), int(gait[NUMBER]), int(gait[DRAWN]))) / gait[REVERSALS])
 
 
 @part
