@@ -55,7 +55,7 @@ class Filament:
     """One kind of flexible filament: nodes at equal distances along a round rod, straight unless it is told otherwise.
 
     A stiffness that is left out follows from Young's modulus. Damping is that of a Kelvin–Voigt material: stress is
-    E (ε + τ dε/dt), with a time τ for stretching and another one for bending and twisting.
+    E (ε + τ dε/dt), with a time τ for stretching and twisting, whose waves are fast, and another one for bending.
 
     Raises:
         InputError: a number is out of its range, or neither a modulus nor the three stiffnesses are there.
@@ -70,8 +70,8 @@ class Filament:
     stretching_stiffness: float | None = None  #: EA [N]
     bending_stiffness: float | None = None  #: EI [N m²]
     twisting_stiffness: float | None = None  #: GJ [N m²]
-    stretching_time: float = 0.0  #: τ of stretching [s]
-    bending_time: float = 0.0  #: τ of bending and twisting [s]
+    stretching_time: float = 0.0  #: τ of stretching and twisting [s]
+    bending_time: float = 0.0  #: τ of bending [s]
     curvature: PreferredCurvature | None = None  #: None: it prefers to be straight
     liquid: Liquid | None = None  #: None: no buoyancy, no drag
     #: Torque per length and rate that resists rolling about its own axis, besides the liquid's: that of bristles [N s]

@@ -93,7 +93,7 @@ def filament_stable_time_step(filament: Filament, law: ContactLaw, effective_mas
         (along + max(tip * kn, side * ks), filament.stretching_time * along + max(tip * cn, side * cs)),
         (bent + max(tip * kn, side * kn), filament.bending_time * bent + max(tip, side) * cn),
         (bent + 3 * side * ks, filament.bending_time * bent + 3 * side * cs),
-        (twisted + 2 * side * ks, filament.bending_time * twisted + 2 * side * cs),
+        (twisted + 2 * side * ks, filament.stretching_time * twisted + 2 * side * cs),
     )
     drag = across * length / mass
     return min(min((math.sqrt((c + drag) ** 2 + 4 * k) - (c + drag)) / k, RESOLVED / math.sqrt(k)) for k, c in modes)

@@ -40,7 +40,7 @@ from dem.engine.links.shapes import INVERSE
 from dem.engine.links.vectors import Vector, add, along, cross, dot, put, put_more, scale, sub, vector
 
 # Columns of a rod: length of a segment at rest ℓ [m]; EA/ℓ [N/m], EI/ℓ and GJ/ℓ [N m], times of Kelvin and Voigt of
-# stretching and of bending [s]; a segment's inertia about its axis [kg m²]; drag of half a segment across and along
+# stretching and twisting, and of bending [s]; a segment's inertia about its axis [kg m²]; drag of half a segment across and along
 # [N s/m], of a segment's roll [N m s]; weight over mass and g [1]; squares of the greatest frequencies of bending
 # and of twisting [1/s²].
 LENGTH, STRETCHING, BENDING, TWISTING, STRETCHING_TIME, BENDING_TIME = range(6)
@@ -233,7 +233,7 @@ def _push_node(
     slope = 1 + 0.25 * bend.twist * bend.twist  # of ν by the twist
     moments = stiffness * v1, stiffness * v2, twisting * bend.twist * slope
     r1, r2, r3 = _rates(one, two, bend, slope)
-    damping = time * stiffness * r1, time * stiffness * r2, time * twisting * r3
+    damping = time * stiffness * r1, time * stiffness * r2, rod[STRETCHING_TIME] * twisting * r3
     if ledger is None:
         moments = add(moments, damping)
     else:
