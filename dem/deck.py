@@ -74,6 +74,8 @@ def _foreign(scene: Scene) -> Iterator[str]:
     """Yield the parts of a scene that LAMMPS cannot compute, by key and name."""
     if scene.smooth:
         yield f"engine: {scene.engine} takes links as they are, a deck has chains of spheres (use engine: yade)"
+    if scene.mixture is not None:
+        yield "particle: other bodies than smarticles (run the scene here on engine: lammps)"
     yield from foreign(scene)
     for index, phase in enumerate(scene.phases):
         if phase.pours:
@@ -100,8 +102,8 @@ def write_deck(scene: Scene, folder: Path) -> None:
     turns = np.asarray(state.link_rotations[:, 1] @ scene.particle.boxes.link_rotations[1].T)
     title = f"Spheres of {len(spheres)} smarticles, {spheres.shape[1]} each: {_one_line(scene.name)}"
     contents = {
-        DATA: text.sphere_lines(scene.particle, scene.cylinder, spheres, title=title),
-        BODIES: text.body_lines(scene.particle, Moving(state.positions, turns, zero, zero, zero, zero)),
+        DATA: text.sphere_lines([scene.particle] * state.count, scene.cylinder, spheres, title=title),
+        BODIES: text.body_lines([scene.particle] * state.count, Moving(state.positions, turns, zero, zero, zero, zero)),
         DECK: _deck(scene),
     }
     for name, lines in contents.items():

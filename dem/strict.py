@@ -50,8 +50,8 @@ _TEXTS = {
     "dict_type": "{shown} is not keys and values; write them as {{key: value}}",
     "model_type": "{shown} is not keys and values; write them as {{key: value}}",
     "model_attributes_type": "{shown} is not keys and values; write them as {{type: …}}",
-    "union_tag_not_found": "type: missing in {shown}; write which one it is, see `smarticles schema`",
-    "union_tag_invalid": "type: {shown_tag} is not known; {choice}",
+    "union_tag_not_found": "{tag_key}: missing in {shown}; write which one it is, see `smarticles schema`",
+    "union_tag_invalid": "{tag_key}: {shown_tag} is not known; {choice}",
 }
 """Message for each of pydantic's types of error; `_text` fills in the fields in braces."""
 
@@ -174,6 +174,7 @@ def _text(kind: str, message: str, value: Any, context: Mapping[str, Any], unit:
         **context,
         shown=shown(value),
         shown_tag=shown(context.get("tag")),
+        tag_key=str(context.get("discriminator", "type")).strip("'"),
         unit=f" {unit}" if unit else "",
         in_unit=f" in {unit}" if unit else "",
         rounded=round(value) if isinstance(value, float) and math.isfinite(value) else "",
@@ -189,12 +190,14 @@ def _text(kind: str, message: str, value: Any, context: Mapping[str, Any], unit:
 def _place(steps: Sequence[int | str], data: Any) -> tuple[str, bool]:
     """Return pydantic's path to a value as a key of the file, and whether the file holds the value.
 
-    In a discriminated union the path has an extra step, the value of `type`, which is no key.
+    In a discriminated union the path has an extra step, the value of `type` or `shape`, which is no key.
     """
     node, keys, given = data, [], True
     for step in steps:
-        if isinstance(node, Mapping) and step not in node and node.get("type") == step:
+        if isinstance(node, Mapping) and step not in node and step in (node.get("type"), node.get("shape")):
             continue
+        if isinstance(node, Mapping) and isinstance(step, int):
+            continue  # one item that the file gives without a list
         if step == _OF_A_KEY:
             given = False
             continue

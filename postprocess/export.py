@@ -1,4 +1,4 @@
-"""Export a run for other programs: VTP files for ParaView, or triangles as STL, OBJ or glTF."""
+"""Export a run for other programs: VTP files for ParaView, GSD for OVITO, or triangles as STL, OBJ or glTF."""
 
 import os
 import shutil
@@ -20,10 +20,11 @@ from dem.record.frames import read_frames
 from dem.record.run import Run, open_run
 from postprocess.bodies.colours import PAINTS, ColourScale, colour_field, linear, scalars, span
 from postprocess.bodies.fields import IDENTITY, fields_of
-from postprocess.bodies.meshes import BOX_FACES, BOX_POINTS, Bodies, checked_kinds, owners, solid
+from postprocess.bodies.meshes import Bodies, at_points, checked_kinds, owners, solid
+from postprocess.trajectory import write_trajectory
 
 SUFFIXES = ("stl", "obj", "gltf", "glb")
-FORMATS = ("vtp", *SUFFIXES)  #: Formats of exports
+FORMATS = ("vtp", "gsd", *SUFFIXES)  #: Formats of exports
 
 SCRIPT = "show_in_paraview.py"  #: Name of the script for ParaView in an export as vtp
 
@@ -48,8 +49,8 @@ def export_run(
     The run may be unfinished. The written file or folder exists only if the export is complete.
 
     Args:
-        output: Path that must not exist: a folder for vtp and for all frames, else a file with this suffix;
-            `export-TO` or `export.TO` in the run directory if not given.
+        output: Path that must not exist: a folder for vtp and for all frames, else a file with this suffix, for gsd
+            always; `export-TO` or `export.TO` in the run directory if not given.
         time: Simulated time [s]; the frame nearest to it is exported. If not given, the last frame is exported.
         wanted: Kinds of bodies besides `postprocess.bodies.meshes.USUAL`.
         unwanted: Kinds of bodies and fields to leave out.
@@ -70,7 +71,7 @@ def export_run(
     kinds = checked_kinds(wanted, unwanted, also=[field.name for field in fields])
     frames = read_frames(directory)
     chosen = range(len(frames)) if every_frame else [len(frames) - 1 if time is None else frames.nearest(time)]
-    folder = every_frame or to == "vtp"
+    folder = to == "vtp" or (every_frame and to != "gsd")
     path = _checked_output(run.path, output, to, folder=folder)
     carried = [field for field in fields if field.name in IDENTITY or not (to in _FIELDLESS or field.name in unwanted)]
     bodies = Bodies(run, kinds, carried)
@@ -84,7 +85,10 @@ def export_run(
     with _whole(path) as made:
         if folder:
             made.mkdir()
-        if to == "vtp":
+        if to == "gsd":
+            every = (frames[index] for index in chosen)
+            written = write_trajectory(made, run, exported(), carried, first=every) if "smarticles" in kinds else 0
+        elif to == "vtp":
             written = _write_collection(made, bodies, exported())
         else:
             painter = _Painter(bodies, color_by, (frames[index] for index in chosen))
@@ -227,9 +231,7 @@ class _Painter:
         points = np.asarray(triangles.points, dtype=np.float64)
         colours = np.tile(PAINTS[kind].rgb, (len(points), 1))
         if kind == "smarticles":
-            # The points of each box follow those of the previous box and are not shared.
-            found = self._scale.painted(scalars(self._field, frame, run)[owners(mesh, frame)])
-            colours = np.repeat(found, BOX_POINTS, axis=0)
+            colours = at_points(mesh, self._scale.painted(scalars(self._field, frame, run)[owners(mesh, frame)]))
         shape = trimesh.Trimesh(
             points @ _Y_UP.T if web else points,
             triangles.regular_faces.astype(np.int64),
@@ -240,7 +242,7 @@ class _Painter:
             # glTF demands an underscore in names of custom attributes, and has no integers of four bytes for them.
             for name, values in mesh.cell_data.items():
                 if values.ndim == 1 and np.isfinite(values).all():
-                    each = np.repeat(np.asarray(values)[::BOX_FACES], BOX_POINTS, axis=0)
+                    each = at_points(mesh, np.asarray(values))
                     shape.vertex_attributes[f"_{name.upper()}"] = each.astype(np.float32)
         return shape
 

@@ -6,6 +6,7 @@
     done = smarticles.run(scene, "runs/a")
     done.series["com_height_m"], done.frames[-1].vertices, smarticles.measure(done)
     smarticles.measures.link_crossings(done.frames[-1].vertices)
+    smarticles.plot(done)
     many = smarticles.sweep(scene, "ratios", vary={"smarticle.aspect_ratio": [0.4, 0.7], "seed": [1, 2]})
     many.table(by="aspect_ratio")
 
@@ -21,7 +22,7 @@ if TYPE_CHECKING:
     from dem.record.run import Run
     from dem.scene.reading import load_scene
     from dem.scene.scene import Scene
-    from smarticles.public import SweepDirectory, measure, read, read_sweep, run, sweep
+    from smarticles.public import SweepDirectory, measure, plot, read, read_sweep, run, sweep
 
     __version__: str
 
@@ -35,6 +36,7 @@ __all__ = [
     "load_scene",
     "measure",
     "measures",
+    "plot",
     "read",
     "read_sweep",
     "run",

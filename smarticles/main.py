@@ -14,6 +14,7 @@ from types import FrameType
 from typing import Any
 
 from dem.errors import InputError, RunError
+from dem.terminal import printable
 from smarticles.command_line import Commands, Parser, add_options
 from smarticles.commands import (
     accuracy,
@@ -112,7 +113,8 @@ class _PrintCompletion(argparse.Action):
 def main(argv: Sequence[str] | None = None) -> int:
     """Run `smarticles` with the given arguments, by default those of this process; return the exit status."""
     words = list(sys.argv[1:] if argv is None else argv)
-    return guarded(lambda: _dispatch(words), debug="--debug" in words)
+    with printable():
+        return guarded(lambda: _dispatch(words), debug="--debug" in words)
 
 
 def guarded(action: Callable[[], int], *, debug: bool = False) -> int:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from functools import partial
 from multiprocessing import get_context
@@ -11,11 +11,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from dem.errors import InputError, nearest
-from dem.record.names import FRAME, OF_SWEEP, collection
+from dem.record.names import FRAME, OF_SWEEP, VTKHDF, collection
+from smarticles.kept_tables import keep, key_of, read_kept
 
 if TYPE_CHECKING:
     import pandas as pd
 
+    from postprocess.measures.registry import FrameMeasure
     from postprocess.measures.table import Costly
     from templates.sweep.folder import Folder
 
@@ -26,7 +28,7 @@ PHASE = ("phase", "phase type")  #: Columns that identify a phase within a run
 
 def has_frames(directory: Path) -> bool:
     """Return whether a run directory contains frames."""
-    return (directory / collection(FRAME)).is_file()
+    return any((directory / name).is_file() for name in (collection(FRAME), VTKHDF))
 
 
 def sources(directories: Sequence[Path]) -> dict[Path, Mapping[str, Any]]:
@@ -70,15 +72,25 @@ def follows(name: str, other: str, points: Iterable[Mapping[str, object]]) -> bo
 
 
 def measured(
-    directories: Sequence[Path], *, frames: bool = False, costly: Costly = "phase-end", jobs: int = 1
+    directories: Sequence[Path],
+    *,
+    frames: bool = False,
+    costly: Costly = "phase-end",
+    also: Sequence[str] = (),
+    measures: Sequence[FrameMeasure] = (),
+    jobs: int = 1,
+    progress: Callable[[int, int], None] = lambda _done, _runs: None,
 ) -> pd.DataFrame:
-    """Measure runs and sweeps.
+    """Measure runs and sweeps; tables of runs that have not changed since are read from their directories.
 
     Args:
         frames: return one row per frame instead of one row per run and phase.
         costly: when to compute the costly packing fractions, see `postprocess.measure_run`.
+        also: names of measures that tables have on request alone, such as "crossing-number".
+        measures: further measures; tables with their columns are not kept.
         jobs: number of processes. More than 1 needs `if __name__ == "__main__":` in the calling script, since the
             processes import it.
+        progress: is called with the number of measured runs and of all runs to measure, after each run.
 
     Returns:
         A table with units in the column names. Variables of a sweep are columns after the first one. A variable is
@@ -89,23 +101,56 @@ def measured(
     """
     import pandas as pd  # noqa: PLC0415
 
-    found = sources(directories)
-    take = partial(_table, frames=frames, costly=costly)
-    if jobs == 1 or len(found) < _MIN_RUNS_FOR_PROCESSES:
-        tables = list(map(take, found, found.values()))
+    # A further measure is a function whose source may be unknown, so that its tables are not kept.
+    found, kind = sources(directories), "" if measures else "-".join(["frames" if frames else "phases", costly, *also])
+    keys = {directory: key_of(directory) if kind else "" for directory in found}
+    tables = {directory: read_kept(directory, kind, key) if kind else None for directory, key in keys.items()}
+    missing = [directory for directory, table in tables.items() if table is None]
+    take = partial(_measure_and_keep, frames=frames, costly=costly, also=also, measures=measures, kind=kind)
+    if jobs == 1 or len(missing) < _MIN_RUNS_FOR_PROCESSES:
+        _collect(map(take, missing, (keys[directory] for directory in missing)), missing, tables, progress)
     else:
         # Spawned, since a forked process would not have the threads of VTK and matplotlib.
-        with ProcessPoolExecutor(jobs, mp_context=get_context("spawn")) as pool:
-            tables = list(pool.map(take, found, found.values()))
-    return pd.concat(tables, ignore_index=True)
+        with ProcessPoolExecutor(min(jobs, len(missing)), mp_context=get_context("spawn")) as pool:
+            made = pool.map(take, missing, (keys[directory] for directory in missing))
+            _collect(made, missing, tables, progress)
+    return pd.concat(
+        [_with_variables(table, found[run]) for run, table in tables.items() if table is not None], ignore_index=True
+    )
 
 
-def _table(directory: Path, values: Mapping[str, Any], *, frames: bool, costly: Costly) -> pd.DataFrame:
-    """Return the measures of one run, with the variables of its sweep after the first column."""
+def _collect(
+    made: Iterable[pd.DataFrame],
+    missing: Sequence[Path],
+    tables: dict[Path, pd.DataFrame | None],
+    progress: Callable[[int, int], None],
+) -> None:
+    for number, (directory, table) in enumerate(zip(missing, made, strict=True), start=1):
+        tables[directory] = table
+        progress(number, len(missing))
+
+
+def _measure_and_keep(
+    directory: Path,
+    key: str,
+    *,
+    frames: bool,
+    costly: Costly,
+    also: Sequence[str],
+    measures: Sequence[FrameMeasure],
+    kind: str,
+) -> pd.DataFrame:
     from dem.record.run import Run  # noqa: PLC0415
     from postprocess.measures.table import measure_run, summarise_run  # noqa: PLC0415
 
-    table = (measure_run if frames else summarise_run)(Run(directory), costly=costly)
+    table = (measure_run if frames else summarise_run)(Run(directory), costly=costly, also=also, measures=measures)
+    if kind:
+        keep(table, directory, kind, key)
+    return table
+
+
+def _with_variables(table: pd.DataFrame, values: Mapping[str, Any]) -> pd.DataFrame:
+    """Return the measures of one run with the variables of its sweep after the first column."""
     for place, (name, value) in enumerate(values.items(), start=1):
         column = name
         if name in table.columns and (table[name] == value).all():
@@ -115,6 +160,19 @@ def _table(directory: Path, values: Mapping[str, Any], *, frames: bool, costly: 
         cell = value if isinstance(value, str | int | float | bool) else json.dumps(value, ensure_ascii=False)
         table.insert(place, column, [cell] * len(table))
     return table
+
+
+def of_phase(table: pd.DataFrame, phase: str) -> pd.DataFrame:
+    """Return the rows of a table of `measured` of one type of phase, or of the last phase of each run ("last").
+
+    Raises:
+        InputError: no run has a phase of this type.
+    """
+    if phase == "last":
+        return table[table["phase"] == table.groupby("run")["phase"].transform("max")].reset_index(drop=True)
+    if not (table["phase type"] == phase).any():
+        raise InputError(f"no run has a phase {phase!r}; {nearest(phase, [*table['phase type'].unique(), 'last'])}")
+    return table[table["phase type"] == phase].reset_index(drop=True)
 
 
 def grouped(table: pd.DataFrame, by: Sequence[str]) -> pd.DataFrame:

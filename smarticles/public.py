@@ -1,29 +1,53 @@
 """Python API: run and read scenes and sweeps, and measure them."""
 
+from __future__ import annotations
+
+import re
 import shlex
 import subprocess
 import tempfile
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import Any, overload
+from typing import TYPE_CHECKING, Any, overload
 
 import pandas as pd
 import yaml
 
 from dem.errors import InputError, RunError
+from dem.record.frame import Frame
+from dem.record.names import SCENE
 from dem.record.run import Run, open_run
 from dem.scene.reading import SCHEMA_VERSION, apply_override, dump_scene
 from dem.scene.scene import Scene
-from dem.scene.yaml_text import load_yaml
 from dem.setting.fidelity import fidelities
+from dem.yaml_text import load_yaml, read_text
+from postprocess.measures.registry import FrameMeasure, measure_of
 from smarticles.main import BAD_INPUT
 from smarticles.measuring import grouped, measured
 from smarticles.sweeps import compute, make_folder, raise_failures
 from templates.local import environment, smarticles_command
 from templates.sweep.folder import Folder, open_folder
 from templates.sweep.sweep_file import SEED
+
+if TYPE_CHECKING:
+    from PIL.Image import Image
+
+#: A measure, or a function of a frame and its run, whose name ends with the unit of its value: `top_m`
+OwnMeasure = FrameMeasure | Callable[[Frame, Run], float]
+
+# Options of the command line and keys of `vary`, as messages name them, and what Python calls them.
+_IN_PYTHON = (
+    (r"--resume\b", "resume=True"),
+    (r"--(threads|ranks|jobs) (\d+)", r"\1=\2"),
+    (r"--(out|threads|ranks|jobs)\b", r"\1"),
+    (r"--set ([\w.]+)='\{\{ \w+ \}\}'", r"vary: \1"),
+    (r"smarticles-\w+/scene\.yaml\.j2, rendered for run", "vary: run"),
+    (r"smarticles-\w+/sweep\.yaml", "vary"),
+    (r"smarticles-\w+/scene\.yaml(\.j2)?", "scene"),
+)
 
 
 @dataclass(frozen=True)
@@ -53,13 +77,22 @@ class SweepDirectory(Sequence[Run]):
     def __getitem__(self, index: int | slice) -> Run | list[Run]:
         return self.folder.runs()[index]
 
-    def table(self, *, by: str | Sequence[str] | None = None, frames: bool = False) -> pd.DataFrame:
+    def table(
+        self,
+        *,
+        by: str | Sequence[str] | None = None,
+        frames: bool = False,
+        measures: Sequence[OwnMeasure] = (),
+        jobs: int = 1,
+    ) -> pd.DataFrame:
         """Return the measures of all runs that have frames, with the sweep's variables as columns.
 
         Args:
             by: columns, such as variables of the sweep. The result is then averaged over runs with equal values in
                 these columns; columns "… SE […]" have the standard errors over runs.
             frames: return one row per frame; cannot be combined with `by`.
+            measures: further measures; a function of a frame and its run returns a number.
+            jobs: number of processes. More than 1 needs `if __name__ == "__main__":` in the calling script.
 
         Returns:
             One row per run and phase, per group and phase with `by`, or per frame. Column names contain the units.
@@ -69,7 +102,7 @@ class SweepDirectory(Sequence[Run]):
         """
         if by is not None and frames:
             raise InputError("by: averages over phases of runs; leave frames out")
-        table = measured([self.path], frames=frames)
+        table = measured([self.path], frames=frames, measures=[measure_of(one) for one in measures], jobs=jobs)
         return table if by is None else grouped(table, [by] if isinstance(by, str) else list(by))
 
 
@@ -91,19 +124,22 @@ def run(
         InputError: the scene is not valid, or `out` contains other files.
         RunError: the run failed or was stopped.
     """
-    with tempfile.TemporaryDirectory(prefix="smarticles-") as scratch:
+    with tempfile.TemporaryDirectory(prefix="smarticles-") as scratch, _in_words_of_python(scratch):
         file = Path(scratch, "scene.yaml") if isinstance(scene, Scene) else Path(scene)
         if isinstance(scene, Scene):
             file.write_text(dump_scene(scene), encoding="utf-8")
         words = [*smarticles_command(file, Path(out), resume), "--threads", str(threads)]
         words += [] if ranks is None else ["--ranks", str(ranks)]
+        if isinstance(scene, Scene):
+            # The file in the temporary folder will not exist; `scene.yaml` in the run directory will.
+            words += ["--recorded-as", shlex.join(["smarticles", "run", str(Path(out) / SCENE), "--out", "NEW"])]
         done = subprocess.run(
             words, env=environment(), stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True, check=False
         )
-    if done.returncode:
-        lines = done.stderr.strip().splitlines() or [f"exit status {done.returncode}, without a message"]
-        text = lines[-1].removeprefix("smarticles: ").removeprefix("error: ")
-        raise InputError(text) if done.returncode == BAD_INPUT else RunError(text)
+        if done.returncode:
+            lines = done.stderr.strip().splitlines() or [f"exit status {done.returncode}, without a message"]
+            text = lines[-1].removeprefix("smarticles: ").removeprefix("error: ")
+            raise InputError(text) if done.returncode == BAD_INPUT else RunError(text)
     return Run(Path(out))
 
 
@@ -112,25 +148,64 @@ def read(directory: Path | str) -> Run:
     return open_run(directory)
 
 
-def measure(run: Run | Path | str, *, frames: bool = False) -> pd.DataFrame:
+def measure(
+    run: Run | Path | str, *, frames: bool = False, also: Sequence[str] = (), measures: Sequence[OwnMeasure] = ()
+) -> pd.DataFrame:
     """Return the measures of a run as a table, as `smarticles measure` does.
 
     Args:
         run: run, or its directory.
         frames: return one row per frame.
+        also: names of measures that tables have on request alone, such as "crossing-number".
+        measures: further measures; a function of a frame and its run returns a number. Its name ends with the unit:
+            `top_m` makes the column `top [m]`.
 
     Returns:
         One row per phase, with means over its last frames and their standard errors, or one row per frame. Column
         names contain the units.
 
     Raises:
-        InputError: the directory is not a run directory, or the run has no frames yet.
+        InputError: the directory is not a run directory, the run has no frames yet, or a name is unknown.
     """
-    return measured([run.path if isinstance(run, Run) else Path(run)], frames=frames)
+    directory = run.path if isinstance(run, Run) else Path(run)
+    return measured([directory], frames=frames, also=also, measures=[measure_of(one) for one in measures])
+
+
+def plot(run: Run | Path | str, *, time: float | None = None, color_by: str | None = None) -> Image:
+    """Draw the pile of a run, as `smarticles render` does; a notebook shows the picture.
+
+    Args:
+        run: run, or its directory.
+        time: simulated time [s] of the frame, the nearest one; None: the last frame.
+        color_by: field that colours the smarticles; None: the default of `smarticles render`.
+
+    Raises:
+        InputError: the directory is not a run directory, the run has no frames yet, or the field does not exist.
+    """
+    from PIL import Image as images  # noqa: N813, PLC0415  (of the extra "viz")
+
+    from postprocess.pictures.render import render_run  # noqa: PLC0415
+
+    with tempfile.TemporaryDirectory(prefix="smarticles-") as scratch:
+        picture = Path(scratch, "pile.png")
+        render_run(run.path if isinstance(run, Run) else Path(run), output=picture, time=time, color_by=color_by)
+        with images.open(picture) as image:
+            return image.copy()
 
 
 def read_sweep(directory: Path | str) -> SweepDirectory:
-    """Open the directory of a sweep or a study, finished or not; raise InputError for any other directory."""
+    """Open the directory of a sweep or a study, finished or not.
+
+    Args:
+        directory: directory that `smarticles sweep`, `smarticles study` or `smarticles.sweep` has made.
+
+    Returns:
+        A sequence of the runs in the order of the sweep; `values` has the variables of each run, `table()` the measures
+        of all runs that have frames.
+
+    Raises:
+        InputError: the directory is not that of a sweep.
+    """
     return SweepDirectory(open_folder(Path(directory)))
 
 
@@ -155,7 +230,7 @@ def sweep(
         InputError: a scene or the sweep is not valid, or the directory contains other files.
         RunError: a run failed.
     """
-    with tempfile.TemporaryDirectory(prefix="smarticles-") as scratch:
+    with tempfile.TemporaryDirectory(prefix="smarticles-") as scratch, _in_words_of_python(scratch):
         if vary is None and isinstance(what, Scene):
             raise InputError("vary: is missing; give the keys of the scene that change, e.g. vary={'seed': [1, 2, 3]}")
         file = write_sweep(what, vary, Path(scratch)) if vary is not None else Path(str(what))
@@ -165,6 +240,18 @@ def sweep(
         folder = make_folder(file, Path(out), again)
     raise_failures(folder, compute(folder, jobs=jobs, command=again))
     return SweepDirectory(folder)
+
+
+@contextmanager
+def _in_words_of_python(scratch: str) -> Iterator[None]:
+    """Let messages name arguments of Python instead of options and of files in a temporary folder."""
+    try:
+        yield
+    except (InputError, RunError) as error:
+        text = str(error).replace(f"{Path(scratch).parent}/", "") if scratch in str(error) else str(error)
+        for pattern, words in _IN_PYTHON:
+            text = re.sub(pattern, words, text)
+        raise type(error)(text) from None
 
 
 # -- sweep file and template for `vary` ------------------------------------------------------------------------------
@@ -219,7 +306,7 @@ def _explicit_keys(scene: Scene) -> dict[str, Any]:
 def _read_scene_file(path: Path) -> dict[str, Any]:
     """Return the content of a scene file, in which paths of runs to take over are absolute."""
     try:
-        data = load_yaml(path.read_text(encoding="utf-8"))
+        data = load_yaml(read_text(path))
     except (OSError, ValueError, yaml.YAMLError) as error:
         msg = f"{path}: cannot be read ({' '.join(str(error).split())}); give a scene or the path of a scene file"
         raise InputError(msg) from None

@@ -302,6 +302,7 @@ STUDY = Study(
             split=one_by_one(DEFINITION, str),
             bounds={ACTIVATION: AT_LEAST},
             reference={ACTIVATION: (_GRAVISH["l_over_w"], _GRAVISH["delta"])},
+            published="Gravish 2012",
             notes=[
                 "Open, with an arrow: no acceleration at which all runs collapsed, a bound.",
                 "Experiment: Gravish et al., PRL 108, 208001 (2012), digitised.",

@@ -41,6 +41,17 @@ class Script:
         text = ast.get_docstring(ast.parse((FOLDER / f"{self.module}.py").read_text(encoding="utf-8"))) or ""
         return f"variant {' '.join(self.variants)} of {self.module}" if self.variants else text.split("\n\n")[0]
 
+    @cached_property
+    def found(self) -> str:
+        """Finding of the full study, with the folder of its results; empty if it was not published.
+
+        Results are in the repository and not in installed packages.
+        """
+        page = FOLDER.parent / "results" / self.name / "README.md"
+        lines = page.read_text(encoding="utf-8").splitlines() if page.is_file() else []
+        finding = next((line.removeprefix("> ") for line in lines if line.startswith("> ")), "")
+        return finding and f"{finding.rstrip('.')} (results/{self.name})."
+
     def load(self) -> Study:
         """Import the script and return its study."""
         study: Study = importlib.import_module(f"studies.{self.module}").STUDY

@@ -411,6 +411,9 @@ class KindDouble:
     def seconds_per_second(self, scene: Demand, time_step: float, activity: Activity) -> float:
         return 1e-6 / time_step
 
+    def seconds_to_compile(self, scene: Demand) -> float:
+        return 0.0
+
     def build(self, scene: Demand, time_step: float) -> EngineDouble:
         self.built.append(EngineDouble.of(scene, time_step))
         return self.built[-1]

@@ -214,7 +214,7 @@ class LinksAccess(_Access):
         # The link becomes too heavy to move, and an external force carries its weight.
         own = _links(engine)
         world, planar = own._world, Planar(*own._world.shapes.planar[0])
-        middle = own.state().link_positions[0, 1].copy()
+        middle = own.state().smarticles.link_positions[0, 1].copy()
         mass, heavy = HEAVY * planar.middle_mass, ("middle_mass", "middle_xx", "middle_yy", "middle_zz")
         planar = planar._replace(
             mass=2 * planar.barb_mass + mass, **{name: HEAVY * getattr(planar, name) for name in heavy}
@@ -253,7 +253,7 @@ class LinksAccess(_Access):
             own.__class__ = Pushed  # a run's engine, built by its kind
         assert isinstance(own, Pushed)
         # One force per link: a force on the middle link alone would turn the smarticle.
-        weights = -(ratio - 1) * own.gravity * own.particle.boxes.link_masses
+        weights = -(ratio - 1) * own.gravity * particle_of(own).boxes.link_masses
         own.forces = {(k, link): np.array([0.0, 0.0, weights[link]]) for link in range(3)}
         own.grown = own.time, rise
 
@@ -342,11 +342,11 @@ class YadeAccess(_Access):
         own = _yade(engine)
         bodies, vector = own._omega.bodies, own._yade.vector
         clump, (v, w) = bodies[own._assembly.bodies[k]].state, (np.asarray(velocity, float), np.asarray(spin, float))
-        state = own.state()
+        state = own.state().smarticles
         rotation = state.link_rotations[k, 1] @ state.boxes.link_rotations[1].T
         clump.vel, clump.angVel = vector(*v), vector(*w)
         # YADE integrates the angular momentum.
-        clump.angMom = vector(*(rotation @ np.diag(own.particle.boxes.inertia) @ rotation.T @ w))
+        clump.angMom = vector(*(rotation @ np.diag(particle_of(own).boxes.inertia) @ rotation.T @ w))
         # Contact laws read the velocities of the spheres in the first step.
         for sphere in own._assembly._spheres[k]:
             member = bodies[sphere].state
@@ -364,7 +364,7 @@ class YadeAccess(_Access):
 
     def swing(self, engine: Engine, links: Iterable[tuple[float, float, float]]) -> None:
         own = _yade(engine)
-        vector, inertias = own._yade.vector, own.particle.boxes.link_inertias[:, 2]
+        vector, inertias = own._yade.vector, particle_of(own).boxes.link_inertias[:, 2]
         for body, (along, across, spin), inertia in zip(bodies_of(engine), links, inertias, strict=True):
             body.vel, body.angVel = vector(float(along), float(across), 0.0), vector(0, 0, float(spin))
             body.angMom = vector(0, 0, float(spin * inertia))
@@ -403,6 +403,12 @@ class YadeAccess(_Access):
 def _yade(engine: Engine) -> YadeEngine:
     assert isinstance(engine, YadeEngine)
     return engine
+
+
+def particle_of(engine: Engine) -> Particle:
+    """Return the smarticle of an engine."""
+    assert isinstance(engine.particle, Particle)
+    return engine.particle
 
 
 def bodies_of(engine: Engine) -> list[Any]:

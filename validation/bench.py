@@ -168,13 +168,13 @@ def watchdog_error(engine: Engine, recorder: Recorder) -> str | None:
 
 def energy(engine: Engine) -> float:
     """Return the sum of kinetic, potential and elastic contact energy [J]."""
-    state = engine.state()
+    state = engine.state().smarticles
     return state.kinetic_energy + state.potential_energy(engine.gravity, 0.0) + engine.ledger.elastic()[0]
 
 
 def fastest(engine: Engine) -> float:
     """Return the largest speed of a link [m/s]."""
-    return float(np.linalg.norm(engine.state().link_velocities, axis=-1).max())
+    return float(np.linalg.norm(engine.state().smarticles.link_velocities, axis=-1).max())
 
 
 def lying(scene: Scene) -> float:

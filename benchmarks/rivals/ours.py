@@ -48,5 +48,5 @@ class OnEngine(World):
             self.engine.advance(min(until, self._due) - self.engine.steps)
 
     def links(self) -> tuple[Array, Array]:
-        state = self.engine.state()
+        state = self.engine.state().smarticles
         return state.link_positions - np.array([0.0, 0.0, self.engine.boundaries.floor]), state.link_rotations

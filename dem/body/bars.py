@@ -1,4 +1,4 @@
-"""Rigid bodies of straight flat bars that are joined at their ends: staples, crosses or rings."""
+"""Rigid bodies of straight bars, flat or round, joined at their ends: staples, crosses or rings."""
 
 import math
 from dataclasses import dataclass
@@ -7,7 +7,7 @@ from itertools import permutations
 
 import numpy as np
 
-from dem.arrays import Array, Numbers
+from dem.arrays import Array, Flags, Numbers
 from dem.body.linear import applied, eigen_symmetric, matrix_product
 from dem.body.particle import mean_width
 from dem.errors import InputError
@@ -26,15 +26,50 @@ def first_ends(points: Array) -> Numbers:
     return np.asarray((np.abs(places[:, None] - places).max(axis=-1) <= JOINED * longest).argmax(axis=1))
 
 
+def owners(first: Numbers, inner: Flags) -> Flags:
+    """Return for each end of segments whether its segment owns the place: the first inner one there, or the first one.
+
+    Args:
+        first: (2 S,) from `first_ends`.
+        inner: (2 S,) whether the segment of an end is joined at both ends.
+    """
+    order = np.lexsort((np.arange(len(first)), ~inner, first))
+    found = np.zeros(len(first), np.bool_)
+    found[order[np.append(True, np.diff(first[order]) != 0)]] = True
+    return found
+
+
+def segment_distances(one: Array, other: Array) -> Array:
+    """Return distances (P,) between segments (P, 2, 3) and (P, 2, 3), pair by pair, in their unit of length.
+
+    Segments may have no length. Source: Ericson, Real-Time Collision Detection, section 5.1.9.
+    """
+    p, q = one[:, 0], other[:, 0]
+    u, v, w = one[:, 1] - p, other[:, 1] - q, p - q
+    a, e, b = (u * u).sum(axis=1), (v * v).sum(axis=1), (u * v).sum(axis=1)
+    c, f = (u * w).sum(axis=1), (v * w).sum(axis=1)
+    det = a * e - b * b
+
+    def ratio(top: Array, bottom: Array) -> Array:
+        return np.clip(np.divide(top, bottom, out=np.zeros_like(top), where=bottom > 0), 0.0, 1.0)
+
+    s = np.where(det > 1e-12 * a * e, ratio(b * f - c * e, det), 0.0)
+    t = ratio(b * s + f, e)
+    s = ratio(b * t - c, a)
+    apart = w + s[:, None] * u - t[:, None] * v
+    return np.asarray(np.sqrt((apart**2).sum(axis=1)))
+
+
 @dataclass(frozen=True, kw_only=True)
 class Bars:
     """S straight bars of one cross-section that form a rigid body.
 
-    Mass and inertia are the sums over one box per bar. Boxes overlap at joints, where mass counts twice, as in the
-    paper.
+    Mass and inertia are the sums over one box, or cylinder, per bar. These overlap at joints, where mass counts twice,
+    as in the paper.
 
     Raises:
-        InputError: a bar is too short for its thickness, or its normal is along it.
+        InputError: a bar is too short for its thickness, its normal is along it, or bars cross or touch apart from
+            their joints.
     """
 
     points: Array  #: (S, 2, 3) both ends of each bar [m], in any frame
@@ -42,14 +77,42 @@ class Bars:
     thickness_normal: float  #: [m]
     thickness_in_plane: float  #: [m]
     density: float  #: [kg/m³]
+    round: bool = False  #: Whether the section is a disc, of the diameter that both thicknesses give
 
     def __post_init__(self) -> None:
         least = self.thickness_in_plane
         for k, length in enumerate(self.lengths):
             if not length > least:
                 raise InputError(f"bar {k}: {length:g} m long; make it longer than its thickness, {least:g} m")
-        if not (np.linalg.norm(np.cross(self.directions, self.normals), axis=1) > 0).all():
+        if not (np.linalg.norm(np.cross(self.directions, self.normals), axis=1) > 1e-9).all():
             raise InputError("normals: one is along its bar; give a direction across it")
+        first, second, apart = self.gaps
+        least = min(self.thickness_normal, self.thickness_in_plane)
+        if len(apart) and not apart.min() > least:
+            k = int(np.argmin(apart))
+            raise InputError(
+                f"bars {first[k]} and {second[k]} cross or touch: their axes are {apart[k]:.3g} m apart away from a "
+                f"common joint; keep them more than their thickness apart, {least:g} m"
+            )
+
+    @cached_property
+    def gaps(self) -> tuple[Numbers, Numbers, Array]:
+        """All pairs of bars, as (P,) first, (P,) second and (P,) distances of their axes [m].
+
+        The distance of two bars with a common joint is that of either's other end from the other bar; bars that lie on
+        each other have the distance 0.
+        """
+        first, second = np.triu_indices(len(self.points), 1)
+        joints = first_ends(self.points).reshape(-1, 2)
+        one, other = joints[first], joints[second]
+        same = one[:, :, None] == other[:, None, :]  # (P, 2, 2) whether an end of one is an end of the other
+        apart = segment_distances(self.points[first], self.points[second])
+        for k in np.flatnonzero(same.any(axis=(1, 2))):
+            i, j = np.argwhere(same[k])[0]
+            a, b = self.points[first[k]], self.points[second[k]]
+            ends = np.array([[a[1 - i], a[1 - i]], [b[1 - j], b[1 - j]]])
+            apart[k] = float(segment_distances(ends, np.array([b, a])).min())
+        return first, second, apart
 
     @cached_property
     def lengths(self) -> Array:
@@ -64,12 +127,18 @@ class Bars:
     @property
     def masses(self) -> Array:
         """(S,) masses of the bars [kg]."""
-        return self.density * self.thickness_normal * self.thickness_in_plane * self.lengths
+        area = self.thickness_normal * self.thickness_in_plane * (math.pi / 4 if self.round else 1.0)
+        return self.density * area * self.lengths
 
     @property
     def mass(self) -> float:
         """Mass of the body [kg]."""
         return float(self.masses.sum())
+
+    @property
+    def volume(self) -> float:
+        """Sum of the bars' volumes [m³]; where they overlap at joints it counts twice, as in the paper."""
+        return self.mass / self.density
 
     @cached_property
     def _frames(self) -> Array:
@@ -89,7 +158,8 @@ class Bars:
 
         Axes are right-handed, and ordered such that they are as near as possible to the axes of that frame.
         """
-        squares = np.array([self.thickness_in_plane**2, self.thickness_normal**2])
+        # The second moment of a disc is 3/4 of that of the square around it, over their areas.
+        squares = np.array([self.thickness_in_plane**2, self.thickness_normal**2]) * (0.75 if self.round else 1.0)
         tensor = np.zeros((3, 3))
         for mass, length, frame, ends in zip(self.masses, self.lengths, self._frames, self.points, strict=True):
             arm = ends.mean(axis=0) - self._centre_of_mass
@@ -122,11 +192,19 @@ class Bars:
         """(S, 2, 3) both ends of each bar in the body's frame: centre of mass, principal axes [m]."""
         return applied(self.rotation.T, self.points - self._centre_of_mass)
 
-    @property
-    def free(self) -> Array:
+    @cached_property
+    def free(self) -> Flags:
         """(S, 2) whether each end of a bar is free: not the end of another bar."""
         first = first_ends(self.points)
         return np.asarray((np.bincount(first, minlength=len(first))[first] == 1).reshape(-1, 2))
+
+    @cached_property
+    def owned(self) -> Flags:
+        """(S, 2) whether a bar owns the joint, or free end, at its end.
+
+        Each joint has one owner: the first of those bars that are joined at both ends, or else the first bar.
+        """
+        return owners(first_ends(self.points), np.repeat((~self.free).all(axis=1), 2)).reshape(-1, 2)
 
     def radius(self, rows: int) -> float:
         """Return the radius [m] of the `rows` strands, swept spheres side by side, that represent a bar.
@@ -134,6 +212,8 @@ class Bars:
         The diameter of a single strand is the mean width of the section. The diameter of several strands is the bar's
         thickness in the plane.
         """
+        if self.round:
+            return self.thickness_in_plane / 2
         one = mean_width(self.thickness_normal, self.thickness_in_plane)
         return (one if rows == 1 else self.thickness_in_plane) / 2
 

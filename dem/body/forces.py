@@ -34,9 +34,9 @@ class ContactForces:
     forces: Array  #: (M, 3) total force on the first smarticle, summed over the points [N]
 
 
-def at_links(smarticle: Number, link: Number) -> Number:
-    """Return the codes of links for `contacts_of_points`, 0 or above, from smarticles and links."""
-    return LINKS * smarticle + link
+def at_links(smarticle: Number, link: Number, each: int = LINKS) -> Number:
+    """Return the codes of links, 0 or above, for `contacts_of_points`; `each`: most links of a body."""
+    return each * smarticle + link
 
 
 def at_boundaries(part: Number) -> Number:
@@ -45,7 +45,14 @@ def at_boundaries(part: Number) -> Number:
 
 
 def contacts_of_points(
-    first: Numbers, second: Numbers, *, loads: Array, points: Array, friction: Array, forces: Array
+    first: Numbers,
+    second: Numbers,
+    *,
+    loads: Array,
+    points: Array,
+    friction: Array,
+    forces: Array,
+    each: int = LINKS,
 ) -> ContactForces:
     """Return the contacts that P points make: one per pair of links, or of a link and a boundary.
 
@@ -56,6 +63,7 @@ def contacts_of_points(
         points: (P, 3) positions [m].
         friction: (P, 3) tangential forces on the links of `first` [N].
         forces: (P, 3) total forces on the links of `first` [N].
+        each: most links of a body, as given to `at_links`.
     """
     turned = (second >= 0) & (second < first)
     sign = np.where(turned, -1.0, 1.0)[:, None]
@@ -73,8 +81,8 @@ def contacts_of_points(
     pairs, loose = which[carried].astype(np.int64), which[carried, 1] < 0
     missing = np.column_stack([np.zeros_like(loose), loose])
     return ContactForces(
-        smarticles=np.where(missing, NONE, pairs // LINKS),
-        links=np.where(missing, NONE, pairs % LINKS),
+        smarticles=np.where(missing, NONE, pairs // each),
+        links=np.where(missing, NONE, pairs % each),
         boundaries=np.where(loose, -1 - pairs[:, 1], NONE),
         points=summed(loads[:, None] * points)[carried] / total[carried, None],
         normal=total[carried],

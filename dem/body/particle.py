@@ -340,18 +340,58 @@ class Particle:
 
     @cached_property
     def smallest_effective_mass(self) -> float:
-        """Smallest effective mass [kg] of the smarticle at any sphere's centre, in any direction.
+        """Smallest effective mass of the smarticle at any sphere's centre, in any direction [kg]."""
+        return smallest_effective_mass(self.boxes.mass, self.boxes.inertia, self.centres)
 
-        A force F in the direction n at a point r from the centre of mass accelerates that point along n by
-        (1/m + (r × n)·I⁻¹(r × n)) F. The effective mass is the inverse of the largest eigenvalue of this mobility. It
-        limits the stable time step: at barb tips it is several times smaller than the mass.
-        """
-        inverse, (x, y, z) = 1.0 / self.boxes.inertia, self.centres.T
-        # A push on a sphere acts at its surface, but the normal passes through the centre.
-        cross = np.zeros((len(x), 3, 3))
-        cross[:, 0, 1], cross[:, 0, 2] = -z, y
-        cross[:, 1, 0], cross[:, 1, 2] = z, -x
-        cross[:, 2, 0], cross[:, 2, 1] = -y, x
-        tensors = np.eye(3) / self.boxes.mass + matrix_product(cross.transpose(0, 2, 1), inverse[:, None] * cross)
-        mobility = float(eigen_symmetric(tensors)[0].max())
-        return 1.0 / mobility
+    @property
+    def mass(self) -> float:
+        """Mass of the smarticle [kg]."""
+        return self.boxes.mass
+
+    @property
+    def inertia(self) -> Array:
+        """(3,) float64 [kg m²]: principal moments about the centre of mass, along the body axes."""
+        return self.boxes.inertia
+
+    @property
+    def volume(self) -> float:
+        """Solid volume [m³], see `Boxes.volume`."""
+        return self.boxes.volume
+
+    @property
+    def size(self) -> float:
+        """Length of the middle link, w [m]."""
+        return self.boxes.middle_length
+
+    @property
+    def thicknesses(self) -> tuple[float, float]:
+        """Thickness along the normal and, of the barbs, in the plane [m]."""
+        return self.boxes.thickness_normal, self.boxes.thickness_in_plane
+
+    @property
+    def diameter(self) -> float:
+        """Sphere diameter [m]."""
+        return self.chain.diameter
+
+
+def smallest_effective_mass(mass: float, inertia: Array, centres: Array) -> float:
+    """Return the smallest effective mass [kg] of a rigid body at any of several points, in any direction.
+
+    A force F in the direction n at a point r from the centre of mass accelerates that point along n by
+    (1/m + (r × n)·I⁻¹(r × n)) F. The effective mass is the inverse of the largest eigenvalue of this mobility. It
+    limits the stable time step: at barb tips it is several times smaller than the mass.
+
+    Args:
+        mass: [kg].
+        inertia: (3,) principal moments [kg m²].
+        centres: (n, 3) the points, from the centre of mass, along the principal axes [m].
+    """
+    inverse, (x, y, z) = 1.0 / inertia, centres.T
+    # A push on a sphere acts at its surface, but the normal passes through the centre.
+    cross = np.zeros((len(x), 3, 3))
+    cross[:, 0, 1], cross[:, 0, 2] = -z, y
+    cross[:, 1, 0], cross[:, 1, 2] = z, -x
+    cross[:, 2, 0], cross[:, 2, 1] = -y, x
+    tensors = np.eye(3) / mass + matrix_product(cross.transpose(0, 2, 1), inverse[:, None] * cross)
+    mobility = float(eigen_symmetric(tensors)[0].max())
+    return 1.0 / mobility

@@ -1,16 +1,17 @@
-"""Poses of smarticles: random poses without overlap, and poses fitted to recorded vertices."""
+"""Poses of bodies: random poses without overlap, and poses fitted to recorded vertices."""
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
 
-from dem.arrays import Array
+from dem.arrays import Array, Numbers
+from dem.body.kinds import Body
 from dem.body.linear import applied, eigen_symmetric
-from dem.body.particle import Boxes, Particle
+from dem.body.particle import Boxes
 from dem.errors import RunError
 
 CLEARANCE = 0.02  # free distance kept between surfaces, in sphere diameters
@@ -21,14 +22,15 @@ MOST_GROWTH = 40  # increases of the slab's height before placement fails
 
 @dataclass(frozen=True)
 class Poses:
-    """Poses of k smarticles."""
+    """Poses of k bodies."""
 
     positions: Array  #: (k, 3) centres of mass [m]
     rotations: tuple[Rotation, ...]  #: k rotations from the body frame to the laboratory frame
+    kinds: Numbers | None = None  #: (k,) numbers of their kinds in a mixture; None: smarticles
 
 
 def place_layer(
-    particle: Particle,
+    bodies: Body | Sequence[Body],
     *,
     count: int,
     radius: float,
@@ -37,33 +39,38 @@ def place_layer(
     obstacles: Array,
     rng: np.random.Generator,
     narrower: Callable[[Array], Array] | None = None,
+    thickest: float = 0.0,
 ) -> Poses:
-    """Return random poses of `count` smarticles without overlap, in a slab of a cylinder.
+    """Return random poses of `count` bodies without overlap, in a slab of a cylinder.
 
     Orientations are drawn uniformly from all rotations, centres from the disc, and the heights of the lowest points
     from the slab. Poses that overlap are drawn again. A slab that is too full is made higher.
 
     Args:
+        bodies: a body, of which all are copies, or as many bodies as `count`.
         radius: inner radius of the cylinder [m].
         bottom: height of the slab's lower face [m]; no sphere reaches below it.
         height: height of the slab [m].
-        obstacles: (n, 3) centres of spheres that are already there, with the particle's sphere diameter [m].
+        obstacles: (n, 3) centres of spheres that are already there [m].
         narrower: function from heights (n,) to inner radii (n,) of the cylinder [m], which must not increase with
             height; None: `radius` everywhere.
+        thickest: radius of the thickest obstacles, if they are thicker than all of `bodies` [m].
 
     Raises:
-        RunError: some smarticles found no room although the slab was made higher `MOST_GROWTH` times.
+        RunError: some bodies found no room although the slab was made higher `MOST_GROWTH` times.
     """
-    diameter = particle.chain.diameter
-    spacing = diameter * (1 + CLEARANCE)
-    margin = particle.radius * (1 + 2 * CLEARANCE)
+    each = list(bodies) if isinstance(bodies, Sequence) else [bodies]
+    each *= 1 if len(each) == count else count
+    thickest = max(thickest, *(body.radius for body in each))
+    spacing = 2 * thickest * (1 + CLEARANCE)
+    margin = thickest * (1 + 2 * CLEARANCE)
     widest = radius - margin
     occupied = obstacles
     positions: list[Array] = []
     rotations: list[Rotation] = []
     increases = 0
     while len(positions) < count:
-        tree = cKDTree(occupied) if len(occupied) else None
+        tree, particle = cKDTree(occupied) if len(occupied) else None, each[len(positions)]
         for _ in range(ATTEMPTS):
             rotation = Rotation.random(random_state=rng)
             spheres = rotation.apply(particle.centres)
@@ -89,7 +96,7 @@ def place_layer(
             increases += 1
             if increases > MOST_GROWTH:
                 raise RunError(
-                    f"only {len(positions)} of {count} smarticles of a layer found room in a container of radius "
+                    f"only {len(positions)} of {count} bodies of a layer found room in a container of radius "
                     f"{radius:g} m; lower phases.0.per_layer or widen container.radius_m"
                 )
     return Poses(np.array(positions), tuple(rotations))

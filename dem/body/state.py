@@ -1,18 +1,200 @@
-"""Poses and velocities of all smarticles at one instant."""
+"""Poses and velocities of all bodies at one instant: of smarticles, or of rigid bodies of other kinds."""
+
+from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Self
+from typing import Protocol, Self
 
 import numpy as np
 
 from dem.arrays import Array, Numbers
+from dem.body.kinds import Kind, Mixture
+from dem.body.linear import matrix_product
 from dem.body.particle import LINKS, Boxes, Particle
+from dem.errors import InputError
+
+
+class PileState(Protocol):
+    """What states of all kinds of bodies have in common, in the laboratory frame."""
+
+    @property
+    def count(self) -> int:
+        """Number of bodies, N."""
+
+    @property
+    def positions(self) -> Array:
+        """(N, 3) centres of mass [m]."""
+
+    @property
+    def velocities(self) -> Array:
+        """(N, 3) velocities of the centres of mass [m/s]."""
+
+    @property
+    def volume(self) -> float:
+        """Mean solid volume of the bodies present [m³]; of all bodies where none is present."""
+
+    @property
+    def tops(self) -> Array:
+        """(N,) heights of the highest point of each body's axes [m]."""
+
+    @property
+    def speeds(self) -> Array:
+        """(N,) speed of the fastest centre of a bar, or link, of each body [m/s]."""
+
+    @property
+    def momentum(self) -> Array:
+        """(3,) momentum of all bodies [kg m/s]."""
+
+    @property
+    def angular_momentum(self) -> Array:
+        """(3,) angular momentum of all bodies about the origin [kg m²/s]."""
+
+    @property
+    def kinetic_energy(self) -> float:
+        """Translational and rotational kinetic energy of all bodies [J]."""
+
+    def potential_energy(self, gravity: float, floor: float) -> float:
+        """Return the gravitational energy [J] of all bodies, 0 at the height `floor` [m]; gravity in m/s²."""
+
+    @property
+    def smarticles(self) -> State:
+        """The state of a pile of smarticles; raises InputError for other bodies, which have no barbs."""
+
+    @property
+    def bodies(self) -> RigidState | None:
+        """The state of a pile of rigid bodies that are no smarticles; None for smarticles."""
+
+
+@dataclass(frozen=True)
+class RigidState:
+    """Poses and velocities of N rigid bodies of several kinds, with M bars in all, in the laboratory frame."""
+
+    mixture: Mixture
+    kind: Numbers  #: (N,) kind of each body
+    positions: Array  #: (N, 3) centres of mass [m]
+    rotations: Array  #: (N, 3, 3) body frame to laboratory frame [1]
+    velocities: Array  #: (N, 3) of the centres of mass [m/s]
+    spins: Array  #: (N, 3) angular velocities [rad/s]
+
+    @property
+    def count(self) -> int:
+        """Number of bodies, N."""
+        return len(self.positions)
+
+    @property
+    def smarticles(self) -> State:
+        """Raise InputError, since these bodies have no barbs."""
+        raise InputError("particle: these bodies are no smarticles, and have no barbs; leave particle out")
+
+    @property
+    def bodies(self) -> RigidState:
+        """This state."""
+        return self
+
+    @property
+    def volume(self) -> float:
+        """Mean solid volume of the bodies present [m³]; of all bodies where none is present."""
+        return self.mixture.mean(self.mixture.volumes.tolist(), self.kind if self.count else None)
+
+    @cached_property
+    def body(self) -> Numbers:
+        """(M,) the body that each bar belongs to."""
+        sizes = np.array([len(kind.bars.points) for kind in self.mixture.kinds], dtype=np.int64)
+        return np.repeat(np.arange(self.count), sizes[self.kind])
+
+    @cached_property
+    def bar(self) -> Numbers:
+        """(M,) number of each bar in its body."""
+        return np.concatenate([np.zeros(0, np.int64), *(np.arange(len(k.bars.points)) for k in self._kinds)])
+
+    @property
+    def _kinds(self) -> list[Kind]:
+        return [self.mixture.kinds[k] for k in self.kind]
+
+    @cached_property
+    def segments(self) -> Array:
+        """(M, 2, 3) both ends of all bars [m]."""
+        local = np.concatenate([np.zeros((0, 2, 3)), *(kind.bars.ends for kind in self._kinds)])
+        turned = matrix_product(self.rotations[self.body, None], local[..., None])[..., 0]
+        return np.asarray(turned + self.positions[self.body, None])
+
+    @cached_property
+    def normals(self) -> Array:
+        """(M, 3) unit vectors along the normal of each bar; zeros where the section is round [1]."""
+        local = np.concatenate(
+            [np.zeros((0, 3)), *((not kind.bars.round) * kind.bars.frames[:, :, 2] for kind in self._kinds)]
+        )
+        return matrix_product(self.rotations[self.body], local[..., None])[..., 0]
+
+    @cached_property
+    def bar_velocities(self) -> Array:
+        """(M, 3) velocities of the bars' centres [m/s]."""
+        arms = self.segments.mean(axis=1) - self.positions[self.body]
+        return self.velocities[self.body] + np.cross(self.spins[self.body], arms)
+
+    @cached_property
+    def tops(self) -> Array:
+        """(N,) heights of the highest point of each body's axes [m]."""
+        return self._largest(self.segments[..., 2].max(axis=1))
+
+    @cached_property
+    def speeds(self) -> Array:
+        """(N,) speed of the fastest centre of a bar of each body [m/s]."""
+        return self._largest(np.linalg.norm(self.bar_velocities, axis=1))
+
+    def _largest(self, values: Array) -> Array:
+        """Return the largest (N,) of the values (M,) of each body's bars."""
+        found = np.full(self.count, -np.inf)
+        np.maximum.at(found, self.body, values)
+        return found
+
+    def spheres(self) -> Array:
+        """Return (N, S, 3) centres of all spheres [m]; the last one of a body fills up its row."""
+        local = self.mixture.spheres[self.kind]
+        return matrix_product(local, np.swapaxes(self.rotations, 1, 2)) + self.positions[:, None]
+
+    def spheres_by_body(self) -> list[Array]:
+        """Return (S, 3) centres of the spheres of each body [m]."""
+        return [row[: len(kind.centres)] for row, kind in zip(self.spheres(), self._kinds, strict=True)]
+
+    @cached_property
+    def _masses(self) -> Array:
+        return self.mixture.masses[self.kind]
+
+    @cached_property
+    def momentum(self) -> Array:
+        """(3,) momentum of all bodies [kg m/s]."""
+        return np.asarray((self._masses[:, None] * self.velocities).sum(axis=0))
+
+    @cached_property
+    def _own_spins(self) -> tuple[Array, Array]:
+        """Principal moments (N, 3) [kg m²], and angular velocities (N, 3) along the principal axes [rad/s]."""
+        inertias = np.array([kind.inertia for kind in self.mixture.kinds])[self.kind]
+        return inertias, matrix_product(np.swapaxes(self.rotations, 1, 2), self.spins[..., None])[..., 0]
+
+    @cached_property
+    def angular_momentum(self) -> Array:
+        """(3,) angular momentum of all bodies about the origin [kg m²/s]."""
+        inertias, spins = self._own_spins
+        own = matrix_product(self.rotations, (inertias * spins)[..., None])[..., 0]
+        orbital = np.cross(self.positions, self._masses[:, None] * self.velocities)
+        return np.asarray((orbital + own).sum(axis=0))
+
+    @cached_property
+    def kinetic_energy(self) -> float:
+        """Translational and rotational kinetic energy of all bodies [J]."""
+        inertias, spins = self._own_spins
+        return float(0.5 * ((self._masses[:, None] * self.velocities**2).sum() + (inertias * spins**2).sum()))
+
+    def potential_energy(self, gravity: float, floor: float) -> float:
+        """Return the gravitational energy [J] of all bodies, 0 at the height `floor` [m]; gravity in m/s²."""
+        return float((self._masses * gravity * (self.positions[:, 2] - floor)).sum())
 
 
 @dataclass(frozen=True)
 class State:
-    """Poses and velocities of all links, in the laboratory frame.
+    """Poses and velocities of all links of smarticles, in the laboratory frame.
 
     A smarticle has three links, whether it is welded or articulated: 0 barb 1, 1 middle link, 2 barb 2.
     """
@@ -68,6 +250,30 @@ class State:
     def _mean(self, values: Array) -> Array:
         return np.asarray(np.einsum("nkj,k->nj", values, self.boxes.link_masses / self.boxes.mass))
 
+    @property
+    def smarticles(self) -> State:
+        """This state."""
+        return self
+
+    @property
+    def bodies(self) -> None:
+        """None: these are smarticles."""
+
+    @property
+    def volume(self) -> float:
+        """Mean solid volume of the bodies present [m³]; of all bodies where none is present."""
+        return self.boxes.volume
+
+    @property
+    def tops(self) -> Array:
+        """(N,) heights of the highest point of each body's axes [m]."""
+        return np.asarray(self.vertices[..., 2].max(axis=1))
+
+    @property
+    def speeds(self) -> Array:
+        """(N,) speed of the fastest centre of a bar of each body [m/s]."""
+        return np.asarray(np.linalg.norm(self.link_velocities, axis=-1).max(axis=-1))
+
     @cached_property
     def vertices(self) -> Array:
         """(N, 4, 3) barb tip, hinge, hinge, barb tip of each smarticle [m]; hinges are the middle link's ends."""
@@ -121,3 +327,11 @@ class State:
         """Return the gravitational energy [J] of all smarticles, 0 at the height `floor` [m]; gravity in m/s²."""
         heights = self.positions[:, 2] - floor
         return float(self.boxes.mass * gravity * heights.sum())
+
+
+def spheres_of(state: PileState, model: Particle | Mixture) -> Array:
+    """Return (N, S, 3) centres of all spheres of all bodies [m]; in a mixture the last one of a body fills its row."""
+    if isinstance(model, Mixture):
+        assert state.bodies is not None  # a pile of these kinds has no smarticles
+        return state.bodies.spheres()
+    return state.smarticles.spheres(model)

@@ -5,6 +5,7 @@ from enum import Enum, auto
 from typing import Protocol
 
 from dem.arrays import Array
+from dem.body.kinds import Kind, Mixture
 from dem.body.particle import Particle
 from dem.engine.effect import EffectName
 from dem.physics.contact import ContactLaw, contact_law
@@ -50,6 +51,12 @@ class Demand(Protocol):
     @property
     def particle(self) -> Particle: ...
     @property
+    def mixture(self) -> Mixture | None: ...
+    @property
+    def model(self) -> Particle | Mixture: ...
+    @property
+    def bodies(self) -> Sequence[Particle | Kind]: ...
+    @property
     def cylinder(self) -> Cylinder: ...
     @property
     def channel(self) -> Channel | None: ...
@@ -60,13 +67,15 @@ class Demand(Protocol):
     @property
     def actuates(self) -> bool: ...
     @property
+    def activities(self) -> frozenset[Activity]: ...
+    @property
     def pulled_by(self) -> Sequence[tuple[float, float]]: ...
     def calls_for(self, effect: EffectName) -> bool: ...
 
 
 def contact_law_of(scene: Demand) -> ContactLaw:
     """Return the contact law of a scene, which does not depend on the engine."""
-    return contact_law(scene.particle, scene.contact, scene.fidelity.stiffness_N_per_m)
+    return contact_law(scene.bodies[0], scene.contact, scene.fidelity.stiffness_N_per_m)
 
 
 def motor_law_of(scene: Demand) -> MotorLaw | None:

@@ -16,9 +16,10 @@ from typing import Any, Protocol
 from dem.arrays import Array, Flags, Numbers
 from dem.body.chain import Tie
 from dem.body.forces import ContactForces
+from dem.body.kinds import Mixture
 from dem.body.particle import Particle
 from dem.body.placement import Poses
-from dem.body.state import State
+from dem.body.state import PileState
 from dem.physics.contact import StringLaw
 from dem.physics.overlaps import Extremes, Overlaps
 from dem.setting.container import Cylinder
@@ -222,9 +223,12 @@ class EnergyLedger(Protocol):
 class Engine(Protocol):
     """A running simulation; one per process, since an engine may be a process-wide singleton."""
 
-    particle: Particle  #: Geometry of each smarticle
     cylinder: Cylinder  #: The container
     gravity: float  #: g, downwards [m/s²]
+
+    @property
+    def particle(self) -> Particle | Mixture:
+        """Geometry of each smarticle, or the kinds of other bodies."""
 
     @property
     def boundaries(self) -> Boundaries:
@@ -278,8 +282,8 @@ class Engine(Protocol):
     def still(self) -> None:
         """Set all velocities of welded smarticles to zero; the kinetic energy counts as dissipated."""
 
-    def state(self) -> State:
-        """Return poses and velocities of all smarticles; raise RunError if one is not finite."""
+    def state(self) -> PileState:
+        """Return poses and velocities of all bodies; raise RunError if one is not finite."""
 
     @property
     def impulse(self) -> float:
@@ -306,7 +310,7 @@ class Engine(Protocol):
         Forces are present ones or, on some engines, those of the last step.
         """
 
-    def extremes(self, state: State) -> Extremes | None:
+    def extremes(self, state: PileState) -> Extremes | None:
         """Return extremes over all smarticles in their present `state`, faster than a full check.
 
         None: the engine has no faster way, or a full check is needed in any case.

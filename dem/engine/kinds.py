@@ -35,6 +35,9 @@ class EngineKind(Protocol):
     def seconds_per_second(self, scene: Demand, time_step: float, activity: Activity) -> float:
         """Return an estimate of the wall time per simulated time [1] on one core, for a time step [s]."""
 
+    def seconds_to_compile(self, scene: Demand) -> float:
+        """Return an estimate of the processor time for code that a scene needs and that is not compiled yet [s]."""
+
     def build(self, scene: Demand, time_step: float) -> Engine:
         """Return a simulation without smarticles.
 

@@ -18,6 +18,7 @@ class Arrange(Part, Phase):
 
     planar: ClassVar[bool | None] = True
     begins: ClassVar[bool] = True
+    of_smarticles: ClassVar[bool] = True
     type: Literal["arrange"]
     gap_m: Length = Field(..., description="free distance of neighbours where they will touch first [m]")
 

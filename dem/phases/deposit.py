@@ -2,23 +2,28 @@
 
 import math
 from collections.abc import Iterator
+from dataclasses import replace
 from typing import ClassVar, Literal
 
 import numpy as np
 from pydantic import Field
 
 from dem.body.placement import place_layer
+from dem.body.state import spheres_of
 from dem.engine.interface import Engine
 from dem.errors import RunError
 from dem.phases.phase import CHECK_INTERVAL, SETTLE_SECONDS, Memory, Phase, SceneView, Settle, Stage, has_settled
 from dem.setting.part import Part, Speed
 
-LAYER_TIMEOUT = 2.0  # s; the fall of a layer takes less than 0.1 s
+# Time after which a layer must have landed: at least 2 s, and 10 times that of a fall √(2h/g) over the wall's height h,
+# the longest fall that there is; at 9.81 m/s² the fall of a layer takes less than 0.1 s.
+LAYER_TIMEOUT = 2.0  # s
+LANDING_FALLS = 10
 LAYER_SECONDS = 0.125  # s, typical time between two layers of a pour; measured on YADE and links, N = 100 … 270
 
 
 class Deposit(Part, Phase):
-    """Pour smarticles in layers of random, non-overlapping poses, then wait until the pile settles.
+    """Pour smarticles, or other bodies, in layers of random, non-overlapping poses, then wait until the pile settles.
 
     A layer is poured just above the pile when the previous layer has landed, or, with `every_s`, at fixed intervals
     from the top of the wall.
@@ -33,7 +38,8 @@ class Deposit(Part, Phase):
         1.0,
         ge=1e-3,
         le=10,
-        description="height of the slab above the pile that a layer is spread over, in units of w [1]",
+        description="height of the slab above the pile that a layer is spread over, in units of w, or of the longest "
+        "bar of other bodies [1]",
     )
     landed_speed_m_per_s: Speed = Field(
         0.2,
@@ -56,8 +62,8 @@ class Deposit(Part, Phase):
             yield "gravity_m_per_s2: 0 m/s²; without gravity nothing comes down in phases.0 (deposit)"
         height = scene.container.height_m
         # The slab that a layer is poured into must end below the wall, with a smarticle that lies flat on its top.
-        slab = self.layer_height_w * scene.smarticle.middle_length_m
-        least = 2 * scene.particle.radius + slab + scene.particle.reach
+        slab = self.layer_height_w * scene.model.size
+        least = 2 * scene.model.radius + slab + scene.model.reach
         if height is not None and height < least:
             key = "container.height_m" if scene.container.tiers is None else "container.tiers"
             what = "it" if scene.container.tiers is None else "height_m of the top tier"
@@ -88,7 +94,7 @@ class Deposit(Part, Phase):
             memory["layer"] = 0  # the next layer does not wait for this one
             return self.every_s
         if memory["layer"]:
-            self._check_layer(memory, engine)
+            self._check_layer(memory, engine, stage.scene.gravity_m_per_s2)
         elif not memory["left"] and has_settled(self.settle, memory, engine):
             return 0.0
         if memory["left"] and not memory["layer"]:
@@ -96,25 +102,29 @@ class Deposit(Part, Phase):
         memory["waited"] += CHECK_INTERVAL
         return CHECK_INTERVAL
 
-    def _check_layer(self, memory: Memory, engine: Engine) -> None:
+    def _check_layer(self, memory: Memory, engine: Engine, gravity: float) -> None:
         size, limit = memory["layer"], self.landed_speed_m_per_s
         fastest = float(-engine.state().velocities[-size:, 2].min())
-        if fastest < limit and engine.touches()[-size:].min() > 0:
+        aloft = int((engine.touches()[-size:] == 0).sum())
+        timeout = max(LAYER_TIMEOUT, LANDING_FALLS * math.sqrt(2 * engine.cylinder.height / gravity))
+        if fastest < limit and not aloft:
             memory.update(layer=0, waited=0.0)
-        elif memory["waited"] > LAYER_TIMEOUT:
-            raise RunError(
-                f"a layer of {size} had not come down {LAYER_TIMEOUT:g} s after it was poured: the fastest falls at "
-                f"{fastest:.3g} m/s, limit {limit:g} m/s; raise phases.0.landed_speed_m_per_s"
-            )
+        elif memory["waited"] > timeout:
+            cause = f"the fastest falls at {fastest:.3g} m/s, limit {limit:g} m/s; raise phases.0.landed_speed_m_per_s"
+            if fastest < limit:
+                cause = (
+                    f"{aloft} of them touch nothing at {gravity:g} m/s² of gravity, so that they still fall or bounce; "
+                    "lower contact.restitution or phases.0.layer_height_w, or raise gravity_m_per_s2"
+                )
+            raise RunError(f"a layer of {size} had not come down {timeout:.3g} s after it was poured: {cause}")
 
     def _pour(self, stage: Stage, engine: Engine) -> None:
         scene, memory = stage.scene, stage.memory
         size = min(self.per_layer, memory["left"])
         rng = np.random.default_rng()
         rng.bit_generator.state = memory["random"]
-        particle, state = scene.particle, engine.state()
-        tops = state.vertices[..., 2].max(axis=1)
-        cylinder, slab = engine.cylinder, self.layer_height_w * scene.smarticle.middle_length_m
+        particle, mixture, state, tops = scene.model, scene.mixture, engine.state(), engine.state().tops
+        cylinder, slab = engine.cylinder, self.layer_height_w * particle.size
         if self.every_s is None:
             bottom = tops.max(initial=engine.boundaries.floor) + particle.radius
         else:
@@ -122,22 +132,28 @@ class Deposit(Part, Phase):
             bottom = cylinder.height - slab - 2 * particle.reach
         near = tops > bottom - 3 * particle.radius
         hooks = [cross.obstacles(2 * particle.radius) for cross in (scene.hooks.crosses if scene.hooks else ())]
+        poured = scene.count - memory["left"]
+        kinds = None if mixture is None else mixture.of[poured : poured + size]
         poses = place_layer(
-            particle,
+            scene.bodies if kinds is None else [scene.bodies[k] for k in kinds],
             count=size,
             radius=float(cylinder.inner_radii(np.array([bottom]))[0]),
             bottom=bottom,
             height=slab,
-            obstacles=np.concatenate([state.spheres(particle)[near].reshape(-1, 3), *hooks]),
+            obstacles=np.concatenate([spheres_of(state, particle)[near].reshape(-1, 3), *hooks]),
             rng=rng,
             narrower=cylinder.inner_radii if cylinder.upper else None,
+            thickest=particle.radius,
         )
         highest = poses.positions[:, 2].max() + particle.reach
         if highest > cylinder.height:
             key = "container.height_m" if scene.container.tiers is None else "height_m of the top tier"
+            noun = "smarticles" if mixture is None else "bodies"
             raise RunError(
-                f"{scene.count} smarticles do not fit: after {engine.count} the next layer would reach {highest:.3g} "
+                f"{scene.count} {noun} do not fit: after {engine.count} the next layer would reach {highest:.3g} "
                 f"m, above container.height_m = {cylinder.height:.3g} m; lower count or raise {key}"
             )
+        if kinds is not None:
+            poses = replace(poses, kinds=kinds)
         engine.add(poses, speed=self.thrown_at_m_per_s)
         memory.update(left=memory["left"] - size, layer=size, waited=0.0, random=rng.bit_generator.state)

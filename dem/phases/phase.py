@@ -51,6 +51,7 @@ class Phase:
 
     actuates: ClassVar[bool] = False  #: Whether motors move or hold the barbs
     begins: ClassVar[bool] = False  #: Whether the phase adds the smarticles; a run begins with one such phase
+    of_smarticles: ClassVar[bool] = False  #: Whether the phase has no meaning for other bodies than smarticles
     sources: ClassVar[frozenset[str]] = frozenset()
     """Keys that say where content is found that another key fixes by its hash; the scene's hash omits them."""
     at_rest: ClassVar[bool] = False
@@ -93,9 +94,14 @@ class Phase:
         """Return the simulated time of the phase [s]; if a criterion ends it, an estimate from `count`."""
         return self.known_duration or 0.0
 
-    @property
-    def pushing_speed(self) -> float:
-        """Speed of the wall, hook or string that the phase moves [m/s]; 0 if it moves none."""
+    speed_key: ClassVar[str] = "speed_m_per_s"  #: Key that `pushing_speed` is proportional to
+
+    def pushing_speed(self, gravity: float) -> float:
+        """Return the greatest speed [m/s] of the boundary that the phase moves; 0 if it moves none.
+
+        Args:
+            gravity: acceleration of gravity [m/s²].
+        """
         return 0.0
 
     def peak_speed(self, gravity: float) -> float:
@@ -104,7 +110,7 @@ class Phase:
         Args:
             gravity: acceleration of gravity [m/s²].
         """
-        return self.pushing_speed
+        return self.pushing_speed(gravity)
 
     @property
     def raises(self) -> float:
@@ -147,6 +153,8 @@ class SceneView(Demand, Protocol):
     def container(self) -> Container: ...
     @property
     def plane(self) -> Plane | None: ...
+    @property
+    def protocol(self) -> str | None: ...
     @property
     def phases(self) -> Sequence[Phase]: ...
     @property

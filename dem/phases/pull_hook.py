@@ -10,7 +10,6 @@ from dem.engine.interface import Engine
 from dem.phases.phase import CHECK_INTERVAL, Memory, Phase, SceneView, Stage, time_left
 from dem.setting.hooks import TOLERANCE, Hooks, with_defaults
 from dem.setting.part import Duration, Force, Length, Part, Speed
-from dem.setting.smarticle import Smarticle
 
 HELD_SECONDS = 0.1  # s, time for which the force is measured on a hook that the force limit has stopped
 
@@ -60,7 +59,7 @@ class PullHook(Part, Phase):
         )
 
     def _held_by_one(self, scene: SceneView, hooks: Hooks) -> Sequence[str]:
-        if self.force_limit_N is not None:
+        if self.force_limit_N is not None or scene.mixture is not None:
             return ()
         across = hooks.upper_height_m - hooks.lower_height_m + hooks.side_m
         inside = scene.smarticle.middle_length_m - scene.sphere_diameter
@@ -72,8 +71,7 @@ class PullHook(Part, Phase):
             f"set them at least {1.005 * (inside - hooks.side_m):.3g} m apart, or give pull-hook a force_limit_N",
         )
 
-    @property
-    def pushing_speed(self) -> float:
+    def pushing_speed(self, gravity: float) -> float:
         return self.speed_m_per_s
 
     @property
@@ -124,10 +122,10 @@ class PullHook(Part, Phase):
 _DEFAULTS = {"distance_m": (2, 0), "speed_m_per_s": (1, 0)}
 
 
-def with_pull_defaults(phase: Any, smarticle: Smarticle) -> Any:
-    """Return data of a phase; in a pull-hook, missing keys are computed from the smarticle's sizes."""
+def with_pull_defaults(phase: Any, sizes: tuple[float, float]) -> Any:
+    """Return data of a phase; in a pull-hook, missing keys are computed from the body's `sizes`."""
     pulls = isinstance(phase, Mapping) and phase.get("type") == "pull-hook"
-    return with_defaults(phase, _DEFAULTS, smarticle) if pulls else phase
+    return with_defaults(phase, _DEFAULTS, sizes) if pulls else phase
 
 
 def _force_sum(engine: Engine) -> list[float]:

@@ -53,8 +53,7 @@ class Strain(Part, ActuatedPhase):
                 f"chain that is h = {chain.width:.4g} m wide; use at least {chain.width:.4g} m"
             )
 
-    @property
-    def pushing_speed(self) -> float:
+    def pushing_speed(self, gravity: float) -> float:
         return self.speed_m_per_s
 
     @property
@@ -86,7 +85,7 @@ class Strain(Part, ActuatedPhase):
                 damping=self.string_damping_N_s_per_m,
             )
             engine.strings.tie(chain.ties(self.tied_at), law, (0.0, self.speed_m_per_s))
-        broken = update % every == 0 and parted(engine.state(), 2 * chain.particle.radius)
+        broken = update % every == 0 and parted(engine.state().smarticles, 2 * chain.particle.radius)
         wait = 0.0 if broken else self.follow(stage, engine, every)
         if not wait:
             engine.strings.untie()

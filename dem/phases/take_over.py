@@ -99,6 +99,7 @@ class TakeOver(Part, Phase):
     """Take the smarticles' poses from a frame of another run, at rest, then wait until the pile settles."""
 
     begins: ClassVar[bool] = True
+    of_smarticles: ClassVar[bool] = True
     at_rest: ClassVar[bool] = True
     sources: ClassVar[frozenset[str]] = frozenset({"run", "frame"})
     type: Literal["take-over"]
@@ -230,7 +231,7 @@ class TakeOver(Part, Phase):
             memory["task"] = "let apart"
             return stride
         if memory["task"] == "let apart":
-            fastest = float(np.linalg.norm(engine.state().link_velocities, axis=-1).max())
+            fastest = float(engine.state().speeds.max())
             if fastest > settle.speed_m_per_s + stride * engine.gravity:
                 if memory["waited"] > settle.timeout_s:
                     raise RunError(

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import brentq
 
-from dem.body.particle import Particle
+from dem.body.kinds import Body
 from dem.setting.contact import Contact
 
 
@@ -23,16 +23,16 @@ class ContactLaw:
     wall_friction: float  #: Coulomb coefficient against the container [1]
 
 
-def typical_effective_mass(particle: Particle) -> float:
-    """Return the effective mass [kg] of a smarticle at a contact, averaged over spheres and directions.
+def typical_effective_mass(body: Body) -> float:
+    """Return the effective mass [kg] of a body at a contact, averaged over spheres and directions.
 
     The average is a harmonic mean. The inverse of the effective mass at a point r from the centre of mass in the
     direction n is the mobility 1/m + (r × n)·I⁻¹(r × n). Its mean over n is a third of the trace of its tensor.
     """
-    inverse = 1.0 / particle.boxes.inertia
-    x, y, z = particle.centres.T
+    inverse = 1.0 / body.inertia
+    x, y, z = body.centres.T
     rotation = (inverse[0] * (y**2 + z**2) + inverse[1] * (x**2 + z**2) + inverse[2] * (x**2 + y**2)) / 3
-    return float(1.0 / np.mean(1.0 / particle.boxes.mass + rotation))
+    return float(1.0 / np.mean(1.0 / body.mass + rotation))
 
 
 def restitution_of(damping_ratio: float) -> float:
@@ -60,13 +60,13 @@ def damping_ratio(restitution: float) -> float:
     return float(brentq(lambda zeta: restitution_of(zeta) - restitution, 0.0, 1e4, xtol=1e-14))
 
 
-def contact_law(particle: Particle, contact: Contact, stiffness: float) -> ContactLaw:
-    """Return the contact law for a scene's contact parameters and a normal stiffness kn [N/m].
+def contact_law(body: Body, contact: Contact, stiffness: float) -> ContactLaw:
+    """Return the contact law of a body for a scene's contact parameters and a normal stiffness kn [N/m].
 
-    Dashpots give `contact.restitution` in collisions at the typical effective mass: of two smarticles, or of one with
+    Dashpots give `contact.restitution` in collisions at the typical effective mass: of two bodies, or of one with
     the container.
     """
-    single = typical_effective_mass(particle)
+    single = typical_effective_mass(body)
     zeta = damping_ratio(contact.restitution)
     return ContactLaw(
         normal_stiffness=stiffness,

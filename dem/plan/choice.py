@@ -328,8 +328,9 @@ def _notes(scene: Scene, table: AccuracyTable, measured: Measured, max_error: fl
     if not table.reference.endswith(_FINEST):
         notes.append(f"errors are against {table.reference}: the table has no finished runs of {_FINEST[0]}")
     activity = activity_of(scene)
+    own_ratio = f"{scene.smarticle.aspect_ratio:g}" if scene.mixture is None else "that of no smarticle (key particle)"
     here = {
-        "l/w": (f"{scene.smarticle.aspect_ratio:g}", f"{table.aspect_ratio:g}"),
+        "l/w": (own_ratio, f"{table.aspect_ratio:g}"),
         "N": (str(scene.count), str(table.count)),
         "activity": (activity, table.activity),
     }

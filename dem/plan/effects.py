@@ -1,16 +1,18 @@
 """Effects of a scene: which ones it needs, why, and what each adds to a run."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from dem.engine.effect import Adds, EffectName
 from dem.engine.kinds import engine_kind
 from dem.phases.actuated import overshoot
 from dem.phases.arrange import chain_of
 from dem.record import columns
+from dem.record.names import VTKHDF
 from dem.scene.scene import Scene
 
 _NOTHING = Adds()
+_ONE_FILE = "reads all contacts and adds a step to one file"
 
 ADDS: Mapping[EffectName, Adds] = {
     EffectName.STRINGS: Adds(series=tuple(columns.STRAIN_COLUMNS)),
@@ -54,9 +56,13 @@ class Decision:
 
 def decide(scene: Scene) -> tuple[Decision, ...]:
     """Return a decision for each effect: whether the scene needs it, why, and what it adds to a run."""
-    own, reasons = engine_kind(scene.engine).adds, _reasons(scene)
+    own, reasons, common = engine_kind(scene.engine).adds, _reasons(scene), dict(ADDS)
+    if scene.recording.frames == "vtkhdf":
+        common[EffectName.FRAMES] = replace(common[EffectName.FRAMES], files=(VTKHDF,), python=_ONE_FILE)
     return tuple(
-        Decision(name, on, why, Adds.together((own.get(name, _NOTHING), ADDS.get(name, _NOTHING))) if on else _NOTHING)
+        Decision(
+            name, on, why, Adds.together((own.get(name, _NOTHING), common.get(name, _NOTHING))) if on else _NOTHING
+        )
         for name, (on, why) in ((name, reasons[name]) for name in EffectName)
     )
 

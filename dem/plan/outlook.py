@@ -4,8 +4,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any, Self
 
-from dem.engine.demand import Activity
-from dem.engine.effect import Adds, EffectName
+from dem.engine.effect import Adds
 from dem.engine.kinds import engine_kind
 from dem.plan.effects import Decision, decide
 from dem.plan.steps import stable_step, time_steps
@@ -48,15 +47,17 @@ class Plan:
     effects: tuple[Decision, ...]
     engines: tuple[str, ...]
     frames: int
-    wall_s: float
+    wall_s: float  #: Expected wall time of all phases, without `compile_s`
     warnings: tuple[str, ...]
     planar: bool = False
     engine: str = "yade"
     fidelity: str = "standard"
     stiffness_N_per_m: float = 0.0
+    bodies: str = "smarticles"  #: Kinds of bodies in words
     strands: int = 0  #: Strands of a link on the engine links; 0 on engines with spheres
     correction: float = 1.0  #: Factor by which wall times were corrected
     protocol: tuple[str, ...] = ()  #: Lines about the keys of the scene's protocol
+    compile_s: float = 0.0  #: Expected processor time for code that is not compiled yet
     overlaps: Mapping[str, float] = field(default_factory=dict)  #: Expected overlaps over a link's width, by cause
 
     def corrected(self, factor: float) -> Self:
@@ -70,7 +71,7 @@ class Plan:
         section = f"smooth links of {self._strands}" if self.strands else f"{self.spheres_per_smarticle} spheres"
         wall = "in a plane" if self.planar else f"wall {1e3 * self.container_height_m:.0f} mm high"
         lines = [
-            f"{self.name}: {self.count} smarticles of {section}, d = {1e3 * self.sphere_diameter_m:.3g} mm, {wall}",
+            f"{self.name}: {self.count} {self.bodies} of {section}, d = {1e3 * self.sphere_diameter_m:.3g} mm, {wall}",
             *self._engine_to_text(),
             *self.protocol,
             self._steps_to_text(),
@@ -83,8 +84,11 @@ class Plan:
             guess = "" if phase.duration_s is not None else "≈ "
             label = f"{phase.index} {phase.type}"
             lines.append(f"{label:<24}{f'{guess}{phase.estimate_s:.2f} s':>12}{_wall_time(phase.wall_s):>22}")
+        if self.compile_s:
+            lines.append(f"{'compiling, once':<24}{'':>12}{_wall_time(self.compile_s):>22}")
+        total = _wall_time(self.wall_s + self.compile_s)
         lines += [
-            f"{'total':<24}{f'{sum(p.estimate_s for p in self.phases):.2f} s':>12}{_wall_time(self.wall_s):>22}",
+            f"{'total':<24}{f'{sum(p.estimate_s for p in self.phases):.2f} s':>12}{total:>22}",
             f"(one core{corrected}; machines differ by a factor of two)",
             "",
             f"{'effect':<20}{'':<5}why, and what it adds",
@@ -129,23 +133,30 @@ def _wall_time(wall: float) -> str:
     return f"{wall / 3600:.1f} h" if wall < 10 * 3600 else f"{wall / 3600:.0f} h"
 
 
+def _bodies(scene: Scene) -> str:
+    if scene.mixture is None:
+        return "smarticles"
+    names = dict.fromkeys(kind.name for kind in scene.mixture.kinds)
+    return f"bodies ({', '.join(names)})"
+
+
 def plan(scene: Scene) -> Plan:
     """Compute the plan of a scene: phases, effects, time steps and cost."""
     kind = engine_kind(scene.engine)
     steps = time_steps(scene)
-    particle = scene.particle
+    model = scene.model
     phases = []
     for index, (phase, dt) in enumerate(zip(scene.phases, steps, strict=True)):
         estimate = phase.expected_duration(scene.count)
-        wall = kind.seconds_per_second(scene, dt, _activity(scene, index)) * estimate
+        wall = kind.seconds_per_second(scene, dt, scene.activity(index)) * estimate
         phases.append(PlannedPhase(index, phase.kind, phase.known_duration, estimate, wall, dt))
     effects = decide(scene)
     engines = Adds.together(effect.adds for effect in effects).engines
     return Plan(
         name=scene.name,
         count=scene.count,
-        spheres_per_smarticle=len(particle.centres),
-        sphere_diameter_m=particle.chain.diameter,
+        spheres_per_smarticle=max(len(body.centres) for body in scene.bodies),
+        sphere_diameter_m=model.diameter,
         time_step_s=min(steps),
         stable_time_step_s=stable_step(scene),
         container_height_m=scene.cylinder.height,
@@ -159,19 +170,12 @@ def plan(scene: Scene) -> Plan:
         engine=scene.engine,
         fidelity=scene.fidelity.base,
         stiffness_N_per_m=scene.fidelity.stiffness_N_per_m,
+        bodies=_bodies(scene),
         strands=scene.fidelity.rows if scene.smooth else 0,
         protocol=protocol_lines(scene),
+        compile_s=kind.seconds_to_compile(scene),
         overlaps={overlap.cause: overlap.widths for overlap in expected_overlaps(scene)},
     )
-
-
-def _activity(scene: Scene, index: int) -> Activity:
-    phase = scene.phases[index]
-    if phase.pours:
-        return Activity.POUR
-    if phase.actuates:
-        return Activity.ACTUATE
-    return Activity.SHAKE if EffectName.CONTAINER_MOTION in phase.calls(scene, index) else Activity.REST
 
 
 def warnings_of(scene: Scene) -> tuple[str, ...]:

@@ -118,6 +118,11 @@ FIELDS = _columns(
     floor_z_m="height of the container's floor, equal for all links; heights are measured from it",
     phase="index of the phase in the scene, equal for all links",
 )
+# More cell data of frames in scenes with other bodies than smarticles, whose links are bars.
+BODY_FIELDS = _columns(
+    kind="kind of the body, a place in the list `kinds` of run.json",
+    normal="unit vector along the normal of a flat section (x, y, z); 0 where the section is round",
+)
 # Cell data of the files of forces: one value per contact; with `recording.contact_forces`.
 FORCE_FIELDS = _columns(
     first_smarticle=("first", "number of the smarticle on which the force acts"),

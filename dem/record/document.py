@@ -55,6 +55,21 @@ class Phase(Document):
     cpu_s: NonNegativeFloat | None = None
 
 
+class Kind(Document):
+    """One kind of bodies that are no smarticles."""
+
+    shape: str
+    bodies: NonNegativeInt  #: Number of bodies of this kind
+    bars: PositiveInt  #: Number of bars of each body
+    mass_kg: PositiveFloat
+    volume_m3: PositiveFloat  #: Solid volume; where bars overlap at joints it counts twice
+    length_m: PositiveFloat  #: Length of all bars together
+    thickness_normal_m: PositiveFloat  #: Of a round section its diameter
+    thickness_in_plane_m: PositiveFloat  #: Of a round section its diameter
+    round: bool
+    sphere_diameter_m: PositiveFloat  #: Of the spheres, or strands, that represent it
+
+
 class Manifest(Document):
     """Manifest of a run, `run.json`: how it was made, and numbers of its scene."""
 
@@ -70,7 +85,9 @@ class Manifest(Document):
     threads: NonNegativeInt  #: Threads of the engine; ranks on lammps
     fidelity: str  #: Named fidelity that gives the defaults of the scene's knobs
     count: PositiveInt
-    aspect_ratio: NonNegativeFloat  #: Barb length over middle length, l/w [1]
+    #: Barb length over middle length, l/w [1]. Of bodies that are no smarticles it is 0, `middle_length_m` is the
+    #: longest bar, mass and volume are means, thicknesses and diameter the smallest, spheres the most of all kinds
+    aspect_ratio: NonNegativeFloat
     middle_length_m: PositiveFloat
     barb_length_m: NonNegativeFloat
     thickness_normal_m: PositiveFloat  #: Thickness t1 along the normal of the smarticle's plane
@@ -88,6 +105,7 @@ class Manifest(Document):
     spheres_per_smarticle: PositiveInt
     time_step_s: PositiveFloat  #: Shortest time step of all phases
     phases: tuple[Phase, ...]
+    kinds: tuple[Kind, ...] | None = None  #: Kinds of bodies; None: smarticles
     taken_over: Mapping[str, Any] | None = None  #: `Phase.origin`: the run from which smarticles were taken
 
     @model_validator(mode="after")

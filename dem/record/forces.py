@@ -76,7 +76,7 @@ def has_forces(directory: Path) -> bool:
 
 def read_forces(frame: Frame) -> RecordedForces:
     """Return the forces recorded together with a frame; raise InputError if they are missing or damaged."""
-    path = frame.path.parent.parent / member(FORCE, int(frame.path.stem.rpartition("_")[2]))
+    path = frame.directory / member(FORCE, frame.number)
     points, data = _content(path)
     number = len(points) // 2
 
@@ -102,7 +102,7 @@ def read_forces(frame: Frame) -> RecordedForces:
 
     contacts = ContactForces(
         smarticles=numbers("first_smarticle", "second_smarticle", below=frame.count),
-        links=numbers("first_link", "second_link", below=3),
+        links=numbers("first_link", "second_link", below=1 + int(frame.link.max(initial=2))),
         boundaries=numbers("fixture", below=len(BOUNDARIES))[:, 0],
         points=values("point_m", 3),
         normal=values("normal_force_N"),

@@ -15,16 +15,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dem.arrays import Array, Flags, Numbers
+from dem.body.kinds import Mixture
 from dem.body.particle import LINKS, Particle
-from dem.body.state import State
+from dem.body.state import PileState, RigidState
 from dem.record.files import cannot_read
-from dem.record.names import FRAME, SCENE, collection
+from dem.record.names import FRAME, SCENE, VTKHDF, collection
+from dem.record.vtkhdf import REMEDY, read_step
 
 VERTICES = 4
 
 
 def _remedy(path: Path) -> str:
     """Return what to do about an unreadable frame; a resumed run does not write earlier frames again."""
+    if path.suffix == ".vtkhdf":
+        return REMEDY.format(path.with_name(SCENE))
     scene = path.parent.parent / SCENE
     return f"remove its line from {scene.with_name(collection(FRAME))} to do without it, or run {scene} anew elsewhere"
 
@@ -96,8 +100,46 @@ def motor_fields(
     return found | {"halted": np.nan_to_num(found["halted"]).astype(np.int64)}
 
 
-def sphere_mesh(state: State, particle: Particle) -> meshio.Mesh:
-    """Return the spheres of all smarticles as points, for ParaView's glyphs."""
+def segment_mesh(state: RigidState, *, contacts: Numbers, time: float, floor: float, phase: int) -> meshio.Mesh:
+    """Return one frame of rigid bodies of any shape as a mesh of lines, one for each of their M bars.
+
+    Args:
+        contacts: (N,) number of other bodies that each body touches.
+        time: simulated time [s].
+        floor: height of the container's floor [m].
+    """
+    body = state.body
+    number = len(body)
+    data = {
+        "smarticle_id": body,
+        "link": state.bar,
+        "velocity_m_per_s": state.bar_velocities,
+        "angular_velocity_rad_per_s": state.spins[body],
+        "contacts": contacts[body],
+        "time_s": np.full(number, time),
+        "floor_z_m": np.full(number, floor),
+        "phase": np.full(number, phase, dtype=np.int64),
+        "kind": state.kind[body],
+        "normal": state.normals,
+    }
+    lines = np.arange(2 * number).reshape(-1, 2)
+    cell_data = {name: [values] for name, values in data.items()}
+    return meshio.Mesh(state.segments.reshape(-1, 3), [("line", lines)], cell_data=cell_data)
+
+
+def sphere_mesh(state: PileState, particle: Particle | Mixture) -> meshio.Mesh:
+    """Return the spheres of all bodies as points, for ParaView's glyphs."""
+    if state.bodies is not None:
+        bodies = state.bodies
+        kinds = [bodies.mixture.kinds[k] for k in bodies.kind]
+        sizes, points = [len(kind.centres) for kind in kinds], np.concatenate(bodies.spheres_by_body())
+        own = {
+            "radius_m": np.repeat([kind.radius for kind in kinds], sizes),
+            "smarticle_id": np.repeat(np.arange(state.count), sizes),
+            "link": np.concatenate([kind.links for kind in kinds]),
+        }
+        return meshio.Mesh(points, [("vertex", np.arange(len(points))[:, None])], point_data=own)
+    assert isinstance(particle, Particle)  # a pile of smarticles
     count, spheres = state.count, len(particle.centres)
     number = count * spheres
     data = {
@@ -105,7 +147,7 @@ def sphere_mesh(state: State, particle: Particle) -> meshio.Mesh:
         "smarticle_id": np.repeat(np.arange(count), spheres),
         "link": np.tile(particle.links, count).astype(np.int64),
     }
-    points = state.spheres(particle).reshape(-1, 3)
+    points = state.smarticles.spheres(particle).reshape(-1, 3)
     return meshio.Mesh(points, [("vertex", np.arange(number)[:, None])], point_data=data)
 
 
@@ -115,61 +157,116 @@ def _lines(count: int) -> Numbers:
     return np.stack([first, first + 1], axis=-1).reshape(-1, 2)
 
 
+@dataclass(frozen=True, eq=False)
+class RecordedBars:
+    """All bars of N bodies that are no smarticles, M of them, body by body."""
+
+    segments: Array  #: (M, 2, 3) both ends [m]
+    body: Numbers  #: (M,) index of the body that each belongs to
+    number: Numbers  #: (M,) number of each in its body
+    kind: Numbers  #: (N,) kind of each body, a place in `Manifest.kinds`
+    normals: Array  #: (M, 3) unit vectors along the normal of flat sections; zeros where the section is round [1]
+
+
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Frame:
-    """The smarticles at one recorded time; all arrays are read-only."""
+    """The bodies at one recorded time; all arrays are read-only.
+
+    Piles of smarticles have `vertices`, and values of links in the form (N, 3, …). Piles of other bodies have bars in
+    any number, M in all, and values of links in the form (M, …). Both have `segments` and `body`.
+    """
 
     path: Path  #: The file
+    number: int  #: Place in the sequence of the run's frames, from 0
     time: float  #: Simulated time [s]
     floor_z: float  #: Height of the container's floor [m]; heights are measured from it
     phase: int  #: Index into `Run.phases`
-    #: (N, 4, 3) float64 [m], barb tip, hinge, hinge, barb tip of each smarticle, in its shape at that time
+    #: (N, 4, 3) float64 [m], barb tip, hinge, hinge, barb tip of each smarticle, in its shape at that time; (N, 0, 3)
+    #: for bodies that are no smarticles
     vertices: Array = field(repr=False)
     smarticle_ids: Numbers = field(repr=False)  #: (N,) int64, numbers of the smarticles
-    #: (N, 3, 3) float64 [m/s], velocities of the centres of barb 1, middle link and barb 2
+    #: (N, 3, 3) or (M, 3) float64 [m/s], velocities of the centres of barb 1, middle link and barb 2, or of bars
     link_velocity: Array = field(repr=False)
-    #: (N, 3, 3) float64 [rad/s], angular velocities of barb 1, middle link and barb 2
+    #: (N, 3, 3) or (M, 3) float64 [rad/s], angular velocities of barb 1, middle link and barb 2, or of bars
     link_angular_velocity: Array = field(repr=False)
-    contacts: Numbers = field(repr=False)  #: (N,) int64, number of other smarticles that each smarticle touches
-    #: Further data of the file, (N, 3, …) one value per link, by name. Frames of scenes that actuate have `angle_rad`,
-    #: `motor_torque_N_m` and `motor_work_J`, NaN on the middle link and on welded smarticles, and `halted`.
+    contacts: Numbers = field(repr=False)  #: (N,) int64, number of other bodies that each body touches
+    #: Further data of the file, (N, 3, …) or (M, …) one value per link, by name. Frames of scenes that actuate have
+    #: `angle_rad`, `motor_torque_N_m` and `motor_work_J`, NaN on the middle link and on welded smarticles, and `halted`
     cell_data: Mapping[str, NDArray[Any]] = field(repr=False)
+    bars: RecordedBars | None = field(repr=False, default=None)  #: Of bodies that are no smarticles
+
+    @property
+    def directory(self) -> Path:
+        """The run directory."""
+        return self.path.parent if self.path.name == VTKHDF else self.path.parent.parent
 
     @property
     def count(self) -> int:
-        """Number of smarticles poured so far."""
+        """Number of bodies poured so far, N."""
         return len(self.vertices)
 
+    @property
+    def segments(self) -> Array:
+        """(M, 2, 3) both ends of all bars, or links, body by body [m]."""
+        if self.bars is not None:
+            return self.bars.segments
+        return np.stack([self.vertices[:, :-1], self.vertices[:, 1:]], axis=2).reshape(-1, 2, 3)
 
-def read_frame(path: Path | str) -> Frame:
-    """Return the content of a frame file, `.vtu`; raise InputError if it is missing or damaged."""
+    @property
+    def body(self) -> Numbers:
+        """(M,) index of the body that each segment belongs to."""
+        return np.repeat(np.arange(self.count), LINKS) if self.bars is None else self.bars.body
+
+    @property
+    def link(self) -> Numbers:
+        """(M,) number of each segment in its body."""
+        return np.tile(np.arange(LINKS), self.count) if self.bars is None else self.bars.number
+
+    @property
+    def kind(self) -> Numbers:
+        """(N,) kind of each body, a place in `Manifest.kinds`; 0 for smarticles."""
+        return np.zeros(self.count, np.int64) if self.bars is None else self.bars.kind
+
+
+def read_frame(path: Path | str, number: int | None = None) -> Frame:
+    """Return a frame of a file, `.vtu` or `.vtkhdf`; raise InputError if it is missing or damaged.
+
+    Args:
+        number: number of the frame in its run; needed for `.vtkhdf`. None: by the name of the file.
+    """
     path = Path(path)
-    mesh = read_mesh(path)
+    if number is None:
+        last = path.stem.rpartition("_")[2]
+        number = int(last) if last.isdecimal() else 0
+    mesh = read_mesh(path, number=number)
 
     def reject(cause: str) -> NoReturn:
-        cannot_read("frame", path, cause, _remedy(path))
+        cannot_read(f"frame {number} of" if path.suffix == ".vtkhdf" else "frame", path, cause, _remedy(path))
 
     if [block.type for block in mesh.cells] != ["line"]:
         reject("it must hold one block of lines and no other cells")
     points, lines = np.asarray(mesh.points), np.asarray(mesh.cells[0].data)
-    count = len(lines) // LINKS
+    data = {name: np.asarray(values[0]) for name, values in mesh.cell_data.items()}
+    general = "kind" in data
+    count = len(np.unique(data.get("smarticle_id", ()))) if general else len(lines) // LINKS
     if count == 0:
         reject("it holds no smarticle")
-    if points.shape != (VERTICES * count, 3):
-        reject(f"{len(lines)} lines need {VERTICES * count} points of 3 coordinates: got {points.shape}")
-    if not np.array_equal(lines, _lines(count)):
+    expected = 2 * len(lines) if general else VERTICES * count
+    if points.shape != (expected, 3):
+        reject(f"{len(lines)} lines need {expected} points of 3 coordinates: got {points.shape}")
+    if not np.array_equal(lines, np.arange(expected).reshape(-1, 2) if general else _lines(count)):
         reject("its lines do not join tip, hinge, hinge, tip in order")
     if not np.all(np.isfinite(points)):
         reject("a point is not finite")
-    data = {name: np.asarray(values[0]) for name, values in mesh.cell_data.items()}
 
     def per_link(name: str, kind: Any, *shape: int) -> NDArray[Any]:
+        """Return cell data (N, 3, …) of smarticles, or (M, …) of other bodies."""
         values = data.pop(name, None)
         if values is None:
             reject(f"cell data '{name}' is missing")
-        if values.shape != (LINKS * count, *shape):
+        if values.shape != (len(lines) if general else LINKS * count, *shape):
             reject(f"cell data '{name}' has shape {values.shape}")
-        return frozen(values.astype(kind).reshape(count, LINKS, *shape))
+        return frozen(values.astype(kind).reshape(*((-1,) if general else (count, LINKS)), *shape))
 
     def constant(name: str) -> float:
         values = per_link(name, np.float64)
@@ -179,35 +276,52 @@ def read_frame(path: Path | str) -> Frame:
         return first
 
     identifiers, links = per_link("smarticle_id", np.int64), per_link("link", np.int64)
-    if np.any(identifiers != identifiers[:, :1]) or np.any(links != np.arange(LINKS)):
+    if general and np.any(np.diff(identifiers) < 0):
+        reject("'smarticle_id' does not go body by body")
+    if not general and np.any((identifiers != identifiers[:, :1]) | (links != np.arange(LINKS))):
         reject("'smarticle_id' and 'link' are not in smarticle-major order")
     phase = constant("phase")
     if phase < 0 or phase != math.floor(phase):
         reject(f"'phase' must be a whole number, 0 or more: got {phase:g}")
+    vertices, bars, first = np.empty((count, 0, 3)), None, LINKS * np.arange(count)
+    if general:
+        _, first, body = np.unique(identifiers, return_index=True, return_inverse=True)
+        kinds, normals = per_link("kind", np.int64)[first], per_link("normal", np.float64, 3)
+        bars = RecordedBars(frozen(points.astype(np.float64).reshape(-1, 2, 3)), body, links, kinds, normals)
+    else:
+        vertices = points.astype(np.float64).reshape(count, VERTICES, 3)
     return Frame(
         path=path,
+        number=number,
         time=constant("time_s"),
         floor_z=constant("floor_z_m"),
         phase=int(phase),
-        vertices=frozen(points.astype(np.float64).reshape(count, VERTICES, 3)),
-        smarticle_ids=frozen(identifiers[:, 0]),
+        vertices=frozen(vertices),
+        smarticle_ids=frozen(identifiers.ravel()[first]),
         link_velocity=per_link("velocity_m_per_s", np.float64, 3),
         link_angular_velocity=per_link("angular_velocity_rad_per_s", np.float64, 3),
-        contacts=frozen(per_link("contacts", np.int64)[:, 0]),
+        contacts=frozen(per_link("contacts", np.int64).ravel()[first]),
         # `data` now holds only what `per_link` has not removed.
         cell_data=MappingProxyType(
-            {name: frozen(values.reshape(count, LINKS, *values.shape[1:])) for name, values in data.items()}
+            {
+                name: frozen(values if general else values.reshape(count, LINKS, *values.shape[1:]))
+                for name, values in data.items()
+            }
         ),
+        bars=bars,
     )
 
 
-def read_mesh(path: Path, what: str = "frame", remedy: str | None = None) -> Any:
+def read_mesh(path: Path, what: str = "frame", remedy: str | None = None, *, number: int = 0) -> Any:
     """Return the mesh of a VTK file; raise InputError if it cannot be read.
 
     Args:
         what: kind of the file, for the message.
         remedy: what to do, for the message; None: advice for frames.
+        number: number of the frame in a file of all frames, `.vtkhdf`.
     """
+    if path.suffix == ".vtkhdf":
+        return read_step(path, number)
     # `meshio.read` prints and exits on damaged files. The reader of the format raises any exception, or prints a
     # warning and continues, which the callers' checks of shapes find.
     noise = io.StringIO()

@@ -15,12 +15,14 @@ import meshio
 import numpy as np
 
 from dem.arrays import Array
-from dem.errors import InputError
+from dem.errors import InputError, RunError, shown
 from dem.record import names
 from dem.record.files import cannot_read, write_text, write_whole
 from dem.record.frame import Frame, read_frame
+from dem.record.vtkhdf import RADIUS, append, create, read_times, truncate
 
 _REMEDY = "give the directory of a run that has written a frame"
+_GONE = "is gone; put it back and continue with `smarticles resume`, or start the run anew"
 
 
 @dataclass
@@ -37,6 +39,15 @@ class FrameWriter:
         write_whole(self.folder / name, lambda path: mesh.write(path, file_format="vtu"))
         self.times.append(time)
         write_text(self.folder / names.collection(self.noun), self._collection(), make_folder=False)
+
+    def check(self) -> None:
+        """Raise RunError if a file that was written is gone."""
+        folder = self.folder / names.folder(self.noun)
+        present = {path.name for path in folder.iterdir()} if folder.is_dir() else set()
+        for number in range(len(self.times)):
+            path = self.folder / names.member(self.noun, number)
+            if path.name not in present:
+                raise RunError(f"{path}: {_GONE}")
 
     def truncate(self, times: Sequence[float]) -> None:
         """Keep the first frames, whose times [s] are given, and remove all later ones."""
@@ -55,17 +66,49 @@ class FrameWriter:
         return head + "  <Collection>\n" + "\n".join(rows) + "\n  </Collection>\n</VTKFile>\n"
 
 
+@dataclass
+class OneFileWriter(FrameWriter):
+    """Writer of frames into one file, `frames.vtkhdf`, with the radius of each line."""
+
+    radii: Sequence[float] = ()  #: Radii of all kinds of lines [m]
+    kind: str = "link"  #: Cell data of frames with the kind of each line
+
+    def write(self, mesh: meshio.Mesh, time: float) -> None:
+        """Write one frame at a simulated time [s]."""
+        radii = np.asarray(self.radii)[mesh.cell_data[self.kind][0]]
+        at_points = np.zeros(len(mesh.points))
+        for end in mesh.cells[0].data.T:
+            np.maximum.at(at_points, end, radii)
+        cell_data = {**mesh.cell_data, RADIUS: [radii]}
+        whole = meshio.Mesh(mesh.points, mesh.cells, point_data={RADIUS: at_points}, cell_data=cell_data)
+        (append if self.times else create)(self.folder / names.VTKHDF, whole, time)
+        self.times.append(time)
+
+    def check(self) -> None:
+        """Raise RunError if the file is gone."""
+        path = self.folder / names.VTKHDF
+        if self.times and not path.is_file():
+            raise RunError(f"{path}: {_GONE}")
+
+    def truncate(self, times: Sequence[float]) -> None:
+        """Keep the first frames, whose times [s] are given, and remove all later ones."""
+        self.times = list(times)
+        truncate(self.folder / names.VTKHDF, len(times))
+
+
 class FrameSequence(Sequence[Frame]):
     """The frames of a run in time order; each access reads a file, and a slice reads none.
 
     Attributes:
-        times: (n,) float64 [s], as listed in `frames.pvd`.
-        paths: the files, in time order.
+        times: (n,) float64 [s], as listed in `frames.pvd` or `frames.vtkhdf`.
+        paths: the files, in time order; one file for all frames is repeated.
+        numbers: (n,) numbers of the frames in their run; from 0 if they are not given.
     """
 
-    def __init__(self, times: Array, paths: tuple[Path, ...]) -> None:
+    def __init__(self, times: Array, paths: tuple[Path, ...], numbers: Sequence[int] | None = None) -> None:
         self.times = times
         self.paths = paths
+        self.numbers = range(len(paths)) if numbers is None else numbers
 
     def __repr__(self) -> str:
         if not self.paths:
@@ -82,8 +125,8 @@ class FrameSequence(Sequence[Frame]):
     def __getitem__(self, index: slice) -> FrameSequence: ...
     def __getitem__(self, index: int | slice) -> Frame | FrameSequence:
         if isinstance(index, slice):
-            return FrameSequence(self.times[index], self.paths[index])
-        return read_frame(self.paths[index])
+            return FrameSequence(self.times[index], self.paths[index], self.numbers[index])
+        return read_frame(self.paths[index], self.numbers[index])
 
     def nearest(self, time: float) -> int:
         """Return the index of the frame nearest to a time [s]; raise InputError outside of the frames' times."""
@@ -107,17 +150,27 @@ class FrameSequence(Sequence[Frame]):
 
 def read_frames(directory: Path | str) -> FrameSequence:
     """Return the frames of a run directory, whose run may be done, failed or still running."""
-    path = Path(directory) / names.collection(names.FRAME)
-    times, files = [], []
+    path, stored = (Path(directory) / name for name in (names.collection(names.FRAME), names.VTKHDF))
+    files: list[Path] = []
     cause: BaseException | str | None = None
-    try:
-        for entry in ET.parse(path).getroot().iter("DataSet"):
-            times.append(float(entry.attrib["timestep"]))
-            files.append(path.parent / entry.attrib["file"])
-    except (OSError, ET.ParseError) as error:
-        cause = error
-    except (KeyError, ValueError) as error:
-        cause = f"entry {len(files)} lacks a time or a file ({error})"
+    if stored.exists():
+        path, times = stored, read_times(stored).tolist()
+        files = [stored] * len(times)
+    else:
+        times = []
+        try:
+            for entry in ET.parse(path).getroot().iter("DataSet"):
+                times.append(float(entry.attrib["timestep"]))
+                name = Path(entry.attrib["file"])
+                if name.is_absolute() or ".." in name.parts:
+                    cause = f"{shown(str(name))} lies outside of the run directory"
+                files.append(path.parent / name)
+        except FileNotFoundError as error:
+            cause = f"{error.strerror}, and no {names.VTKHDF} either"
+        except (OSError, ET.ParseError) as error:
+            cause = error
+        except (KeyError, ValueError) as error:
+            cause = f"entry {len(files)} lacks a time or a file ({error})"
     if cause is None and not files:
         cause = "it lists no frame"
     elif cause is None and (not np.all(np.isfinite(times)) or np.any(np.diff(times) < 0)):

@@ -15,6 +15,8 @@ CHECKPOINT_BEFORE = "checkpoint.previous.zip"
 # Nouns that name the VTK files of centrelines, spheres and forces at contacts; see `collection` and `member`.
 FRAME, SPHERE, FORCE = "frame", "sphere", "force"
 
+VTKHDF = "frames.vtkhdf"  # all frames in one file, in the place of `frames.pvd` and its files
+
 SERIES_FORMAT = 1
 CHECKPOINT_FORMAT = 4
 

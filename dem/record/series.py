@@ -5,7 +5,7 @@ from __future__ import annotations
 import io
 import math
 import time
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from types import MappingProxyType
@@ -79,15 +79,18 @@ class SeriesWriter:
                 file.attrs[name] = value
             columns = self.columns
             for name, column in self.described.items():
-                dataset = file.create_dataset(name, data=columns[name])
+                values = columns[name]
+                # Checksums need chunks, here one per dataset, and no chunk can be empty.
+                checked = {"chunks": values.shape, "fletcher32": True} if values.size else {}
+                dataset = file.create_dataset(name, data=values, **checked)
                 dataset.attrs["unit"] = column.unit
                 dataset.attrs["description"] = column.description
         path.write_bytes(content.getvalue())
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Series:
-    """The recorded quantities of a run against time; all arrays are read-only."""
+class Series(Mapping[str, NDArray[Any]]):
+    """The recorded quantities of a run against time: a mapping of names to arrays, which are read-only."""
 
     path: Path  #: The file
     #: Arrays by name, e.g. "com_height_m": (n,), (n, 2) for barb 1 and barb 2, or (n, 3) for x, y, z. Their names
@@ -105,8 +108,22 @@ class Series:
         except KeyError:
             raise InputError(f"{self.path} holds no series '{name}'; choose one of: {', '.join(self.data)}") from None
 
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.data)
+
     def __len__(self) -> int:
-        return len(self.time)
+        return len(self.data)
+
+    # The mixin methods of Mapping expect KeyError of a missing name, and compare arrays.
+    def __contains__(self, name: object) -> bool:
+        return name in self.data
+
+    def get(self, name: str, default: Any = None) -> Any:
+        """Return the array of one quantity, or `default` if the series has none of that name."""
+        return self.data.get(name, default)
+
+    __eq__ = object.__eq__
+    __hash__ = object.__hash__
 
     @property
     def time(self) -> Array:
@@ -134,15 +151,20 @@ def read_series(directory: Path | str) -> Series:
     path = Path(directory) / names.SERIES
     if not path.is_file():
         cannot_read("series", path, "no such file", _REMEDY)
+    cause: Exception | str | None
     try:
         with h5py.File(path, "r") as file:
-            attributes = dict(file.attrs)
-            data = {name: frozen(np.atleast_1d(file[name][()])) for name in file}
-            texts = {key: {name: str(file[name].attrs[key]) for name in file} for key in ("unit", "description")}
+            if not (cause := _foreign(file)):
+                attributes = dict(file.attrs)
+                data = {name: frozen(np.atleast_1d(file[name][()])) for name in file}
+                texts = {key: {name: str(file[name].attrs[key]) for name in file} for key in ("unit", "description")}
+                cause = _wrong(attributes, data)
+                seed = 0 if cause else int(attributes["seed"])
     # h5py fails with OSError, KeyError or RuntimeError, depending on where the damage lies.
     except Exception as error:
-        cannot_read("series", path, error, _REMEDY)
-    if cause := _wrong(attributes, data):
+        checksum = "filter returned failure" in str(error)
+        cause = "its content does not fit its checksums" if checksum else error
+    if cause:
         cannot_read("series", path, cause, _REMEDY)
     return Series(
         path=path,
@@ -150,8 +172,23 @@ def read_series(directory: Path | str) -> Series:
         units=MappingProxyType(texts["unit"]),
         descriptions=MappingProxyType(texts["description"]),
         scene_sha256=str(attributes["scene_sha256"]),
-        seed=int(attributes["seed"]),
+        seed=seed,
     )
+
+
+def _foreign(file: h5py.File) -> str | None:
+    """Return which dataset of a file does not hold numbers that are stored in the file itself, or None.
+
+    Links may lead to other files, and a dataset that is compressed or not stored may fill the memory.
+    """
+    for name in file:
+        linked = not isinstance(file.get(name, getlink=True), h5py.HardLink)
+        values = None if linked else file[name]
+        if not isinstance(values, h5py.Dataset) or values.external or values.is_virtual:
+            return f"'{name}' is not stored in this file"
+        if values.dtype.kind not in "bfiu" or values.id.get_storage_size() < values.nbytes:
+            return f"'{name}' is not stored as plain numbers"
+    return None
 
 
 def _wrong(attributes: dict[str, Any], data: dict[str, NDArray[Any]]) -> str | None:

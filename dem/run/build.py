@@ -8,13 +8,15 @@ from pathlib import Path
 import numpy as np
 
 from dem.arrays import Array
-from dem.body.state import State
+from dem.body.kinds import Mixture
+from dem.body.particle import LINKS, mean_width
+from dem.body.state import PileState, spheres_of
 from dem.engine.effect import EffectName
 from dem.engine.interface import Engine
 from dem.engine.kinds import engine_kind
 from dem.plan.effects import called_for
 from dem.plan.steps import time_steps
-from dem.record.frames import FrameWriter
+from dem.record.frames import FrameWriter, OneFileWriter
 from dem.record.names import FORCE, SPHERE
 from dem.record.progress import ProgressWriter
 from dem.record.series import SeriesWriter
@@ -60,7 +62,7 @@ def build_recorder(scene: Scene, out: Path, progress: ProgressWriter) -> Recorde
     return Recorder(
         sampler=sampler,
         series=SeriesWriter(out, sampler.described, {"scene_sha256": scene_hash(scene), "seed": scene.seed}),
-        frames=FrameWriter(out),
+        frames=_frame_writer(scene, out),
         watchdog=build_watchdog(scene),
         points=watched_points(scene),
         progress=progress,
@@ -72,14 +74,31 @@ def build_recorder(scene: Scene, out: Path, progress: ProgressWriter) -> Recorde
     )
 
 
-def watched_points(scene: Scene) -> Callable[[State], Array]:
+def _frame_writer(scene: Scene, out: Path) -> FrameWriter:
+    if scene.recording.frames == "vtu":
+        return FrameWriter(out)
+    # No tube about the axis is a flat bar of several rows: one that others meet at an equal mean distance.
+    if scene.mixture is not None:
+        radii = [kind.radius if kind.rows == 1 else mean_width(*kind.thicknesses) / 2 for kind in scene.mixture.kinds]
+        return OneFileWriter(out, radii=radii, kind="kind")
+    particle, boxes = scene.particle, scene.smarticle.boxes
+    if particle.chain.rows == 1 and not boxes.bulge:
+        return OneFileWriter(out, radii=[particle.radius] * LINKS)
+    radii = [mean_width(boxes.thickness_normal, in_plane) / 2 for in_plane in boxes.thicknesses_in_plane]
+    return OneFileWriter(out, radii=radii)
+
+
+def watched_points(scene: Scene) -> Callable[[PileState], Array]:
     """Return a function from states to the points (N, P, 3) [m] that the watchdog checks.
 
     The points are the centres of all spheres, or the ends and middles of smooth links.
     """
-    particle = scene.particle
+    model = scene.model
+    if isinstance(model, Mixture):
+        return lambda state: spheres_of(state, model)
+    particle = model
     if not scene.smooth:
-        return lambda state: state.spheres(particle)
+        return lambda state: spheres_of(state, particle)
     # The first, the middle and the last sphere of each straight row of the chain that represents a link in pictures.
     places = np.column_stack([particle.links, np.round(particle.local_centres[:, 1:] / particle.radius, 6)])
     which = []
@@ -88,14 +107,14 @@ def watched_points(scene: Scene) -> Callable[[State], Array]:
         along = numbers[np.argsort(particle.local_centres[numbers, 0])]
         which += [along[0], along[len(along) // 2], along[-1]]
     kept = np.unique(which)
-    return lambda state: state.spheres(particle, kept)
+    return lambda state: state.smarticles.spheres(particle, kept)
 
 
 def build_watchdog(scene: Scene) -> Watchdog:
     """Return the watchdog of a scene, with its limits."""
     gravity, diameter = scene.gravity_m_per_s2, scene.sphere_diameter
     fall = math.sqrt(2 * gravity * (scene.cylinder.height + sum(phase.raises for phase in scene.phases)))
-    fastest, mass = max(phase.peak_speed(gravity) for phase in scene.phases), scene.count * scene.smarticle.boxes.mass
+    fastest, mass = max(phase.peak_speed(gravity) for phase in scene.phases), scene.count * scene.model.mass
     return Watchdog(
         cylinder=scene.cylinder,
         speed=SPEED_MARGIN * max(fall, fastest),

@@ -3,15 +3,17 @@
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from operator import index
 from typing import Any
 
+import meshio
 from numpy.typing import NDArray
 
 from dem.arrays import Array
-from dem.body.state import State
+from dem.body.state import PileState
 from dem.engine.interface import Engine
 from dem.record.forces import force_mesh
-from dem.record.frame import centreline_mesh, motor_fields, sphere_mesh
+from dem.record.frame import centreline_mesh, motor_fields, segment_mesh, sphere_mesh
 from dem.record.frames import FrameWriter
 from dem.record.progress import ProgressWriter
 from dem.record.series import SeriesWriter
@@ -30,7 +32,7 @@ class Recorder:
     series: SeriesWriter
     frames: FrameWriter
     watchdog: Watchdog  #: Checks the state at intervals, at every checkpoint and at the end
-    points: Callable[[State], Array]  #: Returns (N, P, 3) points of a state that must stay inside the container [m]
+    points: Callable[[PileState], Array]  #: Returns (N, P, 3) points of a state that must stay inside the container [m]
     progress: ProgressWriter
     interval: float  #: Time between samples [s]
     frame_every: int  #: Samples between frames
@@ -48,19 +50,7 @@ class Recorder:
         row = self.sampler.sample(engine, state, phase)
         self.series.add(row)
         if engine.count and self.samples % self.frame_every == 0:
-            motors = engine.motors.readings if engine.motors.articulated else None
-            at_work = () if motors is None else (motors.torques, motors.work, motors.halted)
-            mesh = centreline_mesh(
-                state.vertices,
-                velocities=state.link_velocities,
-                spins=state.link_spins,
-                contacts=engine.neighbours(),
-                time=engine.time,
-                floor=engine.boundaries.floor,
-                phase=phase,
-                extra=motor_fields(state.angles, *at_work) if engine.motors.present else None,
-            )
-            self.frames.write(mesh, engine.time)
+            self.frames.write(_mesh(engine, state, phase), engine.time)
             if self.forces is not None:
                 found = engine.contact_forces()
                 self.forces.write(force_mesh(found, state.positions, time=engine.time, phase=phase), engine.time)
@@ -82,7 +72,7 @@ class Recorder:
         """Set `next_step` to the step nearest to the time of the next sample; needed after each change of dt."""
         self.next_step = engine.steps + max(1, round((self.samples * self.interval - engine.time) / engine.time_step))
 
-    def watch(self, engine: Engine, state: State | None = None) -> None:
+    def watch(self, engine: Engine, state: PileState | None = None) -> None:
         """Let the watchdog check the state, overlaps and energy; it raises RunError beyond a limit."""
         state, time, watchdog = state or engine.state(), engine.time, self.watchdog
         floor, raised, extremes = engine.boundaries.floor, engine.boundaries.raised, engine.extremes(state)
@@ -110,13 +100,38 @@ class Recorder:
 
     def restore(self, memory: Mapping[str, Any], columns: Mapping[str, NDArray[Any]]) -> None:
         """Restore the state that `memory` returned: remove later frames, and write the series `columns`."""
-        self.samples, self.next_step = memory["samples"], memory["next_step"]
+        self.samples, self.next_step = index(memory["samples"]), index(memory["next_step"])
         self.truncate(memory)
         self.sampler.memory = dict(memory["series"])
+        self.check_files()
         self.series.restore(columns)
         self.series.write()
+
+    def check_files(self) -> None:
+        """Raise RunError if a frame, or a file of forces or spheres, that was written is gone."""
+        for _, writer in self._writers():
+            writer.check()
 
     def truncate(self, memory: Mapping[str, Any]) -> None:
         """Remove all frames that `memory` does not list; an empty mapping lists none."""
         for name, writer in self._writers():
             writer.truncate(memory.get(name, []))
+
+
+def _mesh(engine: Engine, state: PileState, phase: int) -> meshio.Mesh:
+    """Return the frame of the present state, in a phase given by its index."""
+    contacts, time, floor = engine.neighbours(), engine.time, engine.boundaries.floor
+    if state.bodies is not None:
+        return segment_mesh(state.bodies, contacts=contacts, time=time, floor=floor, phase=phase)
+    smarticles, motors = state.smarticles, engine.motors.readings if engine.motors.articulated else None
+    at_work = () if motors is None else (motors.torques, motors.work, motors.halted)
+    return centreline_mesh(
+        smarticles.vertices,
+        velocities=smarticles.link_velocities,
+        spins=smarticles.link_spins,
+        contacts=contacts,
+        time=time,
+        floor=floor,
+        phase=phase,
+        extra=motor_fields(smarticles.angles, *at_work) if engine.motors.present else None,
+    )

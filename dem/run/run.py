@@ -14,24 +14,34 @@ import h5py
 import meshio
 import numpy as np
 
+from dem.body.kinds import Mixture
 from dem.engine.kinds import engine_kind
 from dem.errors import InputError, RunError
 from dem.plan.outlook import warnings_of
 from dem.record.checkpoint import Checkpoint, has_checkpoint, read_checkpoint
-from dem.record.document import Done, Ended, Failed, Manifest, Phase
+from dem.record.document import Done, Ended, Failed, Kind, Manifest, Phase
 from dem.record.files import write_text
-from dem.record.names import DONE, FAILED, MANIFEST, SCENE
+from dem.record.names import DONE, FAILED, MANIFEST, SCENE, VTKHDF
 from dem.record.progress import ProgressWriter
 from dem.record.run import Run
-from dem.record.rundir import claimed, log_of
+from dem.record.rundir import Claim, claimed, log_of
+from dem.record.vtkhdf import check_times
 from dem.run.build import Builders
-from dem.run.simulation import Simulation, StopRequestedError
+from dem.run.simulation import Simulation
+from dem.run.stop import StopRequest, StopRequestedError
 from dem.scene.reading import difference, dump_scene, load_scene, scene_hash
 from dem.scene.scene import Scene
 
 
 def run_scene(
-    scene: Scene, out: Path, *, command: str, progress: bool, resume: bool = False, builders: Builders | None = None
+    scene: Scene,
+    out: Path,
+    *,
+    command: str,
+    progress: bool,
+    resume: bool = False,
+    builders: Builders | None = None,
+    stop: StopRequest | None = None,
 ) -> Done | None:
     """Simulate a scene into a run directory; return times and cost, or None if the run was done already.
 
@@ -42,11 +52,12 @@ def run_scene(
         progress: whether to draw a progress line on the terminal.
         resume: whether to continue from the newest undamaged checkpoint, or from the start if none was written.
         builders: functions that make the parts of the run; None: the default ones.
+        stop: whether SIGUSR1 has come, also before this call; None: it is noted from the first step on.
 
     Raises:
         InputError: `out` holds other files, or another process runs in it.
         RunError: the run failed; `failed.json` states the cause, and all files written before stay.
-        StopRequestedError: SIGUSR1 came; the run stopped at its next checkpoint and can be resumed.
+        StopRequestedError: SIGUSR1 came; the run stopped before its first step or at a checkpoint, and can be resumed.
         KeyboardInterrupt: the run was interrupted; all files are complete.
     """
     builders, kind = builders or Builders(), engine_kind(scene.engine)
@@ -54,7 +65,7 @@ def run_scene(
     if not resume:
         _check_ready(scene)
     saved: tuple[Checkpoint, str | None] | None = None
-    with claimed(out, resume=resume):
+    with claimed(out, resume=resume) as claim:
         if resume:
             _check_scene(scene, out)
             if (out / DONE).exists():
@@ -63,7 +74,7 @@ def run_scene(
                 _check_ready(scene)
             else:
                 # Read before anything is changed, since it may be rejected for its version.
-                saved = read_checkpoint(out, scene_sha256=scene_hash(scene), made_by=made_by)
+                saved = _saved(scene, out, made_by)
         else:
             made = manifest(scene, out, steps=steps, command=command, made_by=made_by, threads=threads)
             made.write(out / MANIFEST, make_folder=True)
@@ -79,10 +90,11 @@ def run_scene(
                     scene=scene,
                     engine=builders.engine(scene, min(steps)),
                     recorder=builders.recorder(scene, out, bar),
-                    folder=out,
+                    claim=claim,
                     log=log,
                     made_by=made_by,
                     time_steps=steps,
+                    stop=stop or StopRequest(),
                 )
                 for warning in warnings_of(scene):
                     simulation.warn(warning)
@@ -94,12 +106,12 @@ def run_scene(
                 done.mark(out)
                 return done
             except (Exception, KeyboardInterrupt) as error:
-                cause = _mark_ended(simulation, out, log, error)
+                cause = _mark_ended(simulation, claim, log, error)
                 if isinstance(error, RunError):
                     raise RunError(cause) from error
                 raise
             finally:
-                bar.finish()
+                bar.finish(remove=claim.held)
 
 
 def _check_ready(scene: Scene) -> None:
@@ -126,6 +138,13 @@ def _check_scene(scene: Scene, out: Path) -> None:
     )
 
 
+def _saved(scene: Scene, out: Path, made_by: tuple[str, str]) -> tuple[Checkpoint, str | None]:
+    checkpoint, warning = read_checkpoint(out, scene_sha256=scene_hash(scene), made_by=made_by)
+    if scene.recording.frames == "vtkhdf":
+        check_times(out / VTKHDF, checkpoint.state["recorder"]["frames"])
+    return checkpoint, warning
+
+
 def _restore(simulation: Simulation, saved: tuple[Checkpoint, str | None] | None, threads: int) -> None:
     out, log = simulation.folder, simulation.log
     if saved is None:
@@ -135,7 +154,14 @@ def _restore(simulation: Simulation, saved: tuple[Checkpoint, str | None] | None
     checkpoint, warning = saved
     if warning:
         simulation.warn(warning)
-    simulation.restore(checkpoint)
+    try:
+        simulation.restore(checkpoint)
+    except (InputError, RunError):
+        raise
+    # Content that no run writes can fail anywhere.
+    except Exception as error:
+        msg = f"{out}: cannot be resumed, its checkpoint has other content than the run needs ({error!r}); start anew"
+        raise InputError(msg) from error
     earlier = Run(out).manifest.threads
     if earlier != threads:
         workers = engine_kind(simulation.scene.engine).workers
@@ -146,18 +172,21 @@ def _restore(simulation: Simulation, saved: tuple[Checkpoint, str | None] | None
     log.info("resumed from the checkpoint of t = %.4f s", simulation.engine.time)
 
 
-def _mark_ended(simulation: Simulation | None, out: Path, log: logging.Logger, error: BaseException) -> str:
-    """Write the series and `failed.json`; return the cause, for a failed run with the last checkpoint."""
+def _mark_ended(simulation: Simulation | None, claim: Claim, log: logging.Logger, error: BaseException) -> str:
+    """Write the series and `failed.json`; return the cause, for a failed run with the last checkpoint.
+
+    Nothing is written if the directory is no longer the run's own.
+    """
     status: Ended = "interrupted" if isinstance(error, StopRequestedError | KeyboardInterrupt) else "failed"
     cause = "interrupted by the user" if isinstance(error, KeyboardInterrupt) else str(error)
-    if not isinstance(error, RunError | StopRequestedError | KeyboardInterrupt):
+    if not isinstance(error, InputError | RunError | StopRequestedError | KeyboardInterrupt):
         # A bug in this program: the run directory must still state that the run has ended.
         log.error("unexpected error", exc_info=error)
         cause = f"unexpected {type(error).__name__}: {error}"
     time, checkpoint = 0.0, None
     if simulation is not None:
         # Without samples this process has resumed nothing, and the series of the earlier one must stay.
-        if simulation.recorder.samples:
+        if simulation.recorder.samples and claim.held:
             with contextlib.suppress(RunError):  # a full disk: what was written before is whole
                 simulation.recorder.series.write()
         time, checkpoint = simulation.engine.time, simulation.checkpointed
@@ -165,7 +194,8 @@ def _mark_ended(simulation: Simulation | None, out: Path, log: logging.Logger, e
             good = "none" if checkpoint is None else f"t = {checkpoint:.4f} s"
             cause = f"{cause} (last good checkpoint: {good})"
     log.error("%s", cause)
-    Failed(status=status, cause=cause, time_s=time, checkpoint_s=checkpoint).mark(out)
+    if claim.held:
+        Failed(status=status, cause=cause, time_s=time, checkpoint_s=checkpoint).mark(claim.out)
     return cause
 
 
@@ -178,7 +208,8 @@ def manifest(
         steps: time step of each phase [s].
         made_by: name and version of the engine.
     """
-    particle, boxes, origin = scene.particle, scene.smarticle.boxes, scene.phases[0].origin
+    model, origin = scene.model, scene.phases[0].origin
+    boxes = None if isinstance(model, Mixture) else model.boxes
     if origin is not None:  # a relative path stays right if both runs are moved together
         origin = {**origin, "run": os.path.relpath(origin["run"], out.resolve())}
     return Manifest(
@@ -192,19 +223,19 @@ def manifest(
         threads=threads,
         fidelity=scene.fidelity.base,
         count=scene.count,
-        aspect_ratio=scene.smarticle.aspect_ratio,
-        middle_length_m=boxes.middle_length,
-        barb_length_m=boxes.barb_length,
-        thickness_normal_m=boxes.thickness_normal,
-        thickness_in_plane_m=boxes.thickness_in_plane,
-        middle_thickness_in_plane_m=boxes.middle_thickness_in_plane,
-        smarticle_mass_kg=boxes.mass,
-        solid_volume_m3=boxes.volume,
+        aspect_ratio=0.0 if boxes is None else scene.smarticle.aspect_ratio,
+        middle_length_m=model.size,
+        barb_length_m=0.0 if boxes is None else boxes.barb_length,
+        thickness_normal_m=model.thicknesses[0],
+        thickness_in_plane_m=model.thicknesses[1],
+        middle_thickness_in_plane_m=None if boxes is None else boxes.middle_thickness_in_plane,
+        smarticle_mass_kg=model.mass,
+        solid_volume_m3=model.volume,
         container_radius_m=scene.container.radius_m,
         packing_radius_m=scene.container.packing_radius_m,
         container_tiers=1 + len(scene.cylinder.upper),
-        sphere_diameter_m=particle.chain.diameter,
-        spheres_per_smarticle=len(particle.centres),
+        sphere_diameter_m=model.diameter,
+        spheres_per_smarticle=max(len(body.centres) for body in scene.bodies),
         time_step_s=min(steps),
         phases=tuple(
             Phase(index=k, type=phase.kind, at_rest=phase.at_rest, time_step_s=dt)
@@ -212,7 +243,27 @@ def manifest(
         ),
         planar=scene.plane is not None,
         channel_width_m=None if scene.plane is None else scene.plane.width_m,
+        kinds=None if scene.mixture is None else _kinds(scene.mixture),
         taken_over=origin,
+    )
+
+
+def _kinds(mixture: Mixture) -> tuple[Kind, ...]:
+    numbers = np.bincount(mixture.of, minlength=len(mixture.kinds))
+    return tuple(
+        Kind(
+            shape=kind.name,
+            bodies=int(number),
+            bars=len(kind.bars.points),
+            mass_kg=kind.mass,
+            volume_m3=kind.volume,
+            length_m=float(kind.bars.lengths.sum()),
+            thickness_normal_m=kind.bars.thickness_normal,
+            thickness_in_plane_m=kind.bars.thickness_in_plane,
+            round=kind.bars.round,
+            sphere_diameter_m=kind.diameter,
+        )
+        for kind, number in zip(mixture.kinds, numbers, strict=True)
     )
 
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from dem.arrays import Array
 from dem.body.chain import extent
-from dem.body.state import State
+from dem.body.state import PileState
 from dem.engine.effect import EffectName
 from dem.engine.interface import Engine
 from dem.plan.effects import ADDS
@@ -33,11 +33,10 @@ class Sampler:
         added = {name for effect in self.effects if effect in ADDS for name in ADDS[effect].series}
         return {name: column for name, column in EVERY.items() if name in COLUMNS or name in added}
 
-    def sample(self, engine: Engine, state: State, phase: int) -> dict[str, Any]:
+    def sample(self, engine: Engine, state: PileState, phase: int) -> dict[str, Any]:
         """Return one row: a number, or a (2,) or (3,) array, by name of the column."""
-        boxes = engine.particle.boxes
         heights = state.positions[:, 2] - engine.boundaries.floor
-        phi = packing_fraction(heights, solid_volume=boxes.volume, radius=self.radius)
+        phi = packing_fraction(heights, solid_volume=state.volume, radius=self.radius)
         container_force = self._mean_force(engine, state.momentum)
         extra: dict[str, Any] = {}
         if EffectName.HOOKS in self.effects:
@@ -106,13 +105,13 @@ class Sampler:
             return np.full_like(sums, math.nan)
         return np.asarray((sums - np.array(previous[1])) / (steps - previous[0]))
 
-    def _strain_row(self, engine: Engine, state: State) -> dict[str, Any]:
+    def _strain_row(self, engine: Engine, state: PileState) -> dict[str, Any]:
         strings, none = engine.strings, np.full(3, math.nan)
         row: dict[str, Any] = dict.fromkeys(STRAIN_COLUMNS, math.nan)
         row |= {name: none for name in STRAIN_COLUMNS if name.endswith("_force_N")}
         if not engine.count:
             return row
-        row["chain_width_m"] = extent(state, 2 * engine.particle.radius)
+        row["chain_width_m"] = extent(state.smarticles, 2 * engine.particle.radius)
         if not strings.tied:
             self.memory["strain"] = None
             return row
@@ -124,16 +123,17 @@ class Sampler:
         return row | dict(zip(list(STRAIN_COLUMNS)[:4], means, strict=True))
 
 
-def _motor_row(engine: Engine, state: State) -> dict[str, Any]:
+def _motor_row(engine: Engine, state: PileState) -> dict[str, Any]:
     motors = engine.motors.readings
-    angles = _mean(state.angles)
+    actual = state.smarticles.angles
+    angles = _mean(actual)
     if motors is None or not engine.motors.articulated:
         held = angles if motors is None else _mean(motors.commands)
         behind = error = torque = halted = math.nan
     else:
         held = _mean(motors.commands)
         behind = np.abs(motors.schedule - motors.commands).max(initial=0.0)
-        error = np.abs(motors.commands - state.angles).max(initial=0.0)
+        error = np.abs(motors.commands - actual).max(initial=0.0)
         torque = math.sqrt(np.square(motors.torques).mean())
         halted = motors.halted.mean()
     return {

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from dem.arrays import Array, Flags
-from dem.body.state import State
+from dem.body.state import PileState
 from dem.errors import RunError, reject
 from dem.physics.overlaps import Extremes, Overlaps
 from dem.setting.container import Cylinder
@@ -49,7 +49,7 @@ class Watchdog:
 
     def check(
         self,
-        state: State,
+        state: PileState,
         *,
         floor: float,
         time: float,
@@ -68,7 +68,7 @@ class Watchdog:
             gaps: (N, 2) distances between the links of each hinge [m]; None while welded.
         """
         positions = state.positions
-        speeds = _speeds(state)
+        speeds = state.speeds
         heights = positions[:, 2] - floor
         broken = ~(np.isfinite(positions).all(axis=1) & np.isfinite(speeds))
         reject(broken, time, "a position or velocity that is no number", LOWER_STEP)
@@ -127,7 +127,7 @@ class Watchdog:
             )
         reject(overlaps.deep, time, cause, way_out)
 
-    def check_energy(self, state: State, *, energy: float, elastic: float, time: float) -> None:
+    def check_energy(self, state: PileState, *, energy: float, elastic: float, time: float) -> None:
         """Check that the energy has not risen by more than work and springs explain.
 
         Contacts, hinges and welding dissipate energy, and their springs return at most what they store. Kinetic and
@@ -145,7 +145,7 @@ class Watchdog:
             return
         rise = energy - self._ceiling
         if rise > self.energy:
-            speeds = _speeds(state)
+            speeds = state.speeds
             reject(
                 speeds >= speeds.max() / 2,
                 time,
@@ -170,8 +170,3 @@ class Watchdog:
         if abs(residual) > self.missed * dissipated + (self.energy if math.isfinite(self.energy) else 0.0):
             raise RunError(f"at t = {time:.4f} s {text} (limit {100 * self.missed:.2g} %); {LOWER_STEP}")
         return f"{text}; {LOWER_STEP}"
-
-
-def _speeds(state: State) -> Array:
-    """Return (N,) speed of the fastest link's centre of each smarticle [m/s]."""
-    return np.asarray(np.linalg.norm(state.link_velocities, axis=-1).max(axis=-1))

@@ -14,9 +14,9 @@ from pydantic import ValidationError
 from dem.errors import InputError, shown
 from dem.record.names import SCENE
 from dem.scene.scene import Scene
-from dem.scene.yaml_text import load_yaml, parse_yaml
 from dem.setting.fidelity import FIDELITIES
 from dem.strict import explained
+from dem.yaml_text import load_yaml, parse_yaml, read_text
 
 SCHEMA_VERSION = 1
 MOST_DIFFERENCES = 3  # keys that are shown where two scenes differ
@@ -76,7 +76,7 @@ def load_scene(path: Path | str, overrides: Sequence[str] = ()) -> Scene:
         elif path.suffix == ".j2" and path.is_file():
             problem, way_out = "is a template of scenes", "give the sweep file that names it to `smarticles sweep`"
         else:
-            text = path.read_text(encoding="utf-8")
+            text = read_text(path)
     except OSError as error:
         problem = f"cannot be read ({error.strerror})"
     except UnicodeDecodeError:
@@ -126,11 +126,15 @@ def _plain(scene: Scene) -> dict[str, Any]:
     keys of `ADDED_KEYS`, since a protocol may have filled them in.
     """
     data = scene.model_dump(mode="json")
+    smarticle = data["smarticle"]
     optional: list[tuple[dict[str, Any], Mapping[str, Any]]] = [
-        (data, {"engine": DEFAULT_ENGINE}),
-        (data["recording"], {"contact_forces": False}),
-        (data["smarticle"], {"middle_thickness_in_plane_m": None}),
+        (data, {"engine": DEFAULT_ENGINE, "particle": None}),
+        (data["recording"], {"contact_forces": False, "frames": "vtu"}),
+        (smarticle, {"middle_thickness_in_plane_m": None}),
     ]
+    if scene.shapes is not None:
+        del data["smarticle"]
+        optional = [entry for entry in optional if entry[0] is not smarticle]
     if scene.hooks is not None:
         optional.append((data["hooks"], {"lower_length_m": scene.hooks.length_m, "lower_bars": 1}))
     if scene.protocol is None:
@@ -205,6 +209,10 @@ def json_schema() -> dict[str, Any]:
     mapping = {"$ref": fidelity.pop("$ref")}
     fidelity["anyOf"] = [{"type": "string", "enum": list(FIDELITIES)}, mapping]
     schema["$defs"]["Fidelity"].pop("required")
+    # A file may give one shape without a list, or the default by its name.
+    particle = schema["properties"]["particle"]
+    shapes = particle["anyOf"][0]
+    particle["anyOf"] = [shapes["items"], shapes, {"type": "string", "enum": ["smarticle"]}, {"type": "null"}]
     # Their defaults follow from the smarticle.
     schema["$defs"]["Hooks"].pop("required")
     schema["$defs"]["PullHook"]["required"] = ["type"]

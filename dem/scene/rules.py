@@ -9,17 +9,22 @@ from dem.phases.kinds import KINDS
 from dem.phases.phase import SceneView
 from dem.phases.remove_container import RemoveContainer
 from dem.setting.hooks import TOLERANCE, Hooks
+from dem.setting.motor import Motor
+from dem.setting.smarticle import Smarticle
 
 
 def problems(scene: SceneView, engine: str) -> Iterator[str]:
     """Yield an error message for each problem of a scene on an engine: key, value and what to do."""
+    if scene.mixture is not None:
+        yield from _of_particle(scene)
     if scene.plane is None:
         yield from _of_order(scene)
         yield from _of_container(scene)
     else:
         yield from _of_plane(scene)
-    yield from _of_section(scene)
-    yield from _of_body(scene)
+    if scene.mixture is None:
+        yield from _of_section(scene)
+        yield from _of_body(scene)
     yield from _of_recording(scene)
     for index, phase in enumerate(scene.phases):
         yield from phase.check(scene, index)
@@ -55,6 +60,22 @@ def _of_plane(scene: SceneView) -> Iterator[str]:
         yield f"fidelity.rows: {scene.fidelity.rows} rows of spheres out of the plane; use 1"
 
 
+def _of_particle(scene: SceneView) -> Iterator[str]:
+    """Yield what has no meaning for rigid bodies that are no smarticles."""
+    if scene.smarticle != Smarticle():
+        yield "smarticle: describes smarticles, but particle has other shapes; leave smarticle or particle out"
+    if scene.motor != Motor() and scene.protocol is None:
+        yield "motor: rigid shapes have no hinges; leave motor or particle out"
+    if scene.plane is not None:
+        yield "plane: motion in a plane is that of smarticles; leave plane or particle out"
+    for index, phase in enumerate(scene.phases):
+        if phase.actuates or phase.of_smarticles:
+            yield (
+                f"phases.{index}: {phase.kind} needs smarticles, which have barbs, but particle has rigid shapes; "
+                "leave the phase or particle out"
+            )
+
+
 def _of_section(scene: SceneView) -> Iterator[str]:
     rows, t1 = scene.fidelity.rows, scene.smarticle.thickness_normal_m
     diameter = scene.sphere_diameter
@@ -85,7 +106,8 @@ def _of_body(scene: SceneView) -> Iterator[str]:
 
 
 def _of_container(scene: SceneView) -> Iterator[str]:
-    radius, reach = scene.container.radius_m, scene.particle.reach
+    radius, reach = scene.container.radius_m, scene.model.reach
+    body, bodies = ("a smarticle", "smarticles") if scene.mixture is None else ("a body", "bodies")
     tiers = scene.container.tiers or ()
     for key, inner in (
         ("radius_m", radius),
@@ -93,18 +115,18 @@ def _of_container(scene: SceneView) -> Iterator[str]:
     ):
         if reach > inner:
             yield (
-                f"container.{key}: {inner:g} m is narrower than a smarticle, whose farthest point is {reach:.4g} m "
+                f"container.{key}: {inner:g} m is narrower than {body}, whose farthest point is {reach:.4g} m "
                 f"from its centre of mass; use at least {reach:.4g} m"
             )
     height = scene.container.height_m
     if height is not None:
         # No random packing of thin bars reaches a packing fraction near 0.5, however it is poured.
         space = math.fsum(t.radius_m**2 * t.height_m for t in tiers) if tiers else radius**2 * height
-        most = int(0.5 * math.pi * space / scene.smarticle.boxes.volume)
+        most = int(0.5 * math.pi * space / scene.model.volume)
         if scene.count > most:
             way_out = "make the top tier higher" if tiers else "leave height_m out"
             yield (
-                f"count: {scene.count} smarticles cannot fit into {height:g} m of container.height_m "
+                f"count: {scene.count} {bodies} cannot fit into {height:g} m of container.height_m "
                 f"(half full is {most}); lower the count or {way_out}"
             )
 

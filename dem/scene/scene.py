@@ -8,12 +8,22 @@ from itertools import pairwise
 from typing import Any, Literal, Self
 
 import numpy as np
-from pydantic import Field, ModelWrapValidatorHandler, ValidationInfo, field_validator, model_validator
+from pydantic import (
+    ConfigDict,
+    Field,
+    ModelWrapValidatorHandler,
+    ValidationError,
+    ValidationInfo,
+    field_validator,
+    model_validator,
+)
 
-from dem.arrays import Array
+from dem.arrays import Array, Numbers
+from dem.body.kinds import Kind, Mixture
 from dem.body.particle import Particle, SphereChain, chain_mean_width, mean_width
+from dem.engine.demand import Activity
 from dem.engine.effect import EffectName
-from dem.errors import nearest, shown
+from dem.errors import InputError, nearest, shown
 from dem.phases.kinds import AnyPhase
 from dem.phases.pull_hook import with_pull_defaults
 from dem.scene.rules import problems
@@ -27,7 +37,9 @@ from dem.setting.part import REFERENCE_ASPECT_RATIO, Part
 from dem.setting.plane import Channel, Plane
 from dem.setting.protocol import Protocol, with_protocol
 from dem.setting.recording import Recording
+from dem.setting.shapes import AnyShape, Shaped, listed, numbers_of_shapes
 from dem.setting.smarticle import Smarticle
+from dem.strict import explained
 
 # Distance of neighbouring spheres, in diameters, of the chains that represent smooth links in pours and pictures. Where
 # such chains do not overlap, the links themselves overlap by a thirtieth of a diameter at most.
@@ -49,6 +61,8 @@ def _named(base: str, given: Mapping[str, Any]) -> Mapping[str, Any]:
 class Scene(Part):
     """Description of one run: everything that its result depends on."""
 
+    model_config = ConfigDict(serialize_by_alias=True)
+
     schema_version: Literal[1] = Field(1, description="version of this format [1]")
     engine: Literal["yade", "links", "lammps"] = Field(
         "yade",
@@ -62,8 +76,16 @@ class Scene(Part):
     )
     name: str = Field("scene", min_length=1, max_length=100, description="name for titles and tables")
     seed: int = Field(..., ge=0, lt=2**63, description="the only source of randomness [1]")
+    shapes: tuple[AnyShape, ...] | None = Field(
+        None,
+        alias="particle",
+        min_length=1,
+        max_length=16,
+        description="shape of the bodies, or a list of shapes for a mixture; default: smarticle, described by the key "
+        "smarticle",
+    )
     smarticle: Smarticle = Field(default_factory=Smarticle, description="geometry and material of one smarticle")
-    count: int = Field(..., ge=1, le=100_000, description="N, number of smarticles [1]")
+    count: int = Field(..., ge=1, le=100_000, description="N, number of smarticles, or other bodies [1]")
     container: Container = Field(default_factory=Container, description="the container")
     plane: Plane | None = Field(
         None, description="plane that all motion is confined to, between two walls instead of a container; null: none"
@@ -78,6 +100,16 @@ class Scene(Part):
     )
     phases: tuple[AnyPhase, ...] = Field(..., min_length=1, description="phases of the run, in order")
     recording: Recording = Field(default_factory=Recording, description="frames and series")
+
+    def __init__(self, **keys: Any) -> None:
+        """Make a scene from its keys; raise InputError in one line if they are not valid."""
+        try:
+            super().__init__(**keys)
+        except ValidationError as error:
+            raise InputError(f"Scene: {explained(error, keys, described='`smarticles keys`')}") from None
+
+    # Tells pydantic that files are validated without this method, which would lose the folder of relative paths.
+    __init__.__pydantic_base_init__ = True  # type: ignore[attr-defined]
 
     @model_validator(mode="before")
     @classmethod
@@ -96,6 +128,16 @@ class Scene(Part):
             raise ValueError(f"unknown fidelity {shown(base)}; {nearest(str(base), FIDELITIES)}")
         return {"base": base, **_named(base, {**info.data, **value}), **value}
 
+    @field_validator("container", mode="before")
+    @classmethod
+    def _some_container(cls, value: Any) -> Any:
+        if value is None:
+            raise ValueError(
+                "got null, but there is no scene without a container; leave the key out, give a radius_m that is "
+                "never reached, or add the phase remove-container; see docs/limits.md"
+            )
+        return value
+
     @field_validator("gravity_m_per_s2")
     @classmethod
     def _some_or_none(cls, value: float) -> float:
@@ -103,17 +145,22 @@ class Scene(Part):
             raise ValueError(f"{value:g} m/s² is out of range; use 0 m/s² or at least {_LEAST_GRAVITY:g} m/s²")
         return value
 
+    @field_validator("shapes", mode="before")
+    @classmethod
+    def _one_or_many(cls, value: Any) -> Any:
+        return listed(value)
+
     @field_validator("hooks", mode="before")
     @classmethod
-    def _hooks_of_smarticle(cls, value: Any, info: ValidationInfo) -> Any:
-        return with_hook_defaults(value, info.data.get("smarticle") or Smarticle())
+    def _hooks_of_body(cls, value: Any, info: ValidationInfo) -> Any:
+        return with_hook_defaults(value, _sizes(info.data))
 
     @field_validator("phases", mode="before")
     @classmethod
-    def _pulls_of_smarticle(cls, value: Any, info: ValidationInfo) -> Any:
+    def _pulls_of_body(cls, value: Any, info: ValidationInfo) -> Any:
         if not isinstance(value, list | tuple):
             return value
-        return [with_pull_defaults(phase, info.data.get("smarticle") or Smarticle()) for phase in value]
+        return [with_pull_defaults(phase, _sizes(info.data)) for phase in value]
 
     @model_validator(mode="wrap")
     @classmethod
@@ -165,7 +212,7 @@ class Scene(Part):
         """
         # Smarticles may come to lie on a hook.
         pile = self._height_at(1.2)
-        return max(pile, hooks_top) + 4 * self.particle.reach + 6 * self.smarticle.middle_length_m
+        return max(pile, hooks_top) + 4 * self.model.reach + 6 * self.model.size
 
     @property
     def loose_height(self) -> float:
@@ -178,9 +225,13 @@ class Scene(Part):
 
     def _height_at(self, factor: float) -> float:
         """Return the height [m] of a pile of φ = `factor` d/L in the container."""
-        boxes = self.smarticle.boxes
-        filling = factor * self.sphere_diameter / float(boxes.lengths.sum())
-        return self.count * boxes.volume / (math.pi * self.container.radius_m**2 * filling)
+        mixture = self.mixture
+        if mixture is None:
+            length = float(self.smarticle.boxes.lengths.sum())
+        else:
+            length = mixture.mean([float(kind.bars.lengths.sum()) for kind in mixture.kinds])
+        filling = factor * self.sphere_diameter / length
+        return self.count * self.model.volume / (math.pi * self.container.radius_m**2 * filling)
 
     @property
     def smooth(self) -> bool:
@@ -189,15 +240,24 @@ class Scene(Part):
 
     @property
     def sphere_diameter(self) -> float:
-        """Sphere diameter [m]: `fidelity.diameter_m`, or the default that its description states."""
+        """Sphere diameter [m]: `fidelity.diameter_m`, or the default that its description states.
+
+        Of a mixture it is that of the thinnest spheres.
+        """
+        if self.mixture is not None:
+            return self.mixture.diameter
+        smarticle, rows = self.smarticle, self.fidelity.rows
+        return self._diameter_of(smarticle.thickness_normal_m, smarticle.thickness_in_plane_m, rows)
+
+    def _diameter_of(self, normal: float, in_plane: float, rows: int, *, disc: bool = False) -> float:
+        """Return the diameter [m] of spheres for a section of two thicknesses [m], flat or a disc."""
         if self.fidelity.diameter_m is not None:
             return self.fidelity.diameter_m
-        smarticle = self.smarticle
-        if self.fidelity.rows == 1:
-            width = mean_width(smarticle.thickness_normal_m, smarticle.thickness_in_plane_m)
-            # A smooth round bar touches others at its own diameter, which chains of spheres do not.
-            return width if self.smooth else width / chain_mean_width(self.fidelity.pitch)
-        return smarticle.thickness_in_plane_m
+        if rows > 1:
+            return in_plane
+        width = in_plane if disc else mean_width(normal, in_plane)
+        # A smooth round bar touches others at its own diameter, which chains of spheres do not.
+        return width if self.smooth else width / chain_mean_width(self.fidelity.pitch)
 
     def seed_for(self, purpose: str) -> int:
         """Return a 64-bit seed for one purpose, derived from the scene's seed alone.
@@ -245,10 +305,74 @@ class Scene(Part):
         """Return whether any phase needs an effect."""
         return any(effect in phase.calls(self, index) for index, phase in enumerate(self.phases))
 
+    def activity(self, index: int) -> Activity:
+        """Return the activity of a phase, on which its cost per step depends."""
+        phase = self.phases[index]
+        if phase.pours:
+            return Activity.POUR
+        if phase.actuates:
+            return Activity.ACTUATE
+        return Activity.SHAKE if EffectName.CONTAINER_MOTION in phase.calls(self, index) else Activity.REST
+
+    @property
+    def activities(self) -> frozenset[Activity]:
+        """Activities of all phases that take simulated time."""
+        durations = [phase.expected_duration(self.count) for phase in self.phases]
+        return frozenset(self.activity(index) for index, duration in enumerate(durations) if duration > 0)
+
     @cached_property
     def particle(self) -> Particle:
         """One smarticle, with the spheres that represent it."""
+        assert self.shapes is None  # other bodies are in `mixture`
         diameter = self.sphere_diameter
-        pitch = SMOOTH_PITCH if self.smooth else self.fidelity.pitch
-        chain = SphereChain(rows=self.fidelity.rows, diameter=diameter, pitch=pitch * diameter)
+        chain = SphereChain(rows=self.fidelity.rows, diameter=diameter, pitch=self._pitch * diameter)
         return Particle(self.smarticle.boxes, chain)
+
+    @property
+    def _pitch(self) -> float:
+        return SMOOTH_PITCH if self.smooth else self.fidelity.pitch
+
+    @cached_property
+    def mixture(self) -> Mixture | None:
+        """Kinds of the bodies and the kind of each, from the key `particle`; None for smarticles."""
+        if self.shapes is None:
+            return None
+        rng = np.random.default_rng(self.seed_for("shapes"))
+        kinds: list[Kind] = []
+        of: list[Numbers] = []
+        for shape, number in zip(self.shapes, numbers_of_shapes(self.shapes, self.count), strict=True):
+            of.append(len(kinds) + rng.integers(len(shape.factors), size=number))
+            kinds += [self._kind(shape, float(factor)) for factor in shape.factors]
+        order = np.concatenate(of)
+        return Mixture(tuple(kinds), rng.permutation(order) if len(kinds) > 1 else order)
+
+    def _kind(self, shape: Shaped, factor: float) -> Kind:
+        bars = shape.bars(factor)
+        normal, in_plane = bars.thickness_normal, bars.thickness_in_plane
+        # Rows have a meaning only across the wide side of a flat section.
+        rows = self.fidelity.rows if normal > (self.fidelity.diameter_m or in_plane) and not bars.round else 1
+        diameter = self._diameter_of(normal, in_plane, rows, disc=bars.round)
+        return Kind(name=shape.named, bars=bars, rows=rows, diameter=diameter, pitch=self._pitch * diameter)
+
+    @property
+    def model(self) -> Particle | Mixture:
+        """The bodies as engines compute them: one smarticle, or a mixture."""
+        return self.mixture or self.particle
+
+    @property
+    def bodies(self) -> tuple[Particle | Kind, ...]:
+        """One body of each kind; the first is the one to which the contact law refers."""
+        return (self.particle,) if self.mixture is None else self.mixture.kinds
+
+
+def _sizes(given: Mapping[str, Any]) -> tuple[float, float]:
+    """Return w and t2 of the smarticle, or the longest bar and smallest thickness of other bodies [m].
+
+    Args:
+        given: parts of the scene that are validated already, by their names in the model.
+    """
+    if given.get("shapes"):
+        bars = [shape.bars() for shape in given["shapes"]]
+        return max(float(each.lengths.max()) for each in bars), min(each.thickness_in_plane for each in bars)
+    smarticle = given.get("smarticle") or Smarticle()
+    return smarticle.middle_length_m, smarticle.thickness_in_plane_m

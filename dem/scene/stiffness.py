@@ -35,16 +35,16 @@ class Overlap(NamedTuple):
 
 def expected_overlaps(scene: SceneView) -> tuple[Overlap, ...]:
     """Return the expected overlaps of a scene: for impact, weight, and a hook if one is pulled."""
-    gravity, stiffness, smarticle = scene.gravity_m_per_s2, scene.fidelity.stiffness_N_per_m, scene.smarticle
-    width, boxes = smarticle.middle_length_m, smarticle.boxes
-    thickness = mean_width(smarticle.thickness_normal_m, smarticle.thickness_in_plane_m)
+    gravity, stiffness, model = scene.gravity_m_per_s2, scene.fidelity.stiffness_N_per_m, scene.model
+    width, thickness = model.size, min(mean_width(*body.thicknesses) for body in scene.bodies)
     speeds = [phase.peak_speed(gravity) for phase in scene.phases]
-    if scene.actuates:
-        speeds.append(scene.motor.speed_limit_rad_per_s * boxes.barb_length)
+    if scene.actuates and scene.mixture is None:
+        speeds.append(scene.motor.speed_limit_rad_per_s * scene.particle.boxes.barb_length)
     speed = math.sqrt(max(speeds) ** 2 + 2 * gravity * width)
-    impact = speed * math.sqrt(typical_effective_mass(scene.particle) / stiffness) / thickness
+    mass = max(map(typical_effective_mass, scene.bodies))
+    impact = speed * math.sqrt(mass / stiffness) / thickness
     shaken = max((phase.peak_acceleration_g for phase in scene.phases if isinstance(phase, Shake)), default=0.0)
-    pile = scene.count * boxes.mass * gravity
+    pile = scene.count * model.mass * gravity
     lying = max(1.0, min(scene.count, math.pi * scene.cylinder.radius**2 / width**2))
     loads = {"the pile's weight": pile * (1 + shaken) / (2 * lying)}
     if any(isinstance(phase, PullHook) for phase in scene.phases):

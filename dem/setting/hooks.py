@@ -13,7 +13,6 @@ from pydantic import Field
 
 from dem.arrays import Array
 from dem.setting.part import Length, Part
-from dem.setting.smarticle import Smarticle
 
 TOLERANCE = 1e-9  # relative; lengths and times that meet their limit up to rounding are allowed
 
@@ -54,21 +53,22 @@ class Hooks(Part):
 _HOOK_DEFAULTS = {"side_m": (0, 1), "length_m": (1, 0), "lower_height_m": (0, 10), "upper_height_m": (0, 20)}
 
 
-def with_hook_defaults(hooks: Any, smarticle: Smarticle) -> Any:
-    """Return unvalidated data of `Hooks`, with missing lengths computed from those of the smarticle."""
-    filled = with_defaults(hooks, _HOOK_DEFAULTS, smarticle)
+def with_hook_defaults(hooks: Any, sizes: tuple[float, float]) -> Any:
+    """Return unvalidated data of `Hooks`, with missing lengths computed from `sizes`."""
+    filled = with_defaults(hooks, _HOOK_DEFAULTS, sizes)
     return {"lower_length_m": filled["length_m"]} | filled if isinstance(filled, dict) else filled
 
 
-def with_defaults(data: Any, defaults: Mapping[str, tuple[int, int]], smarticle: Smarticle) -> Any:
+def with_defaults(data: Any, defaults: Mapping[str, tuple[int, int]], sizes: tuple[float, float]) -> Any:
     """Return a mapping with its missing keys filled in; data that are no mapping are returned unchanged.
 
     Args:
         defaults: numbers (a, b) by key; the key's default is a w + b t2 [m].
+        sizes: w and t2 of the smarticle, or the longest bar and smallest thickness of other bodies [m].
     """
     if not isinstance(data, Mapping):
         return data
-    w, t2 = smarticle.middle_length_m, smarticle.thickness_in_plane_m
+    w, t2 = sizes
     return {key: a * w + b * t2 for key, (a, b) in defaults.items()} | dict(data)
 
 

@@ -12,6 +12,16 @@ LONGEST_LENGTH = 1.0  # m; longer smarticles or containers are taken for lengths
 REFERENCE_ASPECT_RATIO = 0.7  # l/w of the smarticle for which the paper states torques and swings
 
 
+# Words that users try as keys, and what no scene can describe.
+_BEYOND = {
+    **dict.fromkeys(("shape", "shapes", "mesh", "mixture", "species", "types"), "such key, see `particle` for shapes"),
+    **dict.fromkeys(("cohesion", "adhesion", "capillary", "glue", "magnets"), "cohesion"),
+    **dict.fromkeys(("air", "drag", "fluid", "water", "wind"), "air or water"),
+    **dict.fromkeys(("material", "materials", "young_modulus", "poisson_ratio"), "materials by this key"),
+    **dict.fromkeys(("lid", "box", "walls", "periodic"), "containers by this key"),
+}
+
+
 class Part(Strict):
     """Base of all parts of a scene: a frozen mapping of keys."""
 
@@ -19,17 +29,20 @@ class Part(Strict):
     def nearest_key(cls, key: str) -> str:
         """Return what to do about an unknown key: use a key of similar spelling, or put it into another part."""
         # Most often the unit, or the second half of a name, was left out.
-        similar = [field for field in cls.model_fields if field.startswith(f"{key}_")]
-        similar = similar or difflib.get_close_matches(key, cls.model_fields, n=1, cutoff=0.7)
+        known = cls.known_keys()
+        similar = [name for name in known if name.startswith(f"{key}_")]
+        similar = similar or difflib.get_close_matches(key, known, n=1, cutoff=0.7)
         if similar:
             return f"did you mean {' or '.join(map(repr, similar))}?"
+        if key in _BEYOND:
+            return f"scenes have no {_BEYOND[key]}; docs/limits.md lists what the project cannot do and what there is"
         for part in Part.__subclasses__():
-            if "type" in part.model_fields and ("type" in cls.model_fields or part.__subclasses__()):
+            if part.__subclasses__() or ("type" in part.model_fields and "type" in cls.model_fields):
                 continue  # a key of one phase does not belong in another phase; base classes are no part of a file
-            elsewhere = difflib.get_close_matches(key, part.model_fields, n=1, cutoff=0.65)
+            elsewhere = difflib.get_close_matches(key, part.known_keys(), n=1, cutoff=0.65)
             if elsewhere:
                 return f"{elsewhere[0]!r} belongs in {part.tag()}"
-        return "known keys: " + ", ".join(cls.model_fields)
+        return "known keys: " + ", ".join(known)
 
     @classmethod
     def tag(cls) -> str:
@@ -56,9 +69,22 @@ def reject_wrong_unit(value: float) -> float:
     return value
 
 
+def reject_density_in_other_units(value: float) -> float:
+    """Return a density [kg/m³]; raise ValueError if it is none of a solid."""
+    if not 50 <= value <= 25000:
+        msg = f"{value:g} kg/m³ is outside 50 … 25000 kg/m³; density is in kg/m³: steel is 7850, not 7.85"
+        raise ValueError(msg)
+    return value
+
+
 # Wide physical limits: numbers beyond them are typing errors, or overflow in sums.
 Length = Annotated[
     float, Field(ge=1e-6, json_schema_extra={"maximum": LONGEST_LENGTH}), AfterValidator(reject_wrong_unit)
+]
+Density = Annotated[
+    float,
+    Field(json_schema_extra={"minimum": 50, "maximum": 25000}),
+    AfterValidator(reject_density_in_other_units),
 ]
 Duration = Annotated[float, Field(ge=1e-6, le=1e6)]
 Speed = Annotated[float, Field(ge=1e-9, le=1e3)]  # m/s

@@ -1,5 +1,7 @@
 """What a run records, and how often."""
 
+from typing import Literal
+
 from pydantic import Field
 
 from dem.setting.part import Duration, Part
@@ -11,6 +13,11 @@ class Recording(Part):
     frame_interval_s: Duration = Field(
         0.04,
         description="time between VTK frames [s]; not a multiple of the shaking period, to sample all its phases",
+    )
+    frames: Literal["vtu", "vtkhdf"] = Field(
+        "vtu",
+        description="files of the frames. vtu: one per frame. vtkhdf: one for all, which ParaView reads from 5.12 on, "
+        "with the radius of each body",
     )
     sphere_interval_s: Duration | None = Field(
         None,

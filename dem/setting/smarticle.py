@@ -6,7 +6,7 @@ from typing import Self
 from pydantic import Field, field_validator, model_validator
 
 from dem.body.particle import Boxes
-from dem.setting.part import Length, Part, in_hinge_range
+from dem.setting.part import Density, Length, Part, in_hinge_range
 
 
 class Smarticle(Part):
@@ -24,23 +24,14 @@ class Smarticle(Part):
         "robots with a body; centred on the line from hinge to hinge; only with the key plane and engine: yade; "
         "default: thickness_in_plane_m",
     )
-    density_kg_per_m3: float = Field(
+    density_kg_per_m3: Density = Field(
         7850.0,
-        json_schema_extra={"minimum": 50, "maximum": 25000},
         description="density of the links [kg/m³]; mass and inertia are those of the boxes",
     )
     angles_deg: tuple[float, float] = Field(
         (90.0, 90.0),
         description="barb angles (α1, α2) [deg]: 0 straight, 90 the U; from -15 to 105",
     )
-
-    @field_validator("density_kg_per_m3")
-    @classmethod
-    def _density_unit(cls, value: float) -> float:
-        if not 50 <= value <= 25000:
-            msg = f"{value:g} kg/m³ is outside 50 … 25000 kg/m³; density is in kg/m³: steel is 7850, not 7.85"
-            raise ValueError(msg)
-        return value
 
     @field_validator("angles_deg")
     @classmethod

@@ -13,6 +13,7 @@ Schema = Mapping[str, Any]
 
 _UNIT = re.compile(r"\s*\[([^\[\]]{1,20})\]")
 _LIMITS = {"minimum": "≥", "exclusiveMinimum": ">", "maximum": "≤", "exclusiveMaximum": "<"}
+TAGS = ("type", "shape")  # keys that say which of several mappings one is
 _TYPES = {"number": "number", "integer": "whole number", "string": "text", "boolean": "true or false", "null": "null"}
 _HEAD = ("key", "type", "unit", "range", "default", "meaning")
 
@@ -25,9 +26,15 @@ def scene_keys() -> str:
     definitions = schema["$defs"]
     phases = _kinds(schema["properties"]["phases"]["items"])
     motions = _kinds(next(iter(_options(definitions["Actuate"]["properties"]["barbs"]))))
-    others = [name for name in definitions if name not in (*phases, *motions)]
+    shapes = _kinds(next(iter(_options(schema["properties"]["particle"]))))
+    others = [name for name in definitions if name not in (*phases, *motions, *shapes)]
     parts = [_table(schema)]
-    for title, names in (("Phases", phases), ("Motions of the barbs", motions), ("Mappings", others)):
+    for title, names in (
+        ("Phases", phases),
+        ("Motions of the barbs", motions),
+        ("Shapes of bodies", shapes),
+        ("Mappings", others),
+    ):
         parts += [f"## {title}\n", *(_part(name, definitions[name]) for name in names)]
     return "\n".join(parts)
 
@@ -41,7 +48,7 @@ def _name(reference: str) -> str:
 
 
 def _part(name: str, definition: Schema) -> str:
-    kind = definition["properties"].get("type", {}).get("const")
+    kind = next((tag for key in TAGS if (tag := definition["properties"].get(key, {}).get("const"))), None)
     about = " ".join(definition.get("description", "").split())
     return f"({anchor(name)})=\n### {kind or name}\n\n{about}\n\n{_table(definition)}"
 
@@ -55,7 +62,7 @@ def _table(definition: Schema) -> str:
     required = definition.get("required", ())
     rows = []
     for key, entry in definition["properties"].items():
-        if key == "type" and "const" in entry:
+        if key in TAGS and "const" in entry:
             continue
         meaning = entry.get("description", "")
         unit = _UNIT.search(meaning)
@@ -73,7 +80,8 @@ def _options(entry: Schema) -> Iterator[Schema]:
 
 
 def _type(entry: Schema) -> str:
-    listed = [_one_type(option) for option in _options(entry)]
+    options = list(_options(entry))
+    listed = ["list of these" if o.get("items") in options else _one_type(o) for o in options]
     if any(option.get("type") == "null" for option in entry.get("anyOf", ())):
         listed.append("null")
     return " or ".join(listed)

@@ -63,9 +63,9 @@ def series_columns() -> str:
 
 def frame_fields() -> str:
     """Return tables of the cell data of a frame, which have one value per link."""
-    from dem.record.columns import FIELDS, MOTOR_FIELDS  # noqa: PLC0415
+    from dem.record.columns import BODY_FIELDS, FIELDS, MOTOR_FIELDS  # noqa: PLC0415
 
-    sets = {"In every scene": FIELDS, "In scenes that actuate": MOTOR_FIELDS}
+    sets = {"In every scene": FIELDS, "In scenes that actuate": MOTOR_FIELDS, "In scenes with `particle`": BODY_FIELDS}
     return "\n".join(f"### {title}\n\n{_described(fields, 'field')}" for title, fields in sets.items())
 
 
@@ -93,6 +93,7 @@ def measure_columns() -> str:
         module = measure.take.func.__module__ if isinstance(measure.take, partial) else measure.take.__module__
         if isinstance(measure, FrameMeasure):
             evaluated = "last frame of each phase" if measure.costly else "each frame"
+            evaluated += f", with `--also {measure.name}`" if measure.on_request else ""
         else:
             evaluated = "phases " + ", ".join(code(name) for name in measure.phases)
         rows = [(code(quantity.header), cell(measure.name), evaluated) for quantity in measure.quantities]

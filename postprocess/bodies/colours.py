@@ -102,10 +102,12 @@ class ColourScale:
 def colour_field(name: str | None, run: Run) -> Field:
     """Return the field of a run by name or short name.
 
-    None stands for crossings, or for smarticle_id if the run is planar. InputError if the name is unknown, or the run
-    lacks the field.
+    None stands for crossings, for smarticle_id if the run is planar, and for contacts, or kind, if bodies are no
+    smarticles. InputError if the name is unknown, or the run lacks the field.
     """
     usual = "smarticle_id" if run.manifest.planar else "crossings"
+    if run.manifest.kinds is not None:
+        usual = "contacts" if len(run.manifest.kinds) == 1 else "kind"
     field = checked_field(usual if name is None else name, ALIASES)
     if not field.available_for(run):
         msg = f"{run.path}: this run has no {field.name} ({field.meaning}); choose another field to colour by"
@@ -114,10 +116,10 @@ def colour_field(name: str | None, run: Run) -> Field:
 
 
 def scalars(field: Field, frame: Frame, run: Run) -> Floats:
-    """Return one value per link, (N, 3): a field's value or its length; NaN if the frame lacks the field."""
+    """Return one value of a field per link, (N, L) as of `link_values`: of vectors the length; NaN if there is none."""
     values = link_values(field, frame, run)
     if values is None:
-        return np.full((frame.count, 3), np.nan)
+        return np.full((frame.count, 1 + int(frame.link.max(initial=2))), np.nan)
     return np.linalg.norm(values, axis=2) if values.ndim == 3 else np.asarray(values, dtype=np.float64)
 
 

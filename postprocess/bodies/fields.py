@@ -12,13 +12,14 @@ from dem.errors import InputError, nearest
 from dem.record.forces import read_forces
 from dem.record.frame import Frame
 from dem.record.run import Run
-from postprocess.geometry.links import Floats, UndefinedMeasureError, centres_of_mass, link_lengths
+from postprocess.geometry.bars import body_centres
+from postprocess.geometry.links import Floats, UndefinedMeasureError, link_lengths
 from postprocess.geometry.voronoi import local_packing
 from postprocess.geometry.voxel import Region
 from postprocess.measures.clusters import Clusters, contact_graph, entanglement_clusters
-from postprocess.measures.entanglement import link_crossings
+from postprocess.measures.entanglement import frame_crossings
 from postprocess.measures.force_chains import force_chains
-from postprocess.measures.registry import in_one_cylinder, in_space
+from postprocess.measures.registry import any_in_space, in_one_cylinder, in_space
 
 LINKS = 3
 
@@ -57,6 +58,10 @@ class Field:
 
 
 def _speed(frame: Frame, run: Run) -> Floats:
+    if frame.bars is not None:
+        lengths = np.linalg.norm(frame.segments[:, 1] - frame.segments[:, 0], axis=1)
+        sums = [np.bincount(frame.body, lengths * part) for part in frame.link_velocity.T]
+        return np.asarray(np.linalg.norm(sums, axis=0) / np.bincount(frame.body, lengths))
     sections = np.array(run.manifest.thicknesses_in_plane_m) / run.manifest.thickness_in_plane_m
     weights = (link_lengths(frame.vertices) * sections)[:, :, None]
     velocity = (weights * frame.link_velocity).sum(axis=1) / weights.sum(axis=1)
@@ -69,7 +74,15 @@ def _recorded_ids(frame: Frame, _: Run) -> NDArray[Any]:
 
 
 def _link_numbers(frame: Frame, _: Run) -> NDArray[Any]:
-    return np.tile(np.arange(LINKS), (frame.count, 1))
+    return frame.link if frame.bars is not None else np.tile(np.arange(LINKS), (frame.count, 1))
+
+
+def _has_smarticles(run: Run) -> bool:
+    return run.manifest.kinds is None
+
+
+def _has_kinds(run: Run) -> bool:
+    return run.manifest.kinds is not None
 
 
 def _records_forces(run: Run) -> bool:
@@ -122,13 +135,28 @@ def _chain(frame: Frame, _: Run) -> NDArray[Any]:
 
 FIELDS: tuple[Field, ...] = (
     Field("smarticle_id", "-", "number of the smarticle, constant in all frames", _recorded_ids, kind="name"),
-    Field("link", "-", "0 barb 1, 1 middle link, 2 barb 2", _link_numbers, kind="name", of="link"),
+    Field(
+        "link",
+        "-",
+        "0 barb 1, 1 middle link, 2 barb 2; of other bodies the number of the bar",
+        _link_numbers,
+        kind="name",
+        of="link",
+    ),
+    Field(
+        "kind",
+        "-",
+        "kind of the body, a place in `kinds` of run.json; scenes with the key particle",
+        lambda frame, _: frame.kind,
+        kind="name",
+        available_for=_has_kinds,
+    ),
     Field("speed_m_per_s", "m/s", "of the smarticle's centre of mass", _speed, label="speed of its centre of mass"),
     Field(
         "height_m",
         "m",
         "of the smarticle's centre of mass above the floor",
-        lambda frame, _: centres_of_mass(frame.vertices)[:, 2] - frame.floor_z,
+        lambda frame, _: body_centres(frame)[:, 2] - frame.floor_z,
         label="height of its centre of mass",
         shown=(1e3, "mm"),
     ),
@@ -152,10 +180,10 @@ FIELDS: tuple[Field, ...] = (
         "crossings",
         "-",
         "links of others that pass through its plane; their mean is ⟨N⟩",
-        lambda frame, _: link_crossings(frame.vertices),
+        lambda frame, _: frame_crossings(frame)[0],
         kind="count",
         label="links of others through its plane",
-        available_for=in_space,
+        available_for=any_in_space,
     ),
     Field(
         "contact_cluster",
@@ -163,6 +191,7 @@ FIELDS: tuple[Field, ...] = (
         "number of its cluster of smarticles whose spheres or strands touch in the engine, 0 the largest",
         _labels(contact_graph),
         kind="name",
+        available_for=_has_smarticles,
     ),
     Field(
         "entanglement_cluster",
@@ -232,9 +261,18 @@ def checked_field(name: str, aliases: Mapping[str, str] = MappingProxyType({})) 
 
 
 def link_values(field: Field, frame: Frame, run: Run) -> NDArray[Any] | None:
-    """Return the values (N, 3) or vectors (N, 3, 3) of a field, one per link; None if the frame lacks it."""
+    """Return the values (N, L) or vectors (N, L, 3) of a field, one per link; None if the frame lacks it.
+
+    L is 3 for smarticles. Other bodies have up to L bars; places without a bar are filled with NaN, or 0.
+    """
     values = field.take(frame, run)
-    if values is None or field.of == "link":
+    if values is None or (field.of == "link" and frame.bars is None):
         return values
-    spread: NDArray[Any] = np.repeat(values[:, None], LINKS, axis=1)
-    return spread
+    most = LINKS if frame.bars is None else int(frame.link.max()) + 1
+    if field.of == "smarticle":
+        spread: NDArray[Any] = np.repeat(values[:, None], most, axis=1)
+        return spread
+    empty = np.nan if values.dtype.kind == "f" else 0
+    found: NDArray[Any] = np.full((frame.count, most, *values.shape[1:]), empty, dtype=values.dtype)
+    found[frame.body, frame.link] = values.reshape(len(frame.body), *values.shape[1:])
+    return found

@@ -13,10 +13,12 @@ from types import MappingProxyType
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from dem.errors import InputError, nearest
+from dem.record.document import Kind
 from dem.record.forces import NO_FORCES, RecordedForces, read_forces
-from dem.record.frame import Frame
+from dem.record.frame import Frame, RecordedBars
 from dem.record.run import Run, SceneData
 from dem.record.series import Series
 from postprocess.bodies.fields import Field, link_values
@@ -170,7 +172,7 @@ def _strings(run: Run, series: Series | None) -> ChainStrings | None:
 
 KINDS: Mapping[str, str] = MappingProxyType(
     {
-        "smarticles": "a box per link, with all fields",
+        "smarticles": "a box per link, or a box or cylinder per bar of other bodies, with all fields",
         "wall": "wall of the container, tiers and ceilings of a mould, or the two walls of a channel",
         "floor": "floor of the container",
         "hooks": "the two crosses",
@@ -185,6 +187,7 @@ USUAL = tuple(kind for kind in KINDS if kind not in ON_REQUEST)
 
 BOX_POINTS, BOX_FACES = 8, 6
 _ROUND = 96  # corners of a circle
+_SIDES = 16  # of a cylinder that stands for a round bar
 _THINNEST = 0.05  # least thickness of a tube of force over the largest thickness
 
 # Corners of a box (along, in plane, normal), and its faces, counterclockwise seen from outside.
@@ -232,7 +235,7 @@ class Bodies:
         """Enlarge walls and floor so that they hold the smarticles of these frames."""
         for frame in frames:
             if frame.count:
-                points = frame.vertices.reshape(-1, 3)
+                points = frame.segments.reshape(-1, 3)
                 self._top = max(self._top, float(points[:, 2].max()) - frame.floor_z)
                 self._reach = max(self._reach, float(np.hypot(points[:, 0], points[:, 1]).max()))
                 low, high = float(points[:, 0].min()), float(points[:, 0].max())
@@ -245,11 +248,14 @@ class Bodies:
 
     def _smarticles(self, frame: Frame) -> pv.PolyData:
         run = self.run
-        mesh = link_boxes(
-            frame.vertices,
-            thickness_normal=run.manifest.thickness_normal_m,
-            thickness_in_plane=run.manifest.thicknesses_in_plane_m,
-        )
+        if frame.bars is not None:
+            mesh = bar_meshes(frame.bars, run.manifest.kinds or ())
+        else:
+            mesh = link_boxes(
+                frame.vertices,
+                thickness_normal=run.manifest.thickness_normal_m,
+                thickness_in_plane=run.manifest.thicknesses_in_plane_m,
+            )
         owner = mesh.cell_data.pop("smarticle"), mesh.cell_data.pop("link")
         for each in self._fields:
             values = link_values(each, frame, run)
@@ -267,7 +273,7 @@ class Bodies:
                 pv.Rectangle([[first, y, floor], [last, y, floor], [last, y, floor + run.manifest.thickness_normal_m]])
                 for y in (-half, half)
             )
-        top = float(frame.vertices[..., 2].max(initial=floor)) - floor
+        top = float(frame.segments[..., 2].max(initial=floor)) - floor
         raised = self.boundaries.raised(frame.time, frame.phase, top)
         if raised is None:
             return None
@@ -327,7 +333,7 @@ class Bodies:
         return mesh
 
     def _crossings(self, frame: Frame) -> pv.PolyData | None:
-        if self.run.manifest.planar or frame.count == 0:
+        if self.run.manifest.planar or frame.bars is not None or frame.count == 0:
             return None
         found = link_passages(frame.vertices)
         if not len(found.i):
@@ -400,12 +406,64 @@ def link_boxes(
     return mesh
 
 
-def owners(mesh: pv.PolyData, frame: Frame) -> tuple[Whole, Whole]:
-    """Return smarticle and link of each of the B boxes of a mesh, which must have the fields `IDENTITY`.
+def bar_meshes(bars: RecordedBars, kinds: Sequence[Kind]) -> pv.PolyData:
+    """Return boxes and cylinders of all bars as one mesh [m].
 
-    Smarticles (B,) are indices into the arrays of the frame; links (B,) are numbers from 0 to 2.
+    The mesh has two arrays of cell data: `smarticle`, the index of the body, and `link`, the number of the bar in it.
     """
-    owner, link = (np.asarray(mesh.cell_data[name])[::BOX_FACES] for name in ("smarticle_id", "link"))
+    along = bars.segments[:, 1] - bars.segments[:, 0]
+    lengths = np.linalg.norm(along, axis=1, keepdims=True)
+    unit = along / lengths
+    normal = bars.normals - (bars.normals * unit).sum(axis=1, keepdims=True) * unit
+    # Of a round bar any direction across it will do.
+    other = np.eye(3)[np.abs(along).argmin(axis=1)]
+    other -= (other * unit).sum(axis=1, keepdims=True) * unit
+    normal = np.where(np.abs(bars.normals).any(axis=1, keepdims=True), normal, other)
+    normal /= np.linalg.norm(normal, axis=1, keepdims=True)
+    across, middles = np.cross(normal, unit), bars.segments.mean(axis=1)
+    parts = []
+    for number, kind in enumerate(kinds):
+        own = np.flatnonzero(bars.kind[bars.body] == number)
+        size = (1.0, kind.thickness_in_plane_m, kind.thickness_normal_m)
+        corners, faces = _prism(_SIDES) if kind.round else (_CORNERS, _FACES)
+        edges = np.stack([along[own], size[1] * across[own], size[2] * normal[own]], axis=1)
+        points = middles[own, None] + np.einsum("ce,bex->bcx", corners, edges)
+        if len(own):
+            cells: Any = faces + len(corners) * np.arange(len(own))[:, None, None]
+            part: pv.PolyData = pv.PolyData.from_regular_faces(points.reshape(-1, 3), cells.reshape(-1, faces.shape[1]))
+            part.cell_data["smarticle"] = np.repeat(bars.body[own], len(faces))
+            part.cell_data["link"] = np.repeat(bars.number[own], len(faces))
+            parts.append(part)
+    return joined(parts)
+
+
+def _prism(sides: int) -> tuple[Floats, Whole]:
+    """Return corners (along, in plane, normal) and triangles of a cylinder of unit length and diameter."""
+    angles = 2 * math.pi * np.arange(sides) / sides
+    disc = np.column_stack([np.cos(angles), np.sin(angles)]) / 2
+    corners = np.concatenate([np.column_stack([np.full(sides, x), disc]) for x in (-0.5, 0.5)])
+    one = np.arange(sides)
+    two = (one + 1) % sides
+    walls = [np.column_stack([one, two, one + sides]), np.column_stack([two, two + sides, one + sides])]
+    caps = [np.column_stack([0 * one, two, one])[1:-1], np.column_stack([0 * one, one, two])[1:-1] + sides]
+    return corners, np.concatenate([*walls, *caps])
+
+
+def at_points(mesh: pv.PolyData, values: NDArray[Any]) -> NDArray[Any]:
+    """Return values (C, …) of the cells of a mesh at its points (P, …), which belong to one bar each."""
+    cells = mesh.GetPolys()
+    ends, corners = (np.asarray(array) for array in (cells.GetOffsetsArray(), cells.GetConnectivityArray()))
+    found = np.empty((mesh.n_points, *values.shape[1:]), dtype=values.dtype)
+    found[corners] = np.repeat(values, np.diff(ends), axis=0)
+    return found
+
+
+def owners(mesh: pv.PolyData, frame: Frame) -> tuple[Whole, Whole]:
+    """Return body and link of each of the C cells of a mesh, which must have the fields `IDENTITY`.
+
+    Bodies (C,) are indices into the arrays of the frame; links (C,) are numbers from 0.
+    """
+    owner, link = (np.asarray(mesh.cell_data[name]) for name in ("smarticle_id", "link"))
     order = np.argsort(frame.smarticle_ids)
     return order[np.searchsorted(frame.smarticle_ids, owner, sorter=order)], link
 

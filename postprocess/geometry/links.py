@@ -40,6 +40,8 @@ def checked_vertices(vertices: Vertices) -> Floats:
     InputError for a wrong shape, a value that is not finite, or a smarticle of length 0.
     """
     array = np.asarray(vertices, dtype=np.float64)
+    if array.ndim == 3 and array.shape[1] == 0 and len(array):
+        raise InputError(f"{len(array)} bodies of a scene with the key particle have no barbs: measure frame.segments")
     if array.ndim != 3 or array.shape[1:] != (4, 3):
         raise InputError(f"vertices must be (N, 4, 3) [m]: got {array.shape}; pass frame.vertices")
     finite = np.isfinite(array).all(axis=(1, 2))

@@ -9,7 +9,7 @@ from scipy.sparse.csgraph import connected_components
 
 from dem.record.frame import Frame
 from dem.record.run import Run
-from postprocess.geometry.links import UndefinedMeasureError, Vertices, Whole, checked_vertices
+from postprocess.geometry.links import Flags, UndefinedMeasureError, Vertices, Whole, checked_vertices
 from postprocess.measures.contacts import at_wall, contact_pairs, on_floor, pairs_in_contact
 from postprocess.measures.entanglement import crossing_pairs
 from postprocess.measures.heights import material_height
@@ -59,9 +59,18 @@ def spans_height(clusters: Clusters, vertices: Vertices, *, diameter: float, flo
     """
     vertices = checked_vertices(vertices)
     top = floor_z + material_height(vertices, floor_z=floor_z)
-    low = clusters.labels[on_floor(vertices, diameter=diameter, floor_z=floor_z)]
-    high = clusters.labels[vertices[..., 2].max(axis=1) >= top]
-    return bool(np.isin(low, high).any())
+    return spans(clusters, on_floor(vertices, diameter=diameter, floor_z=floor_z), vertices[..., 2].max(axis=1) >= top)
+
+
+def spans(clusters: Clusters, low: Flags, high: Flags) -> bool:
+    """Return whether one cluster joins two sets of bodies, such as those at opposite sides of a container.
+
+    The bodies of each set are marked true in an array (N,).
+
+    Source:
+        Stauffer & Aharony, Introduction to Percolation Theory (1994), section 2.
+    """
+    return bool(np.isin(clusters.labels[low], clusters.labels[high]).any())
 
 
 def spans_width(clusters: Clusters, vertices: Vertices, *, diameter: float, wall_radius: float) -> bool:

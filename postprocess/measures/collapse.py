@@ -18,7 +18,8 @@ from scipy.optimize import least_squares
 from dem.errors import InputError
 from dem.record.document import Phase
 from dem.record.run import Run
-from postprocess.geometry.links import Floats, centres_of_mass
+from postprocess.geometry.bars import body_centres
+from postprocess.geometry.links import Floats
 from postprocess.statistics.seeds import mean_with_error
 
 REMAINING, COM, CORE = "remaining", "com", "core"
@@ -144,7 +145,7 @@ def _core(run: Run, shaken: Vibration) -> tuple[Floats, Floats]:
     frames, last = run.frames, shaken.phase.index
     times, heights = [], []
     for frame in (frame for phase in (last - 1, last) for frame in frames.in_phase(phase)):
-        centres = centres_of_mass(frame.vertices)
+        centres = body_centres(frame)
         within = np.hypot(centres[:, 0], centres[:, 1]) <= run.manifest.container_radius_m
         times.append(frame.time)
         heights.append(max(0.0, float(centres[within, 2].mean() - frame.floor_z)) if within.any() else 0.0)

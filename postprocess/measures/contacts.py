@@ -23,11 +23,11 @@ from postprocess.geometry.links import (
     Vertices,
     Whole,
     checked_vertices,
-    link_lengths,
     spheres,
     strands,
     swept_axes,
 )
+from postprocess.geometry.segments import close_segments, inner_axes
 from postprocess.measures.registry import FrameMeasure, Quantity, in_one_cylinder
 
 # Pairs of links per block, which limits memory.
@@ -56,7 +56,7 @@ def contact_pairs(vertices: Vertices, distance: float) -> ContactPairs:
         raise InputError(f"distance must be above 0 m: got {distance} m; a link's thickness is usual")
     count = len(vertices)
     starts, ends = vertices[:, :-1].reshape(-1, 3), vertices[:, 1:].reshape(-1, 3)
-    a, b = _close_links(starts, ends, link_lengths(vertices).ravel(), distance)
+    a, b = close_segments(starts, ends, np.repeat(np.arange(count), 3), distance)
     gaps = np.empty(len(a))
     for start in range(0, len(a), _CHUNK):
         p, q = a[start : start + _CHUNK], b[start : start + _CHUNK]
@@ -99,6 +99,37 @@ def chain_of(run: Run) -> Chain:
         pitch=pitch * run.manifest.sphere_diameter_m if run.manifest.engine == "yade" else 0.0,
         bulge=run.manifest.bulge_m,
     )
+
+
+class Strands(NamedTuple):
+    """K axes of the swept spheres that represent the bodies of a frame in an engine."""
+
+    axes: Floats  #: (K, 2, 3) float64 [m], both ends of each axis
+    body: Whole  #: (K,) int64, index of the body
+    diameter: Floats  #: (K,) float64 [m], of the sphere
+
+
+def strands_of(frame: Frame, run: Run) -> Strands:
+    """Return the strands of all bodies of a frame on links; on other engines the hulls of the chains of spheres.
+
+    Strands that touch agree with the engine links exactly, for smarticles and for other bodies.
+    """
+    chain = chain_of(run)
+    if frame.bars is None:
+        each = strands(checked_vertices(frame.vertices), chain)
+        axes = np.stack([each[:, :, :-1], each[:, :, 1:]], axis=3).reshape(-1, 2, 3)
+        body, diameter = np.repeat(np.arange(frame.count), 3 * chain.rows), np.full(len(axes), chain.diameter)
+    else:
+        kinds = run.manifest.kinds or ()
+        sizes = np.array([(kind.sphere_diameter_m, kind.thickness_normal_m, kind.round) for kind in kinds])
+        thick, normal, round_ = sizes[frame.kind[frame.body]].T
+        inner = inner_axes(frame.segments, thick / 2)
+        reach = np.where((round_ == 1) | (chain.rows == 1), 0.0, (normal - thick) / 2)
+        offsets = np.linspace(-reach, reach, chain.rows, axis=1)[..., None] * frame.bars.normals[:, None]
+        axes = (inner[:, None] + offsets[:, :, None]).reshape(-1, 2, 3)
+        body, diameter = np.repeat(frame.body, chain.rows), np.repeat(thick, chain.rows)
+    real = np.any(axes[:, 0] != axes[:, 1], axis=1)
+    return Strands(axes[real], body[real], diameter[real])
 
 
 def pairs_of_spheres(centres: Floats, diameter: float) -> ContactPairs:
@@ -150,18 +181,6 @@ def segment_distances(p0: Floats, p1: Floats, q0: Floats, q1: Floats) -> Floats:
     across = np.linalg.norm(w + s[:, None] * u - t[:, None] * v, axis=1)
     distances: Floats = np.where(inside, np.minimum(across, ends), ends)
     return distances
-
-
-def _close_links(starts: Floats, ends: Floats, lengths: Floats, distance: float) -> tuple[Whole, Whole]:
-    """Find pairs of links of different smarticles whose bounding spheres are at most a distance [m] apart."""
-    if len(starts) == 0:
-        return np.empty(0, dtype=np.int64), np.empty(0, dtype=np.int64)
-    middles = (starts + ends) / 2
-    pairs = cKDTree(middles).query_pairs(lengths.max() + distance, output_type="ndarray")
-    a, b = pairs.astype(np.int64).T
-    apart = np.linalg.norm(middles[a] - middles[b], axis=1)
-    keep = (a // 3 != b // 3) & (apart <= (lengths[a] + lengths[b]) / 2 + distance)
-    return a[keep], b[keep]
 
 
 def _point_distances(points: Floats, origins: Floats, along: Floats) -> Floats:

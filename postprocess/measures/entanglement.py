@@ -5,20 +5,29 @@ link of another smarticle passes through the plane of the smarticle if the link'
 of the plane and the link meets the plane strictly inside the quadrilateral. A link that ends in the plane, lies in the
 plane, or meets an edge does not pass, within 1e-9 of the smarticle's size. Barbs at unequal angles make the
 quadrilateral concave or self-intersecting; its inside is then where its winding number is not zero.
+
+`polygon_crossings` counts for bodies of any shape. An open bent body spans the polygon of its corners, closed by the
+straight line between its free ends, as a U, C, Z or hook does; a ring spans its own polygon. These bodies span no
+polygon: a straight one, one that branches or has several pieces (a star, a cross), and one whose corners do not lie in
+a plane. The average crossing number is defined for these, too.
 """
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import ArrayLike
+from scipy.spatial import cKDTree
 
 from dem.record.frame import Frame
 from dem.record.run import Run
 from postprocess.geometry.links import (
     Flags,
     Floats,
+    UndefinedMeasureError,
     Vertices,
     Whole,
     bounding_spheres,
@@ -27,13 +36,15 @@ from postprocess.geometry.links import (
     link_lengths,
     plane_frames,
 )
-from postprocess.measures.registry import FrameMeasure, Quantity, Shown, in_space
+from postprocess.geometry.segments import Curve, checked_segments, curves, segments_of
+from postprocess.measures.registry import FrameMeasure, Quantity, Shown, any_in_space
 
-STRAIGHT = 0.99  #: Tip-to-tip distance over unfolded length above which a smarticle counts as straight [-]
+STRAIGHT = 0.99  #: Tip-to-tip distance over unfolded length above which a body counts as straight [-]
+FLAT = 0.1  #: Largest distance of a corner from the plane of its body, over the body's radius, for a flat body [-]
 
 _TOLERANCE = 1e-9
-# Pairs of smarticles per block, which limits memory.
-_CHUNK = 100_000
+# Pairs of polygons and segments per block, which limits memory.
+_CHUNK = 300_000
 
 
 class CrossingPairs(NamedTuple):
@@ -61,6 +72,28 @@ class Entanglement:
     crossings: Whole = field(repr=False)
     has_plane: Flags = field(repr=False)  #: (N,) bool, False for (nearly) straight smarticles, which have no plane
     mean: float  #: ⟨N⟩, mean crossings of the smarticles that have a plane [-]; NaN if none has
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class PolygonCrossings:
+    """Crossings of B bodies, and the P ordered pairs (i, j) where j passes through the polygon of i."""
+
+    bodies: Whole = field(repr=False)  #: (B,) int64, numbers of the bodies
+    crossings: Whole = field(repr=False)  #: (B,) int64, segments of others through the polygon; 0 without a polygon
+    flaws: tuple[str, ...] = field(repr=False)  #: (B,) reason why a body spans no polygon; empty if it spans one
+    i: Whole = field(repr=False)  #: (P,) int64, index in `bodies` of the body that is crossed
+    j: Whole = field(repr=False)  #: (P,) int64, index in `bodies` of the body that passes through
+    segments: Whole = field(repr=False)  #: (P,) int64, number of segments of j that pass through
+
+    @property
+    def has_polygon(self) -> Flags:
+        """Whether each body spans a polygon: (B,) bool."""
+        return np.array([not flaw for flaw in self.flaws], dtype=bool)
+
+    @property
+    def mean(self) -> float:
+        """Mean crossings of the bodies that span a polygon [-]."""
+        return float(self.crossings[self.has_polygon].mean())
 
 
 def entanglement(vertices: Vertices) -> Entanglement:
@@ -119,6 +152,52 @@ def link_passages(vertices: Vertices) -> LinkPassages:
     return LinkPassages(i, j, link.astype(np.int64), start + fraction[:, None] * (end - start))
 
 
+def polygon_crossings(segments: ArrayLike, body: ArrayLike) -> PolygonCrossings:
+    """Count the segments of others that pass through the polygon of each body.
+
+    Args:
+        segments: (M, 2, 3) [m].
+        body: (M,) number of the body of each segment.
+
+    Raises:
+        InputError: See `checked_segments`.
+        UndefinedMeasureError: No body spans a polygon; the message has the reason for the first one.
+
+    Source:
+        Savoie et al., Soft Matter 2023, ⟨N⟩ of smarticles; here for any flat curve.
+    """
+    segments, body = checked_segments(segments, body)
+    found = curves(segments, body)
+    flaws = tuple(_flaw(one) for one in found)
+    if all(flaws):
+        first = f"body {found[0].body} {flaws[0]}" if found else "there is no body"
+        raise UndefinedMeasureError(
+            f"no body spans a polygon: {first}; the average crossing number is defined for every shape"
+        )
+    bodies, number = np.unique(body, return_inverse=True)
+    middles = segments.mean(axis=1)
+    half = np.linalg.norm(segments[:, 1] - segments[:, 0], axis=1) / 2
+    tree, reach = cKDTree(middles), half.max()
+    counts = np.zeros((0, 3), dtype=np.int64)
+    # Polygons of equal numbers of corners are one array.
+    for size in sorted({len(one.corners) for one, flaw in zip(found, flaws, strict=True) if not flaw}):
+        owner = np.array([k for k, one in enumerate(found) if not flaws[k] and len(one.corners) == size])
+        corners = np.array([found[k].corners for k in owner])
+        centres, radii = bounding_spheres(corners)
+        near = tree.query_ball_point(centres, radii + reach)
+        polygon = np.repeat(np.arange(len(owner)), [len(one) for one in near])
+        other = np.concatenate([np.array(one, dtype=np.int64) for one in near])
+        apart = number[other] != owner[polygon]
+        polygon, other = polygon[apart], other[apart]
+        passing = _passing_segments(corners, polygon, segments[other])
+        pairs = np.stack([owner[polygon[passing]], number[other[passing]]], axis=1)
+        unique, times = np.unique(pairs, axis=0, return_counts=True)
+        counts = np.concatenate([counts, np.column_stack([unique.reshape(-1, 2), times])])
+    i, j, passed = counts[np.lexsort((counts[:, 1], counts[:, 0]))].T
+    crossings = np.bincount(i, passed, minlength=len(bodies)).astype(np.int64)
+    return PolygonCrossings(bodies=bodies, crossings=crossings, flaws=flaws, i=i, j=j, segments=passed)
+
+
 def has_plane(vertices: Vertices) -> Flags:
     """Return which of N smarticles are bent enough to span a plane: (N,) bool.
 
@@ -133,6 +212,27 @@ def has_plane(vertices: Vertices) -> Flags:
     return bent
 
 
+def spans_polygon(curve: Curve) -> bool:
+    """Return whether a body spans a polygon: its segments are one curve, bent or closed, and flat."""
+    return not _flaw(curve)
+
+
+def _flaw(curve: Curve) -> str:
+    """Return the reason why a body spans no polygon; empty if it spans one."""
+    if curve.flaw:
+        return curve.flaw
+    corners = curve.corners
+    length = float(np.linalg.norm(np.diff(corners, axis=0), axis=1).sum())
+    if not curve.closed and float(np.linalg.norm(corners[-1] - corners[0])) > STRAIGHT * length:
+        return f"is straight: its ends are more than {STRAIGHT} of its length apart"
+    centred: Floats = corners - corners.mean(axis=0)
+    _, spread, axes = np.linalg.svd(centred)
+    if spread[1] <= 1e-6 * length:
+        return "is straight: its corners lie on one line"
+    off = float(np.abs(centred @ axes[2]).max() / np.linalg.norm(centred, axis=1).max())
+    return f"is not flat: a corner is {off:.2g} of its radius off its plane, above {FLAT}" if off > FLAT else ""
+
+
 def _close_pairs(vertices: Floats, planes: Flags) -> tuple[Whole, Whole]:
     """Find ordered pairs (i, j) of smarticles whose bounding spheres overlap and whose i has a plane."""
     low, high = close_pairs(vertices)
@@ -142,26 +242,38 @@ def _close_pairs(vertices: Floats, planes: Flags) -> tuple[Whole, Whole]:
 
 def _passing(vertices: Floats, i: Whole, j: Whole) -> Flags:
     """Return which links of each j pass through the plane of its i: (P, 3) bool."""
-    centres, radii = bounding_spheres(vertices)
-    frames = plane_frames(vertices)
-    corners = np.einsum("nkc,nac->nka", vertices - centres[:, None], frames[:, :2])
-    passing = np.zeros((len(i), 3), dtype=bool)
-    for start in range(0, len(i), _CHUNK):
-        a, b = i[start : start + _CHUNK], j[start : start + _CHUNK]
-        relative = vertices[b] - centres[a, None]
-        heights = np.einsum("pkc,pc->pk", relative, frames[a, 2])
-        heights[np.abs(heights) <= _TOLERANCE * radii[a, None]] = 0.0
-        row, link = np.nonzero(heights[:, :-1] * heights[:, 1:] < 0)
-        first, last = heights[row, link], heights[row, link + 1]
-        from_, to = relative[row, link], relative[row, link + 1]
+    links = np.stack([vertices[:, :-1], vertices[:, 1:]], axis=2)
+    return _passing_segments(vertices, np.repeat(i, 3), links[j].reshape(-1, 2, 3)).reshape(-1, 3)
+
+
+def _passing_segments(corners: Floats, polygon: Whole, segments: Floats) -> Flags:
+    """Return which segments pass through a polygon: (P,) bool.
+
+    Args:
+        corners: (N, n, 3) corners of N polygons [m]; the last one is joined to the first one.
+        polygon: (P,) index of the polygon that each segment is compared with.
+        segments: (P, 2, 3) ends of the segments [m].
+    """
+    centres, radii = bounding_spheres(corners)
+    frames = plane_frames(corners)
+    outlines = np.einsum("nkc,nac->nka", corners - centres[:, None], frames[:, :2])
+    passing = np.zeros(len(polygon), dtype=bool)
+    for start in range(0, len(polygon), _CHUNK):
+        which = polygon[start : start + _CHUNK]
+        relative = segments[start : start + _CHUNK] - centres[which, None]
+        heights = np.einsum("pkc,pc->pk", relative, frames[which, 2])
+        heights[np.abs(heights) <= _TOLERANCE * radii[which, None]] = 0.0
+        row = np.nonzero(heights[:, 0] * heights[:, 1] < 0)[0]
+        first, last = heights[row].T
+        from_, to = relative[row, 0], relative[row, 1]
         hits = from_ + (first / (first - last))[:, None] * (to - from_)
-        flat = np.einsum("pc,pac->pa", hits, frames[a[row], :2])
-        passing[start + row, link] = _winding(flat, corners[a[row]], _TOLERANCE * radii[a[row]]) != 0
+        flat = np.einsum("pc,pac->pa", hits, frames[which[row], :2])
+        passing[start + row] = _winding(flat, outlines[which[row]], _TOLERANCE * radii[which[row]]) != 0
     return passing
 
 
 def _winding(points: Floats, corners: Floats, tolerance: Floats) -> Whole:
-    """Compute the winding numbers (n,) of quadrilaterals (n, 4, 2) around points (n, 2) [m].
+    """Compute the winding numbers (n,) of polygons (n, k, 2) around points (n, 2) [m].
 
     A point nearer to an edge than its tolerance (n,) [m] has the winding number 0.
     """
@@ -181,9 +293,20 @@ def _winding(points: Floats, corners: Floats, tolerance: Floats) -> Whole:
     return counts
 
 
+def frame_crossings(frame: Frame) -> tuple[Whole, Flags]:
+    """Return the crossings (N,) of the bodies of a frame, and whether each one spans a polygon (N,)."""
+    if frame.bars is None:
+        return link_crossings(frame.vertices), has_plane(frame.vertices)
+    try:
+        found = polygon_crossings(*segments_of(frame))
+    except UndefinedMeasureError:
+        return np.zeros(frame.count, dtype=np.int64), np.zeros(frame.count, dtype=bool)
+    return found.crossings, found.has_polygon
+
+
 def _entanglement_of(frame: Frame, _: Run) -> tuple[float, int]:
-    tangle = entanglement(frame.vertices)
-    return tangle.mean, int(tangle.has_plane.sum())
+    crossings, planes = frame_crossings(frame)
+    return float(crossings[planes].mean()) if planes.any() else math.nan, int(planes.sum())
 
 
 MEASURES = (
@@ -195,6 +318,6 @@ MEASURES = (
             Quantity("planes", "-"),
         ),
         take=_entanglement_of,
-        available_for=in_space,
+        available_for=any_in_space,
     ),
 )

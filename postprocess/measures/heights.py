@@ -11,8 +11,16 @@ from dem.errors import InputError
 from dem.record.frame import Frame
 from dem.record.packing import second_highest
 from dem.record.run import Run
-from postprocess.geometry.links import UndefinedMeasureError, Vertices, centres_of_mass, checked_vertices, link_lengths
-from postprocess.measures.registry import FrameMeasure, Quantity, Shown, in_space
+from postprocess.geometry.bars import body_centres, body_volumes, segment_volumes
+from postprocess.geometry.links import (
+    Floats,
+    UndefinedMeasureError,
+    Vertices,
+    centres_of_mass,
+    checked_vertices,
+    link_lengths,
+)
+from postprocess.measures.registry import FrameMeasure, Quantity, Shown, any_in_space
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -73,9 +81,18 @@ def material_height(vertices: Vertices, *, floor_z: float = 0.0, percentile: flo
     if len(vertices) == 0:
         raise UndefinedMeasureError("a height needs at least 1 smarticle: got 0")
     z = vertices[:, :, 2] - floor_z
-    lower = np.minimum(z[:, :-1], z[:, 1:]).ravel()
-    upper = np.maximum(z[:, :-1], z[:, 1:]).ravel()
-    weights = link_lengths(vertices).ravel()
+    ends = np.stack([z[:, :-1].ravel(), z[:, 1:].ravel()])
+    return _filled_height(ends, link_lengths(vertices).ravel(), percentile)
+
+
+def _filled_height(ends: Floats, weights: Floats, percentile: float) -> float:
+    """Return the height [m] below which a percentage of the material lies.
+
+    Args:
+        ends: (2, M) heights of both ends of all segments [m].
+        weights: (M,) material of each segment, in any unit.
+    """
+    lower, upper = ends.min(axis=0), ends.max(axis=0)
     level = weights.sum() * percentile / 100
     # A horizontal link would divide by 0; a small span makes its step a steep slope.
     span = np.maximum(upper - lower, 1e-12 * (upper.max() - lower.min()) + 1e-15)
@@ -84,8 +101,20 @@ def material_height(vertices: Vertices, *, floor_z: float = 0.0, percentile: flo
     )
 
 
-def _heights_of(frame: Frame, _: Run) -> tuple[float, ...]:
-    levels = heights(frame.vertices, floor_z=frame.floor_z)
+def frame_heights(frame: Frame, run: Run) -> Heights:
+    """Compute the heights of the pile of a frame, with bodies of any shape; UndefinedMeasureError without bodies."""
+    if frame.bars is None:
+        return heights(frame.vertices, floor_z=frame.floor_z)
+    com = body_centres(frame)[:, 2] - frame.floor_z
+    return Heights(
+        mean_com=float(np.average(com, weights=body_volumes(frame, run))),
+        second_highest_com=second_highest(com),
+        top=_filled_height(frame.segments[..., 2].T - frame.floor_z, segment_volumes(frame, run), 95.0),
+    )
+
+
+def _heights_of(frame: Frame, run: Run) -> tuple[float, ...]:
+    levels = frame_heights(frame, run)
     return levels.mean_com, levels.second_highest_com, levels.top
 
 
@@ -99,6 +128,6 @@ MEASURES = (
             Quantity("top 95 % height", "m"),
         ),
         take=_heights_of,
-        available_for=in_space,
+        available_for=any_in_space,
     ),
 )

@@ -8,6 +8,7 @@ the crossings of `postprocess.measures.entanglement`, it is defined for straight
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -105,6 +106,30 @@ def gauss_integral(first: ArrayLike, second: ArrayLike) -> Floats:
     # The origin lies in the plane of the parallelogram, as it does for segments that meet.
     angle[volume == 0] = 0.0
     total: Floats = angle.sum(axis=(-2, -1)) / (2 * math.pi)
+    return total
+
+
+def segment_integrals(first: Floats, second: Floats) -> Floats:
+    """Compute Gauss's integrals of all pairs of straight segments (R, 2, 3) and (C, 2, 3) [m]: (R, C).
+
+    Formulas and convention are those of `gauss_integral`; six times as fast for many segments.
+    """
+    # Components come first, so that every operation runs over contiguous arrays.
+    p, q = np.moveaxis(first, 0, 2)[..., None], np.moveaxis(second, 0, 2)[:, :, None]
+    a, b, c, d = q[0] - p[0], q[1] - p[0], q[1] - p[1], q[0] - p[1]
+
+    def dot(x: Sequence[Floats] | Floats, y: Sequence[Floats] | Floats) -> Floats:
+        product: Floats = x[0] * y[0] + x[1] * y[1] + x[2] * y[2]
+        return product
+
+    la, lb, lc, ld = (np.sqrt(dot(x, x)) for x in (a, b, c, d))
+    u, v = p[1] - p[0], q[1] - q[0]
+    volume = -dot(a, (u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]))
+    diagonal, product = dot(a, c), la * lc
+    angle = np.arctan2(volume, product * lb + dot(a, b) * lc + dot(b, c) * la + diagonal * lb)
+    angle += np.arctan2(volume, product * ld + dot(a, d) * lc + dot(d, c) * la + diagonal * ld)
+    angle[volume == 0] = 0.0
+    total: Floats = angle / (2 * math.pi)
     return total
 
 

@@ -16,11 +16,12 @@ from dem.errors import InputError
 from dem.record.frame import Frame
 from dem.record.packing import filled
 from dem.record.run import Run
+from postprocess.geometry.bars import body_volumes
 from postprocess.geometry.links import UndefinedMeasureError, Vertices, checked_vertices
 from postprocess.geometry.voronoi import local_packing
 from postprocess.geometry.voxel import Region, solid_fraction
-from postprocess.measures.heights import heights, material_height
-from postprocess.measures.registry import FrameMeasure, Quantity, Shown, in_space
+from postprocess.measures.heights import frame_heights, heights, material_height
+from postprocess.measures.registry import FrameMeasure, Quantity, Shown, any_in_space, in_space
 
 DEFINITIONS: Mapping[str, str] = MappingProxyType(
     {
@@ -116,6 +117,8 @@ def packing_of(frame: Frame, run: Run, *, definition: str) -> float:
         return math.nan
     # The costly definitions use an inner cylinder, to which a corrected radius does not apply.
     radius = run.manifest.container_radius_m if definition in COSTLY_DEFINITIONS else run.manifest.measured_radius_m
+    if frame.bars is not None:
+        return _packing_of_bars(frame, run, definition=definition, radius=radius)
     try:
         return packing_fraction(
             frame.vertices,
@@ -128,6 +131,17 @@ def packing_of(frame: Frame, run: Run, *, definition: str) -> float:
         ).value
     except UndefinedMeasureError:
         return math.nan
+
+
+def _packing_of_bars(frame: Frame, run: Run, *, definition: str, radius: float) -> float:
+    """Return the packing fraction [-] of bodies that are no smarticles; NaN if it is undefined."""
+    if definition in COSTLY_DEFINITIONS or frame.count < 2:
+        return math.nan
+    levels = frame_heights(frame, run)
+    height = levels.second_highest_com if definition == "second-highest-com" else levels.top
+    if not height > 0:
+        return math.nan
+    return float(body_volumes(frame, run).sum() / (math.pi * radius**2 * height))
 
 
 def _packing(definition: str, frame: Frame, run: Run) -> tuple[float]:
@@ -146,7 +160,7 @@ MEASURES = tuple(
         place=70,
         quantities=(Quantity(f"phi {definition}", "-", _SHOWN[definition]),),
         take=partial(_packing, definition),
-        available_for=in_space,
+        available_for=in_space if definition in COSTLY_DEFINITIONS else any_in_space,
         definition=definition,
         costly=definition in COSTLY_DEFINITIONS,
     )

@@ -6,14 +6,19 @@ needs its module, a test, and a line in README.
 """
 
 import pkgutil
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cache
 from importlib import import_module
+from importlib.metadata import entry_points
 
+from dem.errors import InputError, nearest
 from dem.record.frame import Frame
 from dem.record.run import Run
 from dem.record.series import Series
+from dem.strict import unit_of
+
+ENTRY_POINTS = "smarticles.measures"  #: Group of the entry points by which installed packages add their `MEASURES`
 
 _PACKAGE = __name__.rpartition(".")[0]
 
@@ -58,11 +63,26 @@ class FrameMeasure:
     #: Whether it takes tens of milliseconds per frame or more; tables then have its values for the last frame of each
     #: phase alone, unless the user asks for every frame
     costly: bool = False
+    on_request: bool = False  #: Whether tables leave it out unless it is named
 
     def columns(self, frame: Frame | None, run: Run) -> dict[str, float]:
         """Return the values of a frame by column; all are NaN if the frame is None."""
         values = [float("nan")] * len(self.quantities) if frame is None else self.take(frame, run)
         return dict(zip((quantity.header for quantity in self.quantities), values, strict=True))
+
+
+def measure_of(function: Callable[[Frame, Run], float] | FrameMeasure) -> FrameMeasure:
+    """Return a function of a frame and its run as a measure; its name ends with the unit: `top_m`, `speed_m_per_s`."""
+    if isinstance(function, FrameMeasure):
+        return function
+    label, unit = unit_of(function.__name__)
+    quantity = Quantity(label.replace("_", " "), unit or "-")
+    return FrameMeasure(
+        name=function.__name__,
+        place=900,
+        quantities=(quantity,),
+        take=lambda frame, run: (float(function(frame, run)),),
+    )
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -83,9 +103,14 @@ class PhaseMeasure:
         return dict(zip((quantity.header for quantity in self.quantities), values, strict=True))
 
 
-def in_space(run: Run) -> bool:
-    """Return whether the smarticles of a run move in three dimensions, not in a plane."""
+def any_in_space(run: Run) -> bool:
+    """Return whether the bodies of a run, of any shape, move in three dimensions, not in a plane."""
     return not run.manifest.planar
+
+
+def in_space(run: Run) -> bool:
+    """Return whether the bodies of a run are smarticles and move in three dimensions, not in a plane."""
+    return any_in_space(run) and run.manifest.kinds is None
 
 
 def in_one_cylinder(run: Run) -> bool:
@@ -95,19 +120,30 @@ def in_one_cylinder(run: Run) -> bool:
 
 @cache
 def registered() -> tuple[FrameMeasure | PhaseMeasure, ...]:
-    """Return all measures of this package, in alphabetical order of their modules.
+    """Return all measures of this package, in alphabetical order of their modules, and of installed packages.
 
     ValueError if two measures have one name, or two quantities one header.
     """
     package = import_module(_PACKAGE)
     modules = [import_module(f"{_PACKAGE}.{found.name}") for found in pkgutil.iter_modules(package.__path__)]
-    measures = tuple(measure for module in modules for measure in getattr(module, "MEASURES", ()))
+    measures = (*(measure for module in modules for measure in getattr(module, "MEASURES", ())), *_installed())
     names = [measure.name for measure in measures]
     headers = [quantity.header for measure in measures for quantity in measure.quantities]
     for kind, words in (("name", names), ("header", headers)):
         if repeated := {word for word in words if words.count(word) > 1}:
             raise ValueError(f"measures share a {kind}: {', '.join(sorted(repeated))}")
     return measures
+
+
+def _installed() -> Iterator[FrameMeasure | PhaseMeasure]:
+    for point in entry_points(group=ENTRY_POINTS):
+        try:
+            yield from point.load()
+        except Exception as error:  # of another package's code
+            raise InputError(
+                f"the measures of {point.value} cannot be loaded ({type(error).__name__}: {error}); repair or "
+                "uninstall that package"
+            ) from error
 
 
 def shown_quantities() -> tuple[tuple[Quantity, Shown], ...]:
@@ -121,12 +157,23 @@ def shown_quantities() -> tuple[tuple[Quantity, Shown], ...]:
     return tuple(sorted(found, key=lambda pair: pair[1].place))
 
 
-def frame_measures(definitions: Sequence[str]) -> tuple[FrameMeasure, ...]:
+def frame_measures(definitions: Sequence[str], also: Collection[str] = ()) -> tuple[FrameMeasure, ...]:
     """Return the measures of frames in the order of their columns.
 
     Measures with a definition come last, in the order of `definitions`; measures with other definitions are left out.
+    So are measures `on_request`, unless their names are among `also`.
+
+    Raises:
+        InputError: There is no measure on request of a name.
     """
-    known = sorted((m for m in registered() if isinstance(m, FrameMeasure)), key=lambda measure: measure.place)
+    asked = {m.name: m for m in registered() if isinstance(m, FrameMeasure) and m.on_request}
+    for name in also:
+        if name not in asked:
+            raise InputError(f"also: {name!r} is no measure on request; {nearest(name, asked)}")
+    known = sorted(
+        (m for m in registered() if isinstance(m, FrameMeasure) and not (m.on_request and m.name not in also)),
+        key=lambda measure: measure.place,
+    )
     defined = {measure.definition: measure for measure in known}
     return (
         *(measure for measure in known if measure.definition is None),

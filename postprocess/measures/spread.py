@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike
 from dem.errors import InputError
 from dem.record.frame import Frame
 from dem.record.run import Run
+from postprocess.geometry.bars import body_centres
 from postprocess.geometry.links import (
     Floats,
     UndefinedMeasureError,
@@ -19,7 +20,7 @@ from postprocess.geometry.links import (
 )
 from postprocess.measures.clusters import contact_clusters, entanglement_clusters
 from postprocess.measures.heights import least_reaching
-from postprocess.measures.registry import FrameMeasure, Quantity, Shown, in_space
+from postprocess.measures.registry import FrameMeasure, Quantity, Shown, any_in_space, in_space
 
 TOUCHING = 1.05
 """Largest distance of two centrelines at which smarticles count as neighbours, over the diameter of the spheres [-].
@@ -154,8 +155,8 @@ def _free_pile_of(frame: Frame, run: Run) -> tuple[float, ...]:
 
 
 def escaped(frame: Frame, run: Run) -> int:
-    """Count the smarticles whose centre of mass is outside the container's radius or below its floor."""
-    centres = centres_of_mass(frame.vertices)
+    """Count the bodies whose centre of mass is outside the container's radius or below its floor."""
+    centres = body_centres(frame)
     outside = np.hypot(centres[:, 0], centres[:, 1]) > run.manifest.container_radius_m
     return int((outside | (centres[:, 2] < frame.floor_z)).sum())
 
@@ -172,7 +173,7 @@ MEASURES = (
         place=20,
         quantities=(Quantity("escaped", "-"),),
         take=lambda frame, run: (escaped(frame, run),),
-        available_for=in_space,
+        available_for=any_in_space,
     ),
     FrameMeasure(
         name="free pile",
@@ -187,6 +188,6 @@ MEASURES = (
         ),
         take=_free_pile_of,
         # The last phase of such a run has no wall any more.
-        available_for=lambda run: not (run.manifest.planar or run.manifest.walled(run.phases[-1].index)),
+        available_for=lambda run: in_space(run) and not run.manifest.walled(run.phases[-1].index),
     ),
 )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass
 from typing import Literal
@@ -14,7 +15,7 @@ from dem.record.frames import FrameSequence
 from dem.record.run import Run
 from dem.record.series import Series
 from postprocess.measures.packing import DEFINITIONS, packing_of
-from postprocess.measures.registry import frame_measures, phase_measures
+from postprocess.measures.registry import FrameMeasure, frame_measures, phase_measures
 from postprocess.statistics.points import ASPECT, SEED, marked
 from postprocess.statistics.seeds import Mean, mean_with_error
 
@@ -39,13 +40,20 @@ class PackingChange:
 
 
 def measure_run(
-    run: Run, *, definitions: Sequence[str] = tuple(DEFINITIONS), costly: Costly = "phase-end"
+    run: Run,
+    *,
+    definitions: Sequence[str] = tuple(DEFINITIONS),
+    costly: Costly = "phase-end",
+    measures: Sequence[FrameMeasure] = (),
+    also: Collection[str] = (),
 ) -> pd.DataFrame:
     """Measure every frame of a run, which may be finished, failed or still running.
 
     Args:
         definitions: Definitions of the packing fraction, keys of `packing.DEFINITIONS`.
         costly: Frames for which costly measures are computed: none, the last recorded frame of each phase, or all.
+        measures: Further measures, whose columns follow those of the registered ones.
+        also: Names of measures that tables have on request alone, such as "crossing-number".
 
     Returns:
         A table with one row per frame and units in its column names. Columns of `series.h5`, if that file exists, have
@@ -53,12 +61,13 @@ def measure_run(
         smarticle, or if it is costly and not computed.
 
     Raises:
-        InputError: Unknown definition, or a file is missing or damaged.
+        InputError: Unknown definition or name, or a file is missing or damaged.
     """
     frames, series = _open(run, definitions)
     rows: list[dict[str, object]] = []
     for part in _frames_by_phase(run, frames):
-        rows += _rows(part, run, series, definitions, costly, offset=len(rows))
+        known = (*frame_measures(definitions, also), *measures)
+        rows += _rows(part, run, series, known, costly, offset=len(rows))
     return pd.DataFrame(rows)
 
 
@@ -68,7 +77,9 @@ def summarise_run(
     last: int = LAST_FRAMES,
     definitions: Sequence[str] = tuple(DEFINITIONS),
     costly: Costly = "phase-end",
+    also: Collection[str] = (),
     phases: Collection[int] | None = None,
+    measures: Sequence[FrameMeasure] = (),
 ) -> pd.DataFrame:
     """Measure each phase of a run: means over its last frames, and measures of the whole phase.
 
@@ -76,7 +87,9 @@ def summarise_run(
         last: Number of frames to average; a phase with fewer frames is averaged over all its frames.
         definitions: Definitions of the packing fraction, keys of `packing.DEFINITIONS`.
         costly: Frames for which costly measures are computed, see `measure_run`.
+        also: Names of measures that tables have on request alone, such as "crossing-number".
         phases: Indices of the phases to measure; all if not given.
+        measures: Further measures, whose columns follow those of the registered ones.
 
     Returns:
         A table with one row per phase and units in its column names. A column "… SE" follows each mean with its
@@ -84,7 +97,7 @@ def summarise_run(
         measures are computed for the last frame alone and have no error.
 
     Raises:
-        InputError: Unknown definition, `last` below 1, or a file is missing or damaged.
+        InputError: Unknown definition or name, `last` below 1, or a file is missing or damaged.
     """
     _check_last(last)
     frames, series = _open(run, definitions)
@@ -92,7 +105,8 @@ def summarise_run(
     for part in _frames_by_phase(run, frames):
         if phases is not None and part[0].phase not in phases:
             continue
-        table = pd.DataFrame(_rows(part[-last:], run, series, definitions, costly))
+        known = (*frame_measures(definitions, also), *measures)
+        table = pd.DataFrame(_rows(part[-last:], run, series, known, costly))
         summary = {name: table[name].iloc[-1] for name in (*_LABELS, "phase", "phase type", "time [s]")}
         summary["frames averaged"] = len(table)
         for name in table.columns.difference([*summary, "frame"], sort=False):
@@ -172,11 +186,17 @@ def _frames_by_phase(run: Run, frames: FrameSequence) -> list[FrameSequence]:
 
 
 def _rows(
-    part: FrameSequence, run: Run, series: Series | None, definitions: Sequence[str], costly: Costly, *, offset: int = 0
+    part: FrameSequence,
+    run: Run,
+    series: Series | None,
+    known: Sequence[FrameMeasure],
+    costly: Costly,
+    *,
+    offset: int = 0,
 ) -> list[dict[str, object]]:
     """Return one row per frame of a part of one phase; `offset` is the number of the first frame."""
     rows: list[dict[str, object]] = []
-    measures = [measure for measure in frame_measures(definitions) if measure.available_for(run)]
+    measures = [measure for measure in known if measure.available_for(run)]
     made = run.manifest
     values = (str(run.path), made.name, made.seed, made.aspect_ratio, made.count, made.fidelity, made.scene_sha256)
     labels = dict(zip(_LABELS, values, strict=True))
@@ -205,11 +225,12 @@ def _series_columns(series: Series, time: float) -> dict[str, float]:
             continue
         # A newer version may have recorded a column that is unknown here.
         label = EVERY[name].label if name in EVERY else name
-        # Files write a pure number's unit as 1, tables as a dash.
-        unit = "-" if series.units[name] in {"1", ""} else series.units[name]
+        # Files write a pure number's unit as 1 and angles in radians; tables have a dash, and degrees as scenes do.
+        unit = {"1": "-", "": "-", "rad": "degree"}.get(series.units[name], series.units[name])
+        factor = math.degrees(1) if unit == "degree" else 1
         if values.ndim == 1:
-            columns[f"{label} [{unit}]"] = float(values[index])
+            columns[f"{label} [{unit}]"] = factor * float(values[index])
         else:
             for component, value in zip(_COMPONENTS[values.shape[1]], values[index], strict=True):
-                columns[f"{label} {component} [{unit}]"] = float(value)
+                columns[f"{label} {component} [{unit}]"] = factor * float(value)
     return columns

@@ -29,7 +29,7 @@ from dem.record.frames import read_frames
 from dem.record.run import Run, open_run
 from postprocess.bodies.colours import PAINTS, ColourScale, colour_field, scalars
 from postprocess.bodies.fields import BY_NAME, IDENTITY, Field
-from postprocess.bodies.meshes import BOX_POINTS, USUAL, Bodies, owners, solid
+from postprocess.bodies.meshes import USUAL, Bodies, at_points, owners, solid
 from postprocess.geometry.links import Floats
 from postprocess.report import figures
 
@@ -168,11 +168,13 @@ def add_bodies(plotter: Any, meshes: Mapping[str, pv.PolyData], frame: Frame, co
             line = {"color": _EDGE, "line_width": 1.8 * _OVERSAMPLING, "lighting": False, "opacity": opacity}
             plotter.add_mesh(edges, **(options | line | {"name": f"{kind} edges"}))
         if kind == "smarticles":
-            mesh.point_data["colour"] = np.repeat(colours[owners(mesh, frame)], BOX_POINTS, axis=0)
+            mesh.point_data["colour"] = at_points(mesh, colours[owners(mesh, frame)])
             options |= {"scalars": "colour", "rgb": True, "opacity": _PALE if pale else 1.0, "specular": 0.12}
             # Hidden back faces would take a quarter of a film's time.
             options |= {"culling": not pale and "back", "ambient": 0.22, "diffuse": 0.85, "specular_power": 20}
-            options |= {"show_edges": True, "edge_color": "#101418", "edge_opacity": 0.55, "line_width": _OVERSAMPLING}
+            # Cylinders are triangles, whose edges are none of the body.
+            boxes = mesh.GetPolys().IsHomogeneous() == 4
+            options |= {"show_edges": boxes, "edge_color": "#101418", "edge_opacity": 0.55, "line_width": _OVERSAMPLING}
         elif kind != "ghost":
             grazed = kind == "floor"  # light at grazing incidence would leave it black
             options |= {"color": PAINTS[kind].colour, "opacity": PAINTS[kind].opacity, "lighting": kind != "wall"}

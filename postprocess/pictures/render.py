@@ -250,6 +250,8 @@ def _focused(subject: Subject, index: int, smarticle: int, style: Style) -> Imag
     The smarticle and its plane are orange, links that pass through the plane blue, other links grey.
     """
     frame, run = subject.frames[index], subject.run
+    if run.manifest.kinds is not None:
+        raise InputError(f"smarticle {smarticle}: these bodies are no smarticles; draw the whole run, or export it")
     if run.manifest.planar:
         msg = f"smarticle {smarticle}: in a plane no link passes through another smarticle; draw the whole run"
         raise InputError(msg)
@@ -334,10 +336,14 @@ def caption_of(frame: Frame, run: Run, *, title: str, pace: str = "", force: flo
     count = f"{run.manifest.count}" if frame.count == run.manifest.count else f"{frame.count} of {run.manifest.count}"
     phase = run.phases[frame.phase].type if frame.phase < len(run.phases) else "?"
     when = f"t = {frame.time:.3f} s ({phase})"
-    lines = [f"l/w = {run.manifest.aspect_ratio:g}   N = {count}   {when}"]
+    kinds = run.manifest.kinds
+    what = f"l/w = {run.manifest.aspect_ratio:g}" if kinds is None else ", ".join(dict.fromkeys(k.shape for k in kinds))
+    lines = [f"{what}   N = {count}   {when}"]
     if pace:
         lines[0] += f"   {pace}"
-    if not run.manifest.planar:  # packing and crossings are undefined in a plane
+    if kinds is not None:
+        lines.append(packing_text(frame, run))
+    elif not run.manifest.planar:  # packing and crossings are undefined in a plane
         mean = entanglement(frame.vertices).mean
         passed = f"⟨N⟩ = {mean:.2f}" if math.isfinite(mean) else "no ⟨N⟩: all are straight"
         lines.append(f"{packing_text(frame, run)}   {passed}")

@@ -12,16 +12,19 @@ import signal
 import subprocess
 import sys
 import tempfile
+import time
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
+from dem.errors import InputError
 from smarticles.command_line import Commands, add_options
+from smarticles.starters import path_of
 
 EXTRAS = {
     **dict.fromkeys(("matplotlib", "PIL", "pyvista", "vtk", "vtkmodules", "imageio_ffmpeg"), "viz"),
     **dict.fromkeys(("trame", "trame_vtk", "trame_client", "trame_server", "aiohttp", "wslink"), "view"),
-    "trimesh": "export",
+    **dict.fromkeys(("trimesh", "gsd"), "export"),
 }
 """Extra of the project that installs a module; other modules come with the project itself."""
 
@@ -49,7 +52,7 @@ print(f"{found}; a sphere falls")
 """
 _LINKS = """
 import sys, numba
-from dem.engine.links.compiler import folder
+from dem.engine.links.cache import folder
 if numba.njit(lambda a, b: a + b)(1, 2) != 3:
     sys.exit("Numba computes nonsense")
 kept = f"compiled code in {folder()}" if folder() else "compiled code cannot be kept"
@@ -85,7 +88,22 @@ _NEEDED = {
     **{name: name for name in ("numpy", "scipy", "h5py", "meshio", "pydantic", "rich", "pandas")},
     **{"yaml": "PyYAML", "jinja2": "Jinja2"},
 }
-_OPTIONAL = {**{name: name for name in ("matplotlib", "trimesh", "trame", "aiohttp")}, "PIL": "pillow"}
+_OPTIONAL = {**{name: name for name in ("matplotlib", "trimesh", "gsd", "trame", "aiohttp")}, "PIL": "pillow"}
+
+
+# Kinds of phases for which code is compiled: description, example scene, changes.
+_LEDGER = "recording.dissipation_interval_s=0.001"
+_COMPILED = (
+    ("pour, rest, shake", "shaken", ()),
+    ("motors", "actuated", ()),
+    ("pour, rest, shake; dissipation recorded", "shaken", (_LEDGER,)),
+    ("motors; dissipation recorded", "actuated", (_LEDGER,)),
+    ("hooks", "hook", ()),
+    ("hooks, motors", "hook", ("phases.1={type: shape-change}",)),
+    ("wall that is lifted", "melting", ("phases.3.speed_m_per_s=0.1",)),
+    ("tiers, motors", "casting", ()),
+    ("chain of robots, strings", "chain", ("fidelity.rows=1",)),
+)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -107,12 +125,17 @@ def add(commands: Commands) -> None:
         summary="test which of YADE, LAMMPS, PyVista, Slurm … are installed and work",
         text="""
 Each part is used once, not just searched for. The exit status is 1 if a part that every run needs
-fails; the output then says what to do.""",
+fails; the output then says what to do.
+
+--compile compiles the code of the engine links for all kinds of phases, and stores the code for later
+runs: once for the image of a node, or for a new machine. It takes minutes.""",
         examples="""\
   smarticles doctor
+  smarticles doctor --compile
   smarticles doctor --json
 """,
     )
+    doctor.add_argument("--compile", action="store_true", help="compile the engine links for all kinds of phases")
     add_options(doctor, "--json")
 
 
@@ -125,6 +148,10 @@ def way_to_install(module: str) -> str:
 
 def examine(arguments: argparse.Namespace) -> int:
     """Print all checks; return 0 if every part that a run needs works, otherwise 1."""
+    if arguments.compile:
+        if arguments.json:
+            raise InputError("--compile: cannot be combined with --json; leave one of them out")
+        return compile_links()
     found = []
     for check in checks():
         found.append(check)
@@ -141,6 +168,32 @@ def examine(arguments: argparse.Namespace) -> int:
     return 1 if failed else 0
 
 
+def compile_links() -> int:
+    """Compile the engine links for all kinds of phases; return 0 if the code is stored, otherwise 1."""
+    try:
+        from dem.engine.links.cache import folder  # noqa: PLC0415
+    except ImportError as error:
+        print(f"links: FAILS: {error}; {way_to_install('numba')}")
+        return 1
+    from dem.run.warm import compile_for  # noqa: PLC0415
+    from dem.scene.reading import load_scene  # noqa: PLC0415
+
+    where = folder()
+    if where is None:
+        return 1  # the cause has been printed
+    before, begun = set(where.glob("*.code")), time.process_time()
+    for kinds, starter, changes in _COMPILED:
+        already, start = set(where.glob("*.code")), time.process_time()
+        compile_for(load_scene(path_of(starter), changes))
+        new = len(set(where.glob("*.code")) - already)
+        done = f"{new} kernels compiled in" if new else "was compiled before; loaded in"
+        print(f"{kinds:<44}{done} {time.process_time() - start:.1f} s of processor time", flush=True)
+    after = set(where.glob("*.code"))
+    took = f"{time.process_time() - begun:.1f} s of processor time"
+    print(f"{len(after - before)} kernels compiled in {took}; {len(after)} are stored in {where}")
+    return 0 if after else 1
+
+
 def checks() -> Iterator[Check]:
     """Yield the results of all checks one by one; all together take a few seconds."""
     yield Check(name="python", ok=True, needed=True, found=f"{platform.python_version()}, {sys.executable}")
@@ -148,7 +201,10 @@ def checks() -> Iterator[Check]:
         "links", *_run_script(_LINKS), f"only scenes with `engine: links` need it; {way_to_install('numba')}"
     )
     # YADE is optional if the links engine works.
-    way_out = "`make setup` installs it, see environment.md; scenes with `engine: links` run without it"
+    way_out = (
+        "scenes with `engine: yade`, or without the key engine, cannot run; `make setup` installs YADE, see "
+        "environment.md; scenes with `engine: links` run without it"
+    )
     yield _check("yade", *_run_script(_YADE), way_out, needed=not links.ok)
     yield links
     yield _check(

@@ -5,9 +5,10 @@ import sys
 from pathlib import Path
 
 from dem.errors import InputError
+from dem.terminal import ERASE_LINE
 from smarticles.command_line import Commands, add_options, names
 
-_FORMATS = ("vtp", "stl", "obj", "gltf", "glb")
+_FORMATS = ("vtp", "gsd", "stl", "obj", "gltf", "glb")
 _LAMMPS = "lammps"
 
 # Kept here because `postprocess.export`, which has this table too, is slow to import; a test compares both.
@@ -30,7 +31,9 @@ scenes that actuate:
   angle_rad [rad]                      angle of the barb
   motor_torque_N_m [N m]               torque of the motor at the barb's hinge
   motor_work_J [J]                     work of that motor since the start
-  halted [-]                           1 if that motor is halted"""
+  halted [-]                           1 if that motor is halted
+scenes with the key particle:
+  kind [-]                             kind of the body, a place in `kinds` of run.json"""
 
 
 def add(commands: Commands) -> None:
@@ -38,13 +41,15 @@ def add(commands: Commands) -> None:
     export = commands.add(
         "export",
         export_run,
-        summary="write the bodies of a run for ParaView, Blender or 3D printers, or a scene for LAMMPS",
+        summary="write the bodies of a run for ParaView, OVITO, Blender or 3D printers, or a scene for LAMMPS",
         text=f"""
 Writes the boxes of all links, and wall, tiers, floor, hooks and strings at one time, in metres.
 Existing files are never replaced. Formats:
 
   vtp        folder for ParaView with all fields below; run `paraview --script=show_in_paraview.py`
              in the folder, or open the .pvd files
+  gsd        one file for OVITO and HOOMD-blue, with all fields below: a capsule for each strand of each
+             link, as contacts see it; no other bodies. --all writes all frames into this file
   gltf, glb  coloured by one field, y upwards, for example for Blender; fields without NaN become attributes
   obj        shape and colours
   stl        shape alone
@@ -61,6 +66,7 @@ Fields of each box:
         examples="""\
   smarticles export runs/a --to glb                        last frame, runs/a/export.glb
   smarticles export runs/a --to vtp --all --with crossings   runs/a/export-vtp, for ParaView
+  smarticles export runs/a --to gsd --all                  all frames, runs/a/export.gsd
   smarticles export runs/a --to stl --time 1.5 --without wall,floor --output pile.stl
   smarticles export on.yaml --to lammps                    on-lammps/in.lammps and its data files
 """,
@@ -70,7 +76,9 @@ Fields of each box:
     default = "default: DIR/export.FORMAT or DIR/export-FORMAT; for lammps SCENE-lammps next to the scene"
     add_options(export, "--output", metavar="PATH", help=default)
     add_options(export, "--time")
-    export.add_argument("--all", action="store_true", help="export all frames, into a folder of numbered files")
+    export.add_argument(
+        "--all", action="store_true", help="export all frames, into a folder of numbered files, or one gsd"
+    )
     export.add_argument("--with", dest="wanted", type=names, default=(), metavar="BODY,…", help="crossings, forces")
     export.add_argument(
         "--without", dest="unwanted", type=names, default=(), metavar="NAME,…", help="bodies or fields to leave out"
@@ -113,7 +121,8 @@ def export_run(arguments: argparse.Namespace) -> int:
 
     def show_progress(done: int, count: int) -> None:
         if sys.stderr.isatty() and count > 1:
-            print(f"\rframe {done} of {count}", end="\n" if done == count else "", file=sys.stderr, flush=True)
+            sys.stderr.write(ERASE_LINE)
+            print(f"frame {done} of {count}", end="\n" if done == count else "", file=sys.stderr, flush=True)
 
     written = export.export_run(
         arguments.directory,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import sys
+import time
 from collections.abc import Container, Sequence
 from pathlib import Path
 from textwrap import wrap
@@ -11,7 +12,7 @@ from typing import TYPE_CHECKING
 
 from dem.errors import InputError
 from smarticles.command_line import Cell, Commands, add_options, as_json, columns, names, reject_existing
-from smarticles.measuring import grouped, measured, sources
+from smarticles.measuring import grouped, measured, of_phase, sources
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -41,7 +42,9 @@ row per phase: means over the last frames of the phase, with standard errors (SE
 fraction φ is given by several definitions; the column names the definition. Phases that pull a hook
 or strain a chain have columns for forces. If DIR is a sweep, all its runs with frames are measured,
 and CSV and JSON have a column for each variable of the sweep. --by averages over all runs that have
-equal values in some columns, for example over seeds.""",
+equal values in some columns, for example over seeds. --also adds measures that take long or that few
+need: crossing-number, closed-linking, orientation, caging. Tables are kept in the run directories, so
+that runs which have not changed are not measured again.""",
         examples="""\
   smarticles measure runs/a
   smarticles measure runs/a runs/b --table phases.csv
@@ -49,17 +52,28 @@ equal values in some columns, for example over seeds.""",
   smarticles measure runs/a --json
   smarticles measure friction --table runs.csv              a sweep: one column per variable
   smarticles measure friction --by friction                 means ± SE over the runs of each value
+  smarticles measure friction --by friction --phase last    of the last phase of each run alone
   smarticles measure runs/a --profile profile.csv           φ(r, z) at the end of each phase
+  smarticles measure runs/a --also crossing-number,caging   measures on request
 """,
     )
     measure.add_argument("directories", nargs="+", type=Path, metavar="DIR", help="runs or sweeps")
     add_options(measure, "--table", help="write all columns as CSV")
     measure.add_argument("--frames", action="store_true", help="one row per frame instead of one per phase")
     measure.add_argument(
-        "--by", type=names, metavar="NAME,…", help="means and SE over runs with equal values in these columns"
+        "--by",
+        type=names,
+        action="extend",
+        metavar="NAME,…",
+        help="means and SE over runs with equal values in these columns; can be repeated",
+    )
+    measure.add_argument("--phase", metavar="NAME|last", help="only phases of this type, or the last phase of each run")
+    measure.add_argument(
+        "--also", type=names, default=(), metavar="NAME,…", help="measures on request, named in the description above"
     )
     profile_help = "write φ(r, z) at the end of each phase, in rings and layers of the container, as CSV"
     measure.add_argument("--profile", type=Path, metavar="FILE.csv", help=profile_help)
+    add_options(measure, "--jobs", help="number of processes; default: one per core")
     add_options(measure, "--overwrite", "--json")
 
 
@@ -67,6 +81,7 @@ def measure_runs(arguments: argparse.Namespace) -> int:
     """Print the measures of runs or write them to files; return the exit status."""
     import pandas as pd  # noqa: PLC0415
 
+    from dem.engine.cores import usable_cores  # noqa: PLC0415
     from dem.record.run import Run, open_run  # noqa: PLC0415
     from postprocess.measures.profile import profile_table  # noqa: PLC0415
     from postprocess.report.tables import write_table  # noqa: PLC0415
@@ -81,7 +96,15 @@ def measure_runs(arguments: argparse.Namespace) -> int:
     directories = list(sources(arguments.directories))
     for warning in filter(None, (open_run(directory).lost_series for directory in directories)):
         print(f"smarticles: warning: {warning}", file=sys.stderr)
-    table = measured(arguments.directories, frames=arguments.frames)
+    jobs = arguments.jobs or usable_cores()
+    table = measured(
+        arguments.directories, frames=arguments.frames, also=arguments.also, jobs=jobs, progress=_Progress()
+    )
+    if arguments.phase is not None:
+        try:
+            table = of_phase(table, arguments.phase)
+        except InputError as error:
+            raise InputError(f"--phase {arguments.phase}: {error}") from None
     if by:
         try:
             table = grouped(table, by)
@@ -105,6 +128,25 @@ def measure_runs(arguments: argparse.Namespace) -> int:
     if profile is not None:
         print(f"{profile}: φ(r, z), {len(rings)} rows")
     return 0
+
+
+class _Progress:
+    """Prints the number of measured runs: continuously on a terminal, else every ten seconds."""
+
+    def __init__(self) -> None:
+        self._last = time.monotonic()
+
+    def __call__(self, done: int, runs: int) -> None:
+        terminal, now = sys.stderr.isatty(), time.monotonic()
+        if runs > 1 and (terminal or now - self._last > 10):
+            self._last = now
+            text = f"measured {done} of {runs} runs"
+            print(
+                f"\r{text}" if terminal else text,
+                end="\n" * (done == runs or not terminal),
+                file=sys.stderr,
+                flush=True,
+            )
 
 
 def _groups(arguments: argparse.Namespace) -> Sequence[str]:
@@ -197,6 +239,11 @@ def _legend(shown: Container[str], *, per_frame: bool, by: Sequence[str]) -> str
         lines.append(
             "⟨N⟩: mean number of links of others through a smarticle's plane; z: height of the centre of mass "
             "above the floor"
+        )
+    if "average crossing number mean [-]" in shown:
+        lines.append(
+            "⟨ACN⟩: average crossing number of a smarticle with all others, half the crossings that are seen from a "
+            "random direction"
         )
     if "hook work [J]" in shown:
         lines.append(

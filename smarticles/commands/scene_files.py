@@ -1,17 +1,20 @@
-"""Commands `init` and `schema`: write a commented example scene; print the JSON schema of scenes."""
+"""Commands `init`, `keys` and `schema`: write an example scene; print the keys of scenes as text and as JSON schema."""
 
 import argparse
 import json
 import shlex
+from collections.abc import Iterator, Mapping
 from pathlib import Path
+from textwrap import wrap
+from typing import Any
 
-from dem.errors import InputError
+from dem.errors import InputError, nearest
 from smarticles.command_line import Commands, add_options
 from smarticles.starters import KINDS, about, starter
 
 
 def add(commands: Commands) -> None:
-    """Add `init` and `schema` to the command line."""
+    """Add `init`, `keys` and `schema` to the command line."""
     init = commands.add(
         "init",
         write_scene,
@@ -27,6 +30,18 @@ def add(commands: Commands) -> None:
         "kind", nargs="?", choices=KINDS, default=KINDS[0], metavar="KIND", help=f"{', '.join(KINDS)}; default: shaken"
     )
     add_options(init, "--output", default=Path("scene.yaml"), metavar="FILE.yaml", help="default: scene.yaml")
+    keys = commands.add(
+        "keys",
+        print_keys,
+        summary="print the keys of scenes with default, range and meaning",
+        text="NAME is a key with keys of its own, or a type of phase or motion. Without NAME the keys of the scene.",
+        examples="""\
+  smarticles keys
+  smarticles keys motor
+  smarticles keys shake
+""",
+    )
+    keys.add_argument("name", nargs="?", metavar="NAME", help="a part of the scene; without it the scene itself")
     commands.add(
         "schema",
         print_schema,
@@ -56,6 +71,68 @@ def write_scene(arguments: argparse.Namespace) -> int:
     print(f"{output}: {about(arguments.kind)}")
     print(f"next: smarticles plan {scene}, smarticles run {scene} --out {run}")
     return 0
+
+
+def print_keys(arguments: argparse.Namespace) -> int:
+    """Print the keys of a part of scenes; return the exit status."""
+    from dem.scene.reading import json_schema  # noqa: PLC0415
+
+    schema = json_schema()
+    parts = dict(_parts(schema))
+    if arguments.name is None:
+        print(
+            *_described(schema),
+            "",
+            *wrap(f"more, by `smarticles keys NAME`: {', '.join(parts)}", 100, break_on_hyphens=False),
+            sep="\n",
+        )
+        return 0
+    if arguments.name not in parts:
+        raise InputError(f"keys {arguments.name}: is no part of a scene; {nearest(arguments.name, parts)}")
+    print(*_described(parts[arguments.name]), sep="\n")
+    return 0
+
+
+def _parts(schema: Mapping[str, Any]) -> Iterator[tuple[str, Mapping[str, Any]]]:
+    """Yield the definitions of a schema by the key that has them, or by their tag, such as the type of a phase."""
+    definitions = schema["$defs"]
+    for definition in (schema, *definitions.values()):
+        for key, entry in definition["properties"].items():
+            found = [option["$ref"] for option in entry.get("anyOf", [entry]) if "$ref" in option]
+            if len(found) == 1:
+                yield key, definitions[found[0].rpartition("/")[2]]
+            elif kinds := _kinds(entry):
+                about = f"{entry.get('description', key)}. Each is one of: {', '.join(kinds)}"
+                yield key, {"description": about, "properties": {}}
+    for definition in definitions.values():
+        for entry in definition["properties"].values():
+            if "const" in entry and isinstance(entry["const"], str):
+                yield entry["const"], definition
+
+
+def _kinds(entry: Mapping[str, Any]) -> list[str]:
+    """Return the tags of the mappings of which an entry, or each item of a list, is one."""
+    if "discriminator" in entry:
+        return list(entry["discriminator"]["mapping"])
+    options = [*entry.get("anyOf", ()), *([entry["items"]] if "items" in entry else [])]
+    return next(filter(None, map(_kinds, options)), [])
+
+
+def _described(definition: Mapping[str, Any]) -> Iterator[str]:
+    """Yield two lines or more for each key: its default, choices and range, and its meaning."""
+    yield from wrap(definition.get("description", ""), 100)
+    signs = {"minimum": "≥", "exclusiveMinimum": ">", "maximum": "≤", "exclusiveMaximum": "<"}
+    for key, entry in definition["properties"].items():
+        options = entry.get("anyOf", [entry])
+        facts = [f"{sign} {option[word]:g}" for option in options for word, sign in signs.items() if word in option]
+        facts += [" or ".join(map(str, option["enum"])) for option in options if "enum" in option]
+        if key in definition.get("required", ()):
+            facts.insert(0, "needed")
+        elif "default" in entry:
+            facts.insert(0, f"default {json.dumps(entry['default'], ensure_ascii=False)}")
+        value = f": {entry['const']}" if "const" in entry else ""
+        yield f"  {key}{value}" + (f"    {', '.join(facts)}" if facts and not value else "")
+        yield from wrap(entry.get("description", ""), 100, initial_indent=" " * 6, subsequent_indent=" " * 6)
 
 
 def print_schema(_: argparse.Namespace) -> int:

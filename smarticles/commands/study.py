@@ -82,12 +82,15 @@ def run_study(arguments: argparse.Namespace) -> int:
     folder = folder_of(sweep, points, arguments.out, arguments.command_line)
     lines = differences(points, expand(load_sweep(shipped.sweep_file())))
     note = f"not the full study: {'; '.join(lines)}" if lines else "the full study as shipped"
-    print(note, flush=True)
+    full = shipped.found if lines else ""
+    print(note, *([f"the full study found: {full}"] if full else []), sep="\n", flush=True)
     earlier = {} if arguments.earlier is None else _earlier(arguments.earlier, folder, shipped.load())
     if earlier:
         note += f"; {len(earlier)} runs from the tables of an earlier analysis, {arguments.earlier}"
     pictured = shipped.load().pictured
-    return compute_and_analyse(folder, arguments, shipped.load, note=note, pictured=pictured, earlier=earlier)
+    return compute_and_analyse(
+        folder, arguments, shipped.load, note=note, full=full, pictured=pictured, earlier=earlier
+    )
 
 
 def compute_and_analyse(
@@ -96,6 +99,7 @@ def compute_and_analyse(
     load: Callable[[], Study],
     *,
     note: str,
+    full: str = "",
     pictured: Mapping[str, object],
     earlier: Mapping[str, MeasuredRun] = MappingProxyType({}),
 ) -> int:
@@ -105,6 +109,7 @@ def compute_and_analyse(
         arguments: parsed command line with --analyse and --jobs.
         load: returns the study that analyses the runs; called late, since it imports large libraries.
         note: how the runs differ from the full study.
+        full: what the full study found; empty if these runs are the full study.
         pictured: values of variables; the first finished run that has them is drawn.
         earlier: measured runs of an earlier analysis by name; these runs are not computed.
     """
@@ -117,7 +122,7 @@ def compute_and_analyse(
         results = folder.path / "results"
         # All runs are passed, since tables list unfinished runs as missing.
         runs = [folder.run(entry) for entry in folder.entries]
-        report = load().analyse(runs, results, note=note, command=arguments.command_line, earlier=earlier)
+        report = load().analyse(runs, results, note=note, full=full, command=arguments.command_line, earlier=earlier)
         figures = [f"figure: {path}" for path in report.files.values() if path.suffix == ".png"]
         origin = f"tables, and the origin of every number: {report.output}"
         print(columns(report.header, report.rows), "", *report.lines, "", *figures, origin, sep="\n", flush=True)
@@ -181,7 +186,8 @@ def differences(quick: Sequence[Point], full: Sequence[Point]) -> list[str]:
     Returns:
         `9 runs instead of 24`: fewer runs;
         `l_over_w: only 0.4, 0.7 of 0.4, 0.5, 0.7`: fewer values of a variable;
-        `shake_s: 1.5 instead of 5.0`: another value in runs that both have;
+        `shake_s: 1.5 instead of 5.0`: another value in all runs that both have;
+        `shake_s: 1.5 instead of 5.0 in 3 of 9 runs`: another value in some of them;
         `draws: 3` or `draws: not there`: a variable that only one of them has.
     """
     lines = [] if len(quick) == len(full) else [f"{len(quick)} runs instead of {len(full)}"]
@@ -196,7 +202,8 @@ def differences(quick: Sequence[Point], full: Sequence[Point]) -> list[str]:
         changed = [pair for pair in pairs if pair[0].values[name] != pair[1].values[name]]
         if changed:
             new, old = (_distinct([pair[k] for pair in changed], name) for k in (0, 1))
-            lines.append(f"{name}: {new} instead of {old}")
+            some = f" in {len(changed)} of {len(quick)} runs" if len(changed) < len(pairs) else ""
+            lines.append(f"{name}: {new} instead of {old}{some}")
         elif some != every and not any(follows(name, other, [point.values for point in full]) for other in listed):
             listed.append(name)
             lines.append(f"{name}: only {some} of {every}")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import shlex
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -49,6 +50,7 @@ def add(commands: Commands) -> None:
   smarticles sweep friction.yaml --dry-run
   smarticles sweep friction.yaml --out friction               write the scenes only
   smarticles sweep friction.yaml --out friction --submit local
+  smarticles sweep friction.yaml --out friction --to snakemake    write friction/Snakefile as well
   smarticles sweep friction.yaml --out friction --submit slurm --cluster example-large --time 12:00:00
   smarticles sweep friction.yaml --out friction --submit slurm --cluster my-cluster.toml --dry-run
 """,
@@ -56,7 +58,12 @@ def add(commands: Commands) -> None:
     sweep.add_argument("sweep", type=Path, metavar="SWEEP.yaml", help="sweep file")
     add_options(sweep, "--out", help="directory of the sweep")
     add_options(sweep, "--submit", default="none")
-    add_options(sweep, "--dry-run", help="print the runs and the job script; write nothing")
+    sweep.add_argument(
+        "--to",
+        choices=("snakemake", "row"),
+        help="write a workflow into DIR, which starts the runs by another tool: Snakemake, or row of signac",
+    )
+    add_options(sweep, "--dry-run", help="print the runs and the job script or workflow; write nothing")
     sweep.add_argument("--max-points", type=positive_int, metavar="N", help="largest number of runs; default: 10000")
     add_options(sweep, "--engine", help="compute all runs on this engine (sets the constant `engine`)")
     add_options(sweep, "--jobs")
@@ -66,10 +73,16 @@ def add(commands: Commands) -> None:
 def run_sweep(arguments: argparse.Namespace) -> int:
     """Expand a sweep file; print, write, compute or submit its runs; return the exit status."""
     from templates.sweep.expand import MAX_POINTS, expand  # noqa: PLC0415
+    from templates.sweep.folder import entry_of  # noqa: PLC0415
+    from templates.workflow import COMMANDS, TOOLS, workflow, write_workflow  # noqa: PLC0415
 
     sweep = sweeps.changed_sweep(arguments.sweep, engine=arguments.engine)
     points = expand(sweep, max_points=arguments.max_points or MAX_POINTS)
     for_cluster = sweeps.is_for_cluster(arguments)
+    if arguments.to and (for_cluster or arguments.submit != "none"):
+        raise InputError(
+            f"--to {arguments.to}: leaves the start of the runs to this tool; leave --submit and --cluster out"
+        )
     # Rendered before anything is written, so that a rejected request leaves no files.
     draft = _draft(sweep.content.name, points, arguments) if for_cluster else None
     if arguments.dry_run:
@@ -78,10 +91,17 @@ def run_sweep(arguments: argparse.Namespace) -> int:
             job = f"jobs/{draft.submission.number}"
             print(f"{draft.request.to_text()}\n\n--- {job}/runs.txt\n{draft.run_list}")
             print(f"--- {job}/array.sh\n{draft.script}")
+        if arguments.to:
+            entries = [entry_of(point, sweeps.expected_wall_s(point.scene)) for point in points]
+            print(f"\n--- {TOOLS[arguments.to]}\n{workflow(arguments.to, sweep.content.name, entries)}")
         return 0
     folder = sweeps.folder_of(sweep, points, _required_out(arguments), arguments.command_line)
     if for_cluster:
         return sweeps.enqueue(folder, arguments)
+    if arguments.to:
+        written, start = write_workflow(folder, arguments.to), COMMANDS[arguments.to]
+        print(f"{written}: {len(points)} runs; start them: cd {shlex.quote(str(folder.path))} && {start}")
+        return 0
     if arguments.submit == "none":
         print(f"{folder.path}: {len(points)} runs written; start them: smarticles resume {folder.path}")
         return 0

@@ -22,7 +22,7 @@ from dem.record.run import Run, open_run
 from dem.scene.reading import load_scene
 from dem.scene.scene import Scene
 from dem.setting.fidelity import fidelities
-from postprocess.measures.registry import shown_quantities
+from postprocess.measures.registry import Shown, shown_quantities
 from postprocess.statistics.points import format_with_error, marked
 from smarticles.command_line import format_cell
 from smarticles.measuring import has_frames, measured
@@ -40,6 +40,14 @@ _CURVES = (
     ("outside_count", 1.0, "-", None),
 )
 _MAX_WARNINGS = 30
+_MAX_REASONS = 5
+_ENERGIES = (
+    ("motor work [J]", Shown(heading="work of the motors since the start [mJ]", place=90, form=".3g", factor=1e3)),
+    (
+        "container work [J]",
+        Shown(heading="work of the container since the start [mJ]", place=91, form=".3g", factor=1e3),
+    ),
+)
 
 
 def run_page(directory: Path, accuracy: Path | None) -> str:
@@ -57,8 +65,11 @@ def run_page(directory: Path, accuracy: Path | None) -> str:
     manifest, status = run.manifest, run.status
     lead = [
         ("status", status.state),
-        ("smarticles", str(manifest.count)),
-        ("l/w", f"{manifest.aspect_ratio:g}"),
+        *(
+            [("smarticles", str(manifest.count)), ("l/w", f"{manifest.aspect_ratio:g}")]
+            if manifest.kinds is None
+            else [("bodies", f"{manifest.count} ({', '.join(dict.fromkeys(kind.shape for kind in manifest.kinds))})")]
+        ),
         ("engine", manifest.engine),
         ("fidelity", manifest.fidelity),
         ("seed", str(manifest.seed)),
@@ -104,6 +115,7 @@ def short_table(found: pd.DataFrame, named: Sequence[str], caption: str) -> Mark
     """
     present = found.columns[found.notna().any()]
     wanted = [(quantity.header, shown) for quantity, shown in shown_quantities() if quantity.header in present]
+    wanted += [(header, shown) for header, shown in _ENERGIES if header in present]
     rows = [
         [
             *(row[name] for name in named),
@@ -122,12 +134,15 @@ def frame_table(found: pd.DataFrame, caption: str) -> Markup:
     return table(caption, list(found.columns), found.itertuples(index=False, name=None), folded=True)
 
 
-def picture_blocks(directory: Path, *, name: str = "", turn: bool = True) -> list[Markup]:
+def picture_blocks(
+    directory: Path, *, name: str = "", turn: bool = True, limits: tuple[float, float] | None = None
+) -> list[Markup]:
     """Return pictures of the last frame of a run, or a note with the reason why there are none.
 
     Args:
         name: name of the run in captions; empty on the page of a single run.
         turn: add views from all sides.
+        limits: ends of the colour scale; None: the extremes in this picture.
     """
     from postprocess.pictures.render import render_run  # noqa: PLC0415  (imports PyVista)
     from postprocess.pictures.render import turntable as draw_views  # noqa: PLC0415
@@ -138,7 +153,7 @@ def picture_blocks(directory: Path, *, name: str = "", turn: bool = True) -> lis
     views = []
     with tempfile.TemporaryDirectory(prefix="smarticles-") as scratch:
         try:
-            still = embedded(render_run(directory, output=Path(scratch, "still.png"), size=(900, 900)))
+            still = embedded(render_run(directory, output=Path(scratch, "still.png"), size=(900, 900), limits=limits))
             for image in draw_views(directory) if turn else ():
                 content = io.BytesIO()
                 image.save(content, "WEBP", quality=80, method=4)
@@ -206,13 +221,15 @@ def scene_blocks(directory: Path, scene: Scene | None, scene_error: str) -> list
 
 
 def effect_blocks(scenes: Sequence[Scene]) -> list[Markup]:
-    """Return a table of effects: the number of scenes that need each, and why the first of them needs it."""
+    """Return a table of effects: the number of scenes that need each, and why they do."""
     rows = []
     for decisions in zip(*map(decide, scenes), strict=True):
         on = [effect for effect in decisions if effect.on]
         effect = (on or decisions)[0]
+        reasons = list(dict.fromkeys(one.why for one in on or decisions))
+        more = [f"and {len(reasons) - _MAX_REASONS} more reasons"] if len(reasons) > _MAX_REASONS else []
         state = f"{len(on)} of {len(decisions)}" if len(decisions) > 1 else "on" if on else "off"
-        rows.append([effect.name, state, effect.why, effect.adds.to_text()])
+        rows.append([effect.name, state, "; ".join([*reasons[:_MAX_REASONS], *more]), effect.adds.to_text()])
     caption = "Effects and the reasons for each; an effect that is off is not computed"
     return [table(caption, ["effect", "on in scenes", "reason", "added computation"], rows)] if rows else []
 

@@ -5,18 +5,22 @@ import json
 import shlex
 from collections import Counter
 from collections.abc import Mapping, Sequence
+from itertools import product
 from pathlib import Path
 from typing import Any
 
 import pandas as pd
 from markupsafe import Markup
+from scipy.special import stdtrit
 
 from dem.errors import InputError
 from dem.record.run import Run
 from dem.scene.reading import load_scene
 from dem.scene.scene import Scene
-from postprocess.measures.registry import shown_quantities
-from postprocess.statistics.points import marked
+from postprocess.measures.entanglement import link_crossings
+from postprocess.measures.registry import in_space, shown_quantities
+from postprocess.statistics.points import RUNS, marked
+from postprocess.statistics.seeds import CONFIDENCE
 from smarticles.command_line import format_cell
 from smarticles.measuring import follows, grouped, has_frames, measured, values_in
 from smarticles.reporting.charts import against_variable
@@ -40,7 +44,8 @@ PROVENANCE = "provenance.json"  #: File in every folder of results
 # Captions of the tables that are shown unfolded.
 _JUDGED = {"findings": "The paper's findings, one by one", "verdicts": "Questions and verdicts"}
 _COMPARED = {"deviations": "Deviations from Gravish's points"}
-_MAX_STILLS, _MAX_CURVES, _MAX_CHARTS = 4, 5, 4
+_MAX_STILLS, _MAX_CURVES, _MAX_CHARTS, _MAX_PARTS = 4, 5, 4, 4
+_LEAST_RUNS = 3  # for an interval that is worth its name
 
 
 def sweep_page(folder: Folder, accuracy: Path | None, *, jobs: int) -> str:
@@ -130,7 +135,7 @@ def _measured(folder: Folder, varied: Mapping[str, Sequence[Any]], *, jobs: int)
     means = grouped(runs, by)
     final = means[means["phase"] == means["phase"].max()]
     kind = str(final["phase type"].iloc[0])
-    caption = f"Means over runs ± standard error, phase {final['phase'].iloc[0]} ({kind})"
+    caption = f"Means over runs ± standard error, phase {final['phase'].iloc[0]} ({kind}).{_few(final)}"
     tables = [
         short_table(final, [*by, "runs [-]"], caption),
         frame_table(means, "All phases and measures, means over runs"),
@@ -140,29 +145,45 @@ def _measured(folder: Folder, varied: Mapping[str, Sequence[Any]], *, jobs: int)
 
 
 def _figures(final: pd.DataFrame, by: Sequence[str], varied: Mapping[str, Sequence[Any]], kind: str) -> list[Markup]:
-    """Return charts against the variable with most values, with one curve per value of a second one."""
+    """Return charts against the variable with most values, with one curve per value of a second one.
+
+    Each combination of further variables has charts of its own.
+    """
     if not by:
         return []
     x_name, *others = sorted(by, key=lambda name: -len(varied[name]))
     curve_name = next((name for name in others if len(varied[name]) <= _MAX_CURVES), None)
-    if len(others) > (curve_name is not None):
-        return []  # a curve would mix the values of further variables
+    further = [name for name in others if name != curve_name]
+    parts = list(final.groupby(further, sort=False)) if further else [((), final)]
     blocks: list[Markup] = []
-    for quantity, shown in shown_quantities():
-        if quantity.header not in final or final[quantity.header].nunique() < 2:
-            continue
+    quantities = [
+        (quantity, shown)
+        for quantity, shown in shown_quantities()
+        if quantity.header in final and final[quantity.header].nunique() > 1
+    ]
+    for (quantity, shown), (values, part) in product(quantities[:_MAX_CHARTS], parts[:_MAX_PARTS]):
+        fixed = "".join(f", {name} = {value}" for name, value in zip(further, values, strict=True))
         groups = {}
-        for value, group in [("all", final)] if curve_name is None else final.groupby(curve_name, sort=False):
+        for value, group in [("all", part)] if curve_name is None else part.groupby(curve_name, sort=False):
             rows = group.sort_values(x_name)
             means, errors = (shown.factor * rows[n] for n in (quantity.header, marked(quantity.header, "SE")))
+            half_widths = stdtrit((rows[RUNS] - 1).clip(lower=1), (1 + CONFIDENCE) / 2) * errors
             name = "all" if curve_name is None else f"{curve_name} = {value}"
-            groups[name] = (rows[x_name].tolist(), means.tolist(), errors.tolist())
+            groups[name] = (rows[x_name].tolist(), means.tolist(), half_widths.tolist())
         heading = shown.heading if "[" in shown.heading else f"{shown.heading} [-]"
-        values = final[quantity.header] * shown.factor
-        alt = f"{quantity.label} against {x_name}, from {values.min():.3g} to {values.max():.3g}"
-        caption = f"{heading}: {quantity.label} against {x_name}, means over runs ± standard error, phase {kind}."
+        drawn = part[quantity.header] * shown.factor
+        alt = f"{quantity.label} against {x_name}{fixed}, from {drawn.min():.3g} to {drawn.max():.3g}"
+        caption = f"{heading}: {quantity.label} against {x_name}{fixed}, phase {kind}. Means over runs; bars: 95 % "
+        caption += "intervals (Student's t)." + _few(part)
         blocks.append(figure(caption, alt, against_variable(x_name, heading, groups), "chart"))
-    return blocks[:_MAX_CHARTS]
+    left_out = len(parts) - _MAX_PARTS
+    return [*blocks, words(f"{left_out} more combinations are in the tables.", tone="note")] if left_out > 0 else blocks
+
+
+def _few(means: pd.DataFrame) -> str:
+    """Return a sentence about means of fewer than three runs, whose intervals are unknown or unreliable."""
+    few = int((means[RUNS] < _LEAST_RUNS).sum())
+    return f" {few} of {len(means)} points have fewer than {_LEAST_RUNS} runs." if few else ""
 
 
 def _pictures(folder: Folder) -> list[Markup]:
@@ -171,11 +192,23 @@ def _pictures(folder: Folder) -> list[Markup]:
     one_seed = [entry for entry in done if entry.values.get(SEED) == done[0].values.get(SEED)]
     count = min(_MAX_STILLS, len(one_seed))
     chosen = [one_seed[round(k * (len(one_seed) - 1) / max(count - 1, 1))] for k in range(count)]
+    limits = _common_limits([Run(folder.run(entry)) for entry in chosen])
     return [
         block
         for entry in chosen
-        for block in picture_blocks(folder.run(entry), name=entry.name, turn=entry is chosen[-1])
+        for block in picture_blocks(folder.run(entry), name=entry.name, turn=entry is chosen[-1], limits=limits)
     ]
+
+
+def _common_limits(runs: Sequence[Run]) -> tuple[float, float] | None:
+    """Return the ends of a colour scale of crossings for the last frames of runs; None if a run has no crossings."""
+    try:
+        if not all(has_frames(run.path) and in_space(run) for run in runs):
+            return None
+        most = max((int(link_crossings(run.frames[-1].vertices).max(initial=0)) for run in runs), default=0)
+    except InputError:  # a damaged frame, or bodies of another shape
+        return None
+    return (0.0, float(most)) if most else None
 
 
 def _repeat(folder: Folder) -> list[Markup]:

@@ -136,6 +136,7 @@ class Means:
     bounds: Mapping[str, str] = field(default_factory=dict)
     #: Published values: places along x and values, by the column of the quantity
     reference: Mapping[str, tuple[pd.Series, pd.Series]] = field(default_factory=dict)
+    published: str = "experiment"  #: Text in the legend for the published values
     fit: Fit | None = None  #: Computes curves from x = 0 to the last point of each series
     #: Returns the crosses of a panel from the study's tables and the panel's value: columns `x`, `y`, and `low` and
     #: `high`, the 95 % interval of x
@@ -174,7 +175,7 @@ class Means:
                 axes.axhline(level, color=style.ORANGE, linewidth=0.9, linestyle=line, label=label)
         if column in self.reference:
             properties = {**marker("o", style.ORANGE, style.ORANGE), "linestyle": "none"}
-            draw_means(axes, *self.reference[column], None, properties=properties, label="experiment")
+            draw_means(axes, *self.reference[column], None, properties=properties, label=self.published)
         positive = True
         for number, engine in enumerate(engines_of(table) or ("",)):
             label = f"simulation on {ENGINE_NAMES.get(engine, engine)}"

@@ -2,6 +2,7 @@
 
 import importlib.metadata
 import json
+import shlex
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -38,6 +39,7 @@ class Origin:
 
     found: Collected  #: Runs that were measured, and runs that are missing
     note: str  #: How the planned runs differ from the full study
+    full: str = ""  #: What the full study found; empty if these runs are the full study
     command: str  #: Command line
     reference: Reference
 
@@ -50,6 +52,11 @@ class Origin:
     def _versions(self, name: str, engine: str = "") -> list[str]:
         manifests = [run.run.manifest for run in self.found.runs if engine in ("", run.run.manifest.engine)]
         return sorted({manifest.versions.get(name, "unknown") for manifest in manifests})
+
+    @property
+    def _start(self) -> str:
+        words = [word for word in shlex.split(self.command) if word != "--analyse"]
+        return shlex.join(words)
 
     @property
     def _engines(self) -> list[str]:
@@ -66,11 +73,14 @@ class Origin:
     def figure_footer(self, points: str, text_name: str) -> list[str]:
         """Return the footer of a figure, which names the file with the full footer."""
         first, *more = (f"planned: {self.note}" if self.found.missing else self.note).split("; ")
+        differs = f"{first[0].upper()}{first[1:]}{' and more' if more else ''}."
+        if self.full:
+            differs = f"Not the full study, which found: {self.full}"
         commits = self._versions("git")
         made = f"{len(commits)} commits" if len(commits) > 2 else f"Commit {', '.join(commits)}"
         return [
             f"{self._which}; {points}",
-            f"{first[0].upper()}{first[1:]}{' and more' if more else ''}. {made}. More: {text_name}, provenance.json.",
+            f"{differs} {made}. More: {text_name}, provenance.json.",
         ]
 
     def footer(self, points: str, *statements: str) -> list[str]:
@@ -82,6 +92,7 @@ class Origin:
             *statements,
             f"Reference: {self.reference.statement}.",
             f"Note: {self.whole_note}",
+            *([f"The full study found: {self.full}"] if self.full else []),
             f"Versions: {versions}. Command: {self.command}",
         ]
 
@@ -141,6 +152,8 @@ class Origin:
             "study": self.found.study,
             "note": self.whole_note,
             "command": self.command,
+            # Commands of runs name scene files in the directory of the study.
+            "scenes": f"written into DIR/scenes by the command that starts the study: {self._start}",
             "footer": list(footer),
             "analysed_with": {"smarticles": version},
             **(packing if any(DEFINITION in column for column in columns) else {}),

@@ -11,7 +11,7 @@ import pandas as pd
 
 from dem.errors import InputError
 from dem.record.run import Run, SceneData
-from postprocess.measures.packing import COSTLY_DEFINITIONS, DEFINITIONS
+from postprocess.measures.packing import COSTLY_DEFINITIONS, DEFINITIONS, packing_of
 from postprocess.measures.table import LAST_FRAMES, packing_change, summarise_run
 from postprocess.statistics.points import ASPECT
 from studies.framework.figures import Histories, History, one_by_one
@@ -23,8 +23,16 @@ SHAKE_TIME = 20.0  #: Time for which Gravish et al. shook [s]
 
 DIGITISING_ERROR = 0.003  #: Assumed error of reading φ from Gravish's figure [-]
 
+AT_REST = "phi_f at rest"
+"""Stage at which φ_f is compared with Gravish: the last frame of the relaxation that follows shaking.
+
+Gravish et al. vibrated staples in a container for 20 s and then removed the container (Physics World, 23 May 2012:
+"Shaken staples stick together"), so that their φ_f is that of a pile at rest. Savoie et al. average φ_f of their
+simulation while the pile is shaken (`changeInPhiAmp.m` of wsavoie/SmarticleSim).
+"""
+
 GRAVISH_COLUMNS: Mapping[str, str] = MappingProxyType(
-    {"phi_0": "phi_initial", "phi_f": "phi_final", "phi_f relaxed": "phi_final"}
+    {"phi_0": "phi_initial", "phi_f": "phi_final", "phi_f relaxed": "phi_final", AT_REST: "phi_final"}
 )  #: Column of `read_gravish` that each stage is compared with
 
 _FILE = files("postprocess") / "reference" / "gravish2012_phi.csv"
@@ -42,9 +50,10 @@ STAGES: Mapping[str, str] = MappingProxyType(
     {
         "phi_0": "before shaking",
         "phi_f": "at the end of shaking",
-        "phi_f relaxed": "after the relaxation that follows shaking",
+        "phi_f relaxed": "while the pile settles after shaking",
+        AT_REST: "at rest after shaking",
     }
-)  #: Stages at which a packing fraction is measured, as a mean over the last frames of a phase
+)  #: Stages at which a packing fraction is measured: means over the last frames of a phase, at rest the last frame
 
 WHEN = f"before shaking and at the end of shaking, means over the last {LAST_FRAMES} frames or fewer"
 """Statement for footers on how φ_0 and φ_f are averaged."""
@@ -162,7 +171,9 @@ def measured_row(run: Run, definitions: Sequence[str]) -> dict[str, object]:
             row[f"phi_f {definition} [-]"] = change.after.value
     for stage, phase in wanted.items():
         row[f"{stage} {DEFINITION} SE in run [-]"] = table.loc[phase, f"phi {DEFINITION} SE [-]"]
-    for name, stage in zip(("before", "after", "relaxed"), STAGES, strict=True):
+    if "phi_f relaxed" in wanted:
+        row[phi(AT_REST)] = packing_of(run.frames[-1], run, definition=DEFINITION)
+    for name, stage in zip(("before", "after", "relaxed"), STAGES, strict=False):
         if stage in wanted:
             row[f"crossings {name} [-]"] = table.loc[wanted[stage], "crossings mean [-]"]
     row["escaped at the end [-]"] = table["escaped [-]"].iloc[-1]

@@ -105,6 +105,7 @@ class Study:
         output: Path | str,
         *,
         note: str,
+        full: str = "",
         command: str,
         earlier: Mapping[str, MeasuredRun] | None = None,
     ) -> Report:
@@ -115,6 +116,7 @@ class Study:
         Args:
             run_dirs: directories of the runs; runs that are not done or cannot be read are listed as missing.
             note: how the runs differ from the full study, for footers.
+            full: what the full study found, for footers; empty if these runs are the full study.
             command: command line, for footers.
             earlier: runs of an earlier analysis by name, which replace directories that do not exist.
         """
@@ -124,7 +126,7 @@ class Study:
         tables = self.tabulate(found.table(), found.times())
         judged = self.judge(tables)
         tables["findings"] = findings_table(judged)
-        origin = Origin(found=found, note=note, command=command, reference=self.reference)
+        origin = Origin(found=found, note=note, full=full, command=command, reference=self.reference)
         footer = origin.footer(*self.statements(tables))
         header, rows = self.table(tables)
         lines = self.text(tables, judged, table_lines(header, rows))

@@ -33,6 +33,8 @@ import meshio
 import numpy as np
 import yaml
 
+from dem.record.vtkhdf import read_step, read_times
+
 CASES = Path(__file__).with_name("bits_scenes.yaml")
 SAID = "said"  # folder of a case with what its commands printed
 LIMIT_S = 900.0  # longest time of one command
@@ -59,6 +61,8 @@ ALLOWED = (
     ("*.txt", r"(?<=(?:done|iled) after )[\d:]+", "wall time"),
     ("*.txt", r"^\d+ of \d+ runs ended.*", "printed twice a minute of wall time"),
     ("*-plan.*", r"(?<=table: )/\S*(?=/results/accuracy/)", "where the checkout lies"),
+    ("*-plan.*", r"^(compile_s: |compiling, once|total ).*", "time to compile, until the code is stored"),
+    ("*.txt", r"^(compiling|another process compiles) the links engine.*", "printed until the code is stored"),
     ("*/array.sh", r"(?<=[ (])/\S*(?=/)", "where the folder and the program lie"),
     ("*/array.sh", r"(?<=--job-name=).*", "contains a hash of where the folder lies"),
     ("*/job.json", r"^job_name: .*", "contains a hash of where the folder lies"),
@@ -66,8 +70,17 @@ ALLOWED = (
     ("accuracy/ladder/results/accuracy.*", r".*", "drawn and printed over processor time; tables are compared"),
     ("accuracy/said/02-accuracy.out.txt", r".*", "printed over processor time; tables are compared"),
 )
-PACKED = (".vtu", ".h5")  # the same content may have other bytes
-SAME_OF_TWINS = ("frames", "spheres", "frames.pvd", "spheres.pvd", "series.h5", "scene.yaml", "done.json")
+PACKED = (".vtu", ".vtkhdf", ".h5")  # the same content may have other bytes
+SAME_OF_TWINS = (
+    "frames",
+    "spheres",
+    "frames.pvd",
+    "frames.vtkhdf",
+    "spheres.pvd",
+    "series.h5",
+    "scene.yaml",
+    "done.json",
+)
 
 
 def read_cases(only: Sequence[str]) -> dict[str, dict[str, Any]]:
@@ -183,6 +196,13 @@ def _arrays(path: Path) -> dict[str, Any]:
         arrays = {"points": mesh.points, **mesh.point_data}
         arrays |= {f"cells.{k}.{block.type}": block.data for k, block in enumerate(mesh.cells)}
         return arrays | {f"{name}.{k}": data for name, parts in mesh.cell_data.items() for k, data in enumerate(parts)}
+    if path.suffix == ".vtkhdf":
+        frames = [read_step(path, k) for k in range(len(read_times(path)))]
+        return {
+            f"{k}.{name}": rows
+            for k, mesh in enumerate(frames)
+            for name, rows in {"points": mesh.points, **{n: v[0] for n, v in mesh.cell_data.items()}}.items()
+        }
     with h5py.File(path) as file:
         found = {f"{item.name}@{key}": value for item in (file, *file.values()) for key, value in item.attrs.items()}
         return found | {name: file[name][()] for name in file}

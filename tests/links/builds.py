@@ -3,13 +3,12 @@
 import math
 from typing import Any
 
-import numba
 import numpy as np
 from scipy.spatial.transform import Rotation
 
 from dem.body.particle import Boxes, Particle, SphereChain, mean_width
 from dem.body.placement import Poses, place_layer
-from dem.engine.links.compiler import OPTIONS
+from dem.engine.links import compiler
 from dem.engine.links.engine import LinksEngine
 from dem.physics.contact import ContactLaw
 from dem.physics.motor import MotorLaw
@@ -40,7 +39,7 @@ ELASTIC = ContactLaw(
 
 def callable_from_python(part: Any) -> Any:
     """A part of the kernels that tests can call."""
-    return numba.njit(**OPTIONS)(part.py_func)
+    return compiler.callable_from_python(part.py_func)
 
 
 def boxes(aspect: float = 0.7, angles: tuple[float, float] = (math.pi / 2, math.pi / 2)) -> Boxes:

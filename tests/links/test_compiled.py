@@ -6,10 +6,9 @@ import sys
 from pathlib import Path
 
 import builds
-import numba
 from numba import types
 
-from dem.engine.links.compiler import OPTIONS
+from dem.engine.links.compiler import callable_from_python
 from dem.engine.links.stepping import advance
 
 HERE = Path(__file__).parent
@@ -50,7 +49,7 @@ def test_a_scene_compiles_what_it_calls_for_only() -> None:
         plain += [signature] if all(one is types.none for one in lacking) else []
     assert plain
     # Nothing of a hook, a rim, a string or the ledger is in its code. Compiled anew: cached code cannot be looked at.
-    fresh = numba.njit(**OPTIONS)(advance.py_func)
+    fresh = callable_from_python(advance.py_func)
     fresh.compile(plain[0])
     code = fresh.inspect_llvm(plain[0])
     for name in ("contacts_with_hooks", "nearest_to_circle", "settle", "middle_of_step"):
@@ -64,14 +63,15 @@ def test_cold_and_warm_give_the_same_bits_and_a_broken_cache_is_no_harm(tmp_path
     warm, said = run(tmp_path)
     assert warm == cold
     assert said == ""
-    # One file of many: each is read by itself, and the largest would be compiled for half a minute once more.
-    small, *others = sorted(tmp_path.rglob("*.nbc"), key=lambda file: file.stat().st_size)
+    # One file of many: each is read by itself, and the largest would be compiled for long once more.
+    small, *others = sorted(tmp_path.rglob("*.code"), key=lambda file: file.stat().st_size)
     assert others
     small.write_bytes(b"rubbish")
     broken, said = run(tmp_path)
     assert broken == cold
     assert "compiled code cannot be read" in said
     assert str(tmp_path) in said
+    assert run(tmp_path) == (cold, "")  # what was broken has been compiled and stored
 
 
 def test_a_folder_that_cannot_be_written_is_told_once(tmp_path: Path) -> None:

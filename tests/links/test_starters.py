@@ -25,7 +25,7 @@ SHORT = {
 def test_a_starter_runs(kind: str, tmp_path: Path) -> None:
     file = tmp_path / "scene.yaml"
     file.write_text(starter(kind), encoding="utf-8")
-    scene = smarticles.load_scene(file, [f"count={FEW.get(kind, 8)}", *SHORT[kind]])
+    scene = smarticles.load_scene(file, [f"count={FEW.get(kind, 8)}", *SHORT.get(kind, [])])
     done = smarticles.run(scene, tmp_path / "run")
     assert done.status.state == "done"
     assert done.frames[-1].count == scene.count

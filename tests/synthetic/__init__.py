@@ -14,8 +14,8 @@ from scipy.spatial.transform import Rotation
 
 from dem.record.columns import EVERY
 from dem.record.document import Done, Failed, Manifest, Phase
-from dem.record.frame import centreline_mesh
-from dem.record.frames import FrameWriter
+from dem.record.frame import centreline_mesh, read_mesh
+from dem.record.frames import FrameWriter, OneFileWriter, read_frames
 from dem.record.series import SeriesWriter
 from synthetic.shapes import RADIUS, T1, T2, W, u_shape
 
@@ -240,3 +240,13 @@ def write_ended(directory: Path, scene_sha256: str, *, status: str = "done") -> 
     directory.mkdir(parents=True)
     write_manifest(directory, SyntheticRun(phases=("deposit",)), scene_sha256=scene_sha256)
     write_ending(directory, ("deposit",), [(0.0, 1.0)], status=status, wall=2.0)
+
+
+def put_into_one_file(directory: Path) -> None:
+    """Replace the frames of a run, `.vtu`, by one file with the same content."""
+    frames = read_frames(directory)
+    writer = OneFileWriter(directory, radii=[T2 / 2] * 3)
+    for number, path in enumerate(frames.paths):
+        writer.write(read_mesh(path), float(frames.times[number]))
+    FrameWriter(directory).truncate([])
+    (directory / "frames.pvd").unlink()

@@ -255,7 +255,7 @@ def oscillation(access: EngineAccess, out: Path, *, seconds: float, count: int =
         engine.motors.actuate(np.tile(centre + angle, (1, count, 1)), interval)
         engine.advance(round(interval / engine.time_step))
         if n % 20 == 0:
-            state = engine.state()
+            state = engine.state().smarticles
             height = state.potential_energy(engine.gravity, 0.0)
             rows.append((n * interval, state.kinetic_energy, height, engine.motors.gaps().max()))
         if n % 500 == 0 and (message := watchdog_error(engine, recorder)):

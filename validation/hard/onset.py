@@ -149,13 +149,13 @@ def _energies(engine: Engine, scene: Scene) -> Iterator[tuple[float, float, floa
     """Advance in steps of about 1 ms; yield time [s], kinetic energy and total energy less motor work [J]."""
     dt = engine.time_step
     interval = dt * max(1, round(scene.fidelity.control_interval_s / dt))
-    held, updates = engine.state().angles, max(1, round(1e-3 / interval))
+    held, updates = engine.state().smarticles.angles, max(1, round(1e-3 / interval))
     while engine.time < SETTLE + WATCH:
         for _ in range(updates):
             if engine.motors.articulated:
                 engine.motors.actuate(held[None], interval)
             engine.advance(round(interval / dt))
-        state = engine.state()
+        state = engine.state().smarticles
         total = state.kinetic_energy + state.potential_energy(engine.gravity, 0.0) + sum(engine.ledger.elastic())
         yield engine.time, state.kinetic_energy, total - engine.motors.work
 

@@ -9,7 +9,7 @@ from typing import Any
 import h5py
 import numpy as np
 
-from dem.body.state import State
+from dem.body.state import PileState
 from dem.engine.interface import Engine
 from dem.errors import InputError, RunError
 from dem.physics.overlaps import Extremes, Overlaps
@@ -36,7 +36,7 @@ class Noting(Watchdog):
         """Return False, so that the watchdog examines all contacts at every check."""
         return False
 
-    def check(self, state: State, **options: Any) -> None:
+    def check(self, state: PileState, **options: Any) -> None:
         """Record the largest gap of a hinge, then check."""
         if (gaps := options.get("gaps")) is not None:
             self._note("gap", gaps.max(initial=0.0) / self.gap)
@@ -47,7 +47,7 @@ class Noting(Watchdog):
         self._note("depth", overlaps.deepest / self.depth)
         super().check_depths(overlaps, **options)
 
-    def check_energy(self, state: State, *, energy: float, **options: Any) -> None:
+    def check_energy(self, state: PileState, *, energy: float, **options: Any) -> None:
         """Record the excess of energy, then check."""
         if np.isfinite(energy - self._ceiling):
             self._note("energy", (energy - self._ceiling) / self.energy)
@@ -143,7 +143,7 @@ def whole(
                 spoil(engine)
             record(engine, phase)
 
-        def watch_timed(engine: Engine, state: State | None = None) -> None:
+        def watch_timed(engine: Engine, state: PileState | None = None) -> None:
             begun = time.process_time()
             try:
                 watch(engine, state)

@@ -23,7 +23,7 @@ def drop(access: EngineAccess, out: Path, *, articulated: bool, time: float) -> 
     access.push(engine, 0, velocity=(0, 0, -speed))
     if articulated:
         engine.motors.articulate()
-    held = engine.state().angles
+    held = engine.state().smarticles.angles
     message = watchdog_error(engine, recorder)
     energies, lows, gaps = [energy(engine)], [math.inf], [0.0]
     interval = scene.fidelity.control_interval_s
@@ -32,7 +32,7 @@ def drop(access: EngineAccess, out: Path, *, articulated: bool, time: float) -> 
             engine.motors.actuate(held[None], interval)
         engine.advance(round(interval / engine.time_step))
         energies.append(energy(engine))
-        lows.append(engine.state().positions[0, 2])
+        lows.append(engine.state().smarticles.positions[0, 2])
         gaps.append(engine.motors.gaps().max())
     d, particle = scene.sphere_diameter, scene.particle
     most, end = (max(energies) - max(0.0, engine.motors.work)) / energies[0], energies[-1] / energies[0]
@@ -44,7 +44,7 @@ def drop(access: EngineAccess, out: Path, *, articulated: bool, time: float) -> 
         below("energy at the end over that of the impact [1]", end, 0.7),
         above("lowest centre of mass [m]", min(lows), -depth),
         below("lowest centre of mass [m]", min(lows), 0.005),
-        above("height at the end [m]", float(engine.state().positions[0, 2]), particle.radius),
+        above("height at the end [m]", float(engine.state().smarticles.positions[0, 2]), particle.radius),
         below("largest joint gap [d]", max(gaps) / d, 1.0 if articulated else 1e-9),
         below("joint gap at the end [d]", gaps[-1] / d, 0.01),
     ]
@@ -63,7 +63,7 @@ def landing(access: EngineAccess, out: Path, *, time: float) -> list[Check]:
     for k in range(4):
         add(engine, (0, 0, 0.01 + 0.01 * k), Rotation.random(random_state=k))
     engine.motors.articulate()
-    held, interval, message, hardest = engine.state().angles, scene.fidelity.control_interval_s, None, 0.0
+    held, interval, message, hardest = engine.state().smarticles.angles, scene.fidelity.control_interval_s, None, 0.0
     while not message and engine.time < time:
         engine.motors.actuate(held[None], interval)
         engine.advance(round(interval / engine.time_step))
@@ -89,7 +89,7 @@ def tip(access: EngineAccess, out: Path, *, speed: float) -> list[Check]:
     message, first, lowest = None, energy(engine), math.inf
     while not message and engine.time < 0.05:
         engine.advance(2)
-        lowest = min(lowest, float(engine.state().spheres(scene.particle)[..., 2].min()))
+        lowest = min(lowest, float(engine.state().smarticles.spheres(scene.particle)[..., 2].min()))
         message = watchdog_error(engine, recorder)
     left = "1 smarticle(s) (0): left through the wall or the floor; raise fidelity.stiffness_N_per_m"
     return [
@@ -111,7 +111,7 @@ def overlap(access: EngineAccess, out: Path, *, time: float) -> list[Check]:
     for _ in range(round(time / 1e-3)):
         engine.advance(round(1e-3 / engine.time_step))
         energies.append(energy(engine))
-    spheres = engine.state().spheres(scene.particle)
+    spheres = engine.state().smarticles.spheres(scene.particle)
     apart = np.linalg.norm(spheres[0][:, None] - spheres[1][None], axis=-1).min()
     # On links the barrier separates them; chains of spheres may pass through each other, which must be reported.
     seen = (
@@ -208,7 +208,7 @@ def mass_ratio(
     while not message and engine.time < start_time + time:
         engine.advance(round(recorder.interval / engine.time_step) // 20)
         message = watchdog_error(engine, recorder)
-        heights.append(engine.state().positions[:, 2])
+        heights.append(engine.state().smarticles.positions[:, 2])
     if not carries:
         return [says(message, "at t = ", "raise fidelity.stiffness_N_per_m")]
     # The heavy smarticle oscillates with little damping: compare the mean, within 10 %.

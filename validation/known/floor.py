@@ -50,7 +50,7 @@ def roll(access: EngineAccess, particle: Particle, law: ContactLaw, *, speed: fl
     rows = []
     for _ in range(400):
         engine.advance(max(1, round(2 * rolls_at / 400 / dt)))
-        state = engine.state()
+        state = engine.state().smarticles
         along = state.velocities[0, 1]
         rows.append((engine.time, along, along + state.link_spins[0, 1, 0] * lever))
     time, speeds, slip = np.array(rows).T
@@ -93,7 +93,7 @@ def slide(access: EngineAccess, *, aspect_ratio: float = 0.7, friction: float = 
     rows = [(0.0, -0.03, speed)]
     while engine.time < 1.5 * stops:
         engine.advance(max(1, round(2e-3 / engine.time_step)))
-        state = engine.state()
+        state = engine.state().smarticles
         rows.append((engine.time, state.positions[0, 1], state.velocities[0, 1]))
     times, ways, speeds = np.array(rows).T
     sliding, across = times < 0.8 * stops, state.positions[0, 0]
@@ -133,7 +133,7 @@ def roll_errors(access: EngineAccess, steps: Sequence[float], *, phases: int = 5
         engine = resting(access, access.roller(), law, dt=dt, speed=speed)
         access.push(engine, 0, velocity=(0, speed + slowed * dt / 2, 0), spin=(spin_rate * dt / 2, 0, 0))
         engine.advance(round(time / dt))
-        return np.asarray(engine.state().positions[0])
+        return np.asarray(engine.state().smarticles.positions[0])
 
     squares = np.zeros(len(steps))
     for number in range(phases):
@@ -165,7 +165,7 @@ def two_high(
 def stack_at_rest(access: EngineAccess) -> list[Answer]:
     engine = two_high(access, ball_law(restitution=0.2), dt=2e-5, sunk=False)
     engine.advance(5000)
-    low, high = engine.state().positions[:, 2]
+    low, high = engine.state().smarticles.positions[:, 2]
     weight, force = BALL_MASS * G, access.floor_force(engine)[2]
     reason = "what is left of the vibration after 0.1 s, 40 periods of it"
     return [
@@ -195,9 +195,9 @@ def stack_errors(access: EngineAccess, steps: Sequence[float]) -> list[float]:
         # Velocities half a step before t = 0, to second order.
         before = modes @ (share * np.cos(frequencies * dt / 2))
         engine = two_high(access, ball_law(), dt=dt, velocities=before, sunk=True)
-        rest = engine.state().positions[:, 2]
+        rest = engine.state().smarticles.positions[:, 2]
         engine.advance(round(time / dt))
-        errors.append(float(np.linalg.norm(engine.state().positions[:, 2] - rest - exact)))
+        errors.append(float(np.linalg.norm(engine.state().smarticles.positions[:, 2] - rest - exact)))
     return errors
 
 
@@ -222,7 +222,7 @@ def _answers(engine: Engine, levels: int, each: int, *, contacts: int | None) ->
     is their number, None if they are not equivalent.
     """
     found = engine.contact_forces()
-    weight = each * engine.particle.boxes.mass * G
+    weight = each * engine.particle.mass * G
     answers = []
     for level in range(levels):
         forces = _level(found, level, each)
@@ -302,7 +302,7 @@ def _sunk(access: EngineAccess, one: Scene, dt: float, *, time: float) -> float:
     engine = access.build(one.particle, law_of(one), dt=dt, gravity=G)
     add(engine, (0, 0, lying(one)))
     engine.advance(round(time / dt))
-    return lying(one) - float(engine.state().positions[0, 2])
+    return lying(one) - float(engine.state().smarticles.positions[0, 2])
 
 
 def _sunk_theory(points: Array, *, stiffness: float, weight: float) -> float:

@@ -30,7 +30,7 @@ def fall(access: EngineAccess, dt: float, *, time: float, throw: float, centred:
     add(engine, (0, 0, 0.1), TILTED)
     access.push(engine, 0, velocity=(0, 0, throw + centred * G * dt / 2))
     engine.advance(round(time / dt))
-    state = engine.state()
+    state = engine.state().smarticles
     turned = (Rotation.from_matrix(body_rotations(state)[0]) * TILTED.inv()).magnitude()
     return state.positions[0] - [0, 0, 0.1], float(state.velocities[0, 2]), float(turned)
 
@@ -73,9 +73,9 @@ def spin_rotations(access: EngineAccess, dt: float, *, spin: Array, times: Array
     rows, spins = [], []
     for time in times:
         engine.advance(round(time / dt) - 1 - engine.steps)
-        before = Rotation.from_matrix(body_rotations(engine.state())[0])
+        before = Rotation.from_matrix(body_rotations(engine.state().smarticles)[0])
         engine.advance(1)
-        rows.append(Rotation.from_matrix(body_rotations(engine.state())[0]))
+        rows.append(Rotation.from_matrix(body_rotations(engine.state().smarticles)[0]))
         spins.append((rows[-1] * before.inv()).as_rotvec() / dt)
     return Rotation.concatenate(rows), np.array(spins)
 

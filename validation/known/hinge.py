@@ -69,7 +69,7 @@ def pull(
     engine = access.build_hinged(one, gravity=0.0)
     add(engine, (0, 0, 0.05), Rotation.from_rotvec([0.4, 0.2, -0.7]))
     engine.motors.articulate()
-    straight, along = engine.state().angles, engine.state().link_rotations[0, 1, :, 0]
+    straight, along = engine.state().smarticles.angles, engine.state().smarticles.link_rotations[0, 1, :, 0]
     force, gaps = 100 * one.smarticle.boxes.mass * G, []
     for time in drive(engine, one, duration, lambda _: straight):
         pulling = min(1.0, 2 * time / duration) * force * along
@@ -95,9 +95,9 @@ def droop(access: EngineAccess, *, aspect_ratio: float = 0.7, fidelity: str = "s
     # On links the external force acts before the spring: an error of (ω dt)²/4 of the sag, 2 % at the scene's step.
     dt = None if access.name == "yade" else one.fidelity.control_interval_s / 20
     engine = upright(access, one, gravity=G, dt=dt)
-    begun = engine.state().angles
+    begun = engine.state().smarticles.angles
     rows = [
-        (*access.torques(engine), *engine.motors.gaps()[0], *(engine.state().angles - begun)[0])
+        (*access.torques(engine), *engine.motors.gaps()[0], *(engine.state().smarticles.angles - begun)[0])
         for _ in drive(engine, one, 0.2, lambda _: begun)
     ]
     # Barbs vibrate about their equilibrium; a Hann window removes the vibration.
@@ -129,20 +129,20 @@ def tilt(access: EngineAccess, *, sweeps: int = 1) -> list[Answer]:
     add(engine, (0, 0, 0.05))
     engine.motors.articulate()
     access.hold(engine)
-    start, goal, each = engine.state().angles[0], math.radians(-15), 0.35
+    start, goal, each = engine.state().smarticles.angles[0], math.radians(-15), 0.35
     for _ in drive(engine, one, each * sweeps, lambda t: start + (goal - start) * (1 - abs(t / each % 2 - 1))):
         pass
     readings, tilts = engine.motors.readings, []
     assert readings is not None  # the scene actuates
     last = readings.commands[0].copy()
     for _ in drive(engine, one, 0.05, lambda _: last):
-        normals = engine.state().link_rotations[0, :, :, 2]
+        normals = engine.state().smarticles.link_rotations[0, :, :, 2]
         tilts.append(np.cross(normals[1], normals[[0, 2]]))
     mass, _, lever = _barb(one)
-    along = engine.state().link_rotations[0, [0, 2], :, 0]
+    along = engine.state().smarticles.link_rotations[0, [0, 2], :, 0]
     expected = np.cross(along * lever, [0, 0, -mass * G]) / hinge_law(one).tilt_stiffness
     found = np.average(tilts, axis=0, weights=np.hanning(len(tilts)))
-    size, angle = float(np.linalg.norm(expected[0])), engine.state().angles[0].mean()
+    size, angle = float(np.linalg.norm(expected[0])), engine.state().smarticles.angles[0].mean()
     worst = size + float(np.abs(found - expected).max())
     return [
         Answer("angle that was reached [rad]", goal, angle, 0.03, VIBRATION),
@@ -166,11 +166,11 @@ def pendulum(access: EngineAccess, *, aspect_ratio: float = 0.7) -> list[Answer]
         access, aspect_ratio=aspect_ratio, angles=(96, 84), stiffness_N_m_per_rad=1e-9, torque_limit_N_m=STRONG
     )
     engine = upright(access, one, gravity=G)
-    begun = engine.state().angles
+    begun = engine.state().smarticles.angles
     times, angles = [], []
     for time in drive(engine, one, 0.45, lambda _: begun):
         times.append(time)
-        angles.append(engine.state().angles[0] - math.pi / 2)
+        angles.append(engine.state().smarticles.angles[0] - math.pi / 2)
     mass, own, lever = _barb(one)
     amplitude = math.radians(6)
     period = 2 * math.pi * math.sqrt((own + mass * lever**2) / (mass * G * lever)) * (1 + amplitude**2 / 16)
@@ -233,9 +233,9 @@ def floating(access: EngineAccess, one: Scene, *, held: bool, dt: float | None =
 def shaft_vibration(access: EngineAccess, *, held: bool) -> list[Answer]:
     one = hinged(access, fidelity="standard", torque_limit_N_m=STRONG)
     engine = floating(access, one, held=held)
-    begun = engine.state().angles
+    begun = engine.state().smarticles.angles
     log: list[Array] = []
-    for _ in drive(engine, one, 0.04, lambda _: begun, each=lambda: log.append(engine.state().angles[0])):
+    for _ in drive(engine, one, 0.04, lambda _: begun, each=lambda: log.append(engine.state().smarticles.angles[0])):
         pass
     turned = np.array(log)[:, 0] - begun[0, 0]
     time: Array = engine.time_step * np.arange(1, len(turned) + 1, dtype=np.float64)
@@ -266,8 +266,8 @@ def vibration_errors(access: EngineAccess, steps: Sequence[float]) -> list[float
 
     def path(dt: float) -> Array:
         engine = floating(access, one, held=False, dt=dt)
-        begun = engine.state().angles
-        return np.array([engine.state().angles[0, 0] for _ in drive(engine, one, 0.01, lambda _: begun)])
+        begun = engine.state().smarticles.angles
+        return np.array([engine.state().smarticles.angles[0, 0] for _ in drive(engine, one, 0.01, lambda _: begun)])
 
     reference = path(min(steps) / 8)
     return [float(np.sqrt(np.mean((path(dt) - reference) ** 2))) for dt in steps]

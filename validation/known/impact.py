@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from dem.body.state import spheres_of
 from dem.engine.interface import Engine
 from dem.physics.contact import ContactLaw, typical_effective_mass
 from dem.plan.steps import time_step
@@ -48,11 +49,11 @@ def touch(access: EngineAccess, engine: Engine, *, most: int) -> Touch:
         engine.advance(1)
         if access.floor_force(engine)[2]:
             pressed += 1
-            state = engine.state()
-            deepest = max(deepest, engine.particle.radius - float(state.spheres(engine.particle)[0, :, 2].min()))
+            state = engine.state().smarticles
+            deepest = max(deepest, engine.particle.radius - float(spheres_of(state, engine.particle)[0, :, 2].min()))
         elif pressed:
             break
-    state = engine.state()
+    state = engine.state().smarticles
     return Touch(state.velocities[0], state.link_spins[0, 1], pressed, deepest)
 
 
@@ -114,7 +115,7 @@ def pair_rebound(access: EngineAccess, restitution: float = 0.5) -> list[Answer]
     access.push(engine, 0, velocity=(0, 0, speed / 4))
     access.push(engine, 1, velocity=(0, 0, -3 * speed / 4))
     engine.advance(4 * RESOLVED)
-    after = engine.state().velocities[:, 2]
+    after = engine.state().smarticles.velocities[:, 2]
     momentum = BALL_MASS * after.sum()
     return [
         Answer("restitution [1]", restitution, (after[1] - after[0]) / speed, 0.01, FIRST),
@@ -165,7 +166,7 @@ def bars_rebound(access: EngineAccess, restitution: float = 0.5) -> list[Answer]
     access.push(engine, 0, velocity=(0, 0, speed / 2))
     access.push(engine, 1, velocity=(0, 0, -speed / 2))
     engine.advance(math.ceil((2e-4 / speed + 0.004) / engine.time_step))
-    after = engine.state().velocities[:, 2]
+    after = engine.state().smarticles.velocities[:, 2]
     exact = dashpot_impact(stiffness=law.normal_stiffness, damping=law.normal_damping, mass=mass / 2).restitution
     left, pairs = mass * after.sum(), "rounding: forces come in pairs"
     return [
@@ -345,7 +346,7 @@ def bounce_errors(access: EngineAccess, steps: Sequence[float], *, restitution: 
             add(engine, (0, 0, BALL_RADIUS + gap), access.ball_turn)
             access.push(engine, 0, velocity=(0, 0, -speed + G * dt / 2))
             engine.advance(round(time / dt))
-            squares[k] += (float(engine.state().positions[0, 2]) - BALL_RADIUS - exact) ** 2
+            squares[k] += (float(engine.state().smarticles.positions[0, 2]) - BALL_RADIUS - exact) ** 2
     return [math.sqrt(square) for square in squares / phases]
 
 
@@ -363,7 +364,7 @@ def _collided(access: EngineAccess, law: ContactLaw, dt: float, gap: float, *, t
     add(engine, (0, lift + gap, 0.1), other)
     access.push(engine, 1, velocity=(0, -0.2, 0))
     engine.advance(round(5.12e-3 / dt))
-    spheres: Array = engine.state().spheres(one.particle).reshape(-1, 3)
+    spheres: Array = engine.state().smarticles.spheres(one.particle).reshape(-1, 3)
     return spheres
 
 

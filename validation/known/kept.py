@@ -63,9 +63,9 @@ def _own_momentum(state: State) -> Array:
 
 def free_gait(access: EngineAccess, *, law: str, damping: float = 0.0) -> list[Answer]:
     engine, swinging = free_pair(access, law, damping)
-    before = engine.state()
-    angles = [engine.state().angles for _ in swinging]
-    after, mass, spin = engine.state(), before.boxes.mass, _own_momentum(before)
+    before = engine.state().smarticles
+    angles = [engine.state().smarticles.angles for _ in swinging]
+    after, mass, spin = engine.state().smarticles, before.boxes.mass, _own_momentum(before)
     momentum = mass * np.linalg.norm(after.velocities - before.velocities, axis=1).max()
     turning = np.linalg.norm(_own_momentum(after) - spin, axis=1).max()
     fast, large = mass * np.linalg.norm(before.velocities, axis=1).max(), np.linalg.norm(spin, axis=1).max()
@@ -108,9 +108,9 @@ def thousand_turns(access: EngineAccess) -> list[Answer]:
     for k, spin in enumerate(spins):
         add(engine, (0.2 * k - 0.2, 0, 0.1), Rotation.random(random_state=k))
         access.push(engine, k, spin=spin)
-    before, momentum = engine.state().kinetic_energy, engine.state().angular_momentum
+    before, momentum = engine.state().kinetic_energy, engine.state().smarticles.angular_momentum
     engine.advance(round(1000 * 2 * math.pi / rate / engine.time_step))
-    after, size = engine.state(), float(np.linalg.norm(momentum))
+    after, size = engine.state().smarticles, float(np.linalg.norm(momentum))
     change, what = (
         float(np.linalg.norm(after.angular_momentum - momentum)),
         "angular momentum, change of the vector [kg m²/s]",
@@ -179,14 +179,14 @@ def thrown_at(access: EngineAccess, *, stiffness: float, throws: int = 30) -> li
         add(engine, (0.03, across, 0.1 + up), Rotation.random(random_state=rng))
         axis = rng.normal(size=3)
         access.push(engine, 1, velocity=(-10, 0, 0), spin=60 * axis / np.linalg.norm(axis))
-        before, passed = engine.state().vertices, False
+        before, passed = engine.state().smarticles.vertices, False
         for _ in range(math.ceil(0.06 / 10 / dt)):
             engine.advance(1)
-            after = engine.state().vertices
+            after = engine.state().smarticles.vertices
             passed |= bool(crossings(before, after))
             before = after
         crossed += passed
-        met += abs(engine.state().velocities[0, 0]) > 1e-3
+        met += abs(engine.state().smarticles.velocities[0, 0]) > 1e-3
     return [
         Answer("throws that met [1]", throws, met, 0.6, "that something happened: some fly by"),
         Answer("links that passed through each other [1]", 0.0, crossed, 0.0, "counted", scale=1.0),

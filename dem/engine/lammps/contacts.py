@@ -1,5 +1,6 @@
 """Contacts and overlaps on LAMMPS, computed in this process from the positions of the spheres."""
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Self
 
@@ -16,37 +17,41 @@ from dem.physics.overlaps import Overlaps
 class Contacts:
     """All contacts at one instant."""
 
-    count: int  #: Number of smarticles, N
+    count: int  #: Number of bodies, N
     pairs: Numbers  #: (C, 2) the two smarticles of each pair of touching spheres
     depths: Array  #: (C,) overlaps of these pairs [m]
     fixed: Numbers  #: (F,) the smarticle at each contact of a sphere with floor or wall
     fixed_depths: Array  #: (F,) overlaps at these contacts [m]
 
     @classmethod
-    def of(cls, spheres: Array, radius: float, boundaries: LammpsBoundaries) -> Self:
+    def of(cls, spheres: Iterable[Array], radius: float | Array, boundaries: LammpsBoundaries) -> Self:
         """Find the contacts of spheres of different smarticles, and of spheres with floor and wall.
 
         Args:
-            spheres: (N, S, 3) centres of the spheres of N smarticles [m].
-            radius: radius of the spheres [m].
+            spheres: (S, 3) centres of the spheres of each of N bodies [m].
+            radius: radius of the spheres, one or (N,) one for each body [m].
         """
-        count, each = spheres.shape[:2]
-        centres = spheres.reshape(-1, 3)
-        owners = np.repeat(np.arange(count), each)
+        bodies = list(spheres)
+        count, sizes = len(bodies), [len(body) for body in bodies]
+        centres = np.concatenate([np.zeros((0, 3)), *bodies])
+        owners = np.repeat(np.arange(count), sizes)
+        radii = np.repeat(np.broadcast_to(radius, count), sizes)
         none = np.zeros((0, 2), dtype=np.int64)
-        found = cKDTree(centres).query_pairs(2 * radius, output_type="ndarray") if len(centres) else none
+        found = cKDTree(centres).query_pairs(2 * radii.max(), output_type="ndarray") if len(centres) else none
         found = found[owners[found[:, 0]] != owners[found[:, 1]]]
         apart = np.linalg.norm(centres[found[:, 0]] - centres[found[:, 1]], axis=1)
-        beside = [radius - (centres[:, 2] - boundaries.floor)]
+        reach = radii[found].sum(axis=1)
+        found, apart, reach = (each[apart <= reach] for each in (found, apart, reach))
+        beside = [radii - (centres[:, 2] - boundaries.floor)]
         if boundaries.walled:
             high = (centres[:, 2] > boundaries.wall_bottom) & (centres[:, 2] < boundaries.wall_top)
             off_axis = np.hypot(centres[:, 0], centres[:, 1])
-            beside.append(np.where(high, radius - (boundaries.cylinder.radius - off_axis), -np.inf))
+            beside.append(np.where(high, radii - (boundaries.cylinder.radius - off_axis), -np.inf))
         touching = [np.flatnonzero(depths > 0) for depths in beside]
         return cls(
             count=count,
             pairs=owners[found],
-            depths=2 * radius - apart,
+            depths=reach - apart,
             fixed=owners[np.concatenate(touching)],
             fixed_depths=np.concatenate([depths[k] for depths, k in zip(beside, touching, strict=True)]),
         )

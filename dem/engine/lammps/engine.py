@@ -14,9 +14,10 @@ from scipy.spatial.transform import Rotation
 
 from dem.arrays import Array, Numbers
 from dem.body.chain import Tie
+from dem.body.kinds import Kind, Mixture
 from dem.body.particle import Particle
 from dem.body.placement import Poses
-from dem.body.state import State
+from dem.body.state import PileState, RigidState, State, spheres_of
 from dem.engine.interface import MotorReadings, Saved
 from dem.engine.lammps import text
 from dem.engine.lammps.boundaries import LammpsBoundaries
@@ -26,6 +27,7 @@ from dem.engine.lammps.text import Moving
 from dem.errors import InputError, RunError
 from dem.physics.contact import ContactLaw, StringLaw
 from dem.physics.overlaps import Overlaps
+from dem.record.files import reject_inflated
 from dem.setting.container import Cylinder
 
 FORMAT = "lammps-2"
@@ -110,14 +112,14 @@ class LammpsEngine:
     def __init__(
         self,
         *,
-        particle: Particle,
+        particle: Particle | Mixture,
         cylinder: Cylinder,
         law: ContactLaw,
         gravity: float,
         time_step: float,
         ranks: int = 1,
     ) -> None:
-        self.particle = particle
+        self.particle: Particle | Mixture = particle
         self.cylinder = cylinder
         self.gravity = gravity
         self.time, self.steps, self.time_step = 0.0, 0, time_step
@@ -125,6 +127,7 @@ class LammpsEngine:
         self.child = Child(ranks)  #: The process of LAMMPS
         self._cpu_before = 0.0  # processor time of earlier LAMMPS processes [s]
         self._moving = Moving.none()
+        self._kinds = np.zeros(0, dtype=np.int64)  # of a mixture, the kind of each body
         # (N, 3, 3) rotations from the body frame to LAMMPS's principal frame, known after the first dump.
         self._frames: Array | None = None
         self._fresh = True  # whether the next run must be set up
@@ -132,9 +135,11 @@ class LammpsEngine:
         self._seconds = 0.0
         self._thrown = 0.0
         self._contacts: Contacts | None = None
-        self.boundaries = LammpsBoundaries(cylinder, self._send, lambda: (self.steps, self.time_step))
+        self.boundaries: LammpsBoundaries = LammpsBoundaries(cylinder, self._send, lambda: (self.steps, self.time_step))
         self.motors, self.strings = NoMotors(), NoStrings()
-        self.ledger = LammpsLedger(lambda: self.boundaries.moving, lambda: self.contacts.elastic_energy(law))
+        self.ledger: LammpsLedger = LammpsLedger(
+            lambda: self.boundaries.moving, lambda: self.contacts.elastic_energy(law)
+        )
 
     def _send(self, commands: Iterator[str]) -> None:
         """Send commands, and have LAMMPS set up its next run anew.
@@ -148,7 +153,7 @@ class LammpsEngine:
 
     def _scene(self, box: str) -> Iterator[str]:
         """Yield all commands for a new LAMMPS except those for bodies; the command `box` reads the spheres."""
-        between, at_wall = text.contact_terms(self._law, self.particle.boxes.mass)
+        between, at_wall = text.contact_terms(self._law, self._reference.mass)
         yield from text.before_box(self.particle)
         # Vertical cuts divide the pile among ranks: above a horizontal cut there would be little work.
         yield "processors * * 1"
@@ -195,7 +200,7 @@ class LammpsEngine:
             raise RunError("engine: lammps lost its smarticles")
         self.steps += steps
         self.time += steps * self.time_step
-        self._seconds += steps * self.time_step * self.count
+        self._seconds += steps * self.time_step * float(self._relative_masses.sum())
         self._contacts = None
 
     def _run(self, steps: int) -> None:
@@ -237,17 +242,27 @@ class LammpsEngine:
         return len(self._moving.positions)
 
     def add(self, poses: Poses, *, speed: float = 0.0) -> None:
-        new, boxes, before = len(poses.positions), self.particle.boxes, self._moving
+        new, before = len(poses.positions), self._moving
+        self._kinds = np.append(self._kinds, [] if poses.kinds is None else poses.kinds).astype(np.int64)
+        bodies = [self._body(k) for k in range(self.count + new)]
+        added_bodies, masses = bodies[self.count :], np.array([body.mass for body in bodies[self.count :]])
         turns = np.array([turn.as_matrix() for turn in poses.rotations]).reshape(-1, 3, 3)
         zero, thrown = np.zeros((new, 3)), np.tile([0.0, 0.0, -speed], (new, 1))
-        weight = np.tile([0.0, 0.0, -boxes.mass * self.gravity], (new, 1))
+        weight = -self.gravity * masses[:, None] * [0.0, 0.0, 1.0]
         added = Moving(poses.positions, turns, thrown, zero, zero, weight)
-        spheres = State.rigid(boxes, poses.positions, turns, thrown, zero).spheres(self.particle)
-        lines = text.sphere_lines(self.particle, self.cylinder, spheres, title="smarticles", first=self.count)
+        spheres = self._spheres(self._pile(added, self._kinds[self.count :]))
+        lines = text.sphere_lines(
+            added_bodies,
+            self.cylinder,
+            spheres,
+            title="smarticles",
+            first=self.count,
+            first_sphere=sum(len(body.centres) for body in bodies[: self.count]),
+        )
         pairs = zip(vars(before).values(), vars(added).values(), strict=True)
         self._moving = Moving(*(np.concatenate(pair) for pair in pairs))
         self._write(SPHERES, lines)
-        self._write(BODIES, text.body_lines(self.particle, self._moving))
+        self._write(BODIES, text.body_lines(bodies, self._moving))
         if self._box:
             self.child.send(*FORGET_BODIES, f"read_data {SPHERES} add merge", *self._balanced())
         else:
@@ -257,8 +272,26 @@ class LammpsEngine:
             self._box = True
         self.child.send(*self._bodies(BODIES))
         self._frames, self._fresh, self._contacts = None, True, None
-        self.ledger.added += boxes.mass * (self.gravity * float(poses.positions[:, 2].sum()) + new * speed**2 / 2)
-        self._thrown += boxes.mass * new * speed
+        mass, relative = self.particle.mass, masses / self.particle.mass
+        lifted, amount = float((relative * poses.positions[:, 2]).sum()), float(relative.sum())
+        self.ledger.added += mass * (self.gravity * lifted + amount * speed**2 / 2)
+        self._thrown += mass * amount * speed
+
+    @property
+    def _reference(self) -> Particle | Kind:
+        """The body whose dashpots the contact law has."""
+        return self.particle if isinstance(self.particle, Particle) else self.particle.kinds[0]
+
+    def _body(self, number: int) -> Particle | Kind:
+        """Return the particle, or the kind, that a body is."""
+        return self.particle if isinstance(self.particle, Particle) else self.particle.kinds[self._kinds[number]]
+
+    @property
+    def _relative_masses(self) -> Array:
+        """(N,) masses of the bodies, over the mean mass of all kinds' bodies [1]; of smarticles exactly 1."""
+        if isinstance(self.particle, Particle):
+            return np.ones(self.count)
+        return np.asarray(self.particle.masses[self._kinds] / self.particle.mass)
 
     def _write(self, name: str, lines: Iterator[str]) -> None:
         with (self.child.scratch / name).open("w", encoding="ascii") as file:
@@ -270,25 +303,37 @@ class LammpsEngine:
         self._moving = replace(self._moving, velocities=none, spins=none, momenta=none)
         self._send(iter(f"velocity all zero {what} rigid bodies" for what in ("linear", "angular")))
 
-    def state(self) -> State:
-        moving = self._moving
-        return State.rigid(self.particle.boxes, moving.positions, moving.turns, moving.velocities, moving.spins)
+    def state(self) -> PileState:
+        return self._pile(self._moving, self._kinds)
+
+    def _pile(self, moving: Moving, kinds: Numbers) -> PileState:
+        poses = (moving.positions, moving.turns, moving.velocities, moving.spins)
+        if isinstance(self.particle, Mixture):
+            return RigidState(self.particle, kinds, *poses)
+        return State.rigid(self.particle.boxes, *poses)
+
+    def _spheres(self, state: PileState) -> list[Array]:
+        """Return (S, 3) centres of the spheres of each body of a state [m]."""
+        if state.bodies is not None:
+            return state.bodies.spheres_by_body()
+        return list(spheres_of(state, self.particle))
 
     @property
     def impulse(self) -> float:
-        return self._seconds * self.particle.boxes.mass * self.gravity + self._thrown
+        return self._seconds * self.particle.mass * self.gravity + self._thrown
 
     def unbalanced_force(self) -> float:
         if not self.count or not self.gravity:
             return math.inf
-        weight = self.particle.boxes.mass * self.gravity
+        weight = self.particle.mass * self.gravity * float(self._relative_masses.mean())
         return float(np.linalg.norm(self._moving.forces, axis=1).mean() / weight)
 
     @property
     def contacts(self) -> Contacts:
         """All contacts at present."""
         if self._contacts is None:
-            self._contacts = Contacts.of(self.state().spheres(self.particle), self.particle.radius, self.boundaries)
+            radii = np.array([self._body(k).radius for k in range(self.count)])
+            self._contacts = Contacts.of(self._spheres(self.state()), radii, self.boundaries)
         return self._contacts
 
     def neighbours(self) -> Numbers:
@@ -300,7 +345,7 @@ class LammpsEngine:
     def overlaps(self, limit: float) -> Overlaps:
         return self.contacts.overlaps(limit, self._law)
 
-    def extremes(self, state: State) -> None:
+    def extremes(self, state: PileState) -> None:
         """Return None: on LAMMPS extremes are not cheaper than a full check."""
 
     def contact_forces(self) -> NoReturn:
@@ -329,6 +374,7 @@ class LammpsEngine:
             "time_step": self.time_step,
             "seconds": self._seconds,
             "thrown": self._thrown,
+            **({"kinds": self._kinds.tolist()} if len(self._kinds) else {}),
             "fixtures": self.boundaries.memory,
             "account": [self.ledger.added, self.ledger.dissipated],
         }
@@ -346,6 +392,8 @@ class LammpsEngine:
             )
         try:
             with zipfile.ZipFile(io.BytesIO(saved.content)) as archive:
+                # Positions and velocities hardly shrink, and deflating can shrink zeros a thousand times.
+                reject_inflated(archive, 100 * len(saved.content))
                 files = {name: archive.read(name) for name in archive.namelist()}
                 self._box = RESTART in files
                 with np.load(io.BytesIO(files[STATE])) as arrays:
@@ -354,6 +402,7 @@ class LammpsEngine:
             raise InputError(f"checkpoint: not readable by the lammps engine ({error}); start the run anew") from error
         self.time, self.steps, self.time_step = memory["time"], memory["steps"], memory["time_step"]
         self._seconds, self._thrown = memory["seconds"], memory["thrown"]
+        self._kinds = np.array(memory.get("kinds", ()), dtype=np.int64)
         self.ledger.added, self.ledger.dissipated = memory["account"]
         self.boundaries.restore(memory["fixtures"])
         self._frames, self._fresh, self._contacts = None, True, None

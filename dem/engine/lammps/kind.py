@@ -47,16 +47,21 @@ class LammpsKind:
 
     def stable_step(self, scene: Demand, *, articulated: bool) -> float:
         # Spheres, law and scheme of integration are YADE's.
-        return stable_time_step(scene.particle, contact_law_of(scene))
+        return min(stable_time_step(body, contact_law_of(scene)) for body in scene.bodies)
 
     def seconds_per_second(self, scene: Demand, time_step: float, activity: Activity) -> float:
-        spheres, per_sphere = len(scene.particle.centres) * scene.count, STEP.get(activity, STEP[Activity.SHAKE])
+        each = [float(len(body.centres)) for body in scene.bodies]
+        mean = each[0] if scene.mixture is None else scene.mixture.mean(each)
+        spheres, per_sphere = mean * scene.count, STEP.get(activity, STEP[Activity.SHAKE])
         steps = per_sphere * spheres * (1 + LONGER * min(1.0, spheres / MANY)) / time_step
         return steps + (SAMPLE[0] + SAMPLE[1] * scene.count) / scene.recording.series_interval_s
 
+    def seconds_to_compile(self, scene: Demand) -> float:
+        return 0.0
+
     def build(self, scene: Demand, time_step: float) -> LammpsEngine:
         return LammpsEngine(
-            particle=scene.particle,
+            particle=scene.model,
             cylinder=scene.cylinder,
             law=contact_law_of(scene),
             gravity=scene.gravity_m_per_s2,

@@ -4,13 +4,14 @@ Keywords are those of version 29 Sep 2021, update 2, which Debian 12 has.
 """
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Self
 
 import numpy as np
 
 from dem.arrays import Array
+from dem.body.kinds import Kind, Mixture
 from dem.body.particle import Particle
 from dem.physics.contact import ContactLaw
 from dem.setting.container import Cylinder
@@ -40,58 +41,69 @@ class Moving:
         return cls(empty, np.zeros((0, 3, 3)), empty, empty, empty, empty)
 
 
-def sphere_masses(particle: Particle) -> Array:
+def sphere_masses(body: Particle | Kind) -> Array:
     """Return masses (S,) of the spheres [kg] that have the smarticle's mass and centre of mass.
 
     Weights of the spheres then exert no torque. The masses are as equal as possible, by least squares.
     """
-    count = len(particle.centres)
+    count = len(body.centres)
     # Conditions: the masses sum to the smarticle's mass, the first moments to zero.
-    rows = np.concatenate([np.ones((1, count)), particle.centres.T / particle.boxes.middle_length])
-    wanted = np.array([particle.boxes.mass, 0.0, 0.0, 0.0])
-    equal = np.full(count, particle.boxes.mass / count)
+    rows = np.concatenate([np.ones((1, count)), body.centres.T / body.size])
+    wanted = np.array([body.mass, 0.0, 0.0, 0.0])
+    equal = np.full(count, body.mass / count)
     return np.asarray(equal + np.linalg.pinv(rows) @ (wanted - rows @ equal))
 
 
 def sphere_lines(
-    particle: Particle, cylinder: Cylinder, spheres: Array, *, title: str, first: int = 0
+    bodies: Sequence[Particle | Kind],
+    cylinder: Cylinder,
+    spheres: Iterable[Array],
+    *,
+    title: str,
+    first: int = 0,
+    first_sphere: int = 0,
 ) -> Iterator[str]:
     """Yield the lines of a file of spheres, for the command `read_data`.
 
     Each sphere has number, type, position, diameter, density and number of its smarticle.
 
     Args:
-        spheres: (N, S, 3) centres [m].
+        bodies: the N bodies.
+        spheres: (S, 3) centres of the spheres of each body [m].
         first: number of smarticles that LAMMPS has already.
     """
-    count, each = spheres.shape[:2]
-    d = particle.chain.diameter
+    d = max(body.diameter for body in bodies)
     yield title
-    yield f"\n{count * each} atoms\n1 atom types\n"
+    yield f"\n{sum(len(body.centres) for body in bodies)} atoms\n1 atom types\n"
     side, top = cylinder.corner_radius + d, cylinder.height + d
     for low, high, axis in ((-side, side, "x"), (-side, side, "y"), (cylinder.bottom - d, top, "z")):
         yield f"{low:.9g} {high:.9g} {axis}lo {axis}hi"
     yield "\nAtoms # hybrid sphere bond\n"
-    densities = sphere_masses(particle) / (math.pi / 6 * d**3)
-    ends = [f"{d:.17g} {density:.17g}" for density in densities]
-    for k, chain in enumerate(spheres.tolist(), first):
-        for s, (x, y, z) in enumerate(chain):
-            yield f"{k * each + s + 1} 1 {x:.17g} {y:.17g} {z:.17g} {ends[s]} {k + 1}"
+    ends: dict[int, list[str]] = {}  # diameters and densities of the spheres, by kind of body
+    number = first_sphere
+    for k, (body, chain) in enumerate(zip(bodies, spheres, strict=True), first):
+        if id(body) not in ends:
+            densities = sphere_masses(body) / (math.pi / 6 * body.diameter**3)
+            ends[id(body)] = [f"{body.diameter:.17g} {density:.17g}" for density in densities]
+        for (x, y, z), end in zip(chain.tolist(), ends[id(body)], strict=True):
+            number += 1
+            yield f"{number} 1 {x:.17g} {y:.17g} {z:.17g} {end} {k + 1}"
 
 
-def body_lines(particle: Particle, moving: Moving) -> Iterator[str]:
+def body_lines(bodies: Sequence[Particle | Kind], moving: Moving) -> Iterator[str]:
     """Yield the lines of a file of bodies, for `infile` of `fix rigid/small`.
 
     Each body has number, mass, centre of mass, inertia tensor (xx yy zz xy xz yz), velocity, angular momentum and three
     image flags.
     """
-    tensors = moving.turns @ np.diag(particle.boxes.inertia) @ np.swapaxes(moving.turns, 1, 2)
+    inertias = np.array([np.diag(body.inertia) for body in bodies]).reshape(-1, 3, 3)
+    tensors = moving.turns @ inertias @ np.swapaxes(moving.turns, 1, 2)
     moments = tensors[:, (0, 1, 2, 0, 0, 1), (0, 1, 2, 1, 2, 2)]
     yield str(len(moving.positions))
     columns = (moving.positions, moments, moving.velocities, moving.momenta)
-    for k, row in enumerate(np.concatenate(columns, axis=1).tolist()):
+    for k, (body, row) in enumerate(zip(bodies, np.concatenate(columns, axis=1).tolist(), strict=True)):
         numbers = " ".join("0" if value == 0 else f"{value:.17g}" for value in row)
-        yield f"{k + 1} {particle.boxes.mass:.17g} {numbers} 0 0 0"
+        yield f"{k + 1} {body.mass:.17g} {numbers} 0 0 0"
 
 
 def contact_terms(law: ContactLaw, mass: float) -> tuple[str, str]:
@@ -109,7 +121,7 @@ def contact_terms(law: ContactLaw, mass: float) -> tuple[str, str]:
     )
 
 
-def before_box(particle: Particle) -> Iterator[str]:
+def before_box(particle: Particle | Mixture) -> Iterator[str]:
     """Yield the commands that must precede the simulation box, such as units and atom style."""
     yield "units            si"
     yield "# Springs of friction need each pair on both of two processors, and velocities of spheres at their borders."
@@ -122,13 +134,13 @@ def before_box(particle: Particle) -> Iterator[str]:
     yield "atom_style       hybrid sphere bond"
     yield "atom_modify      map array"
     yield "# A body is moved by the processor of one of its spheres, which must see all others: as far as it is long."
-    yield f"comm_modify      vel yes cutoff {2 * particle.reach + particle.chain.diameter:.9g}"
+    yield f"comm_modify      vel yes cutoff {2 * particle.reach + 2 * particle.radius:.9g}"
 
 
-def neighbours(particle: Particle) -> Iterator[str]:
+def neighbours(particle: Particle | Mixture) -> Iterator[str]:
     """Yield the commands of the neighbour list."""
     yield "# Spheres of one smarticle do not touch each other."
-    yield f"neighbor         {SKIN * particle.chain.diameter:.9g} bin"
+    yield f"neighbor         {SKIN * particle.diameter:.9g} bin"
     yield "neigh_modify     delay 0 every 1 check yes exclude molecule/intra all"
 
 

@@ -41,11 +41,19 @@ MANY, LONGER, GROWTH = 5000, 0.3, 0.8
 # tries their strands.
 MORE_CONTACTS, MORE_PAIRS = 0.3, 1.2
 
+# Processor time to compile [s]: all kernels of the first kind of phase in a process, and those of one more kind.
+# `doctor --compile` with an empty cache on the machine above while other work used both cores: 11 to 16, and 4 to 9.
+COMPILE_FIRST, COMPILE_MORE = 13.0, 7.0
+
 
 def seconds_per_second(scene: Demand, time_step: float, activity: Activity) -> float:
     """Return the estimate of `dem.engine.kinds.EngineKind.seconds_per_second`."""
     count, strands, recording = scene.count, scene.fidelity.rows, scene.recording
-    rates, links = RATES[activity], 1.0 if scene.smarticle.boxes.barb_length > 0 else 1 / 3
+    rates = RATES[activity]
+    if scene.mixture is None:
+        links = 1.0 if scene.smarticle.boxes.barb_length > 0 else 1 / 3
+    else:  # bars of a body, over a smarticle's three
+        links = scene.mixture.mean([len(kind.bars.points) / 3 for kind in scene.mixture.kinds])
     per_step = rates.step * (1 + MORE_CONTACTS * (1 - 1 / strands)) + RIM * strands * len(scene.cylinder.upper)
     each = links * (per_step / time_step + rates.second * strands**MORE_PAIRS)
     if activity is Activity.ACTUATE:

@@ -13,9 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dem.body.forces import ContactForces, contacts_of_points
+from dem.body.kinds import Mixture
 from dem.body.particle import Particle
 from dem.body.placement import Poses
-from dem.body.state import State
+from dem.body.state import PileState
 from dem.engine.interface import Saved
 from dem.engine.links.boundaries import LinksBoundaries, ground_for
 from dem.engine.links.contact import queries
@@ -29,6 +30,7 @@ from dem.errors import InputError
 from dem.physics.contact import ContactLaw
 from dem.physics.motor import MotorLaw
 from dem.physics.overlaps import APART, Extremes, Held, Overlaps, held_between
+from dem.record.files import reject_inflated
 from dem.setting.container import Cylinder
 from dem.setting.hooks import Cross
 from dem.setting.plane import Channel
@@ -47,7 +49,7 @@ class LinksEngine:
     """`dem.engine.interface.Engine` on links.
 
     Args:
-        particle: one smarticle.
+        particle: one smarticle, or a mixture of rigid bodies.
         cylinder: the container; its floor is at z = 0 at the start.
         law: contact law.
         gravity: g, downwards [m/s²].
@@ -63,7 +65,7 @@ class LinksEngine:
     def __init__(
         self,
         *,
-        particle: Particle,
+        particle: Particle | Mixture,
         cylinder: Cylinder,
         law: ContactLaw,
         gravity: float,
@@ -80,7 +82,8 @@ class LinksEngine:
         self.gravity = gravity
         self.cpu_elsewhere = 0.0
         self._world = World(
-            particle=particle,
+            particle=particle if isinstance(particle, Particle) else None,
+            mixture=particle if isinstance(particle, Mixture) else None,
             contact=law,
             ground=ground_for(cylinder, hooks, channel),
             gravity=gravity,
@@ -127,7 +130,7 @@ class LinksEngine:
     def advance(self, steps: int) -> None:
         if steps > 0:
             self._world.advance(steps)
-            self._smarticle_seconds += steps * self.time_step * self.count
+            self._smarticle_seconds += steps * self.time_step * float(self._relative_masses.sum())
 
     # -- smarticles --------------------------------------------------------------------------------------------
 
@@ -137,9 +140,22 @@ class LinksEngine:
 
     def add(self, poses: Poses, *, speed: float = 0.0) -> None:
         self._world.add(poses, speed=speed)
-        mass, new = self.particle.boxes.mass, len(poses.positions)
-        self.ledger.added += mass * (self.gravity * float(poses.positions[:, 2].sum()) + new * speed**2 / 2)
+        mass, heights = self._first_mass, poses.positions[:, 2]
+        relative = self._relative_masses[-len(heights) :] if len(heights) else np.zeros(0)
+        new = float(relative.sum())
+        self.ledger.added += mass * (self.gravity * float((relative * heights).sum()) + new * speed**2 / 2)
         self._thrown += mass * new * speed
+
+    @property
+    def _first_mass(self) -> float:
+        """Mass of a body of the first kind [kg]."""
+        return float(self._world.shapes.mass[0])
+
+    @property
+    def _relative_masses(self) -> Array:
+        """(N,) masses of the bodies, over that of the first kind [1]; of smarticles exactly 1."""
+        masses = self._world.shapes.mass
+        return np.asarray((masses / masses[0])[self._world.bodies.shape])
 
     def still(self) -> None:
         assert not self.motors.articulated  # links that are at rest would be told otherwise by their motors
@@ -148,19 +164,19 @@ class LinksEngine:
         for moving in (world.bodies.velocity, world.bodies.momentum, world.bodies.spin):
             moving[:] = 0.0
 
-    def state(self) -> State:
+    def state(self) -> PileState:
         return self._world.state()
 
     @property
     def impulse(self) -> float:
-        return self._smarticle_seconds * self.particle.boxes.mass * self.gravity + self._thrown
+        return self._smarticle_seconds * self._first_mass * self.gravity + self._thrown
 
     def unbalanced_force(self) -> float:
         if not self.count or not self.gravity:
             return math.inf
-        weight = self.particle.boxes.mass * self.gravity
-        forces = self._world.bodies.load[:, :3] - [0.0, 0.0, weight]
-        return float(np.linalg.norm(forces, axis=1).mean() / weight)
+        weight, relative = self._first_mass * self.gravity, self._relative_masses
+        forces = self._world.bodies.load[:, :3] - weight * relative[:, None] * [0.0, 0.0, 1.0]
+        return float(np.linalg.norm(forces, axis=1).mean() / (weight * float(relative.mean())))
 
     def neighbours(self) -> NDArray[np.int64]:
         pairs = self._world.contacts().pairs
@@ -181,7 +197,7 @@ class LinksEngine:
         between = world.bodies.deepest.copy()
         world.bodies.deepest[:] = 0.0
         passed = ~(between <= PASSES)
-        diameter = self.particle.chain.diameter
+        diameter = self.particle.diameter
         depths = diameter * np.where(passed, np.maximum(found.depths, between), found.depths)
         deep = ~(depths <= limit)
         held = self._held(found.held, ~(depths <= min(limit, HOLDS * diameter)), APART * diameter)
@@ -199,11 +215,17 @@ class LinksEngine:
             points=rows[:, queries.POINT : queries.FRICTION],
             friction=rows[:, queries.FRICTION : queries.WHOLE],
             forces=rows[:, queries.WHOLE :],
+            each=self._world.each,
         )
 
-    def extremes(self, state: State) -> Extremes | None:
+    def extremes(self, state: PileState) -> Extremes | None:
         """Return the extremes; None if an overlap needs a full check. The gap is 0, since hinges are rigid."""
-        found, bodies = self._world.extremes(state.link_velocities), self._world.bodies
+        if state.bodies is None:
+            velocities = state.smarticles.link_velocities
+        else:  # three bars to a row, as of links
+            each = state.bodies.bar_velocities
+            velocities = np.concatenate([each, np.zeros((-len(each) % 3, 3))]).reshape(-1, 3, 3)
+        found, bodies = self._world.extremes(velocities), self._world.bodies
         if not (found[BETWEEN] <= PASSES and found[DEEPEST] <= HOLDS):
             return None
         bodies.deepest[:] = 0.0
@@ -213,7 +235,7 @@ class LinksEngine:
             highest=found[HIGHEST],
             widest=found[WIDEST],
             gap=0.0,
-            deepest=found[DEEPEST] * self.particle.chain.diameter,
+            deepest=found[DEEPEST] * self.particle.diameter,
             elastic_energy=found[ELASTIC],
         )
 
@@ -257,6 +279,7 @@ class LinksEngine:
             )
         try:
             with np.load(io.BytesIO(saved.content)) as file:
+                reject_inflated(file.zip, len(saved.content))
                 arrays = {name: file[name] for name in file.files}
         except (zipfile.BadZipFile, ValueError, OSError) as error:
             raise InputError(f"checkpoint: not readable by the links engine ({error}); start the run anew") from error

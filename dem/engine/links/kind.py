@@ -2,15 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numba
 
 from dem.engine.demand import Activity, Demand, contact_law_of, motor_law_of
 from dem.engine.effect import EffectName
 from dem.engine.links.adds import ADDS, ORDER
-from dem.engine.links.compiler import stamp
-from dem.engine.links.cost import seconds_per_second
+from dem.engine.links.cache import announce, is_kept, stamp
+from dem.engine.links.cost import COMPILE_FIRST, COMPILE_MORE, seconds_per_second
 from dem.engine.links.engine import LinksEngine
-from dem.engine.links.stable_step import links_stable_time_step
+from dem.engine.links.shapes import kind_shape
+from dem.engine.links.stable_step import links_stable_time_step, rigid_stable_time_step
+
+# Groups of arrays without which `advance` is compiled where a scene has none of them.
+OPTIONAL = frozenset({"channel", "cords", "hooks", "ledger", "motors", "rims"})
 
 
 class LinksKind:
@@ -32,6 +38,9 @@ class LinksKind:
         return 1
 
     def stable_step(self, scene: Demand, *, articulated: bool) -> float:
+        if scene.mixture is not None:
+            shapes = [kind_shape(kind) for kind in scene.mixture.kinds]
+            return rigid_stable_time_step(shapes, contact_law_of(scene))
         return links_stable_time_step(
             scene.particle,
             contact_law_of(scene),
@@ -43,9 +52,17 @@ class LinksKind:
     def seconds_per_second(self, scene: Demand, time_step: float, activity: Activity) -> float:
         return seconds_per_second(scene, time_step, activity)
 
+    def seconds_to_compile(self, scene: Demand) -> float:
+        missing = [present for present in _present(scene) if not is_kept(OPTIONAL - present)]
+        # While a wall is lifted its edge is there as well; whether one is lifted or vanishes is not known here.
+        lifted = scene.calls_for(EffectName.WALL_REMOVAL)
+        return COMPILE_FIRST + COMPILE_MORE * (len(missing) - 1 + lifted) if missing else 0.0
+
     def build(self, scene: Demand, time_step: float) -> LinksEngine:
+        if seconds := self.seconds_to_compile(scene):
+            announce(seconds)
         return LinksEngine(
-            particle=scene.particle,
+            particle=scene.model,
             cylinder=scene.cylinder,
             law=contact_law_of(scene),
             gravity=scene.gravity_m_per_s2,
@@ -57,3 +74,18 @@ class LinksKind:
             channel=scene.channel,
             strengths=scene.motor_strengths,
         )
+
+
+def _present(scene: Demand) -> Iterator[frozenset[str]]:
+    """Yield the groups of arrays that are present in each kind of phase of a scene."""
+    known = {
+        "channel": scene.channel is not None,
+        "hooks": scene.hooks is not None,
+        "ledger": scene.recording.dissipation_interval_s is not None,
+        "rims": scene.channel is None and bool(scene.cylinder.upper),
+    }
+    always = frozenset(name for name, there in known.items() if there)
+    if scene.activities - {Activity.ACTUATE}:
+        yield always
+    if Activity.ACTUATE in scene.activities:
+        yield always | {"motors", *(["cords"] if scene.pulled_by else [])}

@@ -107,6 +107,7 @@ class LinksMotors:
         return np.zeros((self._world.count, 2))
 
     def _made(self, law: MotorLaw) -> Motoring:
+        assert self._world.particle is not None  # scenes with motors have smarticles
         n, planar = self._world.count, planar_of(self._world.particle)
         factors = np.ones((n, 2)) if self._strengths is None else np.asarray(self._strengths, dtype=np.float64)
         # What τ_max gives to a barb about a hinge that is held.

@@ -8,14 +8,15 @@ two hinges; all other shapes are rigid.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from dem.body.bars import Bars, first_ends
+from dem.body.bars import Bars, first_ends, owners
 from dem.body.filament import Filament
+from dem.body.kinds import Kind
 from dem.body.particle import Particle
 from dem.engine.links.compiler import inlined
 from dem.physics.contact import typical_effective_mass
@@ -24,7 +25,7 @@ Array = NDArray[np.float64]
 
 # Columns of a segment: start of its axis and vector to its end [m], inverse squared length [1/m²], radius [m].
 START, VECTOR, INVERSE, RADIUS, LINE = 0, 3, 6, 7, 8
-AT_START, AT_END = 1, 2  # bits: the segment's start, or its end, is also an end of an earlier segment of the body
+AT_START, AT_END = 1, 2  # bits: the segment starts, or ends, at a joint that another segment of the body owns
 
 
 class Planar(NamedTuple):
@@ -58,7 +59,7 @@ class Shape:
     inertia: Array
     lines: Array  #: (M, LINE) segments, the strands of a link one after the other; for the columns see `START`
     link: NDArray[np.int64]  #: (M,) link of each segment; for a smarticle 0 barb 1, 1 middle link, 2 barb 2
-    shared: NDArray[np.uint8]  #: (M,) which ends are also ends of earlier segments, as bits `AT_START` and `AT_END`
+    shared: NDArray[np.uint8]  #: (M,) which ends belong to other segments, as bits `AT_START` and `AT_END`
     effective_mass: float  #: Harmonic mean of the effective mass over points and directions [kg], for the dashpots
     planar: Planar | None = None  #: Geometry of a smarticle; None: another body
     filament: Filament | None = None  #: Of a flexible body; None: a rigid body or a smarticle
@@ -150,21 +151,27 @@ def offsets_of(particle: Particle) -> Array:
     return np.zeros(1) if particle.chain.rows == 1 else np.linspace(-reach, reach, particle.chain.rows)
 
 
-def rigid_shape(bars: Bars, rows: int = 1) -> Shape:
-    """Return the shape of a rigid body of flat bars.
+def kind_shape(kind: Kind) -> Shape:
+    """Return the shape of a kind of rigid body."""
+    shape = rigid_shape(kind.bars, kind.rows, kind.radius)
+    return replace(shape, effective_mass=typical_effective_mass(kind))
+
+
+def rigid_shape(bars: Bars, rows: int = 1, radius: float | None = None) -> Shape:
+    """Return the shape of a rigid body of bars.
 
     Args:
         rows: number of strands of each bar. The diameter of a single strand is the mean width of the section; that of
             several strands is the bar's thickness in the plane.
+        radius: of the strands [m]; None: that of `Bars.radius`.
     """
-    radius = bars.radius(rows)
+    radius = bars.radius(rows) if radius is None else radius
     reach = 0.0 if rows == 1 else bars.thickness_normal / 2 - radius
     starts, ends = bars.axes(radius)
     # (bars, rows, 3): strands along each bar's normal.
     offsets = np.linspace(-reach, reach, rows)[:, None] * bars.frames[:, None, :, 2]
     points = np.stack([starts[:, None] + offsets, ends[:, None] + offsets], axis=2).reshape(-1, 2, 3)
-    first = first_ends(points)
-    later = (first != np.arange(len(first))).reshape(-1, 2)
+    later = ~owners(first_ends(points), np.repeat((~bars.free).all(axis=1), 2 * rows)).reshape(-1, 2)
     xx, yy, zz = bars.inertia
     return Shape(
         mass=bars.mass,

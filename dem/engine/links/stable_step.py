@@ -127,6 +127,61 @@ def _step_of(
         (AGAINST_NEIGHBOURS * ks * rub, AGAINST_NEIGHBOURS * damping * cs * rub),
     ]
     modes += [(stiffness * tips, damping * tips) for stiffness, damping in strings]
+    return _step_of_modes(mass, modes)
+
+
+def rigid_stable_time_step(shapes: Sequence[Shape], law: ContactLaw) -> float:
+    """Return the largest stable time step [s] over the stiffest modes of rigid bodies of several shapes.
+
+    They are those of `links_stable_time_step`: any end of a bar, with all its strands, against another such end and
+    against a boundary; and a pile of bodies that lie on their broad side, with a contact at every end, which heaves or
+    rubs.
+    """
+    return min(_rigid_step(shape, law) for shape in shapes)
+
+
+def _rigid_step(shape: Shape, law: ContactLaw) -> float:
+    mass = np.diag([*[shape.mass] * 3, *shape.inertia[:3]])
+    kn, ks, cn, cw = law.normal_stiffness, law.tangential_stiffness, law.normal_damping, law.wall_damping
+    cs, damping = law.tangential_damping, max(cn, cw / 2)
+    places: dict[tuple[int, int], list[Array]] = {}  # strands at each end of each bar
+    for line, link, shared in zip(shape.lines, shape.link, shape.shared, strict=True):
+        for bit, place in ((AT_END, line[:3] + line[3:6]), (AT_START, line[:3])):
+            if not shared & bit:
+                places.setdefault((int(link), bit), []).append(place)
+    ends = list(places.values())
+    modes = []
+    for strands in ends:
+        tips = sum((matrix_product(push.T, push) for push in map(_motion, strands)), np.zeros((6, 6)))
+        modes += [
+            (2 * CONTACTS_AT_A_TIP * kn * tips, 2 * CONTACTS_AT_A_TIP * cn * tips),
+            (CONTACTS_AT_A_TIP * kn * tips, CONTACTS_AT_A_TIP * cw * tips),
+        ]
+    # The broad side is across the axis along which the bars reach least: strands lie one above the other there.
+    spread = np.ptp([np.mean(strands, axis=0) for strands in ends], axis=0)
+    within = np.sum([np.ptp(strands, axis=0) for strands in ends], axis=0)
+    up = int(np.lexsort((-within, np.round(spread / (spread.max() + 1e-30), 6)))[0])
+    across = [axis for axis in range(3) if axis != up]
+    radius, heave, rub = float(shape.lines[:, RADIUS].max()), np.zeros((6, 6)), np.zeros((6, 6))
+    for strands in ends:
+        top = max(strands, key=lambda place: float(place[up])) + radius * np.eye(3)[up]
+        push = _motion(top)
+        heave += matrix_product(push[[up]].T, push[[up]])
+        rub += matrix_product(push[across].T, push[across])
+    modes += [
+        (AGAINST_NEIGHBOURS * kn * heave, AGAINST_NEIGHBOURS * damping * heave),
+        (AGAINST_NEIGHBOURS * ks * rub, AGAINST_NEIGHBOURS * damping * cs * rub),
+    ]
+    return _step_of_modes(mass, modes)
+
+
+def _motion(place: Array) -> Array:
+    """Return (3, 6): velocity of a point of a rigid body from its velocity and angular velocity; place in m."""
+    x, y, z = place
+    return np.column_stack([np.eye(3), [[0, z, -y], [-z, 0, x], [y, -x, 0]]])
+
+
+def _step_of_modes(mass: Array, modes: Sequence[tuple[Array, Array]]) -> float:
     stiffness, resisting = (np.array(each) for each in zip(*modes, strict=True))
     # Without dashpots the longest stable step would resolve a contact by three steps, and energy would drift.
     return min(

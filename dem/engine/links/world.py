@@ -10,10 +10,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from dem.body.forces import at_links
+from dem.body.kinds import Mixture
 from dem.body.linear import matrix_product
-from dem.body.particle import Particle
+from dem.body.particle import LINKS, Particle
 from dem.body.placement import Poses
-from dem.body.state import State
+from dem.body.state import PileState, RigidState, State
 from dem.engine.links.arrays import (
     LEDGER,
     MOTION,
@@ -55,7 +57,7 @@ from dem.engine.links.motion.bending import pose_filaments_from_python
 from dem.engine.links.motion.planar import lay_out
 from dem.engine.links.motion.poses import find_links, pose_all
 from dem.engine.links.rods import apart, filaments_at, none_of
-from dem.engine.links.shapes import LINE, RADIUS, Shape, smarticle_shape, table_of
+from dem.engine.links.shapes import LINE, RADIUS, Shape, kind_shape, smarticle_shape, table_of
 from dem.engine.links.stepping import PAST, Clock, advance
 from dem.errors import reject
 from dem.physics.contact import ContactLaw
@@ -89,16 +91,17 @@ class Contacts:
 class World:
     """All data of a simulation, and methods that change it between calls of the kernels.
 
-    Bodies of the first shape are smarticles, which `add` adds; `add_bodies` adds bodies of any shape.
+    Kinds of bodies are smarticles, if there are any, then those of a mixture, then `more`.
     """
 
-    particle: Particle  #: One smarticle
+    particle: Particle | None  #: One smarticle; None: there are none
     contact: ContactLaw  #: The contact law
     ground: Ground  #: The boundaries
     gravity: float  #: g, downwards [m/s²]
     planar: bool  #: Whether all motion is confined to the plane z = 0
     keep_ledger: bool  #: Whether to sum the energy that contacts dissipate
     more: tuple[Shape, ...] = ()  #: Shapes of bodies that are not smarticles
+    mixture: Mixture | None = None  #: Kinds of rigid bodies
     steps: int = 0  #: Number of steps made since the start
     time_step: float = math.nan  #: dt [s]
     motors: Motoring | None = None  #: The motors; None before the first articulation
@@ -114,7 +117,9 @@ class World:
     filaments: Filaments | None = None  #: None where no shape is flexible
 
     def __post_init__(self) -> None:
-        self.kinds = (smarticle_shape(self.particle), *self.more)
+        own = () if self.particle is None else (smarticle_shape(self.particle),)
+        mixed = () if self.mixture is None else tuple(map(kind_shape, self.mixture.kinds))
+        self.kinds = (*own, *mixed, *self.more)
         self.shapes = table_of(self.kinds)
         law, masses = self.contact, np.array([kind.effective_mass for kind in self.kinds])
         # The law's dashpots are those of two smarticles and of one; damping goes with the root of the effective mass.
@@ -145,6 +150,11 @@ class World:
         return len(self.bodies.position)
 
     @property
+    def each(self) -> int:
+        """Most links of a body, 3 at least."""
+        return max(LINKS, 1 + max(int(kind.link.max()) for kind in self.kinds))
+
+    @property
     def time(self) -> float:
         """Simulated time [s]."""
         return self.begin + self.made * self.time_step
@@ -164,29 +174,35 @@ class World:
         self.skins[[2, 5]] = NEAR_STEPS * time_step, WIDE_STEPS * time_step
 
     def add(self, poses: Poses, *, speed: float = 0.0) -> None:
-        """Add welded smarticles that fall at a speed [m/s] without rotation."""
+        """Add welded bodies that fall at a speed [m/s] without rotation."""
+        turns = np.array([rotation.as_matrix() for rotation in poses.rotations]).reshape(-1, 3, 3)
+        if poses.kinds is not None:
+            self.add_bodies(poses.kinds, poses.positions, turns, speed=speed)
+            return
+        assert self.particle is not None  # poses without kinds are those of smarticles
         # Poses are those of the principal axes; here the axes are the middle link's.
         middle = self.particle.boxes.link_rotations[1]
-        turns = np.array([matrix_product(rotation.as_matrix(), middle) for rotation in poses.rotations])
-        self.add_bodies(0, poses.positions, turns.reshape(-1, 3, 3), speed=speed)
+        self.add_bodies(0, poses.positions, matrix_product(turns, middle), speed=speed)
 
-    def add_bodies(self, shape: int, positions: Array, turns: Array, *, speed: float = 0.0) -> None:
-        """Add bodies of one shape.
+    def add_bodies(self, shape: int | NDArray[np.int64], positions: Array, turns: Array, *, speed: float = 0.0) -> None:
+        """Add bodies.
 
         Args:
-            shape: number of the shape: 0 for the smarticle, from 1 on the shapes of `more`.
+            shape: number of the shape in `kinds`, or (n,) one for each body.
             positions: (n, 3) centres of mass [m].
             turns: (n, 3, 3) rotations from the frame of the body to the laboratory frame.
             speed: downward speed of the bodies [m/s].
         """
-        kind, fresh = self.kinds[shape], bodies_for(len(positions))
+        fresh = bodies_for(len(positions))
         fresh.position[:] = positions
         fresh.velocity[:, 2] = -speed
         fresh.shape[:] = shape
         for i, turn in enumerate(turns):
+            kind = self.kinds[fresh.shape[i]]
             fresh.turn[i] = quaternion_of(turn)
             fresh.plane[i, 14:18] = kind.inertia
             if kind.planar is not None:
+                assert self.particle is not None  # the shape of smarticles follows from it
                 fresh.alpha[i] = self.particle.boxes.angles
                 lay_out(kind.planar, *self.particle.boxes.angles, fresh.plane[i])
         self.bodies = joined(self.bodies, fresh)
@@ -239,7 +255,7 @@ class World:
         hinged, bent = np.repeat(self.shapes.hinged[shapes], sizes), np.repeat(flexible, sizes)
         moved = hinged if self.articulated else 0  # links that move by themselves
         #: (Q,) code of each segment's link in recorded contacts
-        self.links = (3 * body + np.where(hinged, own, 0)).astype(np.int32)
+        self.links = at_links(body.astype(np.int64), own, self.each).astype(np.int32)
         self.segments = Segments(
             line=np.concatenate([np.zeros((0, LINE)), *(kinds[k].lines for k in shapes)]),
             begin=np.cumsum([0, *sizes]).astype(np.int32),
@@ -365,13 +381,13 @@ class World:
             pose_filaments_from_python(self.filaments, self.bodies, self.parts, self.segments)
         return self.bodies
 
-    def state(self) -> State:
-        """Return poses and velocities of all links of a pile of smarticles.
+    def state(self) -> PileState:
+        """Return poses and velocities of all bodies of a pile, of smarticles or of a mixture.
 
         Raises:
             RunError: a position or velocity is not finite.
         """
-        bodies, boxes, n = self.posed(), self.particle.boxes, self.count
+        bodies, n = self.posed(), self.count
         states = (bodies.position, bodies.velocity, bodies.spin)
         broken = ~np.logical_and.reduce([np.isfinite(values).all(axis=1) for values in states])
         reject(
@@ -380,10 +396,14 @@ class World:
             "positions or velocities are no numbers, the simulation has blown up",
             "lower fidelity.time_step_fraction",
         )
+        if self.mixture is not None:
+            moving = (bodies.position.copy(), bodies.axes.copy(), bodies.velocity.copy(), bodies.spin.copy())
+            return RigidState(self.mixture, bodies.shape.astype(np.int64), *moving)
+        assert self.particle is not None  # a pile of shapes in `more` has no state for output
         places, velocities, spins = (np.empty((n, 3, 3)) for _ in range(3))
         frames = np.empty((n, 3, 3, 3))
         find_links(bodies, self.parts, 3 if self.articulated else 1, places, frames, velocities, spins)
-        return State(boxes, places, frames, velocities, spins)
+        return State(self.particle.boxes, places, frames, velocities, spins)
 
     def contacts(self) -> Contacts:
         """Return all contacts at this instant, without a change of the simulation.

@@ -1,4 +1,4 @@
-"""Smarticles as rigid bodies of spheres: one body if welded, three bodies and two hinges otherwise.
+"""Bodies of spheres: one rigid body each, or three links and two hinges of an articulated smarticle.
 
 Welding and articulating conserve positions, momentum and angular momentum up to rounding. Articulating also conserves
 the kinetic energy; welding dissipates the energy of the links' relative motion.
@@ -11,9 +11,10 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from dem.arrays import Array
+from dem.body.kinds import Kind, Mixture
 from dem.body.particle import LINKS, Particle
 from dem.body.placement import Poses
-from dem.body.state import State
+from dem.body.state import PileState, RigidState, State
 from dem.engine.yade.construction import SMARTICLE_MATERIAL
 from dem.engine.yade.hinges import HingeLaw, Hinges, add_nodes, hinge_nodes
 from dem.engine.yade.library import Yade, rows_of
@@ -26,14 +27,15 @@ class Assembly:
     def __init__(
         self,
         yade: Yade,
-        particle: Particle,
+        particle: Particle | Mixture,
         hinge_law: HingeLaw | None,
         *,
         planar: bool = False,
         strengths: Array | None = None,
     ) -> None:
         self._yade = yade
-        self._particle = particle
+        self._model = particle
+        self._kinds: list[int] = []  # of a mixture, the kind of each body
         self._hinge_law = hinge_law
         self._planar = planar
         self._strengths = strengths
@@ -57,14 +59,37 @@ class Assembly:
         return self._ids
 
     @property
+    def _particle(self) -> Particle:
+        """One smarticle."""
+        assert isinstance(self._model, Particle)  # other bodies are neither articulated nor tied
+        return self._model
+
+    def _body(self, number: int) -> Particle | Kind:
+        """Return the particle, or the kind, that a body is."""
+        return self._model if isinstance(self._model, Particle) else self._model.kinds[self._kinds[number]]
+
+    @property
+    def each(self) -> int:
+        """Most links of a body, 3 at least."""
+        if isinstance(self._model, Particle):
+            return LINKS
+        return max(LINKS, *(len(kind.bars.points) for kind in self._model.kinds))
+
+    @property
     def link_of(self) -> Mapping[int, tuple[int, int]]:
-        """(smarticle, link) of each sphere, by the sphere's id."""
-        links = self._particle.links.tolist()
+        """(body, link) of each sphere, by the sphere's id."""
         return {
             sphere: (k, link)
             for k, spheres in enumerate(self._spheres)
-            for sphere, link in zip(spheres, links, strict=True)
+            for sphere, link in zip(spheres, self._body(k).links.tolist(), strict=True)
         }
+
+    @property
+    def masses(self) -> Array:
+        """(N,) of the bodies [kg]."""
+        if isinstance(self._model, Particle):
+            return np.full(self.count, self._model.mass)
+        return self._model.masses[np.array(self._kinds, dtype=np.int64)]
 
     def bind(self) -> None:
         """Look up YADE's objects again, after loading has replaced them."""
@@ -72,9 +97,10 @@ class Assembly:
         self._states = [bodies[body].state for body in self._ids]
 
     def add(self, poses: Poses, *, speed: float = 0.0) -> None:
-        particle, omega, still = self._particle, self._yade.omega, np.zeros(3)
-        falling = np.array([0.0, 0.0, -speed])
+        omega, still, falling = self._yade.omega, np.zeros(3), np.array([0.0, 0.0, -speed])
+        self._kinds += [] if poses.kinds is None else poses.kinds.tolist()
         for position, rotation in zip(poses.positions, poses.rotations, strict=True):
+            particle = self._body(len(self._spheres))
             spheres = [
                 omega.bodies.append(
                     self._yade.utils.sphere(self._yade.vector(*centre), particle.radius, material=SMARTICLE_MATERIAL)
@@ -86,19 +112,25 @@ class Assembly:
             self._clump(
                 members=spheres,
                 local=particle.centres,
-                mass=particle.boxes.mass,
-                inertia=particle.boxes.inertia,
+                mass=particle.mass,
+                inertia=particle.inertia,
                 position=position,
                 rotation=rotation.as_matrix(),
                 velocity=falling,
                 angular_momentum=still,
             )
-        new = len(poses.positions)
-        boxes = particle.boxes
+        if isinstance(self._model, Mixture):
+            return
+        new, boxes = len(poses.positions), self._model.boxes
         self._arms = np.concatenate([self._arms, np.tile(boxes.link_centres, (new, 1, 1))])
         self._turns = np.concatenate([self._turns, np.tile(boxes.link_rotations, (new, 1, 1, 1))])
 
     def state(self) -> State:
+        """Return the state of a pile of smarticles."""
+        return self.pile().smarticles
+
+    def pile(self) -> PileState:
+        """Return the state of a pile of any bodies."""
         rows = []
         for body, to_body in zip(self._states, self._to_body, strict=True):
             x, v, w, q = body.pos, body.vel, body.angVel, body.ori * to_body
@@ -108,7 +140,10 @@ class Assembly:
         self._check(table)
         positions, velocities, spins, quaternions = np.split(table, (3, 6, 9), axis=1)
         rotations = Rotation.from_quat(quaternions).as_matrix() if rows else np.empty((0, 3, 3))
-        boxes = self._particle.boxes
+        if isinstance(self._model, Mixture):
+            kinds = np.array(self._kinds, dtype=np.int64)
+            return RigidState(self._model, kinds, positions, rotations, velocities, spins)
+        boxes = self._model.boxes
         if self.hinges is not None:
             shape = (-1, LINKS, 3)
             return State(
@@ -235,6 +270,7 @@ class Assembly:
     def memory(self) -> dict[str, Any]:
         return {
             "spheres": self._spheres,
+            **({"kinds": self._kinds} if self._kinds else {}),
             "bodies": self._ids,
             "to_body": [[q[0], q[1], q[2], q[3]] for q in self._to_body],
             "arms": self._arms.tolist(),
@@ -244,6 +280,7 @@ class Assembly:
 
     def restore(self, memory: Mapping[str, Any]) -> None:
         self._spheres = [list(spheres) for spheres in memory["spheres"]]
+        self._kinds = list(memory.get("kinds", ()))
         self.smarticle_of = {sphere: k for k, spheres in enumerate(self._spheres) for sphere in spheres}
         self._ids = list(memory["bodies"])
         # Component by component: the constructor from (w, x, y, z) is exact, normalising would not be.

@@ -29,7 +29,7 @@ def contact_forces(yade: Yade, assembly: Assembly, boundaries: YadeBoundaries) -
     Tangential forces lack the part of the dashpot at contacts that stick, which YADE does not store. It is zero in a
     pile at rest.
     """
-    codes_of = {sphere: at_links(*link) for sphere, link in assembly.link_of.items()}
+    codes_of = {sphere: at_links(*link, assembly.each) for sphere, link in assembly.link_of.items()}
     codes_of |= {body: at_boundaries(part) for body, part in boundaries.part_of.items()}
     rows = []
     for contact in contacts_of(yade, assembly):
@@ -55,6 +55,7 @@ def contact_forces(yade: Yade, assembly: Assembly, boundaries: YadeBoundaries) -
         points=table[:, 3:6],
         friction=table[:, 6:9],
         forces=table[:, 9:],
+        each=assembly.each,
     )
 
 

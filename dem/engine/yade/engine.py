@@ -7,9 +7,10 @@ import numpy as np
 
 from dem.arrays import Array, Numbers
 from dem.body.forces import ContactForces
+from dem.body.kinds import Mixture
 from dem.body.particle import Particle
 from dem.body.placement import Poses
-from dem.body.state import State
+from dem.body.state import PileState
 from dem.engine.effect import Adds, EffectName
 from dem.engine.interface import Saved
 from dem.engine.yade.assembly import Assembly
@@ -51,7 +52,7 @@ class YadeEngine:
     def __init__(
         self,
         *,
-        particle: Particle,
+        particle: Particle | Mixture,
         cylinder: Cylinder,
         law: ContactLaw,
         gravity: float,
@@ -186,7 +187,7 @@ class YadeEngine:
         if self.steps != target:
             msg = f"YADE stopped at step {self.steps} of {target} (t = {self.time:.4f} s); see its message above"
             raise RunError(msg)
-        self._smarticle_seconds += steps * self.time_step * self.count
+        self._smarticle_seconds += steps * self.time_step * float(self._relative_masses.sum())
 
     @property
     def count(self) -> int:
@@ -194,20 +195,27 @@ class YadeEngine:
 
     def add(self, poses: Poses, *, speed: float = 0.0) -> None:
         self._assembly.add(poses, speed=speed)
-        mass, new = self.particle.boxes.mass, len(poses.positions)
-        self.ledger.added += mass * (self.gravity * float(poses.positions[:, 2].sum()) + new * speed**2 / 2)
+        mass, heights = self.particle.mass, poses.positions[:, 2]
+        relative = self._relative_masses[-len(heights) :] if len(heights) else np.zeros(0)
+        new = float(relative.sum())
+        self.ledger.added += mass * (self.gravity * float((relative * heights).sum()) + new * speed**2 / 2)
         self._thrown += mass * new * speed
+
+    @property
+    def _relative_masses(self) -> Array:
+        """(N,) masses of the bodies, over the mean mass of all kinds' bodies [1]; of smarticles exactly 1."""
+        return self._assembly.masses / self.particle.mass
 
     def still(self) -> None:
         self.ledger.dissipated += self.state().kinetic_energy
         self._assembly.still()
 
-    def state(self) -> State:
-        return self._assembly.state()
+    def state(self) -> PileState:
+        return self._assembly.pile()
 
     @property
     def impulse(self) -> float:
-        return self._smarticle_seconds * self.particle.boxes.mass * self.gravity + self._thrown
+        return self._smarticle_seconds * self.particle.mass * self.gravity + self._thrown
 
     def neighbours(self) -> Numbers:
         touching: set[tuple[int, int]] = set()
@@ -235,7 +243,7 @@ class YadeEngine:
     def contact_forces(self) -> ContactForces:
         return contact_forces(self._yade, self._assembly, self.boundaries)
 
-    def extremes(self, state: State) -> None:
+    def extremes(self, state: PileState) -> None:
         """Return None: on YADE extremes are not cheaper than a full check."""
 
     def unbalanced_force(self) -> float:
@@ -245,7 +253,7 @@ class YadeEngine:
             return self._loaded[1]
         if not self.count or not self.gravity:
             return math.inf
-        weight = self.particle.boxes.mass * self.gravity
+        weight, relative = self.particle.mass * self.gravity, self._relative_masses
         forces = rows_of(map(self._omega.forces.f, self._assembly.bodies)).reshape(self.count, -1, 3).sum(axis=1)
-        forces[:, 2] -= weight
-        return float(np.linalg.norm(forces, axis=1).mean() / weight)
+        forces[:, 2] -= weight * relative
+        return float(np.linalg.norm(forces, axis=1).mean() / (weight * float(relative.mean())))

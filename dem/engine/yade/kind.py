@@ -32,18 +32,23 @@ class YadeKind:
         law = contact_law_of(scene)
         if articulated and scene.channel is not None:
             return planar_stable_time_step(scene.particle, law, hinge_law(scene), scene.pulled_by)
-        stable = stable_time_step(scene.particle, law)
+        stable = min(stable_time_step(body, law) for body in scene.bodies)
         if articulated:
             stable = min(stable, hinged_stable_time_step(scene.particle, law, hinge_law(scene)))
         return stable
 
     def seconds_per_second(self, scene: Demand, time_step: float, activity: Activity) -> float:
-        per_step = COST_PER_SPHERE_STEP * len(scene.particle.centres) * scene.count
+        spheres = [float(len(body.centres)) for body in scene.bodies]
+        each = spheres[0] if scene.mixture is None else scene.mixture.mean(spheres)
+        per_step = COST_PER_SPHERE_STEP * each * scene.count
         return per_step / time_step * FACTORS.get(activity, 1.0)
+
+    def seconds_to_compile(self, scene: Demand) -> float:
+        return 0.0
 
     def build(self, scene: Demand, time_step: float) -> YadeEngine:
         return YadeEngine(
-            particle=scene.particle,
+            particle=scene.model,
             cylinder=scene.cylinder,
             law=contact_law_of(scene),
             gravity=scene.gravity_m_per_s2,

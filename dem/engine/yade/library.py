@@ -70,7 +70,7 @@ def import_yade() -> Any:
             return importlib.import_module("yade")
     except ImportError as error:
         raise RunError(
-            f"YADE cannot be imported ({error}); install it with `make setup` or `apt-get install yade`, see "
-            "environment.md, or run the scene on the engine that needs none: --engine links; `smarticles doctor` "
-            "reports what is missing"
+            f"YADE cannot be imported ({error}), the engine of scenes without the key engine; install it with "
+            "`make setup` or `apt-get install yade`, see environment.md, or write `engine: links` into the scene, "
+            "which needs no YADE (--engine links); `smarticles doctor` reports what is missing"
         ) from None

@@ -8,6 +8,7 @@ from scipy.linalg import block_diag, eigh
 from scipy.optimize import brentq
 
 from dem.arrays import Array
+from dem.body.kinds import Kind
 from dem.body.particle import LINKS, Boxes, Particle
 from dem.engine.yade.hinges import HingeLaw
 from dem.physics.contact import ContactLaw
@@ -20,8 +21,8 @@ CONTACTS_AT_A_TIP = 2
 CONTACTS_IN_A_ROW = 3
 
 
-def stable_time_step(particle: Particle, law: ContactLaw) -> float:
-    """Return the largest stable time step [s] of the leapfrog scheme for rigid smarticles in contact.
+def stable_time_step(body: Particle | Kind, law: ContactLaw) -> float:
+    """Return the largest stable time step [s] of the leapfrog scheme for rigid bodies in contact.
 
     The step is the least over the stiffest modes, each a mass on parallel springs and dashpots:
 
@@ -39,17 +40,19 @@ def stable_time_step(particle: Particle, law: ContactLaw) -> float:
     Source: characteristic polynomial λ² - (2 - c dt - ω²dt²) λ + (1 - c dt) at λ = -1; chain of equal masses at the
     edge of its band, K = 4k.
     """
-    lightest, mass, spheres = particle.smallest_effective_mass, particle.boxes.mass, len(particle.centres)
+    lightest, mass, spheres = body.smallest_effective_mass, body.mass, len(body.centres)
+    # Bodies lie on their broad side, across the axis along which their spheres reach least: z of smarticles.
+    up = 2 if isinstance(body, Particle) else int(np.argmin(np.ptp(body.centres, axis=0)))
     flat_damping = max(law.normal_damping, law.wall_damping / 2)
     modes = [
         (lightest / 2, CONTACTS_AT_A_TIP, law.normal_stiffness, law.normal_damping),
         (lightest, CONTACTS_AT_A_TIP, law.normal_stiffness, law.wall_damping),
         (mass / 4, spheres, law.normal_stiffness, flat_damping),
     ]
-    arms = float(((particle.centres[:, 2] + particle.radius) ** 2).sum())
+    arms = float(((body.centres[:, up] + body.radius) ** 2).sum())
     modes += [
         (inertia / arms, 4, law.tangential_stiffness, flat_damping * law.tangential_damping)
-        for inertia in particle.boxes.inertia[:2]
+        for inertia in np.delete(body.inertia, up)
     ]
     steps = []
     for moved, contacts, stiffness, damping in modes:

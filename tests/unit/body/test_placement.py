@@ -70,7 +70,7 @@ def test_impossible_layer_fails_with_the_way_out() -> None:
     with pytest.raises(RunError) as caught:
         place(particle, count=3, radius=0.3 * particle.reach)
     assert str(caught.value) == (
-        f"only 0 of 3 smarticles of a layer found room in a container of radius {0.3 * particle.reach:g} m; "
+        f"only 0 of 3 bodies of a layer found room in a container of radius {0.3 * particle.reach:g} m; "
         "lower phases.0.per_layer or widen container.radius_m"
     )
 

@@ -155,7 +155,7 @@ def test_vtp_lists_every_frame_with_its_time_and_all_fields(pile, tmp_path):
     assert [float(entry["timestep"]) for entry in listed] == pytest.approx(frames.times.tolist(), rel=1e-8)
     mesh = pv.read(folder / listed[-1]["file"])
     assert mesh.n_cells == 12 * 3 * 6
-    asked_for = {"angle_rad", "motor_torque_N_m", "motor_work_J", "halted", "normal_force_N", "force_chain"}
+    asked_for = {"angle_rad", "motor_torque_N_m", "motor_work_J", "halted", "normal_force_N", "force_chain", "kind"}
     rigid = {field.name for field in FIELDS} - asked_for
     assert set(mesh.cell_data.keys()) == rigid
     assert mesh.field_data["TimeValue"] == pytest.approx([frames.times[-1]])
@@ -196,7 +196,7 @@ def test_a_kind_that_comes_or_goes_is_nothing_at_the_other_times(opened, tmp_pat
 def test_hostile_names_are_data(tmp_path, name):
     run = write_run(tmp_path / "run", SyntheticRun(count=2, frames_per_phase=1, name=name))
     before = sorted(path.name for path in tmp_path.iterdir())
-    for suffix in FORMATS:
+    for suffix in ("vtp", *SUFFIXES):
         export_run(run, to=suffix, unwanted=["local_packing_fraction"])
     assert sorted(path.name for path in tmp_path.iterdir()) == before
     (file,) = (run / "export-vtp" / "smarticles").glob("*.vtp")

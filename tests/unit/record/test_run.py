@@ -13,7 +13,7 @@ from dem.record.run import Run, open_run
 
 def test_a_run_has_what_its_directory_holds(tmp_path: Path) -> None:
     run = open_run(write_run(tmp_path / "run", SyntheticRun()))
-    assert (run.manifest.count, len(run.frames), len(run.series)) == (run.frames[0].count, 16, len(run.series.time))
+    assert (run.manifest.count, len(run.frames), len(run.series)) == (run.frames[0].count, 16, len(run.series.data))
     assert [phase.type for phase in run.phases] == ["deposit", "relax", "shake", "relax"]
     assert run.frames is run.frames
     assert run == Run(Path(str(run)))

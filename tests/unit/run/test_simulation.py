@@ -2,6 +2,7 @@
 
 import json
 import os
+import shutil
 import signal
 import subprocess
 from collections.abc import Callable
@@ -13,14 +14,20 @@ import pytest
 from double import EngineDouble, KindDouble
 from scenes import CHAIN, SMALL, changed
 
+from dem.engine.effect import EffectName
 from dem.errors import InputError, RunError
+from dem.plan.effects import decide
 from dem.plan.outlook import plan
 from dem.plan.steps import time_steps
 from dem.record.document import Done
+from dem.record.run import Run
+from dem.record.vtkhdf import truncate
 from dem.run.run import run_scene
-from dem.run.simulation import Simulation, StopRequestedError
+from dem.run.simulation import Simulation
+from dem.run.stop import StopRequest, StopRequestedError
 from dem.scene.reading import load_scene, parse_scene, scene_hash
 from dem.scene.scene import Scene
+from smarticles.commands.compare import compare_bits
 
 SWING = {"type": "internal-oscillation", "theta_deg": 4, "duration_s": 0.05}
 DEPOSIT, RELAX = {"type": "deposit", "per_layer": 5}, {"type": "relax", "duration_s": 0.1}
@@ -171,6 +178,27 @@ def test_a_run_asked_to_stop_does_so_at_its_next_checkpoint(
     assert failed["checkpoint_s"] == failed["time_s"]
 
 
+def test_a_run_asked_to_stop_before_its_first_step_can_be_continued(
+    kind: KindDouble, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    scene, build = scene_of("rested"), kind.build
+
+    def signalled(scene: Scene, time_step: float) -> EngineDouble:
+        os.kill(os.getpid(), signal.SIGUSR1)
+        return build(scene, time_step)
+
+    before, stop = signal.getsignal(signal.SIGUSR1), StopRequest()
+    with monkeypatch.context() as patch, stop.listening():
+        patch.setattr(kind, "build", signalled)
+        with pytest.raises(StopRequestedError, match=r"stopped as requested before it went on from t = 0\.0000 s"):
+            run(scene, tmp_path / "run", stop=stop)
+    assert signal.getsignal(signal.SIGUSR1) is before
+    assert json.loads((tmp_path / "run/failed.json").read_text())["status"] == "interrupted"
+    run(scene, tmp_path / "run", resume=True)
+    run(scene, tmp_path / "straight")
+    assert series(tmp_path / "run") == series(tmp_path / "straight")
+
+
 def test_an_engine_that_stops_fails_the_run_and_keeps_what_was_recorded(
     kind: KindDouble, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -191,6 +219,105 @@ def test_an_engine_that_stops_fails_the_run_and_keeps_what_was_recorded(
     assert not (tmp_path / "done.json").exists()
     with h5py.File(tmp_path / "series.h5") as file:
         assert failed["time_s"] - file["time_s"][-1] <= 0.004
+
+
+# -- files that are lost while the run writes them ----------------------------------------------------------------
+
+
+def replaced(out: Path) -> None:
+    shutil.move(out, out.with_name("moved"))
+    shutil.copytree(out.with_name("moved"), out)
+
+
+LOSSES: dict[str, tuple[Callable[[Path], object], str]] = {
+    "directory deleted": (shutil.rmtree, "was deleted, moved or replaced|its folder is gone"),
+    "directory replaced": (replaced, "was deleted, moved or replaced"),
+    "lock": (lambda out: (out / ".lock").unlink(), "was deleted, moved or replaced"),
+    "manifest": (lambda out: (out / "run.json").unlink(), r"run\.json: is gone, and without it the run cannot be read"),
+    "frames": (lambda out: shutil.rmtree(out / "frames"), r"frame_000000\.vtu: is gone; put it back"),
+    "one file": (lambda out: (out / "frames.vtkhdf").unlink(), r"frames\.vtkhdf: (is gone; put it|cannot be written)"),
+    "one frame": (lambda out: (out / "frames/frame_000001.vtu").unlink(), r"frame_000001\.vtu: is gone; put it back"),
+}
+
+
+@pytest.mark.parametrize("name", LOSSES)
+@pytest.mark.parametrize("step", [100, -1])
+def test_a_run_that_loses_its_files_fails_and_leaves_others_alone(
+    kind: KindDouble, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str, step: int
+) -> None:
+    more = ONE_FILE if name == "one file" else {}
+    scene, out, advance = scene_of("rested", **more), tmp_path / "run", EngineDouble._step
+    last = (run(scene, tmp_path / "whole") or Done(time_s=0, steps=0, wall_s=0, phases=())).steps
+    lose, stated = LOSSES[name]
+
+    def losing(engine: EngineDouble) -> None:
+        advance(engine)
+        if engine.steps == (step if step > 0 else last):
+            lose(out)
+
+    monkeypatch.setattr(EngineDouble, "_step", losing)
+    with pytest.raises(RunError, match=stated):
+        run(scene, out)
+    assert not (out / "done.json").exists()
+    own = name in ("manifest", "frames", "one file", "one frame")
+    assert (out / "failed.json").exists() == own
+
+
+# -- frames in one file ------------------------------------------------------------------------------------------------
+
+ONE_FILE = {"recording.frames": "vtkhdf"}
+
+
+@pytest.mark.parametrize("name", ["rested", "shaken"])
+def test_frames_in_one_file_are_those_in_many_also_after_a_stop(
+    kind: KindDouble, interrupted: Callable[[int], None], tmp_path: Path, name: str
+) -> None:
+    many, one, resumed = (tmp_path / place for place in ("many", "one", "resumed"))
+    run(scene_of(name), many)
+    run(scene_of(name, **ONE_FILE), one)
+    interrupted(2)
+    with pytest.raises(KeyboardInterrupt):
+        run(scene_of(name, **ONE_FILE), resumed)
+    assert 0 < len(Run(resumed).frames) < len(Run(one).frames)
+    run(scene_of(name, **ONE_FILE), resumed, resume=True)
+    for other in (one, resumed):
+        assert [path.name for path in other.glob("frames*")] == ["frames.vtkhdf"]
+        bits = compare_bits(Run(many), Run(other))
+        assert bits["identical"], bits
+        assert bits["frames"] == bits["compared"] > 3
+    with h5py.File(one / "frames.vtkhdf", "r+") as file:
+        file["VTKHDF/Points"][-1, 2] += 1e-12
+    assert compare_bits(Run(many), Run(one))["frames"] == bits["frames"] - 1
+    files = [
+        {entry.name: entry for entry in decide(scene_of(name, **more))}[EffectName.FRAMES].adds.files
+        for more in ({}, ONE_FILE)
+    ]
+    assert files == [("frames.pvd", "frames"), ("frames.vtkhdf",)]
+    assert scene_hash(scene_of(name)) == scene_hash(scene_of(name, **{"recording.frames": "vtu"}))
+
+
+def test_a_run_whose_frames_are_damaged_is_not_continued_and_not_changed(
+    kind: KindDouble, interrupted: Callable[[int], None], tmp_path: Path
+) -> None:
+    scene, file = scene_of("rested", **ONE_FILE), tmp_path / "frames.vtkhdf"
+    interrupted(2)
+    with pytest.raises(KeyboardInterrupt):
+        run(scene, tmp_path)
+    whole = file.read_bytes()
+    before = {path.name: path.read_bytes() for path in tmp_path.iterdir() if path != file}
+    shorter = tmp_path.with_name("shorter.vtkhdf")
+    shorter.write_bytes(whole)
+    truncate(shorter, 1)
+    for damaged in (whole[:-200], whole[:2000] + b"x" * 500 + whole[2500:], shorter.read_bytes(), None):
+        file.unlink()
+        if damaged is not None:
+            file.write_bytes(damaged)
+        with pytest.raises(InputError, match=r"cannot read frames .*frames\.vtkhdf: .*; put the file back, or run"):
+            run(scene, tmp_path, resume=True)
+        assert {path.name: path.read_bytes() for path in tmp_path.iterdir() if path != file} == before
+        file.write_bytes(whole)
+    run(scene, tmp_path, resume=True)
+    assert (tmp_path / "done.json").exists()
 
 
 # -- directories that are not a run's ----------------------------------------------------------------------------------

@@ -3,6 +3,7 @@
 import math
 import re
 from collections.abc import Mapping
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -77,6 +78,7 @@ HOOKS: Bad = [
     ({"hooks": {}, "phases": [DEPOSIT, {**PULL, "distance_m": 23.4}]}, "phases.1.distance_m", "23.4"),
     ({"hooks": {}, "phases": [DEPOSIT, {**PULL, "which": "lower"}]}, "phases.1.which", "'lower'"),
     ({"phases": [DEPOSIT, REMOVE, SHAKE, REMOVE]}, "phases.3", "remove-container"),
+    ({"phases": [DEPOSIT, {**SHAKE, "frequency_hz": 0.01}]}, "phases.1.frequency_hz", "0.01 Hz at Γ = 2"),
     ({"hooks": {"length_m": 0.048}}, "hooks.length_m", "0.048"),
     ({"hooks": {"lower_length_m": 0.048, "lower_bars": 3}}, "hooks.lower_length_m", "0.048"),
     ({"hooks": {"lower_length_m": 0.01, "lower_bars": 12}}, "hooks.lower_bars", "no room between them"),
@@ -207,3 +209,32 @@ def test_what_is_filled_in_from_a_wrong_value_is_no_second_error() -> None:
     both = rejected(SMALL, {"hooks": {"length_m": 11.7, "lower_length_m": 11.7}})
     assert both.count("11.7 means") == 2
     assert "; also hooks.lower_length_m: 11.7 means" in both
+
+
+@pytest.mark.parametrize(("changes", "message"), [
+    ({"shape": "ring"}, "unknown key 'shape'; scenes have no such key, see `particle` for shapes; docs/limits.md lists"),
+    ({"contact": {"cohesion": 1.0}}, "contact: unknown key 'cohesion'; scenes have no cohesion; docs/limits.md lists"),
+    ({"air": {"viscosity": 1.8e-5}}, "unknown key 'air'; scenes have no air or water; docs/limits.md lists"),
+    ({"container": None}, "container: got null, but there is no scene without a container; leave the key out"),
+])  # fmt: skip
+def test_what_no_scene_can_describe_points_to_the_page_of_limits(changes: dict[str, Any], message: str) -> None:
+    with pytest.raises(InputError) as raised:
+        parse_scene({**SMALL, **changes}, source="scene.yaml")
+    assert message in str(raised.value)
+
+
+def test_every_shipped_scene_names_its_engine() -> None:
+    root = Path(__file__).resolve().parents[3]
+    files = [*root.glob("smarticles/starters/*.yaml"), *root.glob("studies/*.j2")]
+    texts = {path.name: path.read_text(encoding="utf-8") for path in files}
+    for path in (root / "README.md", *root.glob("docs/**/*.md")):
+        for number, block in enumerate(re.findall(r"```yaml\n(.*?)```", path.read_text(encoding="utf-8"), re.DOTALL)):
+            if "schema_version: 1" in block and "phases:" in block:
+                texts[f"{path.name} {number}"] = block
+        for number, call in enumerate(
+            re.findall(r"smarticles\.Scene\((.*?)\n\)", path.read_text(encoding="utf-8"), re.S)
+        ):
+            texts[f"{path.name} Scene {number}"] = call.replace("engine=", "engine:")
+    texts["gait.ipynb"] = (root / "examples" / "gait.ipynb").read_text(encoding="utf-8").replace("engine=", "engine:")
+    assert len(texts) > 25
+    assert [name for name, text in texts.items() if "engine:" not in text] == []

@@ -6,6 +6,8 @@ from pathlib import Path
 import pytest
 from command_cases import Smarticles
 
+from dem.engine.links import cache
+from dem.run import warm
 from smarticles.commands import doctor
 
 Answers = dict[str, tuple[bool, str]]
@@ -27,6 +29,23 @@ def test_a_machine_without_slurm_is_fit_for_runs(answers: Answers, smarticles: S
     assert "yade            ok    1.2\n" in said.out
     assert "slurm           no    no sbatch\n" in said.out
     assert "way out: only `sweep --submit slurm` needs it" in said.out
+
+
+def test_compile_says_what_was_compiled(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, smarticles: Smarticles
+) -> None:
+    monkeypatch.setattr(cache, "folder", lambda: tmp_path)
+    monkeypatch.setattr(warm, "compile_for", lambda scene: (tmp_path / f"{scene.name}.code").touch())
+    said = smarticles("doctor", "--compile")
+    assert said.status == 0
+    kinds = said.out.splitlines()
+    assert [line.split("  ")[0] for line in kinds[:-1]] == [kind for kind, _, _ in doctor._COMPILED]
+    assert "1 kernels compiled in " in kinds[0]
+    assert "was compiled before" in kinds[2]  # another scene of that name
+    assert kinds[-1].endswith(f" are stored in {tmp_path}")
+    assert smarticles("doctor", "--compile", "--json").status == 2
+    monkeypatch.setattr(cache, "folder", lambda: None)
+    assert smarticles("doctor", "--compile").status == 1
 
 
 @pytest.mark.parametrize(

@@ -37,4 +37,4 @@ def test_a_folder_that_is_missing_and_a_kind_that_is_not_known(tmp_path: Path, s
     assert said.status == 2
     assert f"the folder {tmp_path / 'no'} does not exist; make it" in said.err
     assert "did you mean 'melting'?" in smarticles("init", "meltin").err
-    assert "known: shaken, actuated, hook" in smarticles("init", "straight").err
+    assert "known: shaken, actuated, hook" in smarticles("init", "quiet").err

@@ -2,6 +2,7 @@
 
 import subprocess
 import sys
+from collections.abc import Mapping
 from pathlib import Path
 
 import pytest
@@ -9,7 +10,9 @@ from command_cases import WriteRun
 
 import smarticles
 from dem.errors import InputError
+from dem.record.frame import Frame
 from dem.setting.fidelity import fidelities
+from postprocess.measures import registry
 from smarticles.public import write_sweep
 from smarticles.sweeps import make_folder
 from templates.sweep.expand import expand
@@ -108,3 +111,95 @@ def test_keys_that_end_alike_keep_all_their_words(tmp_path: Path) -> None:
     assert [*points[0].values] == ["phases_1_duration_s", "phases_2_duration_s", "restitution"]
     assert [[phase.duration_s for phase in point.scene.phases[1:]] for point in points] == [[0.1, 0.3], [0.2, 0.3]]
     assert points[0].scene.contact.restitution == 0.5
+
+
+# -- words of Python ---------------------------------------------------------------------------------------------------
+
+
+def test_a_wrong_scene_is_an_input_error_in_one_line() -> None:
+    with pytest.raises(smarticles.InputError) as raised:
+        smarticles.Scene(seed=-1, count=5, phases=[{"type": "deposit"}], contact={"friction": 0.4})
+    assert "\n" not in str(raised.value)
+    assert "seed: -1 is out of range; use at least 0" in str(raised.value)
+    assert "contact: unknown key 'friction'" in str(raised.value)
+
+
+@pytest.mark.parametrize(("vary", "message"), [
+    ({"contact.frctn": [1]}, "vary: run frctn1: contact: unknown key 'frctn'"),
+    ({"phases.7.duration_s": [1]}, "vary: phases.7.duration_s: there is no '7' in the scene"),
+    ({"seed": [1, 1]}, "vary: repeats.seeds: a seed is given twice"),
+])  # fmt: skip
+def test_errors_of_a_sweep_name_arguments_and_no_temporary_file(
+    tmp_path: Path, vary: dict[str, list[int]], message: str
+) -> None:
+    with pytest.raises(smarticles.InputError) as raised:
+        smarticles.sweep(scene_of(), tmp_path / "out", vary=vary)
+    assert str(raised.value).startswith(message)
+
+
+def test_errors_of_a_run_name_arguments(tmp_path: Path) -> None:
+    with pytest.raises(smarticles.InputError) as raised:
+        smarticles.run(scene_of(engine="links"), tmp_path / "a", resume=True)
+    assert str(raised.value) == f"out {tmp_path / 'a'}: holds no run to resume; leave resume=True out to start one"
+
+
+def test_the_recorded_command_names_a_scene_that_exists(tmp_path: Path) -> None:
+    scene = smarticles.Scene(seed=1, count=1, engine="links", fidelity="draft", phases=[{"type": "deposit"}])
+    done = smarticles.run(scene, tmp_path / "a")
+    words = done.manifest.command.split()
+    assert words[:2] + words[3:] == ["smarticles", "run", "--out", "NEW"]
+    assert Path(words[2]) == tmp_path / "a" / "scene.yaml"
+    assert smarticles.load_scene(words[2]) == scene
+
+
+def test_measures_of_ones_own_are_columns(swept: smarticles.SweepDirectory) -> None:
+    def top_m(frame: Frame, run: smarticles.Run) -> float:
+        return float(frame.vertices[..., 2].max())
+
+    last = swept[0].frames[-1]
+    table = smarticles.measure(swept[0], measures=[top_m])
+    assert table["top [m]"].iloc[-1] == pytest.approx(last.vertices[..., 2].max())
+    means = swept.table(by="aspect_ratio", measures=[top_m])
+    assert means["top [m]"].notna().all()
+    assert "top [m]" not in swept.table()
+
+
+def test_measures_of_installed_packages_are_columns(
+    tmp_path: Path, write_run: WriteRun, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def lowest_m(frame: Frame, run: smarticles.Run) -> float:
+        return float(frame.vertices[..., 2].min())
+
+    class Point:
+        value = "elsewhere:MEASURES"
+
+        def load(self) -> object:
+            return (registry.measure_of(lowest_m),)
+
+    monkeypatch.setattr(registry, "entry_points", lambda group: [Point()] if group == "smarticles.measures" else [])
+    monkeypatch.setattr("smarticles.kept_tables._program", lambda: "another program")
+    monkeypatch.setattr(registry, "registered", registry.registered.__wrapped__)
+    found = smarticles.read(write_run(tmp_path / "run", frames_per_phase=1))
+    assert smarticles.measure(found)["lowest [m]"].iloc[-1] == pytest.approx(found.frames[-1].vertices[..., 2].min())
+    monkeypatch.setattr(Point, "load", lambda _: 1 / 0)
+    with pytest.raises(smarticles.InputError, match="the measures of elsewhere:MEASURES cannot be loaded"):
+        registry.registered()
+
+
+def test_a_series_is_a_mapping(tmp_path: Path, write_run: WriteRun) -> None:
+    series = smarticles.read(write_run(tmp_path / "run")).series
+    assert isinstance(series, Mapping)
+    assert list(series) == list(series.keys()) == list(series.data)
+    assert [id(array) for array in series.values()] == [id(array) for array in series.data.values()]
+    assert "time_s" in series
+    assert "nothing" not in series
+    assert series.get("nothing") is None
+    with pytest.raises(smarticles.InputError, match="holds no series 'nothing'"):
+        series["nothing"]
+
+
+def test_a_plot_is_a_picture_that_a_notebook_shows(tmp_path: Path, write_run: WriteRun) -> None:
+    image = smarticles.plot(write_run(tmp_path / "run"))
+    assert image.size == (1200, 1200)
+    assert image._repr_png_().startswith(b"\x89PNG")
+    assert len(image.convert("L").getcolors()) > 10

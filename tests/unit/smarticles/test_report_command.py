@@ -7,15 +7,19 @@ from html.parser import HTMLParser
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 import yaml
 from command_cases import Smarticles, WriteRun
 from scenes import small
 
 from dem.scene.reading import dump_scene
+from dem.scene.scene import Scene
 from postprocess.pictures import render
 from postprocess.report import figures
-from smarticles.reporting.charts import thinned
+from smarticles.reporting.charts import Groups, against_variable, thinned
+from smarticles.reporting.run import effect_blocks
+from smarticles.reporting.sweep import _figures
 from smarticles.sweeps import make_folder
 from studies.registry import shipped
 
@@ -197,8 +201,12 @@ def test_a_study_is_analysed_drawn_and_reported(tmp_path: Path, write_run: Write
     assert said.status == 1
     lines, results = said.out.splitlines(), folder.path / "results"
     assert lines[0].startswith("not the full study: 18 runs instead of 73; ")
-    assert "shake_s: 1.5 instead of 20.0" in lines[0]
-    assert lines[2].split()[:4] == ["links", "0.4", "20", "3"]
+    assert "; shake_s: 1.5 instead of 20.0 in 3 of 18 runs; " in lines[0]
+    assert lines[1] == f"the full study found: {shipped('gravish').found}"
+    assert "(results/gravish)" in lines[1]
+    assert lines[3].split()[:4] == ["links", "0.4", "20", "3"]
+    for table in ("points.csv", "deviations.csv", "findings.md"):
+        assert f"The full study found: {shipped('gravish').found}" in (results / table).read_text(encoding="utf-8")
     assert "FOUND: φ_f is above φ_0 at every l/w" in lines
     drawn = [line.removeprefix("figure: ") for line in lines if line.startswith("figure: ")]
     assert drawn
@@ -221,6 +229,45 @@ def test_a_study_is_analysed_drawn_and_reported(tmp_path: Path, write_run: Write
 
 
 # -- parts -------------------------------------------------------------------------------------------------------------
+
+
+def test_charts_of_several_variables_have_intervals_and_a_part_for_each_combination() -> None:
+    rows = [
+        {"theta": theta, "omega": omega, "l_over_w": aspect, "runs [-]": 3 if omega else 2}
+        | {"crossings mean [-]": theta + omega + aspect, "crossings mean SE [-]": 0.1}
+        for theta in (5, 10, 15)
+        for omega in (0, 6)
+        for aspect in (0.4, 0.7)
+    ]
+    varied = {"theta": [5, 10, 15], "omega": [0, 6], "l_over_w": [0.4, 0.7]}
+    drawn = {}
+
+    def noted(variable: str, label: str, groups: Groups) -> str:
+        drawn[len(drawn)] = groups
+        return against_variable(variable, label, groups)
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("smarticles.reporting.sweep.against_variable", noted)
+        blocks = _figures(pd.DataFrame(rows), list(varied), varied, "relax")
+    assert len(blocks) == 2  # a chart for each l/w
+    assert "against theta, l_over_w = 0.4" in blocks[0]
+    assert "95 % intervals" in blocks[0]
+    assert "3 of 6 points have fewer than 3 runs" in blocks[0]
+    assert list(drawn[1]) == ["omega = 0", "omega = 6"]
+    xs, means, half_widths = drawn[1]["omega = 6"]
+    assert (list(xs), means) == ([5, 10, 15], pytest.approx([11.7, 16.7, 21.7]))
+    assert half_widths == pytest.approx([4.303 * 0.1] * 3, rel=1e-3)  # Student's t, three runs
+    assert drawn[1]["omega = 0"][2] == pytest.approx([12.706 * 0.1] * 3, rel=1e-3)  # two runs
+
+
+def test_reasons_of_effects_are_those_of_all_scenes() -> None:
+    def scene(speed: float) -> Scene:
+        gait = {"type": "internal-oscillation", "theta_deg": 10, "duration_s": 1}
+        motor = {"speed_limit_rad_per_s": speed}
+        return Scene(seed=1, count=5, engine="links", phases=[{"type": "deposit"}, gait], motor=motor)
+
+    (page,) = effect_blocks([scene(3.0), scene(6.0), scene(12.0)])
+    assert all(f"{speed:g} rad/s" in page for speed in (3, 6, 12))
 
 
 def test_a_thinned_curve_keeps_its_extremes() -> None:

@@ -4,9 +4,13 @@ import csv
 import json
 from pathlib import Path
 
+import pandas as pd
 import pytest
 from command_cases import Smarticles, WriteRun
 from PIL import Image
+
+from dem.record.run import Run
+from postprocess.measures.table import summarise_run
 
 
 def test_measure_writes_a_profile_of_each_run_beside_the_table(
@@ -43,6 +47,30 @@ def test_measure_gives_json_without_nan(tmp_path: Path, write_run: WriteRun, sma
     assert 0.05 < rows[0]["phi second-highest-com [-]"] < 0.2
 
 
+def test_measure_adds_measures_on_request_alone(tmp_path: Path, write_run: WriteRun, smarticles: Smarticles) -> None:
+    run = write_run(tmp_path / "a")
+    plain = json.loads(smarticles("measure", run, "--json").out)[-1]
+    more = json.loads(smarticles("measure", run, "--json", "--also", "crossing-number,closed-linking,orientation").out)[
+        -1
+    ]
+    assert {name: more[name] for name in plain} == plain
+    added = {name for name in set(more) - set(plain) if " SE " not in name}
+    assert added == {
+        "average crossing number mean [-]",
+        "nematic order of all links [-]",
+        "polar order of mouths [-]",
+        "mouths upwards [-]",
+        "closed linking number mean [-]",
+        "linked graph largest share [-]",
+    }
+    assert more["average crossing number mean [-]"] > 0.1
+    said = smarticles("measure", run, "--also", "crossing-number")
+    assert "⟨ACN⟩: average crossing number" in said.out
+    unknown = smarticles("measure", run, "--also", "caging,crossing")
+    assert unknown.status == 2
+    assert "also: 'crossing' is no measure on request; did you mean 'crossing-number'?" in unknown.err
+
+
 def test_measure_has_the_variables_of_a_sweep_and_means_by_them(
     tmp_path: Path, sweep_file: Path, write_run: WriteRun, smarticles: Smarticles
 ) -> None:
@@ -63,6 +91,41 @@ def test_measure_has_the_variables_of_a_sweep_and_means_by_them(
     # Of 0.12 and 0.14: their mean, and half their difference.
     assert lines[3].split()[5:7] == ["0.1300", "0.0100"]
     assert "standard error over runs" in said.out
+    rest = smarticles("measure", out, "--by", "kind", "--by", "count", "--phase", "last").out.splitlines()
+    assert [line.split()[:4] for line in rest[1:3]] == [["a", "5", "1", "relax"], ["a", "6", "1", "relax"]]
+    unknown = smarticles("measure", out, "--phase", "shakes")
+    assert unknown.status == 2
+    assert "--phase shakes: no run has a phase 'shakes'; did you mean 'shake'?" in unknown.err
+
+
+def test_measure_keeps_the_tables_of_runs_that_have_not_changed(
+    tmp_path: Path, write_run: WriteRun, smarticles: Smarticles, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    measured = []
+    measure = summarise_run
+
+    def noted(run: Run, **keywords: object) -> pd.DataFrame:
+        measured.append(run.path.name)
+        return measure(run, **keywords)  # type: ignore[arg-type]
+
+    monkeypatch.setattr("postprocess.measures.table.summarise_run", noted)
+    runs = [write_run(tmp_path / name, seed=seed) for seed, name in enumerate("ab")]
+    first = smarticles("measure", *runs, "--json").out
+    assert smarticles("measure", *runs, "--json").out == first
+    assert measured == ["a", "b"]
+    # Other frames, a damaged table, and a directory with another name.
+    frame = runs[0] / "frames" / "frame_000009.vtu"
+    frame.write_bytes((runs[1] / "frames" / "frame_000009.vtu").read_bytes())
+    kept = runs[1] / ".measures-phases-phase-end.txt"
+    kept.write_text(kept.read_text().replace("0.1", "0.2"))
+    again = smarticles("measure", *runs, "--json").out
+    assert measured == ["a", "b", "a", "b"]
+    rows, before = json.loads(again), json.loads(first)
+    assert rows[4:] == before[4:]
+    assert rows[:4] != before[:4]
+    moved = runs[1].rename(tmp_path / "moved")
+    assert {row["run"] for row in json.loads(smarticles("measure", moved, "--json").out)} == {str(moved)}
+    assert measured == ["a", "b", "a", "b"]
 
 
 def test_a_frame_that_is_cut_off_has_a_way_out_that_works(

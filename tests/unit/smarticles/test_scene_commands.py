@@ -98,3 +98,21 @@ def test_a_resumed_run_has_the_threads_that_it_began_with_unless_asked(
     shutil.copy(scene_file, out / "scene.yaml")
     assert smarticles("resume", out, *options).status == 0
     assert seen == [threads, threads]
+
+
+def test_keys_are_printed_with_range_and_meaning(smarticles: Smarticles) -> None:
+    lines = smarticles("keys", "contact").out.splitlines()
+    place = next(k for k, line in enumerate(lines) if line.strip().startswith("friction_wall"))
+    assert "default 0.4, ≥ 0" in lines[place]
+    assert "smarticle-container" in lines[place + 1]
+    assert any(line.startswith("  duration_s    ") for line in smarticles("keys", "shake").out.splitlines())
+    whole = smarticles("keys").out
+    names = whole.partition("more, by `smarticles keys NAME`: ")[2].replace("\n", " ").strip().split(", ")
+    assert {"motor", "shake", "container", "recording", "fidelity", "phases", "barbs"} <= set(names)
+    assert "one of: actuate, arrange, deposit" in smarticles("keys", "phases").out.replace("\n", " ")
+    assert all(smarticles("keys", name).status == 0 for name in names)
+    wrong = smarticles("keys", "moter")
+    assert (wrong.status, wrong.err) == (
+        2,
+        "smarticles: error: keys moter: is no part of a scene; did you mean 'motor'?\n",
+    )

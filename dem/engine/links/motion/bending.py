@@ -40,9 +40,9 @@ from dem.engine.links.shapes import INVERSE
 from dem.engine.links.vectors import Vector, add, along, cross, dot, put, put_more, scale, sub, vector
 
 # Columns of a rod: length of a segment at rest ℓ [m]; EA/ℓ [N/m], EI/ℓ and GJ/ℓ [N m], times of Kelvin and Voigt of
-# stretching and twisting, and of bending [s]; a segment's inertia about its axis [kg m²]; drag of half a segment across and along
-# [N s/m], of a segment's roll [N m s]; weight over mass and g [1]; squares of the greatest frequencies of bending
-# and of twisting [1/s²].
+# stretching and twisting, and of bending [s]; a segment's inertia about its axis [kg m²]; drag of half a segment across
+# and along [N s/m], of a segment's roll [N m s]; weight over mass and g [1]; squares of the greatest frequencies of
+# bending and of twisting [1/s²].
 LENGTH, STRETCHING, BENDING, TWISTING, STRETCHING_TIME, BENDING_TIME = range(6)
 AXIAL, ACROSS, ALONG, ROLLING, WEIGHT, STIFFEST, STIFFEST_TWIST, ROD = range(6, 14)
 # Columns of a gait: ψ [rad], its rate [rad/s], sense ±1, mean reversals per second, time to the next one [s], reversals

@@ -61,8 +61,8 @@ def test_columns_of_motors_and_energies_where_there_are_any(make_run):
         for name, (values, unit) in columns.items():
             file.create_dataset(name, data=values).attrs.update({"unit": unit, "description": name})
     table = measure_run(Run(directory), definitions=CHEAP)
-    assert table["angle barb 1 [rad]"].tolist() == [1.5, 1.4, 0.1]
-    assert table["angle barb 2 [rad]"].tolist() == [1.5, 1.3, 0.2]
+    assert table["angle barb 1 [degree]"].tolist() == pytest.approx([85.9437, 80.2141, 5.72958], rel=1e-5)
+    assert table["angle barb 2 [degree]"].tolist() == pytest.approx([85.9437, 74.4845, 11.4592], rel=1e-5)
     assert table["motor work [J]"].tolist() == [0.0, 1e-6, 3e-6]
     assert table["halted fraction [-]"].tolist()[1:] == [0.5, 0.25]
     assert table["gravitational energy [J]"].iloc[-1] == 3e-4

@@ -1,0 +1,157 @@
+"""A file that is changed in place, and whose changes are made all or not at all; HDF5 by itself offers no such thing.
+
+Changes stay in memory until `Journaled.commit`, which stores the present content of all pages that change beside the
+file, changes the file, and removes the stored pages. A process that ends in between leaves them, and the next one reads
+the file as it was before. A full disk is noticed by `commit`, not inside of the library that writes.
+
+Source: the rollback journal of SQLite, https://www.sqlite.org/atomiccommit.html
+"""
+
+import contextlib
+import io
+import os
+import zlib
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from dem.record.files import whole
+
+PAGE = 4096  #: Bytes that are read and stored together
+_NUMBER = 8  # bytes of a whole number in a journal
+
+
+class Journaled(io.RawIOBase):
+    """A file object for reading and writing; see the module for when changes reach the disk.
+
+    Raises:
+        OSError: the file or its journal cannot be read.
+        ValueError: the journal is damaged.
+    """
+
+    def __init__(self, path: Path) -> None:
+        super().__init__()
+        self._path = path
+        self._disk = path.open("rb")
+        self._place = 0
+        found = read_journal(path)
+        self._size, pages = (os.fstat(self._disk.fileno()).st_size, {}) if found is None else found
+        self._pages = {number: bytearray(content) for number, content in pages.items()}
+
+    def close(self) -> None:
+        """Close the file; changes that are not committed are forgotten."""
+        self._disk.close()
+        super().close()
+
+    def seek(self, offset: int, whence: int = os.SEEK_SET) -> int:
+        """Move the place of the next read or write, and return it."""
+        self._place = offset + {os.SEEK_SET: 0, os.SEEK_CUR: self._place, os.SEEK_END: self._size}[whence]
+        return self._place
+
+    def truncate(self, size: int | None = None) -> int:
+        """Set the size of the file [bytes], and return it."""
+        self._size = self._place if size is None else size
+        return self._size
+
+    def readinto(self, buffer: Any) -> int:
+        """Read into a buffer; bytes behind the end are zeros, as the HDF5 library expects them."""
+        view = memoryview(buffer).cast("B")
+        for number, start, stop, at in self._spans(len(view)):
+            view[at : at + stop - start] = self._page(number)[start:stop]
+        return len(view)
+
+    def write(self, data: Any) -> int:
+        """Change bytes in memory; return their number."""
+        view = memoryview(data).cast("B")
+        for number, start, stop, at in self._spans(len(view)):
+            page = self._pages.setdefault(number, self._page(number))
+            page[start:stop] = view[at : at + stop - start]
+        self._size = max(self._size, self._place)
+        return len(view)
+
+    def _spans(self, length: int) -> list[tuple[int, int, int, int]]:
+        """Return page, start and stop in it, and place in the data, of the next bytes, and move behind them."""
+        spans, at, end = [], 0, self._place + length
+        while self._place < end:
+            number, start = divmod(self._place, PAGE)
+            stop = min(PAGE, start + length - at)
+            spans.append((number, start, stop, at))
+            at += stop - start
+            self._place += stop - start
+        return spans
+
+    def _page(self, number: int) -> bytearray:
+        """Return the present content of a page, filled up with zeros."""
+        found = self._pages.get(number)
+        return found or bytearray(os.pread(self._disk.fileno(), PAGE, number * PAGE).ljust(PAGE, b"\0"))
+
+    def commit(self) -> None:
+        """Make all changes on the disk; raise OSError if that fails, and leave the file as it was."""
+        disk = self._disk.fileno()
+        size = os.fstat(disk).st_size
+        changed = self._pages.keys() | range(self._size // PAGE, -(-size // PAGE))  # the latter are cut off
+        before = {number: os.pread(disk, PAGE, number * PAGE) for number in changed if number * PAGE < size}
+        _write_journal(self._path, size, before)
+        try:
+            _change(self._path, self._size, self._pages)
+        except OSError:
+            # If this fails as well, the journal stays.
+            with contextlib.suppress(OSError):
+                roll_back(self._path)
+            raise
+        journal_of(self._path).unlink()
+
+
+def journal_of(path: Path) -> Path:
+    """Return the path of the journal of a file; it exists only while the file is being changed."""
+    return path.with_name(f"{path.name}.journal")
+
+
+def roll_back(path: Path) -> None:
+    """Undo a change that did not come to its end; raises as `Journaled` does."""
+    found = read_journal(path)
+    if found is not None:
+        _change(path, *found)
+        journal_of(path).unlink()
+
+
+def read_journal(path: Path) -> tuple[int, dict[int, bytes]] | None:
+    """Return size [bytes] and pages by number that a file had before a change; None where no change is under way."""
+    try:
+        content = journal_of(path).read_bytes()
+    except FileNotFoundError:
+        return None
+    body, check = content[:-_NUMBER], int.from_bytes(content[-_NUMBER:], "little")
+    if len(content) < 2 * _NUMBER or zlib.crc32(body) != check:
+        raise ValueError(f"its journal {journal_of(path).name} is damaged")
+    step = _NUMBER + PAGE
+    rows = [body[k : k + step] for k in range(_NUMBER, len(body), step)]
+    return int.from_bytes(body[:_NUMBER], "little"), {
+        int.from_bytes(row[:_NUMBER], "little"): row[_NUMBER:] for row in rows
+    }
+
+
+def _write_journal(path: Path, size: int, pages: Mapping[int, bytes]) -> None:
+    rows = [number.to_bytes(_NUMBER, "little") + content.ljust(PAGE, b"\0") for number, content in pages.items()]
+    body = b"".join([size.to_bytes(_NUMBER, "little"), *rows])
+    with whole(journal_of(path)) as temporary, temporary.open("wb") as file:
+        file.write(body + zlib.crc32(body).to_bytes(_NUMBER, "little"))
+        file.flush()
+        os.fsync(file.fileno())
+    # The journal's name must be on the disk before the file changes.
+    folder = os.open(path.parent, os.O_RDONLY)
+    try:
+        os.fsync(folder)
+    finally:
+        os.close(folder)
+
+
+def _change(path: Path, size: int, pages: Mapping[int, bytes | bytearray]) -> None:
+    """Write pages of a file, and set its size [bytes]."""
+    with path.open("r+b") as file:
+        for number in sorted(pages):
+            file.seek(number * PAGE)
+            file.write(pages[number])
+        file.truncate(size)
+        file.flush()
+        os.fsync(file.fileno())

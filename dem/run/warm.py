@@ -1,0 +1,49 @@
+"""Have an engine compile all code that a scene needs, without simulating the scene."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from dem.body.chain import Tie
+from dem.body.placement import Poses
+from dem.engine.effect import EffectName
+from dem.engine.interface import Engine
+from dem.engine.kinds import engine_kind
+from dem.physics.contact import StringLaw
+from dem.plan.steps import time_steps
+from dem.scene.scene import Scene
+
+APART = 1.0  # m; distance of smarticles, which touch nothing: code is compiled whether there are contacts or not
+
+
+def compile_for(scene: Scene) -> None:
+    """Call everything that compiles code for a scene, in each kind of its phases: make a step, query, record."""
+    engine = engine_kind(scene.engine).build(scene, min(time_steps(scene)))
+    places = np.zeros((scene.count, 3))
+    places[:, 0 if scene.plane is not None else 2] = APART * (1 + np.arange(scene.count))
+    engine.add(Poses(places, (Rotation.identity(),) * scene.count))
+    # A chain is pulled from the start on.
+    if not scene.pulled_by:
+        _step_and_query(engine)
+    if scene.actuates:
+        engine.motors.articulate()
+        engine.motors.actuate(np.zeros((1, scene.count, 2)), scene.fidelity.control_interval_s)
+        if scene.pulled_by:
+            ends = [Tie(0, 0, 0.0), Tie(scene.count - 1, 2, 0.0)]
+            engine.strings.tie(ends, StringLaw(length=APART, stiffness=1.0, damping=0.0), (0.0, 0.0))
+        _step_and_query(engine)
+        if scene.pulled_by:
+            engine.strings.untie()
+        engine.motors.weld()
+    if scene.calls_for(EffectName.WALL_REMOVAL) and any(phase.pushing_speed for phase in scene.phases):
+        engine.boundaries.lift_wall(0.0)
+        _step_and_query(engine)
+
+
+def _step_and_query(engine: Engine) -> None:
+    engine.advance(1)
+    engine.extremes(engine.state())
+    engine.overlaps(APART)
+    engine.contact_forces()
+    assert np.isfinite(engine.motors.work)

@@ -1,0 +1,44 @@
+"""Compute centres and volumes of bodies of any shape from their segments."""
+
+import math
+
+import numpy as np
+
+from dem.record.frame import Frame
+from dem.record.run import Run
+from postprocess.geometry.links import Floats, Whole, centres_of_mass
+
+
+def centres_of_bodies(segments: Floats, body: Whole) -> Floats:
+    """Return the centres of mass (N, 3) [m] of bodies whose segments have one cross-section each.
+
+    Args:
+        segments: (M, 2, 3) both ends of all segments [m].
+        body: (M,) index of the body that each belongs to, in ascending order and without gaps.
+    """
+    lengths = np.linalg.norm(segments[:, 1] - segments[:, 0], axis=1)
+    total = np.bincount(body, lengths)
+    middles = lengths[:, None] * segments.mean(axis=1)
+    return np.stack([np.bincount(body, part) / total for part in middles.T], axis=1)
+
+
+def body_centres(frame: Frame) -> Floats:
+    """Return the centres of mass (N, 3) [m] of all bodies of a frame; links are taken to have equal sections."""
+    return centres_of_mass(frame.vertices) if frame.bars is None else centres_of_bodies(frame.segments, frame.body)
+
+
+def body_volumes(frame: Frame, run: Run) -> Floats:
+    """Return the solid volumes (N,) [m³] of all bodies of a frame; overlaps at joints count twice."""
+    if run.manifest.kinds is None:
+        return np.full(frame.count, run.manifest.solid_volume_m3)
+    return np.array([kind.volume_m3 for kind in run.manifest.kinds])[frame.kind]
+
+
+def segment_volumes(frame: Frame, run: Run) -> Floats:
+    """Return the solid volumes (M,) [m³] of all segments of a frame of bodies that are no smarticles."""
+    areas = [
+        kind.thickness_normal_m * kind.thickness_in_plane_m * (math.pi / 4 if kind.round else 1.0)
+        for kind in run.manifest.kinds or ()
+    ]
+    lengths = np.linalg.norm(frame.segments[:, 1] - frame.segments[:, 0], axis=1)
+    return np.asarray(np.array(areas)[frame.kind[frame.body]] * lengths)
