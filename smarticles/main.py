@@ -18,6 +18,7 @@ from dem.terminal import printable
 from smarticles.command_line import Commands, Parser, add_options
 from smarticles.commands import (
     accuracy,
+    calibrate,
     compare,
     doctor,
     export,
@@ -36,6 +37,7 @@ from smarticles.commands import (
 COMMANDS = (
     *(scene_files.add, run.add, plan.add, doctor.add, measure.add, compare.add, render.add, view.add, export.add),
     *(report.add, sweep.add, status.add, run.add_resume, study.add, accuracy.add),
+    calibrate.add,
 )
 """Functions that add the commands, in the order of `smarticles --help`; add a new command here."""
 

@@ -212,7 +212,7 @@ def test_what_is_filled_in_from_a_wrong_value_is_no_second_error() -> None:
 
 
 @pytest.mark.parametrize(("changes", "message"), [
-    ({"shape": "ring"}, "unknown key 'shape'; scenes have no such key, see `particle` for shapes; docs/limits.md lists"),
+    ({"shape": "ring"}, "unknown key 'shape'; scenes have no such key, see `particle` for shapes; docs/limits.md"),
     ({"contact": {"cohesion": 1.0}}, "contact: unknown key 'cohesion'; scenes have no cohesion; docs/limits.md lists"),
     ({"air": {"viscosity": 1.8e-5}}, "unknown key 'air'; scenes have no air or water; docs/limits.md lists"),
     ({"container": None}, "container: got null, but there is no scene without a container; leave the key out"),
