@@ -373,6 +373,12 @@ def view_run(directory: Path | str, *, port: int = 0, opened: Callable[[str], No
     Viewer(RunView(directory), port=port, opened=opened).serve()
 
 
+def _port(request: web.Request) -> int:
+    """Return the port of the connection; the one in `request.url` is from the browser's header Host."""
+    assert request.transport is not None
+    return int(request.transport.get_extra_info("sockname")[1])
+
+
 def protect(app: web.Application, token: str) -> None:
     """Reject every request without the token by status 403.
 
@@ -384,14 +390,14 @@ def protect(app: web.Application, token: str) -> None:
         request: web.Request, handler: Callable[[web.Request], Awaitable[web.StreamResponse]]
     ) -> web.StreamResponse:
         # Servers on several ports share the cookies of a machine.
-        name = f"smarticles-{request.url.port}"
+        name = f"smarticles-{_port(request)}"
         tokens = request.query.get("token", ""), request.cookies.get(name, "")
         allowed = [secrets.compare_digest(word.encode(), token.encode()) for word in tokens]
         if not any(allowed):
             raise web.HTTPForbidden(text="403: open the address that `smarticles view` printed, with its token\n")
         response = await handler(request)
         if not response.prepared:
-            own = f"ws://{HOST}:{request.url.port}"
+            own = f"ws://{HOST}:{_port(request)}"
             response.headers.update({key: value.replace("{own}", own) for key, value in _HEADERS.items()})
             if allowed[0]:
                 response.set_cookie(name, token, httponly=True, samesite="Strict", max_age=24 * 3600)
@@ -399,7 +405,7 @@ def protect(app: web.Application, token: str) -> None:
 
     async def session(request: web.Request) -> web.StreamResponse:
         """Return the address and the token for the messages of the page's script."""
-        return web.json_response({"sessionURL": f"ws://{HOST}:{request.url.port}/ws", "secret": token})
+        return web.json_response({"sessionURL": f"ws://{HOST}:{_port(request)}/ws", "secret": token})
 
     app.middlewares.append(guard)
     app.router.add_post("/paraview/", session)

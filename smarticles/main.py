@@ -14,9 +14,11 @@ from types import FrameType
 from typing import Any
 
 from dem.errors import InputError, RunError
+from dem.terminal import printable
 from smarticles.command_line import Commands, Parser, add_options
 from smarticles.commands import (
     accuracy,
+    calibrate,
     compare,
     doctor,
     export,
@@ -35,6 +37,7 @@ from smarticles.commands import (
 COMMANDS = (
     *(scene_files.add, run.add, plan.add, doctor.add, measure.add, compare.add, render.add, view.add, export.add),
     *(report.add, sweep.add, status.add, run.add_resume, study.add, accuracy.add),
+    calibrate.add,
 )
 """Functions that add the commands, in the order of `smarticles --help`; add a new command here."""
 
@@ -112,7 +115,8 @@ class _PrintCompletion(argparse.Action):
 def main(argv: Sequence[str] | None = None) -> int:
     """Run `smarticles` with the given arguments, by default those of this process; return the exit status."""
     words = list(sys.argv[1:] if argv is None else argv)
-    return guarded(lambda: _dispatch(words), debug="--debug" in words)
+    with printable():
+        return guarded(lambda: _dispatch(words), debug="--debug" in words)
 
 
 def guarded(action: Callable[[], int], *, debug: bool = False) -> int:

@@ -22,8 +22,8 @@ from dem.record.names import SCENE
 from dem.record.run import Run, open_run
 from dem.scene.reading import SCHEMA_VERSION, apply_override, dump_scene
 from dem.scene.scene import Scene
-from dem.scene.yaml_text import load_yaml
 from dem.setting.fidelity import fidelities
+from dem.yaml_text import load_yaml, read_text
 from postprocess.measures.registry import FrameMeasure, measure_of
 from smarticles.main import BAD_INPUT
 from smarticles.measuring import grouped, measured
@@ -306,7 +306,7 @@ def _explicit_keys(scene: Scene) -> dict[str, Any]:
 def _read_scene_file(path: Path) -> dict[str, Any]:
     """Return the content of a scene file, in which paths of runs to take over are absolute."""
     try:
-        data = load_yaml(path.read_text(encoding="utf-8"))
+        data = load_yaml(read_text(path))
     except (OSError, ValueError, yaml.YAMLError) as error:
         msg = f"{path}: cannot be read ({' '.join(str(error).split())}); give a scene or the path of a scene file"
         raise InputError(msg) from None

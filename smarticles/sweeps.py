@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import platform
 import shlex
+import sys
 from collections.abc import Mapping, Sequence
 from importlib.metadata import version
 from pathlib import Path
@@ -12,6 +13,7 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING
 
 from dem.errors import InputError, RunError
+from dem.terminal import bare
 from smarticles.command_line import Parser, add_options, positive_int
 
 if TYPE_CHECKING:
@@ -87,7 +89,7 @@ def compute(folder: Folder, *, jobs: int | None, command: str) -> list[Outcome]:
 
     reject_queued(folder)
     try:
-        return run_folder(folder, Display(Console(stderr=True)), slots=jobs)
+        return run_folder(folder, Display(Console(file=bare(sys.stderr))), slots=jobs)
     except KeyboardInterrupt:
         raise KeyboardInterrupt(f"finished runs are kept; continue with: {command}") from None
 

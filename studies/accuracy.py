@@ -590,16 +590,18 @@ class Promises:
                 of_energy = row["quantity"] == SYMBOLS["energy"]
                 panel.errorbar(row[COST], row["error [%]"], yerr=bar, label=row[ENGINE],
                                **marker("o", colour, "white" if of_energy else colour))  # fmt: skip
-                text = row["quantity"] if of_energy else f"{row['fidelity']}: {row['quantity']}"
-                panel.annotate(text, (row[COST], row["bound [%]"]), (0, 3), textcoords="offset points", ha="center",
-                               color=colour)  # fmt: skip
-            low, high = table[COST].min() / 2, table[COST].max() * 1.5
-            panel.set(title=title, xscale="log", xlim=(low, high), xlabel="processor time per simulated time [s/s]")
-            panel.xaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
-            panel.xaxis.set_major_formatter("{x:g}")
-            panel.xaxis.set_minor_locator(NullLocator())
-            panel.margins(y=0.15)
-            panel.set_ylim(bottom=0)
+                # Energies to the left of their points, the others to the right: the points may be close.
+                text = "E" if of_energy else f"{row['fidelity']}: {row['quantity']}"
+                aside, side = (-5, "right") if of_energy else (5, "left")
+                panel.annotate(text, (row[COST], row["error [%]"]), (aside, 0), textcoords="offset points", ha=side,
+                               va="center", color=colour)  # fmt: skip
+            low, high = table[COST].min() / 2, table[COST].max() * 2
+            panel.set(title=title, xlabel="processor time per simulated s [s/s]", ylim=(1, 100))
+            panel.set(xscale="log", yscale="log", xlim=(low, high))
+            for axis in (panel.xaxis, panel.yaxis):
+                axis.set_major_locator(LogLocator(subs=(1, 2, 5)))
+                axis.set_major_formatter("{x:g}")
+                axis.set_minor_locator(NullLocator())
         axes[0].set_ylabel("error against the converged fidelity [%]")
         notes = [
             "Largest error of φ_0, φ_f, height and ⟨N⟩ (filled), and error of the energy put in (open, E). "

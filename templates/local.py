@@ -26,6 +26,7 @@ from rich.text import Text
 from dem.engine.cores import usable_cores
 from dem.record.document import Progress
 from dem.record.run import Run
+from dem.terminal import escaped
 from templates.sweep.folder import Entry, Folder
 
 RunCommand = Callable[[Path, Path, bool], Sequence[str]]
@@ -121,7 +122,7 @@ class Display:
         if self._live:
             table, total = Table.grid(padding=(0, 2)), Table.grid(padding=(0, 2))
             for row in snapshot.rows:
-                table.add_row(*map(Text, row))
+                table.add_row(*(Text(escaped(cell)) for cell in row))
             total.add_row(ProgressBar(max(snapshot.total, 1), snapshot.ended, width=30), str(snapshot))
             self._live.update(Group(table, total))
         elif time.monotonic() - self._last >= self._interval_s:
@@ -135,7 +136,7 @@ class Display:
 
     def _print(self, line: str) -> None:
         # A run's name may contain brackets, which rich would take for markup.
-        self._console.print(line, markup=False, highlight=False, soft_wrap=True)
+        self._console.print(escaped(line), markup=False, highlight=False, soft_wrap=True)
 
 
 def smarticles_command(scene: Path, directory: Path, resume: bool) -> tuple[str, ...]:

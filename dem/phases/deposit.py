@@ -15,7 +15,10 @@ from dem.errors import RunError
 from dem.phases.phase import CHECK_INTERVAL, SETTLE_SECONDS, Memory, Phase, SceneView, Settle, Stage, has_settled
 from dem.setting.part import Part, Speed
 
-LAYER_TIMEOUT = 2.0  # s; the fall of a layer takes less than 0.1 s
+# Time after which a layer must have landed: at least 2 s, and 10 times that of a fall √(2h/g) over the wall's height h,
+# the longest fall that there is; at 9.81 m/s² the fall of a layer takes less than 0.1 s.
+LAYER_TIMEOUT = 2.0  # s
+LANDING_FALLS = 10
 LAYER_SECONDS = 0.125  # s, typical time between two layers of a pour; measured on YADE and links, N = 100 … 270
 
 
@@ -91,7 +94,7 @@ class Deposit(Part, Phase):
             memory["layer"] = 0  # the next layer does not wait for this one
             return self.every_s
         if memory["layer"]:
-            self._check_layer(memory, engine)
+            self._check_layer(memory, engine, stage.scene.gravity_m_per_s2)
         elif not memory["left"] and has_settled(self.settle, memory, engine):
             return 0.0
         if memory["left"] and not memory["layer"]:
@@ -99,16 +102,21 @@ class Deposit(Part, Phase):
         memory["waited"] += CHECK_INTERVAL
         return CHECK_INTERVAL
 
-    def _check_layer(self, memory: Memory, engine: Engine) -> None:
+    def _check_layer(self, memory: Memory, engine: Engine, gravity: float) -> None:
         size, limit = memory["layer"], self.landed_speed_m_per_s
         fastest = float(-engine.state().velocities[-size:, 2].min())
-        if fastest < limit and engine.touches()[-size:].min() > 0:
+        aloft = int((engine.touches()[-size:] == 0).sum())
+        timeout = max(LAYER_TIMEOUT, LANDING_FALLS * math.sqrt(2 * engine.cylinder.height / gravity))
+        if fastest < limit and not aloft:
             memory.update(layer=0, waited=0.0)
-        elif memory["waited"] > LAYER_TIMEOUT:
-            raise RunError(
-                f"a layer of {size} had not come down {LAYER_TIMEOUT:g} s after it was poured: the fastest falls at "
-                f"{fastest:.3g} m/s, limit {limit:g} m/s; raise phases.0.landed_speed_m_per_s"
-            )
+        elif memory["waited"] > timeout:
+            cause = f"the fastest falls at {fastest:.3g} m/s, limit {limit:g} m/s; raise phases.0.landed_speed_m_per_s"
+            if fastest < limit:
+                cause = (
+                    f"{aloft} of them touch nothing at {gravity:g} m/s² of gravity, so that they still fall or bounce; "
+                    "lower contact.restitution or phases.0.layer_height_w, or raise gravity_m_per_s2"
+                )
+            raise RunError(f"a layer of {size} had not come down {timeout:.3g} s after it was poured: {cause}")
 
     def _pour(self, stage: Stage, engine: Engine) -> None:
         scene, memory = stage.scene, stage.memory

@@ -94,9 +94,14 @@ class Phase:
         """Return the simulated time of the phase [s]; if a criterion ends it, an estimate from `count`."""
         return self.known_duration or 0.0
 
-    @property
-    def pushing_speed(self) -> float:
-        """Speed of the wall, hook or string that the phase moves [m/s]; 0 if it moves none."""
+    speed_key: ClassVar[str] = "speed_m_per_s"  #: Key that `pushing_speed` is proportional to
+
+    def pushing_speed(self, gravity: float) -> float:
+        """Return the greatest speed [m/s] of the boundary that the phase moves; 0 if it moves none.
+
+        Args:
+            gravity: acceleration of gravity [m/s²].
+        """
         return 0.0
 
     def peak_speed(self, gravity: float) -> float:
@@ -105,7 +110,7 @@ class Phase:
         Args:
             gravity: acceleration of gravity [m/s²].
         """
-        return self.pushing_speed
+        return self.pushing_speed(gravity)
 
     @property
     def raises(self) -> float:

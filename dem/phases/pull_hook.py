@@ -71,8 +71,7 @@ class PullHook(Part, Phase):
             f"set them at least {1.005 * (inside - hooks.side_m):.3g} m apart, or give pull-hook a force_limit_N",
         )
 
-    @property
-    def pushing_speed(self) -> float:
+    def pushing_speed(self, gravity: float) -> float:
         return self.speed_m_per_s
 
     @property

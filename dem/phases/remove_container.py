@@ -33,8 +33,7 @@ class RemoveContainer(Part, Phase):
             if phase.frees:
                 yield f"phases.{index}: remove-container, but phases.{earlier} did so already; leave one of them out"
 
-    @property
-    def pushing_speed(self) -> float:
+    def pushing_speed(self, gravity: float) -> float:
         return self.speed_m_per_s or 0.0
 
     def calls(self, scene: SceneView, index: int) -> Mapping[EffectName, str]:

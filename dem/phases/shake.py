@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from typing import Literal
+from typing import ClassVar, Literal
 
 from pydantic import Field
 
@@ -12,6 +12,10 @@ from dem.errors import RunError
 from dem.phases.phase import Memory, Phase, SceneView, Stage
 from dem.setting.part import Duration, Part
 
+# Largest amplitude in sphere diameters. The rounding of positions at this height, 2⁻⁵³ of it, is 1e-11 diameters, still
+# far below the overlap of a lone smarticle at rest, about 1e-4 diameters.
+MOST_AMPLITUDE = 1e5
+
 
 class Shake(Part, Phase):
     """Shake the container, or its floor alone, vertically: z = A sin(2πft) with A = Γg/(2πf)².
@@ -19,6 +23,7 @@ class Shake(Part, Phase):
     After a phase that takes the container away the unbounded floor is shaken, with all smarticles on it.
     """
 
+    speed_key: ClassVar[str] = "peak_acceleration_g"
     type: Literal["shake"]
     duration_s: Duration = Field(20.0, description="length of the phase [s]")
     frequency_hz: float = Field(30.0, ge=0.01, le=2000, description="f, frequency [Hz]")
@@ -39,7 +44,7 @@ class Shake(Part, Phase):
             "with the floor like one body and never leaves it; use more than 1 to loosen the pile",
         )
 
-    def peak_speed(self, gravity: float) -> float:
+    def pushing_speed(self, gravity: float) -> float:
         return self.amplitude(gravity) * 2 * math.pi * self.frequency_hz
 
     def calls(self, scene: SceneView, index: int) -> Mapping[EffectName, str]:
@@ -52,6 +57,14 @@ class Shake(Part, Phase):
     def check(self, scene: SceneView, index: int) -> Iterator[str]:
         # The floor must not drop below the wall's lower edge.
         amplitude, depth = self.amplitude(scene.gravity_m_per_s2), -scene.cylinder.bottom
+        most = MOST_AMPLITUDE * scene.sphere_diameter
+        if amplitude > most:
+            least = self.frequency_hz * math.sqrt(amplitude / most)
+            yield (
+                f"phases.{index}.frequency_hz: {self.frequency_hz:g} Hz at Γ = {self.peak_acceleration_g:g} moves the "
+                f"container by A = {amplitude:.3g} m up and down, at most {most:.3g} m are computed; use at least "
+                f"{1.005 * least:.3g} Hz"
+            )
         if self.moves == "floor" and amplitude > depth:
             yield (
                 f"phases.{index}.moves: the floor alone would go {amplitude:.3g} m down, and the wall ends "

@@ -53,8 +53,7 @@ class Strain(Part, ActuatedPhase):
                 f"chain that is h = {chain.width:.4g} m wide; use at least {chain.width:.4g} m"
             )
 
-    @property
-    def pushing_speed(self) -> float:
+    def pushing_speed(self, gravity: float) -> float:
         return self.speed_m_per_s
 
     @property

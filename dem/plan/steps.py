@@ -7,8 +7,9 @@ from dem.engine.kinds import engine_kind
 from dem.errors import InputError
 from dem.scene.scene import Scene
 from dem.scene.stiffness import too_soft
+from dem.strict import unit_of
 
-# Largest distance, in sphere diameters, by which walls, hooks or strings may move in a step. Measured with a hook
+# Largest distance, in sphere diameters, by which boundaries may move in a step. Measured with a hook
 # pulled out of piles of 30, draft and standard, 3 to 4 seeds: the deepest contact is 0.29 to 0.55 diameters deep at
 # 0.03, 0.42 to 0.70 at 0.05 and 0.61 to 0.66 at 0.1, where the watchdog's limit is 0.5; at 0.3 the hook leaves the pile
 # behind.
@@ -60,7 +61,7 @@ def time_steps(scene: Scene) -> tuple[float, ...]:
     stable. In a plane, or if `fidelity.time_step_s` is given, all phases have one step.
 
     Raises:
-        InputError: as in `time_step`, or a wall, hook or string moves too fast for the step of its phase.
+        InputError: as in `time_step`, or a wall, hook, string or shaking moves too fast for the step of its phase.
     """
     count, shortest = len(scene.phases), time_step(scene)
     first = next((k for k, phase in enumerate(scene.phases) if phase.actuates), count)
@@ -80,15 +81,17 @@ def _steps_in(interval: float, wanted: float) -> int:
 
 
 def _check_speeds(scene: Scene, steps: Sequence[float]) -> None:
-    """Reject speeds of walls, hooks or strings that are too high for contacts to push smarticles away."""
+    """Reject speeds of walls, hooks, strings or shaking that are too high for contacts to push smarticles away."""
     diameter = scene.sphere_diameter
     for index, (phase, step) in enumerate(zip(scene.phases, steps, strict=True)):
         most = MOST_PER_STEP * diameter / step
-        speed = phase.pushing_speed
+        speed = phase.pushing_speed(scene.gravity_m_per_s2)
         if speed > most:
+            key, unit = phase.speed_key, unit_of(phase.speed_key)[1]
+            value = getattr(phase, key)
             # Half a percent less, so that the three digits are not above it.
             raise InputError(
-                f"phases.{index}.speed_m_per_s: {speed:g} m/s ({phase.kind}) is {speed * step / diameter:.3g} sphere "
+                f"phases.{index}.{key}: {value:g} {unit} ({phase.kind}) is {speed * step / diameter:.3g} sphere "
                 f"diameters in a time step of {step:.3g} s, which contacts cannot follow; use at most "
-                f"{0.995 * most:.3g} m/s or a shorter fidelity.time_step_s"
+                f"{0.995 * value * most / speed:.3g} {unit} or a shorter fidelity.time_step_s"
             )

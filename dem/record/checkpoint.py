@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dem.errors import InputError, RunError
-from dem.record.files import whole
+from dem.record.files import reject_inflated, whole
 from dem.record.names import CHECKPOINT, CHECKPOINT_BEFORE, CHECKPOINT_FORMAT
 
 _ENGINE, _STATE, _SERIES = "engine.bin", "state.json", "series.npz"
@@ -77,7 +77,8 @@ def read_checkpoint(folder: Path, *, scene_sha256: str, made_by: tuple[str, str]
             continue
         try:
             format_, checkpoint = _read(path)
-        except (zipfile.BadZipFile, KeyError, ValueError, OSError, EOFError) as error:
+        # Damage can be anywhere in archive, JSON and arrays, and each reader fails in its own ways.
+        except Exception as error:
             damaged.append(f"{name} ({' '.join(str(error).split())})")
             continue
         for what, found, wanted in (
@@ -102,11 +103,14 @@ def has_checkpoint(folder: Path) -> bool:
 def _read(path: Path) -> tuple[object, Checkpoint]:
     """Return the format of a checkpoint, and its content."""
     with zipfile.ZipFile(path) as archive:
+        reject_inflated(archive, path.stat().st_size)  # it is not compressed
         # Reading a member checks its CRC.
         state = json.loads(archive.read(_STATE))
-        with np.load(io.BytesIO(archive.read(_SERIES))) as columns:
+        content = archive.read(_SERIES)
+        with np.load(io.BytesIO(content)) as columns:
+            reject_inflated(columns.zip, len(content))
             series = {name: columns[name] for name in columns.files}
         engine = archive.read(_ENGINE)
-    scene, made_by = str(state.get("scene_sha256")), (state["made_by"]["engine"], state["made_by"]["version"])
+    scene, made_by = str(state.get("scene_sha256")), (str(state["made_by"]["engine"]), str(state["made_by"]["version"]))
     checkpoint = Checkpoint(scene_sha256=scene, made_by=made_by, state=state, series=series, engine=engine)
     return state.get("format"), checkpoint

@@ -2,6 +2,7 @@
 
 import contextlib
 import os
+import zipfile
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import NoReturn
@@ -62,6 +63,13 @@ def write_whole(path: Path, write: Callable[[Path], object], *, make_folder: boo
 def write_text(path: Path, text: str, *, make_folder: bool = True) -> None:
     """Write a text file in UTF-8; arguments and errors as in `write_whole`."""
     write_whole(path, lambda temporary: temporary.write_bytes(text.encode()), make_folder=make_folder)
+
+
+def reject_inflated(archive: zipfile.ZipFile | None, most: int) -> None:
+    """Raise ValueError if an archive, which a stranger may have made, would unpack to more than `most` bytes."""
+    total = sum(member.file_size for member in archive.infolist()) if archive else 0
+    if total > most:
+        raise ValueError(f"it would unpack to {total} bytes, at most {most} are possible")
 
 
 def cannot_read(what: str, path: Path, cause: BaseException | str, remedy: str) -> NoReturn:

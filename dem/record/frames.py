@@ -15,13 +15,14 @@ import meshio
 import numpy as np
 
 from dem.arrays import Array
-from dem.errors import InputError
+from dem.errors import InputError, RunError, shown
 from dem.record import names
 from dem.record.files import cannot_read, write_text, write_whole
 from dem.record.frame import Frame, read_frame
 from dem.record.vtkhdf import RADIUS, append, create, read_times, truncate
 
 _REMEDY = "give the directory of a run that has written a frame"
+_GONE = "is gone; put it back and continue with `smarticles resume`, or start the run anew"
 
 
 @dataclass
@@ -38,6 +39,15 @@ class FrameWriter:
         write_whole(self.folder / name, lambda path: mesh.write(path, file_format="vtu"))
         self.times.append(time)
         write_text(self.folder / names.collection(self.noun), self._collection(), make_folder=False)
+
+    def check(self) -> None:
+        """Raise RunError if a file that was written is gone."""
+        folder = self.folder / names.folder(self.noun)
+        present = {path.name for path in folder.iterdir()} if folder.is_dir() else set()
+        for number in range(len(self.times)):
+            path = self.folder / names.member(self.noun, number)
+            if path.name not in present:
+                raise RunError(f"{path}: {_GONE}")
 
     def truncate(self, times: Sequence[float]) -> None:
         """Keep the first frames, whose times [s] are given, and remove all later ones."""
@@ -73,6 +83,12 @@ class OneFileWriter(FrameWriter):
         whole = meshio.Mesh(mesh.points, mesh.cells, point_data={RADIUS: at_points}, cell_data=cell_data)
         (append if self.times else create)(self.folder / names.VTKHDF, whole, time)
         self.times.append(time)
+
+    def check(self) -> None:
+        """Raise RunError if the file is gone."""
+        path = self.folder / names.VTKHDF
+        if self.times and not path.is_file():
+            raise RunError(f"{path}: {_GONE}")
 
     def truncate(self, times: Sequence[float]) -> None:
         """Keep the first frames, whose times [s] are given, and remove all later ones."""
@@ -145,7 +161,10 @@ def read_frames(directory: Path | str) -> FrameSequence:
         try:
             for entry in ET.parse(path).getroot().iter("DataSet"):
                 times.append(float(entry.attrib["timestep"]))
-                files.append(path.parent / entry.attrib["file"])
+                name = Path(entry.attrib["file"])
+                if name.is_absolute() or ".." in name.parts:
+                    cause = f"{shown(str(name))} lies outside of the run directory"
+                files.append(path.parent / name)
         except FileNotFoundError as error:
             cause = f"{error.strerror}, and no {names.VTKHDF} either"
         except (OSError, ET.ParseError) as error:

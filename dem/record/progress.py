@@ -9,6 +9,7 @@ from time import monotonic
 from dem.errors import RunError
 from dem.record.document import Progress
 from dem.record.names import PROGRESS
+from dem.terminal import ERASE_LINE
 
 INTERVAL = 1.0  # s of wall time between updates
 
@@ -44,8 +45,8 @@ class ProgressWriter:
 
     def warn(self, message: str) -> None:
         """Print a warning to standard error."""
-        start = "\r\x1b[K" if self.show else ""
-        sys.stderr.write(f"{start}smarticles: warning: {message}\n")
+        self._erase()
+        sys.stderr.write(f"smarticles: warning: {message}\n")
 
     def checkpointed(self, time: float) -> None:
         """Write the simulated time [s] of a new checkpoint at once."""
@@ -71,12 +72,16 @@ class ProgressWriter:
         if self.show:
             self._draw(time, count, wall)
 
-    def finish(self) -> None:
-        """Remove `progress.json`, and clear the line on the terminal."""
-        (self.folder / PROGRESS).unlink(missing_ok=True)
+    def finish(self, *, remove: bool = True) -> None:
+        """Remove `progress.json` if `remove`, and clear the line on the terminal."""
+        if remove:
+            (self.folder / PROGRESS).unlink(missing_ok=True)
+        self._erase()
+        sys.stderr.flush()
+
+    def _erase(self) -> None:
         if self.show:
-            sys.stderr.write("\r\x1b[K")
-            sys.stderr.flush()
+            sys.stderr.write(ERASE_LINE)
 
     def _draw(self, time: float, count: int, wall: float) -> None:
         (wall_resumed, resumed), progress = self._resumed, self._progress
@@ -96,5 +101,6 @@ class ProgressWriter:
                 left = f"  about {(wall - wall_resumed) * (1 / fraction**2 - 1):.0f} s left in this phase"
         packing = f"  φ {phi:.3f}" if phi is not None else ""
         line = f"{phase:<8}{done}  t = {time:.2f} s{packing}{left}"
-        sys.stderr.write(f"\r\x1b[K{line}")
+        self._erase()
+        sys.stderr.write(line)
         sys.stderr.flush()

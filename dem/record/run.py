@@ -9,7 +9,7 @@ from typing import Any, Literal, NoReturn
 
 import yaml
 
-from dem.errors import InputError
+from dem.errors import InputError, shown
 from dem.record.document import REMEDY, Done, Failed, Manifest, Phase, Progress
 from dem.record.files import cannot_read
 from dem.record.forces import RecordedForces, has_forces, read_forces
@@ -17,9 +17,12 @@ from dem.record.frames import FrameSequence, read_frames
 from dem.record.names import CHECKPOINT, DONE, FAILED, MANIFEST, OF_SWEEP, PROGRESS, SCENE, SERIES
 from dem.record.rundir import in_use
 from dem.record.series import Series, read_series
+from dem.yaml_text import load_yaml, read_text
 
 State = Literal["done", "running", "queued", "failed", "interrupted", "stopped", "missing"]
 """`interrupted` closed its files when asked to stop; `stopped` was killed; `queued` waits for a job of a cluster."""
+
+_PARTS = ("smarticle", "container", "plane", "hooks", "contact", "motor", "fidelity", "recording")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -63,11 +66,17 @@ class Run:
         """The resolved scene, `scene.yaml`, as a mapping in which all defaults are filled in."""
         path = self.path / SCENE
         try:
-            content = yaml.load(path.read_text(encoding="utf-8"), yaml.CSafeLoader)
+            content = load_yaml(read_text(path), yaml.CSafeLoader)
         except (OSError, ValueError, yaml.YAMLError) as error:
             cannot_read("scene", path, error, REMEDY)
         if not isinstance(content, dict):
             cannot_read("scene", path, "it must be a mapping", REMEDY)
+        # A file that was cut may have half a word where a part was.
+        phases = content.get("phases") or []
+        parts = [content.get(key) or {} for key in _PARTS] + (phases if isinstance(phases, list) else [phases])
+        for part in parts:
+            if not isinstance(part, dict):
+                cannot_read("scene", path, f"{shown(part)} stands where a mapping must be", REMEDY)
         return SceneData(path, "", content)
 
     @cached_property

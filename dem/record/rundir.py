@@ -5,14 +5,46 @@ import logging
 import os
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
+from typing import TextIO
 
-from dem.errors import InputError
+from dem.errors import InputError, RunError
 from dem.record.names import LOCK, LOG, MANIFEST, is_partial
 
 
+@dataclass(frozen=True)
+class Claim:
+    """A locked run directory."""
+
+    out: Path
+    lock: TextIO  #: The open lock file
+
+    @property
+    def held(self) -> bool:
+        """Whether the path still leads to the locked directory, which was not deleted, moved or replaced."""
+        try:
+            present = (self.out / LOCK).stat()
+        except OSError:
+            return False
+        return os.path.samestat(present, os.fstat(self.lock.fileno()))
+
+    def check(self) -> None:
+        """Raise RunError if the directory is not the locked one any more, or has lost its manifest."""
+        if not self.held:
+            raise RunError(
+                f"{self.out}: was deleted, moved or replaced while the run wrote into it (its lock, {LOCK}, is gone or "
+                "another file); if it was moved, continue there: smarticles resume DIR; otherwise start the run anew"
+            )
+        if not (self.out / MANIFEST).is_file():
+            raise RunError(
+                f"{self.out / MANIFEST}: is gone, and without it the run cannot be read; put it back and continue with "
+                "`smarticles resume`, or start the run anew"
+            )
+
+
 @contextmanager
-def claimed(out: Path, *, resume: bool) -> Iterator[None]:
+def claimed(out: Path, *, resume: bool) -> Iterator[Claim]:
     """Lock a run directory while a run writes into it, and make it if needed.
 
     The lock is held by the kernel and ends with the process, so that it is never stale.
@@ -41,7 +73,7 @@ def claimed(out: Path, *, resume: bool) -> Iterator[None]:
         lock.truncate(0)
         lock.write(f"{os.getpid()}\n")
         lock.flush()
-        yield
+        yield Claim(out, lock)
 
 
 def _check_content(out: Path, *, resume: bool) -> None:

@@ -3,6 +3,7 @@
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from operator import index
 from typing import Any
 
 import meshio
@@ -99,11 +100,17 @@ class Recorder:
 
     def restore(self, memory: Mapping[str, Any], columns: Mapping[str, NDArray[Any]]) -> None:
         """Restore the state that `memory` returned: remove later frames, and write the series `columns`."""
-        self.samples, self.next_step = memory["samples"], memory["next_step"]
+        self.samples, self.next_step = index(memory["samples"]), index(memory["next_step"])
         self.truncate(memory)
         self.sampler.memory = dict(memory["series"])
+        self.check_files()
         self.series.restore(columns)
         self.series.write()
+
+    def check_files(self) -> None:
+        """Raise RunError if a frame, or a file of forces or spheres, that was written is gone."""
+        for _, writer in self._writers():
+            writer.check()
 
     def truncate(self, memory: Mapping[str, Any]) -> None:
         """Remove all frames that `memory` does not list; an empty mapping lists none."""

@@ -24,16 +24,24 @@ from dem.record.files import write_text
 from dem.record.names import DONE, FAILED, MANIFEST, SCENE, VTKHDF
 from dem.record.progress import ProgressWriter
 from dem.record.run import Run
-from dem.record.rundir import claimed, log_of
+from dem.record.rundir import Claim, claimed, log_of
 from dem.record.vtkhdf import check_times
 from dem.run.build import Builders
-from dem.run.simulation import Simulation, StopRequestedError
+from dem.run.simulation import Simulation
+from dem.run.stop import StopRequest, StopRequestedError
 from dem.scene.reading import difference, dump_scene, load_scene, scene_hash
 from dem.scene.scene import Scene
 
 
 def run_scene(
-    scene: Scene, out: Path, *, command: str, progress: bool, resume: bool = False, builders: Builders | None = None
+    scene: Scene,
+    out: Path,
+    *,
+    command: str,
+    progress: bool,
+    resume: bool = False,
+    builders: Builders | None = None,
+    stop: StopRequest | None = None,
 ) -> Done | None:
     """Simulate a scene into a run directory; return times and cost, or None if the run was done already.
 
@@ -44,11 +52,12 @@ def run_scene(
         progress: whether to draw a progress line on the terminal.
         resume: whether to continue from the newest undamaged checkpoint, or from the start if none was written.
         builders: functions that make the parts of the run; None: the default ones.
+        stop: whether SIGUSR1 has come, also before this call; None: it is noted from the first step on.
 
     Raises:
         InputError: `out` holds other files, or another process runs in it.
         RunError: the run failed; `failed.json` states the cause, and all files written before stay.
-        StopRequestedError: SIGUSR1 came; the run stopped at its next checkpoint and can be resumed.
+        StopRequestedError: SIGUSR1 came; the run stopped before its first step or at a checkpoint, and can be resumed.
         KeyboardInterrupt: the run was interrupted; all files are complete.
     """
     builders, kind = builders or Builders(), engine_kind(scene.engine)
@@ -56,7 +65,7 @@ def run_scene(
     if not resume:
         _check_ready(scene)
     saved: tuple[Checkpoint, str | None] | None = None
-    with claimed(out, resume=resume):
+    with claimed(out, resume=resume) as claim:
         if resume:
             _check_scene(scene, out)
             if (out / DONE).exists():
@@ -81,10 +90,11 @@ def run_scene(
                     scene=scene,
                     engine=builders.engine(scene, min(steps)),
                     recorder=builders.recorder(scene, out, bar),
-                    folder=out,
+                    claim=claim,
                     log=log,
                     made_by=made_by,
                     time_steps=steps,
+                    stop=stop or StopRequest(),
                 )
                 for warning in warnings_of(scene):
                     simulation.warn(warning)
@@ -96,12 +106,12 @@ def run_scene(
                 done.mark(out)
                 return done
             except (Exception, KeyboardInterrupt) as error:
-                cause = _mark_ended(simulation, out, log, error)
+                cause = _mark_ended(simulation, claim, log, error)
                 if isinstance(error, RunError):
                     raise RunError(cause) from error
                 raise
             finally:
-                bar.finish()
+                bar.finish(remove=claim.held)
 
 
 def _check_ready(scene: Scene) -> None:
@@ -144,7 +154,14 @@ def _restore(simulation: Simulation, saved: tuple[Checkpoint, str | None] | None
     checkpoint, warning = saved
     if warning:
         simulation.warn(warning)
-    simulation.restore(checkpoint)
+    try:
+        simulation.restore(checkpoint)
+    except (InputError, RunError):
+        raise
+    # Content that no run writes can fail anywhere.
+    except Exception as error:
+        msg = f"{out}: cannot be resumed, its checkpoint has other content than the run needs ({error!r}); start anew"
+        raise InputError(msg) from error
     earlier = Run(out).manifest.threads
     if earlier != threads:
         workers = engine_kind(simulation.scene.engine).workers
@@ -155,18 +172,21 @@ def _restore(simulation: Simulation, saved: tuple[Checkpoint, str | None] | None
     log.info("resumed from the checkpoint of t = %.4f s", simulation.engine.time)
 
 
-def _mark_ended(simulation: Simulation | None, out: Path, log: logging.Logger, error: BaseException) -> str:
-    """Write the series and `failed.json`; return the cause, for a failed run with the last checkpoint."""
+def _mark_ended(simulation: Simulation | None, claim: Claim, log: logging.Logger, error: BaseException) -> str:
+    """Write the series and `failed.json`; return the cause, for a failed run with the last checkpoint.
+
+    Nothing is written if the directory is no longer the run's own.
+    """
     status: Ended = "interrupted" if isinstance(error, StopRequestedError | KeyboardInterrupt) else "failed"
     cause = "interrupted by the user" if isinstance(error, KeyboardInterrupt) else str(error)
-    if not isinstance(error, RunError | StopRequestedError | KeyboardInterrupt):
+    if not isinstance(error, InputError | RunError | StopRequestedError | KeyboardInterrupt):
         # A bug in this program: the run directory must still state that the run has ended.
         log.error("unexpected error", exc_info=error)
         cause = f"unexpected {type(error).__name__}: {error}"
     time, checkpoint = 0.0, None
     if simulation is not None:
         # Without samples this process has resumed nothing, and the series of the earlier one must stay.
-        if simulation.recorder.samples:
+        if simulation.recorder.samples and claim.held:
             with contextlib.suppress(RunError):  # a full disk: what was written before is whole
                 simulation.recorder.series.write()
         time, checkpoint = simulation.engine.time, simulation.checkpointed
@@ -174,7 +194,8 @@ def _mark_ended(simulation: Simulation | None, out: Path, log: logging.Logger, e
             good = "none" if checkpoint is None else f"t = {checkpoint:.4f} s"
             cause = f"{cause} (last good checkpoint: {good})"
     log.error("%s", cause)
-    Failed(status=status, cause=cause, time_s=time, checkpoint_s=checkpoint).mark(out)
+    if claim.held:
+        Failed(status=status, cause=cause, time_s=time, checkpoint_s=checkpoint).mark(claim.out)
     return cause
 
 

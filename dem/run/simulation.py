@@ -2,12 +2,11 @@
 
 import logging
 import shutil
-import signal
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from operator import index
 from pathlib import Path
-from types import FrameType
 from typing import Any
 
 from dem.engine.interface import Engine, Saved
@@ -16,15 +15,13 @@ from dem.phases.phase import Stage
 from dem.record.checkpoint import Checkpoint, write_checkpoint
 from dem.record.document import Phase
 from dem.record.names import CHECKPOINT
+from dem.record.rundir import Claim
 from dem.run.recorder import Recorder
+from dem.run.stop import StopRequest, StopRequestedError
 from dem.scene.reading import scene_hash
 from dem.scene.scene import Scene
 
 SMALLEST_CHECKPOINT = 2**20  # bytes; the container alone makes half of it
-
-
-class StopRequestedError(Exception):
-    """A run stopped at its next checkpoint after the signal SIGUSR1, e.g. of a batch system."""
 
 
 @dataclass
@@ -34,10 +31,11 @@ class Simulation:
     scene: Scene
     engine: Engine
     recorder: Recorder
-    folder: Path  #: The run directory
+    claim: Claim  #: The run directory, locked
     log: logging.Logger
     made_by: tuple[str, str]  #: Name and version of the engine
     time_steps: Sequence[float]  #: Time step of each phase [s]
+    stop: StopRequest = field(default_factory=StopRequest)
     checkpointed: float | None = None  #: Simulated time of the newest checkpoint [s]; None: no checkpoint yet
     _phase: int = 0
     _stage: Stage | None = None
@@ -47,22 +45,26 @@ class Simulation:
     _began: float = field(default_factory=time.monotonic)
     _cpu_spent: float = 0.0
     _cpu_began: float = field(default_factory=time.process_time)
-    _stop_requested: bool = False
+
+    @property
+    def folder(self) -> Path:
+        """The run directory."""
+        return self.claim.out
 
     def run(self) -> tuple[Phase, ...]:
         """Run from the present state to the end of the last phase; return the phases with their times."""
-        before = signal.signal(signal.SIGUSR1, self._request_stop)
-        try:
+        with self.stop.listening():
+            if self.stop.came:
+                raise StopRequestedError(f"stopped as requested before it went on from t = {self.engine.time:.4f} s")
             if not self.engine.steps:
                 self.recorder.record(self.engine, 0)
             while self._phase < len(self.scene.phases):
                 self._run_phase()
-        finally:
-            signal.signal(signal.SIGUSR1, before)
         if self.checkpointed != self.engine.time:
             # At a checkpoint the state was checked; after it contacts are unknown until the next step.
             self.recorder.watch(self.engine)
         self.recorder.series.write()
+        self._check_files()
         if self.recorder.residual:
             self.warn(self.recorder.residual)
         return tuple(Phase(**entry) for entry in self._performed)
@@ -118,6 +120,7 @@ class Simulation:
     def _checkpoint(self) -> None:
         # Only a state without errors becomes a checkpoint.
         self.recorder.watch(self.engine)
+        self._check_files()
         self._check_space()
         saved = self.engine.save(self.folder)
         assert self._stage is not None  # a checkpoint is taken while a phase runs
@@ -139,12 +142,16 @@ class Simulation:
         )
         write_checkpoint(self.folder, checkpoint)
         self._note_checkpoint()
-        if self._stop_requested:
+        if self.stop.came:
             raise StopRequestedError(f"stopped as requested at the checkpoint of t = {self.engine.time:.4f} s")
 
     def _note_checkpoint(self) -> None:
         self.checkpointed = self.engine.time
         self.recorder.progress.checkpointed(self.engine.time)
+
+    def _check_files(self) -> None:
+        self.claim.check()
+        self.recorder.check_files()
 
     def _check_space(self) -> None:
         # An engine may not notice a full disk when it saves, and would then load a truncated file.
@@ -163,7 +170,7 @@ class Simulation:
         self.engine.load(Saved(content=checkpoint.engine, memory=state["engine"]), self.folder)
         self._note_checkpoint()
         self.recorder.restore(state["recorder"], checkpoint.series)
-        self._phase, self._target = state["phase"], state["target"]
+        self._phase, self._target = index(state["phase"]), index(state["target"])
         self.engine.set_time_step(self.time_steps[self._phase])
         self._stage = self.scene.phases[self._phase].begin(self.scene, self._phase)
         self._stage.memory = dict(state["stage"])
@@ -180,6 +187,3 @@ class Simulation:
     def cpu(self) -> float:
         """Processor time spent on the run [s], including earlier processes and local processes of the engine."""
         return self._cpu_spent + time.process_time() - self._cpu_began + self.engine.cpu_elsewhere
-
-    def _request_stop(self, number: int, frame: FrameType | None) -> None:
-        self._stop_requested = True

@@ -14,9 +14,10 @@ from pydantic import ValidationError
 from dem.errors import InputError, shown
 from dem.record.names import SCENE
 from dem.scene.scene import Scene
-from dem.scene.yaml_text import load_yaml, parse_yaml
+from dem.setting.contact import PRESET
 from dem.setting.fidelity import FIDELITIES
 from dem.strict import explained
+from dem.yaml_text import load_yaml, parse_yaml, read_text
 
 SCHEMA_VERSION = 1
 MOST_DIFFERENCES = 3  # keys that are shown where two scenes differ
@@ -76,7 +77,7 @@ def load_scene(path: Path | str, overrides: Sequence[str] = ()) -> Scene:
         elif path.suffix == ".j2" and path.is_file():
             problem, way_out = "is a template of scenes", "give the sweep file that names it to `smarticles sweep`"
         else:
-            text = path.read_text(encoding="utf-8")
+            text = read_text(path)
     except OSError as error:
         problem = f"cannot be read ({error.strerror})"
     except UnicodeDecodeError:
@@ -209,6 +210,11 @@ def json_schema() -> dict[str, Any]:
     mapping = {"$ref": fidelity.pop("$ref")}
     fidelity["anyOf"] = [{"type": "string", "enum": list(FIDELITIES)}, mapping]
     schema["$defs"]["Fidelity"].pop("required")
+    schema["$defs"]["Contact"]["properties"][PRESET] = {
+        "type": "string",
+        "description": "file of contact parameters, relative to the scene file, such as `smarticles calibrate` writes; "
+        "keys beside it have priority; a resolved scene has the values instead",
+    }
     # A file may give one shape without a list, or the default by its name.
     particle = schema["properties"]["particle"]
     shapes = particle["anyOf"][0]

@@ -28,7 +28,7 @@ from dem.phases.kinds import AnyPhase
 from dem.phases.pull_hook import with_pull_defaults
 from dem.scene.rules import problems
 from dem.scene.stiffness import stiffness_for
-from dem.setting.contact import Contact
+from dem.setting.contact import Contact, with_preset
 from dem.setting.container import Container, Cylinder
 from dem.setting.fidelity import FIDELITIES, Fidelity, fidelities
 from dem.setting.hooks import Hooks, with_hook_defaults
@@ -113,8 +113,8 @@ class Scene(Part):
 
     @model_validator(mode="before")
     @classmethod
-    def _filled_by_protocol(cls, data: Any) -> Any:
-        return with_protocol(data)
+    def _filled_by_preset_and_protocol(cls, data: Any, info: ValidationInfo) -> Any:
+        return with_protocol(with_preset(data, (info.context or {}).get("folder")))
 
     @field_validator("fidelity", mode="before")
     @classmethod

@@ -1,8 +1,17 @@
-"""Contact parameters of a scene."""
+"""Contact parameters of a scene, and files of such parameters that scenes name."""
 
-from pydantic import Field
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
 
+import yaml
+from pydantic import Field, ValidationError
+
+from dem.errors import shown
 from dem.setting.part import Part
+from dem.strict import explained
+
+PRESET = "preset"  #: Key of `contact` that names a file of contact parameters
 
 
 class Contact(Part):
@@ -26,3 +35,37 @@ class Contact(Part):
         le=1,
         description="cs/cn of a sticking contact [1]; √(ks/kn) = 0.9 damps both directions by the same ratio",
     )
+
+
+def with_preset(data: Any, folder: Path | None) -> Any:
+    """Return a scene's data, not yet validated, with the values of the file that `contact.preset` names.
+
+    Keys that the scene gives beside `preset` have priority over those of the file.
+
+    Args:
+        folder: Folder that the path of the file is relative to; None: the working directory.
+
+    Raises:
+        ValueError: The file cannot be read, or does not hold valid keys of `contact`.
+    """
+    contact = data.get("contact") if isinstance(data, Mapping) else None
+    if not isinstance(contact, Mapping) or PRESET not in contact:
+        return data
+    named = contact[PRESET]
+    where = f"contact.{PRESET}"
+    if not isinstance(named, str) or not named:
+        raise ValueError(f"{where}: {shown(named)} is not text; give the path of a file of contact parameters")
+    file = (folder or Path()) / named
+    try:
+        values = yaml.safe_load(file.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise ValueError(f"{where}: {file} cannot be read ({error.strerror}); give the path of a preset") from None
+    except (UnicodeDecodeError, yaml.YAMLError):
+        raise ValueError(f"{where}: {file} is not YAML; give a file that `smarticles calibrate` wrote") from None
+    if not isinstance(values, Mapping):
+        raise ValueError(f"{where}: {file} holds {shown(values)}, not keys of `contact` with their values; correct it")
+    try:
+        Contact.model_validate(values)
+    except ValidationError as error:
+        raise ValueError(f"{where}: {file}: {explained(error, values, described='`smarticles schema`')}") from None
+    return {**data, "contact": {**values, **{key: value for key, value in contact.items() if key != PRESET}}}

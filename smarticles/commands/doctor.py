@@ -25,6 +25,7 @@ EXTRAS = {
     **dict.fromkeys(("matplotlib", "PIL", "pyvista", "vtk", "vtkmodules", "imageio_ffmpeg"), "viz"),
     **dict.fromkeys(("trame", "trame_vtk", "trame_client", "trame_server", "aiohttp", "wslink"), "view"),
     **dict.fromkeys(("trimesh", "gsd"), "export"),
+    **dict.fromkeys(("sklearn", "emcee", "SALib"), "calibrate"),
 }
 """Extra of the project that installs a module; other modules come with the project itself."""
 

@@ -5,6 +5,7 @@ import sys
 from pathlib import Path
 
 from dem.errors import InputError
+from dem.terminal import ERASE_LINE
 from smarticles.command_line import Commands, add_options, names
 
 _FORMATS = ("vtp", "gsd", "stl", "obj", "gltf", "glb")
@@ -120,7 +121,8 @@ def export_run(arguments: argparse.Namespace) -> int:
 
     def show_progress(done: int, count: int) -> None:
         if sys.stderr.isatty() and count > 1:
-            print(f"\rframe {done} of {count}", end="\n" if done == count else "", file=sys.stderr, flush=True)
+            sys.stderr.write(ERASE_LINE)
+            print(f"frame {done} of {count}", end="\n" if done == count else "", file=sys.stderr, flush=True)
 
     written = export.export_run(
         arguments.directory,

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from dem.errors import InputError
+from dem.terminal import bare
 from smarticles.command_line import Commands, add_options, positive_number, reader
 
 _PICTURE_SUFFIX = ".png"
@@ -150,4 +151,4 @@ def _track(images: Iterable[Any], count: int) -> Iterable[Any]:
     from rich.console import Console  # noqa: PLC0415  (takes 0.1 s)
     from rich.progress import track  # noqa: PLC0415
 
-    return track(images, "drawing", total=count, console=Console(stderr=True), transient=True)
+    return track(images, "drawing", total=count, console=Console(file=bare(sys.stderr)), transient=True)

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 
 from dem.errors import InputError
 from dem.record.names import MANIFEST, SCENE
+from dem.run.stop import StopRequest, StopRequestedError
 from smarticles import sweeps
 from smarticles.command_line import Commands, add_options, scene_settings
 
@@ -131,18 +132,31 @@ def read_scene(scene_file: Path, settings: Sequence[str]) -> Scene:
 def _run(
     scene_file: Path, out: Path, arguments: argparse.Namespace, settings: Sequence[str] = (), *, resume: bool
 ) -> int:
+    stop = StopRequest()
+    with stop.listening():
+        return _run_until(stop, scene_file, out, arguments, settings, resume=resume)
+
+
+def _run_until(
+    stop: StopRequest,
+    scene_file: Path,
+    out: Path,
+    arguments: argparse.Namespace,
+    settings: Sequence[str],
+    *,
+    resume: bool,
+) -> int:
     scene = read_scene(scene_file, settings)
     _set_parallelism(scene, out, resume=resume, threads=arguments.threads, ranks=arguments.ranks)
     # Imported last: both import YADE, which takes seconds and needs the variables set above.
     from dem.run import run  # noqa: PLC0415
-    from dem.run.simulation import StopRequestedError  # noqa: PLC0415
 
     quoted_out = shlex.quote(str(out))
     command = getattr(arguments, "recorded_as", None) or arguments.command_line
     try:
-        outcome = run.run_scene(scene, out, command=command, progress=sys.stderr.isatty(), resume=resume)
-    except StopRequestedError as stop:
-        print(f"smarticles: {stop}; to be continued: smarticles resume {quoted_out}", file=sys.stderr)
+        outcome = run.run_scene(scene, out, command=command, progress=sys.stderr.isatty(), resume=resume, stop=stop)
+    except StopRequestedError as stopped:
+        print(f"smarticles: {stopped}; to be continued: smarticles resume {quoted_out}", file=sys.stderr)
         return TO_BE_CONTINUED
     except KeyboardInterrupt:
         commands = f"measure: smarticles measure {quoted_out}; continue: smarticles resume {quoted_out}"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import sys
 import time
 from collections import Counter
 from collections.abc import Sequence
@@ -12,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 from dem.errors import InputError
 from dem.record.names import MANIFEST, OF_SWEEP
+from dem.terminal import bare, escaped
 from smarticles.command_line import Commands, add_options, as_json, columns, positive_number
 
 if TYPE_CHECKING:
@@ -135,7 +137,7 @@ def _watch(directory: Path, interval: float) -> None:
     from rich.live import Live  # noqa: PLC0415
     from rich.text import Text  # noqa: PLC0415
 
-    console = Console(soft_wrap=True)
+    console = Console(file=bare(sys.stdout), soft_wrap=True)
     # `Text`, since names of runs may contain rich's markup. A long table is cut to the terminal until the last update.
     live = Live(console=console, auto_refresh=False, vertical_overflow="ellipsis") if console.is_terminal else None
     printed = ""
@@ -144,7 +146,7 @@ def _watch(directory: Path, interval: float) -> None:
             live.start()
         while True:
             status = _read_status(directory)
-            text = str(status)
+            text = escaped(str(status))
             if live:
                 live.update(Text(text), refresh=True)
             elif text != printed:

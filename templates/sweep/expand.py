@@ -42,8 +42,18 @@ def expand(sweep: Sweep, *, max_points: int = MAX_POINTS) -> list[Point]:
         chosen = matching(assigned, again.only, f"{sweep.path}: again.only", ("variable", "point"))
         repeated = [_derived(sweep, {**point, **again.constants}) for point in chosen]
     _check_count(sweep, len(assigned) + len(repeated), max_points)
+    return points_of(sweep, [*assigned, *repeated], again_from=len(assigned))
+
+
+def points_of(sweep: Sweep, rows: Sequence[Mapping[str, Value]], *, again_from: int | None = None) -> list[Point]:
+    """Make the points of a sweep from the values of all its variables; InputError if a scene is not valid.
+
+    Args:
+        rows: Values of the variables of each point, with the seed.
+        again_from: Index of the first point that repeats another one, see `Again`; None: no point does.
+    """
     points = []
-    for index, values in enumerate([*assigned, *repeated]):
+    for index, values in enumerate(rows):
         name = render_text(sweep.content.run_name, values, f"{sweep.path}: run_name")
         if not _RUN_NAME.match(name):
             raise InputError(
@@ -53,8 +63,8 @@ def expand(sweep: Sweep, *, max_points: int = MAX_POINTS) -> list[Point]:
         data = render_yaml(sweep.template_text, values, str(sweep.template))
         source = f"{sweep.template}, rendered for run {name}"
         scene = parse_scene(data, source=source, folder=sweep.template.parent)
-        again_ = index >= len(assigned)
-        points.append(Point(name=name, values=values, scene=scene, scene_sha256=scene_hash(scene), again=again_))
+        again = again_from is not None and index >= again_from
+        points.append(Point(name=name, values=values, scene=scene, scene_sha256=scene_hash(scene), again=again))
     _reject_twins(sweep, points)
     return points
 

@@ -4,8 +4,15 @@ For YAML, each `{{ … }}` becomes a placeholder in the text. The text is parsed
 then replaced by the values. A value that is alone keeps its type, and no value can change the structure of the YAML.
 """
 
+import os
 import re
-from collections.abc import Callable, Mapping
+import resource
+import signal
+import threading
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+from types import FrameType
 from typing import Any, NoReturn
 
 import jinja2
@@ -13,10 +20,48 @@ import yaml
 from jinja2.runtime import Context
 from jinja2.sandbox import ImmutableSandboxedEnvironment
 
-from dem.errors import InputError, nearest
-from dem.scene.yaml_text import StrictLoader, parse_yaml
+from dem.errors import InputError, nearest, shown
+from dem.yaml_text import LONGEST, StrictLoader, parse_yaml
 
 Value = Any  #: Value of a variable: None, bool, int, float, str, or lists and mappings of such values
+
+
+# What a rendering may take beyond the memory of the process [bytes], and its processor time [s]. Templates of the
+# project take less than 10 MiB and 0.05 s; those of a stranger may multiply, repeat and nest loops without end.
+MOST_MEMORY, MOST_SECONDS = 2**28, 1.0
+
+
+class _TooLongError(BaseException):
+    """The time of a rendering is over; a BaseException, since Jinja2 catches errors in constants."""
+
+
+@contextmanager
+def _limited() -> Iterator[None]:
+    """Raise MemoryError or `_TooLongError` where a rendering takes more than `MOST_MEMORY` or `MOST_SECONDS`.
+
+    Without `/proc` the memory is not limited, and in threads other than the main one the time is not.
+    """
+    timed = threading.current_thread() is threading.main_thread()
+    before = resource.getrlimit(resource.RLIMIT_AS)
+    statm = Path("/proc/self/statm")
+    try:
+        if statm.exists():
+            most = int(statm.read_text().split()[0]) * os.sysconf("SC_PAGE_SIZE") + MOST_MEMORY
+            soft = most if before[0] == resource.RLIM_INFINITY else min(before[0], most)
+            resource.setrlimit(resource.RLIMIT_AS, (soft, before[1]))
+        if timed:
+            handler = signal.signal(signal.SIGVTALRM, _stop)
+            signal.setitimer(signal.ITIMER_VIRTUAL, MOST_SECONDS)
+        yield
+    finally:
+        if timed:
+            signal.setitimer(signal.ITIMER_VIRTUAL, 0.0)
+            signal.signal(signal.SIGVTALRM, handler)
+        resource.setrlimit(resource.RLIMIT_AS, before)
+
+
+def _stop(_number: int, _frame: FrameType | None) -> None:
+    raise _TooLongError
 
 
 def _environment(finalize: Callable[..., Any] | None = None) -> ImmutableSandboxedEnvironment:
@@ -38,6 +83,16 @@ def _plain(value: Value) -> bool:
     return value is None or isinstance(value, bool | int | float | str)
 
 
+def _check(value: Value, rule: str) -> None:
+    """Raise an error of Jinja2 if a template gives an unknown name, no plain data, or a very long text or list."""
+    if isinstance(value, jinja2.Undefined):
+        str(value)  # StrictUndefined raises, with the name
+    if not _plain(value):
+        raise jinja2.TemplateRuntimeError(f"gives {type(value).__name__}; {rule}")
+    if len(str(value)) > LONGEST:
+        raise jinja2.TemplateRuntimeError(f"gives more than {LONGEST} characters; {rule}")
+
+
 def _line(error: BaseException) -> int | None:
     """Return the line of the template at which rendering failed; None if it is unknown."""
     line, step = None, error.__traceback__
@@ -48,9 +103,12 @@ def _line(error: BaseException) -> int | None:
     return line
 
 
-def _reject(error: Exception, where: str, values: Mapping[str, Value]) -> NoReturn:
+def _reject(error: BaseException, where: str, values: Mapping[str, Value]) -> NoReturn:
     text = " ".join(str(error).split())
-    if isinstance(error, jinja2.UndefinedError):
+    if isinstance(error, MemoryError | _TooLongError):
+        most = f"{MOST_MEMORY >> 20} MiB" if isinstance(error, MemoryError) else f"{MOST_SECONDS:g} s"
+        msg = f"{where}: takes more than {most} to compute; use smaller numbers and fewer loops"
+    elif isinstance(error, jinja2.UndefinedError):
         name = re.match(r"'([^']+)' is undefined", text)
         advice = nearest(name[1], sorted(values)) if name else f"defined: {', '.join(sorted(values))}"
         msg = f"{where}: {text}; {advice}"
@@ -60,30 +118,30 @@ def _reject(error: Exception, where: str, values: Mapping[str, Value]) -> NoRetu
 
 
 # Errors of Jinja2, and of Python in expressions.
-_FAILURES = (jinja2.TemplateError, ArithmeticError, TypeError, ValueError, LookupError)
+_FAILURES = (
+    *(jinja2.TemplateError, ArithmeticError, TypeError, ValueError, LookupError, AttributeError, RuntimeError),
+    *(SyntaxError, MemoryError, _TooLongError),
+)
 
 
 def evaluate(expression: str, values: Mapping[str, Value], source: str) -> Value:
     """Return the value of a Jinja2 expression such as `(n / 2) | round | int`, or raise InputError."""
-    environment = _environment()
     try:
-        result = environment.compile_expression(expression, undefined_to_none=False)(**values)
-        if isinstance(result, jinja2.Undefined):
-            str(result)  # StrictUndefined raises, with the name
+        with _limited():
+            result = _environment().compile_expression(expression, undefined_to_none=False)(**values)
+            _check(result, "an expression must give numbers or text")
     except _FAILURES as error:
-        _reject(error, f"{source} = {expression!r}", values)
-    if not _plain(result):
-        what = type(result).__name__
-        raise InputError(f"{source} = {expression!r}: gives {what}; an expression must give numbers or text")
+        _reject(error, f"{source} = {shown(expression)}", values)
     return result
 
 
 def render_text(template: str, values: Mapping[str, Value], source: str) -> str:
     """Render a template as text, not as YAML; raise InputError if it fails or uses an unknown name."""
     try:
-        return _environment().from_string(template).render(**values)
+        with _limited():
+            return _environment().from_string(template).render(**values)
     except _FAILURES as error:
-        _reject(error, f"{source} = {template!r}", values)
+        _reject(error, f"{source} = {shown(template)}", values)
 
 
 def render_yaml(template: str, values: Mapping[str, Value], source: str) -> Any:
@@ -95,17 +153,14 @@ def render_yaml(template: str, values: Mapping[str, Value], source: str) -> Any:
 
     @jinja2.pass_context  # so that Jinja2 does not call this at compile time for constants
     def hold(_: Context, value: Value) -> str:
-        if isinstance(value, jinja2.Undefined):
-            str(value)  # StrictUndefined raises, with the name
-        if not _plain(value):
-            msg = f"{{{{ … }}}} gives {type(value).__name__}; it must give numbers, text or lists"
-            raise jinja2.TemplateRuntimeError(msg)
+        _check(value, "it must give numbers, text or lists")
         held.append(value)
         return f"{prefix}{len(held) - 1}z"
 
     environment = _environment(hold)
     try:
-        text = environment.from_string(template).render(**values)
+        with _limited():
+            text = environment.from_string(template).render(**values)
     except _FAILURES as error:
         number = getattr(error, "lineno", None) or _line(error)
         _reject(error, f"{source}, line {number}" if number else source, values)

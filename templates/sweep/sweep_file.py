@@ -17,11 +17,12 @@ import yaml
 from pydantic import AfterValidator, Field, ValidationError, field_validator, model_validator
 
 from dem.errors import InputError, nearest, shown
-from dem.scene.yaml_text import parse_yaml
 from dem.strict import Strict, explained
+from dem.yaml_text import parse_yaml
 from templates.sweep.render import Value
 
 SEED = "seed"
+LONGEST_TABLE = 10_000_000  # characters; a table of 100 000 points, more than a sweep can compute, is shorter
 ENGINE = "engine"  #: The constant of a sweep that names the engine of its scenes
 _IDENTIFIER = re.compile(r"[A-Za-z_][A-Za-z0-9_]*\Z")
 _RESERVED = {SEED, "loop", "true", "false", "none", "True", "False", "None"}
@@ -272,11 +273,15 @@ def on_engine(sweep: Sweep, engine: str) -> Sweep:
 def read_text(path: Path, what: str) -> str:
     """Return the text of a file of the kind `what`; raise InputError if it is no readable UTF-8 text."""
     try:
-        return path.read_text(encoding="utf-8")
+        with path.open(encoding="utf-8") as file:
+            text = file.read(LONGEST_TABLE + 1)
     except UnicodeDecodeError as error:
         raise InputError(f"{path}: not UTF-8 text (byte {error.start}); a {what} is a text file") from error
     except OSError as error:
         raise InputError(f"{path}: cannot read the {what}: {error.strerror}; check the path") from error
+    if len(text) > LONGEST_TABLE:
+        raise InputError(f"{path}: has more than {LONGEST_TABLE} characters; a {what} is shorter")
+    return text
 
 
 def parse_table(text: str, source: str) -> list[dict[str, int | float | str]]:

@@ -79,7 +79,16 @@ def advice(table: pd.DataFrame, knob: str = "time-step") -> tuple[str, str]:
     return str(found.verdict), found.note
 
 
-@pytest.mark.parametrize("name", ["accuracy", "accuracy/reference", "accuracy/oscillation", "accuracy-links"])
+LINKS = ["shaken", "oscillation", "shape-change"]
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        *("accuracy", "accuracy/reference", "accuracy/oscillation", "accuracy-links/knobs"),
+        *(f"accuracy-links/{scene}" for scene in LINKS),
+    ],
+)
 def test_published_tables_follow_from_their_runs(name: str) -> None:
     folder = RESULTS / name
     published = pd.read_csv(folder / "work_precision.csv", comment="#", keep_default_na=False, dtype=str)
@@ -93,6 +102,14 @@ def test_published_tables_follow_from_their_runs(name: str) -> None:
     for column in (one for one in published if "error" in one):
         wanted = pd.to_numeric(published[column]).to_numpy()
         assert made[column].to_numpy() == pytest.approx(wanted, rel=1e-3, abs=1e-3, nan_ok=True), column
+
+
+def test_the_shipped_table_has_the_rows_of_all_scenes() -> None:
+    folder = RESULTS / "accuracy-links"
+    header, *rows = (folder / "work_precision.csv").read_text(encoding="utf-8").splitlines()
+    parts = [(folder / scene / "work_precision.csv").read_text(encoding="utf-8").splitlines() for scene in LINKS]
+    assert [part[0] for part in parts] == [header] * len(parts)
+    assert rows == [row for part in parts for row in part[1:]]
 
 
 def test_errors_and_bands_are_those_put_in() -> None:

@@ -40,6 +40,14 @@ run_name: "seed{{ seed }}"
 points: {list: [{}]}
 repeats: {seeds: [1, 2]}
 """
+CALIBRATION = """\
+schema_version: 1
+name: small
+template: scene.yaml.j2
+free: {friction: {low: 0.2, high: 1.0}}
+data: data.csv
+budget: 10
+"""
 
 
 @pytest.fixture(scope="module")
@@ -49,6 +57,8 @@ def place(tmp_path_factory: pytest.TempPathFactory) -> Path:
     (folder / "sitecustomize.py").write_text(BLOCKER)
     (folder / "scene.yaml.j2").write_text(SCENE)
     (folder / "sweep.yaml").write_text(SWEEP)
+    (folder / "calibration.yaml").write_text(CALIBRATION)
+    (folder / "data.csv").write_text("measure,value,error\nphi [-],0.1,0.01\n")
     return folder
 
 
@@ -80,6 +90,7 @@ def test_run_sweep_and_measure_need_no_extra(place: Path) -> None:
         (["report", "a"], "viz"),
         (["export", "a", "--to", "glb"], "viz"),
         (["view", "a", "--no-browser"], "view"),
+        (["calibrate", "calibration.yaml", "--out", "c"], "calibrate"),
         (["study", "gravish", "--quick", "--out", "g", "--analyse"], "viz"),
     ],
     ids=lambda value: value[0] if isinstance(value, list) else value,

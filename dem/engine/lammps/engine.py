@@ -27,6 +27,7 @@ from dem.engine.lammps.text import Moving
 from dem.errors import InputError, RunError
 from dem.physics.contact import ContactLaw, StringLaw
 from dem.physics.overlaps import Overlaps
+from dem.record.files import reject_inflated
 from dem.setting.container import Cylinder
 
 FORMAT = "lammps-2"
@@ -391,6 +392,8 @@ class LammpsEngine:
             )
         try:
             with zipfile.ZipFile(io.BytesIO(saved.content)) as archive:
+                # Positions and velocities hardly shrink, and deflating can shrink zeros a thousand times.
+                reject_inflated(archive, 100 * len(saved.content))
                 files = {name: archive.read(name) for name in archive.namelist()}
                 self._box = RESTART in files
                 with np.load(io.BytesIO(files[STATE])) as arrays:

@@ -22,6 +22,8 @@ LEDGER = 10  # numbers of a row of the ledger, see `dem.engine.links.contact.pai
 SLOTS = 3  # points at which a pair of segments can touch, see `dem.engine.links.contact.meeting`
 # Columns of a rigid part: velocity at a point [m/s], angular velocity [rad/s], that point [m].
 VELOCITY, SPIN, ORIGIN, MOTION = 0, 3, 6, 9
+# Columns of a part that stretches: its axis [1], rate of strain [1/s], first moment of axial forces [N m].
+AXIS, STRAIN_RATE, MOMENT, STRETCH = 0, 3, 4, 5
 
 
 class Bodies(NamedTuple):
@@ -56,6 +58,9 @@ class Parts(NamedTuple):
     #: (R, MOTION) velocity at a point, angular velocity and this point, in the columns from `VELOCITY` on
     motion: Array
     load: Array  #: (R, 6) force [N] and torque about `ORIGIN` [N m] of contacts in this step
+    #: (R, STRETCH) of parts that stretch along an axis: the axis [1], rate of strain [1/s], first moment along the axis
+    #: of the axial forces of contacts [N m]; None where no body is flexible
+    stretch: Any
 
 
 class Segments(NamedTuple):
@@ -67,6 +72,14 @@ class Segments(NamedTuple):
     part: Indices  #: (Q,) number of the rigid part with which each segment moves
     shared: NDArray[np.uint8]  #: (Q,) which ends are ends of earlier segments, as bits `shapes.AT_START` and `AT_END`
     first: Indices  #: (L + 1,) number of the first segment of each link, then Q
+    bends: Any  #: `Bends`; None where no body is flexible
+
+
+class Bends(NamedTuple):
+    """What is known besides of the segments of flexible bodies."""
+
+    apart: Indices  #: (Q,) by how much numbers of segments of one body differ at least if they can touch; 0: never
+    ends: Array  #: (Q, 6) velocities of start and end of a segment of a flexible body [m/s]
 
 
 class Pairs(NamedTuple):
@@ -229,6 +242,34 @@ class Motoring(NamedTuple):
     over: NDArray[np.int64]
 
 
+class Filaments(NamedTuple):
+    """F flexible bodies with n nodes in all. A segment has the number of the node that it starts at.
+
+    See `dem.engine.links.motion.bending` for the columns.
+    """
+
+    body: Indices  #: (F,) body that each filament is
+    begin: Indices  #: (F + 1,) where the nodes of each begin
+    rod: Array  #: (F, ROD) constants of each
+    gait: Array  #: (F, GAIT) of preferred curvature
+    wave: Array  #: (n, 3) preferred angle at a node [rad], cosine and sine of its phase
+    preferred: Array  #: (n, 2) preferred angles at nodes now [rad]
+    mass: Array  #: (n,) [kg]
+    position: Array  #: (n, 3) [m]
+    velocity: Array  #: (n, 3) [m/s]
+    spin: Array  #: (n,) rate of roll of a segment about its axis [rad/s]
+    tangent: Array  #: (n, 3) direction of a segment [1]
+    extent: Array  #: (n,) length of a segment [m]
+    director: Array  #: (n, 3) direction across a segment, which turns with its material [1]
+    force: Array  #: (n, 4) on a node [N], and torque about a segment's axis [N m]; all but the next two
+    damping: Array  #: (n, 4) of internal damping
+    drag: Array  #: (n, 4) of the liquid
+    grip: NDArray[np.int64]  #: (n,) grip that holds a node, times 8, plus 1, 2, 4 for held x, y, z; 0: free
+    grip_speed: Array  #: (G, 3) velocities of the grips [m/s]
+    grip_force: Array  #: (G, 3) forces of the grips on their nodes in the last step [N]
+    sums: Array  #: (SUMS,) see `dem.engine.links.motion.bending.DAMPED`
+
+
 class System(NamedTuple):
     """All data of one simulation that kernels read or write."""
 
@@ -248,6 +289,7 @@ class System(NamedTuple):
     cords: Any  #: `Cords`; None if no string is tied
     #: (n, LEDGER) forces that dissipate energy, see `contact.pairs.enter`; None if dissipation is not recorded
     ledger: Any
+    filaments: Any  #: `Filaments`; None where no body is flexible
 
 
 class Scratch(NamedTuple):

@@ -109,7 +109,7 @@ def _lacking(kind: Any, name: str) -> Iterator[str]:
     """Yield the name of an argument that is None, or those of its fields that are, at any depth."""
     if isinstance(kind, types.NoneType):
         yield name
-    elif isinstance(kind, types.BaseNamedTuple):
+    elif isinstance(kind, types.NamedTuple | types.NamedUniTuple):
         for field, of_field in zip(kind.fields, kind.types, strict=True):
             yield from _lacking(of_field, field)
 

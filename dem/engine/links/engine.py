@@ -30,6 +30,7 @@ from dem.errors import InputError
 from dem.physics.contact import ContactLaw
 from dem.physics.motor import MotorLaw
 from dem.physics.overlaps import APART, Extremes, Held, Overlaps, held_between
+from dem.record.files import reject_inflated
 from dem.setting.container import Cylinder
 from dem.setting.hooks import Cross
 from dem.setting.plane import Channel
@@ -278,6 +279,7 @@ class LinksEngine:
             )
         try:
             with np.load(io.BytesIO(saved.content)) as file:
+                reject_inflated(file.zip, len(saved.content))
                 arrays = {name: file[name] for name in file.files}
         except (zipfile.BadZipFile, ValueError, OSError) as error:
             raise InputError(f"checkpoint: not readable by the links engine ({error}); start the run anew") from error

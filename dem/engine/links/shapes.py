@@ -9,14 +9,16 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from dem.body.bars import Bars, first_ends, owners
+from dem.body.filament import Filament
 from dem.body.kinds import Kind
 from dem.body.particle import Particle
+from dem.engine.links.compiler import inlined
 from dem.physics.contact import typical_effective_mass
 
 Array = NDArray[np.float64]
@@ -48,7 +50,8 @@ class Planar(NamedTuple):
 class Shape:
     """Shape of a body, in a frame with its origin at the centre of mass.
 
-    The axes of the frame are those of the middle link of a smarticle, or the principal axes of a rigid body.
+    The axes of the frame are those of the middle link of a smarticle, the principal axes of a
+    rigid body, or those of the laboratory for a filament.
     """
 
     mass: float  #: Mass of the body [kg]
@@ -58,7 +61,8 @@ class Shape:
     link: NDArray[np.int64]  #: (M,) link of each segment; for a smarticle 0 barb 1, 1 middle link, 2 barb 2
     shared: NDArray[np.uint8]  #: (M,) which ends belong to other segments, as bits `AT_START` and `AT_END`
     effective_mass: float  #: Harmonic mean of the effective mass over points and directions [kg], for the dashpots
-    planar: Planar | None = None  #: Geometry of a smarticle; None: a rigid body
+    planar: Planar | None = None  #: Geometry of a smarticle; None: another body
+    filament: Filament | None = None  #: Of a flexible body; None: a rigid body or a smarticle
 
     @property
     def reach(self) -> float:
@@ -78,10 +82,20 @@ class Shapes(NamedTuple):
     first: NDArray[np.int64]  #: (K + 1,) index in `lines` of the first segment of each shape, then M
     lines: Array  #: (M, LINE) segments in the frame of the body; for the columns see `START`
     link: NDArray[np.int64]  #: (M,) link of each segment
+    flexible: Any  #: (K,) whether `dem.engine.links.motion.bending` moves such bodies; None where it moves none
+
+
+@inlined
+def is_flexible(flexible: Any, kind: int) -> bool:
+    """Return whether bodies of a kind are flexible; takes `Shapes.flexible`."""
+    if flexible is None:
+        return False
+    return bool(flexible[kind] != 0)
 
 
 def table_of(shapes: Sequence[Shape]) -> Shapes:
     """Return shapes as arrays for the kernels."""
+    flexible = np.array([shape.filament is not None for shape in shapes], dtype=np.uint8)
     return Shapes(
         mass=np.array([shape.mass for shape in shapes]),
         radius=np.array([shape.lines[:, RADIUS].min() for shape in shapes]),
@@ -91,6 +105,7 @@ def table_of(shapes: Sequence[Shape]) -> Shapes:
         first=np.cumsum([0, *(len(shape.lines) for shape in shapes)]),
         lines=np.concatenate([shape.lines for shape in shapes]),
         link=np.concatenate([shape.link for shape in shapes]),
+        flexible=flexible if flexible.any() else None,
     )
 
 
@@ -166,6 +181,23 @@ def rigid_shape(bars: Bars, rows: int = 1, radius: float | None = None) -> Shape
         # Strands of bars that are twisted against each other do not meet, and count apart.
         shared=(later @ [AT_START, AT_END]).astype(np.uint8),
         effective_mass=bars.effective_mass,
+    )
+
+
+def filament_shape(filament: Filament) -> Shape:
+    """Return the shape of a filament, straight along x."""
+    count, length = filament.nodes - 1, filament.segment_length
+    axes = np.zeros((count, 6))
+    axes[:, 0], axes[:, 3] = (np.arange(count) - count / 2) * length, length
+    return Shape(
+        mass=filament.mass,
+        inertia=np.zeros(4),  # nodes move by themselves
+        lines=_lines(axes, filament.diameter / 2),
+        link=np.arange(count),
+        shared=np.where(np.arange(count) > 0, AT_START, 0).astype(np.uint8),
+        # A push at s moves the two nodes by (1 - s)²/m and s²/m, 2/3 in the mean.
+        effective_mass=1.5 * filament.mass / count,
+        filament=filament,
     )
 
 

@@ -13,11 +13,12 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from dem.body.filament import Filament
 from dem.body.linear import matrix_product, positive_definite
 from dem.body.particle import Particle
 from dem.engine.links.arrays import PLANE
 from dem.engine.links.motion.planar import lay_out
-from dem.engine.links.shapes import AT_END, AT_START, RADIUS, Shape, smarticle_shape
+from dem.engine.links.shapes import AT_END, AT_START, RADIUS, Shape, filament_shape, smarticle_shape
 from dem.physics.contact import ContactLaw
 
 Array = NDArray[np.float64]
@@ -63,6 +64,39 @@ def links_stable_time_step(
         angles += [(angle, angle) for angle in np.linspace(0.0, WIDEST, SHAPES)]
     shapes = (smarticle_shape(replace(particle, boxes=replace(boxes, angles=each))) for each in angles)
     return min(_step_of(shape, each, law, free, strings) for shape, each in zip(shapes, angles, strict=True))
+
+
+def filament_stable_time_step(filament: Filament, law: ContactLaw, effective_mass: float) -> float:
+    """Return the largest stable time step [s] over the stiffest modes of a filament among others.
+
+    Neighbouring nodes that move against each other: along the filament, across it, about its axis. To the stiffness of
+    stretching, bending and twisting comes that of contacts, which lie on both sides, a diameter apart, and a tip's: all
+    as if they were at one node, and what they touch moves against it.
+
+    Args:
+        law: of the contacts.
+        effective_mass: that the law's dashpots are for, of a smarticle [kg].
+    """
+    length, mass = filament.segment_length, filament.mass / (filament.nodes - 1)
+    stretching, bending, twisting = filament.stiffnesses
+    across = filament.drags[0]
+    share = math.sqrt(filament_shape(filament).effective_mass / effective_mass)
+    cn = max(2 * law.normal_damping, law.wall_damping) * share / mass
+    kn, ks, cs = 2 * law.normal_stiffness / mass, 2 * law.tangential_stiffness / mass, cn * law.tangential_damping
+    # A tip has half the mass of a node; contacts a diameter apart share their push between neighbouring nodes.
+    tip, side = 2 * CONTACTS_AT_A_TIP, max(CONTACTS_AT_A_TIP, length / filament.diameter)
+    along, bent = 4 * stretching / (length * mass), 16 * bending / (length**3 * mass)
+    twisted = 4 * twisting / (length * filament.axial_inertia)
+    # Squares of frequencies [1/s²] and rates of damping [1/s]; a push on the side of a filament that can roll meets a
+    # third of its mass.
+    modes = (
+        (along + max(tip * kn, side * ks), filament.stretching_time * along + max(tip * cn, side * cs)),
+        (bent + max(tip * kn, side * kn), filament.bending_time * bent + max(tip, side) * cn),
+        (bent + 3 * side * ks, filament.bending_time * bent + 3 * side * cs),
+        (twisted + 2 * side * ks, filament.stretching_time * twisted + 2 * side * cs),
+    )
+    drag = across * length / mass
+    return min(min((math.sqrt((c + drag) ** 2 + 4 * k) - (c + drag)) / k, RESOLVED / math.sqrt(k)) for k, c in modes)
 
 
 def _step_of(

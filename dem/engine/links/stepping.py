@@ -5,12 +5,20 @@ from __future__ import annotations
 import math
 from typing import Any, NamedTuple
 
-from dem.engine.links.arrays import Array, Bodies, Ground, Parts, Scratch, System
+from dem.engine.links.arrays import Array, Bodies, Ground, Parts, Scratch, Segments, System
 from dem.engine.links.compiler import kernel, part
 from dem.engine.links.contact.barrier import FINEST, Step, ticks_for
 from dem.engine.links.contact.boundaries import push_boundaries
 from dem.engine.links.contact.cords import pull
 from dem.engine.links.contact.pairs import GAIN, POINT, POWER, PUSH, ROWS, push_apart, velocity_at
+from dem.engine.links.motion.bending import (
+    drift_nodes,
+    kick_nodes,
+    move_segments,
+    pose_filaments,
+    push_nodes,
+    resolve_nodes,
+)
 from dem.engine.links.motion.motoring import update
 from dem.engine.links.motion.moving import drift, gather, kick, resolve_speeds
 from dem.engine.links.motion.poses import find_motions, pose
@@ -45,7 +53,10 @@ def shaken_to(ground: Ground, time: float) -> None:
 
 
 @part
-def settle(shapes: Shapes, bodies: Bodies, parts: Parts, ledger: Array, motors: Any, dt: float) -> float:
+def settle(
+    shapes: Shapes, bodies: Bodies, parts: Parts, segments: Segments, ledger: Array, motors: Any, filaments: Any,
+    dt: float,
+) -> float:  # fmt: skip
     """Return the energy that the forces in the ledger dissipated in a kick [J]; called after the kick.
 
     A force changes the kinetic energy by its work along the mean of the velocities before and after the kick.
@@ -59,6 +70,7 @@ def settle(shapes: Shapes, bodies: Bodies, parts: Parts, ledger: Array, motors: 
     """
     total = 0.0
     find_motions(shapes, bodies, parts, motors)
+    move_segments(filaments, parts, segments)
     for n in range(1, int(ledger[0, 0]) + 1):
         row = ledger[n]
         total -= dt * row[POWER] + row[GAIN]
@@ -106,6 +118,8 @@ def act(
         pulling = pull(bodies, parts, cords, motors, step)
     gather(bodies, parts)
     resolve_speeds(shapes, bodies, parts, segments, system.gravity, step)
+    push_nodes(system.filaments, parts, system.gravity, ledger, step)
+    resolve_nodes(system.filaments, shapes.radius, bodies, step)
     if motors is not None and tick == 0 and motors.due[1] == 0:
         # After the forces, whose velocities are those of before, as in the kick: so that work and dissipation agree.
         update(shapes, bodies, motors)
@@ -122,11 +136,13 @@ def act(
         if k < 4:
             totals[WORK] -= ground.force[k, 2] * ground.speed[k] * acting
     kick(shapes, bodies, parts, motors, system.gravity, system.planar, past, acting)
+    kick_nodes(system.filaments, acting)
     if motors is not None:
         motors.elapsed[0] += acting
     if ledger is not None:
-        totals[LOST] += lost + settle(shapes, bodies, parts, ledger, motors, acting)
+        totals[LOST] += lost + settle(shapes, bodies, parts, segments, ledger, motors, system.filaments, acting)
     drift(shapes, bodies, motors, length, scratch.plane)
+    drift_nodes(system.filaments, length)
     for k in range(4):
         if not ground.shaken[k]:
             ground.place[k] += ground.speed[k] * length
@@ -161,6 +177,7 @@ def advance(steps: int, clock: Clock, system: System, scratch: Scratch, totals: 
         while tick < FINEST:
             shaken_to(ground, clock.begin + (clock.made + made_now + tick / FINEST) * dt)
             pose(system.shapes, system.bodies, system.parts, system.segments, system.motors)
+            pose_filaments(system.filaments, system.bodies, system.parts, system.segments)
             if update_lists(system.bodies, system.segments, system.pairs, scratch.cells, system.skins) == FULL:
                 totals[TICK] = tick
                 return made_now

@@ -20,10 +20,13 @@ from dem.engine.links.arrays import (
     LEDGER,
     MOTION,
     PLANE,
+    STRETCH,
+    Bends,
     Bodies,
     Boundaries,
     Cells,
     Cords,
+    Filaments,
     Ground,
     Hooks,
     Kept,
@@ -50,8 +53,10 @@ from dem.engine.links.contact.queries import (
     forces_of_pairs,
     query_all,
 )
+from dem.engine.links.motion.bending import pose_filaments_from_python
 from dem.engine.links.motion.planar import lay_out
 from dem.engine.links.motion.poses import find_links, pose_all
+from dem.engine.links.rods import apart, filaments_at, none_of
 from dem.engine.links.shapes import LINE, RADIUS, Shape, kind_shape, smarticle_shape, table_of
 from dem.engine.links.stepping import PAST, Clock, advance
 from dem.errors import reject
@@ -109,6 +114,7 @@ class World:
     rims: Rims | None = None
     channel: Array | None = None
     cords: Cords | None = None
+    filaments: Filaments | None = None  #: None where no shape is flexible
 
     def __post_init__(self) -> None:
         own = () if self.particle is None else (smarticle_shape(self.particle),)
@@ -126,6 +132,8 @@ class World:
                 (law.wall_damping * walls, law.wall_friction),
             )
         )
+        if self.shapes.flexible is not None:
+            self.filaments = none_of()
         self.bodies: Bodies = bodies_for(0)
         self.pairs: Pairs = pairs_for(0, 0, 256)
         self.cells: Cells = cells_for(0, 0, 0, 256)
@@ -207,28 +215,62 @@ class World:
         self._make_room_at_boundaries()
         self.make_room()
 
+    def add_filaments(
+        self, shape: int, points: Array, *, velocities: Array | None = None, starts: Array | None = None, seed: int = 0
+    ) -> None:
+        """Add filaments of one shape.
+
+        Args:
+            shape: number of the shape, as in `add_bodies`.
+            points: (F, nodes, 3) of the nodes [m].
+            velocities: (F, nodes, 3) [m/s]; None: at rest.
+            starts: (F,) ψ of the preferred curvatures at the start [rad]; None: 0.
+            seed: of the times at which preferred curvatures reverse, together with the numbers of the filaments.
+        """
+        filament = self.kinds[shape].filament
+        assert filament is not None
+        assert self.filaments is not None
+        assert not self.planar
+        first, masses = self.count, filament.masses
+        centres = (masses[:, None] * points).sum(axis=1) / masses.sum()
+        self.add_bodies(shape, centres, np.tile(np.eye(3), (len(points), 1, 1)))
+        bodies = np.arange(first, self.count)
+        self.filaments = filaments_at(self.filaments, filament, bodies, points, velocities, starts, seed)
+
     def _lay_out_parts(self) -> None:
         """Make the arrays of parts and segments for the present bodies."""
         shapes, kinds = self.bodies.shape, self.kinds
-        parts = np.array([3 if kind.planar is not None else 1 for kind in kinds])[shapes]
-        sizes = np.array([len(kind.lines) for kind in kinds])[shapes]
+        flexible = np.array([kind.filament is not None for kind in kinds])
+        sizes = np.array([len(kind.lines) for kind in kinds])
+        parts = np.where(flexible, sizes, [3 if kind.planar is not None else 1 for kind in kinds])[shapes]
+        flexible, sizes = flexible[shapes], sizes[shapes]
         begin = np.cumsum([0, *parts]).astype(np.int32)
-        self.parts = Parts(begin, np.zeros((int(begin[-1]), MOTION)), np.zeros((int(begin[-1]), 6)))
+        rows = int(begin[-1])
+        stretch = None if self.filaments is None else np.zeros((rows, STRETCH))
+        self.parts = Parts(begin, np.zeros((rows, MOTION)), np.zeros((rows, 6)), stretch)
         body = np.repeat(np.arange(self.count, dtype=np.int32), sizes)
         # Links of a body in the order of its segments, and a number for each in the pile.
         own = np.concatenate([np.zeros(0, np.int64), *(kinds[k].link for k in shapes)])
         fresh = np.append(True, (np.diff(own) != 0) | (np.diff(body) != 0)) if len(own) else np.zeros(0, np.bool_)
-        hinged = np.repeat(self.shapes.hinged[shapes], sizes)
+        hinged, bent = np.repeat(self.shapes.hinged[shapes], sizes), np.repeat(flexible, sizes)
+        moved = hinged if self.articulated else 0  # links that move by themselves
         #: (Q,) code of each segment's link in recorded contacts
         self.links = at_links(body.astype(np.int64), own, self.each).astype(np.int32)
         self.segments = Segments(
             line=np.concatenate([np.zeros((0, LINE)), *(kinds[k].lines for k in shapes)]),
             begin=np.cumsum([0, *sizes]).astype(np.int32),
             body=body,
-            part=(begin[body] + (hinged * own if self.articulated else 0)).astype(np.int32),
+            part=(begin[body] + (moved + bent) * own).astype(np.int32),
             shared=np.concatenate([np.zeros(0, np.uint8), *(kinds[k].shared for k in shapes)]),
             first=np.append(np.flatnonzero(fresh), len(own)).astype(np.int32),
+            bends=None if self.filaments is None else self._bends(sizes),
         )
+
+    def _bends(self, sizes: NDArray[np.int64]) -> Bends:
+        """Return `Segments.bends` of bodies with so many segments each."""
+        rods = [kind.filament for kind in self.kinds]
+        least = np.array([0 if rod is None else apart(rod) for rod in rods], dtype=np.int32)
+        return Bends(np.repeat(least[self.bodies.shape], sizes), np.zeros((int(sizes.sum()), 6)))
 
     def _make_room_at_boundaries(self) -> None:
         """Enlarge the memory of contacts with boundaries for the present segments and boundaries."""
@@ -288,8 +330,9 @@ class World:
         """Enlarge all lists for the present bodies, and for at least `capacity` pairs."""
         rows, links = len(self.segments.line), len(self.segments.first) - 1
         capacity = max(capacity, 12 * rows + 256, len(self.pairs.first))
-        if capacity > len(self.pairs.first):
-            self.pairs = self.pairs._replace(**{n: longer(getattr(self.pairs, n), capacity) for n in (*LISTS, *FRESH)})
+        # Those of a checkpoint are as long as what is in them, each of its own length.
+        short = [name for name in (*LISTS, *FRESH) if len(getattr(self.pairs, name)) < capacity]
+        self.pairs = self.pairs._replace(**{name: longer(getattr(self.pairs, name), capacity) for name in short})
         if len(self.cells.marks) != rows or len(self.cells.first) != capacity:
             self.cells = cells_for(self.count, links, rows, capacity)
         if self.ledger is not None:
@@ -318,7 +361,7 @@ class World:
         law, wall_law = self.laws
         return System(
             self.shapes, law, wall_law, self.bodies, self.parts, self.segments, self.pairs, self.kept, self._known,
-            self.gravity, self.planar, self.skins, self.hinged, self.cords, self.ledger,
+            self.gravity, self.planar, self.skins, self.hinged, self.cords, self.ledger, self.filaments,
         )  # fmt: skip
 
     @property
@@ -334,6 +377,8 @@ class World:
     def posed(self) -> Bodies:
         """Return the bodies, after computing all that follows from their state."""
         pose_all(self.shapes, self.bodies, self.parts, self.segments, self.hinged)
+        if self.filaments is not None:
+            pose_filaments_from_python(self.filaments, self.bodies, self.parts, self.segments)
         return self.bodies
 
     def state(self) -> PileState:
@@ -440,6 +485,7 @@ class World:
             "hooks": self.hooks,
             "rims": self.rims,
             "cords": self.cords,
+            "filaments": self.filaments,
         }
         return {name: group for name, group in groups.items() if group is not None}
 
@@ -471,6 +517,7 @@ class World:
         self.rims = group(Rims, "rims") if "rims.heights" in arrays else None
         self.kept = group(Kept, "kept")
         self.cords = group(Cords, "cords") if "cords.anchor" in arrays else None
+        self.filaments = group(Filaments, "filaments") if "filaments.body" in arrays else None
         self.make_room()
 
 

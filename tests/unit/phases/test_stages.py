@@ -1,6 +1,7 @@
 """Each phase while it runs, against an engine in memory: its calls of the engine, and how long it takes."""
 
 import json
+import math
 from collections.abc import Callable
 from typing import Any
 
@@ -103,6 +104,40 @@ def test_a_resumed_pour_draws_the_same_poses() -> None:
         )
         poses.append(engine.state().link_positions)
     assert np.array_equal(*poses)
+
+
+def test_a_layer_has_ten_times_as_long_as_a_fall_takes_at_low_gravity() -> None:
+    # √(2w/g) is 2.8 s; some smarticles of each of the two layers fall that far.
+    scene = small({"gravity_m_per_s2": 0.003})
+    engine = EngineDouble.of(scene, 5 * DT)
+    duration = run_phase(scene, engine, 0)
+    assert engine.touches().all()
+    assert duration > 2 * 2.0
+
+
+@pytest.mark.parametrize(
+    ("gravity", "speed", "said"),
+    [
+        (9.81, 0.0, r"2 s .*: 5 of them touch nothing at 9\.81 m/s² of gravity.*; lower contact\.restitution or "),
+        (9.81, 0.3, r"2 s .*: the fastest falls at 0\.3 m/s, limit 0\.2 m/s; raise phases\.0\.landed_speed_m_per_s"),
+        (0.01, 0.0, r"\d\d\S* s .*: 5 of them touch nothing at 0\.01 m/s² of gravity"),
+    ],
+)
+def test_a_layer_that_does_not_land_is_reported_with_what_keeps_it(
+    monkeypatch: pytest.MonkeyPatch, gravity: float, speed: float, said: str
+) -> None:
+    def hover(engine: EngineDouble) -> None:
+        engine.velocities[:, 2] = -speed
+        engine.steps += 1
+
+    monkeypatch.setattr(EngineDouble, "_step", hover)
+    scene = small({"gravity_m_per_s2": gravity})
+    engine = EngineDouble.of(scene, CHECK_INTERVAL)
+    with pytest.raises(RunError, match=rf"^a layer of 5 had not come down {said}") as caught:
+        run_phase(scene, engine, 0)
+    if gravity < 1:
+        waited = float(str(caught.value).split(" s after")[0].split()[-1])
+        assert waited == pytest.approx(10 * math.sqrt(2 * scene.cylinder.height / gravity), rel=0.01)
 
 
 @pytest.mark.parametrize(

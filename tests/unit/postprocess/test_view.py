@@ -138,6 +138,18 @@ def test_the_token_opens_the_page_and_then_a_cookie_does(page):
     assert asked(page[1].partition("index.html")[0] + "vue.global.js", cookies=jar)[0] == 200
 
 
+def test_host_and_port_are_those_of_the_server_whatever_the_browser_says(page):
+    port, token = ADDRESS.fullmatch(page[1]).groups()
+    for path, method in ((f"index.html?token={token}", "GET"), (f"paraview/?token={token}", "POST")):
+        request = urllib.request.Request(f"http://127.0.0.1:{port}/{path}", method=method, headers={"Host": "evil:66"})
+        with urllib.request.urlopen(request, timeout=10) as answer:
+            said = f"{answer.headers}{answer.read().decode()}"
+        assert f"ws://127.0.0.1:{port}" in said
+        assert f"smarticles-{port}=" in said
+        assert ":66" not in said
+        assert "smarticles-66" not in said
+
+
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_ctrl_c_ends_it_well(served, number):
     with serving(served) as (process, address):

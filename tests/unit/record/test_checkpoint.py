@@ -1,5 +1,8 @@
 """A checkpoint is plain data and an engine's own bytes; one without an engine name is read."""
 
+import io
+import json
+import zipfile
 from pathlib import Path
 
 import numpy as np
@@ -59,3 +62,49 @@ def test_a_checkpoint_of_another_format_is_rejected(tmp_path: Path, monkeypatch:
         write_checkpoint(tmp_path, checkpoint())
     with pytest.raises(InputError, match="made with checkpoint format 3, here is 4; resume with what made it"):
         read_checkpoint(tmp_path, scene_sha256="abc", made_by=MADE_BY)
+
+
+def packed(series: bytes, state: bytes, how: int = zipfile.ZIP_STORED) -> bytes:
+    content = io.BytesIO()
+    with zipfile.ZipFile(content, "w", how) as archive:
+        for name, part in (("state.json", state), ("series.npz", series), ("engine.bin", b"")):
+            archive.writestr(name, part)
+    return content.getvalue()
+
+
+def npz(how: int, **members: bytes) -> bytes:
+    content = io.BytesIO()
+    with zipfile.ZipFile(content, "w", how) as archive:
+        for name, member in members.items():
+            archive.writestr(f"{name}.npy", member)
+    return content.getvalue()
+
+
+def npy(shape: str) -> bytes:
+    head = f"{{'descr': '<f8', 'fortran_order': False, 'shape': {shape}}}"
+    return b"\x93NUMPY\x01\x00" + len(head).to_bytes(2, "little") + head.encode()
+
+
+STATE = json.dumps({"format": 4, "made_by": {"engine": "double", "version": "1.2"}, "scene_sha256": "abc"}).encode()
+ZEROS = bytes(2**24)
+
+
+@pytest.mark.parametrize(
+    ("content", "cause"),
+    [
+        (packed(b"", STATE + ZEROS, zipfile.ZIP_DEFLATED), r"it would unpack to \d{8} bytes, at most \d{5}"),
+        (packed(npz(zipfile.ZIP_DEFLATED, time_s=ZEROS), STATE), r"it would unpack to \d{8} bytes, at most \d{5}"),
+        (packed(npz(zipfile.ZIP_STORED, time_s=npy("(10**14,)")), STATE), "."),
+        (packed(npz(zipfile.ZIP_STORED, time_s=npy("(100000000000000,)")), STATE), "."),
+        (packed(b"", b"[" * 100_000), "recursion"),
+        (packed(b"", b"[]"), "."),
+        (packed(b"", b'{"made_by": 3}'), "."),
+    ],
+)
+def test_a_checkpoint_that_no_run_has_written_is_damaged(tmp_path: Path, content: bytes, cause: str) -> None:
+    (tmp_path / "checkpoint.zip").write_bytes(content)
+    with pytest.raises(
+        InputError, match=rf"cannot be resumed, damaged: checkpoint\.zip \(.*{cause}.*\); start"
+    ) as caught:
+        read_checkpoint(tmp_path, scene_sha256="abc", made_by=MADE_BY)
+    assert "\n" not in str(caught.value)

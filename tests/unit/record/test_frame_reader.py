@@ -125,6 +125,8 @@ def test_frame_with_other_cells(tmp_path):
         ("<VTKFile/>", "lists no frame"),
         ('<VTKFile><DataSet timestep="now" file="a"/></VTKFile>', "entry 0 lacks"),
         ('<V><DataSet timestep="1" file="a"/><DataSet timestep="0" file="b"/></V>', "do not ascend"),
+        ('<V><DataSet timestep="1" file="../a.vtu"/></V>', "'../a.vtu' lies outside of the run directory"),
+        ('<V><DataSet timestep="1" file="/etc/passwd"/></V>', "'/etc/passwd' lies outside of the run directory"),
     ],
 )
 def test_bad_list_of_frames(tmp_path, text, message):

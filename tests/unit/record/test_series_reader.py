@@ -53,6 +53,14 @@ def _replace(name, values):
     return change
 
 
+def _link(link):
+    return lambda file: file.__setitem__("energy", link)
+
+
+def _dataset(**how):
+    return lambda file: file.create_dataset("energy", **how).attrs.update({"unit": "-", "description": ""})
+
+
 @pytest.mark.parametrize(
     ("change", "message"),
     [
@@ -61,11 +69,41 @@ def _replace(name, values):
         (lambda file: file.attrs.__delitem__("seed"), "attribute 'seed' is missing"),
         (lambda file: file.attrs.__setitem__("format", 9), "'format' must be 1: got 9"),
         (lambda file: file["phase"].attrs.__delitem__("unit"), "KeyError"),
+        (lambda file: file.attrs.__setitem__("format", "x"), "ValueError"),
+        (lambda file: file.attrs.__setitem__("seed", "x"), "ValueError"),
+        (_link(h5py.ExternalLink("/etc/other.h5", "/x")), "'energy' is not stored in this file"),
+        (_link(h5py.SoftLink("/time_s")), "'energy' is not stored in this file"),
+        (_dataset(external=[("/etc/passwd", 0, 24)], shape=(3,), dtype="f8"), "'energy' is not stored in this file"),
+        (lambda file: file.create_group("energy"), "'energy' is not stored in this file"),
+        (_dataset(shape=(10**12,), dtype="f8", chunks=(1000,)), "'energy' is not stored as plain numbers"),
+        (_dataset(data=np.zeros(10**6), compression="gzip"), "'energy' is not stored as plain numbers"),
+        (_dataset(data=["a", "b", "c"]), "'energy' is not stored as plain numbers"),
     ],
 )
 def test_series_that_breaks_the_contract(run, change, message):
     with h5py.File(run / "series.h5", "a") as file:
         change(file)
     with pytest.raises(InputError, match=message) as error:
+        read_series(run)
+    assert "\n" not in str(error.value)
+
+
+def test_a_flipped_bit_is_found_by_the_checksum_and_a_series_without_checksums_is_read(run, tmp_path):
+    path = run / "series.h5"
+    with h5py.File(path) as file:
+        assert all(dataset.fletcher32 for dataset in file.values())
+        values = file["kinetic_energy_J"][()]
+        place = path.read_bytes().index(values.tobytes())
+        old = tmp_path / "old"
+        old.mkdir()
+        with h5py.File(old / "series.h5", "w") as plain:
+            plain.attrs.update(file.attrs)
+            for name, dataset in file.items():
+                plain.create_dataset(name, data=dataset[()]).attrs.update(dataset.attrs)
+    assert np.array_equal(read_series(old)["kinetic_energy_J"], values)
+    content = bytearray(path.read_bytes())
+    content[place + 3] ^= 1
+    path.write_bytes(content)
+    with pytest.raises(InputError, match=r"series\.h5: its content does not fit its checksums") as error:
         read_series(run)
     assert "\n" not in str(error.value)

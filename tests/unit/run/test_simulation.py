@@ -2,6 +2,7 @@
 
 import json
 import os
+import shutil
 import signal
 import subprocess
 from collections.abc import Callable
@@ -22,7 +23,8 @@ from dem.record.document import Done
 from dem.record.run import Run
 from dem.record.vtkhdf import truncate
 from dem.run.run import run_scene
-from dem.run.simulation import Simulation, StopRequestedError
+from dem.run.simulation import Simulation
+from dem.run.stop import StopRequest, StopRequestedError
 from dem.scene.reading import load_scene, parse_scene, scene_hash
 from dem.scene.scene import Scene
 from smarticles.commands.compare import compare_bits
@@ -176,6 +178,27 @@ def test_a_run_asked_to_stop_does_so_at_its_next_checkpoint(
     assert failed["checkpoint_s"] == failed["time_s"]
 
 
+def test_a_run_asked_to_stop_before_its_first_step_can_be_continued(
+    kind: KindDouble, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    scene, build = scene_of("rested"), kind.build
+
+    def signalled(scene: Scene, time_step: float) -> EngineDouble:
+        os.kill(os.getpid(), signal.SIGUSR1)
+        return build(scene, time_step)
+
+    before, stop = signal.getsignal(signal.SIGUSR1), StopRequest()
+    with monkeypatch.context() as patch, stop.listening():
+        patch.setattr(kind, "build", signalled)
+        with pytest.raises(StopRequestedError, match=r"stopped as requested before it went on from t = 0\.0000 s"):
+            run(scene, tmp_path / "run", stop=stop)
+    assert signal.getsignal(signal.SIGUSR1) is before
+    assert json.loads((tmp_path / "run/failed.json").read_text())["status"] == "interrupted"
+    run(scene, tmp_path / "run", resume=True)
+    run(scene, tmp_path / "straight")
+    assert series(tmp_path / "run") == series(tmp_path / "straight")
+
+
 def test_an_engine_that_stops_fails_the_run_and_keeps_what_was_recorded(
     kind: KindDouble, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -196,6 +219,48 @@ def test_an_engine_that_stops_fails_the_run_and_keeps_what_was_recorded(
     assert not (tmp_path / "done.json").exists()
     with h5py.File(tmp_path / "series.h5") as file:
         assert failed["time_s"] - file["time_s"][-1] <= 0.004
+
+
+# -- files that are lost while the run writes them ----------------------------------------------------------------
+
+
+def replaced(out: Path) -> None:
+    shutil.move(out, out.with_name("moved"))
+    shutil.copytree(out.with_name("moved"), out)
+
+
+LOSSES: dict[str, tuple[Callable[[Path], object], str]] = {
+    "directory deleted": (shutil.rmtree, "was deleted, moved or replaced|its folder is gone"),
+    "directory replaced": (replaced, "was deleted, moved or replaced"),
+    "lock": (lambda out: (out / ".lock").unlink(), "was deleted, moved or replaced"),
+    "manifest": (lambda out: (out / "run.json").unlink(), r"run\.json: is gone, and without it the run cannot be read"),
+    "frames": (lambda out: shutil.rmtree(out / "frames"), r"frame_000000\.vtu: is gone; put it back"),
+    "one file": (lambda out: (out / "frames.vtkhdf").unlink(), r"frames\.vtkhdf: (is gone; put it|cannot be written)"),
+    "one frame": (lambda out: (out / "frames/frame_000001.vtu").unlink(), r"frame_000001\.vtu: is gone; put it back"),
+}
+
+
+@pytest.mark.parametrize("name", LOSSES)
+@pytest.mark.parametrize("step", [100, -1])
+def test_a_run_that_loses_its_files_fails_and_leaves_others_alone(
+    kind: KindDouble, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str, step: int
+) -> None:
+    more = ONE_FILE if name == "one file" else {}
+    scene, out, advance = scene_of("rested", **more), tmp_path / "run", EngineDouble._step
+    last = (run(scene, tmp_path / "whole") or Done(time_s=0, steps=0, wall_s=0, phases=())).steps
+    lose, stated = LOSSES[name]
+
+    def losing(engine: EngineDouble) -> None:
+        advance(engine)
+        if engine.steps == (step if step > 0 else last):
+            lose(out)
+
+    monkeypatch.setattr(EngineDouble, "_step", losing)
+    with pytest.raises(RunError, match=stated):
+        run(scene, out)
+    assert not (out / "done.json").exists()
+    own = name in ("manifest", "frames", "one file", "one frame")
+    assert (out / "failed.json").exists() == own
 
 
 # -- frames in one file ------------------------------------------------------------------------------------------------

@@ -78,6 +78,7 @@ HOOKS: Bad = [
     ({"hooks": {}, "phases": [DEPOSIT, {**PULL, "distance_m": 23.4}]}, "phases.1.distance_m", "23.4"),
     ({"hooks": {}, "phases": [DEPOSIT, {**PULL, "which": "lower"}]}, "phases.1.which", "'lower'"),
     ({"phases": [DEPOSIT, REMOVE, SHAKE, REMOVE]}, "phases.3", "remove-container"),
+    ({"phases": [DEPOSIT, {**SHAKE, "frequency_hz": 0.01}]}, "phases.1.frequency_hz", "0.01 Hz at Γ = 2"),
     ({"hooks": {"length_m": 0.048}}, "hooks.length_m", "0.048"),
     ({"hooks": {"lower_length_m": 0.048, "lower_bars": 3}}, "hooks.lower_length_m", "0.048"),
     ({"hooks": {"lower_length_m": 0.01, "lower_bars": 12}}, "hooks.lower_bars", "no room between them"),

@@ -100,3 +100,37 @@ def test_file_that_is_no_yaml(tmp_path: Path) -> None:
 def test_bad_override(tmp_path: Path, override: str, expected: str) -> None:
     message = rejected(tmp_path, GOOD, [override])
     assert message.startswith(expected) if expected.endswith(": ") else message == expected
+
+
+BOMB = "".join(f"- &a{k} [{', '.join([f'*a{k - 1}'] * 9) if k else 'x'}]\n" for k in range(12))
+
+
+@pytest.mark.parametrize(
+    ("content", "stated"),
+    [
+        (GOOD + "name:\n" + BOMB, "more than 200000 characters with all aliases (*) written out; use fewer"),
+        (GOOD.replace("phases: [{type: deposit}]", "phases:\n" + BOMB), "with all aliases (*) written out"),
+        (GOOD + "name: &a [*a]\n", "with all aliases (*) written out"),
+        (GOOD + "name: [&a " + "x" * 9999 + 30 * ", *a" + "]\n", "with all aliases (*) written out"),
+        (GOOD + "name: " + "x" * 200_000, "more than 200000 characters, which no scene or sweep needs; shorten it"),
+    ],
+)
+def test_a_text_that_stands_for_gigabytes_is_rejected_before_it_is_expanded(
+    tmp_path: Path, content: str, stated: str
+) -> None:
+    message = rejected(tmp_path, content)
+    assert message.startswith("bad.yaml: not valid YAML: more than 200000 characters")
+    assert stated in message
+
+
+def test_a_few_aliases_and_merged_keys_are_read(tmp_path: Path) -> None:
+    path = tmp_path / "scene.yaml"
+    path.write_text(
+        GOOD.replace("[{type: deposit}]", "[{type: deposit}, &r {type: relax, duration_s: 1}, *r, {<<: *r}]")
+    )
+    assert [phase.kind for phase in load_scene(path).phases] == ["deposit", "relax", "relax", "relax"]
+
+
+def test_a_file_without_end_is_not_read_on() -> None:
+    with pytest.raises(InputError, match="more than 200000 characters"):
+        load_scene("/dev/zero")

@@ -5,11 +5,13 @@ import signal
 import subprocess
 import sys
 import threading
+from pathlib import Path
 
 import pytest
 from command_cases import Smarticles
 
 from dem.errors import InputError, RunError
+from dem.terminal import ERASE_LINE, printable
 from smarticles.command_line import Cell, columns
 from smarticles.main import build_parser, guarded, orderly_stop
 
@@ -93,6 +95,28 @@ def test_errors_have_a_status_and_a_message(
 
     assert guarded(action) == status
     assert capsys.readouterr() == ("", f"smarticles: {line}\n")
+
+
+def test_control_characters_reach_the_terminal_as_escapes(tmp_path: Path, smarticles: Smarticles) -> None:
+    scene = tmp_path / "scene.yaml"
+    name = r"\e[2J\a\rme\u202e\u009b"
+    scene.write_text(
+        f'{{schema_version: 1, name: "{name}", seed: 1, count: 9, phases: [{{type: deposit}}], engine: links}}'
+    )
+    said = smarticles("plan", str(scene))
+    assert said.out.startswith(r"\x1b[2J\x07\x0dme\u202e\x9b: 9 smarticles of ")
+    for words in (["plan", "\x1b]0;title\x07"], ["\x1b[1m"], ["plan", str(scene), "--set", "\x1b[1m=2"]):
+        said = smarticles(*words)
+        assert said.status == 2
+        assert r"\x1b" in said.err
+        assert not set("\x1b\x07\r").intersection(said.out + said.err)
+
+
+def test_a_line_of_progress_is_still_redrawn(capsys: pytest.CaptureFixture[str]) -> None:
+    with printable():
+        sys.stderr.write(ERASE_LINE)
+        sys.stderr.write("\x1b[1m")
+    assert capsys.readouterr().err == "\r\x1b[K" + r"\x1b[1m"
 
 
 @pytest.mark.parametrize("words", [["--debug", "plan", "absent.yaml"], ["plan", "absent.yaml", "--debug"]])

@@ -1,5 +1,7 @@
 """Templates: values keep their type, cannot break out, and a misspelt name is an error."""
 
+import resource
+import signal
 from typing import Any
 
 import pytest
@@ -89,3 +91,39 @@ def test_expressions(expression: str, value: Any) -> None:
 def test_bad_expressions_are_input_errors(expression: str, message: str) -> None:
     with pytest.raises(InputError, match=message):
         evaluate(expression, {"n": 270}, "f: derived.x")
+
+
+@pytest.mark.parametrize(
+    ("expression", "message"),
+    [
+        ("'a' * 10 ** 10", "takes more than 256 MiB"),
+        ("[0] * 10 ** 9", "takes more than 256 MiB"),
+        ("'%01000000000d' % n", "takes more than 256 MiB"),
+        ("'a' | center(10 ** 10)", "takes more than 256 MiB"),
+        ("9 ** (9 ** 9) > n", "takes more than 1 s to compute; use smaller numbers and fewer loops"),
+        ("9 ** 9999", "Exceeds the limit"),
+        ("'a' * 10 ** 6", "gives more than 200000 characters"),
+    ],
+)
+def test_an_expression_that_would_take_all_memory_or_hours_is_rejected(expression: str, message: str) -> None:
+    with pytest.raises(InputError, match=message):
+        evaluate(expression, {"n": 270}, "f: derived.x")
+
+
+@pytest.mark.parametrize(
+    ("template", "message"),
+    [
+        ("a: {{ 9 ** (9 ** 9) }}", "takes more than 1 s"),
+        ("{% for a in range(99999) %}{% for b in range(99999) %}{% endfor %}{% endfor %}", "takes more than 1 s"),
+        ("{% set x = namespace(t='ab') %}{% for a in range(99) %}{% set x.t = x.t ~ x.t %}{% endfor %}", "256 MiB"),
+        ("{% macro m() %}{{ m() }}{% endmacro %}{{ m() }}", "recursion"),
+        ("{% for a in [1] %}" * 30 + "{% endfor %}" * 30, "too many statically nested blocks"),
+        ("a: {{ [[[[['x'] * 50] * 50] * 50] * 50] * 50 }}", "takes more than"),
+        ("a: {% for a in range(99999) %}xxx{% endfor %}", "more than 200000 characters"),
+    ],
+)
+def test_a_template_that_would_take_all_memory_or_hours_is_rejected(template: str, message: str) -> None:
+    limits = resource.getrlimit(resource.RLIMIT_AS), signal.getitimer(signal.ITIMER_VIRTUAL)
+    with pytest.raises(InputError, match=message):
+        render_yaml(template, {"x": 1}, "t")
+    assert (resource.getrlimit(resource.RLIMIT_AS), signal.getitimer(signal.ITIMER_VIRTUAL)) == limits

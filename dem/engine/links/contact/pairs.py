@@ -5,7 +5,20 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from dem.engine.links.arrays import ORIGIN, SPIN, VELOCITY, Array, Bodies, Law, Pairs, Parts, Segments
+from dem.engine.links.arrays import (
+    AXIS,
+    MOMENT,
+    ORIGIN,
+    SPIN,
+    STRAIN_RATE,
+    VELOCITY,
+    Array,
+    Bodies,
+    Law,
+    Pairs,
+    Parts,
+    Segments,
+)
 from dem.engine.links.compiler import inlined, part
 from dem.engine.links.contact.barrier import Step, resolve, stretch
 from dem.engine.links.contact.law import resist, share_of_step
@@ -45,6 +58,24 @@ ROWS, POINT, PUSH, POWER, GAIN = 0, 2, 5, 8, 9
 
 
 @inlined
+def _extended(stretch: Any, row: int, velocity: Vector, arm: Vector) -> Vector:
+    """Add the velocity that a part's stretching gives to a point at `arm` [m] from the part's origin."""
+    if stretch is None:
+        return velocity
+    axis = vector(stretch[row], AXIS)
+    return along(velocity, stretch[row, STRAIN_RATE] * dot(arm, axis), axis)
+
+
+@inlined
+def _extend(stretch: Any, row: int, arm: Vector, force: Vector) -> None:
+    """Let a force at `arm` [m] from a part's origin stretch the part."""
+    if stretch is None:
+        return
+    axis = vector(stretch[row], AXIS)
+    stretch[row, MOMENT] += dot(arm, axis) * dot(force, axis)
+
+
+@inlined
 def push(parts: Parts, row: int, place: Vector, force: Vector) -> None:
     """Add a force at a point of a part to the part's load.
 
@@ -56,7 +87,9 @@ def push(parts: Parts, row: int, place: Vector, force: Vector) -> None:
     """
     load = parts.load[row]
     put_more(load, 0, force)
-    put_more(load, 3, cross(sub(place, vector(parts.motion[row], ORIGIN)), force))
+    arm = sub(place, vector(parts.motion[row], ORIGIN))
+    put_more(load, 3, cross(arm, force))
+    _extend(parts.stretch, row, arm, force)
 
 
 @inlined
@@ -84,7 +117,8 @@ def enter(ledger: Array, rows: tuple[int, int], place: Vector, force: Vector, po
 def velocity_at(parts: Parts, row: int, place: Vector) -> Vector:
     """Return the velocity of a point of a part [m/s]."""
     motion = parts.motion[row]
-    return moving(vector(motion, VELOCITY), vector(motion, SPIN), sub(place, vector(motion, ORIGIN)))
+    arm = sub(place, vector(motion, ORIGIN))
+    return _extended(parts.stretch, row, moving(vector(motion, VELOCITY), vector(motion, SPIN), arm), arm)
 
 
 @inlined

@@ -18,7 +18,7 @@ from dem.engine.links.contact.pairs import velocity_at
 from dem.engine.links.motion.motoring import ITERATIONS, contact_torques, free_torques, middle_of_step
 from dem.engine.links.motion.planar import planar_at, rates, spin_of
 from dem.engine.links.motion.poses import SLIP, along_normal
-from dem.engine.links.shapes import Shapes
+from dem.engine.links.shapes import Shapes, is_flexible
 from dem.engine.links.vectors import along, dot, turned_back, vector
 
 
@@ -49,6 +49,8 @@ def kick(
     """
     velocity, momentum, load, across = bodies.velocity, bodies.momentum, bodies.load, 0.0 if planar else 1.0
     for i in range(velocity.shape[0]):
+        if is_flexible(shapes.flexible, bodies.shape[i]):
+            continue
         share = dt / shapes.mass[bodies.shape[i]]
         velocity[i, 0] += share * load[i, 0]
         velocity[i, 1] += share * load[i, 1]
@@ -93,6 +95,8 @@ def resolve_speeds(
     velocity, spin, load = bodies.velocity, bodies.spin, bodies.load
     for i in range(velocity.shape[0]):
         k = bodies.shape[i]
+        if is_flexible(shapes.flexible, k):
+            continue
         limit, reach, per_force = LONGEST * shapes.radius[k], shapes.reach[k], step.whole / shapes.mass[k]
         gain = per_force * per_force * (load[i, 0] ** 2 + load[i, 1] ** 2 + load[i, 2] ** 2)
         speed = velocity[i, 0] ** 2 + velocity[i, 1] ** 2 + velocity[i, 2] ** 2
@@ -131,6 +135,8 @@ def drift(shapes: Shapes, bodies: Bodies, motors: Any, dt: float, row: Array) ->
     """
     position, velocity, turn = bodies.position, bodies.velocity, bodies.turn
     for i in range(position.shape[0]):
+        if is_flexible(shapes.flexible, bodies.shape[i]):
+            continue
         for d in range(3):
             position[i, d] += dt * velocity[i, d]
         if motors is not None and shapes.hinged[bodies.shape[i]]:

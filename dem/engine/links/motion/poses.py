@@ -7,7 +7,7 @@ from typing import Any
 from dem.engine.links.arrays import ORIGIN, SPIN, VELOCITY, Array, Bodies, Parts, Segments
 from dem.engine.links.compiler import inlined, kernel, part
 from dem.engine.links.motion.planar import planar_at, rates, spin_of
-from dem.engine.links.shapes import Planar, Shapes
+from dem.engine.links.shapes import Planar, Shapes, is_flexible
 from dem.engine.links.vectors import Vector, add, moving, put, put_more, scale, sub, turned, turned_back, vector
 
 SLIP = 3  # laws of motors from here on leave the angles free
@@ -110,13 +110,15 @@ def place_segments(shapes: Shapes, bodies: Bodies, segments: Segments, i: int) -
 def find_motions(shapes: Shapes, bodies: Bodies, parts: Parts, hinged: Any) -> None:
     """Write the angular velocities of all bodies and the motion of all parts."""
     for i in range(bodies.position.shape[0]):
+        if is_flexible(shapes.flexible, bodies.shape[i]):
+            continue
         find_spin(bodies, i, hinged)
         find_motion(shapes, bodies, parts, i, hinged)
 
 
 @part
 def pose(shapes: Shapes, bodies: Bodies, parts: Parts, segments: Segments, hinged: Any) -> None:
-    """Compute everything that follows from the state of the bodies.
+    """Compute everything that follows from the state of the bodies that are not flexible.
 
     Args:
         bodies: `axes` and `spin` are written, and `rate` if angles are free.
@@ -125,6 +127,8 @@ def pose(shapes: Shapes, bodies: Bodies, parts: Parts, segments: Segments, hinge
         hinged: the motors; None while smarticles are welded.
     """
     for i in range(bodies.position.shape[0]):
+        if is_flexible(shapes.flexible, bodies.shape[i]):
+            continue
         turn_axes(bodies, i)
         if hinged is not None and hinged.law >= SLIP and shapes.hinged[bodies.shape[i]]:
             p1, p2 = hinged.momentum[i, 0], hinged.momentum[i, 1]

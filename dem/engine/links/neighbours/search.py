@@ -12,7 +12,7 @@ processor's cache; their list is in the order of the bins, so that a step reads 
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from dem.engine.links.arrays import Array, Cells, Indices, Segments
 from dem.engine.links.compiler import inlined, part
@@ -52,6 +52,14 @@ def near_each_other(line: Array, p: int, q: int, reach: float) -> bool:
     s, t = nearest(both)
     gap = between(both, s, t)
     return bool(dot(gap, gap) < reach * reach)
+
+
+@inlined
+def _cannot_touch(bends: Any, p: int, q: int) -> bool:
+    """Return whether two segments of one body never touch: all of a rigid one, neighbours of a flexible one."""
+    if bends is None:
+        return True
+    return bool((bends.apart[p] == 0) | (abs(p - q) < bends.apart[p]))
 
 
 @part
@@ -205,7 +213,7 @@ def _boxed(
 
 @part
 def find_pairs(segments: Segments, cells: Cells, grid: Grid) -> int:
-    """Write all near pairs of segments of different bodies into `cells.lower` and `cells.upper`.
+    """Write all near pairs of segments that can touch into `cells.lower` and `cells.upper`.
 
     Args:
         segments: the body of each segment.
@@ -239,7 +247,10 @@ def find_pairs(segments: Segments, cells: Cells, grid: Grid) -> int:
                         return -1
                     reach = skin + rows[b, RADIUS] + rows[b, SKIN]
                     upper[hits] = b
-                    hits += not (off_lines(rows, a, b, reach) | (segments.body[numbers[b]] == own))
+                    q = numbers[b]
+                    hits += not (
+                        off_lines(rows, a, b, reach) | ((segments.body[q] == own) & _cannot_touch(segments.bends, p, q))
+                    )
             for k in range(number, hits):
                 b = upper[k]
                 q = numbers[b]

@@ -8,6 +8,7 @@ slow ones thin skins, so that all skins are used up at about the same time.
 from __future__ import annotations
 
 import math
+from typing import Any
 
 from dem.engine.links.arrays import Array, Bodies, Segments
 from dem.engine.links.compiler import inlined, part
@@ -40,6 +41,14 @@ def _square(a: Vector) -> float:
     return a[0] ** 2 + a[1] ** 2 + a[2] ** 2
 
 
+@inlined
+def _at_end(bends: Any, p: int, end: int, mean: Vector, rigid: Vector) -> Vector:
+    """Return the velocity of an end of a segment against `mean`: `rigid` unless its body is flexible."""
+    if bends is None or bends.apart[p] == 0:
+        return rigid
+    return sub(vector(bends.ends[p], 3 * end), mean)
+
+
 @part
 def mark(
     bodies: Bodies, segments: Segments, marks: Array, centres: Array, least: float, most: float, time: float
@@ -68,5 +77,6 @@ def mark(
         for end in range(2):
             arm = sub(vector(marks[p], 3 * end), vector(bodies.position[i], 0))
             velocity = moving(sub(vector(bodies.velocity[i], 0), mean), vector(bodies.spin[i], 0), arm)
+            velocity = _at_end(segments.bends, p, end, mean, velocity)
             fastest = max(fastest, dot(velocity, velocity))
         marks[p, 6] = min(most, least + time * math.sqrt(fastest))

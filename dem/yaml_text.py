@@ -1,7 +1,10 @@
 """Strict reader of YAML, for scenes, sweeps and templates."""
 
+import math
 import re
 import sys
+from itertools import chain
+from pathlib import Path
 from typing import Any
 
 import yaml
@@ -19,6 +22,9 @@ _FLOAT = re.compile(
 )
 # YAML 1.1 reads 1:30 as 90 and 010 as 8; here both are text, which keys of numbers reject.
 _INT = re.compile(r"[-+]?(?:0|[1-9][0-9_]*)\Z")
+# Characters of a text, also with all aliases written out. Scenes have up to 5000 and the sweeps of the project up to
+# 20 000; the slowest text to read, a list of short items, takes 2 s at this length.
+LONGEST = 200_000
 _OWN = ("tag:yaml.org,2002:float", "tag:yaml.org,2002:int")
 
 
@@ -51,11 +57,27 @@ StrictLoader.add_implicit_resolver("tag:yaml.org,2002:float", _FLOAT, list("-+.0
 StrictLoader.add_implicit_resolver("tag:yaml.org,2002:int", _INT, list("-+0123456789"))
 
 
-def load_yaml(text: str, loader: type[StrictLoader] = StrictLoader) -> Any:
-    """Return the data of a YAML text; raise yaml.YAMLError, which `parse_yaml` explains to users."""
+def read_text(path: Path) -> str:
+    """Return a text in UTF-8, of a longer one than `load_yaml` accepts only the beginning."""
+    with path.open(encoding="utf-8") as file:
+        return file.read(LONGEST + 1)
+
+
+def load_yaml(text: str, loader: type[Any] = StrictLoader) -> Any:
+    """Return the data of a YAML text; raise yaml.YAMLError, which `parse_yaml` explains to users.
+
+    Args:
+        loader: `StrictLoader`, a class derived from it, or another safe loader, which makes no Python objects.
+    """
+    if len(text) > LONGEST:
+        raise yaml.YAMLError(f"more than {LONGEST} characters, which no scene or sweep needs; shorten it")
+    reader = loader(text)
     try:
-        # The loader is a SafeLoader, which makes no Python objects.
-        return yaml.load(text, Loader=loader)
+        node = reader.get_single_node()
+        # Counted before any data are made, since a few aliases of aliases stand for gigabytes.
+        if node is not None and _characters(node, {}) > LONGEST:
+            raise yaml.YAMLError(f"more than {LONGEST} characters with all aliases (*) written out; use fewer")
+        return None if node is None else reader.construct_document(node)
     except ValueError as error:
         digits = sys.get_int_max_str_digits()
         lengthy = f"Exceeds the limit ({digits} digits)" in str(error)
@@ -64,6 +86,20 @@ def load_yaml(text: str, loader: type[StrictLoader] = StrictLoader) -> Any:
         raise yaml.YAMLError(problem) from error
     except RecursionError as error:
         raise yaml.YAMLError("nested too deeply to read") from error
+    finally:
+        reader.dispose()
+
+
+def _characters(node: yaml.Node, known: dict[yaml.Node, float]) -> float:
+    """Return about the number of characters of a node with all aliases written out; `known` are those of others."""
+    if node not in known:
+        known[node] = math.inf  # of a node that contains itself
+        if isinstance(node, yaml.ScalarNode):
+            known[node] = 1 + len(node.value)
+        else:
+            parts = chain.from_iterable(node.value) if isinstance(node, yaml.MappingNode) else node.value
+            known[node] = 1 + sum(_characters(part, known) for part in parts)
+    return known[node]
 
 
 def parse_yaml(text: str, source: str, loader: type[StrictLoader] = StrictLoader) -> Any:
@@ -78,5 +114,6 @@ def parse_yaml(text: str, source: str, loader: type[StrictLoader] = StrictLoader
             problem = "a tab; YAML is indented and spaced by blanks"
         msg = f"{source}{where}: not valid YAML: {problem}" + ("" if ";" in problem else "; correct this line")
     except yaml.YAMLError as error:
-        msg = f"{source}: not valid YAML: {' '.join(str(error).split())}; correct the file"
+        problem = " ".join(str(error).split())
+        msg = f"{source}: not valid YAML: {problem}" + ("" if ";" in problem else "; correct the file")
     raise InputError(msg)

@@ -1,0 +1,490 @@
+"""Motion of flexible bodies: nodes with mass, segments that stretch and roll, bending and twist between segments.
+
+Between two segments with tangents t, t', directors d1, d1' and d2 = t × d1, the discrete elastic rod of Bergou et al.,
+ACM Trans. Graph. 27, 63 (2008) and 29, 116 (2010), has the angles
+
+    κ1 = b·(d2 + d2')/2,   κ2 = -b·(d1 + d1')/2,   ν = 2 tan(m/2),   b = 2 t × t'/(1 + t·t'),
+
+m the twist, and with ℓ the length at rest the energy (EI/2ℓ) |κ - κ̄|² + (GJ/2ℓ) ν² + (EA/2ℓ) (|e| - ℓ)². Forces and
+torques are its derivatives: forces add up to nothing, and neither do moments of forces and torques about axes.
+Directors turn with their segments without twist, and besides by the roll, which has an inertia of its own, so that
+friction rolls a filament as it does a rigid bar.
+
+Leapfrog, as for rigid bodies: velocities belong to the middles of sub-steps.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from dem.engine.links.arrays import (
+    AXIS,
+    MOMENT,
+    ORIGIN,
+    SPIN,
+    STRAIN_RATE,
+    VELOCITY,
+    Array,
+    Bodies,
+    Filaments,
+    Parts,
+    Segments,
+)
+from dem.engine.links.compiler import inlined, kernel, part
+from dem.engine.links.contact.barrier import LONGEST, STRIDE, Step
+from dem.engine.links.motion.planar import direction
+from dem.engine.links.shapes import INVERSE
+from dem.engine.links.vectors import Vector, add, along, cross, dot, put, put_more, scale, sub, vector
+
+# Columns of a rod: length of a segment at rest ℓ [m]; EA/ℓ [N/m], EI/ℓ and GJ/ℓ [N m], times of Kelvin and Voigt of
+# stretching and twisting, and of bending [s]; a segment's inertia about its axis [kg m²]; drag of half a segment across
+# and along [N s/m], of a segment's roll [N m s]; weight over mass and g [1]; squares of the greatest frequencies of
+# bending and of twisting [1/s²].
+LENGTH, STRETCHING, BENDING, TWISTING, STRETCHING_TIME, BENDING_TIME = range(6)
+AXIAL, ACROSS, ALONG, ROLLING, WEIGHT, STIFFEST, STIFFEST_TWIST, ROD = range(6, 14)
+# Columns of a gait: ψ [rad], its rate [rad/s], sense ±1, mean reversals per second, time to the next one [s], reversals
+# that were drawn, seed and number of the filament; a factor on the preferred angles, its target, and the rate at which
+# it gets there [1/s].
+PSI, RATE, SENSE, REVERSALS, WAIT, DRAWN, SEED, NUMBER, FACTOR, TARGET, CHANGE, GAIT = range(12)
+# Work [J]: what internal damping and the liquid's drag took, what activity and grips gave.
+DAMPED, DRAGGED, ACTIVE, GRIPPED, SUMS = range(5)
+GRIP = 8  # `Filaments.grip` is the grip's number times this, plus the directions that it holds
+RESOLVED = 1.4  # ω dt, as in `dem.engine.links.stable_step`
+
+
+# -- from nodes to segments --------------------------------------------------------------------------------------
+
+
+@part
+def move_segments(filaments: Any, parts: Parts, segments: Segments) -> None:
+    """Write how the segments of all filaments move, from the velocities of their nodes.
+
+    Args:
+        parts: `motion` and `stretch` are written.
+        segments: `bends.ends` is written.
+    """
+    if filaments is None:
+        return
+    for f in range(filaments.body.shape[0]):
+        first, last, body = filaments.begin[f], filaments.begin[f + 1] - 1, filaments.body[f]
+        to_part, to_segment = parts.begin[body] - first, segments.begin[body] - first
+        for i in range(first, last):
+            start, end = vector(filaments.velocity[i], 0), vector(filaments.velocity[i + 1], 0)
+            axis, opening, extent = vector(filaments.tangent[i], 0), sub(end, start), filaments.extent[i]
+            motion, stretch = parts.motion[to_part + i], parts.stretch[to_part + i]
+            put(motion, VELOCITY, scale(0.5, add(start, end)))
+            put(motion, SPIN, along(scale(filaments.spin[i], axis), 1 / extent, cross(axis, opening)))
+            stretch[STRAIN_RATE] = dot(opening, axis) / extent
+            put(segments.bends.ends[to_segment + i], 0, start)
+            put(segments.bends.ends[to_segment + i], 3, end)
+
+
+@part
+def pose_filaments(filaments: Any, bodies: Bodies, parts: Parts, segments: Segments) -> None:
+    """Bring everything up to date that follows from the nodes of filaments.
+
+    Args:
+        bodies: `position` and `velocity` are written.
+        parts: `motion` and `stretch` are written.
+        segments: `line` and `bends.ends` are written.
+    """
+    if filaments is None:
+        return
+    for f in range(filaments.body.shape[0]):
+        first, last, body = filaments.begin[f], filaments.begin[f + 1] - 1, filaments.body[f]
+        to_part, to_segment = parts.begin[body] - first, segments.begin[body] - first
+        place, velocity, mass = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), 0.0
+        for i in range(first, last + 1):
+            start, own = vector(filaments.position[i], 0), filaments.mass[i]
+            place, velocity = along(place, own, start), along(velocity, own, vector(filaments.velocity[i], 0))
+            mass += own
+            if i == last:
+                break
+            edge, line, stretch = (
+                sub(vector(filaments.position[i + 1], 0), start),
+                segments.line[to_segment + i],
+                parts.stretch[to_part + i],
+            )
+            put(line, 0, start)
+            put(line, 3, edge)
+            line[INVERSE] = 1 / dot(edge, edge)
+            put(parts.motion[to_part + i], ORIGIN, along(start, 0.5, edge))
+            put(stretch, AXIS, vector(filaments.tangent[i], 0))
+            stretch[MOMENT] = 0.0
+        put(bodies.position[body], 0, scale(1 / mass, place))
+        put(bodies.velocity[body], 0, scale(1 / mass, velocity))
+    move_segments(filaments, parts, segments)
+
+
+@kernel
+def pose_filaments_from_python(filaments: Filaments, bodies: Bodies, parts: Parts, segments: Segments) -> None:
+    """Call `pose_filaments` from Python."""
+    pose_filaments(filaments, bodies, parts, segments)
+
+
+# -- forces ------------------------------------------------------------------------------------------------------
+
+
+class Piece(NamedTuple):
+    """One segment."""
+
+    t: Vector  #: Tangent [1]
+    d: Vector  #: First director [1]
+    e: Vector  #: Second one, t × d [1]
+    inverse: float  #: 1 over its length [1/m]
+    opening: Vector  #: Velocity of its end against its start, over its length [1/s]
+    spin: float  #: Rate of its roll [rad/s]
+
+
+class Bend(NamedTuple):
+    """The angles between two segments."""
+
+    k1: float  #: κ1
+    k2: float  #: κ2
+    twist: float  #: ν
+    binormal: Vector  #: b
+    tangent: Vector  #: Sum of both tangents over 1 + t·t'
+    first: Vector  #: Sum of both first directors over 1 + t·t'
+    second: Vector  #: Sum of both second directors over 1 + t·t'
+    #: Both directors of the first and of the second segment along b
+    along: tuple[float, float, float, float]
+
+
+@inlined
+def _piece(filaments: Filaments, i: int) -> Piece:
+    """Return a segment."""
+    t, d, inverse = vector(filaments.tangent[i], 0), vector(filaments.director[i], 0), 1 / filaments.extent[i]
+    opening = sub(vector(filaments.velocity[i + 1], 0), vector(filaments.velocity[i], 0))
+    return Piece(t, d, cross(t, d), inverse, scale(inverse, opening), filaments.spin[i])
+
+
+@inlined
+def _bend_of(one: Piece, two: Piece) -> Bend:
+    """Return the angles between two segments."""
+    inverse = 1 / (1 + dot(one.t, two.t))
+    binormal, d, e = scale(2 * inverse, cross(one.t, two.t)), add(one.d, two.d), add(one.e, two.e)
+    d1, e1, d2, e2 = dot(one.d, binormal), dot(one.e, binormal), dot(two.d, binormal), dot(two.e, binormal)
+    # The first director, carried to the second segment without twist, in that segment's frame.
+    off = dot(one.d, two.t) * inverse
+    sine = off * dot(one.t, two.e) - dot(one.d, two.e)
+    cosine = dot(one.d, two.d) - off * dot(one.t, two.d)
+    return Bend(
+        0.5 * (e1 + e2), -0.5 * (d1 + d2), 2 * sine / (1 + cosine), binormal, scale(inverse, add(one.t, two.t)),
+        scale(inverse, d), scale(inverse, e), (d1, e1, d2, e2),
+    )  # fmt: skip
+
+
+@inlined
+def _push_bend(out: Array, i: int, moments: Vector, one: Piece, two: Piece, bend: Bend) -> None:
+    """Add forces and torques of moments between the segments i - 1 and i.
+
+    Args:
+        out: (n, 4) added to.
+        moments: derivatives of the energy by κ1, κ2 and the twist [N m].
+    """
+    m1, m2, twist = moments
+    d1, e1, d2, e2 = bend.along
+    c = sub(scale(m1, bend.second), scale(m2, bend.first))
+    rest = sub(scale(0.5 * twist, bend.binormal), scale(m1 * bend.k1 + m2 * bend.k2, bend.tangent))
+    a = scale(one.inverse, add(cross(two.t, c), rest))
+    b = scale(two.inverse, sub(rest, cross(one.t, c)))
+    put_more(out[i - 1], 0, a)
+    put_more(out[i], 0, sub(b, a))
+    put_more(out[i + 1], 0, scale(-1.0, b))
+    out[i - 1, 3] += 0.5 * (m1 * d1 + m2 * e1) + twist
+    out[i, 3] += 0.5 * (m1 * d2 + m2 * e2) - twist
+
+
+@inlined
+def _rates(one: Piece, two: Piece, bend: Bend, slope: float) -> Vector:
+    """Return the rates of κ1 and κ2, and that of ν times its slope by the twist [1/s]."""
+    d1, e1, d2, e2 = bend.along
+    both = add(one.opening, two.opening)
+    g, growth = sub(cross(one.opening, two.t), cross(two.opening, one.t)), dot(both, bend.tangent)
+    return (
+        dot(bend.second, g) - bend.k1 * growth - 0.5 * (one.spin * d1 + two.spin * d2),
+        -dot(bend.first, g) - bend.k2 * growth - 0.5 * (one.spin * e1 + two.spin * e2),
+        slope * slope * (0.5 * dot(bend.binormal, both) + two.spin - one.spin),
+    )
+
+
+@inlined
+def _push_node(
+    filaments: Filaments, i: int, rod: Array, angle: Vector, one: Piece, two: Piece, ledger: Any, step: Step
+) -> float:
+    """Add forces and torques of bending and twist at an inner node; the work of a change of its preferred angles [J].
+
+    Args:
+        angle: cosine and sine of ψ, and the factor on the preferred angles.
+        one: the segment before.
+        two: the segment after.
+    """
+    bend = _bend_of(one, two)
+    stiffness, twisting, time = rod[BENDING], rod[TWISTING], rod[BENDING_TIME]
+    preferred, wave, (c, s, factor) = filaments.preferred[i], filaments.wave[i], angle
+    u1, u2 = bend.k1 - preferred[0], bend.k2 - preferred[1]
+    preferred[0] = factor * wave[0] * (c * wave[1] - s * wave[2])
+    preferred[1] = factor * wave[0] * (s * wave[1] + c * wave[2])
+    v1, v2 = bend.k1 - preferred[0], bend.k2 - preferred[1]
+    work = 0.5 * stiffness * (v1 * v1 + v2 * v2 - u1 * u1 - u2 * u2)
+    slope = 1 + 0.25 * bend.twist * bend.twist  # of ν by the twist
+    moments = stiffness * v1, stiffness * v2, twisting * bend.twist * slope
+    r1, r2, r3 = _rates(one, two, bend, slope)
+    damping = time * stiffness * r1, time * stiffness * r2, rod[STRETCHING_TIME] * twisting * r3
+    if ledger is None:
+        moments = add(moments, damping)
+    else:
+        _push_bend(filaments.damping, i, damping, one, two, bend)
+    _push_bend(filaments.force, i, moments, one, two, bend)
+    # The energy stiffens as the angle θ grows: κ = 2 tan(θ/2), κ'² + κ κ'' = (1 + q) (1 + 3 q) with q = tan²(θ/2).
+    # The twist likewise, and what bends resists rolls that are not alike.
+    q, p = 0.25 * dot(bend.binormal, bend.binormal), slope - 1
+    twisted = rod[STIFFEST_TWIST] * (1 + p) * (1 + 3 * p) + 4 * q * stiffness / rod[AXIAL]
+    stiffest = step.whole * step.whole * max(rod[STIFFEST] * (1 + q) * (1 + 3 * q), twisted)
+    if stiffest > RESOLVED * RESOLVED:
+        step.need[0] = max(step.need[0], math.sqrt(stiffest) / RESOLVED)
+    return float(work)
+
+
+@inlined
+def _push_segment(
+    filaments: Filaments, i: int, rod: Array, own: Piece, stretch: float, load: Array, out: Array
+) -> None:
+    """Add forces and torques on a segment: of contacts, stretching and drag, and what keeps its spin along its axis.
+
+    Args:
+        stretch: first moment of axial forces of contacts [N m].
+        load: (6,) of contacts.
+        out: (n, 4) to which forces of internal damping are added.
+    """
+    t, half, torque = own.t, scale(0.5, vector(load, 0)), vector(load, 3)
+    # Of forces ± at both nodes: the couple of contacts, the spin that turns with the axis, the axial spring.
+    pair = add(cross(torque, t), scale(rod[AXIAL] * own.spin, cross(t, own.opening)))
+    pair = along(scale(own.inverse, pair), stretch * own.inverse - rod[STRETCHING] * _stretched(filaments, i, rod), t)
+    put_more(filaments.force[i], 0, sub(half, pair))
+    put_more(filaments.force[i + 1], 0, add(half, pair))
+    filaments.force[i, 3] += dot(torque, t)
+    resisting = rod[STRETCHING] * rod[STRETCHING_TIME] * filaments.extent[i] * dot(own.opening, t)
+    put_more(out[i], 0, scale(resisting, t))
+    put_more(out[i + 1], 0, scale(-resisting, t))
+    if rod[ACROSS] > 0.0:
+        more = rod[ACROSS] - rod[ALONG]
+        for k in range(i, i + 2):
+            velocity = vector(filaments.velocity[k], 0)
+            put_more(filaments.drag[k], 0, along(scale(-rod[ACROSS], velocity), more * dot(velocity, t), t))
+
+
+@inlined
+def _stretched(filaments: Filaments, i: int, rod: Array) -> float:
+    """Return by how much a segment is longer than at rest [m]."""
+    return float(filaments.extent[i] - rod[LENGTH])
+
+
+@inlined
+def _damping_of(ledger: Any, force: Array, damping: Array) -> Array:
+    """Return where forces of internal damping go: apart where a ledger is kept, otherwise to all others."""
+    if ledger is None:
+        return force
+    return damping
+
+
+@part
+def push_nodes(filaments: Any, parts: Parts, gravity: float, ledger: Any, step: Step) -> None:
+    """Write all forces on nodes and all torques about the axes of segments.
+
+    Args:
+        filaments: `force`, `damping`, `drag`, `preferred` and `sums` are written.
+        parts: with the loads of contacts.
+        gravity: g [m/s²].
+        ledger: None where nothing reads it.
+        step: `need` is written.
+    """
+    if filaments is None:
+        return
+    out = _damping_of(ledger, filaments.force, filaments.damping)
+    for f in range(filaments.body.shape[0]):
+        first, last, rod, gait = filaments.begin[f], filaments.begin[f + 1] - 1, filaments.rod[f], filaments.gait[f]
+        to_part = parts.begin[filaments.body[f]] - first
+        for i in range(first, last + 1):
+            for d in range(4):
+                filaments.force[i, d] = filaments.damping[i, d] = filaments.drag[i, d] = 0.0
+            filaments.force[i, 2] = -gravity * rod[WEIGHT] * filaments.mass[i]
+        c, s = direction(gait[PSI])
+        before, work = _piece(filaments, first), 0.0
+        for i in range(first, last):
+            own = _piece(filaments, i)
+            _push_segment(filaments, i, rod, own, parts.stretch[to_part + i, MOMENT], parts.load[to_part + i], out)
+            if i > first:
+                work += _push_node(filaments, i, rod, (c, s, gait[FACTOR]), before, own, ledger, step)
+            before = own
+        filaments.sums[ACTIVE] += work
+
+
+@part
+def resolve_nodes(filaments: Any, radii: Array, bodies: Bodies, step: Step) -> None:
+    """Ask for sub-steps where a node would move far in a step.
+
+    Args:
+        filaments: with the forces of this instant.
+        radii: (K,) of the kinds of bodies [m].
+        step: `need` is written.
+    """
+    if filaments is None:
+        return
+    for f in range(filaments.body.shape[0]):
+        radius, fastest = radii[bodies.shape[filaments.body[f]]], 0.0
+        for i in range(filaments.begin[f], filaments.begin[f + 1]):
+            gain = step.whole / filaments.mass[i]
+            velocity = along(vector(filaments.velocity[i], 0), gain, vector(filaments.force[i], 0))
+            fastest = max(fastest, dot(velocity, velocity))
+        stride = step.whole * math.sqrt(fastest)
+        if stride > LONGEST * radius:
+            step.need[0] = max(step.need[0], stride / (STRIDE * radius))
+
+
+# -- motion ------------------------------------------------------------------------------------------------------
+
+
+@part
+def kick_nodes(filaments: Any, dt: float) -> None:
+    """Change the velocities of nodes and the spins of segments by the forces of this instant.
+
+    Args:
+        filaments: `velocity`, `spin`, `grip_force` and `sums` are written.
+        dt: time over which they act [s].
+    """
+    if filaments is None:
+        return
+    sums = filaments.sums
+    filaments.grip_force[:] = 0.0
+    for f in range(filaments.body.shape[0]):
+        first, last, rod = filaments.begin[f], filaments.begin[f + 1] - 1, filaments.rod[f]
+        roll, inertia = dt * rod[ROLLING] / rod[AXIAL], rod[AXIAL]
+        damped = dragged = 0.0
+        for i in range(first, last + 1):
+            share, grip = dt / filaments.mass[i], filaments.grip[i]
+            for d in range(3):
+                force = filaments.force[i, d] + filaments.damping[i, d] + filaments.drag[i, d]
+                before = filaments.velocity[i, d]
+                after = before + share * force
+                if grip & (1 << d):
+                    held = grip // GRIP
+                    after = filaments.grip_speed[held, d]
+                    reaction = (after - before) / share - force
+                    filaments.grip_force[held, d] += reaction
+                    sums[GRIPPED] += 0.5 * dt * reaction * (before + after)
+                damped -= filaments.damping[i, d] * (before + after)
+                dragged -= filaments.drag[i, d] * (before + after)
+                filaments.velocity[i, d] = after
+        for i in range(first, last):
+            before = filaments.spin[i]
+            # Drag of the roll is implicit: an axis has next to no inertia.
+            after = (before + dt / inertia * (filaments.force[i, 3] + filaments.damping[i, 3])) / (1 + roll)
+            if (filaments.grip[i] & filaments.grip[i + 1]) % GRIP == GRIP - 1:
+                after = 0.0
+            damped -= filaments.damping[i, 3] * (before + after)
+            dragged += rod[ROLLING] * after * (before + after)
+            filaments.spin[i] = after
+        sums[DAMPED] += 0.5 * dt * damped
+        sums[DRAGGED] += 0.5 * dt * dragged
+
+
+@inlined
+def _uniform(seed: int, number: int, event: int) -> float:
+    """Return a random number between 0 and 1, which depends on the three numbers alone.
+
+    Source: the finalizer of SplitMix64, Steele, Lea and Flood, OOPSLA 2014, once for each number.
+    """
+    state = np.uint64(0)
+    for key in (seed, number, event):
+        state = (state ^ np.uint64(key)) + np.uint64(0x9E3779B97F4A7C15)
+        state = (state ^ (state >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
+        state = (state ^ (state >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)
+        state = state ^ (state >> np.uint64(31))
+    return (float(state >> np.uint64(11)) + 0.5) * 2.0**-53
+
+
+@part
+def _wait(gait: Array) -> float:
+    """Draw the time to the next reversal [s]."""
+    gait[DRAWN] += 1
+    return float(-math.log(_uniform(int(gait[SEED]), int(gait[NUMBER]), int(gait[DRAWN]))) / gait[REVERSALS])
+
+
+@part
+def _turn_wave(gait: Array, dt: float) -> None:
+    """Turn the preferred curvature by a sub-step, reverse it where its time has come, and change its factor."""
+    change, rest = gait[CHANGE] * dt, gait[TARGET] - gait[FACTOR]
+    gait[FACTOR] = gait[TARGET] if abs(rest) <= change else gait[FACTOR] + math.copysign(change, rest)
+    gait[PSI] += gait[SENSE] * gait[RATE] * dt
+    if gait[REVERSALS] > 0.0:
+        if math.isinf(gait[WAIT]):
+            gait[WAIT] = _wait(gait)
+        gait[WAIT] -= dt
+        while gait[WAIT] < 0.0:
+            # It has gone on for too long, and turns back by that and as much again.
+            gait[PSI] += 2 * gait[SENSE] * gait[RATE] * gait[WAIT]
+            gait[SENSE] = -gait[SENSE]
+            gait[WAIT] += _wait(gait)
+
+
+@part
+def drift_nodes(filaments: Any, dt: float) -> None:
+    """Move all nodes by a sub-step, and carry the directors along.
+
+    Args:
+        filaments: `position`, `tangent`, `extent`, `director` and `gait` are written.
+        dt: length of the sub-step [s].
+    """
+    if filaments is None:
+        return
+    for f in range(filaments.body.shape[0]):
+        first, last = filaments.begin[f], filaments.begin[f + 1] - 1
+        _turn_wave(filaments.gait[f], dt)
+        for i in range(first, last + 1):
+            put(filaments.position[i], 0, along(vector(filaments.position[i], 0), dt, vector(filaments.velocity[i], 0)))
+        for i in range(first, last):
+            edge = sub(vector(filaments.position[i + 1], 0), vector(filaments.position[i], 0))
+            extent = math.sqrt(dot(edge, edge))
+            old, new, d = vector(filaments.tangent[i], 0), scale(1 / extent, edge), vector(filaments.director[i], 0)
+            # The smallest turn from the old to the new tangent, then the roll by Cayley's rotation.
+            d = along(d, -dot(d, new) / (1 + dot(old, new)), add(old, new))
+            half = 0.5 * dt * filaments.spin[i]
+            per = 1 / (1 + half * half)
+            d = along(scale((1 - half * half) * per, d), 2 * half * per, cross(new, d))
+            # Against rounding: across the axis, and of unit length by one step of Newton's.
+            d = along(d, -dot(d, new), new)
+            put(filaments.director[i], 0, scale(1.5 - 0.5 * dot(d, d), d))
+            put(filaments.tangent[i], 0, new)
+            filaments.extent[i] = extent
+
+
+# -- energies ----------------------------------------------------------------------------------------------------
+
+
+@kernel
+def measure(filaments: Filaments, gravity: float, found: Array) -> None:
+    """Add up the energies of all filaments.
+
+    Args:
+        gravity: g [m/s²].
+        found: (5,) written: kinetic, potential, stretching, bending and twisting energy [J].
+    """
+    found[:] = 0.0
+    for f in range(filaments.body.shape[0]):
+        first, last, rod = filaments.begin[f], filaments.begin[f + 1] - 1, filaments.rod[f]
+        for i in range(first, last + 1):
+            velocity, mass = vector(filaments.velocity[i], 0), filaments.mass[i]
+            found[0] += 0.5 * mass * dot(velocity, velocity)
+            found[1] += gravity * rod[WEIGHT] * mass * filaments.position[i, 2]
+            if i < last:
+                found[0] += 0.5 * rod[AXIAL] * filaments.spin[i] ** 2
+                found[2] += 0.5 * rod[STRETCHING] * _stretched(filaments, i, rod) ** 2
+            if first < i < last:
+                bend = _bend_of(_piece(filaments, i - 1), _piece(filaments, i))
+                k1, k2 = bend.k1 - filaments.preferred[i, 0], bend.k2 - filaments.preferred[i, 1]
+                found[3] += 0.5 * rod[BENDING] * (k1 * k1 + k2 * k2)
+                found[4] += 0.5 * rod[TWISTING] * bend.twist**2

@@ -1,0 +1,120 @@
+"""Arrays of filaments, as the kernels of `dem.engine.links.motion.bending` want them."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dem.body.filament import Filament
+from dem.engine.links.arrays import Filaments
+from dem.engine.links.motion import bending
+
+Array = NDArray[np.float64]
+
+# A circle with the diameter of a filament is its tightest bend: segments half a turn apart begin to touch each other.
+TIGHTEST = math.pi / 2  # arc between them, in diameters
+
+
+def apart(filament: Filament) -> int:
+    """Return by how much the numbers of two segments differ at least that can touch each other."""
+    return 1 + max(1, math.ceil(TIGHTEST * filament.diameter / filament.segment_length))
+
+
+def rod_of(filament: Filament) -> Array:
+    """Return the constants (ROD,) of a filament for the kernels, see `dem.engine.links.motion.bending`."""
+    length, (stretching, bend, twist) = filament.segment_length, filament.stiffnesses
+    across, along, roll = filament.drags
+    stiffest = 16 * bend / length**3 / (filament.mass / (filament.nodes - 1))
+    return np.array(
+        [
+            length, stretching / length, bend / length, twist / length, filament.stretching_time, filament.bending_time,
+            filament.axial_inertia, across * length / 2, along * length / 2, roll * length, filament.weight_share,
+            stiffest, 4 * twist / length / filament.axial_inertia,
+        ]
+    )  # fmt: skip
+
+
+def none_of() -> Filaments:
+    """Return the arrays of no filaments."""
+    f = np.zeros
+    return Filaments(
+        f(0, np.int32), f(1, np.int32), f((0, bending.ROD)), f((0, bending.GAIT)), f((0, 3)), f((0, 2)), f(0),
+        f((0, 3)), f((0, 3)), f(0), f((0, 3)), f(0), f((0, 3)), f((0, 4)), f((0, 4)), f((0, 4)), f(0, np.int64),
+        f((0, 3)), f((0, 3)), f(bending.SUMS),
+    )  # fmt: skip
+
+
+def filaments_at(
+    old: Filaments,
+    filament: Filament,
+    bodies: NDArray[np.int64],
+    points: Array,
+    velocities: Array | None,
+    starts: Array | None,
+    seed: int,
+) -> Filaments:
+    """Return the filaments of `old` and new ones; see `World.add_filaments`.
+
+    Args:
+        bodies: (F,) numbers of the new ones among all bodies.
+    """
+    count, nodes, _ = points.shape
+    edges = np.diff(points, axis=1)
+    extents = np.sqrt((edges**2).sum(axis=2))
+    tangents = edges / extents[:, :, None]
+    wave = np.zeros((nodes, 3))
+    gait = np.zeros((count, bending.GAIT))
+    gait[:, bending.SENSE] = gait[:, bending.FACTOR] = gait[:, bending.TARGET] = 1.0
+    gait[:, bending.WAIT] = math.inf
+    gait[:, bending.SEED], gait[:, bending.NUMBER] = seed, bodies
+    gait[:, bending.PSI] = 0.0 if starts is None else starts
+    if filament.curvature is not None:
+        own = filament.curvature
+        gait[:, bending.RATE], gait[:, bending.REVERSALS] = own.rate, own.reversal_rate
+        # A curvature 1/R turns a segment by the angle ℓ/R, and κ is twice the tangent of half of it.
+        wave[1:-1, 0] = 2 * np.tan(np.asarray(own.amplitudes) * filament.segment_length / 2)
+        wave[1:-1, 1], wave[1:-1, 2] = np.cos(own.phases), np.sin(own.phases)
+
+    def per_node(values: Array) -> Array:
+        """Return values of segments (F, nodes - 1, …) with a row of zeros for each last node."""
+        return np.concatenate([values, np.zeros_like(values[:, :1])], axis=1).reshape(count * nodes, *values.shape[2:])
+
+    total = count * nodes
+    fresh = none_of()._replace(
+        body=bodies.astype(np.int32),
+        begin=(len(old.mass) + nodes * np.arange(1, count + 1)).astype(np.int32),
+        rod=np.tile(rod_of(filament), (count, 1)),
+        gait=gait,
+        wave=np.tile(wave, (count, 1)),
+        preferred=np.zeros((total, 2)),
+        mass=np.tile(filament.masses, count),
+        position=points.reshape(total, 3).copy(),
+        velocity=np.zeros((total, 3)) if velocities is None else velocities.reshape(total, 3).copy(),
+        spin=np.zeros(total),
+        tangent=per_node(tangents),
+        extent=per_node(extents),
+        director=per_node(_untwisted(tangents)),
+        **{name: np.zeros((total, 4)) for name in ("force", "damping", "drag")},
+        grip=np.zeros(total, np.int64),
+    )
+    joined = Filaments(*(np.concatenate([a, b]) for a, b in zip(old, fresh, strict=True)))
+    return joined._replace(sums=old.sums)
+
+
+def _untwisted(tangents: Array) -> Array:
+    """Return directors (F, S, 3) [1] of segments with tangents (F, S, 3), carried along without twist."""
+    found = np.zeros_like(tangents)
+    for f, own in enumerate(tangents):
+        least = np.zeros(3)
+        least[np.abs(own[0]).argmin()] = 1.0
+        d = least
+        for k, tangent in enumerate(own):
+            if k:
+                middle = own[k - 1] + tangent
+                d = d - (d * tangent).sum() / (1 + (own[k - 1] * tangent).sum()) * middle
+            d = d - (d * tangent).sum() * tangent
+            d = d / math.sqrt((d**2).sum())
+            found[f, k] = d
+    return found

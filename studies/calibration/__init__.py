@@ -1,0 +1,1 @@
+"""Infer parameters of scenes from measured data: designed runs, emulators, narrowing waves, posterior."""

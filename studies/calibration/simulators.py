@@ -1,0 +1,116 @@
+"""Compute runs of a calibration by a Python function, or read them from a table; measure run directories.
+
+`smarticles.commands.calibrate` computes them as sweeps of scenes.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+
+from dem.errors import InputError, RunError, nearest
+from dem.record.run import Run
+from postprocess.measures.packing import DEFINITIONS
+from postprocess.measures.table import summarise_run
+from studies.calibration.emulator import Array
+from studies.calibration.inference import Measured
+from studies.calibration.problem import CONDITION, Problem
+from templates.sweep.render import Value
+
+
+@dataclass(frozen=True)
+class FunctionSimulator:
+    """A Python function as the simulation: it gets a run's variables, with its seed, and returns its measures.
+
+    A RunError of the function is a failed run.
+    """
+
+    problem: Problem
+    function: Callable[[Mapping[str, Value]], Measured]
+
+    def planned(self, wave: int) -> None:
+        """Return None, since nothing is kept."""
+
+    def run(self, wave: int, theta: Array) -> list[tuple[Mapping[str, Value], Measured | None]]:
+        """Call the function for all runs of a wave."""
+        return [(values, self._measured(values)) for values in self.problem.runs(wave, theta)]
+
+    def _measured(self, values: Mapping[str, Value]) -> Measured | None:
+        try:
+            return self.function(values)
+        except RunError:
+            return None
+
+
+def read_runs(path: Path) -> pd.DataFrame:
+    """Read a table of runs made elsewhere; InputError if it cannot be read."""
+    try:
+        return pd.read_csv(path, comment="#")
+    except (OSError, ValueError) as error:
+        raise InputError(
+            f"--table {path}: cannot be read: {error}; give a CSV file whose first line names columns"
+        ) from error
+
+
+class TableSimulator:
+    """Runs made elsewhere, one wave: a table with a column for each variable and each measure."""
+
+    def __init__(self, problem: Problem, table: pd.DataFrame, source: str) -> None:
+        if problem.content.waves != 1:
+            raise InputError(f"{problem.path}: waves: runs of a table are one wave; set waves to 1")
+        needed = {*problem.names, *(name for one in problem.conditions for name in one)}
+        needed |= {datum.measure for datum in problem.data}
+        for name in sorted(needed - set(table.columns)):
+            raise InputError(f"{source}: column {name!r} is missing; columns are {', '.join(table.columns)}")
+        self.problem, self.table = problem, table
+
+    def planned(self, wave: int) -> Array:
+        """Return the parameters (n, d) of all rows."""
+        found: Array = self.table[list(self.problem.names)].to_numpy(np.float64)
+        return found
+
+    def run(self, wave: int, theta: Array) -> list[tuple[Mapping[str, Value], Measured | None]]:
+        """Return the rows whose variables are those of a condition."""
+        found: list[tuple[Mapping[str, Value], Measured | None]] = []
+        measures = list(dict.fromkeys(datum.measure for datum in self.problem.data))
+        for row in self.table.to_dict("records"):
+            for index, condition in enumerate(self.problem.conditions):
+                if all(row[name] == value for name, value in condition.items()):
+                    parameters = {name: row[name] for name in self.problem.names}
+                    found.append(({**parameters, **condition, CONDITION: index}, {m: row[m] for m in measures}))
+        return found
+
+
+def measured(run: Run, names: Sequence[str]) -> dict[str, float]:
+    """Return measures of a run by their names, as means over the last frames of a phase.
+
+    Args:
+        names: `COLUMN` or `COLUMN @ PHASE`: a column of the table that `smarticles measure` prints, and the index of a
+            phase, from 0, or from the end as -1; default: the last phase.
+
+    Raises:
+        InputError: There is no such phase or column, or a file of the run is missing or damaged.
+    """
+    count = len(run.phases)
+    wanted: dict[str, tuple[str, int]] = {}
+    for name in names:
+        column, _, phase = (part.strip() for part in name.partition("@"))
+        try:
+            index = range(count)[int(phase or -1)]
+        except (ValueError, IndexError):
+            raise InputError(f"{run.path}: measure {name!r}: no phase {phase!r}; there are 0 to {count - 1}") from None
+        wanted[name] = column, index
+    # Costly definitions are measured only if they are asked for.
+    used = [one for one in DEFINITIONS if any(one in column for column, _ in wanted.values())]
+    table = summarise_run(run, definitions=used, phases={index for _, index in wanted.values()}).set_index("phase")
+    found = {}
+    for name, (column, index) in wanted.items():
+        if column not in table.columns:
+            raise InputError(f"{run.path}: measure {column!r} is no column; {nearest(column, map(str, table.columns))}")
+        found[name] = float(table.loc[index, column]) if index in table.index else math.nan
+    return found

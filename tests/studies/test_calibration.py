@@ -1,0 +1,315 @@
+"""Calibration against known answers: an analytic model in place of the simulation, through the code that runs use."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pytest
+from scipy import stats
+
+from dem.errors import InputError, RunError
+from studies.calibration import emulator, inference, report
+from studies.calibration.inference import Array, Result, calibrate
+from studies.calibration.problem import Datum, Problem, load_problem
+from studies.calibration.simulators import FunctionSimulator, TableSimulator
+
+ASPECTS = (0.4, 0.7, 1.0)
+MEASURES = ("phi_0", "phi_f")
+SCATTER = 0.02  # relative, from seed to seed, as of φ_0 in piles of 200
+ERROR = 0.01  # relative, of the data
+DISCREPANCY = 0.05
+FREE = "friction: {low: 0.2, high: 1.0}, wall: {low: 0.2, high: 1.5}"
+
+
+def model(friction: Any, wall: Any, aspect: float, measure: str) -> Any:
+    """A response like that of φ: not linear, and one measure depends on one friction more than on the other."""
+    if measure == "phi_0":
+        return 0.15 * np.exp(-0.5 * friction - 0.1 * wall * friction) * (1.6 - aspect)
+    return 0.2 * np.exp(-0.2 * friction - 0.6 * wall) * (1 + 0.3 * wall**2) * (1.5 - aspect)
+
+
+def simulated(values: Mapping[str, Any]) -> dict[str, float]:
+    random = np.random.default_rng(values["seed"])
+    frictions = values["friction"], values["wall"], values["l_over_w"]
+    return {name: model(*frictions, name) * (1 + SCATTER * random.standard_normal()) for name in MEASURES}
+
+
+def written(
+    folder: Path,
+    truth: Sequence[float],
+    *,
+    sigma: float = 0.0,
+    random: np.random.Generator | None = None,
+    free: str = FREE,
+    keys: str = "budget: 90",
+    predict: Sequence[float] = (),
+) -> Problem:
+    """Write a calibration whose data are those of the model with the parameters `truth`, and read it."""
+    rows = ["l_over_w,measure,value,error,predict"]
+    for measure in MEASURES:
+        size = np.mean([model(*truth, aspect, measure) for aspect in ASPECTS])
+        for aspect in ASPECTS:
+            value = model(*truth, aspect, measure)
+            if random is not None:
+                value += ERROR * value * random.standard_normal() + sigma * size * random.standard_normal()
+            rows.append(f"{aspect},{measure},{value!s},{ERROR * value!s},{int(aspect in predict)}")
+    (folder / "data.csv").write_text("\n".join(rows) + "\n")
+    file = folder / "calibration.yaml"
+    file.write_text(f"schema_version: 1\nname: analytic\nfree: {{{free}}}\ndata: data.csv\n{keys}\n")
+    return load_problem(file)
+
+
+def calibrated(problem: Problem) -> Result:
+    result = calibrate(problem, FunctionSimulator(problem, simulated), say=lambda _: None)
+    assert result is not None
+    return result
+
+
+def exact(problem: Problem, count: int = 50) -> tuple[Array, Array]:
+    """The posterior by a grid of the model itself: parameters (n, 2), weights (n,); no emulator, no chain."""
+    axes = np.linspace(0.2, 1.0, count), np.linspace(0.2, 1.5, count), np.linspace(0.002, 0.25, count)
+    friction, wall, sigma = (grid.ravel() for grid in np.meshgrid(*axes, indexing="ij"))
+    density = -0.5 * (sigma / DISCREPANCY) ** 2
+    for datum, size in zip(problem.data, problem.sizes, strict=True):
+        if datum.fitted:
+            aspect = float(problem.conditions[datum.condition]["l_over_w"])
+            variance = datum.error**2 + (size * sigma) ** 2
+            density -= 0.5 * (datum.value - model(friction, wall, aspect, datum.measure)) ** 2 / variance
+            density -= 0.5 * np.log(variance)
+    weights = np.exp(density - density.max())
+    return np.stack([friction, wall], axis=1), weights / weights.sum()
+
+
+@pytest.fixture(scope="module")
+def result(tmp_path_factory: pytest.TempPathFactory) -> Result:
+    """Three free parameters, of which one acts on nothing; data at l/w = 1.0 are predicted only."""
+    folder = tmp_path_factory.mktemp("calibration")
+    free = f"{FREE}, nothing: {{low: 0.0, high: 2.0}}"
+    random = np.random.default_rng(3)
+    problem = written(
+        folder, (0.5, 0.6), sigma=0.02, random=random, free=free, keys="budget: 140\nwaves: 2", predict=[1.0]
+    )
+    return calibrated(problem)
+
+
+def test_known_parameters_are_found_as_by_a_grid_of_the_model_itself(result: Result) -> None:
+    table = result.posterior().set_index("parameter")
+    assert table.loc["friction", "low 95 %"] < 0.5 < table.loc["friction", "high 95 %"]
+    assert table.loc["wall", "low 95 %"] < 0.6 < table.loc["wall", "high 95 %"]
+    grid, weights = exact(result.problem)
+    mean = weights @ grid
+    deviation = np.sqrt(weights @ (grid - mean) ** 2)
+    # Emulators of 28 runs with 2 % of scatter add to the deviation; the grid has none. An effect of one deviation of
+    # the data would be seen, and a posterior as wide as the prior is rejected.
+    assert np.all(np.abs(np.mean(result.theta, axis=0)[:2] - mean) < 0.5 * deviation)
+    ratio = np.std(result.theta, axis=0)[:2] / deviation
+    assert np.all((ratio > 0.75) & (ratio < 1.6)), ratio
+    assert not result.warnings
+    assert result.diagnostics["steps over autocorrelation time"] >= inference.ENOUGH_TIMES
+    assert 0.2 < result.diagnostics["acceptance"] < 0.6
+
+
+def test_a_parameter_without_effect_is_not_identified(result: Result) -> None:
+    table = result.posterior().set_index("parameter")
+    assert table.loc["nothing", "verdict"] == "not identified"
+    assert table.loc["nothing", "width"] > 0.85
+    assert table.loc["friction", "width"] < 0.5
+    indices = result.sensitivity().set_index(["measure", "parameter"])["total"]
+    assert indices["phi_0"]["nothing"].max() < 0.1
+    assert indices["phi_0"]["friction"].min() > 0.8
+    assert indices["phi_f"]["wall"].min() > 0.6
+
+
+def test_points_left_out_are_run_in_the_last_wave_and_predicted(result: Result) -> None:
+    counts = result.runs.groupby(["wave", "l_over_w"]).size()
+    assert counts[1].to_dict() == {0.4: 28, 0.7: 28}
+    assert counts[2].to_dict() == {0.4: 28, 0.7: 28, 1.0: 28}
+    assert len(result.runs) == 140
+    assert result.runs["seed"].is_unique
+    fit = result.predictive()
+    assert list(fit["fitted"]) == [True, True, False] * 2
+    assert fit["covered"].all()
+    # Bands include error and discrepancy, together some 5 % to either side; priors alone span φ_f by a factor of 2.
+    assert (fit["high 95 %"] / fit["low 95 %"] < 1.6).all()
+
+
+def test_results_are_written(result: Result, tmp_path: Path) -> None:
+    lines = report.write(result, tmp_path / "results", "smarticles calibrate …")
+    text = "\n".join(lines)
+    assert "Not settled by the data: wall: weakly identified; nothing: not identified." in text
+    assert "Data predicted only: 2 of 2 in their 95 % bands" in text
+    assert "half-normal prior of scale 0.05" in text
+    names = {path.name for path in (tmp_path / "results").iterdir()}
+    tables = {f"{name}.csv" for name in ("posterior", "fit", "sensitivity", "waves", "emulators", "runs", "draws")}
+    # No free parameter is called as one of contacts, so there is no preset.
+    assert names == {*tables, "calibration.md", "pairs.png", "pairs.svg", "fit.png", "fit.svg"}
+
+
+def test_emulators_know_their_error_unless_noise_is_ignored(monkeypatch: pytest.MonkeyPatch) -> None:
+    random = np.random.default_rng(1)
+
+    def covered() -> float:
+        """Share of the true values in 95 % bands, and of runs in those of predictions from all others."""
+        inside = []
+        for trial in range(10):
+            unit = stats.qmc.Sobol(2, rng=trial).random_base2(4)
+            truth = model(unit[:, 0], unit[:, 1], 0.7, "phi_f")
+            fitted = emulator.fit(unit, truth * (1 + SCATTER * random.standard_normal(16)), "φ_f")
+            places = random.uniform(size=(100, 2))
+            mean, variance = fitted.predict(places)
+            error = mean - model(places[:, 0], places[:, 1], 0.7, "phi_f")
+            inside.append(np.mean(np.abs(error) < 1.96 * np.sqrt(variance)))
+        return float(np.mean(inside))
+
+    assert covered() > 0.85
+    monkeypatch.setattr(emulator, "NOISE", (1e-9, 1e-8))
+    assert covered() < 0.7
+
+
+def test_waves_narrow_the_region_and_repeat_exactly(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(inference, "MOST_STEPS", 500)
+    problem = written(tmp_path, (0.5, 0.6))
+    one, other = calibrated(problem), calibrated(problem)
+    assert np.array_equal(one.draws, other.draws)
+    assert (one.waves["and after [%]"] < 60).all()
+    assert (inference.implausibility(problem, one.emulators, np.array([[0.5, 0.6]])) < inference.CUTOFF).all()
+    # Every point of the second wave is one that the emulators of the first wave did not rule out.
+    first = inference.emulate(problem, one.runs[one.runs["wave"] == 1])
+    second = one.runs[one.runs["wave"] == 2][["friction", "wall"]].to_numpy()
+    assert (inference.implausibility(problem, first, second) < 1.01 * inference.CUTOFF).all()
+
+
+def test_wrong_data_and_failed_runs_are_reported(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(inference, "MOST_STEPS", 500)
+    problem = written(tmp_path, (0.5, 0.6), keys="budget: 90\nwaves: 1")
+    wrong = replace(problem.data[2], value=2 * problem.data[2].value)
+    problem = replace(problem, data=(*problem.data[:2], wrong, *problem.data[3:]))
+
+    def failing(values: Mapping[str, Any]) -> dict[str, float]:
+        if values["point"] in (3, 4):
+            raise RunError("escaped")
+        return simulated(values)
+
+    result = calibrate(problem, FunctionSimulator(problem, failing), say=lambda _: None)
+    assert result is not None
+    assert result.waves["failed"].tolist() == [6]
+    assert result.emulators[0] is not None
+    assert len(result.emulators[0].inputs) == 28
+    assert any(text.startswith("no parameters reach all data within 3") for text in result.warnings)
+    assert any("has not converged" in text for text in result.warnings)
+    with pytest.raises(InputError, match=r"phi_0 \(l_over_w 0.4\): 0 finished runs; an emulator needs 6"):
+        calibrate(problem, FunctionSimulator(problem, lambda _: {}), say=lambda _: None)
+
+
+def test_normal_priors_are_cut_and_sampled_as_stated(tmp_path: Path) -> None:
+    problem = written(tmp_path, (0.5, 0.6), free="friction: {low: 0.2, high: 1.0, mean: 0.4, sd: 0.2}")
+    theta = problem.from_unit(np.linspace(0, 1, 4001)[:, None])
+    assert (theta.min(), theta.max()) == (0.2, 1.0)
+    # The mean of evenly spaced quantiles is that by the density.
+    even = np.linspace(0.2, 1.0, 4001)
+    mean = np.average(even, weights=np.exp(problem.log_prior(even[:, None])))
+    assert theta.mean() == pytest.approx(mean, abs=1e-3)
+    assert mean > 0.43  # more is cut below 0.4 than above
+    assert np.isneginf(problem.log_prior(np.array([[0.19], [1.01]]))).all()
+
+
+def test_runs_of_a_table_are_taken(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(inference, "MOST_STEPS", 500)
+    problem = written(tmp_path, (0.5, 0.6), keys="budget: 60\nwaves: 1")
+    theta = inference.first_points(problem, 20)
+    table = pd.DataFrame([{**values, **simulated(values)} for values in problem.runs(1, theta)])
+    result = calibrate(problem, TableSimulator(problem, table, "runs.csv"), say=lambda _: None)
+    assert result is not None
+    assert np.array_equal(result.draws, calibrated(problem).draws)
+    with pytest.raises(InputError, match=r"runs.csv: column 'wall' is missing; columns are "):
+        TableSimulator(problem, table.drop(columns="wall"), "runs.csv")
+
+
+@pytest.mark.parametrize(
+    ("keys", "stated"),
+    [
+        ("budget: 9", "budget: 9 runs are 1 points in each of 2 waves; 2 free parameters need 9 points in all"),
+        ("budget: 90\nwave: 1", "unknown key 'wave'; did you mean 'waves'?"),
+        ("budget: 90\nscene: a\ntemplate: b", "both template and scene are given; keep one of them"),
+        ("budget: 90\nkeys: {a: b}", "keys: are for `scene`"),
+    ],
+)
+def test_wrong_files_are_rejected(tmp_path: Path, keys: str, stated: str) -> None:
+    with pytest.raises(InputError) as caught:
+        print(written(tmp_path, (0.5, 0.6), keys=keys).points_per_wave)
+    assert stated in str(caught.value)
+    assert str(tmp_path / "calibration.yaml") in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("row", "stated"),
+    [
+        ("0.4,phi_0,0.1,0,0", "row 8: error: 0 is not a number above 0; give the standard deviation of the value"),
+        ("0.4,phi_0,x,0.1,0", "row 8: value: 'x' is not a finite number"),
+        ("0.4,phi_0,0.1,0.1,2", "row 8: predict: 2 is neither 0 (fit) nor 1 (predict only)"),
+        ("0.4,phi_0,0.1,0.1,0", "row 8: phi_0 (l_over_w 0.4) is given twice; give one mean with its error"),
+    ],
+)
+def test_wrong_data_files_are_rejected(tmp_path: Path, row: str, stated: str) -> None:
+    written(tmp_path, (0.5, 0.6))
+    with (tmp_path / "data.csv").open("a") as file:
+        file.write(row + "\n")
+    with pytest.raises(InputError) as caught:
+        load_problem(tmp_path / "calibration.yaml")
+    assert stated in str(caught.value)
+
+
+def _ranks(folder: Path, trials: int, assumed: float = DISCREPANCY) -> tuple[Array, Array]:
+    """Ranks (trials, 2), from 0 to 1, of parameters from the prior in their posteriors: calibrated, and by the grid."""
+    ranks, known = [], []
+    for trial in range(trials):
+        random = np.random.default_rng(1000 + trial)
+        truth = random.uniform([0.2, 0.2], [1.0, 1.5])
+        sigma = abs(random.normal(0.0, DISCREPANCY))
+        keys = f"budget: 90\nfirst_seed: {10_000_000 * trial + 1}\ndiscrepancy: {assumed}"
+        problem = written(folder, truth, sigma=sigma, random=random, keys=keys)
+        ranks.append(np.mean(calibrated(problem).theta < truth, axis=0))
+        grid, weights = exact(problem)
+        known.append(weights @ (grid < truth))
+    return np.array(ranks), np.array(known)
+
+
+def _covered(ranks: Array) -> int:
+    """Number of parameters within their 95 % intervals."""
+    return int(np.sum((ranks > 0.025) & (ranks < 0.975)))
+
+
+def _chi_square(ranks: Array) -> float:
+    """Probability of ranks at least as uneven in five classes, if they are uniform."""
+    counts, _ = np.histogram(ranks, bins=5, range=(0.0, 1.0))
+    return float(stats.chisquare(counts).pvalue)
+
+
+@pytest.mark.long
+def test_known_parameters_are_found_in_18_of_20_trials_with_uniform_ranks(tmp_path: Path) -> None:
+    """Simulation-based calibration (Talts et al., 2018): parameters and discrepancies are drawn from their priors.
+
+    18 of 20 hold for both parameters together, 36 of 40 intervals: 38 ± 1.4 are expected. The grid, without emulators,
+    finds 36 too, and 285 of 300 in 150 trials.
+    """
+    ranks, known = _ranks(tmp_path, 20)
+    assert _covered(ranks) >= 36, ranks
+    assert _chi_square(ranks) > 0.01, ranks
+    # Emulators of runs with scatter move ranks. Ranks in posteriors of other data would differ by 1/3 on average.
+    assert np.mean(np.abs(ranks - known)) < 0.1, ranks - known
+
+
+@pytest.mark.long
+def test_ranks_reveal_intervals_that_are_too_narrow(tmp_path: Path) -> None:
+    """Broken on purpose: the discrepancy is assumed to be 50 times smaller than it is."""
+    ranks, _ = _ranks(tmp_path, 10, assumed=DISCREPANCY / 50)
+    assert _covered(ranks) < 16, ranks
+    assert _chi_square(ranks) < 0.01, ranks
+
+
+def test_labels_name_measure_and_condition() -> None:
+    datum = Datum(condition=0, measure="phi_0", value=1.0, error=0.1, fitted=True)
+    assert (datum.label([{"l_over_w": 0.4}]), datum.label([{}])) == ("phi_0 (l_over_w 0.4)", "phi_0")

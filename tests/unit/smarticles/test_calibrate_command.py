@@ -1,0 +1,165 @@
+"""calibrate: from the command line over waves that are sweeps to the preset."""
+
+import json
+from pathlib import Path
+
+import pytest
+import yaml
+from command_cases import Smarticles, WriteRun
+
+from dem.scene.reading import load_scene, scene_hash
+from studies.calibration import inference
+from templates.sweep.folder import Entry, Folder, open_folder
+
+SCENE = """\
+schema_version: 1
+seed: 1
+count: 12
+fidelity: draft
+engine: links
+phases:
+  - {type: deposit}
+  - {type: relax, duration_s: 0.3}
+"""
+CALIBRATION = """\
+schema_version: 1
+name: test
+scene: scene.yaml
+keys: {mu: contact.friction_smarticle, n: count}
+free: {mu: {low: 0.2, high: 1.0}}
+data: data.csv
+budget: 24
+"""
+PHI = "phi second-highest-com [-] @ 1"
+DATA = f"n,measure,value,error,predict\n10,{PHI},0.12,0.002,0\n12,{PHI},0.12,0.002,1\n"
+RUNS = 8  # of a wave and condition
+
+
+@pytest.fixture
+def calibration(tmp_path: Path) -> Path:
+    (tmp_path / "scene.yaml").write_text(SCENE)
+    (tmp_path / "data.csv").write_text(DATA)
+    file = tmp_path / "calibration.yaml"
+    file.write_text(CALIBRATION)
+    return file
+
+
+def finish(folder: Folder, entry: Entry, write_run: WriteRun) -> None:
+    """Make a run look finished; φ falls with friction, and is 0.12 at 0.6."""
+    level = 0.15 - 0.05 * float(entry.values["mu"]) + 0.0005 * (int(entry.values["seed"]) % 3 - 1)
+    phases = ("deposit", "relax")
+    run = write_run(folder.run(entry), seed=entry.values["seed"], phases=phases, packing=(level, level))
+    manifest = json.loads((run / "run.json").read_text(encoding="utf-8"))
+    manifest["scene_sha256"] = entry.scene_sha256
+    (run / "run.json").write_text(json.dumps(manifest), encoding="utf-8")
+
+
+def test_a_dry_run_lists_the_waves(calibration: Path, smarticles: Smarticles) -> None:
+    before = sorted(calibration.parent.iterdir())
+    said = smarticles("calibrate", calibration, "--dry-run")
+    assert said.status == 0
+    rows = [line.split() for line in said.out.splitlines()]
+    assert [row[:5] for row in rows[1:3]] == [["1", "8", "1", "1", "8"], ["2", "8", "2", "1", "16"]]
+    assert said.out.splitlines()[-1].startswith("24 runs of a budget of 24, about ")
+    assert sorted(calibration.parent.iterdir()) == before
+    assert "calibrate: --out DIR is missing" in smarticles("calibrate", calibration).err
+
+
+def test_waves_are_sweeps_that_the_repeated_command_continues(
+    calibration: Path, smarticles: Smarticles, write_run: WriteRun, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(inference, "MOST_STEPS", 500)
+    out = calibration.parent / "out"
+    words = ["calibrate", calibration, "--out", out, "--submit", "none"]
+    said = smarticles(*words)
+    assert said.status == 0, said.err
+    assert f"{out}/wave1: 8 runs to do; start them: smarticles resume {out}/wave1" in said.out
+    assert "continue with: smarticles calibrate" in said.out
+    first = open_folder(out / "wave1")
+    *rest, last = first.entries
+    for entry in rest:
+        finish(first, entry, write_run)
+    # A run that failed is left out and not started again.
+    first.run(last).mkdir(parents=True)
+    failed = {"format": 1, "status": "failed", "cause": "a smarticle escaped", "phase": 0, "time_s": 0.1, "wall_s": 1.0}
+    finish(first, last, write_run)
+    (first.run(last) / "done.json").unlink()
+    (first.run(last) / "failed.json").write_text(json.dumps(failed))
+    said = smarticles(*words)
+    assert said.status == 0, said.err
+    assert "a smarticle escaped" in said.err
+    assert "wave 1: 8 points, 8 runs, 1 of them failed and left out; " in said.out
+    second = open_folder(out / "wave2")
+    assert sorted(str(entry.values["n"]) for entry in second.entries) == ["10"] * RUNS + ["12"] * RUNS
+    seeds = {entry.values["seed"] for entry in (*first.entries, *second.entries)}
+    assert len(seeds) == 3 * RUNS
+    for entry in second.entries:
+        finish(second, entry, write_run)
+    said = smarticles(*words)
+    assert said.status == 0, said.err
+    assert "Data fitted: 1 of 1 in their 95 % bands" in said.out
+    assert "Data predicted only: 1 of 1 in their 95 % bands" in said.out
+    preset = yaml.safe_load((out / "results" / "contact.yaml").read_text())
+    assert preset["friction_smarticle"] == pytest.approx(0.6, abs=0.1)
+    assert preset["friction_wall"] == 0.4
+
+    # A scene that names the preset is, by its hash, the scene with its values.
+    scene = calibration.parent / "named.yaml"
+    scene.write_text(SCENE + "contact: {preset: out/results/contact.yaml, restitution: 0.5}\n")
+    plain = calibration.parent / "plain.yaml"
+    plain.write_text(SCENE + f"contact: {json.dumps({**preset, 'restitution': 0.5})}\n")
+    assert scene_hash(load_scene(scene)) == scene_hash(load_scene(plain))
+
+    calibration.write_text(CALIBRATION.replace("mu: {low: 0.2", "mu: {low: 0.1").replace("n: count", "n: seed"))
+    assert "holds another sweep" in smarticles(*words).err
+    calibration.write_text(CALIBRATION.replace("mu", "other"))
+    assert "wave1: its runs have no variable 'other'; give" in smarticles(*words).err
+
+
+def test_a_cluster_gets_one_wave_at_a_time(calibration: Path, smarticles: Smarticles) -> None:
+    out = calibration.parent / "out"
+    said = smarticles("calibrate", calibration, "--out", out, "--submit", "none", "--cluster", "example-large")
+    assert said.status == 0, said.err
+    assert "8 of 8 runs" in said.out
+    assert (out / "wave1" / "jobs").is_dir()
+    assert not (out / "wave2").exists()
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "stated"),
+    [
+        ("n: count", "m: count", "keys: 'n' is missing; give the key of"),
+        ("n: count", "n: count, m: count", "keys.m: is no variable; there are mu, n"),
+        (
+            "scene: scene.yaml\nkeys: {mu: contact.friction_smarticle, n: count}\n",
+            "",
+            "template: missing; give a scene",
+        ),
+        (
+            "high: 1.0",
+            "high: 11.0",
+            "rendered for run p1_c0_r0: contact.friction_smarticle: 11.0 is out of range; use at most 10",
+        ),
+        ("high: 1.0", "high: 0.1", "free.mu.high: 0.1 is not above low, 0.2; exchange them"),
+    ],
+)
+def test_wrong_files_are_rejected(calibration: Path, smarticles: Smarticles, old: str, new: str, stated: str) -> None:
+    calibration.write_text(CALIBRATION.replace(old, new))
+    said = smarticles("calibrate", calibration, "--dry-run")
+    assert said.status == 2
+    assert stated in said.err
+
+
+def test_a_measure_that_does_not_exist_is_named(calibration: Path, smarticles: Smarticles, write_run: WriteRun) -> None:
+    data = calibration.parent / "data.csv"
+    data.write_text(DATA.replace(PHI, "phi second-highest [-] @ 1"))
+    words = ["calibrate", calibration, "--out", calibration.parent / "out", "--submit", "none"]
+    smarticles(*words)
+    folder = open_folder(calibration.parent / "out" / "wave1")
+    for entry in folder.entries:
+        finish(folder, entry, write_run)
+    said = smarticles(*words)
+    assert said.status == 2
+    assert "measure 'phi second-highest [-]' is no column; " in said.err
+    data.write_text(DATA.replace("@ 1", "@ 2"))
+    assert "measure 'phi second-highest-com [-] @ 2': no phase '2'; there are 0 to 1" in smarticles(*words).err
