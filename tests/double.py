@@ -21,7 +21,7 @@ from dem.body.chain import Tie
 from dem.body.forces import ContactForces, at_boundaries, at_links, contacts_of_points
 from dem.body.particle import Particle
 from dem.body.placement import Poses
-from dem.body.state import State
+from dem.body.state import PileState, State
 from dem.engine.demand import Activity, Demand
 from dem.engine.effect import Adds, EffectName
 from dem.engine.interface import Engine, MotorReadings, Saved
@@ -366,7 +366,7 @@ class EngineDouble:
             forces=weight * up,
         )
 
-    def extremes(self, state: State) -> Extremes | None:
+    def extremes(self, state: PileState) -> Extremes | None:
         return None
 
     # -- checkpoints -------------------------------------------------------------------------------------------
