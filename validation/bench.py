@@ -47,9 +47,10 @@ def scene_of(data: Mapping[str, Any]) -> Scene:
 def scene_data(access: EngineAccess, *phases: Mapping[str, Any], per_layer: int = 6, **keys: Any) -> dict[str, Any]:
     """Return a scene as a dictionary: a deposit of smarticles, by default six, then the given phases.
 
-    The fidelity is draft unless `keys` names another one.
+    The fidelity is draft unless `keys` names another one; on all engines contacts have the stiffness of draft on YADE.
     """
-    given = {"schema_version": 1, "engine": access.name, "name": "hard", "seed": 1, "count": 6, "fidelity": "draft"}
+    fidelity = {"base": "draft", "stiffness_N_per_m": 250.0}
+    given = {"schema_version": 1, "engine": access.name, "name": "hard", "seed": 1, "count": 6, "fidelity": fidelity}
     return {**given, "phases": [{"type": "deposit", "per_layer": per_layer}, *phases], **keys}
 
 

@@ -19,9 +19,8 @@ import pytest
 from scipy import stats
 
 from dem.record.run import open_run
-from dem.scene.reading import dump_scene, scene_hash
+from dem.scene.reading import dump_scene
 from dem.scene.scene import Scene
-from dem.setting.fidelity import fidelities
 from studies.framework.runs import DEFINITION
 from studies.framework.study import Study
 from studies.registry import shipped
@@ -31,9 +30,6 @@ from templates.sweep.sweep_file import SEED, load_sweep
 RESULTS = Path(__file__).resolve().parents[2] / "results"
 CHANCE = 0.01
 """That a sound run is found out of its cell, all its columns together."""
-
-FORMER = {"base": "standard", "rows": 1, "stiffness_N_per_m": 500.0}
-"""The fidelity `standard` on links when the tables in results/ were made."""
 
 NUMBERED = (SEED, "block")
 """Variables that tell runs of one point apart: `finite-size` has several blocks of its seeds."""
@@ -113,15 +109,6 @@ def points(table: str) -> dict[str, Point]:
     return {point.name: point for point in expand(load_sweep(shipped(table).sweep_file()))}
 
 
-def formerly(scene: Scene) -> Scene:
-    """The scene at the fidelity of the tables; a stiffness and a time step of its own are kept."""
-    fidelity = scene.fidelity.model_dump()
-    named = fidelities(scene.engine)["standard"]
-    kept = fidelity["stiffness_N_per_m"] != named["stiffness_N_per_m"]
-    changes = {**FORMER, **({"stiffness_N_per_m": fidelity["stiffness_N_per_m"]} if kept else {})}
-    return Scene.model_validate({**scene.model_dump(mode="json"), "fidelity": {**fidelity, **changes}})
-
-
 @cache
 def runs(table: str) -> pd.DataFrame:
     """The table of runs; where one is measured in several ways, as columns that collapse are, the first of them."""
@@ -157,9 +144,8 @@ def again(table: str, run: str, scene: Scene, folder: Path) -> Mapping[str, obje
 def test_a_cell_comes_out_again(table: str, run: str, tmp_path: Path) -> None:
     point = points(table)[run]
     told = runs(table).loc[run]
-    scene = formerly(point.scene)
-    assert told["scene_sha256"] == scene_hash(scene), "the table is of another scene than the study has now"
-    measured = again(table, run, scene, tmp_path)
+    assert told["scene_sha256"] == point.scene_sha256, "the table is of another scene than the study has now"
+    measured = again(table, run, point.scene, tmp_path)
     known = cell(table, run)
     assert len(known.rows) >= FEWEST.get(table, 8)
     assert set(known.rows) - {"engine"} <= set(measured)
@@ -171,13 +157,13 @@ def test_a_long_run_begins_as_the_table_has_it(tmp_path: Path) -> None:
     """Two hundred seconds of shaking are minutes; their first five are not."""
     table, run, begin = "compaction", "lw0.70_mu0.65_seed1", 5.0
     point = points(table)[run]
-    scene = formerly(point.scene)
-    assert runs(table).loc[run]["scene_sha256"] == scene_hash(scene)
+    assert runs(table).loc[run]["scene_sha256"] == point.scene_sha256
     phases = [
-        phase.model_copy(update={"duration_s": begin}) if phase.type == "shake" else phase for phase in scene.phases
+        phase.model_copy(update={"duration_s": begin}) if phase.type == "shake" else phase
+        for phase in point.scene.phases
     ]
-    assert phases != list(scene.phases)
-    measured = again(table, run, scene.model_copy(update={"phases": tuple(phases)}), tmp_path)
+    assert phases != list(point.scene.phases)
+    measured = again(table, run, point.scene.model_copy(update={"phases": tuple(phases)}), tmp_path)
     known = cell(table, run)
     columns = [f"phi_0 {DEFINITION} [-]", "crossings before [-]", f"phi {begin:g} s {DEFINITION} [-]"]
     part = Cell(table=table, run=run, rows=known.rows[columns])

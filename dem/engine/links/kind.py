@@ -16,7 +16,7 @@ from dem.engine.links.shapes import kind_shape
 from dem.engine.links.stable_step import links_stable_time_step, rigid_stable_time_step
 
 # Groups of arrays without which `advance` is compiled where a scene has none of them.
-OPTIONAL = frozenset({"channel", "cords", "hooks", "ledger", "motors", "rims"})
+OPTIONAL = frozenset({"channel", "cords", "filaments", "hooks", "ledger", "motors", "rims"})
 
 
 class LinksKind:
