@@ -44,6 +44,9 @@ def scene_of(data: Mapping[str, Any]) -> Scene:
     return parse_scene(data, source="case")
 
 
+ONE_STRAND = {"base": "standard", "rows": 1, "stiffness_N_per_m": 500.0}  #: Links are round on both engines
+
+
 def scene_data(access: EngineAccess, *phases: Mapping[str, Any], per_layer: int = 6, **keys: Any) -> dict[str, Any]:
     """Return a scene as a dictionary: a deposit of smarticles, by default six, then the given phases.
 

@@ -14,7 +14,7 @@ from dem.physics.contact import ContactLaw, restitution_of, typical_effective_ma
 from dem.plan.steps import time_step
 from dem.scene.scene import Scene
 from validation.access import BALL_MASS, BALL_RADIUS, STIFFNESS, EngineAccess
-from validation.bench import Array, G, add, ball_law, law_of, lying, scene
+from validation.bench import ONE_STRAND, Array, G, add, ball_law, law_of, lying, scene
 from validation.cases import COARSE, LEAPFROG, Answer, case, ladder
 from validation.known.theory import falling_on_springs
 
@@ -80,7 +80,7 @@ def ball_rolls(access: EngineAccess) -> list[Answer]:
 
 @case("sliding to rolling, bar", "a bar of spheres thrown across itself, with its box's inertia", "v₀/(1 + I/mr²)")
 def bar_rolls(access: EngineAccess) -> list[Answer]:
-    one = scene(access, fidelity="standard", smarticle={"aspect_ratio": 0})
+    one = scene(access, fidelity=ONE_STRAND, smarticle={"aspect_ratio": 0})
     return roll(access, one.particle, law_of(one), speed=0.3, dt=time_step(one) / 4)
 
 
@@ -245,7 +245,7 @@ def _answers(engine: Engine, levels: int, each: int, *, contacts: int | None) ->
     "statics and symmetry: a contact bears a quarter of the weight above it",
 )
 def crossed_bars(access: EngineAccess, *, levels: int = 5) -> list[Answer]:
-    one = scene(access, fidelity="standard", smarticle={"aspect_ratio": 0})
+    one = scene(access, fidelity=ONE_STRAND, smarticle={"aspect_ratio": 0})
     engine = access.build(one.particle, law_of(one), dt=time_step(one), gravity=G)
     radius = one.particle.radius
     apart = 2 * radius * round(one.particle.boxes.middle_length / 6 / radius)
@@ -263,7 +263,7 @@ def crossed_bars(access: EngineAccess, *, levels: int = 5) -> list[Answer]:
     "statics: contacts bear the weight above them",
 )
 def flat_smarticles(access: EngineAccess, *, levels: int = 4) -> list[Answer]:
-    one = scene(access, fidelity="standard")
+    one = scene(access, fidelity=ONE_STRAND)
     engine = access.build(one.particle, law_of(one), dt=time_step(one), gravity=G)
     for level in range(levels):
         add(engine, (0.0, 0.0, (2 * level + 1) * lying(one)))

@@ -220,7 +220,11 @@ def numbers(node: Any, place: str = "") -> Iterator[tuple[str, dict[str, Any]]]:
 
 
 def test_every_number_states_its_range() -> None:
-    found = {place: node for place, node in numbers(SCHEMA) if not {"const", "enum"} & node.keys() and "prefixItems" not in place}
+    found = {
+        place: node
+        for place, node in numbers(SCHEMA)
+        if not {"const", "enum"} & node.keys() and "prefixItems" not in place
+    }
     assert len(found) > 60
     low, high = {"minimum", "exclusiveMinimum"}, {"maximum", "exclusiveMaximum"}
     assert [place for place, node in found.items() if not (low & node.keys() and high & node.keys())] == []
