@@ -12,6 +12,7 @@ from dem.run.run import run_scene
 from dem.scene.reading import parse_scene
 
 POUR: dict[str, Any] = {
+    "fidelity": {"base": "standard", "rows": 1, "stiffness_N_per_m": 500.0},  # round links on both engines
     "schema_version": 1,
     "name": "pour",
     "seed": 3,

@@ -45,8 +45,7 @@ def test_poses_are_handed_over_and_the_pile_stays(
         # Beads reach into valleys that links do not have: in 6 piles of 60 it moved by 0.10 to 0.15 diameters on
         # average, and by 0.42 to 0.56 where nothing stopped what overlapped.
         assert taken["stops"] > 0
-        # Links of draft are twice as stiff as spheres of draft, which moved a pile of 20 by 0.41 diameters.
-        assert 0.01 < moved.mean() < 0.5
+        assert 0.01 < moved.mean() < 0.3
         assert abs(taken["rise"]) < 0.15 * taken["diameter"]
     # Nothing comes from nowhere: what contacts held was taken in, and is lost.
     assert taken["gained"] < 0.01 * taken["diameter"]
