@@ -1,19 +1,17 @@
 """Bodies of any shape on YADE, in a process of its own; see `cases.py`."""
 
-import os
-import signal
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from scipy.spatial.transform import Rotation
+from stopping import run_until
 
 from dem.body.placement import Poses
 from dem.engine.yade.engine import YadeEngine
 from dem.plan.steps import time_step
-from dem.run.build import Builders, build_engine
+from dem.run.build import build_engine
 from dem.run.run import run_scene
-from dem.run.simulation import StopRequestedError
 from dem.scene.reading import load_scene
 from validation.bench import scene_of
 
@@ -38,30 +36,10 @@ def clumps(data: dict[str, Any]) -> dict[str, Any]:
     }
 
 
-class Interrupted:
-    """An engine that asks the run to stop once a time has passed."""
-
-    def __init__(self, engine: Any, when: float) -> None:
-        self._engine, self._when = engine, when
-
-    def __getattr__(self, name: str) -> Any:
-        return getattr(self._engine, name)
-
-    def advance(self, steps: int) -> None:
-        self._engine.advance(steps)
-        if self._engine.time > self._when:
-            os.kill(os.getpid(), signal.SIGUSR1)
-
-
 def run(file: str, out: str, how: str = "") -> None:
     """Run a scene to its end, to a time, or from its last checkpoint on."""
     scene, options = load_scene(Path(file)), {"command": "", "progress": False}
     if how in ("", "resume"):
         run_scene(scene, Path(out), resume=how == "resume", **options)
         return
-    builders = Builders(engine=lambda scene, dt: Interrupted(build_engine(scene, dt), float(how)))
-    try:
-        run_scene(scene, Path(out), builders=builders, **options)
-    except StopRequestedError:
-        return
-    raise AssertionError("the run was not stopped")
+    run_until(scene, Path(out), float(how))

@@ -1,7 +1,5 @@
 """Scenes with the key `particle` on links: flight, piles, kill and resume, and a staple against a smarticle."""
 
-import os
-import signal
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -12,6 +10,7 @@ import pytest
 from scenes import small
 from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation
+from stopping import assert_equal_frames, run_until
 
 from dem.body.placement import Poses, place_layer
 from dem.engine.links.arrays import PLANE
@@ -20,9 +19,8 @@ from dem.engine.links.motion.planar import lay_out
 from dem.engine.links.shapes import smarticle_shape
 from dem.engine.links.world import World
 from dem.record.run import Run
-from dem.run.build import Builders, build_engine
+from dem.run.build import build_engine
 from dem.run.run import run_scene
-from dem.run.simulation import StopRequestedError
 from dem.scene.scene import Scene
 
 G = 9.81
@@ -119,36 +117,16 @@ def test_a_pile_of_each_shape_settles(name: str, tmp_path: Path) -> None:
     assert kinds[0].volume_m3 == pytest.approx(scene.bodies[0].volume, rel=1e-12)
 
 
-class Interrupted:
-    """An engine that asks the run to stop once a time has passed."""
-
-    def __init__(self, engine: Any, when: float) -> None:
-        self._engine, self._when = engine, when
-
-    def __getattr__(self, name: str) -> Any:
-        return getattr(self._engine, name)
-
-    def advance(self, steps: int) -> None:
-        self._engine.advance(steps)
-        if self._engine.time > self._when:
-            os.kill(os.getpid(), signal.SIGUSR1)
-
-
 def test_a_mixture_of_all_shapes_goes_on_with_the_same_bits(tmp_path: Path) -> None:
     scene = scene_of(*SHAPES, count=20)
     whole, parts = tmp_path / "whole", tmp_path / "parts"
     run_scene(scene, whole, command="", progress=False)
-    builders = Builders(engine=lambda scene, dt: Interrupted(build_engine(scene, dt), 0.17))  # type: ignore[arg-type, return-value]
-    with pytest.raises(StopRequestedError):
-        run_scene(scene, parts, command="", progress=False, builders=builders)
+    run_until(scene, parts, 0.17)
     assert Run(parts).status.time_s < 0.9 * Run(whole).status.time_s  # type: ignore[operator]
     run_scene(scene, parts, command="", progress=False, resume=True)
     one, other = Run(whole), Run(parts)
-    assert len(one.frames) == len(other.frames) > 5
-    for there, here in zip(one.frames, other.frames, strict=True):
-        np.testing.assert_array_equal(there.segments, here.segments)
-        np.testing.assert_array_equal(there.link_velocity, here.link_velocity)
-        np.testing.assert_array_equal(there.kind, here.kind)
+    assert len(one.frames) > 5
+    assert_equal_frames(one, other)
     for name, column in one.series.data.items():
         np.testing.assert_array_equal(column, other.series[name])
     kinds = one.manifest.kinds
