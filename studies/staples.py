@@ -1,0 +1,342 @@
+"""Staples with legs at 20° and at 90° to the crown are vibrated and then torn: which bundle is stronger?
+
+Sohn, Pezeshki and Barthelat (arXiv 2510.09933) find that staples of 90° entangle more when they are poured, that
+vibration entangles those of 20° faster, and that bundles of 20° then are almost ten times as strong; one to three chains
+carry the tension (arXiv 2412.05415). Here a pile is poured onto a grid, vibrated or not, freed of the wall, and torn by a
+hook above the grid.
+
+Piles of both angles are paired by seed. If the hook stops at its force limit ("held fast"), the peak force is a lower
+bound.
+"""
+
+import math
+from functools import partial
+
+import numpy as np
+import pandas as pd
+
+from dem.body.forces import NONE
+from dem.errors import InputError
+from dem.record.forces import RecordedForces, read_forces
+from dem.record.frame import Frame
+from dem.record.run import Run
+from postprocess.geometry.bars import body_centres
+from postprocess.measures.entanglement import polygon_crossings
+from postprocess.measures.graph import entanglement_graph
+from postprocess.measures.pull import PULL, WINDOW, held_fast, moving_mean, peak, read_pull, weight_of_one
+from postprocess.statistics.points import SEED
+from postprocess.statistics.seeds import mean_over_seeds
+from studies.framework.figures import Histories, History, Means, one_by_one
+from studies.framework.findings import Effect, Finding, Outcome, means_by
+from studies.framework.provenance import Reference
+from studies.framework.runs import Key, Row, declare, last_columns, run_columns
+from studies.framework.study import COUNT, Study
+
+ANGLE, GAMMA = "crown-leg angle [deg]", "peak acceleration [g]"
+NARROW, SQUARE = 20.0, 90.0  #: The two angles that are compared [deg]
+PEAK, RAISED, WORK = "peak force over n W [-]", "hook raised at the peak [m]", "work over n W crown [-]"
+BEFORE, HELD_FAST, CHAINS = "load before the pull over n W [-]", "held fast [-]", "chains at the peak [-]"
+POURED, LINKS, HEIGHT = "links per staple poured [-]", "links per staple [-]", "com height [m]"
+
+TIMES = 5.0  #: Ratio of strengths above which "almost ten times" counts as found: half of it
+MOST_CHAINS = 3.0  #: Largest number of chains that the paper states
+CUTS = (0.25, 0.5, 0.75)  #: Heights of the cuts through which chains are counted, of the distance from grid to hook
+
+QUANTITIES = declare(
+    {
+        PEAK: ("peak", ".3f", f"largest mean over {WINDOW:g} s of the force on the hook; a bound where it held fast"),
+        RAISED: ("raised at it [mm]", ".1f", "displacement of the hook at the peak"),
+        WORK: ("work / n W crown", ".3f", "∫ F dz over the whole pull"),
+        BEFORE: ("before", ".3f", "force on the hook before the pull, by weight and by bracing of the pile"),
+        HELD_FAST: ("held fast", ".2f", "1 where the hook was stopped by its force limit, 0 where it arrived"),
+        CHAINS: (
+            "chains",
+            ".2f",
+            "(Σ T)²/Σ T² of the upward pulls T between pairs of staples above and below a level, in the frame nearest "
+            "to the peak, mean over three levels between grid and hook",
+        ),
+        POURED: ("links poured", ".2f", "pairs of staples with one through the polygon of the other, per staple"),
+        LINKS: ("links before", ".2f", "the same at rest before the wall went"),
+        HEIGHT: ("height [mm]", ".1f", "height of the centre of mass above the floor, without the wall"),
+    },
+    axes={
+        PEAK: r"peak force $F_\mathrm{max}/(n W)$ [-]",
+        CHAINS: "chains at the peak [-]",
+        LINKS: "links per staple [-]",
+        WORK: r"work / $(n W$ crown) [-]",
+    },
+    scales={RAISED: 1e3, HEIGHT: 1e3},
+)
+
+
+def measure(run: Run) -> Row:
+    """Measure links before and after vibration, the force on the hook, and the chains at the peak; return the row."""
+    phases, hooks = run.phases, run.scene.get("hooks")
+    types = tuple(phase.type for phase in phases)
+    shaken = types == ("deposit", "relax", "shake", "relax", "remove-container", PULL)
+    if hooks is None or not (shaken or types == ("deposit", "relax", "remove-container", PULL)):
+        raise InputError(f"{run.path}: not a pour, a rest, a vibration with a rest or none, and a pull; leave it out")
+    parts = [run.frames.in_phase(phase.index) for phase in phases]
+    if not all(parts[1:]):
+        raise InputError(f"{run.path}: no frame of a phase; run it again")
+    pull = read_pull(run, run.series, phases[-1].index)
+    highest, weight = peak(pull), run.manifest.count * weight_of_one(run)
+    settings = run.scene["phases"][-1]
+    free, frames = parts[-2][-1], parts[-1]
+    since = np.array([frame.time for frame in frames]) - free.time
+    torn = frames[int(np.abs(since - highest.time).argmin())]
+    # The crown of a kind of staple; of smarticles the middle link.
+    particle = run.scene.get("particle") or {}
+    grid = free.floor_z + hooks["lower_height_m"]
+    hook = free.floor_z + hooks["upper_height_m"] + highest.raised
+    return {
+        ANGLE: float(particle.get("angle_deg", SQUARE)),
+        GAMMA: float(run.scene["phases"][2]["peak_acceleration_g"]) if shaken else 0.0,
+        **{name: value for name, value in run_columns(run).items() if name in (SEED, COUNT, "fidelity")},
+        POURED: links_per_body(parts[1][-1]),
+        LINKS: links_per_body(parts[-3][-1]),
+        HEIGHT: float(body_centres(free)[:, 2].mean()) - free.floor_z,
+        PEAK: highest.force / weight,
+        RAISED: highest.raised,
+        WORK: pull.work / weight / run.manifest.middle_length_m,
+        BEFORE: pull.before / weight,
+        HELD_FAST: float(held_fast(pull, settings)),
+        CHAINS: chains_between(torn, grid, hook) if run.forces is not None else math.nan,
+        **last_columns(run),
+    }
+
+
+def links_per_body(frame: Frame) -> float:
+    """Return the number of pairs of bodies with one through the polygon of the other, over the number of bodies."""
+    graph = entanglement_graph(polygon_crossings(frame.segments, frame.body), least=1)
+    return len(graph.i) / frame.count
+
+
+def chains_between(frame: Frame, low: float, high: float, forces: RecordedForces | None = None) -> float:
+    """Return the mean number of chains [-] that carry tension through the levels `CUTS` between two heights [m].
+
+    NaN if no level has a tension. The recorded forces of the frame are read from its run directory if not given.
+    """
+    forces = read_forces(frame) if forces is None else forces
+    found = [chains_through(frame, forces, low + part * (high - low)) for part in CUTS]
+    known = [one for one in found if not math.isnan(one)]
+    return float(np.mean(known)) if known else math.nan
+
+
+def chains_through(frame: Frame, forces: RecordedForces, level: float) -> float:
+    """Return the number of chains [-] that carry tension through a level [m]: (Σ T)² / Σ T².
+
+    T is the upward pull of a body whose centre is above the level on one whose centre is below it, summed over their
+    contacts; pushes are left out. The number is n if n pairs carry equal pulls; NaN if there is no pull.
+    """
+    contacts = forces.contacts
+    between = contacts.boundaries == NONE
+    pair, pulled = contacts.smarticles[between], contacts.forces[between, 2]
+    above = body_centres(frame)[:, 2] > level
+    first, second = above[pair].T
+    across = first != second
+    # Recorded is the force on the first body.
+    upward = np.where(first, -pulled, pulled)[across]
+    _, number = np.unique(pair[across], axis=0, return_inverse=True)
+    tension = np.bincount(number.ravel(), upward)
+    tension = tension[tension > 0]
+    return float(tension.sum() ** 2 / (tension**2).sum()) if len(tension) else math.nan
+
+
+def force_history(run: Run) -> History:
+    """Read the force on the hook over n W [-] against the displacement of the hook [mm]."""
+    pull = read_pull(run, run.series, run.phases[-1].index)
+    times, force = moving_mean(pull)
+    displacement = 1e3 * np.interp(times, pull.edges, pull.raised)
+    return History(times=displacement, values=force / run.manifest.count / weight_of_one(run))
+
+
+def ratio(table: pd.DataFrame, gamma: float, *, threshold: float) -> Effect:
+    """Return the mean over seeds of ln(peak at 20° / peak at 90°) of one vibration, against a ratio."""
+    own = table[table[GAMMA] == gamma]
+    narrow, square = own[own[ANGLE] == NARROW].set_index(SEED), own[own[ANGLE] == SQUARE].set_index(SEED)
+    logs = (np.log(narrow[PEAK]) - np.log(square[PEAK])).dropna()
+    mean = mean_over_seeds(logs.tolist())
+    low, high = (math.exp(mean.value + side * mean.half_width) for side in (-1, 1)) if len(logs) else (math.nan,) * 2
+    text = f"{math.exp(mean.value):.3g} ({low:.3g} to {high:.3g} at 95 %, n = {mean.count})" if len(logs) else "no data"
+    return Effect(
+        label=f"Γ = {gamma:g}: peak at 20° over that at 90°",
+        value=mean,
+        threshold=math.log(threshold),
+        text=text,
+        may_be_higher=bool(narrow[HELD_FAST].any()),
+        may_be_lower=bool(square[HELD_FAST].any()),
+    )
+
+
+def vibrated(table: pd.DataFrame) -> list[float]:
+    """Return the accelerations [g] of the runs with vibration."""
+    return sorted(float(gamma) for gamma in table[GAMMA].unique() if gamma > 0)
+
+
+def stronger(table: pd.DataFrame, *, threshold: float) -> Outcome:
+    """Judge whether bundles of 20° are stronger than those of 90° by a factor after each vibration."""
+    held = table.groupby([ANGLE, GAMMA])[HELD_FAST].agg(["sum", "size"])
+    cells = ", ".join(
+        f"{angle:g}° Γ = {gamma:g}: {int(row['sum'])} of {int(row['size'])}"
+        for (angle, gamma), row in held.iterrows()
+        if row["sum"]
+    )
+    effects = [ratio(table, gamma, threshold=threshold) for gamma in vibrated(table)]
+    return Outcome(effects=effects, note=f"held fast (bounds): {cells or 'none'}")
+
+
+def by_angle(table: pd.DataFrame, values: pd.Series, gamma: float, label: str, sign: int) -> Effect:
+    """Return the mean difference of a value between 20° and 90° at one vibration, paired by seed."""
+    own = pd.DataFrame({SEED: table[SEED], ANGLE: table[ANGLE], "value": values})[table[GAMMA] == gamma]
+    both = own.pivot_table(index=SEED, columns=ANGLE, values="value")
+    known = {NARROW, SQUARE} <= set(both.columns)
+    differences = (both[NARROW] - both[SQUARE]).dropna().tolist() if known else []
+    return Effect(label=f"{label}, 20° less 90°", value=mean_over_seeds(differences), sign=sign)
+
+
+def poured_more(table: pd.DataFrame) -> Outcome:
+    """Judge whether poured staples of 90° have more links than those of 20°."""
+    note = f"by angle: {means_by(table, POURED, ANGLE, '.2f')}"
+    gamma = 0.0 if (table[GAMMA] == 0).any() else float(table[GAMMA].min())
+    return Outcome(effects=[by_angle(table, table[POURED], gamma, "links per staple", -1)], note=note)
+
+
+def entangles_faster(table: pd.DataFrame, *, relative: bool) -> Outcome:
+    """Judge whether vibration adds more links per staple at 20° than at 90°, absolutely or over those poured."""
+    gain = table[LINKS] / table[POURED] - 1 if relative else table[LINKS] - table[POURED]
+    what = "links gained over those poured" if relative else "links gained per staple"
+    effects = [by_angle(table, gain, gamma, f"Γ = {gamma:g}: {what}", 1) for gamma in vibrated(table)]
+    parts = [
+        f"Γ = {gamma:g} by angle: {means_by(table[table[GAMMA] == gamma].assign(gain=gain), 'gain', ANGLE, '.2f')}"
+        for gamma in vibrated(table)
+    ]
+    return Outcome(effects=effects, note="; ".join(parts))
+
+
+def grows(table: pd.DataFrame, *, angle: float) -> Outcome:
+    """Judge whether vibration makes bundles of one angle stronger, by logarithms of the peaks paired by seed."""
+    own = table[table[ANGLE] == angle].assign(log=np.log(table[PEAK]))
+    still = own[own[GAMMA] == 0]
+    effects = []
+    for gamma in vibrated(own):
+        after = own[own[GAMMA] == gamma]
+        both = after.set_index(SEED)["log"] - still.set_index(SEED)["log"]
+        mean = mean_over_seeds(both.dropna().tolist())
+        effects.append(
+            Effect(
+                label=f"Γ = {gamma:g}: ln(peak vibrated / poured)",
+                value=mean,
+                may_be_higher=bool(after[HELD_FAST].any()),
+                may_be_lower=bool(still[HELD_FAST].any()),
+            )
+        )
+    return Outcome(effects=effects, note=f"peak by Γ: {means_by(own, PEAK, GAMMA, '.3g')}")
+
+
+def few_chains(table: pd.DataFrame, *, angle: float) -> Outcome:
+    """Judge whether at most three chains carry the tension of vibrated bundles of one angle."""
+    own = table[(table[ANGLE] == angle) & (table[GAMMA] > 0)]
+    effects = [
+        Effect(
+            label=f"Γ = {gamma:g}: chains",
+            value=mean_over_seeds(own.loc[own[GAMMA] == gamma, CHAINS].tolist()),
+            sign=-1,
+            threshold=MOST_CHAINS,
+        )
+        for gamma in vibrated(own)
+    ]
+    return Outcome(effects=effects)
+
+
+AFTER_EACH = "after every vibration, the mean over seeds of ln(F at 20° / F at 90°), paired, is above {}"
+
+FINDINGS = (
+    Finding(
+        id="narrow-stronger",
+        says="After vibration bundles of 20° are stronger than bundles of 90°",
+        outcome=partial(stronger, threshold=1.0),
+        found_if=AFTER_EACH.format("0"),
+    ),
+    Finding(
+        id="almost-ten-times",
+        says="They are almost ten times as strong",
+        outcome=partial(stronger, threshold=TIMES),
+        found_if=AFTER_EACH.format(f"ln {TIMES:g}, half of ten times"),
+    ),
+    Finding(id="poured-less", says="Before vibration staples of 90° are more entangled", outcome=poured_more),
+    Finding(
+        id="entangles-faster",
+        says="Vibration entangles staples of 20° faster than staples of 90°",
+        outcome=partial(entangles_faster, relative=False),
+    ),
+    Finding(
+        id="entangles-faster-relative",
+        says="(ours) relative to the links of the poured pile, it entangles staples of 20° faster",
+        outcome=partial(entangles_faster, relative=True),
+    ),
+    Finding(
+        id="vibration-strengthens-20",
+        says="Bundles of 20° become stronger by vibration",
+        outcome=partial(grows, angle=NARROW),
+    ),
+    Finding(
+        id="few-chains-20",
+        says="One to three chains carry the tension, at 20°",
+        outcome=partial(few_chains, angle=NARROW),
+    ),
+    Finding(
+        id="few-chains-90",
+        says="One to three chains carry the tension, at 90°",
+        outcome=partial(few_chains, angle=SQUARE),
+    ),
+)
+
+_BY_ANGLE = one_by_one(ANGLE, "{:g}°".format, last=0.6)
+
+FIGURES = (
+    Histories(
+        name="force_raised",
+        history=force_history,
+        split=_BY_ANGLE,
+        panels=GAMMA,
+        panel="Γ = {:g}",
+        width=0.5,  # the side of the hook's bars
+        unit="mm",
+        x_label="hook raised by [mm]",
+        quantities={"": r"force on the hook $F/(n W)$ [-]"},
+    ),
+    Means(
+        name="strength",
+        quantities=[QUANTITIES[name] for name in (PEAK, LINKS, WORK, CHAINS)],
+        x=GAMMA,
+        x_label=r"peak acceleration $\Gamma$ of the vibration [-]",
+        ticks=True,
+        split=_BY_ANGLE,
+        log=True,
+    ),
+)
+
+STUDY = Study(
+    name="staples",
+    title="Staples of 20° and 90°, vibrated and torn, against the findings of Sohn, Pezeshki and Barthelat",
+    measure=measure,
+    keys=(Key(column=ANGLE, label="angle", form="g", unit="°"), Key(column=GAMMA, label="Γ", form="g")),
+    quantities=tuple(QUANTITIES.values()),
+    findings=FINDINGS,
+    figures=FIGURES,
+    same_count=(),
+    order=(ANGLE, GAMMA, SEED),
+    bounds=(HELD_FAST, "held fast"),
+    one_engine=True,
+    remarks=(
+        "W: weight of one staple. A link: two staples, one of which passes through the polygon of the other, which is "
+        "closed straight between its tips. Staples are rigid: a chain of them between grid and hook gives way at its "
+        "contacts alone, so that the limit of the force ends the pull.",
+    ),
+    reference=Reference(
+        statement="abstracts of Sohn, Pezeshki and Barthelat, arXiv 2510.09933 and 2412.05415; no data of theirs",
+        facts={"arxiv": "2510.09933, 2412.05415", "what": "statements in the abstracts"},
+    ),
+    pictured={"angle_deg": 20, "gamma": 2},
+)
