@@ -1,9 +1,9 @@
 """Staples with legs at 20° and at 90° to the crown are vibrated and then torn: which bundle is stronger?
 
 Sohn, Pezeshki and Barthelat (arXiv 2510.09933) find that staples of 90° entangle more when they are poured, that
-vibration entangles those of 20° faster, and that bundles of 20° then are almost ten times as strong; one to three chains
-carry the tension (arXiv 2412.05415). Here a pile is poured onto a grid, vibrated or not, freed of the wall, and torn by a
-hook above the grid.
+vibration entangles those of 20° faster, and that bundles of 20° then are almost ten times as strong; one to three
+chains carry the tension (arXiv 2412.05415). Here a pile is poured onto a grid, vibrated or not, freed of the wall, and
+torn by a hook above the grid.
 
 Piles of both angles are paired by seed. If the hook stops at its force limit ("held fast"), the peak force is a lower
 bound.
