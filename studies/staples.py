@@ -34,8 +34,9 @@ from studies.framework.study import COUNT, Study
 
 ANGLE, GAMMA = "crown-leg angle [deg]", "peak acceleration [g]"
 NARROW, SQUARE = 20.0, 90.0  #: The two angles that are compared [deg]
-PEAK, RAISED, WORK = "peak force over n W [-]", "hook raised at the peak [m]", "work over n W crown [-]"
-BEFORE, HELD_FAST, CHAINS = "load before the pull over n W [-]", "held fast [-]", "chains at the peak [-]"
+PEAK, RAISED, WORK = "peak force over W [-]", "hook raised at the peak [m]", "work over W crown [-]"
+ABOVE, STRENGTH = "staples above the hook [-]", "peak force beyond the weight above over W [-]"
+BEFORE, HELD_FAST, CHAINS = "load before the pull over W [-]", "held fast [-]", "chains at the peak [-]"
 POURED, LINKS, HEIGHT = "links per staple poured [-]", "links per staple [-]", "com height [m]"
 
 TIMES = 5.0  #: Ratio of strengths above which "almost ten times" counts as found: half of it
@@ -44,10 +45,12 @@ CUTS = (0.25, 0.5, 0.75)  #: Heights of the cuts through which chains are counte
 
 QUANTITIES = declare(
     {
-        PEAK: ("peak", ".3f", f"largest mean over {WINDOW:g} s of the force on the hook; a bound where it held fast"),
+        PEAK: ("peak", ".3g", f"largest mean over {WINDOW:g} s of the force on the hook; a bound where it held fast"),
+        ABOVE: ("above", ".0f", "number of staples with the centre above the hook before the pull"),
+        STRENGTH: ("strength", ".3g", "peak force less the weight of the staples above the hook; a bound like it"),
         RAISED: ("raised at it [mm]", ".1f", "displacement of the hook at the peak"),
-        WORK: ("work / n W crown", ".3f", "∫ F dz over the whole pull"),
-        BEFORE: ("before", ".3f", "force on the hook before the pull, by weight and by bracing of the pile"),
+        WORK: ("work / W crown", ".3g", "∫ F dz over the whole pull"),
+        BEFORE: ("before", ".3g", "force on the hook before the pull, by weight and by bracing of the pile"),
         HELD_FAST: ("held fast", ".2f", "1 where the hook was stopped by its force limit, 0 where it arrived"),
         CHAINS: (
             "chains",
@@ -60,10 +63,10 @@ QUANTITIES = declare(
         HEIGHT: ("height [mm]", ".1f", "height of the centre of mass above the floor, without the wall"),
     },
     axes={
-        PEAK: r"peak force $F_\mathrm{max}/(n W)$ [-]",
+        STRENGTH: r"peak force beyond the weight / $W$ [-]",
         CHAINS: "chains at the peak [-]",
         LINKS: "links per staple [-]",
-        WORK: r"work / $(n W$ crown) [-]",
+        WORK: r"work / ($W$ crown) [-]",
     },
     scales={RAISED: 1e3, HEIGHT: 1e3},
 )
@@ -80,30 +83,43 @@ def measure(run: Run) -> Row:
     if not all(parts[1:]):
         raise InputError(f"{run.path}: no frame of a phase; run it again")
     pull = read_pull(run, run.series, phases[-1].index)
-    highest, weight = peak(pull), run.manifest.count * weight_of_one(run)
+    highest, weight = peak(pull), weight_of_one(run)
     settings = run.scene["phases"][-1]
     free, frames = parts[-2][-1], parts[-1]
     since = np.array([frame.time for frame in frames]) - free.time
     torn = frames[int(np.abs(since - highest.time).argmin())]
-    # The crown of a kind of staple; of smarticles the middle link.
-    particle = run.scene.get("particle") or {}
     grid = free.floor_z + hooks["lower_height_m"]
-    hook = free.floor_z + hooks["upper_height_m"] + highest.raised
+    hook = free.floor_z + hooks["upper_height_m"]
+    higher = int((body_centres(free)[:, 2] > hook).sum())
     return {
-        ANGLE: float(particle.get("angle_deg", SQUARE)),
+        ANGLE: angle_of(run),
         GAMMA: float(run.scene["phases"][2]["peak_acceleration_g"]) if shaken else 0.0,
         **{name: value for name, value in run_columns(run).items() if name in (SEED, COUNT, "fidelity")},
         POURED: links_per_body(parts[1][-1]),
         LINKS: links_per_body(parts[-3][-1]),
         HEIGHT: float(body_centres(free)[:, 2].mean()) - free.floor_z,
         PEAK: highest.force / weight,
+        ABOVE: higher,
+        STRENGTH: highest.force / weight - higher,
         RAISED: highest.raised,
         WORK: pull.work / weight / run.manifest.middle_length_m,
         BEFORE: pull.before / weight,
         HELD_FAST: float(held_fast(pull, settings)),
-        CHAINS: chains_between(torn, grid, hook) if run.forces is not None else math.nan,
+        CHAINS: chains_between(torn, grid, hook + highest.raised) if run.forces is not None else math.nan,
         **last_columns(run),
     }
+
+
+def angle_of(run: Run) -> float:
+    """Return the angle between crown and legs of a run's staples [deg]; 90 of smarticles.
+
+    InputError if bodies are of another shape, of several kinds, or have unlike legs.
+    """
+    shapes = run.scene.get("particle") or []
+    angles = set(np.ravel([shape.get("angle_deg") for shape in shapes if shape.get("shape") == "staple"]).tolist())
+    if len(shapes) > 1 or (shapes and len(angles) != 1):
+        raise InputError(f"{run.path}: its bodies are not staples of one kind with legs alike; leave it out")
+    return float(angles.pop()) if shapes else SQUARE
 
 
 def links_per_body(frame: Frame) -> float:
@@ -144,26 +160,23 @@ def chains_through(frame: Frame, forces: RecordedForces, level: float) -> float:
 
 
 def force_history(run: Run) -> History:
-    """Read the force on the hook over n W [-] against the displacement of the hook [mm]."""
+    """Read the force on the hook over W [-] against the displacement of the hook [mm]."""
     pull = read_pull(run, run.series, run.phases[-1].index)
     times, force = moving_mean(pull)
     displacement = 1e3 * np.interp(times, pull.edges, pull.raised)
-    return History(times=displacement, values=force / run.manifest.count / weight_of_one(run))
+    return History(times=displacement, values=force / weight_of_one(run))
 
 
-def ratio(table: pd.DataFrame, gamma: float, *, threshold: float) -> Effect:
-    """Return the mean over seeds of ln(peak at 20° / peak at 90°) of one vibration, against a ratio."""
+def contrast(table: pd.DataFrame, gamma: float, *, times: float) -> Effect:
+    """Return the mean over seeds of the strength at 20° less a multiple of that at 90°, after one vibration."""
     own = table[table[GAMMA] == gamma]
     narrow, square = own[own[ANGLE] == NARROW].set_index(SEED), own[own[ANGLE] == SQUARE].set_index(SEED)
-    logs = (np.log(narrow[PEAK]) - np.log(square[PEAK])).dropna()
-    mean = mean_over_seeds(logs.tolist())
-    low, high = (math.exp(mean.value + side * mean.half_width) for side in (-1, 1)) if len(logs) else (math.nan,) * 2
-    text = f"{math.exp(mean.value):.3g} ({low:.3g} to {high:.3g} at 95 %, n = {mean.count})" if len(logs) else "no data"
+    differences = (narrow[STRENGTH] - times * square[STRENGTH]).dropna()
+    by = f"{times:g} times " if times != 1 else ""
     return Effect(
-        label=f"Γ = {gamma:g}: peak at 20° over that at 90°",
-        value=mean,
-        threshold=math.log(threshold),
-        text=text,
+        label=f"Γ = {gamma:g}: strength at 20° less {by}that at 90°",
+        value=mean_over_seeds(differences.tolist()),
+        unit=" W",
         may_be_higher=bool(narrow[HELD_FAST].any()),
         may_be_lower=bool(square[HELD_FAST].any()),
     )
@@ -174,16 +187,17 @@ def vibrated(table: pd.DataFrame) -> list[float]:
     return sorted(float(gamma) for gamma in table[GAMMA].unique() if gamma > 0)
 
 
-def stronger(table: pd.DataFrame, *, threshold: float) -> Outcome:
-    """Judge whether bundles of 20° are stronger than those of 90° by a factor after each vibration."""
+def stronger(table: pd.DataFrame, *, times: float) -> Outcome:
+    """Judge whether bundles of 20° are stronger than a multiple of those of 90° after each vibration."""
     held = table.groupby([ANGLE, GAMMA])[HELD_FAST].agg(["sum", "size"])
     cells = ", ".join(
         f"{angle:g}° Γ = {gamma:g}: {int(row['sum'])} of {int(row['size'])}"
         for (angle, gamma), row in held.iterrows()
         if row["sum"]
     )
-    effects = [ratio(table, gamma, threshold=threshold) for gamma in vibrated(table)]
-    return Outcome(effects=effects, note=f"held fast (bounds): {cells or 'none'}")
+    after = table[table[GAMMA] > 0]
+    note = f"strength by angle [W]: {means_by(after, STRENGTH, ANGLE, '.3g')}; held fast (bounds): {cells or 'none'}"
+    return Outcome(effects=[contrast(table, gamma, times=times) for gamma in vibrated(table)], note=note)
 
 
 def by_angle(table: pd.DataFrame, values: pd.Series, gamma: float, label: str, sign: int) -> Effect:
@@ -215,23 +229,24 @@ def entangles_faster(table: pd.DataFrame, *, relative: bool) -> Outcome:
 
 
 def grows(table: pd.DataFrame, *, angle: float) -> Outcome:
-    """Judge whether vibration makes bundles of one angle stronger, by logarithms of the peaks paired by seed."""
-    own = table[table[ANGLE] == angle].assign(log=np.log(table[PEAK]))
+    """Judge whether vibration makes bundles of one angle stronger, paired by seed."""
+    own = table[table[ANGLE] == angle]
     still = own[own[GAMMA] == 0]
     effects = []
     for gamma in vibrated(own):
         after = own[own[GAMMA] == gamma]
-        both = after.set_index(SEED)["log"] - still.set_index(SEED)["log"]
+        both = after.set_index(SEED)[STRENGTH] - still.set_index(SEED)[STRENGTH]
         mean = mean_over_seeds(both.dropna().tolist())
         effects.append(
             Effect(
-                label=f"Γ = {gamma:g}: ln(peak vibrated / poured)",
+                label=f"Γ = {gamma:g}: strength vibrated less poured",
                 value=mean,
+                unit=" W",
                 may_be_higher=bool(after[HELD_FAST].any()),
                 may_be_lower=bool(still[HELD_FAST].any()),
             )
         )
-    return Outcome(effects=effects, note=f"peak by Γ: {means_by(own, PEAK, GAMMA, '.3g')}")
+    return Outcome(effects=effects, note=f"strength by Γ [W]: {means_by(own, STRENGTH, GAMMA, '.3g')}")
 
 
 def few_chains(table: pd.DataFrame, *, angle: float) -> Outcome:
@@ -249,20 +264,20 @@ def few_chains(table: pd.DataFrame, *, angle: float) -> Outcome:
     return Outcome(effects=effects)
 
 
-AFTER_EACH = "after every vibration, the mean over seeds of ln(F at 20° / F at 90°), paired, is above {}"
+AFTER_EACH = "after vibration, the strength at 20° less {}that at 90° is above 0, paired by seed"
 
 FINDINGS = (
     Finding(
         id="narrow-stronger",
         says="After vibration bundles of 20° are stronger than bundles of 90°",
-        outcome=partial(stronger, threshold=1.0),
-        found_if=AFTER_EACH.format("0"),
+        outcome=partial(stronger, times=1.0),
+        found_if=AFTER_EACH.format(""),
     ),
     Finding(
         id="almost-ten-times",
         says="They are almost ten times as strong",
-        outcome=partial(stronger, threshold=TIMES),
-        found_if=AFTER_EACH.format(f"ln {TIMES:g}, half of ten times"),
+        outcome=partial(stronger, times=TIMES),
+        found_if=AFTER_EACH.format(f"{TIMES:g} times (half of ten) "),
     ),
     Finding(id="poured-less", says="Before vibration staples of 90° are more entangled", outcome=poured_more),
     Finding(
@@ -304,16 +319,15 @@ FIGURES = (
         width=0.5,  # the side of the hook's bars
         unit="mm",
         x_label="hook raised by [mm]",
-        quantities={"": r"force on the hook $F/(n W)$ [-]"},
+        quantities={"": r"force on the hook $F/W$ [-]"},
     ),
     Means(
         name="strength",
-        quantities=[QUANTITIES[name] for name in (PEAK, LINKS, WORK, CHAINS)],
+        quantities=[QUANTITIES[name] for name in (STRENGTH, LINKS, WORK, CHAINS)],
         x=GAMMA,
         x_label=r"peak acceleration $\Gamma$ of the vibration [-]",
         ticks=True,
         split=_BY_ANGLE,
-        log=True,
     ),
 )
 
@@ -338,5 +352,5 @@ STUDY = Study(
         statement="abstracts of Sohn, Pezeshki and Barthelat, arXiv 2510.09933 and 2412.05415; no data of theirs",
         facts={"arxiv": "2510.09933, 2412.05415", "what": "statements in the abstracts"},
     ),
-    pictured={"angle_deg": 20, "gamma": 2},
+    pictured={"angle_deg": 20, "gamma": 6},
 )
