@@ -3,8 +3,8 @@
 Kim, Wu and Han (Nature Communications 2025, arXiv 2509.00216) find that the number of links grows as the logarithm of
 time, that the network of links percolates at a critical number, which continuum percolation of rings describes, and
 that the opening angle changes the network. Here two C shapes are linked if their linking number, closed straight across
-the mouths, is not 0. The critical number is found by random removal of bodies from the network, which lowers the density
-as in continuum percolation; the same is done with C shapes that are placed at random, which may overlap.
+the mouths, is not 0. The critical number is found by random removal of bodies from the network, which lowers the
+density as in continuum percolation; the same is done with C shapes that are placed at random, which may overlap.
 """
 
 import math
@@ -289,13 +289,13 @@ FINDINGS = (
         id="percolates",
         says="The network of links percolates: it forms a giant cluster",
         outcome=percolates,
-        found_if=f"after the vibration the largest cluster has more than {GIANT:.0%} of the bodies, at every angle",
+        found_if=f"after the vibration the largest cluster has over {GIANT:.0%} of the bodies, at every angle",
     ),
     Finding(
         id="as-rings-at-random",
         says="Continuum percolation of rings describes the critical number of links",
         outcome=as_at_random,
-        found_if="the ratio of the critical number in piles to that of C shapes at random places, mean over all runs, is "
+        found_if="the ratio of the critical number in piles to that of C shapes at random places, mean over runs, is "
         f"within a factor of {math.exp(NEAR):.3g}, at 95 %",
     ),
     Finding(
@@ -346,9 +346,9 @@ STUDY = Study(
     count_values=True,
     one_engine=True,
     remarks=(
-        "A link: two C shapes, closed straight across their mouths, with a linking number other than 0. Links per body: "
-        "number of links over number of bodies, half the mean degree. A random graph, whose links disregard places, has "
-        "half of its bodies in one cluster at 0.69 links per body.",
+        "A link: two C shapes, closed straight across their mouths, with a linking number other than 0. Links per "
+        "body: number of links over that of bodies, half the mean degree. A random graph, whose links disregard "
+        "places, has half of its bodies in one cluster at 0.69 links per body.",
     ),
     reference=Reference(
         statement="abstract of Kim, Wu and Han, Nature Communications 2025, arXiv 2509.00216; no data of theirs",

@@ -1,0 +1,275 @@
+"""Rods of several aspect ratios without a wall: does a pile hold its height where strong entanglement spans it?
+
+Jung, Plumb-Reyes, Lin and Mahadevan (PNAS 2025, arXiv 2310.04903) find that longer rods entangle more, by the local
+average crossing number, that regions of strong entanglement percolate as the aspect ratio grows, and that piles become
+mechanically stable there. Here the wall is removed; a pile stands if its centre of mass keeps half of its height.
+
+Spanning level: the largest threshold of the local average crossing number at which the region above it still joins
+bottom and top of the pile. The paper's threshold was not available, so that one number cannot be tested against it. But
+if percolation decides, then one threshold must serve piles of all preparations: the spanning level where piles begin to
+stand must be equal in series that differ in number density or in friction.
+"""
+
+import math
+from functools import partial
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from dem.errors import InputError
+from dem.record.frame import Frame
+from dem.record.run import Run
+from postprocess.geometry.bars import body_centres
+from postprocess.measures.crossing_number import average_crossing_numbers, crossing_field, region_spans
+from postprocess.statistics.points import SEED
+from postprocess.statistics.seeds import mean_over_seeds, slope_within
+from studies.framework.figures import Means, one_by_one
+from studies.framework.findings import Effect, Finding, Outcome, means_by, within
+from studies.framework.provenance import Reference
+from studies.framework.runs import Key, Row, declare, last_columns, run_columns
+from studies.framework.study import COUNT, Study
+
+SERIES, SLENDER = "series", "rod length over diameter [-]"
+SHAKEN, POURED, SLIPPERY = "shaken", "poured", "slippery"
+ORDER = (SHAKEN, POURED, SLIPPERY)
+KEPT, HEIGHT = "com height kept [-]", "height over length [-]"
+ACN, LEVEL, DENSITY = "crossing number per rod [-]", "spanning level [-]", "rods per cube of the length [-]"
+CONTACTS = "contacts per rod [-]"
+ONSET, AT_ONSET = "aspect ratio at the onset [-]", "spanning level at the onset [-]"
+DENSITY_AT = "density at the onset [-]"
+
+STANDS = 0.5  #: Share of the height of the centre of mass that a standing pile keeps
+LIKE = math.log(1.25)  #: Largest |ln| of a ratio of levels, or of aspect ratios, that counts as coincidence
+INNER = 0.7  #: Half side of the square, over the container's radius, in which the field is taken
+PITCH = 0.25  #: Distance of the points of the field, over the length of a rod
+BALL = 0.5  #: Radius of the balls of the field, over the length of a rod
+STEEL = 0.3  #: Coefficient of friction above which a shaken pile belongs to the series `SHAKEN`
+EDGE = 0.1  #: Share of the height that is left out at bottom and top, where balls are half empty
+
+QUANTITIES = declare(
+    {
+        KEPT: ("kept", ".2f", "height of the centre of mass 1 s after the wall went, over that with the wall"),
+        HEIGHT: ("height / L", ".2f", "height below which 95 % of the material lies, over the rods' length"),
+        ACN: ("ACN per rod", ".1f", "average crossing number with all other rods"),
+        LEVEL: (
+            "spanning level",
+            ".1f",
+            "largest threshold of the local ACN whose region spans the height",
+        ),
+        DENSITY: ("n L³", ".1f", "number density of the rods times the cube of their length"),
+        CONTACTS: ("contacts", ".2f", "rods that a rod touches, with the wall"),
+    },
+    axes={
+        KEPT: "height kept without the wall [-]",
+        ACN: "average crossing number per rod [-]",
+        LEVEL: "spanning level of the local ACN [-]",
+        DENSITY: r"number density $n L^3$ [-]",
+    },
+)
+
+
+def measure(run: Run) -> Row:
+    """Measure entanglement with the wall and the height that is kept without it; return the run's row."""
+    types = [phase.type for phase in run.phases]
+    shaken = types == ["deposit", "shake", "relax", "remove-container"]
+    if not shaken and types != ["deposit", "relax", "remove-container"]:
+        raise InputError(f"{run.path}: its phases are {', '.join(types)}, not a pour, a rest, a removal; leave it out")
+    rest, free = (run.frames.in_phase(run.phases[place].index) for place in (-2, -1))
+    if not rest or not free:
+        raise InputError(f"{run.path}: no frame of the rest or of the removal; run it again")
+    walled, last = rest[-1], free[-1]
+    length, radius = length_of(run), run.manifest.container_radius_m
+    friction = float(run.scene["contact"]["friction_smarticle"])
+    top = float(np.percentile(walled.segments[..., 2], 95)) - walled.floor_z
+    height, after = (float(body_centres(frame)[:, 2].mean()) - frame.floor_z for frame in (walled, last))
+    return {
+        SERIES: (SHAKEN if friction > STEEL else SLIPPERY) if shaken else POURED,
+        SLENDER: round(length / run.manifest.sphere_diameter_m, 6),
+        **{name: value for name, value in run_columns(run).items() if name in (SEED, COUNT, "fidelity")},
+        KEPT: after / height,
+        HEIGHT: top / length,
+        ACN: average_crossing_numbers(walled.segments, walled.body).mean,
+        LEVEL: spanning_level(local_crossings(walled, length=length, radius=radius, top=top)),
+        DENSITY: run.manifest.count * length**3 / (math.pi * radius**2 * top),
+        CONTACTS: float(walled.contacts.mean()),
+        **last_columns(run),
+    }
+
+
+def length_of(run: Run) -> float:
+    """Return the length of a run's rods [m]; InputError if its bodies are of another shape or of several kinds."""
+    shapes = run.scene.get("particle") or []
+    if [shape.get("shape") for shape in shapes] != ["rod"]:
+        raise InputError(f"{run.path}: its bodies are not rods of one kind; leave it out")
+    return float(shapes[0]["length_m"])
+
+
+def local_crossings(frame: Frame, *, length: float, radius: float, top: float) -> NDArray[np.float64]:
+    """Return the local average crossing number (X, Y, Z) [-] in the inside of a pile.
+
+    Points fill a box around the axis, see `INNER` and `EDGE`; lengths, the container's radius and the pile's height
+    `top` are in [m].
+    """
+    side = 2 * INNER * radius
+    across, up = (max(2, round(span / (PITCH * length)) + 1) for span in (side, (1 - 2 * EDGE) * top))
+    level = np.linspace(-side / 2, side / 2, across)
+    heights = frame.floor_z + np.linspace(EDGE * top, (1 - EDGE) * top, up)
+    points = np.stack(np.meshgrid(level, level, heights, indexing="ij"), axis=-1)
+    return crossing_field(frame.segments, frame.body, points, radius=BALL * length)
+
+
+def spanning_level(field: NDArray[np.float64]) -> float:
+    """Return the largest value of a field (X, Y, Z) whose region, at or above it, joins bottom and top; 0 if none."""
+    values = np.unique(field)
+    spanning = [value for value in values if region_spans(field >= value, 2)]
+    return float(max(spanning, default=0.0))
+
+
+def onsets(runs: pd.DataFrame) -> pd.DataFrame:
+    """Tabulate where piles begin to stand: a row per series and seed.
+
+    The aspect ratio at which the height kept crosses `STANDS` for the last time is interpolated in its logarithm, and
+    so are the logarithms of the spanning level and of the density there. NaN where it is not crossed.
+    """
+    rows = []
+    for (series, seed), group in runs.groupby([SERIES, SEED], sort=False):
+        own = group.sort_values(SLENDER)
+        kept, ratio = own[KEPT].to_numpy(), np.log(own[SLENDER].to_numpy())
+        below = np.nonzero(kept < STANDS)[0]
+        row: dict[str, object] = {SERIES: series, SEED: seed, ONSET: math.nan, AT_ONSET: math.nan, DENSITY_AT: math.nan}
+        if len(below) and below[-1] + 1 < len(kept):
+            at = int(below[-1])
+            part = (STANDS - kept[at]) / (kept[at + 1] - kept[at])
+            for name, values in {ONSET: ratio, AT_ONSET: np.log(own[LEVEL]), DENSITY_AT: np.log(own[DENSITY])}.items():
+                known = np.asarray(values, dtype=np.float64)
+                row[name] = math.exp(known[at] + part * (known[at + 1] - known[at]))
+        rows.append(row)
+    return pd.DataFrame(rows)
+
+
+def crossing_number_rises(table: pd.DataFrame) -> Outcome:
+    """Judge whether the average crossing number per rod rises with the aspect ratio in every series."""
+    effects = []
+    for series, rows in table.groupby(SERIES, sort=False):
+        slope = slope_within(np.log(rows[SLENDER]).tolist(), np.log(rows[ACN]).tolist(), ["all"] * len(rows))
+        effects.append(Effect(label=f"{series}: power of the aspect ratio", value=slope))
+    shaken = table[table[SERIES] == SHAKEN]
+    return Outcome(effects=effects, note=f"shaken, by aspect ratio: {means_by(shaken, ACN, SLENDER, '.3g')}")
+
+
+def stands_from(table: pd.DataFrame) -> Outcome:
+    """Judge whether the thickest shaken rods fall and the thinnest stand."""
+    own = table[table[SERIES] == SHAKEN]
+    effects = [
+        Effect(
+            label=f"height kept at aspect ratio {ratio:g}",
+            value=mean_over_seeds(own.loc[own[SLENDER] == ratio, KEPT].tolist()),
+            sign=sign,
+            threshold=STANDS,
+        )
+        for ratio, sign in ((own[SLENDER].min(), -1), (own[SLENDER].max(), 1))
+    ]
+    return Outcome(effects=effects, note=f"by aspect ratio: {means_by(own, KEPT, SLENDER, '.2f')}")
+
+
+def ratio_of(table: pd.DataFrame, column: str, one: str, other: str) -> Effect:
+    """Return the mean over seeds of ln of a column's ratio between two series, paired by seed; not judged by itself."""
+    both = table.pivot_table(index=SEED, columns=SERIES, values=column)
+    known = {one, other} <= set(both.columns)
+    logs = (np.log(both[one]) - np.log(both[other])).dropna().tolist() if known else []
+    mean = mean_over_seeds(logs)
+    low, high = (np.exp(mean.value + side * mean.half_width) for side in (-1, 1))
+    text = f"{np.exp(mean.value):.3g} ({low:.3g} to {high:.3g} at 95 %, n = {mean.count})" if logs else "no data"
+    return Effect(label=f"{column.partition(' [')[0]}, {one} over {other}", value=mean, sign=0, text=text)
+
+
+def one_level(table: pd.DataFrame, *, other: str) -> Outcome:
+    """Judge whether piles of another series begin to stand at the spanning level of shaken piles."""
+    level = ratio_of(table, AT_ONSET, other, SHAKEN)
+    effects = [level, *(ratio_of(table, column, other, SHAKEN) for column in (ONSET, DENSITY_AT))]
+    note = f"level at the onset: {means_by(table, AT_ONSET, SERIES, '.3g')}; "
+    note += f"aspect ratio at the onset: {means_by(table, ONSET, SERIES, '.3g')}"
+    return Outcome(effects=effects, note=note, verdict=within(level.value.value, level.value.half_width, LIKE))
+
+
+SAME_LEVEL = f"the ratio of the spanning levels at the onset is within a factor of {math.exp(LIKE):.3g} at 95 %"
+
+FINDINGS = (
+    Finding(
+        id="crossing-number-rises",
+        says="Entanglement grows with the aspect ratio",
+        outcome=crossing_number_rises,
+        found_if="the average crossing number per rod rises with the aspect ratio in every series",
+    ),
+    Finding(
+        id="stands-from",
+        says="Piles become mechanically stable as the aspect ratio grows",
+        outcome=stands_from,
+        found_if=f"without the wall the thickest rods keep less than {STANDS:g} of the height, the thinnest more",
+    ),
+    Finding(
+        id="one-level-poured",
+        says="The mechanical onset coincides with the percolation of strong entanglement: poured and shaken piles, of "
+        "other number densities, begin to stand at one spanning level",
+        outcome=partial(one_level, other=POURED),
+        tables=["onsets"],
+        found_if=SAME_LEVEL,
+    ),
+    Finding(
+        id="one-level-slippery",
+        says="(ours) Piles of half the friction begin to stand at the same spanning level",
+        outcome=partial(one_level, other=SLIPPERY),
+        tables=["onsets"],
+        found_if=SAME_LEVEL,
+    ),
+)
+
+_BY_SERIES = one_by_one(SERIES, str, last=0.75)
+
+FIGURES = (
+    Means(
+        name="onset",
+        quantities=[QUANTITIES[name] for name in (KEPT, ACN, LEVEL, DENSITY)],
+        x=SLENDER,
+        x_label="aspect ratio of the rods, length over diameter [-]",
+        split=_BY_SERIES,
+        log_x=True,
+    ),
+    Means(
+        name="kept_level",
+        quantities=[QUANTITIES[KEPT]],
+        x=LEVEL,
+        x_label="spanning level of the local ACN [-]",
+        split=_BY_SERIES,
+        log_x=True,
+        notes=[f"Percolation decides alone if all series cross {STANDS:g} at one spanning level."],
+    ),
+)
+
+STUDY = Study(
+    name="rods",
+    title="Rods without a wall, against the findings of Jung, Plumb-Reyes, Lin and Mahadevan",
+    measure=measure,
+    keys=(
+        Key(column=SERIES, label="series", order=ORDER),
+        Key(column=SLENDER, label="L/d", form="g"),
+    ),
+    quantities=tuple(QUANTITIES.values()),
+    findings=FINDINGS,
+    figures=FIGURES,
+    extra=lambda runs: {"onsets": onsets(runs)},
+    same_count=(SLENDER,),
+    order=(SERIES, SLENDER, SEED),
+    one_engine=True,
+    remarks=(
+        f"Local average crossing number: of all parts of rods in a ball of radius {BALL:g} L, prefactor 1/4π, at "
+        f"points {PITCH:g} L apart in the inside of the pile with the wall. Onset: the aspect ratio at which the height kept "
+        f"crosses {STANDS:g}, seed by seed.",
+    ),
+    reference=Reference(
+        statement="abstract of Jung, Plumb-Reyes, Lin and Mahadevan, PNAS 2025, arXiv 2310.04903; no data of theirs",
+        facts={"doi": "10.1073/pnas.2401868122", "arxiv": "2310.04903", "what": "statements in the abstract"},
+    ),
+    pictured={"series": "shaken", "aspect": 32},
+)
