@@ -264,8 +264,8 @@ STUDY = Study(
     one_engine=True,
     remarks=(
         f"Local average crossing number: of all parts of rods in a ball of radius {BALL:g} L, prefactor 1/4π, at "
-        f"points {PITCH:g} L apart in the inside of the pile with the wall. Onset: the aspect ratio at which the height kept "
-        f"crosses {STANDS:g}, seed by seed.",
+        f"points {PITCH:g} L apart in the inside of the pile with the wall. Onset: the aspect ratio at which the "
+        f"height kept crosses {STANDS:g}, seed by seed.",
     ),
     reference=Reference(
         statement="abstract of Jung, Plumb-Reyes, Lin and Mahadevan, PNAS 2025, arXiv 2310.04903; no data of theirs",

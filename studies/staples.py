@@ -10,6 +10,7 @@ bound.
 """
 
 import math
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -27,7 +28,7 @@ from postprocess.measures.pull import PULL, WINDOW, held_fast, moving_mean, peak
 from postprocess.statistics.points import SEED
 from postprocess.statistics.seeds import mean_over_seeds
 from studies.framework.figures import Histories, History, Means, one_by_one
-from studies.framework.findings import Effect, Finding, Outcome, means_by
+from studies.framework.findings import Effect, Finding, Outcome, means_by, symbol
 from studies.framework.provenance import Reference
 from studies.framework.runs import Key, Row, declare, last_columns, run_columns
 from studies.framework.study import COUNT, Study
@@ -35,7 +36,7 @@ from studies.framework.study import COUNT, Study
 ANGLE, GAMMA = "crown-leg angle [deg]", "peak acceleration [g]"
 NARROW, SQUARE = 20.0, 90.0  #: The two angles that are compared [deg]
 PEAK, RAISED, WORK = "peak force over W [-]", "hook raised at the peak [m]", "work over W crown [-]"
-ABOVE, STRENGTH = "staples above the hook [-]", "peak force beyond the weight above over W [-]"
+ABOVE, STRENGTH = "staples above the hook [-]", "tension from hook to grid over W [-]"
 BEFORE, HELD_FAST, CHAINS = "load before the pull over W [-]", "held fast [-]", "chains at the peak [-]"
 POURED, LINKS, HEIGHT = "links per staple poured [-]", "links per staple [-]", "com height [m]"
 
@@ -47,7 +48,12 @@ QUANTITIES = declare(
     {
         PEAK: ("peak", ".3g", f"largest mean over {WINDOW:g} s of the force on the hook; a bound where it held fast"),
         ABOVE: ("above", ".0f", "number of staples with the centre above the hook before the pull"),
-        STRENGTH: ("strength", ".3g", "peak force less the weight of the staples above the hook; a bound like it"),
+        STRENGTH: (
+            "strength",
+            ".3g",
+            f"largest mean over {WINDOW:g} s of the upward force on the grid, 0 where it is pushed down throughout; a "
+            "bound where the hook held fast",
+        ),
         RAISED: ("raised at it [mm]", ".1f", "displacement of the hook at the peak"),
         WORK: ("work / W crown", ".3g", "∫ F dz over the whole pull"),
         BEFORE: ("before", ".3g", "force on the hook before the pull, by weight and by bracing of the pile"),
@@ -63,7 +69,7 @@ QUANTITIES = declare(
         HEIGHT: ("height [mm]", ".1f", "height of the centre of mass above the floor, without the wall"),
     },
     axes={
-        STRENGTH: r"peak force beyond the weight / $W$ [-]",
+        STRENGTH: r"tension from hook to grid / $W$ [-]",
         CHAINS: "chains at the peak [-]",
         LINKS: "links per staple [-]",
         WORK: r"work / ($W$ crown) [-]",
@@ -100,7 +106,7 @@ def measure(run: Run) -> Row:
         HEIGHT: float(body_centres(free)[:, 2].mean()) - free.floor_z,
         PEAK: highest.force / weight,
         ABOVE: higher,
-        STRENGTH: highest.force / weight - higher,
+        STRENGTH: max(0.0, peak(replace(pull, force=pull.held)).force) / weight,
         RAISED: highest.raised,
         WORK: pull.work / weight / run.manifest.middle_length_m,
         BEFORE: pull.before / weight,
@@ -167,15 +173,16 @@ def force_history(run: Run) -> History:
     return History(times=displacement, values=force / weight_of_one(run))
 
 
-def contrast(table: pd.DataFrame, gamma: float, *, times: float) -> Effect:
-    """Return the mean over seeds of the strength at 20° less a multiple of that at 90°, after one vibration."""
+def contrast(table: pd.DataFrame, gamma: float, *, times: float, quantity: str = STRENGTH, sign: int = 1) -> Effect:
+    """Return the mean over seeds of a force at 20° less a multiple of that at 90°, after one vibration."""
     own = table[table[GAMMA] == gamma]
     narrow, square = own[own[ANGLE] == NARROW].set_index(SEED), own[own[ANGLE] == SQUARE].set_index(SEED)
-    differences = (narrow[STRENGTH] - times * square[STRENGTH]).dropna()
+    differences = (narrow[quantity] - times * square[quantity]).dropna()
     by = f"{times:g} times " if times != 1 else ""
     return Effect(
-        label=f"Γ = {gamma:g}: strength at 20° less {by}that at 90°",
+        label=f"Γ = {gamma:g}: {symbol(quantity)} at 20° less {by}that at 90°",
         value=mean_over_seeds(differences.tolist()),
+        sign=sign,
         unit=" W",
         may_be_higher=bool(narrow[HELD_FAST].any()),
         may_be_lower=bool(square[HELD_FAST].any()),
@@ -196,8 +203,11 @@ def stronger(table: pd.DataFrame, *, times: float) -> Outcome:
         if row["sum"]
     )
     after = table[table[GAMMA] > 0]
-    note = f"strength by angle [W]: {means_by(after, STRENGTH, ANGLE, '.3g')}; held fast (bounds): {cells or 'none'}"
-    return Outcome(effects=[contrast(table, gamma, times=times) for gamma in vibrated(table)], note=note)
+    note = f"tension by angle [W]: {means_by(after, STRENGTH, ANGLE, '.3g')}; "
+    note += f"peak by angle [W]: {means_by(after, PEAK, ANGLE, '.3g')}; held fast (bounds): {cells or 'none'}"
+    effects = [contrast(table, gamma, times=times) for gamma in vibrated(table)]
+    effects += [contrast(table, gamma, times=times, quantity=PEAK, sign=0) for gamma in vibrated(table)]
+    return Outcome(effects=effects, note=note)
 
 
 def by_angle(table: pd.DataFrame, values: pd.Series, gamma: float, label: str, sign: int) -> Effect:
@@ -239,14 +249,14 @@ def grows(table: pd.DataFrame, *, angle: float) -> Outcome:
         mean = mean_over_seeds(both.dropna().tolist())
         effects.append(
             Effect(
-                label=f"Γ = {gamma:g}: strength vibrated less poured",
+                label=f"Γ = {gamma:g}: tension vibrated less poured",
                 value=mean,
                 unit=" W",
                 may_be_higher=bool(after[HELD_FAST].any()),
                 may_be_lower=bool(still[HELD_FAST].any()),
             )
         )
-    return Outcome(effects=effects, note=f"strength by Γ [W]: {means_by(own, STRENGTH, GAMMA, '.3g')}")
+    return Outcome(effects=effects, note=f"tension by Γ [W]: {means_by(own, STRENGTH, GAMMA, '.3g')}")
 
 
 def few_chains(table: pd.DataFrame, *, angle: float) -> Outcome:
@@ -264,7 +274,7 @@ def few_chains(table: pd.DataFrame, *, angle: float) -> Outcome:
     return Outcome(effects=effects)
 
 
-AFTER_EACH = "after vibration, the strength at 20° less {}that at 90° is above 0, paired by seed"
+AFTER_EACH = "after vibration, the tension at 20° less {}that at 90° is above 0, paired by seed"
 
 FINDINGS = (
     Finding(
@@ -344,9 +354,10 @@ STUDY = Study(
     bounds=(HELD_FAST, "held fast"),
     one_engine=True,
     remarks=(
-        "W: weight of one staple. A link: two staples, one of which passes through the polygon of the other, which is "
-        "closed straight between its tips. Staples are rigid: a chain of them between grid and hook gives way at its "
-        "contacts alone, so that the limit of the force ends the pull.",
+        "W: weight of one staple. Strength: the tension that goes from the hook through the whole pile to the grid; "
+        "the force on the hook lifts staples, too. A link: two staples, one of which passes through the polygon of the "
+        "other, which is closed straight between its tips. Staples are rigid: a chain of them between grid and hook "
+        "gives way at its contacts alone, so that the limit of the force ends the pull.",
     ),
     reference=Reference(
         statement="abstracts of Sohn, Pezeshki and Barthelat, arXiv 2510.09933 and 2412.05415; no data of theirs",
