@@ -25,7 +25,7 @@ from postprocess.measures.graph import EntanglementGraph, entanglement_graph
 from postprocess.statistics.points import SEED
 from postprocess.statistics.seeds import mean_over_seeds, slope_within
 from studies.framework.figures import Histories, Means, Series, marker, one_by_one
-from studies.framework.findings import Effect, Finding, Outcome, means_by, within
+from studies.framework.findings import Effect, Finding, Outcome, decide, means_by, within
 from studies.framework.provenance import Reference
 from studies.framework.runs import Key, MeasuredRun, declare, last_columns, run_columns
 from studies.framework.study import COUNT, Study
@@ -74,9 +74,7 @@ def measure(run: Run) -> MeasuredRun:
     """Count links over time and find the critical number; return the run's row and its history."""
     types = [phase.type for phase in run.phases]
     if types != ["deposit", "relax", "shake"]:
-        raise InputError(
-            f"{run.path}: its phases are {', '.join(types)}, not a pour, a rest, a vibration; leave it out"
-        )
+        raise InputError(f"{run.path}: its phases are {', '.join(types)}, not deposit, relax, shake; leave it out")
     rest, shaken = run.frames.in_phase(1), run.frames.in_phase(2)
     if not rest or not shaken:
         raise InputError(f"{run.path}: no frame of the rest or of the vibration; run it again")
@@ -268,8 +266,7 @@ def depends_on_opening(table: pd.DataFrame, *, quantity: str, label: str) -> Out
     effect = Effect(label=f"{label} against the opening angle", value=slope, sign=0, unit=" per degree")
     note = f"by angle: {means_by(table, quantity, OPENING, '.3g')}"
     clear = abs(slope.value) > slope.half_width
-    verdict = Effect(label="", value=slope, sign=1 if slope.value > 0 else -1).verdict
-    return Outcome(effects=[effect], note=note, verdict=verdict if clear or math.isnan(slope.value) else None)
+    return Outcome(effects=[effect], note=note, verdict=decide(clear, data=not math.isnan(slope.value)))
 
 
 FINDINGS = (
