@@ -209,9 +209,9 @@ def residual(law: str, times: Floats, values: Floats) -> float:
 
     if law != "exponential":
         return float(np.sqrt(np.mean(left(np.zeros(1)) ** 2)))
-    ends = np.log([times[0] / 3, 10 * times[-1]])
-    starts = np.linspace(*ends, 6)[1:-1]
-    tries = (least_squares(left, [start], bounds=(ends[:1], ends[1:])) for start in starts)
+    first, last = math.log(times[0] / 3), math.log(10 * times[-1])
+    starts = np.linspace(first, last, 6)[1:-1]
+    tries = (least_squares(left, [start], bounds=([first], [last])) for start in starts)
     return float(np.sqrt(np.mean(min(tries, key=lambda found: float(found.cost)).fun ** 2)))
 
 
