@@ -54,7 +54,8 @@ class Plan:
     fidelity: str = "standard"
     stiffness_N_per_m: float = 0.0
     bodies: str = "smarticles"  #: Kinds of bodies in words
-    strands: int = 0  #: Strands of a link on the engine links; 0 on engines with spheres
+    strands: int = 0  #: `fidelity.rows` on the engine links; 0 on engines with spheres
+    most_strands: int = 0  #: Most strands of a bar, or link, on the engine links; 0 on engines with spheres
     correction: float = 1.0  #: Factor by which wall times were corrected
     protocol: tuple[str, ...] = ()  #: Lines about the keys of the scene's protocol
     compile_s: float = 0.0  #: Expected processor time for code that is not compiled yet
@@ -68,7 +69,8 @@ class Plan:
     def to_text(self) -> str:
         """Return the plan as tables for the terminal."""
         corrected = "" if self.correction == 1 else f", corrected by {self.correction:.3g} as measured at this fidelity"
-        section = f"smooth links of {self._strands}" if self.strands else f"{self.spheres_per_smarticle} spheres"
+        smooth = f"smooth links of {_strands(self.most_strands)}"
+        section = smooth if self.strands else f"{self.spheres_per_smarticle} spheres"
         wall = "in a plane" if self.planar else f"wall {1e3 * self.container_height_m:.0f} mm high"
         lines = [
             f"{self.name}: {self.count} {self.bodies} of {section}, d = {1e3 * self.sphere_diameter_m:.3g} mm, {wall}",
@@ -100,10 +102,6 @@ class Plan:
         lines += [f"warning: {warning}" for warning in self.warnings]
         return "\n".join(lines)
 
-    @property
-    def _strands(self) -> str:
-        return f"{self.strands} strand{'' if self.strands == 1 else 's'}"
-
     def _engine_to_text(self) -> list[str]:
         """Return lines about the engine: knobs that it ignores, and on links the fidelity; none on YADE."""
         idle = ", ".join(engine_kind(self.engine).idle_knobs)
@@ -115,7 +113,7 @@ class Plan:
             usual = ""
         return [
             f"engine {self.engine}: fidelity.rows are strands; {idle} have no meaning here",
-            f"fidelity {self.fidelity}: {self._strands}, {self.stiffness_N_per_m:g} N/m, time step "
+            f"fidelity {self.fidelity}: {_strands(self.strands)}, {self.stiffness_N_per_m:g} N/m, time step "
             f"{self.time_step_s / self.stable_time_step_s:.2g} of the stable one{usual}",
         ]
 
@@ -131,6 +129,16 @@ def _wall_time(wall: float) -> str:
         if wall < most:
             return f"{wall / unit:{form}} {name}"
     return f"{wall / 3600:.1f} h" if wall < 10 * 3600 else f"{wall / 3600:.0f} h"
+
+
+def _strands(number: int) -> str:
+    return f"{number} strand{'' if number == 1 else 's'}"
+
+
+def _most_strands(scene: Scene) -> int:
+    if not scene.smooth:
+        return 0
+    return scene.fidelity.rows if scene.mixture is None else max(kind.rows for kind in scene.mixture.kinds)
 
 
 def _bodies(scene: Scene) -> str:
@@ -172,6 +180,7 @@ def plan(scene: Scene) -> Plan:
         stiffness_N_per_m=scene.fidelity.stiffness_N_per_m,
         bodies=_bodies(scene),
         strands=scene.fidelity.rows if scene.smooth else 0,
+        most_strands=_most_strands(scene),
         protocol=protocol_lines(scene),
         compile_s=kind.seconds_to_compile(scene),
         overlaps={overlap.cause: overlap.widths for overlap in expected_overlaps(scene)},

@@ -113,7 +113,7 @@ def _listing(ladder: Ladder, expected_s: Mapping[str, float], seeds: int, jobs: 
     for rung in ladder.rungs:
         planned = plan(ladder.scenes[rung.setting])
         note = "reference" if references[rung.knob] == rung else ""
-        section = f"{planned.strands} strands" if planned.strands else f"{planned.spheres_per_smarticle} spheres"
+        section = f"{planned.most_strands} strands" if planned.strands else f"{planned.spheres_per_smarticle} spheres"
         shape = [planned.time_step_s, section]
         rows.append([rung.knob, rung.label, rung.setting, note, *shape, round(expected_s[rung.setting])])
     header = ["knob", "value", "setting", "", "time step s", "section", "expected wall s"]

@@ -7,7 +7,9 @@ from typing import Any
 import pytest
 from scenes import small
 
+from dem.engine.demand import Activity
 from dem.engine.effect import Adds
+from dem.engine.kinds import engine_kind
 from dem.plan.effects import ADDS, decide
 from dem.plan.outlook import Plan, plan, warnings_of
 from dem.record.columns import (
@@ -124,3 +126,26 @@ def bench(activity: dict[str, object], fidelity: str = "standard", count: int = 
 )
 def test_costs_are_those_measured(made: Plan, kind: str, measured: float) -> None:
     assert rates(made)[kind] == pytest.approx(measured, rel=0.25)
+
+
+@pytest.mark.parametrize(("sections", "least", "most"), [("r", 1.0, 1.0), ("f", 1.05, 2.0), ("rf", 1.02, 1.5)])
+def test_strands_are_those_of_each_body(sections: str, least: float, most: float) -> None:
+    """Bars with a round section have one strand, whatever the fidelity says."""
+    rods = {"f": {"shape": "rod", "length_m": 0.01}}
+    rods["r"] = {**rods["f"], "diameter_m": 0.001}
+    one, two = (
+        small(
+            {
+                "engine": "links",
+                "particle": [rods[key] for key in sections],
+                "fidelity": {"base": "draft", "rows": rows},
+            }
+        )
+        for rows in (1, 2)
+    )
+    assert "bodies (rod) of smooth links of 1 strand," in plan(one).to_text()
+    strands = "1 strand," if sections == "r" else "2 strands,"
+    assert f"bodies (rod) of smooth links of {strands}" in plan(two).to_text()
+    assert "fidelity draft: 2 strands" in plan(two).to_text()
+    cost = [engine_kind("links").seconds_per_second(scene, 1e-5, Activity.SHAKE) for scene in (one, two)]
+    assert least <= cost[1] / cost[0] <= most
