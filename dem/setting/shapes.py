@@ -6,7 +6,7 @@ from typing import Annotated, Any, Literal, Self, get_args
 
 import numpy as np
 from pydantic import BeforeValidator, Field, model_validator
-from scipy.stats import norm
+from scipy.special import ndtri
 
 from dem.arrays import Array
 from dem.body.bars import Bars
@@ -81,7 +81,7 @@ class Shaped(Part):
         """Factors on the body's lengths [1]: `SIZES` equally frequent ones, or only 1 without a spread."""
         if not self.spread:
             return np.ones(1)
-        values = norm.ppf((np.arange(SIZES) + 0.5) / SIZES)
+        values = ndtri((np.arange(SIZES) + 0.5) / SIZES)
         return np.asarray(1 + self.spread * values / math.sqrt(float((values**2).mean())))
 
     def bars(self, factor: float = 1.0) -> Bars:
