@@ -105,7 +105,8 @@ class Deposit(Part, Phase):
     def _check_layer(self, memory: Memory, engine: Engine, gravity: float) -> None:
         size, limit = memory["layer"], self.landed_speed_m_per_s
         fastest = float(-engine.state().velocities[-size:, 2].min())
-        aloft = int((engine.touches()[-size:] == 0).sum())
+        # Contacts are looked for only where the answer depends on them.
+        aloft = int((engine.touches()[-size:] == 0).sum()) if fastest < limit else 0
         timeout = max(LAYER_TIMEOUT, LANDING_FALLS * math.sqrt(2 * engine.cylinder.height / gravity))
         if fastest < limit and not aloft:
             memory.update(layer=0, waited=0.0)
@@ -123,7 +124,8 @@ class Deposit(Part, Phase):
         size = min(self.per_layer, memory["left"])
         rng = np.random.default_rng()
         rng.bit_generator.state = memory["random"]
-        particle, mixture, state, tops = scene.model, scene.mixture, engine.state(), engine.state().tops
+        particle, mixture, state = scene.model, scene.mixture, engine.state()
+        tops = state.tops
         cylinder, slab = engine.cylinder, self.layer_height_w * particle.size
         if self.every_s is None:
             bottom = tops.max(initial=engine.boundaries.floor) + particle.radius
@@ -135,7 +137,7 @@ class Deposit(Part, Phase):
         poured = scene.count - memory["left"]
         kinds = None if mixture is None else mixture.of[poured : poured + size]
         poses = place_layer(
-            scene.bodies if kinds is None else [scene.bodies[k] for k in kinds],
+            scene.bodies[0] if kinds is None else [scene.bodies[k] for k in kinds],
             count=size,
             radius=float(cylinder.inner_radii(np.array([bottom]))[0]),
             bottom=bottom,

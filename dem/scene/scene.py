@@ -19,7 +19,7 @@ from pydantic import (
 )
 
 from dem.arrays import Array, Numbers
-from dem.body.kinds import Kind, Mixture
+from dem.body.kinds import Kind, Mixture, bodies_of
 from dem.body.particle import Particle, SphereChain, chain_mean_width, mean_width
 from dem.engine.demand import Activity
 from dem.engine.effect import EffectName
@@ -352,7 +352,7 @@ class Scene(Part):
         # Rows have a meaning only across the wide side of a flat section.
         rows = self.fidelity.rows if normal > (self.fidelity.diameter_m or in_plane) and not bars.round else 1
         diameter = self._diameter_of(normal, in_plane, rows, disc=bars.round)
-        return Kind(name=shape.named, bars=bars, rows=rows, diameter=diameter, pitch=self._pitch * diameter)
+        return Kind(name=shape.tag(), bars=bars, rows=rows, diameter=diameter, pitch=self._pitch * diameter)
 
     @property
     def model(self) -> Particle | Mixture:
@@ -362,7 +362,7 @@ class Scene(Part):
     @property
     def bodies(self) -> tuple[Particle | Kind, ...]:
         """One body of each kind; the first is the one to which the contact law refers."""
-        return (self.particle,) if self.mixture is None else self.mixture.kinds
+        return bodies_of(self.model)
 
 
 def _sizes(given: Mapping[str, Any]) -> tuple[float, float]:

@@ -68,13 +68,8 @@ class Shaped(Part):
             for factor in self.factors[[0, -1]]:
                 _ = self.bars(float(factor))
         except InputError as error:
-            raise ValueError(f"shape: {self.named}: {error}") from None
+            raise ValueError(f"shape: {self.tag()}: {error}") from None
         return self
-
-    @property
-    def named(self) -> str:
-        """Name of the shape."""
-        return str(get_args(type(self).model_fields["shape"].annotation)[0])
 
     @property
     def factors(self) -> Array:
@@ -312,7 +307,7 @@ def listed(value: Any) -> Any:
     if value is None or value == "smarticle":
         return None
     if isinstance(value, str):
-        names = ", ".join(get_args(shape.model_fields["shape"].annotation)[0] for shape in SHAPES)
+        names = ", ".join(shape.tag() for shape in SHAPES)
         raise ValueError(f"{value!r} needs its lengths: write {{shape: {value}, …}}; shapes are {names}, or smarticle")
     return [value] if not isinstance(value, list | tuple) else value
 

@@ -41,7 +41,7 @@ class Contacts:
         found = found[owners[found[:, 0]] != owners[found[:, 1]]]
         apart = np.linalg.norm(centres[found[:, 0]] - centres[found[:, 1]], axis=1)
         reach = radii[found].sum(axis=1)
-        found, apart, reach = (each[apart <= reach] for each in (found, apart, reach))
+        meeting = apart <= reach
         beside = [radii - (centres[:, 2] - boundaries.floor)]
         if boundaries.walled:
             high = (centres[:, 2] > boundaries.wall_bottom) & (centres[:, 2] < boundaries.wall_top)
@@ -50,8 +50,8 @@ class Contacts:
         touching = [np.flatnonzero(depths > 0) for depths in beside]
         return cls(
             count=count,
-            pairs=owners[found],
-            depths=reach - apart,
+            pairs=owners[found[meeting]],
+            depths=(reach - apart)[meeting],
             fixed=owners[np.concatenate(touching)],
             fixed_depths=np.concatenate([depths[k] for depths, k in zip(beside, touching, strict=True)]),
         )

@@ -14,7 +14,7 @@ from scipy.spatial.transform import Rotation
 
 from dem.arrays import Array, Numbers
 from dem.body.chain import Tie
-from dem.body.kinds import Kind, Mixture
+from dem.body.kinds import Kind, Mixture, bodies_of, body_of
 from dem.body.particle import Particle
 from dem.body.placement import Poses
 from dem.body.state import PileState, RigidState, State, spheres_of
@@ -280,11 +280,11 @@ class LammpsEngine:
     @property
     def _reference(self) -> Particle | Kind:
         """The body whose dashpots the contact law has."""
-        return self.particle if isinstance(self.particle, Particle) else self.particle.kinds[0]
+        return bodies_of(self.particle)[0]
 
     def _body(self, number: int) -> Particle | Kind:
         """Return the particle, or the kind, that a body is."""
-        return self.particle if isinstance(self.particle, Particle) else self.particle.kinds[self._kinds[number]]
+        return body_of(self.particle, self._kinds, number)
 
     @property
     def _relative_masses(self) -> Array:

@@ -221,11 +221,10 @@ class LinksEngine:
     def extremes(self, state: PileState) -> Extremes | None:
         """Return the extremes; None if an overlap needs a full check. The gap is 0, since hinges are rigid."""
         if state.bodies is None:
-            velocities = state.smarticles.link_velocities
-        else:  # three bars to a row, as of links
-            each = state.bodies.bar_velocities
-            velocities = np.concatenate([each, np.zeros((-len(each) % 3, 3))]).reshape(-1, 3, 3)
-        found, bodies = self._world.extremes(velocities), self._world.bodies
+            velocities = state.smarticles.link_velocities.reshape(-1, 3)
+        else:
+            velocities = state.bodies.bar_velocities
+        found, bodies = self._world.extremes(np.ascontiguousarray(velocities)), self._world.bodies
         if not (found[BETWEEN] <= PASSES and found[DEEPEST] <= HOLDS):
             return None
         bodies.deepest[:] = 0.0
