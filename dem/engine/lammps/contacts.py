@@ -18,14 +18,14 @@ class Contacts:
     """All contacts at one instant."""
 
     count: int  #: Number of bodies, N
-    pairs: Numbers  #: (C, 2) the two smarticles of each pair of touching spheres
+    pairs: Numbers  #: (C, 2) the two bodies of each pair of touching spheres
     depths: Array  #: (C,) overlaps of these pairs [m]
-    fixed: Numbers  #: (F,) the smarticle at each contact of a sphere with floor or wall
+    fixed: Numbers  #: (F,) the body at each contact of a sphere with floor or wall
     fixed_depths: Array  #: (F,) overlaps at these contacts [m]
 
     @classmethod
     def of(cls, spheres: Iterable[Array], radius: float | Array, boundaries: LammpsBoundaries) -> Self:
-        """Find the contacts of spheres of different smarticles, and of spheres with floor and wall.
+        """Find the contacts of spheres of different bodies, and of spheres with floor and wall.
 
         Args:
             spheres: (S, 3) centres of the spheres of each of N bodies [m].

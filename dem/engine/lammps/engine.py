@@ -197,7 +197,7 @@ class LammpsEngine:
         if self.count:
             self._run(steps)
         elif self._box:
-            raise RunError("engine: lammps lost its smarticles")
+            raise RunError("engine: lammps lost its bodies")
         self.steps += steps
         self.time += steps * self.time_step
         self._seconds += steps * self.time_step * float(self._relative_masses.sum())
@@ -234,7 +234,7 @@ class LammpsEngine:
         rows = np.array(lines[HEAD].split(), dtype=np.float64).reshape(-1, len(text.WRITTEN.split()))
         file.unlink()
         if len(rows) != self.count:
-            raise RunError(f"LAMMPS wrote {len(rows)} of {self.count} smarticles at step {step}")
+            raise RunError(f"LAMMPS wrote {len(rows)} of {self.count} bodies at step {step}")
         return np.asarray(rows[np.argsort(rows[:, 0])])
 
     @property
