@@ -40,6 +40,13 @@ class Printable:
         return getattr(self.stream, name)
 
 
+def redraw(text: str, *, last: bool = False) -> None:
+    """Write text to standard error in place of the current line; `last` ends the line."""
+    sys.stderr.write(ERASE_LINE)
+    sys.stderr.write(text + "\n" * last)
+    sys.stderr.flush()
+
+
 def bare(stream: TextIO) -> TextIO:
     """Return the stream below a `Printable`, for rich, which writes control characters of its own."""
     return stream.stream if isinstance(stream, Printable) else stream

@@ -11,6 +11,7 @@ from textwrap import wrap
 from typing import TYPE_CHECKING
 
 from dem.errors import InputError
+from dem.terminal import redraw
 from smarticles.command_line import Cell, Commands, add_options, as_json, columns, names, reject_existing
 from smarticles.measuring import grouped, measured, of_phase, sources
 
@@ -141,12 +142,10 @@ class _Progress:
         if runs > 1 and (terminal or now - self._last > 10):
             self._last = now
             text = f"measured {done} of {runs} runs"
-            print(
-                f"\r{text}" if terminal else text,
-                end="\n" * (done == runs or not terminal),
-                file=sys.stderr,
-                flush=True,
-            )
+            if terminal:
+                redraw(text, last=done == runs)
+            else:
+                print(text, file=sys.stderr, flush=True)
 
 
 def _groups(arguments: argparse.Namespace) -> Sequence[str]:
