@@ -161,7 +161,8 @@ class Scene(Part):
     def _pulls_of_body(cls, value: Any, info: ValidationInfo) -> Any:
         if not isinstance(value, list | tuple):
             return value
-        return [with_pull_defaults(phase, _sizes(info.data)) for phase in value]
+        sizes = _sizes(info.data)
+        return [with_pull_defaults(phase, sizes) for phase in value]
 
     @model_validator(mode="wrap")
     @classmethod
