@@ -22,7 +22,7 @@ from dem.record.names import SCENE
 from dem.record.run import Run, open_run
 from dem.scene.reading import SCHEMA_VERSION, apply_override, dump_scene
 from dem.scene.scene import Scene
-from dem.setting.fidelity import fidelities
+from dem.scene.stiffness import stiffness_for
 from dem.yaml_text import load_yaml, read_text
 from postprocess.measures.registry import FrameMeasure, measure_of
 from smarticles.main import BAD_INPUT
@@ -297,8 +297,10 @@ def _explicit_keys(scene: Scene) -> dict[str, Any]:
     """Return the keys that were set explicitly, without derived keys, which may depend on varied keys."""
     data = scene.model_dump(mode="json", exclude_unset=True)
     if "fidelity" in data:
-        named = fidelities(scene.engine)[scene.fidelity.base]
-        differing = {key: value for key, value in data["fidelity"].items() if named.get(key) != value}
+        derived = dict(scene.named_knobs)
+        if scene.smooth:
+            derived["stiffness_N_per_m"] = max(derived["stiffness_N_per_m"], stiffness_for(scene))
+        differing = {key: value for key, value in data["fidelity"].items() if derived.get(key) != value}
         data["fidelity"] = {**differing, "base": scene.fidelity.base}
     return {"schema_version": SCHEMA_VERSION, **data}
 

@@ -10,7 +10,7 @@ from dem.plan.effects import Decision, decide
 from dem.plan.steps import stable_step, time_steps
 from dem.scene.scene import Scene
 from dem.scene.stiffness import expected_overlaps, too_soft
-from dem.setting.fidelity import Fidelity, fidelities
+from dem.setting.fidelity import Fidelity
 from dem.setting.protocol import PARTS, PROTOCOLS, applies
 
 _LEFT_OUT = {
@@ -53,6 +53,8 @@ class Plan:
     engine: str = "yade"
     fidelity: str = "standard"
     stiffness_N_per_m: float = 0.0
+    named_rows: int = 1  #: `fidelity.rows` that the name of the fidelity has in the scene
+    named_stiffness_N_per_m: float = 0.0  #: Stiffness that the name of the fidelity has
     bodies: str = "smarticles"  #: Kinds of bodies in words
     strands: int = 0  #: Strands of a link on the engine links; 0 on engines with spheres
     correction: float = 1.0  #: Factor by which wall times were corrected
@@ -109,10 +111,9 @@ class Plan:
         idle = ", ".join(engine_kind(self.engine).idle_knobs)
         if not self.strands:
             return [f"engine {self.engine}: {idle} have no meaning here"] if idle else []
-        named = fidelities(self.engine)[self.fidelity]
-        usual = f" (by name {named['rows']}, {named['stiffness_N_per_m']:g} N/m)"
-        if (self.strands, self.stiffness_N_per_m) == (named["rows"], named["stiffness_N_per_m"]):
-            usual = ""
+        named = (self.named_rows, self.named_stiffness_N_per_m)
+        changed = (self.strands, self.stiffness_N_per_m) != named
+        usual = f" (by name {named[0]}, {named[1]:g} N/m)" if changed else ""
         return [
             f"engine {self.engine}: fidelity.rows are strands; {idle} have no meaning here",
             f"fidelity {self.fidelity}: {self._strands}, {self.stiffness_N_per_m:g} N/m, time step "
@@ -170,6 +171,8 @@ def plan(scene: Scene) -> Plan:
         engine=scene.engine,
         fidelity=scene.fidelity.base,
         stiffness_N_per_m=scene.fidelity.stiffness_N_per_m,
+        named_rows=scene.named_knobs["rows"],
+        named_stiffness_N_per_m=scene.named_knobs["stiffness_N_per_m"],
         bodies=_bodies(scene),
         strands=scene.fidelity.rows if scene.smooth else 0,
         protocol=protocol_lines(scene),
@@ -192,8 +195,7 @@ def warnings_of(scene: Scene) -> tuple[str, ...]:
 
 def engine_warnings(scene: Scene) -> tuple[str, ...]:
     """Return a warning in one line about knobs that the scene sets and its engine ignores."""
-    fidelity = scene.fidelity
-    named = fidelities(scene.engine)[fidelity.base]
+    fidelity, named = scene.fidelity, scene.named_knobs
     usual = {key: named.get(key, Fidelity.model_fields[key].default) for key in engine_kind(scene.engine).idle_knobs}
     idle = [f"{key} ({getattr(fidelity, key):g})" for key, value in usual.items() if getattr(fidelity, key) != value]
     if not idle:

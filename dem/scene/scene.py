@@ -236,6 +236,11 @@ class Scene(Part):
         return self.count * self.model.volume / (math.pi * self.container.radius_m**2 * filling)
 
     @property
+    def named_knobs(self) -> Mapping[str, Any]:
+        """Knobs that the name of the fidelity has in this scene, without those that the scene or a rule changes."""
+        return _named(self.fidelity.base, dict(self), self.fidelity.diameter_m)
+
+    @property
     def smooth(self) -> bool:
         """Whether the engine computes links as swept segments, not as chains of spheres."""
         return self.engine == "links"

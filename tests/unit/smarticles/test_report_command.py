@@ -18,7 +18,7 @@ from dem.scene.scene import Scene
 from postprocess.pictures import render
 from postprocess.report import figures
 from smarticles.reporting.charts import Groups, against_variable, thinned
-from smarticles.reporting.run import effect_blocks
+from smarticles.reporting.run import accuracy_blocks, effect_blocks
 from smarticles.reporting.sweep import _figures
 from smarticles.sweeps import make_folder
 from studies.registry import shipped
@@ -99,6 +99,13 @@ def test_the_page_of_a_run_has_everything(run: Path, smarticles: Smarticles) -> 
     assert "smarticles run pile/scene.yaml --out pile-again" in page.text
     assert str(run.parent) not in (run / "report.html").read_text(encoding="utf-8")
     assert len(page.of("img")) >= 3
+
+
+def test_knobs_that_follow_from_the_scene_are_no_changes() -> None:
+    square = {"thickness_normal_m": 5e-4, "thickness_in_plane_m": 5e-4}
+    blocks = "".join(accuracy_blocks(small({"engine": "links", "fidelity": "standard", "smarticle": square}), None))
+    assert "this run" in blocks
+    assert "This scene changes" not in blocks
 
 
 def test_nothing_leaves_the_page_and_nothing_runs_in_it(run: Path, smarticles: Smarticles) -> None:
