@@ -23,6 +23,7 @@ from dem.record.run import Run, open_run
 from dem.scene.reading import SCHEMA_VERSION, apply_override, dump_scene
 from dem.scene.scene import Scene
 from dem.scene.stiffness import stiffness_for
+from dem.setting.contact import PRESET
 from dem.yaml_text import load_yaml, read_text
 from postprocess.measures.registry import FrameMeasure, measure_of
 from smarticles.main import BAD_INPUT
@@ -306,7 +307,7 @@ def _explicit_keys(scene: Scene) -> dict[str, Any]:
 
 
 def _read_scene_file(path: Path) -> dict[str, Any]:
-    """Return the content of a scene file, in which paths of runs to take over are absolute."""
+    """Return the content of a scene file, in which paths of other files are absolute."""
     try:
         data = load_yaml(read_text(path))
     except (OSError, ValueError, yaml.YAMLError) as error:
@@ -314,8 +315,9 @@ def _read_scene_file(path: Path) -> dict[str, Any]:
         raise InputError(msg) from None
     if not isinstance(data, dict):
         raise InputError(f"{path}: a scene is a mapping of keys to values, got {type(data).__name__}")
-    for phase in data["phases"] if isinstance(data.get("phases"), list) else ():
-        # `run` is relative to the scene file, and the template is in another folder.
-        if isinstance(phase, dict) and isinstance(phase.get("run"), str):
-            phase["run"] = str((path.parent / phase["run"]).resolve())
+    phases = data["phases"] if isinstance(data.get("phases"), list) else ()
+    # These paths are relative to the scene file, and the template is in another folder.
+    for part, key in [(data.get("contact"), PRESET), *((phase, "run") for phase in phases)]:
+        if isinstance(part, dict) and isinstance(part.get(key), str):
+            part[key] = str((path.parent / part[key]).resolve())
     return data

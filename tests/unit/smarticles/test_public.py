@@ -123,6 +123,17 @@ def test_a_scene_that_a_template_would_run_is_rejected(tmp_path: Path) -> None:
         write_sweep(scene_of(name="{{ 7 * 7 }}"), {"count": [1, 2]}, tmp_path)
 
 
+def test_a_preset_is_found_beside_the_scene_file(tmp_path: Path) -> None:
+    (tmp_path / "own").mkdir()
+    (tmp_path / "own" / "contact.yaml").write_text("friction_wall: 0.25\n")
+    scene = tmp_path / "own" / "scene.yaml"
+    scene.write_text(
+        "schema_version: 1\nseed: 1\ncount: 5\ncontact: {preset: contact.yaml}\nphases: [{type: deposit}]\n"
+    )
+    points = expand(load_sweep(write_sweep(scene, {"count": [4, 5]}, tmp_path)))
+    assert [point.scene.contact.friction_wall for point in points] == [0.25, 0.25]
+
+
 def test_keys_that_end_alike_keep_all_their_words(tmp_path: Path) -> None:
     waits = [{"type": "deposit"}, {"type": "relax"}, {"type": "relax"}]
     scene = smarticles.Scene(seed=1, count=5, phases=waits)
