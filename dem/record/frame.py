@@ -4,7 +4,7 @@ import contextlib
 import io
 import math
 import warnings
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from types import MappingProxyType
@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dem.arrays import Array, Flags, Numbers
-from dem.body.kinds import Mixture
+from dem.body.kinds import Kind, Mixture
 from dem.body.particle import LINKS, Particle
 from dem.body.state import PileState, RigidState
 from dem.record.files import cannot_read
@@ -129,26 +129,20 @@ def segment_mesh(state: RigidState, *, contacts: Numbers, time: float, floor: fl
 
 def sphere_mesh(state: PileState, particle: Particle | Mixture) -> meshio.Mesh:
     """Return the spheres of all bodies as points, for ParaView's glyphs."""
+    bodies: Sequence[Particle | Kind]
     if state.bodies is not None:
-        bodies = state.bodies
-        kinds = [bodies.mixture.kinds[k] for k in bodies.kind]
-        sizes, points = [len(kind.centres) for kind in kinds], np.concatenate(bodies.spheres_by_body())
-        own = {
-            "radius_m": np.repeat([kind.radius for kind in kinds], sizes),
-            "smarticle_id": np.repeat(np.arange(state.count), sizes),
-            "link": np.concatenate([kind.links for kind in kinds]),
-        }
-        return meshio.Mesh(points, [("vertex", np.arange(len(points))[:, None])], point_data=own)
-    assert isinstance(particle, Particle)  # a pile of smarticles
-    count, spheres = state.count, len(particle.centres)
-    number = count * spheres
+        bodies = [state.bodies.mixture.kinds[k] for k in state.bodies.kind]
+        points = np.concatenate(state.bodies.spheres_by_body())
+    else:
+        assert isinstance(particle, Particle)  # a pile of smarticles
+        bodies, points = [particle] * state.count, state.smarticles.spheres(particle).reshape(-1, 3)
+    sizes = [len(body.centres) for body in bodies]
     data = {
-        "radius_m": np.full(number, particle.radius),
-        "smarticle_id": np.repeat(np.arange(count), spheres),
-        "link": np.tile(particle.links, count).astype(np.int64),
+        "radius_m": np.repeat([body.radius for body in bodies], sizes),
+        "smarticle_id": np.repeat(np.arange(state.count), sizes),
+        "link": np.concatenate([body.links for body in bodies]),
     }
-    points = state.smarticles.spheres(particle).reshape(-1, 3)
-    return meshio.Mesh(points, [("vertex", np.arange(number)[:, None])], point_data=data)
+    return meshio.Mesh(points, [("vertex", np.arange(len(points))[:, None])], point_data=data)
 
 
 def _lines(count: int) -> Numbers:
