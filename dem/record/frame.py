@@ -4,7 +4,7 @@ import contextlib
 import io
 import math
 import warnings
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from types import MappingProxyType
@@ -242,22 +242,7 @@ def read_frame(path: Path | str, number: int | None = None) -> Frame:
     points, lines = np.asarray(mesh.points), np.asarray(mesh.cells[0].data)
     data = {name: np.asarray(values[0]) for name, values in mesh.cell_data.items()}
     general = "kind" in data
-    # Form of the values of links, number of points, and the points of each line, in order.
-    if general:
-        form, expected, joined = (len(lines),), 2 * len(lines), "its own two points"
-        order = np.arange(expected).reshape(-1, 2)
-    else:
-        count = len(lines) // LINKS
-        form, expected, joined = (count, LINKS), VERTICES * count, "tip, hinge, hinge, tip"
-        order = _lines(count)
-    if form[0] == 0:
-        reject("it holds no smarticle")
-    if points.shape != (expected, 3):
-        reject(f"{len(lines)} lines need {expected} points of 3 coordinates: got {points.shape}")
-    if not np.array_equal(lines, order):
-        reject(f"its lines do not join {joined} in order")
-    if not np.all(np.isfinite(points)):
-        reject("a point is not finite")
+    form = _form(points, lines, reject, general=general)
 
     def per_link(name: str, kind: Any, *shape: int) -> NDArray[Any]:
         """Return cell data (N, 3, …) of smarticles, or (M, …) of other bodies."""
@@ -295,7 +280,7 @@ def read_frame(path: Path | str, number: int | None = None) -> Frame:
     else:
         if np.any((identifiers != identifiers[:, :1]) | (links != np.arange(LINKS))):
             reject("'smarticle_id' and 'link' are not in smarticle-major order")
-        bars, first, vertices = None, LINKS * np.arange(count), points.reshape(count, VERTICES, 3)
+        bars, first, vertices = None, LINKS * np.arange(form[0]), points.reshape(-1, VERTICES, 3)
     return Frame(
         path=path,
         number=number,
@@ -313,6 +298,29 @@ def read_frame(path: Path | str, number: int | None = None) -> Frame:
         ),
         bars=bars,
     )
+
+
+def _form(
+    points: NDArray[Any], lines: NDArray[Any], reject: Callable[[str], NoReturn], *, general: bool
+) -> tuple[int, ...]:
+    """Return the form of values of links, (N, 3) of smarticles or (M,) of other bodies; reject damaged lines."""
+    form: tuple[int, ...]
+    if general:
+        form, expected, joined = (len(lines),), 2 * len(lines), "its own two points"
+        order = np.arange(expected).reshape(-1, 2)
+    else:
+        count = len(lines) // LINKS
+        form, expected, joined = (count, LINKS), VERTICES * count, "tip, hinge, hinge, tip"
+        order = _lines(count)
+    if form[0] == 0:
+        reject("it holds no smarticle")
+    if points.shape != (expected, 3):
+        reject(f"{len(lines)} lines need {expected} points of 3 coordinates: got {points.shape}")
+    if not np.array_equal(lines, order):
+        reject(f"its lines do not join {joined} in order")
+    if not np.all(np.isfinite(points)):
+        reject("a point is not finite")
+    return form
 
 
 def read_mesh(path: Path, what: str = "frame", remedy: str | None = None, *, number: int = 0) -> Any:
