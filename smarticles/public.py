@@ -20,7 +20,7 @@ from dem.errors import InputError, RunError
 from dem.record.frame import Frame
 from dem.record.names import SCENE
 from dem.record.run import Run, open_run
-from dem.scene.reading import SCHEMA_VERSION, apply_override, dump_scene
+from dem.scene.reading import SCHEMA_VERSION, dump_scene
 from dem.scene.scene import Scene
 from dem.scene.stiffness import stiffness_for
 from dem.setting.contact import PRESET
@@ -31,6 +31,7 @@ from smarticles.measuring import grouped, measured
 from smarticles.sweeps import compute, make_folder, raise_failures
 from templates.local import environment, smarticles_command
 from templates.sweep.folder import Folder, open_folder
+from templates.sweep.from_scene import as_template
 from templates.sweep.sweep_file import SEED
 
 if TYPE_CHECKING:
@@ -263,22 +264,13 @@ def write_sweep(scene: Scene | Path | str, vary: Mapping[str, Sequence[Any]], fo
     if not vary:
         raise InputError("vary: is empty; give a key of the scene and its values, e.g. {'seed': [1, 2, 3]}")
     data = _explicit_keys(scene) if isinstance(scene, Scene) else _read_scene_file(Path(scene))
-    text = yaml.safe_dump(data, sort_keys=False, allow_unicode=True)
-    for mark in ("{{", "{%", "{#"):
-        if mark in text:
-            name = "scene" if isinstance(scene, Scene) else scene
-            raise InputError(f"{name}: contains {mark!r}, which is template syntax; remove it")
     # A variable is named by the last word of its key, or by all words if two keys end alike.
     last = [key.rpartition(".")[2] for key in vary]
     names = {
         key: word if last.count(word) == 1 and not word.isdigit() else key.replace(".", "_")
         for key, word in zip(vary, last, strict=True)
     }
-    for key, name in names.items():
-        apply_override(data, f"{key}='{{{{ {name} }}}}'")
-    text = yaml.safe_dump(data, sort_keys=False, allow_unicode=True)
-    for name in names.values():
-        text = text.replace(f"'{{{{ {name} }}}}'", f"{{{{ {name} }}}}")
+    text = as_template(data, names, "scene" if isinstance(scene, Scene) else str(scene))
     (folder / "scene.yaml.j2").write_text(text, encoding="utf-8")
     grid = {name: list(vary[key]) for key, name in names.items() if name != SEED}
     content: dict[str, Any] = {
