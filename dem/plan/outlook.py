@@ -141,27 +141,30 @@ def _bodies(scene: Scene) -> str:
     return f"bodies ({', '.join(names)})"
 
 
-def plan(scene: Scene) -> Plan:
-    """Compute the plan of a scene: phases, effects, time steps and cost."""
-    kind = engine_kind(scene.engine)
-    steps = time_steps(scene)
-    model = scene.model
-    phases = []
-    for index, (phase, dt) in enumerate(zip(scene.phases, steps, strict=True)):
+def planned_phases(scene: Scene) -> tuple[PlannedPhase, ...]:
+    """Return the phases of a scene with their time steps and expected wall times."""
+    kind, phases = engine_kind(scene.engine), []
+    for index, (phase, dt) in enumerate(zip(scene.phases, time_steps(scene), strict=True)):
         estimate = phase.expected_duration(scene.count)
         wall = kind.seconds_per_second(scene, dt, scene.activity(index)) * estimate
         phases.append(PlannedPhase(index, phase.kind, phase.known_duration, estimate, wall, dt))
+    return tuple(phases)
+
+
+def plan(scene: Scene) -> Plan:
+    """Compute the plan of a scene: phases, effects, time steps and cost."""
+    kind, phases = engine_kind(scene.engine), planned_phases(scene)
     effects = decide(scene)
     engines = Adds.together(effect.adds for effect in effects).engines
     return Plan(
         name=scene.name,
         count=scene.count,
         spheres_per_smarticle=max(len(body.centres) for body in scene.bodies),
-        sphere_diameter_m=model.diameter,
-        time_step_s=min(steps),
+        sphere_diameter_m=scene.model.diameter,
+        time_step_s=min(phase.time_step_s for phase in phases),
         stable_time_step_s=stable_step(scene),
         container_height_m=scene.cylinder.height,
-        phases=tuple(phases),
+        phases=phases,
         effects=effects,
         engines=tuple(sorted(engines, key=kind.order.index)),
         frames=round(sum(phase.estimate_s for phase in phases) / scene.recording.frame_interval_s),
