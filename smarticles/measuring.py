@@ -175,12 +175,15 @@ def of_phase(table: pd.DataFrame, phase: str) -> pd.DataFrame:
     return table[table["phase type"] == phase].reset_index(drop=True)
 
 
-def grouped(table: pd.DataFrame, by: Sequence[str]) -> pd.DataFrame:
-    """Average a table of `measured` over runs with equal values in `by`, with standard errors, by phase."""
+def grouped(table: pd.DataFrame, by: Sequence[str], *, intervals: bool = False) -> pd.DataFrame:
+    """Average a table of `measured` over runs with equal values in `by`, with standard errors, by phase.
+
+    With `intervals` it has the half-widths "… 95 % […]" of confidence intervals, too.
+    """
     from postprocess.statistics.points import means_by  # noqa: PLC0415
 
     for name in by:
         if name not in table.columns:
             known = [str(column) for column in table.columns if not str(column).endswith("]")]
             raise InputError(f"{name!r} is no column of these runs; {nearest(name, known)}")
-    return means_by(table, [*by, *(name for name in PHASE if name not in by)])
+    return means_by(table, [*by, *(name for name in PHASE if name not in by)], intervals=intervals)
