@@ -265,7 +265,7 @@ def _kinds(mixture: Mixture) -> tuple[Kind, ...]:
             bars=len(kind.bars.points),
             mass_kg=kind.mass,
             volume_m3=kind.volume,
-            length_m=float(kind.bars.lengths.sum()),
+            length_m=kind.length,
             thickness_normal_m=kind.bars.thickness_normal,
             thickness_in_plane_m=kind.bars.thickness_in_plane,
             round=kind.bars.round,

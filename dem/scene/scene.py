@@ -231,7 +231,7 @@ class Scene(Part):
         if mixture is None:
             length = float(self.smarticle.boxes.lengths.sum())
         else:
-            length = mixture.mean([float(kind.bars.lengths.sum()) for kind in mixture.kinds])
+            length = mixture.mean([kind.length for kind in mixture.kinds])
         filling = factor * self.sphere_diameter / length
         return self.count * self.model.volume / (math.pi * self.container.radius_m**2 * filling)
 
