@@ -572,7 +572,11 @@ class Promises:
     name: str = "fidelities"
 
     def draw(self, path: Path, analysis: Analysis) -> list[Path]:
-        """Draw the ladder of one scene; return the files."""
+        """Draw the largest error of each named fidelity against its cost, for the scene of an analysis.
+
+        Returns:
+            The files.
+        """
         table = analysis.tables["work_precision"]
         return self.compare(path, {str(table[ACTIVITY].dropna().iloc[0]): table}, analysis.footer)
 

@@ -101,7 +101,7 @@ def friction(access: EngineAccess, out: Path, *, value: float, count: int) -> li
 def _with_step(data: dict[str, Any], share: float) -> tuple[dict[str, Any], float, float]:
     """Set a scene's time step to `share` times the stable step; return scene, step and stable step [s]."""
     stable = stable_step(scene_of(data))
-    return {**data, "fidelity": {"base": "draft", "time_step_s": share * stable}}, share * stable, stable
+    return {**data, "fidelity": {**data["fidelity"], "time_step_s": share * stable}}, share * stable, stable
 
 
 @hard("time step 0.5 of the stable one", {"share": 0.5, "count": 4}, {"count": 40})

@@ -157,7 +157,8 @@ def same_place(access: EngineAccess, out: Path, *, time: float) -> list[Check]:
 def shaken(access: EngineAccess, out: Path, *, count: int, seconds: float, rest: float) -> list[Check]:
     """Shake at Γ = 10 and 30 Hz, then rest."""
     shake = {"type": "shake", "duration_s": seconds, "frequency_hz": 30, "peak_acceleration_g": 10}
-    run = whole(scene_data(access, shake, {"type": "relax", "duration_s": rest}, count=count), out)
+    # By its name: the time step of 250 N/m is too long for the floor's speed.
+    run = whole(scene_data(access, shake, {"type": "relax", "duration_s": rest}, count=count, fidelity="draft"), out)
     checks = run.sound()
     if run.error is None:
         peak = 10 * 9.81 / (2 * np.pi * 30)
