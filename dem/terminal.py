@@ -47,6 +47,11 @@ def redraw(text: str, *, last: bool = False) -> None:
     sys.stderr.flush()
 
 
+def warn(text: str) -> None:
+    """Print a warning to standard error."""
+    print(f"smarticles: warning: {text}", file=sys.stderr)
+
+
 def bare(stream: TextIO) -> TextIO:
     """Return the stream below a `Printable`, for rich, which writes control characters of its own."""
     return stream.stream if isinstance(stream, Printable) else stream

@@ -9,7 +9,7 @@ from time import monotonic
 from dem.errors import RunError
 from dem.record.document import Progress
 from dem.record.names import PROGRESS
-from dem.terminal import ERASE_LINE, redraw
+from dem.terminal import ERASE_LINE, redraw, warn
 
 INTERVAL = 1.0  # s of wall time between updates
 
@@ -46,7 +46,7 @@ class ProgressWriter:
     def warn(self, message: str) -> None:
         """Print a warning to standard error."""
         self._erase()
-        sys.stderr.write(f"smarticles: warning: {message}\n")
+        warn(message)
 
     def checkpointed(self, time: float) -> None:
         """Write the simulated time [s] of a new checkpoint at once."""
