@@ -79,6 +79,11 @@ class Kind:
         """Length of the longest bar [m]."""
         return float(self.bars.lengths.max())
 
+    @cached_property
+    def length(self) -> float:
+        """Sum of the bars' lengths [m]."""
+        return float(self.bars.lengths.sum())
+
     @property
     def thicknesses(self) -> tuple[float, float]:
         """Thickness along the normal and in the plane [m]."""

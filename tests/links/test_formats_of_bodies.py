@@ -66,6 +66,14 @@ def test_frames_in_one_file_are_those_in_many(tmp_path: Path) -> None:
         assert radii == pytest.approx((width if flat else kind.sphere_diameter_m) / 2)
 
 
+def test_frames_of_bodies_are_read_only(tmp_path: Path) -> None:
+    (frame,) = written(tmp_path / "run", *SHAPES, count=10, frames="vtu")[1].frames
+    assert frame.bars is not None
+    arrays = [value for part in (frame, frame.bars) for value in vars(part).values() if isinstance(value, np.ndarray)]
+    assert len(arrays) == 10
+    assert not any(array.flags.writeable for array in arrays)
+
+
 @pytest.mark.parametrize("name", SHAPES)
 def test_capsules_are_the_strands_of_the_engine(name: str, tmp_path: Path) -> None:
     state, run = written(tmp_path, name, count=2, frames="vtkhdf")

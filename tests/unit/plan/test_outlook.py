@@ -69,6 +69,13 @@ def test_each_effect_is_called_for_by_its_own_part_of_the_scene(changes: dict[st
     assert json.loads(json.dumps(asdict(planned)))["effects"][0]["adds"]["engines"] == list(plain.engines)
 
 
+def test_knobs_are_compared_with_those_of_the_name_in_this_scene() -> None:
+    narrow = {"engine": "links", "fidelity": "standard", "smarticle": {"thickness_normal_m": 5e-4}}
+    assert "fidelity standard: 1 strand, 1000 N/m, time step 0.92 of the stable one\n" in plan(small(narrow)).to_text()
+    two = plan(small({"engine": "links", "fidelity": {"base": "standard", "rows": 2, "diameter_m": 4e-4}})).to_text()
+    assert "fidelity standard: 2 strands, 1000 N/m, time step 0.92 of the stable one (by name 1, 1000 N/m)\n" in two
+
+
 def test_every_column_belongs_to_one_effect() -> None:
     declared = [name for adds in ADDS.values() for name in adds.series]
     tables = (COLUMNS, MOTOR_COLUMNS, ENERGY_COLUMNS, LEDGER_COLUMNS, HOOK_COLUMNS, RELEASE_COLUMNS, STRAIN_COLUMNS)

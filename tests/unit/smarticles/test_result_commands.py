@@ -2,6 +2,7 @@
 
 import csv
 import json
+import sys
 from pathlib import Path
 
 import pandas as pd
@@ -31,6 +32,15 @@ def test_measure_writes_a_profile_of_each_run_beside_the_table(
     assert (again.status, "exists" in again.err) == (2, True)
     both = smarticles("measure", runs[0], "--profile", tmp_path / "x.csv", "--table", tmp_path / "x.csv")
     assert (both.status, "is the file of --table too" in both.err) == (2, True)
+
+
+def test_measure_replaces_its_line_of_progress(
+    tmp_path: Path, write_run: WriteRun, smarticles: Smarticles, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    runs = [write_run(tmp_path / "a"), write_run(tmp_path / "b", seed=2)]
+    monkeypatch.setattr(sys.stderr, "isatty", lambda: True)
+    said = smarticles("measure", *runs, "--jobs", "1")
+    assert said.err == "\r\x1b[Kmeasured 1 of 2 runs\r\x1b[Kmeasured 2 of 2 runs\n"
 
 
 def test_measure_gives_json_without_nan(tmp_path: Path, write_run: WriteRun, smarticles: Smarticles) -> None:

@@ -7,6 +7,8 @@ import pytest
 from command_cases import Smarticles, WriteRun
 from synthetic import write_ended
 
+from dem.plan.steps import time_steps
+from dem.scene.scene import Scene
 from studies.registry import shipped
 from templates.sweep.folder import open_folder
 
@@ -27,6 +29,26 @@ def test_a_dry_run_lists_and_writes_nothing(sweep_file: Path, smarticles: Smarti
     assert [line.split()[:2] for line in lines[1:3]] == [["n5", "5"], ["n6", "6"]]
     assert lines[3].startswith("2 runs, about ")
     assert sorted(sweep_file.parent.iterdir()) == before
+
+
+@pytest.mark.parametrize(
+    "options", ["--to snakemake --dry-run", "--to row --out out", "--cluster local-slurm --out out"]
+)
+def test_each_run_is_planned_once(
+    options: str, sweep_file: Path, tmp_path: Path, smarticles: Smarticles, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Plans take far longer than all else: 0.2 s for a scene with motors."""
+    monkeypatch.chdir(tmp_path)
+    planned: list[Scene] = []
+
+    def noted(scene: Scene) -> tuple[float, ...]:
+        planned.append(scene)
+        return time_steps(scene)
+
+    monkeypatch.setattr("dem.plan.outlook.time_steps", noted)
+    said = smarticles("sweep", sweep_file, *options.split())
+    assert said.status == 0, said.err
+    assert len(planned) == 2
 
 
 def test_a_sweep_is_written_and_started_later(sweep_file: Path, tmp_path: Path, smarticles: Smarticles) -> None:
