@@ -19,7 +19,7 @@ from postprocess.bodies.fields import BY_NAME, Field, link_values
 from postprocess.geometry.links import Floats, Whole
 from postprocess.measures.contacts import strands_of
 
-_NAMES = ("barb 1", "middle link", "barb 2")
+_NAMES: tuple[str, ...] = ("barb 1", "middle link", "barb 2")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -78,15 +78,16 @@ def write_trajectory(
     Args:
         frames: the frames with their numbers.
         fields: fields to write as `log/particles/NAME`.
-        first: the frames once more, read before all others for the size of the box.
+        first: the frames once more, read before all others for shapes and the size of the box.
     """
     import gsd.hoomd  # noqa: PLC0415 - an extra
 
-    half, written = np.zeros(3), 0
+    half, most, written = np.zeros(3), 0, 0
     shapes: list[dict[str, Any]] = []
     for frame in first:
         capsules = capsules_of(frame, run)
-        shapes = shapes or shapes_of(capsules)
+        if len(capsules.ends) > most:  # earlier frames may lack whole types
+            shapes, most = shapes_of(capsules), len(capsules.ends)
         half = np.maximum(half, np.abs(capsules.ends).max(axis=(0, 1)) + capsules.radii.max())
     with gsd.hoomd.open(path, "w") as file:
         for number, frame in frames:

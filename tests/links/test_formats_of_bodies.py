@@ -1,5 +1,7 @@
 """Frames in one file, and capsules for GSD, of bodies that are no smarticles."""
 
+import importlib.util
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +14,7 @@ from scipy.spatial.transform import Rotation
 from dem.body.placement import Poses
 from dem.body.state import RigidState
 from dem.engine.links.shapes import rigid_shape
-from dem.record.frame import segment_mesh
+from dem.record.frame import RecordedBars, segment_mesh
 from dem.record.names import MANIFEST, SCENE
 from dem.record.run import Run
 from dem.record.vtkhdf import read_step
@@ -21,7 +23,7 @@ from dem.run.run import manifest
 from dem.scene.reading import dump_scene
 from postprocess.measures.caging import cages
 from postprocess.measures.contacts import strands_of
-from postprocess.trajectory import capsules_of, orientations, shapes_of
+from postprocess.trajectory import capsules_of, orientations, shapes_of, write_trajectory
 from smarticles.commands.compare import compare_bits
 
 SHAPES: dict[str, dict[str, Any]] = {
@@ -111,3 +113,30 @@ def test_round_rods_that_cross_touch_once_at_any_fidelity(tmp_path: Path) -> Non
         _, run = written(tmp_path / fidelity, "round rod", count=2, fidelity=fidelity, places=places, turns=crossing)
         strands = strands_of(run.frames[0], run)
         assert cages(strands.axes, strands.body, diameter=strands.diameter).contacts.tolist() == [1, 1], fidelity
+
+
+@pytest.mark.skipif(importlib.util.find_spec("gsd") is None, reason="the package gsd is not installed")
+def test_a_trajectory_has_the_shapes_of_kinds_that_are_poured_later(tmp_path: Path) -> None:
+    import gsd.hoomd  # noqa: PLC0415
+
+    _, run = written(tmp_path, "rod", "cross", count=4)
+    last = run.frames[0]
+    assert last.bars is not None
+    bars = np.flatnonzero(last.body == 0)
+    alone = RecordedBars(*(getattr(last.bars, name)[bars] for name in ("segments", "body", "number")),
+                         last.bars.kind[:1], last.bars.normals[bars])  # fmt: skip
+    early = replace(
+        last,
+        vertices=last.vertices[:1],
+        smarticle_ids=last.smarticle_ids[:1],
+        link_velocity=last.link_velocity[bars],
+        bars=alone,
+    )
+    assert len(set(last.kind)) == 2
+    frames = [early, last]
+    assert write_trajectory(tmp_path / "all.gsd", run, enumerate(frames), [], first=frames) == 2
+    with gsd.hoomd.open(tmp_path / "all.gsd", "r") as file:
+        assert [frame.particles.N for frame in file] == [len(capsules_of(frame, run).ends) for frame in frames]
+        for frame in file:
+            assert [len(shape["vertices"]) for shape in frame.particles.type_shapes] == [2] * 5  # no points
+            assert frame.particles.type_shapes == shapes_of(capsules_of(last, run))
