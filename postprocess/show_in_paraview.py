@@ -114,7 +114,7 @@ def largest_at(source: Any, time: float, name: str) -> float:
 
 
 def boxes(_kind: str, source: Any, view: Any) -> None:
-    """Show smarticles coloured by crossings, or, of a planar run, by number, on one scale for all times."""
+    """Show smarticles in colours that mean the same at all times: crossings, or numbers if the run is planar."""
     shown = simple.Show(source, view)
     name = colouring(source)
     simple.ColorBy(shown, ("CELLS", name))

@@ -574,7 +574,11 @@ class Promises:
     name: str = "fidelities"
 
     def draw(self, path: Path, analysis: Analysis) -> list[Path]:
-        """Draw the ladder of one scene; return the files."""
+        """Draw the largest error of each named fidelity against its cost, for the scene of an analysis.
+
+        Returns:
+            The files.
+        """
         table = analysis.tables["work_precision"]
         return self.compare(path, {next(iter(table[ACTIVITY].dropna()), ""): table}, analysis.footer)
 

@@ -11,8 +11,9 @@ from dem.run.build import build_engine
 from dem.run.run import run_scene
 from dem.scene.reading import parse_scene
 
+ROUND: dict[str, Any] = {"base": "standard", "rows": 1, "stiffness_N_per_m": 500.0}  # round links on both engines
 POUR: dict[str, Any] = {
-    "fidelity": {"base": "standard", "rows": 1, "stiffness_N_per_m": 500.0},  # round links on both engines
+    "fidelity": ROUND,
     "schema_version": 1,
     "name": "pour",
     "seed": 3,
@@ -22,15 +23,16 @@ POUR: dict[str, Any] = {
 }
 
 
-def pour(engine: str, out: str) -> None:
+def pour(engine: str, out: str, fidelity: Any = ROUND) -> None:
     """A pile at rest, as a run."""
-    run_scene(parse_scene({**POUR, "engine": engine}, source="pour"), Path(out), command="test", progress=False)
+    scene = parse_scene({**POUR, "engine": engine, "fidelity": fidelity}, source="pour")
+    run_scene(scene, Path(out), command="test", progress=False)
 
 
-def taken_over(engine: str, source: str) -> dict[str, Any]:
+def taken_over(engine: str, source: str, fidelity: Any = ROUND) -> dict[str, Any]:
     """Take a pile over, and let it settle and rest for 0.1 s."""
     phases = [{"type": "take-over", "run": source}, {"type": "relax", "duration_s": 0.1}]
-    scene = parse_scene({**POUR, "engine": engine, "phases": phases}, source="on")
+    scene = parse_scene({**POUR, "engine": engine, "fidelity": fidelity, "phases": phases}, source="on")
     running = build_engine(scene, time_step(scene))
     there = take(Path(source), LAST).vertices
     put, memory = None, {}

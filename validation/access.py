@@ -1,4 +1,4 @@
-"""Test access to the internals of engines, for example to set velocities or to hold a body.
+"""Test access to the internals of the engines YADE and links, for example to set velocities or to hold a body.
 
 Both engines use the leapfrog scheme, whose velocities belong to the half step before the positions. For a velocity v at
 t = 0 under an acceleration a, set the velocity v − a dt/2.
@@ -27,7 +27,6 @@ from dem.engine.yade.engine import YadeEngine
 from dem.engine.yade.kind import hinge_law
 from dem.engine.yade.library import rows_of
 from dem.physics.contact import ContactLaw
-from dem.physics.motor import LAWS
 from dem.plan.steps import time_step
 from dem.scene.scene import Scene
 from dem.setting.container import Cylinder
@@ -150,8 +149,7 @@ class Pushed(LinksEngine):
                 sign, place, hinge = (-1.0, 0, -planar.half) if link == 0 else (1.0, 1, planar.half)
                 arm = centre[:2] - [hinge - row[0], -row[1]]
                 pulled[place] += sign * (arm[0] * local[1] - arm[1] * local[0])
-            free = LAWS[motors.law] in ("slip", "servo")
-            (motors.momentum if free else motors.impulse)[k] += dt * pulled
+            motors.momentum[k] += dt * pulled
 
 
 class LinksAccess(_Access):

@@ -83,6 +83,6 @@ _BY_ENGINE: Mapping[str, Mapping[str, Mapping[str, Any]]] = {
 def fidelities(engine: str) -> Mapping[str, Mapping[str, Any]]:
     """Return an engine's named fidelities, from coarse to fine: values of `Fidelity`'s keys by name.
 
-    A named fidelity has similar errors on all engines. An unknown engine gets the fidelities for YADE.
+    An unknown engine gets the fidelities for YADE.
     """
     return _BY_ENGINE.get(engine, FIDELITIES)

@@ -163,7 +163,10 @@ class Return(_Straight):
 
 
 class _Wave(_Endless):
-    """Swing about an angle, at `cycles_offset` 0 upwards first; the barb jumps to the swing's first angle."""
+    """Swing about an angle; the scheduled angle jumps to the first angle of the swing when the motion begins.
+
+    With `cycles_offset` 0 the swing begins at the centre, upwards.
+    """
 
     centre_deg: HingeAngle = Field(..., description="angle that the barb swings about [deg]")
     amplitude_deg: float = Field(

@@ -52,8 +52,8 @@ def average_crossing_numbers(segments: ArrayLike, body: ArrayLike) -> CrossingNu
     """Compute the average crossing numbers of all pairs of bodies, exactly.
 
     The value of two segments is the solid angle over 4π that their differences subtend, at most 1/2. There is no
-    cut-off: the cost is 0.3 µs per pair of segments, 0.1 s for 270 smarticles, 2 s for 200 worms of 20 segments. The
-    matrix takes 8 B² bytes for B bodies.
+    cut-off: the cost is 0.3 µs per pair of segments, 0.1 s for 270 smarticles, 2 s for 200 filaments of 20 segments.
+    The matrix takes 8 B² bytes for B bodies.
 
     Args:
         segments: (M, 2, 3) [m].

@@ -1,4 +1,4 @@
-"""Command `compare`: compare scenes, versions, measures and bits of two runs or two sweeps."""
+"""Command `compare`: compare two runs or two sweeps: scenes, versions, measures, and frames and series bit by bit."""
 
 from __future__ import annotations
 

@@ -129,10 +129,13 @@ def procedure_row(run: Run) -> dict[str, object]:
 
 
 def height_history(run: Run) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Read the height of the centre of mass over h0 (n,) [-], and times since the activity began (n,) [s].
+    """Return the height of the centre of mass over h0 (n,) [-], and the times of its samples (n,) [s].
 
-    The samples begin with the rest before the activity; h0 is the mean height over that rest. InputError if the height
-    was not recorded.
+    h0 is the mean height in the rest before the activity, with which the samples begin; the time is 0 at the beginning
+    of the activity. Samples without a height are left out.
+
+    Raises:
+        InputError: the phases are not one activity between two rests, or no sample of the first rest has a height.
     """
     series, active = run.series, activity(run)
     height = np.asarray(series["com_height_m"], dtype=np.float64)

@@ -1,6 +1,6 @@
 """Runs of a study and their tables: finished and missing runs, columns, and several engines.
 
-If a study has runs on several engines, findings are judged by the runs on links, which is then the judging engine.
+The *judging engine* of a study is the one whose runs decide its findings: links, if runs are on several engines.
 """
 
 import json

@@ -325,7 +325,7 @@ def test_a_sliding_filament_begins_to_roll_as_a_cylinder() -> None:
 # -- in a pile -----------------------------------------------------------------------------------------------------
 
 
-WORM = Filament(
+ACTIVE = Filament(
     nodes=13, length=30e-3, diameter=0.8e-3, density=1060.0, young_modulus=5e4, stretching_time=1e-4,
     bending_time=2e-3, liquid=Liquid(viscosity=1e-3, density=1000.0),
     curvature=PreferredCurvature(amplitudes=100.0, phases=0.5 * np.arange(11), rate=6.0, reversal_rate=5.0),
@@ -333,8 +333,8 @@ WORM = Filament(
 
 
 def soft(stiffness: float = 10.0) -> ContactLaw:
-    ratio, mass = 0.3, filament_shape(WORM).effective_mass
-    reference = world(WORM).kinds[0].effective_mass
+    ratio, mass = 0.3, filament_shape(ACTIVE).effective_mass
+    reference = world(ACTIVE).kinds[0].effective_mass
     damping = 2 * ratio * math.sqrt(stiffness * mass) * math.sqrt(reference / mass)
     return ContactLaw(
         normal_stiffness=stiffness, tangential_stiffness=0.8 * stiffness, normal_damping=damping / math.sqrt(2),
@@ -342,22 +342,22 @@ def soft(stiffness: float = 10.0) -> ContactLaw:
     )  # fmt: skip
 
 
-def worms(count: int, *, seed: int = 1, **more: object) -> World:
-    """Return worms above each other, each in an arc, which fall into a dish."""
-    worm, rng = replace(WORM, **more), np.random.default_rng(seed)  # type: ignore[arg-type]
+def pile(count: int, *, seed: int = 1, **more: object) -> World:
+    """Return filaments above each other, each in an arc, which fall into a dish."""
+    filament, rng = replace(ACTIVE, **more), np.random.default_rng(seed)  # type: ignore[arg-type]
     law = soft()
-    made = world(worm, gravity=9.81, law=law, radius=12e-3)
-    made.set_time_step(0.9 * filament_stable_time_step(worm, law, made.kinds[0].effective_mass))
-    bow, points = 7.5e-3, np.zeros((count, worm.nodes, 3))
+    made = world(filament, gravity=9.81, law=law, radius=12e-3)
+    made.set_time_step(0.9 * filament_stable_time_step(filament, law, made.kinds[0].effective_mass))
+    bow, points = 7.5e-3, np.zeros((count, filament.nodes, 3))
     for k in range(count):
-        angle = np.linspace(-2, 2, worm.nodes) + rng.uniform(0, 6)
-        points[k] = np.column_stack([bow * np.cos(angle), bow * np.sin(angle), np.full(worm.nodes, 1e-3 * (k + 1))])
+        angle = np.linspace(-2, 2, filament.nodes) + rng.uniform(0, 6)
+        points[k] = np.column_stack([bow * np.cos(angle), bow * np.sin(angle), np.full(filament.nodes, 1e-3 * (k + 1))])
     made.add_filaments(1, points, starts=rng.uniform(0, 6, count), seed=seed)
     return made
 
 
 def test_a_blob_keeps_its_ledger_while_it_acts_falls_and_is_gripped() -> None:
-    made = worms(12)
+    made = pile(12)
     held = LinksFilaments(made)
     contacts = made.contacts().elastic_energy
     start = held.energies.residual + contacts
@@ -378,14 +378,14 @@ def test_a_blob_keeps_its_ledger_while_it_acts_falls_and_is_gripped() -> None:
     assert worst < 0.01, worst
 
 
-def test_worms_repeat_their_bits_also_after_a_checkpoint() -> None:
-    one, two = worms(6), worms(6)
+def test_filaments_repeat_their_bits_also_after_a_checkpoint() -> None:
+    one, two = pile(6), pile(6)
     for made in (one, two):
         LinksFilaments(made).grip({2: [0]})
         made.advance(3000)
     arrays = {name: array.copy() for name, array in one.arrays.items()}
     memory = dict(one.memory)
-    three = worms(6)
+    three = pile(6)
     three.restore(arrays, memory)
     for made in (one, two, three):
         LinksFilaments(made).move(0, (0.0, 0.0, 5e-3))
@@ -401,7 +401,7 @@ def test_worms_repeat_their_bits_also_after_a_checkpoint() -> None:
 
 
 def test_lists_of_a_checkpoint_have_room_however_long_they_are() -> None:
-    made = worms(2)
+    made = pile(2)
     made.make_room(30 * len(made.segments.line))
     made.pairs.counts[0] = len(made.pairs.first)
     made.restore(dict(made.arrays), dict(made.memory))
@@ -431,7 +431,7 @@ def test_reversals_come_at_the_given_rate_and_do_not_depend_on_the_step() -> Non
 
 def test_a_filament_does_not_pass_through_itself() -> None:
     # It prefers to curl up into less room than it has.
-    coil = replace(WORM, curvature=PreferredCurvature(amplitudes=700.0))
+    coil = replace(ACTIVE, curvature=PreferredCurvature(amplitudes=700.0))
     made = world(coil, law=soft())
     made.set_time_step(3e-5)
     made.add_filaments(1, straight(coil))
@@ -445,7 +445,7 @@ def test_a_filament_does_not_pass_through_itself() -> None:
 
 @pytest.mark.parametrize("times", [(0.0, 0.0), (1e-4, 2e-3)])
 def test_a_pile_is_stable_up_to_its_step_and_blows_up_at_twice_that(times: tuple[float, float]) -> None:
-    made = worms(16, curvature=None, liquid=None, stretching_time=times[0], bending_time=times[1])
+    made = pile(16, curvature=None, liquid=None, stretching_time=times[0], bending_time=times[1])
     held, step = LinksFilaments(made), made.time_step / 0.9
     made.advance(6000)
     arrays, memory = {name: array.copy() for name, array in made.arrays.items()}, dict(made.memory)

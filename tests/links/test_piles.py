@@ -8,6 +8,7 @@ import builds
 import numpy as np
 import pytest
 
+from dem.arrays import Array
 from dem.engine.interface import Saved
 from dem.engine.links.engine import LinksEngine
 from dem.engine.links.motion import motoring
@@ -146,42 +147,55 @@ def test_the_energy_ledger_closes_in_a_shaken_pile() -> None:
     assert abs(given - stored - made.ledger.dissipated) < 0.004 * given
 
 
-def test_a_motor_that_halts_holds_and_may_give_way() -> None:
-    made = builds.engine(motor_law=builds.motor_law("halt"), gravity=9.81, dt=5e-5, law=builds.LAW)
-    pile = builds.pile(made, 1, settle=0.2)
-    assert pile.count == 1
-    pile.motors.articulate()
-    bodies = pile._world.bodies
-    # A load above the limit, as if a heavy thing leant on barb 1 against its way.
-    pile.motors.actuate(bodies.alpha[None] + 1e-3, 2e-4)
-    pile.advance(4)
-    pile._world.motors.impulse[:] -= 2e-5 * 2e-4
-    pile.motors.actuate(bodies.alpha[None] + 1e-3, 2e-4)
-    pile.advance(1)
-    readings = pile.motors.readings
-    assert readings.halted.all()
-    assert (bodies.rate == 0.0).all()
-    pile.advance(3)
-    pile._world.motors.impulse[:] -= 2e-5 * 2e-4
-    pile.motors.actuate(bodies.alpha[None] - 1e-3, 2e-4)
-    pile.advance(1)
-    assert not pile.motors.readings.halted.any()
-    assert (bodies.rate < 0.0).all()
-
-
-def test_a_motor_that_stalls_does_not_move_either_way() -> None:
-    made = builds.engine(motor_law=builds.motor_law("stall"), dt=5e-5)
+def strained(law: str, load: float) -> LinksEngine:
+    """A smarticle in free space whose motors have found a mean torque `load` [N m] since their last update."""
+    made = builds.engine(motor_law=builds.motor_law(law), dt=5e-5)
     made.add(builds.at([0, 0, 5.0]))
     made.motors.articulate()
-    for sign in (1, -1):
-        made.motors.actuate(made._world.bodies.alpha[None] + 1e-3, 2e-4)
-        made.advance(4)
-        made._world.motors.impulse[:] -= 2e-5 * 2e-4
-        made.motors.actuate(made._world.bodies.alpha[None] + sign * 1e-3, 2e-4)
-        made.advance(1)
-        assert made.motors.readings.halted.all()
-        assert (made._world.bodies.rate == 0.0).all()
-        made.advance(3)
+    made.motors.actuate(made._world.bodies.alpha[None], 2e-4)
+    made.advance(4)
+    assert made._world.motors is not None
+    made._world.motors.impulse[:] = load * 2e-4
+    return made
+
+
+def commanded(made: LinksEngine, by: float) -> Array:
+    """Changes of the commands at a control update whose targets differ by `by` [rad], (1, 2) [rad]."""
+    assert made._world.motors is not None
+    before = made._world.motors.command.copy()
+    made.motors.actuate(before[None] + by, 2e-4)
+    made.advance(1)
+    return made._world.motors.command - before
+
+
+@pytest.mark.parametrize("law", ["halt", "stall"])
+def test_a_motor_at_its_limit_holds_against_the_load_and_may_give_way_with_it(law: str) -> None:
+    against, along = strained(law, 2e-5), strained(law, 2e-5)
+    np.testing.assert_array_equal(commanded(against, 1e-3), 0.0)
+    assert against.motors.readings is not None
+    assert against.motors.readings.halted.all()
+    np.testing.assert_allclose(commanded(along, -1e-3), -1e-3 if law == "halt" else 0.0)
+    free = strained(law, 1.5e-5)
+    np.testing.assert_allclose(commanded(free, 1e-3), 1e-3)
+
+
+@pytest.mark.parametrize("law", ["halt", "stall"])
+@pytest.mark.parametrize("stiffness", [500.0, 16000.0])
+def test_the_torque_at_a_stop_is_that_of_the_shaft_however_stiff_contacts_are(law: str, stiffness: float) -> None:
+    # Both tips are opened at 1 rad/s against a narrow wall: τ_max and k ω T, the gain of a shaft in a control period.
+    contact = replace(builds.LAW, normal_stiffness=stiffness, tangential_stiffness=0.8 * stiffness)
+    motor = builds.motor_law(law, speed_limit=1.0)
+    made = builds.engine(law=contact, motor_law=motor, dt=1e-5, radius=9.5e-3)
+    made.add(builds.at([0, 0, 5.0]))
+    made.motors.articulate()
+    torques = []
+    for look in range(5000):
+        made.motors.actuate(np.full((1, 1, 2), max(0.0, math.pi / 2 - 2e-4 * look)), 2e-4)
+        made.advance(20)
+        assert made.motors.readings is not None
+        torques.append(made.motors.readings.torques.copy())
+    assert (np.abs(torques[-1]) > 0.9 * builds.TORQUE).all()
+    assert np.abs(torques).max() <= builds.TORQUE + 2 * motor.stiffness * motor.speed_limit * 2e-4
 
 
 @pytest.mark.parametrize("law", ["slip", "servo"])
@@ -199,18 +213,17 @@ def test_a_slipping_motor_never_exceeds_its_torque(law: str) -> None:
     assert np.abs(made.state().angles - made.motors.readings.commands).max() < 0.1
 
 
-def test_speed_and_acceleration_of_a_prescribed_angle_are_limited() -> None:
-    made = builds.engine(motor_law=builds.motor_law("halt"), dt=5e-5)
+def test_the_speed_of_a_command_is_limited() -> None:
+    made = builds.engine(motor_law=builds.motor_law("halt", torque_limit=1.0), dt=5e-5)
     made.add(builds.at([0, 0, 5.0]))
     made.motors.articulate()
-    rates = [0.0]
+    commands = []
     for look in range(400):
         made.motors.actuate(np.full((1, 1, 2), 0.5 if look < 200 else 1.2), 2e-4)
-        rates.append(float(made._world.bodies.rate[0, 0]))
         made.advance(4)
-    most = made._world.motors.acceleration[0, 0] * 2e-4
-    assert np.abs(rates).max() <= 6.0
-    assert np.abs(np.diff(rates)).max() <= most * (1 + 1e-12)
+        assert made.motors.readings is not None
+        commands.append(float(made.motors.readings.commands[0, 0]))
+    assert np.abs(np.diff(commands)).max() == pytest.approx(6.0 * 2e-4)
 
 
 def test_a_fast_spin_is_taken_in_short_steps() -> None:
@@ -233,23 +246,20 @@ def test_an_easing_motor_is_that_of_the_other_engine() -> None:
     made.motors.articulate()
     motors = made._world.motors
     assert motors is not None
-    motors.acceleration[:] = 1e12
     plain = Motors(replace(law, stiffness=1.0), made._world.bodies.alpha)
     update, rng = builds.callable_from_python(motoring.update), np.random.default_rng(1)
     loads = [np.repeat(rng.random((1, 2)) < 0.8, 15, axis=0) for _ in range(40)]
     speeds = set()
     for over in np.concatenate(loads):
         torque = np.where(over, 1.5, 0.5) * law.torque_limit
-        motors.torque[0] = torque
         before = plain.commands.copy()
-        far = before + 1.0
-        plain.update(before - torque, far, 2e-4, 5e-5)
-        motors.schedule[0] = motors.command[0] = made._world.bodies.alpha[0]
-        made.motors.actuate((made._world.bodies.alpha + 1.0)[None], 2e-4)
+        plain.update(before - torque, before + 1.0, 2e-4, 5e-5)
+        motors.command[0], motors.impulse[0], motors.elapsed[0] = before[0], torque * 2e-4, 2e-4
+        made.motors.actuate(before[None] + 1.0, 2e-4)
         update(made._world.shapes, made._world.bodies, made._world.motors)
-        np.testing.assert_allclose(made._world.bodies.rate * 2e-4, plain.commands - before, atol=1e-15)
+        np.testing.assert_allclose(made._world.motors.command, plain.commands, atol=1e-15)
         np.testing.assert_array_equal(motors.halted, plain.halted)
-        speeds |= set(np.round(made._world.bodies.rate[0], 9))
+        speeds |= set(np.round((plain.commands - before)[0] / 2e-4, 9))
     assert speeds == {0.0, law.speed_limit / 2, law.speed_limit}
 
 

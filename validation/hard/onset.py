@@ -171,10 +171,12 @@ def climb(engine: str, name: str, seed: int) -> list[dict[str, Any]]:
 
 
 def onset(name: str, runs: pd.DataFrame) -> dict[str, Any]:
-    """Return the smallest factors at which a setting chatters and blows up: extremes over the seeds.
+    """Return a setting's row of the table of onsets, made from its runs (rows of `climb`).
 
-    A factor is inf if no run chattered or blew up. Chatter is NaN for smarticles that are not at rest at half the
-    stable step, and for crossed or random smarticles, which may rock at any time step.
+    "chatter from" and "blow-up from" are time steps as multiples of the stable step: each seed has the smallest one at
+    which it chatters or blows up, inf if it never does; the row has the least and the most of all seeds. A blow-up
+    counts as chatter. Chatter is NaN for stacks that still move at half the stable step, and for crossed or random
+    smarticles, which may rock at any time step.
     """
     factor, speed, rise = (pd.to_numeric(runs[column], errors="coerce") for column in (FACTOR, SPEED, RISE))
     small, blown = factor <= 0.9, rise > BLOW_UP

@@ -124,10 +124,15 @@ def whole(
     steps: Callable[[Scene], Sequence[float]] = time_steps,
     spoil: Callable[[Engine], None] | None = None,
 ) -> Watched:
-    """Run a scene, given as a dictionary, and return the outcome.
+    """Run a scene and return the outcome.
 
-    With `note` the watchdog is `Noting`. `steps` returns the time step of each phase [s]. `spoil` changes the engine
-    before each record.
+    Args:
+        data: the scene as a dictionary.
+        out: run directory to be written.
+        note: record the largest fraction of each limit of the watchdog, which then examines all contacts at every
+            check.
+        steps: returns the time step of each phase [s]; default: those of `smarticles run`.
+        spoil: changes the engine before each sample of the series.
     """
     nearest: dict[str, float] = {}
     checks: list[float] = []  # processor time of each check of the watchdog [s]

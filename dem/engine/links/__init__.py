@@ -1,1 +1,1 @@
-"""The links engine: links as swept segments, motors as prescribed motion, kernels compiled by Numba."""
+"""The links engine: links as swept segments, hinges driven by motors, kernels compiled by Numba."""

@@ -213,31 +213,23 @@ class Motoring(NamedTuple):
     law: int  #: 0 halt, 1 stall, 2 ease, 3 slip, 4 servo
     speed: float  #: ω, the greatest speed [rad/s]
     limit: Array  #: (N, 2) torque limits τ_max [N m]
-    stiffness: Array  #: (N, 2) twist stiffness of the shafts of slip and servo motors [N m/rad]
+    stiffness: Array  #: (N, 2) twist stiffness of the shafts [N m/rad]
     damping: float  #: Derivative gain of servos [N m s/rad]
-    acceleration: Array  #: (N, 2) greatest change of a prescribed rate at a control update over the period [rad/s²]
     command: Array  #: (N, 2) angles that the motors hold [rad]
     schedule: Array  #: (N, 2) angles of the schedule at the last control update [rad]
     torque: Array  #: (N, 2) mean torques on the barbs between the last two control updates [N m]
-    work: Array  #: (N, 2) work on the links up to the last control update; for slip and servo up to now [J]
+    work: Array  #: (N, 2) work on the links up to now [J]
     halted: NDArray[
         np.bool_
     ]  #: (N, 2) whether a motor was stopped at the last update; slip and servo: was at its limit
-    begun: Array  #: (N, 2) angles at the last control update [rad]
-    #: (N, 2) momenta p of the angles (see `motion.planar`) after the last control update; for slip and servo now
-    #: [kg m²/s]
-    momentum: Array
-    #: (N, 2) time integral since the last control update of all torques on an angle but the motor's; for slip and servo
-    #: of the motor's torque [N m s]
-    impulse: Array
+    momentum: Array  #: (N, 2) momenta p that belong to the angles, see `motion.planar` [kg m²/s]
+    impulse: Array  #: (N, 2) time integral of the torques since the last control update [N m s]
     elapsed: Array  #: (1,) time since the last control update [s]
     interval: float  #: Time between two control updates, the control period [s]
     period: int  #: Number of steps in a control period
     targets: Array  #: (updates, N, 2) angles of the schedule at the ends of the next control periods [rad]
     #: (2,) row of `targets` for the next control update, and number of steps until then; below 0: no update is planned
     due: NDArray[np.int64]
-    #: (N, 2) changes of the prescribed rates at a control update, until the kick that follows [rad/s]
-    jump: Array
     #: (N,) number of barbs in a row found at τ_max, barb 1 and barb 2 of a smarticle in turn; for ease
     over: NDArray[np.int64]
 

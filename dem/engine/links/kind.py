@@ -45,7 +45,6 @@ class LinksKind:
             scene.particle,
             contact_law_of(scene),
             articulated=articulated,
-            free=articulated and scene.motor.law in ("slip", "servo"),
             strings=scene.pulled_by,
         )
 

@@ -9,8 +9,7 @@ from numpy.typing import NDArray
 
 from dem.engine.interface import MotorReadings
 from dem.engine.links.arrays import Motoring
-from dem.engine.links.motion.motoring import engage, release, work_so_far
-from dem.engine.links.shapes import planar_of
+from dem.engine.links.motion.motoring import engage, release
 from dem.engine.links.world import World
 from dem.errors import InputError
 from dem.physics.motor import LAWS, MotorLaw
@@ -98,33 +97,26 @@ class LinksMotors:
         world = self._world
         if world.motors is None:
             return 0.0
-        if not world.articulated:
-            return float(world.motors.work.sum())
-        return float(work_so_far(world.shapes, world.bodies, world.motors))
+        return float(world.motors.work.sum())
 
     def gaps(self) -> Array:
         """Return zeros (N, 2), since hinges are rigid."""
         return np.zeros((self._world.count, 2))
 
     def _made(self, law: MotorLaw) -> Motoring:
-        assert self._world.particle is not None  # scenes with motors have smarticles
-        n, planar = self._world.count, planar_of(self._world.particle)
+        n = self._world.count
         factors = np.ones((n, 2)) if self._strengths is None else np.asarray(self._strengths, dtype=np.float64)
-        # What τ_max gives to a barb about a hinge that is held.
-        inertia = planar.barb_zz + planar.barb_mass * planar.arm**2
         return Motoring(
             law=LAWS.index(law.law),
             speed=float(law.speed_limit),
             limit=law.torque_limit * factors,
             stiffness=law.stiffness * factors,
             damping=float(law.damping),
-            acceleration=law.torque_limit * factors / inertia,
             command=np.zeros((n, 2)),
             schedule=np.zeros((n, 2)),
             torque=np.zeros((n, 2)),
             work=np.zeros((n, 2)),
             halted=np.zeros((n, 2), dtype=np.bool_),
-            begun=np.zeros((n, 2)),
             momentum=np.zeros((n, 2)),
             impulse=np.zeros((n, 2)),
             elapsed=np.zeros(1),
@@ -132,7 +124,6 @@ class LinksMotors:
             period=0,
             targets=np.zeros((1, n, 2)),
             due=np.array([0, -1]),
-            jump=np.zeros((n, 2)),
             over=np.zeros(n, dtype=np.int64),
         )
 

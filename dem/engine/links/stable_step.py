@@ -38,7 +38,6 @@ def links_stable_time_step(
     law: ContactLaw,
     *,
     articulated: bool = False,
-    free: bool = False,
     strings: Sequence[tuple[float, float]] = (),
 ) -> float:
     """Return the largest time step [s] that is stable for the stiffest modes of a smarticle in a pile.
@@ -51,11 +50,10 @@ def links_stable_time_step(
     - such a pile in which links roll against those above and below;
     - a tip with a string.
 
-    Prescribed rates of angles add no stiffness. Free angles reduce the effective mass of a tip.
+    Angles that motors may turn are free, which reduces the effective mass of a tip.
 
     Args:
-        articulated: whether barbs may have other angles than those of the particle.
-        free: whether angles are free, under the laws slip and servo.
+        articulated: whether motors may turn the barbs.
         strings: stiffness [N/m] and damping [N s/m] of each string.
     """
     boxes = particle.boxes
@@ -63,7 +61,7 @@ def links_stable_time_step(
     if articulated and boxes.barb_length > 0:
         angles += [(angle, angle) for angle in np.linspace(0.0, WIDEST, SHAPES)]
     shapes = (smarticle_shape(replace(particle, boxes=replace(boxes, angles=each))) for each in angles)
-    return min(_step_of(shape, each, law, free, strings) for shape, each in zip(shapes, angles, strict=True))
+    return min(_step_of(shape, each, law, articulated, strings) for shape, each in zip(shapes, angles, strict=True))
 
 
 def filament_stable_time_step(filament: Filament, law: ContactLaw, effective_mass: float) -> float:

@@ -126,7 +126,7 @@ def act(
     totals[MOST] = max(totals[MOST], need[0])
     ticks = ticks_for(need[0], tick)
     length = dt * (ticks / FINEST)
-    past, acting = totals[PAST], 0.5 * (totals[PAST] + length)
+    acting = 0.5 * (totals[PAST] + length)
     totals[PAST] = length
     totals[WORK] += acting * pulling
     weight = length / dt
@@ -135,7 +135,7 @@ def act(
             ground.sums[k, d] += weight * ground.force[k, d]
         if k < 4:
             totals[WORK] -= ground.force[k, 2] * ground.speed[k] * acting
-    kick(shapes, bodies, parts, motors, system.gravity, system.planar, past, acting)
+    kick(shapes, bodies, parts, motors, system.gravity, system.planar, acting)
     kick_nodes(system.filaments, acting)
     if motors is not None:
         motors.elapsed[0] += acting

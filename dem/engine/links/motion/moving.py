@@ -17,7 +17,7 @@ from dem.engine.links.contact.barrier import LONGEST, STRIDE, Step
 from dem.engine.links.contact.pairs import velocity_at
 from dem.engine.links.motion.motoring import ITERATIONS, contact_torques, free_torques, middle_of_step
 from dem.engine.links.motion.planar import planar_at, rates, spin_of
-from dem.engine.links.motion.poses import SLIP, along_normal
+from dem.engine.links.motion.poses import along_normal
 from dem.engine.links.shapes import Shapes, is_flexible
 from dem.engine.links.vectors import along, dot, turned_back, vector
 
@@ -34,17 +34,13 @@ def gather(bodies: Bodies, parts: Parts) -> None:
 
 
 @part
-def kick(
-    shapes: Shapes, bodies: Bodies, parts: Parts, motors: Any, gravity: float, planar: bool, past: float, dt: float
-) -> None:
+def kick(shapes: Shapes, bodies: Bodies, parts: Parts, motors: Any, gravity: float, planar: bool, dt: float) -> None:
     """Change momenta by the forces in `load`, by weight and by motors.
 
     Args:
         bodies: `velocity` and `momentum` are written.
         parts: loads on the parts, of which those on barbs change angles.
-        motors: the motors, of which `impulse` and `work`, and for free angles `momentum`, are written; None while
-            smarticles are welded.
-        past: length of the last sub-step [s].
+        motors: the motors, of which `impulse`, `momentum` and `work` are written; None while smarticles are welded.
         dt: time for which the forces act [s]: half of the last and half of the next sub-step.
     """
     velocity, momentum, load, across = bodies.velocity, bodies.momentum, bodies.load, 0.0 if planar else 1.0
@@ -60,26 +56,18 @@ def kick(
         momentum[i, 2] += dt * load[i, 5]
         if motors is not None and shapes.hinged[bodies.shape[i]]:
             q1, q2 = contact_torques(planar_at(shapes, bodies.shape[i]), bodies, parts, i)
-            if motors.law < SLIP:
-                motors.impulse[i, 0] += dt * q1
-                motors.impulse[i, 1] += dt * q2
-                # Half a sub-step of these forces went along the rates before the control update.
-                motors.work[i, 0] += 0.5 * past * q1 * motors.jump[i, 0]
-                motors.work[i, 1] += 0.5 * past * q2 * motors.jump[i, 1]
-                motors.jump[i, 0] = motors.jump[i, 1] = 0.0
-            else:
-                row, normal = bodies.plane[i], along_normal(bodies, i)
-                p1, p2 = motors.momentum[i, 0] + dt * q1, motors.momentum[i, 1] + dt * q2
-                r1, r2 = rates(row, normal, p1, p2)
-                t1, t2 = free_torques(bodies, motors, i, r1, r2, dt)
-                p1, p2 = p1 + dt * t1, p2 + dt * t2
-                r1, r2 = rates(row, normal, p1, p2)
-                motors.work[i, 0] += 0.5 * dt * t1 * (bodies.rate[i, 0] + r1)
-                motors.work[i, 1] += 0.5 * dt * t2 * (bodies.rate[i, 1] + r2)
-                motors.impulse[i, 0] += dt * t1
-                motors.impulse[i, 1] += dt * t2
-                motors.momentum[i, 0], motors.momentum[i, 1] = p1, p2
-                bodies.rate[i, 0], bodies.rate[i, 1] = r1, r2
+            row, normal = bodies.plane[i], along_normal(bodies, i)
+            p1, p2 = motors.momentum[i, 0] + dt * q1, motors.momentum[i, 1] + dt * q2
+            r1, r2 = rates(row, normal, p1, p2)
+            t1, t2 = free_torques(bodies, motors, i, r1, r2, dt)
+            p1, p2 = p1 + dt * t1, p2 + dt * t2
+            r1, r2 = rates(row, normal, p1, p2)
+            motors.work[i, 0] += 0.5 * dt * t1 * (bodies.rate[i, 0] + r1)
+            motors.work[i, 1] += 0.5 * dt * t2 * (bodies.rate[i, 1] + r2)
+            motors.impulse[i, 0] += dt * t1
+            motors.impulse[i, 1] += dt * t2
+            motors.momentum[i, 0], motors.momentum[i, 1] = p1, p2
+            bodies.rate[i, 0], bodies.rate[i, 1] = r1, r2
 
 
 @part

@@ -144,21 +144,7 @@ def spin_of(row: Array, lx: float, ly: float, lz: float, internal: float) -> tup
         lz: z component of L [kg m²/s].
         internal: h = b·α̇ [kg m²/s].
     """
-    flat, normal = inverses(row)
-    return spin_by(row, flat, normal, lx, ly, lz, internal)
-
-
-@inlined
-def inverses(row: Array) -> tuple[float, float]:
-    """Return the inverse determinant of the in-plane inertia [1/(kg² m⁴)] and 1/I_zz [1/(kg m²)]."""
-    return 1 / (row[14] * row[15] - row[17] * row[17]), 1 / row[16]
-
-
-@inlined
-def spin_by(
-    row: Array, flat: float, normal: float, lx: float, ly: float, lz: float, internal: float
-) -> tuple[float, float, float]:
-    """Return the result of `spin_of` from the results `flat` and `normal` of `inverses`."""
+    flat, normal = 1 / (row[14] * row[15] - row[17] * row[17]), 1 / row[16]
     xx, yy, xy = row[14], row[15], row[17]
     return (yy * lx - xy * ly) * flat, (xx * ly - xy * lx) * flat, (lz - internal) * normal
 

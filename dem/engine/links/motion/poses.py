@@ -10,8 +10,6 @@ from dem.engine.links.motion.planar import planar_at, rates, spin_of
 from dem.engine.links.shapes import Planar, Shapes, is_flexible
 from dem.engine.links.vectors import Vector, add, moving, put, put_more, scale, sub, turned, turned_back, vector
 
-SLIP = 3  # laws of motors from here on leave the angles free
-
 
 @inlined
 def turn_axes(bodies: Bodies, i: int) -> None:
@@ -130,7 +128,7 @@ def pose(shapes: Shapes, bodies: Bodies, parts: Parts, segments: Segments, hinge
         if is_flexible(shapes.flexible, bodies.shape[i]):
             continue
         turn_axes(bodies, i)
-        if hinged is not None and hinged.law >= SLIP and shapes.hinged[bodies.shape[i]]:
+        if hinged is not None and shapes.hinged[bodies.shape[i]]:
             p1, p2 = hinged.momentum[i, 0], hinged.momentum[i, 1]
             bodies.rate[i, 0], bodies.rate[i, 1] = rates(bodies.plane[i], along_normal(bodies, i), p1, p2)
         find_spin(bodies, i, hinged)
