@@ -112,8 +112,8 @@ def test_what_a_study_does_not_have_is_rejected(
     ("words", "note"),
     [
         ("friction --quick", "fidelity: draft instead of standard; relax_s: 0.25 instead of 0.5"),
-        ("procedures --fidelity draft", "not the full study: fidelity: draft instead of standard"),
-        ("procedures --fidelity standard", "the full study as shipped"),
+        ("casting --fidelity draft", "not the full study: fidelity: draft instead of standard"),
+        ("casting --fidelity standard", "the full study as shipped"),
     ],
 )
 def test_a_fidelity_with_other_knobs_is_named_by_its_base(
