@@ -145,11 +145,11 @@ def _with_variables(table: pd.DataFrame, values: Mapping[str, Any]) -> pd.DataFr
     """Return the measures of one run with the variables of its sweep after the first column."""
     for place, (name, value) in enumerate(values.items(), start=1):
         column = name
-        if name in table.columns and (table[name] == value).all():
+        cell = value if isinstance(value, str | int | float | bool) else json.dumps(value, ensure_ascii=False)
+        if name in table.columns and (table[name] == cell).all():
             table = table.drop(columns=name)  # inserted again below
         elif name in table.columns:
             column = f"{name} (swept)"
-        cell = value if isinstance(value, str | int | float | bool) else json.dumps(value, ensure_ascii=False)
         table.insert(place, column, [cell] * len(table))
     return table
 

@@ -81,6 +81,21 @@ def test_measure_adds_measures_on_request_alone(tmp_path: Path, write_run: Write
     assert "also: 'crossing' is no measure on request; did you mean 'crossing-number'?" in unknown.err
 
 
+def test_measure_takes_a_sweep_whose_fidelity_is_a_mapping(
+    tmp_path: Path, sweep_file: Path, write_run: WriteRun, smarticles: Smarticles
+) -> None:
+    out = tmp_path / "out"
+    mapping = "constants: {fidelity: {base: draft, rows: 1}}\npoints:"
+    sweep_file.write_text(sweep_file.read_text().replace("points:", mapping))
+    smarticles("sweep", sweep_file, "--out", out)
+    for name in ("n5", "n6"):
+        write_run(out / "runs" / name)
+    said = smarticles("measure", out, "--table", tmp_path / "table.csv")
+    assert said.status == 0, said.err
+    swept = pd.read_csv(tmp_path / "table.csv", comment="#")["fidelity (swept)"]
+    assert set(swept) == {'{"base": "draft", "rows": 1}'}
+
+
 def test_measure_has_the_variables_of_a_sweep_and_means_by_them(
     tmp_path: Path, sweep_file: Path, write_run: WriteRun, smarticles: Smarticles
 ) -> None:

@@ -130,6 +130,22 @@ def test_what_a_study_does_not_have_is_rejected(
     assert not (tmp_path / "out").exists()
 
 
+@pytest.mark.parametrize(
+    ("words", "note"),
+    [
+        ("friction --quick", "fidelity: draft instead of standard; relax_s: 0.25 instead of 0.5"),
+        ("casting --fidelity draft", "not the full study: fidelity: draft instead of standard"),
+        ("casting --fidelity standard", "the full study as shipped"),
+    ],
+)
+def test_a_fidelity_with_other_knobs_is_named_by_its_base(
+    words: str, note: str, tmp_path: Path, smarticles: Smarticles
+) -> None:
+    said = smarticles("study", *words.split(), "--out", tmp_path / "out", "--analyse")
+    assert "no run of " in said.err
+    assert note in said.out.splitlines()[0]
+
+
 def test_a_sweep_runs_on_the_engine_that_is_asked_for(sweep_file: Path, tmp_path: Path, smarticles: Smarticles) -> None:
     said = smarticles("sweep", sweep_file, "--engine", "links", "--out", tmp_path / "out")
     assert said.status == 2
