@@ -9,7 +9,7 @@ from typing import Protocol, Self
 import numpy as np
 
 from dem.arrays import Array, Numbers
-from dem.body.kinds import Kind, Mixture
+from dem.body.kinds import Mixture
 from dem.body.linear import matrix_product
 from dem.body.particle import LINKS, Boxes, Particle
 from dem.errors import InputError
@@ -100,31 +100,31 @@ class RigidState:
     @cached_property
     def body(self) -> Numbers:
         """(M,) the body that each bar belongs to."""
-        sizes = np.array([len(kind.bars.points) for kind in self.mixture.kinds], dtype=np.int64)
-        return np.repeat(np.arange(self.count), sizes[self.kind])
+        return np.repeat(np.arange(self.count), self.mixture.sizes[self.kind])
 
     @cached_property
     def bar(self) -> Numbers:
         """(M,) number of each bar in its body."""
-        return np.concatenate([np.zeros(0, np.int64), *(np.arange(len(k.bars.points)) for k in self._kinds)])
+        sizes = self.mixture.sizes[self.kind]
+        return np.arange(len(self.body)) - np.repeat(np.cumsum(sizes) - sizes, sizes)
 
-    @property
-    def _kinds(self) -> list[Kind]:
-        return [self.mixture.kinds[k] for k in self.kind]
+    @cached_property
+    def _bar_of_kind(self) -> Numbers:
+        """(M,) number of each bar among the bars of all kinds, see `Mixture.ends`."""
+        sizes = self.mixture.sizes
+        return (np.cumsum(sizes) - sizes)[self.kind[self.body]] + self.bar
 
     @cached_property
     def segments(self) -> Array:
         """(M, 2, 3) both ends of all bars [m]."""
-        local = np.concatenate([np.zeros((0, 2, 3)), *(kind.bars.ends for kind in self._kinds)])
+        local = self.mixture.ends[self._bar_of_kind]
         turned = matrix_product(self.rotations[self.body, None], local[..., None])[..., 0]
         return np.asarray(turned + self.positions[self.body, None])
 
     @cached_property
     def normals(self) -> Array:
         """(M, 3) unit vectors along the normal of each bar; zeros where the section is round [1]."""
-        local = np.concatenate(
-            [np.zeros((0, 3)), *((not kind.bars.round) * kind.bars.frames[:, :, 2] for kind in self._kinds)]
-        )
+        local = self.mixture.normals[self._bar_of_kind]
         return matrix_product(self.rotations[self.body], local[..., None])[..., 0]
 
     @cached_property
@@ -156,7 +156,8 @@ class RigidState:
 
     def spheres_by_body(self) -> list[Array]:
         """Return (S, 3) centres of the spheres of each body [m]."""
-        return [row[: len(kind.centres)] for row, kind in zip(self.spheres(), self._kinds, strict=True)]
+        kinds = [self.mixture.kinds[k] for k in self.kind]
+        return [row[: len(kind.centres)] for row, kind in zip(self.spheres(), kinds, strict=True)]
 
     @cached_property
     def _masses(self) -> Array:
@@ -170,8 +171,8 @@ class RigidState:
     @cached_property
     def _own_spins(self) -> tuple[Array, Array]:
         """Principal moments (N, 3) [kg m²], and angular velocities (N, 3) along the principal axes [rad/s]."""
-        inertias = np.array([kind.inertia for kind in self.mixture.kinds])[self.kind]
-        return inertias, matrix_product(np.swapaxes(self.rotations, 1, 2), self.spins[..., None])[..., 0]
+        spins = matrix_product(np.swapaxes(self.rotations, 1, 2), self.spins[..., None])[..., 0]
+        return self.mixture.inertias[self.kind], spins
 
     @cached_property
     def angular_momentum(self) -> Array:

@@ -27,7 +27,7 @@ RATES: Mapping[Activity, Rates] = {
     Activity.POUR: Rates(1.35e-7, 1.3e-3),
     Activity.REST: Rates(4.0e-7, 0.0),
     Activity.SHAKE: Rates(1.5e-7, 2.6e-3),
-    Activity.ACTUATE: Rates(3.8e-7, 3.0e-3),
+    Activity.ACTUATE: Rates(4.35e-7, 0.0),
 }
 LOOK = 2.4e-7  # s per control update of a smarticle
 RIM = 1.1e-7  # s per edge of a wall of tiers, smarticle and step
@@ -48,12 +48,13 @@ COMPILE_FIRST, COMPILE_MORE = 13.0, 7.0
 
 def seconds_per_second(scene: Demand, time_step: float, activity: Activity) -> float:
     """Return the estimate of `dem.engine.kinds.EngineKind.seconds_per_second`."""
-    count, strands, recording = scene.count, scene.fidelity.rows, scene.recording
+    count, recording, mixture = scene.count, scene.recording, scene.mixture
     rates = RATES[activity]
-    if scene.mixture is None:
-        links = 1.0 if scene.smarticle.boxes.barb_length > 0 else 1 / 3
+    if mixture is None:
+        links, strands = 1.0 if scene.smarticle.boxes.barb_length > 0 else 1 / 3, float(scene.fidelity.rows)
     else:  # bars of a body, over a smarticle's three
-        links = scene.mixture.mean([len(kind.bars.points) / 3 for kind in scene.mixture.kinds])
+        links = mixture.mean([len(kind.bars.points) / 3 for kind in mixture.kinds])
+        strands = mixture.mean([kind.rows for kind in mixture.kinds])
     per_step = rates.step * (1 + MORE_CONTACTS * (1 - 1 / strands)) + RIM * strands * len(scene.cylinder.upper)
     each = links * (per_step / time_step + rates.second * strands**MORE_PAIRS)
     if activity is Activity.ACTUATE:
