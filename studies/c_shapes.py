@@ -326,7 +326,6 @@ FIGURES = (
         x=OPENING,
         x_label="opening angle [degree]",
         split=lambda table: [Series(rows=table, label="piles", properties=marker("o", "#0072B2", "#0072B2"))],
-        ticks=True,
     ),
 )
 

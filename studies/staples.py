@@ -28,7 +28,7 @@ from postprocess.measures.pull import PULL, WINDOW, held_fast, moving_mean, peak
 from postprocess.statistics.points import SEED
 from postprocess.statistics.seeds import mean_over_seeds
 from studies.framework.figures import Histories, History, Means, one_by_one
-from studies.framework.findings import Effect, Finding, Outcome, means_by, symbol
+from studies.framework.findings import Effect, Finding, Outcome, means_by
 from studies.framework.provenance import Reference
 from studies.framework.runs import Key, Row, declare, last_columns, run_columns
 from studies.framework.study import COUNT, Study
@@ -37,6 +37,7 @@ ANGLE, GAMMA = "crown-leg angle [deg]", "peak acceleration [g]"
 NARROW, SQUARE = 20.0, 90.0  #: The two angles that are compared [deg]
 PEAK, RAISED, WORK = "peak force over W [-]", "hook raised at the peak [m]", "work over W crown [-]"
 ABOVE, STRENGTH = "staples above the hook [-]", "tension from hook to grid over W [-]"
+LOG_PEAK = "log10 of the peak force over W [-]"
 BEFORE, HELD_FAST, CHAINS = "load before the pull over W [-]", "held fast [-]", "chains at the peak [-]"
 POURED, LINKS, HEIGHT = "links per staple poured [-]", "links per staple [-]", "com height [m]"
 
@@ -47,9 +48,10 @@ CUTS = (0.25, 0.5, 0.75)  #: Heights of the cuts through which chains are counte
 QUANTITIES = declare(
     {
         PEAK: ("peak", ".3g", f"largest mean over {WINDOW:g} s of the force on the hook; a bound where it held fast"),
+        LOG_PEAK: ("", "", "decimal logarithm of the peak force over W, whose scatter is even to both sides"),
         ABOVE: ("above", ".0f", "number of staples with the centre above the hook before the pull"),
         STRENGTH: (
-            "strength",
+            "tension",
             ".3g",
             f"largest mean over {WINDOW:g} s of the upward force on the grid, 0 where it is pushed down throughout; a "
             "bound where the hook held fast",
@@ -69,7 +71,7 @@ QUANTITIES = declare(
         HEIGHT: ("height [mm]", ".1f", "height of the centre of mass above the floor, without the wall"),
     },
     axes={
-        STRENGTH: r"tension from hook to grid / $W$ [-]",
+        LOG_PEAK: r"peak force $\log_{10}(F_\mathrm{max}/W)$ [-]",
         CHAINS: "chains at the peak [-]",
         LINKS: "links per staple [-]",
         WORK: r"work / ($W$ crown) [-]",
@@ -105,6 +107,7 @@ def measure(run: Run) -> Row:
         LINKS: links_per_body(parts[-3][-1]),
         HEIGHT: float(body_centres(free)[:, 2].mean()) - free.floor_z,
         PEAK: highest.force / weight,
+        LOG_PEAK: math.log10(highest.force / weight) if highest.force > 0 else math.nan,
         ABOVE: higher,
         STRENGTH: max(0.0, peak(replace(pull, force=pull.held)).force) / weight,
         RAISED: highest.raised,
@@ -173,17 +176,17 @@ def force_history(run: Run) -> History:
     return History(times=displacement, values=force / weight_of_one(run))
 
 
-def contrast(table: pd.DataFrame, gamma: float, *, times: float, quantity: str = STRENGTH, sign: int = 1) -> Effect:
-    """Return the mean over seeds of a force at 20° less a multiple of that at 90°, after one vibration."""
+def ratio(table: pd.DataFrame, gamma: float, *, times: float) -> Effect:
+    """Return the mean over seeds of ln(peak force at 20° / at 90°) after one vibration, against the ln of a factor."""
     own = table[table[GAMMA] == gamma]
     narrow, square = own[own[ANGLE] == NARROW].set_index(SEED), own[own[ANGLE] == SQUARE].set_index(SEED)
-    differences = (narrow[quantity] - times * square[quantity]).dropna()
-    by = f"{times:g} times " if times != 1 else ""
+    mean = mean_over_seeds((np.log(narrow[PEAK]) - np.log(square[PEAK])).dropna().tolist())
+    low, middle, high = (math.exp(mean.value + half) for half in (-mean.half_width, 0.0, mean.half_width))
     return Effect(
-        label=f"Γ = {gamma:g}: {symbol(quantity)} at 20° less {by}that at 90°",
-        value=mean_over_seeds(differences.tolist()),
-        sign=sign,
-        unit=" W",
+        label=f"Γ = {gamma:g}: peak force at 20° over that at 90°",
+        value=mean,
+        threshold=math.log(times),
+        text=f"{middle:.3g} ({low:.3g} to {high:.3g} at 95 %; n = {mean.count})" if mean.count else "no data",
         may_be_higher=bool(narrow[HELD_FAST].any()),
         may_be_lower=bool(square[HELD_FAST].any()),
     )
@@ -205,9 +208,7 @@ def stronger(table: pd.DataFrame, *, times: float) -> Outcome:
     after = table[table[GAMMA] > 0]
     note = f"tension by angle [W]: {means_by(after, STRENGTH, ANGLE, '.3g')}; "
     note += f"peak by angle [W]: {means_by(after, PEAK, ANGLE, '.3g')}; held fast (bounds): {cells or 'none'}"
-    effects = [contrast(table, gamma, times=times) for gamma in vibrated(table)]
-    effects += [contrast(table, gamma, times=times, quantity=PEAK, sign=0) for gamma in vibrated(table)]
-    return Outcome(effects=effects, note=note)
+    return Outcome(effects=[ratio(table, gamma, times=times) for gamma in vibrated(table)], note=note)
 
 
 def by_angle(table: pd.DataFrame, values: pd.Series, gamma: float, label: str, sign: int) -> Effect:
@@ -245,18 +246,17 @@ def grows(table: pd.DataFrame, *, angle: float) -> Outcome:
     effects = []
     for gamma in vibrated(own):
         after = own[own[GAMMA] == gamma]
-        both = after.set_index(SEED)[STRENGTH] - still.set_index(SEED)[STRENGTH]
+        both = after.set_index(SEED)[LOG_PEAK] - still.set_index(SEED)[LOG_PEAK]
         mean = mean_over_seeds(both.dropna().tolist())
         effects.append(
             Effect(
-                label=f"Γ = {gamma:g}: tension vibrated less poured",
+                label=f"Γ = {gamma:g}: log10 of the peak force, vibrated less poured",
                 value=mean,
-                unit=" W",
                 may_be_higher=bool(after[HELD_FAST].any()),
                 may_be_lower=bool(still[HELD_FAST].any()),
             )
         )
-    return Outcome(effects=effects, note=f"tension by Γ [W]: {means_by(own, STRENGTH, GAMMA, '.3g')}")
+    return Outcome(effects=effects, note=f"peak force by Γ [W]: {means_by(own, PEAK, GAMMA, '.3g')}")
 
 
 def few_chains(table: pd.DataFrame, *, angle: float) -> Outcome:
@@ -274,20 +274,20 @@ def few_chains(table: pd.DataFrame, *, angle: float) -> Outcome:
     return Outcome(effects=effects)
 
 
-AFTER_EACH = "after vibration, the tension at 20° less {}that at 90° is above 0, paired by seed"
+AFTER_EACH = "after vibration, the mean over seeds of ln(peak force at 20° / at 90°) is above ln {}"
 
 FINDINGS = (
     Finding(
         id="narrow-stronger",
         says="After vibration bundles of 20° are stronger than bundles of 90°",
         outcome=partial(stronger, times=1.0),
-        found_if=AFTER_EACH.format(""),
+        found_if=AFTER_EACH.format("1"),
     ),
     Finding(
         id="almost-ten-times",
         says="They are almost ten times as strong",
         outcome=partial(stronger, times=TIMES),
-        found_if=AFTER_EACH.format(f"{TIMES:g} times (half of ten) "),
+        found_if=AFTER_EACH.format(f"{TIMES:g}, half of ten times"),
     ),
     Finding(id="poured-less", says="Before vibration staples of 90° are more entangled", outcome=poured_more),
     Finding(
@@ -330,14 +330,15 @@ FIGURES = (
         unit="mm",
         x_label="hook raised by [mm]",
         quantities={"": r"force on the hook $F/W$ [-]"},
+        notes=["A line ends where the force limit stopped the first of its runs."],
     ),
     Means(
         name="strength",
-        quantities=[QUANTITIES[name] for name in (STRENGTH, LINKS, WORK, CHAINS)],
+        quantities=[QUANTITIES[name] for name in (LOG_PEAK, LINKS, WORK, CHAINS)],
         x=GAMMA,
         x_label=r"peak acceleration $\Gamma$ of the vibration [-]",
-        ticks=True,
         split=_BY_ANGLE,
+        notes=["Peak forces of runs that the limit stopped are lower bounds."],
     ),
 )
 
@@ -349,13 +350,13 @@ STUDY = Study(
     quantities=tuple(QUANTITIES.values()),
     findings=FINDINGS,
     figures=FIGURES,
-    same_count=(),
+    same_count=(ANGLE,),
     order=(ANGLE, GAMMA, SEED),
     bounds=(HELD_FAST, "held fast"),
     one_engine=True,
     remarks=(
-        "W: weight of one staple. Strength: the tension that goes from the hook through the whole pile to the grid; "
-        "the force on the hook lifts staples, too. A link: two staples, one of which passes through the polygon of the "
+        "W: weight of one staple. The peak force lifts staples, too; the tension from hook to grid goes through the "
+        "whole pile. A link: two staples, one of which passes through the polygon of the "
         "other, which is closed straight between its tips. Staples are rigid: a chain of them between grid and hook "
         "gives way at its contacts alone, so that the limit of the force ends the pull.",
     ),

@@ -26,6 +26,7 @@ from studies.staples import (
     GAMMA,
     HELD_FAST,
     LINKS,
+    LOG_PEAK,
     NARROW,
     PEAK,
     POURED,
@@ -118,7 +119,8 @@ def runs_of(
             noise = 1 + 0.1 * generator.standard_normal(4)
             poured, after = (links or {}).get((angle, 0.0), 1.0), (links or {}).get((angle, gamma), 1.0)
             rows.append(
-                {ANGLE: angle, GAMMA: gamma, SEED: seed, STRENGTH: tension * noise[0], PEAK: 10 + tension * noise[0]}
+                {ANGLE: angle, GAMMA: gamma, SEED: seed, STRENGTH: tension * noise[0], PEAK: 1 + tension * noise[0]}
+                | {LOG_PEAK: np.log10(1 + tension * noise[0])}
                 | {POURED: poured * noise[1], LINKS: after * noise[2], HELD_FAST: held * (angle == SQUARE)}
                 | {CHAINS: 2 * noise[3]}
             )
