@@ -24,10 +24,11 @@ from postprocess.geometry.bars import body_centres
 from postprocess.measures.crossing_number import average_crossing_numbers, crossing_field, region_spans
 from postprocess.statistics.points import SEED
 from postprocess.statistics.seeds import mean_over_seeds, slope_within
-from studies.framework.figures import Means, one_by_one
-from studies.framework.findings import Effect, Finding, Outcome, means_by, within
+from postprocess.statistics.size_law import Profile, alike, profiles
+from studies.framework.figures import Means, Scatter, one_by_one
+from studies.framework.findings import Effect, Finding, Outcome, decide, means_by
 from studies.framework.provenance import Reference
-from studies.framework.runs import Key, Row, declare, last_columns, run_columns
+from studies.framework.runs import Key, Quantity, Row, declare, last_columns, run_columns
 from studies.framework.study import COUNT, Study
 
 SERIES, SLENDER = "series", "rod length over diameter [-]"
@@ -36,11 +37,10 @@ ORDER = (SHAKEN, POURED, SLIPPERY)
 KEPT, HEIGHT = "com height kept [-]", "height over length [-]"
 ACN, LEVEL, DENSITY = "crossing number per rod [-]", "spanning level [-]", "rods per cube of the length [-]"
 CONTACTS = "contacts per rod [-]"
-ONSET, AT_ONSET = "aspect ratio at the onset [-]", "spanning level at the onset [-]"
-DENSITY_AT = "density at the onset [-]"
 
 STANDS = 0.5  #: Share of the height of the centre of mass that a standing pile keeps
-LIKE = math.log(1.25)  #: Largest |ln| of a ratio of levels, or of aspect ratios, that counts as coincidence
+LIKE = math.log(1.25)  #: Largest |ln| of a ratio of levels that counts as coincidence
+REJECTED = 0.05  #: Greatest p-value at which one level for two series is rejected
 INNER = 0.7  #: Half side of the square, over the container's radius, in which the field is taken
 PITCH = 0.25  #: Distance of the points of the field, over the length of a rod
 BALL = 0.5  #: Radius of the balls of the field, over the length of a rod
@@ -61,9 +61,9 @@ QUANTITIES = declare(
         CONTACTS: ("contacts", ".2f", "rods that a rod touches, with the wall"),
     },
     axes={
-        KEPT: "height kept without the wall [-]",
-        ACN: "average crossing number per rod [-]",
-        LEVEL: "spanning level of the local ACN [-]",
+        KEPT: "height kept [-]",
+        ACN: "crossing number per rod [-]",
+        LEVEL: "spanning level [-]",
         DENSITY: r"number density $n L^3$ [-]",
     },
 )
@@ -126,26 +126,27 @@ def spanning_level(field: NDArray[np.float64]) -> float:
     return float(max(spanning, default=0.0))
 
 
-def onsets(runs: pd.DataFrame) -> pd.DataFrame:
-    """Tabulate where piles begin to stand: a row per series and seed.
+def thresholds(runs: pd.DataFrame, column: str) -> dict[str, Profile]:
+    """Fit, by series, the value of a column above which piles stand, in its logarithm, by profile likelihood."""
+    own = runs[(runs[column] > 0) & np.isfinite(runs[column])]
+    if own.empty:
+        return {}
+    names = list(dict.fromkeys(own[SERIES]))
+    standing = (own[KEPT] > STANDS).to_numpy(dtype=np.float64)
+    found = profiles(np.log(own[column].to_numpy(dtype=np.float64)), standing, own[SERIES].map(names.index).to_numpy())
+    return {names[number]: one for number, one in found.items()}
 
-    The aspect ratio at which the height kept crosses `STANDS` for the last time is interpolated in its logarithm, and
-    so are the logarithms of the spanning level and of the density there. NaN where it is not crossed.
-    """
+
+def onsets(runs: pd.DataFrame) -> pd.DataFrame:
+    """Tabulate the values above which half of the piles stand: a row per series and column, with 95 % intervals."""
     rows = []
-    for (series, seed), group in runs.groupby([SERIES, SEED], sort=False):
-        own = group.sort_values(SLENDER)
-        kept, ratio = own[KEPT].to_numpy(), np.log(own[SLENDER].to_numpy())
-        below = np.nonzero(kept < STANDS)[0]
-        row: dict[str, object] = {SERIES: series, SEED: seed, ONSET: math.nan, AT_ONSET: math.nan, DENSITY_AT: math.nan}
-        if len(below) and below[-1] + 1 < len(kept):
-            at = int(below[-1])
-            part = (STANDS - kept[at]) / (kept[at + 1] - kept[at])
-            for name, values in {ONSET: ratio, AT_ONSET: np.log(own[LEVEL]), DENSITY_AT: np.log(own[DENSITY])}.items():
-                known = np.asarray(values, dtype=np.float64)
-                row[name] = math.exp(known[at] + part * (known[at + 1] - known[at]))
-        rows.append(row)
-    return pd.DataFrame(rows)
+    for column in (SLENDER, LEVEL, DENSITY):
+        for series, one in thresholds(runs, column).items():
+            low, high = one.interval
+            numbers = (math.exp(value) for value in (one.best, low, high))
+            rows.append((series, column, one.runs, one.having, *numbers))
+    names = ["runs [-]", "standing [-]", "half of piles stand at [-]", "from [-]", "to [-]"]
+    return pd.DataFrame(rows, columns=[SERIES, "against", *names])
 
 
 def crossing_number_rises(table: pd.DataFrame) -> Outcome:
@@ -173,27 +174,37 @@ def stands_from(table: pd.DataFrame) -> Outcome:
     return Outcome(effects=effects, note=f"by aspect ratio: {means_by(own, KEPT, SLENDER, '.2f')}")
 
 
-def ratio_of(table: pd.DataFrame, column: str, one: str, other: str) -> Effect:
-    """Return the mean over seeds of ln of a column's ratio between two series, paired by seed; not judged by itself."""
-    both = table.pivot_table(index=SEED, columns=SERIES, values=column)
-    known = {one, other} <= set(both.columns)
-    logs = (np.log(both[one]) - np.log(both[other])).dropna().tolist() if known else []
-    mean = mean_over_seeds(logs)
-    low, high = (np.exp(mean.value + side * mean.half_width) for side in (-1, 1))
-    text = f"{np.exp(mean.value):.3g} ({low:.3g} to {high:.3g} at 95 %, n = {mean.count})" if logs else "no data"
-    return Effect(label=f"{column.partition(' [')[0]}, {one} over {other}", value=mean, sign=0, text=text)
+def ratio_of(runs: pd.DataFrame, column: str, one: str, other: str) -> tuple[float, float, float]:
+    """Return ln of the ratio of two series' thresholds in a column, its 95 % half-width, and p of equal thresholds.
+
+    The half-width is that of both intervals, added in squares; all are NaN where a series has no threshold.
+    """
+    found = thresholds(runs, column)
+    if not {one, other} <= set(found) or not (found[one].known and found[other].known):
+        return math.nan, math.nan, math.nan
+    halves = [max(part.best - part.interval[0], part.interval[1] - part.best) for part in (found[one], found[other])]
+    return found[one].best - found[other].best, math.hypot(*halves), alike([found[one], found[other]])
 
 
-def one_level(table: pd.DataFrame, *, other: str) -> Outcome:
+def one_level(runs: pd.DataFrame, *, other: str) -> Outcome:
     """Judge whether piles of another series begin to stand at the spanning level of shaken piles."""
-    level = ratio_of(table, AT_ONSET, other, SHAKEN)
-    effects = [level, *(ratio_of(table, column, other, SHAKEN) for column in (ONSET, DENSITY_AT))]
-    note = f"level at the onset: {means_by(table, AT_ONSET, SERIES, '.3g')}; "
-    note += f"aspect ratio at the onset: {means_by(table, ONSET, SERIES, '.3g')}"
-    return Outcome(effects=effects, note=note, verdict=within(level.value.value, level.value.half_width, LIKE))
+    cells = []
+    for column in (LEVEL, SLENDER, DENSITY):
+        value, half, chance = ratio_of(runs, column, other, SHAKEN)
+        low, middle, high = (math.exp(value + part) for part in (-half, 0.0, half))
+        name = column.partition(" [")[0]
+        cells.append(f"{name}: {middle:.3g} ({low:.3g} to {high:.3g} at 95 %; alike: p = {chance:.2g})")
+    value, half, chance = ratio_of(runs, LEVEL, other, SHAKEN)
+    levels = ", ".join(f"{series} {math.exp(one.best):.3g}" for series, one in thresholds(runs, LEVEL).items())
+    note = f"at the onset, {other} over {SHAKEN}: {'; '.join(cells)}; spanning levels: {levels}"
+    verdict = decide(abs(value) + half <= LIKE, chance < REJECTED, data=not math.isnan(value))
+    return Outcome(note=note, verdict=verdict)
 
 
-SAME_LEVEL = f"the ratio of the spanning levels at the onset is within a factor of {math.exp(LIKE):.3g} at 95 %"
+SAME_LEVEL = (
+    f"the ratio of the spanning levels above which half of the piles stand is within a factor of {math.exp(LIKE):.3g} "
+    f"at 95 %; not found if one level for both series is rejected, p < {REJECTED:g}"
+)
 
 FINDINGS = (
     Finding(
@@ -213,14 +224,12 @@ FINDINGS = (
         says="The mechanical onset coincides with the percolation of strong entanglement: poured and shaken piles, of "
         "other number densities, begin to stand at one spanning level",
         outcome=partial(one_level, other=POURED),
-        tables=["onsets"],
         found_if=SAME_LEVEL,
     ),
     Finding(
         id="one-level-slippery",
         says="(ours) Piles of half the friction begin to stand at the same spanning level",
         outcome=partial(one_level, other=SLIPPERY),
-        tables=["onsets"],
         found_if=SAME_LEVEL,
     ),
 )
@@ -232,18 +241,15 @@ FIGURES = (
         name="onset",
         quantities=[QUANTITIES[name] for name in (KEPT, ACN, LEVEL, DENSITY)],
         x=SLENDER,
-        x_label="aspect ratio of the rods, length over diameter [-]",
+        x_label="aspect ratio of the rods [-]",
         split=_BY_SERIES,
-        log_x=True,
     ),
-    Means(
-        name="kept_level",
-        quantities=[QUANTITIES[KEPT]],
-        x=LEVEL,
-        x_label="spanning level of the local ACN [-]",
+    Scatter(
+        name="kept",
+        xs=[QUANTITIES[LEVEL], QUANTITIES[DENSITY], Quantity(column=SLENDER, axis="aspect ratio of the rods [-]")],
+        y=QUANTITIES[KEPT],
         split=_BY_SERIES,
-        log_x=True,
-        notes=[f"Percolation decides alone if all series cross {STANDS:g} at one spanning level."],
+        means=False,
     ),
 )
 
@@ -264,8 +270,8 @@ STUDY = Study(
     one_engine=True,
     remarks=(
         f"Local average crossing number: of all parts of rods in a ball of radius {BALL:g} L, prefactor 1/4π, at "
-        f"points {PITCH:g} L apart in the inside of the pile with the wall. Onset: the aspect ratio at which the "
-        f"height kept crosses {STANDS:g}, seed by seed.",
+        f"points {PITCH:g} L apart in the inside of the pile with the wall. Onset: half of the piles keep more than "
+        f"{STANDS:g} of the height; logistic fits in the logarithm, intervals by profile likelihood.",
     ),
     reference=Reference(
         statement="abstract of Jung, Plumb-Reyes, Lin and Mahadevan, PNAS 2025, arXiv 2310.04903; no data of theirs",

@@ -400,7 +400,7 @@ class Scatter:
     xs: Sequence[Quantity]  #: Drawn along x, in a panel each
     y: Quantity  #: Drawn along y in all panels
     split: Split  #: Makes the series of runs and of points; their properties have a marker and a colour
-    bounds: str  #: Column that is above 0 where y is a lower bound, which is drawn with an arrow
+    bounds: str = ""  #: Column that is above 0 where y is a lower bound, which is drawn with an arrow; empty: none is
     means: bool = True  #: Whether means over seeds are drawn
 
     def draw(self, path: Path, analysis: Analysis) -> list[Path]:
@@ -415,7 +415,7 @@ class Scatter:
                 small = {"color": colour, "alpha": 0.55}
                 label = "_" if self.means else series.label
                 axes.plot(rows[x], rows[y], series.properties["marker"], markersize=1.8, **small, label=label)
-                held = rows[rows[self.bounds] > 0]
+                held = rows[rows[self.bounds] > 0] if self.bounds else rows.iloc[:0]
                 draw_bounds(axes, held[x], held[y], length, properties={**small, "elinewidth": 0.6, "capsize": 1.6})
             for series in self.split(analysis.table("points")) if self.means else ():
                 properties = {"markersize": 4.2, **series.properties, "linestyle": "none"}
@@ -426,7 +426,8 @@ class Scatter:
             axes.set_xlabel(quantity.axis or x)
             axes.set_ylabel(self.y.axis or y)
             axes.set_ylim(bottom=0)
-        note = "Small: runs, with an arrow: a lower bound; large: means over seeds."
+        arrows = ", with an arrow: a lower bound" if self.bounds else ""
+        note = f"Small: runs{arrows}; large: means over seeds." if self.means or arrows else "A marker is a run."
         return finish(figure, path, [note], analysis.footer)
 
 

@@ -11,11 +11,9 @@ from dem.errors import InputError
 from postprocess.statistics.points import SEED
 from studies.rods import (
     ACN,
-    AT_ONSET,
     DENSITY,
     KEPT,
     LEVEL,
-    ONSET,
     ORDER,
     POURED,
     SERIES,
@@ -55,46 +53,46 @@ def test_the_field_is_that_of_the_inside_of_the_pile() -> None:
     assert field[0].max() == field[:, :, 0].max() == 0
 
 
-def series_of(onset: dict[str, float], level: dict[str, float], *, seeds: int = 8) -> pd.DataFrame:
+def series_of(onset: dict[str, float], level: dict[str, float], *, seeds: int = 8, noise: float = 0.02) -> pd.DataFrame:
     """Rows of all series; piles keep half at `onset`, where the spanning level is `level`."""
     generator, rows = np.random.default_rng(11), []
     for series, place in onset.items():
         for seed in range(1, seeds + 1):
-            noise = 0.02 * generator.standard_normal(2)
             for ratio in RATIOS:
-                away = np.log(ratio / place)
+                # Levels scatter, so that they lie close to the onset, too.
+                away = np.log(ratio / place) + noise * generator.standard_normal()
                 rows.append(
-                    {SERIES: series, SEED: seed, SLENDER: ratio, KEPT: 0.5 + 0.3 * (away + noise[0])}
-                    | {LEVEL: level[series] * np.exp(2 * away + noise[1]), DENSITY: 5 * ratio, ACN: ratio}
+                    {SERIES: series, SEED: seed, SLENDER: ratio, KEPT: 0.5 + 0.3 * away}
+                    | {LEVEL: level[series] * np.exp(2 * away), DENSITY: 5 * ratio, ACN: ratio}
                 )
     return pd.DataFrame(rows)
 
 
 def test_onsets_are_those_put_in() -> None:
     onset, level = {SHAKEN: 17.0, POURED: 20.0}, {SHAKEN: 100.0, POURED: 150.0}
-    found = onsets(series_of(onset, level)).groupby(SERIES)[[ONSET, AT_ONSET]].mean()
-    for series, place in onset.items():
-        # Eight seeds of 2 % each: 4 standard errors.
-        assert found.loc[series, ONSET] == pytest.approx(place, rel=0.03)
-        assert found.loc[series, AT_ONSET] == pytest.approx(level[series], rel=0.07)
-    late = onsets(series_of({SHAKEN: 60.0}, {SHAKEN: 100.0}, seeds=1))
-    assert late[[ONSET, AT_ONSET]].isna().all(axis=None)
+    found = onsets(series_of(onset, level, seeds=30, noise=0.3)).set_index(["against", SERIES])
+    for series, place in level.items():
+        row = found.loc[LEVEL, series]
+        # Thresholds are tried 2 % apart.
+        assert row["from [-]"] / 1.02 < place < 1.02 * row["to [-]"]
+        assert row["half of piles stand at [-]"] == pytest.approx(place, rel=0.1)
+        # Scatter moves piles across the onset in the aspect ratio, not in the level.
+        assert found.loc[SLENDER, series]["from [-]"] < onset[series] < found.loc[SLENDER, series]["to [-]"]
+    assert found.loc[LEVEL, SHAKEN]["runs [-]"] == 150
 
 
 def verdicts(runs: pd.DataFrame) -> dict[str, str]:
-    tables = {"onsets": onsets(runs)}
-    return {finding.id: str(finding.judge(runs, tables).verdict) for finding in STUDY.findings}
+    return {finding.id: str(finding.judge(runs).verdict) for finding in STUDY.findings}
 
 
 def test_one_level_for_all_series_is_found() -> None:
-    # With equal noise in both, seeds cancel; the levels are alike although the onsets are not.
-    found = verdicts(series_of({SHAKEN: 14.0, POURED: 18.0, SLIPPERY: 20.0}, dict.fromkeys(ORDER, 100.0)))
-    assert set(found.values()) == {"found"}
+    runs = series_of({SHAKEN: 14.0, POURED: 18.0, SLIPPERY: 20.0}, dict.fromkeys(ORDER, 100.0), seeds=60, noise=0.5)
+    assert set(verdicts(runs).values()) == {"found"}
 
 
 def test_other_levels_are_not_found() -> None:
-    level = {SHAKEN: 100.0, POURED: 102.0, SLIPPERY: 300.0}
-    found = verdicts(series_of(dict.fromkeys(ORDER, 16.0), level))
+    level = {SHAKEN: 100.0, POURED: 102.0, SLIPPERY: 1000.0}
+    found = verdicts(series_of(dict.fromkeys(ORDER, 16.0), level, noise=0.2))
     assert (found["one-level-poured"], found["one-level-slippery"]) == ("found", "not found")
     one = verdicts(series_of({SHAKEN: 16.0}, {SHAKEN: 100.0}))
     assert (one["one-level-poured"], one["stands-from"]) == ("no data", "found")
