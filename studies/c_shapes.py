@@ -22,6 +22,7 @@ from dem.record.run import Run
 from postprocess.geometry.bars import body_centres
 from postprocess.measures.closed_linking import closed_linking
 from postprocess.measures.graph import EntanglementGraph, entanglement_graph
+from postprocess.report import figures as style
 from postprocess.statistics.points import SEED
 from postprocess.statistics.seeds import mean_over_seeds, slope_within
 from studies.framework.figures import Histories, Means, Series, marker, one_by_one
@@ -38,6 +39,7 @@ SHARE_POURED = "largest cluster poured [-]"
 GROWTH = "links per body and decade of time [-]"
 CRITICAL, RANDOM = "critical links per body [-]", "critical links per body at random [-]"
 AGAINST_LINE, AGAINST_END = "ln residual over that of a line [-]", "ln residual over that of an exponential [-]"
+DELAYED = "ln residual with an onset over that of an exponential [-]"
 
 EARLY = 0.1  # s, time at which fits begin: three periods of vibration
 MOMENTS = 24  #: Number of times, equally apart on a logarithmic axis, at which links are counted
@@ -65,6 +67,7 @@ QUANTITIES = declare(
         ),
         AGAINST_LINE: ("", "", "ln of the residual of a + b ln t over that of a + b t"),
         AGAINST_END: ("", "", "ln of the residual of a + b ln t over that of a + b exp(-t/τ)"),
+        DELAYED: ("", "", "ln of the residual of a + b ln(1 + t/τ) over that of a + b exp(-t/τ)"),
     },
     axes={CRITICAL: "critical links per body [-]", GROWTH: "links per body and decade [-]"},
 )
@@ -107,6 +110,7 @@ def measure(run: Run) -> MeasuredRun:
         RANDOM: critical_links(linked(placed, np.repeat(np.arange(count), len(placed) // count)), generator),
         AGAINST_LINE: math.log(residuals["logarithm"] / residuals["line"]),
         AGAINST_END: math.log(residuals["logarithm"] / residuals["exponential"]),
+        DELAYED: math.log(residuals["delayed logarithm"] / residuals["exponential"]),
         **last_columns(run),
     }
     return MeasuredRun(run=run, rows=[row], history=history)
@@ -194,8 +198,9 @@ def critical_links(graph: EntanglementGraph, generator: np.random.Generator) -> 
 LAWS: dict[str, Callable[[Floats, float], Floats]] = {
     "logarithm": lambda t, _: np.log(t),
     "line": lambda t, _: t,
+    "delayed logarithm": lambda t, tau: np.log1p(t / tau),
     "exponential": lambda t, tau: np.exp(-t / tau),
-}  #: What multiplies b in a + b f(t, τ), by the name of the law; τ is fitted to the exponential alone
+}  #: What multiplies b in a + b f(t, τ), by the name of the law; τ is fitted to the last two
 
 
 def residual(law: str, times: Floats, values: Floats) -> float:
@@ -207,7 +212,7 @@ def residual(law: str, times: Floats, values: Floats) -> float:
         solved, *_ = np.linalg.lstsq(matrix, values, rcond=None)
         return np.asarray(matrix @ solved - values, dtype=np.float64)
 
-    if law != "exponential":
+    if law in ("logarithm", "line"):
         return float(np.sqrt(np.mean(left(np.zeros(1)) ** 2)))
     first, last = math.log(times[0] / 3), math.log(10 * times[-1])
     starts = np.linspace(first, last, 6)[1:-1]
@@ -225,15 +230,15 @@ def grows(table: pd.DataFrame) -> Outcome:
 
 
 def logarithm_best(table: pd.DataFrame) -> list[Effect]:
-    """Judge whether a + b ln t leaves less than a line and than a saturating exponential, over all runs."""
-    laws = {"a line": AGAINST_LINE, "a + b exp(-t/τ)": AGAINST_END}
+    """Judge whether logarithms leave less than a line and than an exponential, of equal numbers of parameters."""
+    laws = {
+        "a + b ln t over that of a line": (AGAINST_LINE, -1),
+        "a + b ln(1 + t/τ) over that of a + b exp(-t/τ)": (DELAYED, -1),
+        "a + b ln t over that of a + b exp(-t/τ), which has a parameter more": (AGAINST_END, 0),
+    }
     return [
-        Effect(
-            label=f"ln of the residual of a + b ln t over that of {law}",
-            value=mean_over_seeds(table[column].tolist()),
-            sign=-1,
-        )
-        for law, column in laws.items()
+        Effect(label=f"ln of the residual of {law}", value=mean_over_seeds(table[column].tolist()), sign=sign)
+        for law, (column, sign) in laws.items()
     ]
 
 
@@ -280,7 +285,7 @@ FINDINGS = (
         id="logarithm",
         says="The growth is logarithmic",
         outcome=logarithm_best,
-        found_if="a + b ln t leaves less than a + b t and than a + b exp(-t/τ), means over all runs",
+        found_if="a + b ln t leaves less than a + b t, and a + b ln(1 + t/τ) less than a + b exp(-t/τ), mean of runs",
     ),
     Finding(
         id="percolates",
@@ -325,7 +330,7 @@ FIGURES = (
         quantities=[QUANTITIES[name] for name in (CRITICAL, GROWTH)],
         x=OPENING,
         x_label="opening angle [degree]",
-        split=lambda table: [Series(rows=table, label="piles", properties=marker("o", "#0072B2", "#0072B2"))],
+        split=lambda table: [Series(rows=table, label="piles", properties=marker("o", style.BLUE, style.BLUE))],
     ),
 )
 

@@ -18,6 +18,7 @@ from matplotlib.cm import ScalarMappable
 from matplotlib.colors import Normalize
 from matplotlib.container import ErrorbarContainer
 from matplotlib.figure import Figure as Canvas
+from matplotlib.ticker import LogLocator, NullFormatter
 from numpy.typing import ArrayLike, NDArray
 
 from dem.errors import InputError
@@ -36,6 +37,7 @@ _CONFIDENCE = "_95 %"  # label of the lines of error bars; Matplotlib keeps labe
 _COLOURS = {SHAPE: style.ORANGE, EXTERNAL: style.BLUE, INTERNAL: style.SKY, STATIC: style.GREY}
 _SHAPES = {SHAPE: "s", EXTERNAL: "D", INTERNAL: "o", STATIC: "^"}
 _ASIDE = 0.16  # distance of the series in a row, over the distance of two rows: error bars must not overlap
+_SHORT = 100  # ratio of the ends of a logarithmic axis below which 1, 2 and 5 times powers of ten have labels
 _LEAST_BIN = 0.1  # s, three periods of shaking at 30 Hz
 _BINS = 100  # intervals of a history
 _CELL = math.sqrt(2)  # factor in x from the outermost points of a heat map to the edges of their cells
@@ -373,6 +375,11 @@ class Histories:
             axes.set_xlabel(self.x_label)
             axes.set_ylabel(label)
             axes.set_xscale("log" if self.log and any(histories for _, histories in drawn) else "linear")
+            if axes.get_xscale() == "log" and axes.get_xlim()[1] < _SHORT * axes.get_xlim()[0]:
+                # Labels of powers alone are too few, those of all ticks overlap.
+                axes.xaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
+                axes.xaxis.set_major_formatter("{x:g}")
+                axes.xaxis.set_minor_formatter(NullFormatter())
             if value is not None:
                 axes.set_title(self.panel.format(self.panel_scale * value), fontsize=8)
         means = "logarithmic intervals" if self.log else f"{width:.2g} {self.unit}"
