@@ -65,6 +65,7 @@ def _capsules_of_bars(frame: Frame, bars: RecordedBars, run: Run) -> Capsules:
     free = np.ones(2 * len(ends), dtype=bool)
     near = cKDTree(ends.reshape(-1, 3)).query_pairs(_JOINED * lengths.max(), output_type="ndarray")
     free[near[bars.body[near[:, 0] // 2] == bars.body[near[:, 1] // 2]]] = False
+    free &= ~np.repeat(np.array([each.flexible for each in kinds])[kind], 2)
     inset = np.minimum(radius / lengths, 0.5)[:, None, None] * (free.reshape(-1, 2, 1) * along[:, None])
     ends += inset * np.array([1.0, -1.0])[:, None]
     offsets = [_offsets(each, run.scene["fidelity"]["rows"]) for each in kinds]

@@ -123,7 +123,8 @@ def strands_of(frame: Frame, run: Run) -> Strands:
         kinds = run.manifest.kinds or ()
         sizes = np.array([(kind.sphere_diameter_m, kind.thickness_normal_m, kind.round) for kind in kinds])
         thick, normal, round_ = sizes[frame.kind[frame.body]].T
-        inner = inner_axes(frame.segments, thick / 2)
+        caps = np.array([kind.flexible for kind in kinds])[frame.kind[frame.body]]
+        inner = inner_axes(frame.segments, np.where(caps, 0.0, thick / 2))
         reach = np.where((round_ == 1) | (chain.rows == 1), 0.0, (normal - thick) / 2)
         offsets = np.linspace(-reach, reach, chain.rows, axis=1)[..., None] * frame.bars.normals[:, None]
         axes = (inner[:, None] + offsets[:, :, None]).reshape(-1, 2, 3)

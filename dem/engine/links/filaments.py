@@ -90,7 +90,7 @@ class LinksFilaments:
                 turn = 2 * math.pi * filament.segment_length / activity.wavelength
                 own = PreferredCurvature(
                     amplitudes=activity.curvature,
-                    phases=turn * np.arange(filament.nodes - 2),
+                    phases=turn * np.arange(filament.nodes - 2, dtype=np.float64),
                     rate=activity.rate,
                     reversal_rate=activity.reversal_rate,
                 )

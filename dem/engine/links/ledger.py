@@ -24,7 +24,7 @@ class LinksLedger:
 
     @property
     def dissipated(self) -> float:
-        """Energy dissipated since the start [J], by welding, stopping and drag, and by contacts and bends if recorded."""
+        """Energy dissipated since the start [J], by welding, stopping and drag; by contacts and bends if recorded."""
         lost = float(self._world.totals[LOST])
         if self._filaments is None:
             return lost
