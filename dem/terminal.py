@@ -40,6 +40,18 @@ class Printable:
         return getattr(self.stream, name)
 
 
+def redraw(text: str, *, last: bool = False) -> None:
+    """Write text to standard error in place of the current line; `last` ends the line."""
+    sys.stderr.write(ERASE_LINE)
+    sys.stderr.write(text + "\n" * last)
+    sys.stderr.flush()
+
+
+def warn(text: str) -> None:
+    """Print a warning to standard error."""
+    print(f"smarticles: warning: {text}", file=sys.stderr)
+
+
 def bare(stream: TextIO) -> TextIO:
     """Return the stream below a `Printable`, for rich, which writes control characters of its own."""
     return stream.stream if isinstance(stream, Printable) else stream

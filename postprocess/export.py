@@ -75,7 +75,8 @@ def export_run(
     path = _checked_output(run.path, output, to, folder=folder)
     carried = [field for field in fields if field.name in IDENTITY or not (to in _FIELDLESS or field.name in unwanted)]
     bodies = Bodies(run, kinds, carried)
-    bodies.hold(frames[index] for index in chosen)
+    if to != "gsd":
+        bodies.hold(frames[index] for index in chosen)
 
     def exported() -> Iterator[tuple[int, Frame]]:
         for done, index in enumerate(chosen):

@@ -12,17 +12,14 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from scipy.spatial import cKDTree
 
-from dem.record.document import Kind
-from dem.record.frame import Frame, RecordedBars
+from dem.record.frame import Frame
 from dem.record.run import Run
 from postprocess.bodies.fields import BY_NAME, Field, link_values
-from postprocess.geometry.links import Floats, Whole, checked_vertices, strands
-from postprocess.measures.contacts import chain_of
+from postprocess.geometry.links import Floats, Whole
+from postprocess.measures.contacts import strands_of
 
-_JOINED = 1e-6  # of the longest bar: ends of a body that are nearer are one joint
-_NAMES = ("barb 1", "middle link", "barb 2")
+_NAMES: tuple[str, ...] = ("barb 1", "middle link", "barb 2")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -39,54 +36,15 @@ class Capsules:
 
 def capsules_of(frame: Frame, run: Run) -> Capsules:
     """Return the capsules of all links, or bars, of a frame, see `dem.engine.links.shapes`."""
-    if frame.bars is not None:
-        return _capsules_of_bars(frame, frame.bars, run)
-    chain = chain_of(run)
-    axes = strands(checked_vertices(frame.vertices), chain)
-    ends = np.stack([axes[:, :, :-1], axes[:, :, 1:]], axis=3)
-    body, _, link = np.indices(ends.shape[:3]).reshape(3, -1)
-    return Capsules(
-        ends=ends.reshape(-1, 2, 3),
-        body=body,
-        link=link,
-        types=_NAMES,
-        type_of=link,
-        radii=np.full(len(_NAMES), chain.diameter / 2),
-    )
-
-
-def _capsules_of_bars(frame: Frame, bars: RecordedBars, run: Run) -> Capsules:
-    kinds, kind = run.manifest.kinds or (), bars.kind[bars.body]
-    radius = np.array([each.sphere_diameter_m / 2 for each in kinds])[kind]
-    ends = bars.segments.copy()
-    along = ends[:, 1] - ends[:, 0]
-    lengths = np.linalg.norm(along, axis=1)
-    # A free end is a tip, which the surface of the capsule reaches; at joints axes meet.
-    free = np.ones(2 * len(ends), dtype=bool)
-    near = cKDTree(ends.reshape(-1, 3)).query_pairs(_JOINED * lengths.max(), output_type="ndarray")
-    free[near[bars.body[near[:, 0] // 2] == bars.body[near[:, 1] // 2]]] = False
-    free &= ~np.repeat(np.array([each.flexible for each in kinds])[kind], 2)
-    inset = np.minimum(radius / lengths, 0.5)[:, None, None] * (free.reshape(-1, 2, 1) * along[:, None])
-    ends += inset * np.array([1.0, -1.0])[:, None]
-    offsets = [_offsets(each, run.scene["fidelity"]["rows"]) for each in kinds]
-    own = np.repeat(np.arange(len(ends)), [len(offsets[k]) for k in kind])
-    aside = np.concatenate([np.zeros(0), *(offsets[k] for k in kind)])
-    names = [(k, j) for k, each in enumerate(kinds) for j in range(each.bars)]
-    first = np.cumsum([0, *(each.bars for each in kinds)])
-    return Capsules(
-        ends=ends[own] + (aside[:, None] * bars.normals[own])[:, None],
-        body=bars.body[own],
-        link=bars.number[own],
-        types=[f"{k} {kinds[k].shape}, bar {j}" for k, j in names],
-        type_of=(first[kind] + bars.number)[own],
-        radii=np.array([kinds[k].sphere_diameter_m / 2 for k, _ in names]),
-    )
-
-
-def _offsets(kind: Kind, rows: int) -> Floats:
-    """Return the offsets of a bar's strands along its normal [m], see `dem.engine.links.shapes.rigid_shape`."""
-    reach = (kind.thickness_normal_m - kind.sphere_diameter_m) / 2
-    return np.linspace(-reach, reach, rows) if rows > 1 and reach > 0 and not kind.round else np.zeros(1)
+    found, kinds = strands_of(frame, run), run.manifest.kinds
+    if kinds is None:
+        types, first, radii = _NAMES, np.zeros(1, np.int64), np.full(len(_NAMES), run.manifest.sphere_diameter_m / 2)
+    else:
+        types = tuple(f"{k} {kind.shape}, bar {j}" for k, kind in enumerate(kinds) for j in range(kind.bars))
+        first = np.cumsum([0, *(kind.bars for kind in kinds)])
+        radii = np.repeat([kind.sphere_diameter_m / 2 for kind in kinds], np.diff(first))
+    type_of = first[frame.kind[found.body]] + found.link
+    return Capsules(ends=found.axes, body=found.body, link=found.link, types=types, type_of=type_of, radii=radii)
 
 
 def orientations(directions: Floats) -> Floats:
@@ -120,15 +78,16 @@ def write_trajectory(
     Args:
         frames: the frames with their numbers.
         fields: fields to write as `log/particles/NAME`.
-        first: the frames once more, read before all others for the size of the box.
+        first: the frames once more, read before all others for shapes and the size of the box.
     """
     import gsd.hoomd  # noqa: PLC0415 - an extra
 
-    half, written = np.zeros(3), 0
+    half, most, written = np.zeros(3), 0, 0
     shapes: list[dict[str, Any]] = []
     for frame in first:
         capsules = capsules_of(frame, run)
-        shapes = shapes or shapes_of(capsules)
+        if len(capsules.ends) > most:  # earlier frames may lack whole types
+            shapes, most = shapes_of(capsules), len(capsules.ends)
         half = np.maximum(half, np.abs(capsules.ends).max(axis=(0, 1)) + capsules.radii.max())
     with gsd.hoomd.open(path, "w") as file:
         for number, frame in frames:

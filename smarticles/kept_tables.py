@@ -6,12 +6,13 @@ import hashlib
 import json
 import sys
 from collections.abc import Iterator
+from contextlib import suppress
 from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from dem.errors import InputError, RunError
-from dem.record.files import write_whole
+from dem.errors import RunError
+from dem.record.files import write_text
 from dem.record.names import DONE, FAILED, FORCE, FRAME, MANIFEST, SCENE, SERIES, VTKHDF, collection, folder
 
 if TYPE_CHECKING:
@@ -51,10 +52,9 @@ def keep(table: pd.DataFrame, directory: Path, kind: str, key: str) -> None:
     rows = table.astype(object).to_numpy().tolist()
     text = json.dumps({"columns": list(table.columns), "rows": rows}, default=_plain)
     content = f"{key}\n{hashlib.sha256(text.encode()).hexdigest()}\n{text}"
-    try:
-        write_whole(_file(directory, kind), lambda path: path.write_text(content, encoding="utf-8"), make_folder=False)
-    except (OSError, InputError, RunError):
-        pass  # a read-only directory or a full disk: the table is computed again next time
+    # In a read-only directory or on a full disk the table is computed again next time.
+    with suppress(RunError):
+        write_text(_file(directory, kind), content, make_folder=False)
 
 
 def _file(directory: Path, kind: str) -> Path:

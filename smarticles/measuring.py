@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
+from contextlib import nullcontext
 from functools import partial
 from multiprocessing import get_context
 from pathlib import Path
@@ -107,27 +108,18 @@ def measured(
     tables = {directory: read_kept(directory, kind, key) if kind else None for directory, key in keys.items()}
     missing = [directory for directory, table in tables.items() if table is None]
     take = partial(_measure_and_keep, frames=frames, costly=costly, also=also, measures=measures, kind=kind)
-    if jobs == 1 or len(missing) < _MIN_RUNS_FOR_PROCESSES:
-        _collect(map(take, missing, (keys[directory] for directory in missing)), missing, tables, progress)
-    else:
-        # Spawned, since a forked process would not have the threads of VTK and matplotlib.
-        with ProcessPoolExecutor(min(jobs, len(missing)), mp_context=get_context("spawn")) as pool:
-            made = pool.map(take, missing, (keys[directory] for directory in missing))
-            _collect(made, missing, tables, progress)
+    processes = 1 if len(missing) < _MIN_RUNS_FOR_PROCESSES else min(jobs, len(missing))
+    # Spawned, since a forked process would not have the threads of VTK and matplotlib.
+    pool = nullcontext() if processes == 1 else ProcessPoolExecutor(processes, mp_context=get_context("spawn"))
+    with pool as executor:
+        each = map if executor is None else executor.map
+        made = each(take, missing, [keys[directory] for directory in missing])
+        for number, (directory, table) in enumerate(zip(missing, made, strict=True), start=1):
+            tables[directory] = table
+            progress(number, len(missing))
     return pd.concat(
         [_with_variables(table, found[run]) for run, table in tables.items() if table is not None], ignore_index=True
     )
-
-
-def _collect(
-    made: Iterable[pd.DataFrame],
-    missing: Sequence[Path],
-    tables: dict[Path, pd.DataFrame | None],
-    progress: Callable[[int, int], None],
-) -> None:
-    for number, (directory, table) in enumerate(zip(missing, made, strict=True), start=1):
-        tables[directory] = table
-        progress(number, len(missing))
 
 
 def _measure_and_keep(
@@ -153,11 +145,11 @@ def _with_variables(table: pd.DataFrame, values: Mapping[str, Any]) -> pd.DataFr
     """Return the measures of one run with the variables of its sweep after the first column."""
     for place, (name, value) in enumerate(values.items(), start=1):
         column = name
-        if name in table.columns and (table[name] == value).all():
+        cell = value if isinstance(value, str | int | float | bool) else json.dumps(value, ensure_ascii=False)
+        if name in table.columns and (table[name] == cell).all():
             table = table.drop(columns=name)  # inserted again below
         elif name in table.columns:
             column = f"{name} (swept)"
-        cell = value if isinstance(value, str | int | float | bool) else json.dumps(value, ensure_ascii=False)
         table.insert(place, column, [cell] * len(table))
     return table
 
@@ -175,12 +167,15 @@ def of_phase(table: pd.DataFrame, phase: str) -> pd.DataFrame:
     return table[table["phase type"] == phase].reset_index(drop=True)
 
 
-def grouped(table: pd.DataFrame, by: Sequence[str]) -> pd.DataFrame:
-    """Average a table of `measured` over runs with equal values in `by`, with standard errors, by phase."""
+def grouped(table: pd.DataFrame, by: Sequence[str], *, intervals: bool = False) -> pd.DataFrame:
+    """Average a table of `measured` over runs with equal values in `by`, with standard errors, by phase.
+
+    With `intervals` it has the half-widths "… 95 % […]" of confidence intervals, too.
+    """
     from postprocess.statistics.points import means_by  # noqa: PLC0415
 
     for name in by:
         if name not in table.columns:
             known = [str(column) for column in table.columns if not str(column).endswith("]")]
             raise InputError(f"{name!r} is no column of these runs; {nearest(name, known)}")
-    return means_by(table, [*by, *(name for name in PHASE if name not in by)])
+    return means_by(table, [*by, *(name for name in PHASE if name not in by)], intervals=intervals)

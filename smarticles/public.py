@@ -20,9 +20,10 @@ from dem.errors import InputError, RunError
 from dem.record.frame import Frame
 from dem.record.names import SCENE
 from dem.record.run import Run, open_run
-from dem.scene.reading import SCHEMA_VERSION, apply_override, dump_scene
+from dem.scene.reading import SCHEMA_VERSION, dump_scene
 from dem.scene.scene import Scene
-from dem.setting.fidelity import fidelities
+from dem.scene.stiffness import stiffness_for
+from dem.setting.contact import PRESET
 from dem.yaml_text import load_yaml, read_text
 from postprocess.measures.registry import FrameMeasure, measure_of
 from smarticles.main import BAD_INPUT
@@ -30,6 +31,7 @@ from smarticles.measuring import grouped, measured
 from smarticles.sweeps import compute, make_folder, raise_failures
 from templates.local import environment, smarticles_command
 from templates.sweep.folder import Folder, open_folder
+from templates.sweep.from_scene import as_template
 from templates.sweep.sweep_file import SEED
 
 if TYPE_CHECKING:
@@ -262,22 +264,13 @@ def write_sweep(scene: Scene | Path | str, vary: Mapping[str, Sequence[Any]], fo
     if not vary:
         raise InputError("vary: is empty; give a key of the scene and its values, e.g. {'seed': [1, 2, 3]}")
     data = _explicit_keys(scene) if isinstance(scene, Scene) else _read_scene_file(Path(scene))
-    text = yaml.safe_dump(data, sort_keys=False, allow_unicode=True)
-    for mark in ("{{", "{%", "{#"):
-        if mark in text:
-            name = "scene" if isinstance(scene, Scene) else scene
-            raise InputError(f"{name}: contains {mark!r}, which is template syntax; remove it")
     # A variable is named by the last word of its key, or by all words if two keys end alike.
     last = [key.rpartition(".")[2] for key in vary]
     names = {
         key: word if last.count(word) == 1 and not word.isdigit() else key.replace(".", "_")
         for key, word in zip(vary, last, strict=True)
     }
-    for key, name in names.items():
-        apply_override(data, f"{key}='{{{{ {name} }}}}'")
-    text = yaml.safe_dump(data, sort_keys=False, allow_unicode=True)
-    for name in names.values():
-        text = text.replace(f"'{{{{ {name} }}}}'", f"{{{{ {name} }}}}")
+    text = as_template(data, names, "scene" if isinstance(scene, Scene) else str(scene))
     (folder / "scene.yaml.j2").write_text(text, encoding="utf-8")
     grid = {name: list(vary[key]) for key, name in names.items() if name != SEED}
     content: dict[str, Any] = {
@@ -297,14 +290,16 @@ def _explicit_keys(scene: Scene) -> dict[str, Any]:
     """Return the keys that were set explicitly, without derived keys, which may depend on varied keys."""
     data = scene.model_dump(mode="json", exclude_unset=True)
     if "fidelity" in data:
-        named = fidelities(scene.engine)[scene.fidelity.base]
-        differing = {key: value for key, value in data["fidelity"].items() if named.get(key) != value}
+        derived = dict(scene.named_knobs)
+        if scene.smooth:
+            derived["stiffness_N_per_m"] = max(derived["stiffness_N_per_m"], stiffness_for(scene))
+        differing = {key: value for key, value in data["fidelity"].items() if derived.get(key) != value}
         data["fidelity"] = {**differing, "base": scene.fidelity.base}
     return {"schema_version": SCHEMA_VERSION, **data}
 
 
 def _read_scene_file(path: Path) -> dict[str, Any]:
-    """Return the content of a scene file, in which paths of runs to take over are absolute."""
+    """Return the content of a scene file, in which paths of other files are absolute."""
     try:
         data = load_yaml(read_text(path))
     except (OSError, ValueError, yaml.YAMLError) as error:
@@ -312,8 +307,9 @@ def _read_scene_file(path: Path) -> dict[str, Any]:
         raise InputError(msg) from None
     if not isinstance(data, dict):
         raise InputError(f"{path}: a scene is a mapping of keys to values, got {type(data).__name__}")
-    for phase in data["phases"] if isinstance(data.get("phases"), list) else ():
-        # `run` is relative to the scene file, and the template is in another folder.
-        if isinstance(phase, dict) and isinstance(phase.get("run"), str):
-            phase["run"] = str((path.parent / phase["run"]).resolve())
+    phases = data["phases"] if isinstance(data.get("phases"), list) else ()
+    # These paths are relative to the scene file, and the template is in another folder.
+    for part, key in [(data.get("contact"), PRESET), *((phase, "run") for phase in phases)]:
+        if isinstance(part, dict) and isinstance(part.get(key), str):
+            part[key] = str((path.parent / part[key]).resolve())
     return data

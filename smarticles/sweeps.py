@@ -50,23 +50,34 @@ def changed_sweep(file: Path, constants: Mapping[str, str] = MappingProxyType({}
     return sweep if engine is None else on_engine(sweep, engine)
 
 
-def folder_of(sweep: Sweep, points: Sequence[Point], out: Path, command: str, *, extend: bool = False) -> Folder:
-    """Create or open the directory of an expanded sweep, see `templates.sweep.folder.create_folder`."""
+def folder_of(
+    sweep: Sweep,
+    points: Sequence[Point],
+    out: Path,
+    command: str,
+    *,
+    expected_s: Sequence[float] | None = None,
+    extend: bool = False,
+) -> Folder:
+    """Create or open the directory of an expanded sweep, see `templates.sweep.folder.create_folder`.
+
+    `expected_s` has the expected wall time of each point [s]; None: the points are planned.
+    """
     from templates.sweep.folder import create_folder  # noqa: PLC0415
 
     # Versions of the packages that expand a sweep; each run records the versions of its engine.
     packages = ("smarticles", "jinja2", "pydantic", "pyyaml")
     versions = {"python": platform.python_version(), **{name: version(name) for name in packages}}
-    return create_folder(
-        out, sweep, points, command=command, versions=versions, expected_s=expected_wall_s, extend=extend
-    )
+    if expected_s is None:
+        expected_s = [expected_wall_s(point.scene) for point in points]
+    return create_folder(out, sweep, points, command=command, versions=versions, expected_s=expected_s, extend=extend)
 
 
 def expected_wall_s(scene: Scene) -> float:
     """Return the expected wall time of a scene [s] on one core of the machine of the cost measurements."""
-    from dem.plan.outlook import plan  # noqa: PLC0415
+    from dem.plan.outlook import planned_phases  # noqa: PLC0415
 
-    return plan(scene).wall_s
+    return sum(phase.wall_s for phase in planned_phases(scene))
 
 
 # -- on this machine ---------------------------------------------------------------------------------------------------

@@ -6,6 +6,7 @@ of the model, such as restitution, have no accuracy but a sensitivity; their ref
 within the scatter between seeds is not resolved, which does not prove that it is 0.
 """
 
+import argparse
 import math
 import re
 from collections.abc import Mapping, Sequence
@@ -546,7 +547,8 @@ def advise(table: pd.DataFrame, knob: str) -> Outcome:
 def worst_errors(table: pd.DataFrame) -> pd.DataFrame:
     """Return the largest error of each named fidelity: of packing, heights and ⟨N⟩, and in a row of its own of energy.
 
-    The largest error is that with the largest bound: its absolute value plus its 95 % band. Columns: `engine`,
+    The largest error is that with the largest bound: its absolute value plus its 95 % band. Quantities whose error or
+    band is unknown are left out. Columns: `engine`,
     `fidelity`, `COST`, `quantity` (its symbol), `error [%]` (absolute value), `bound [%]`, and the number of seeds.
     """
     knob = "engine" if (table[KNOB] == "engine").any() else "fidelity"
@@ -557,7 +559,7 @@ def worst_errors(table: pd.DataFrame) -> pd.DataFrame:
             errors = {
                 SYMBOLS[name]: (abs(row[f"{name} error [%]"]), row[f"{name} error 95 % [%]"])
                 for name in names
-                if math.isfinite(row[f"{name} error [%]"])
+                if math.isfinite(row[f"{name} error [%]"] + row[f"{name} error 95 % [%]"])
             }
             if errors:
                 symbol, (error, band) = max(errors.items(), key=lambda item: sum(item[1]))
@@ -578,17 +580,21 @@ class Promises:
             The files.
         """
         table = analysis.tables["work_precision"]
-        return self.compare(path, {str(table[ACTIVITY].dropna().iloc[0]): table}, analysis.footer)
+        return self.compare(path, {next(iter(table[ACTIVITY].dropna()), ""): table}, analysis.footer)
 
     def compare(self, path: Path, tables: Mapping[str, pd.DataFrame], footer: Sequence[str]) -> list[Path]:
-        """Draw tables of work and precision by the name of their scene; return the files."""
+        """Draw tables of work and precision by the name of their scene; return the files.
+
+        A fidelity whose cost is unknown or 0 has no place on the logarithmic axis and is left out.
+        """
         figure, axes = panels(len(tables), columns=3, height=3.0, sharey=True)
         for panel, (title, table) in zip(axes, tables.items(), strict=True):
             for name, promise in PROMISES.items():
                 panel.axhline(promise, color=GREY, linewidth=0.6, linestyle=":")
                 panel.annotate(f"{name}: {promise:g} %", (0.01, promise), (0, 1), xycoords=("axes fraction", "data"),
                                textcoords="offset points", color=GREY, fontsize=5.5)  # fmt: skip
-            for _, row in worst_errors(table).iterrows():
+            costs = table[COST][table[COST] > 0]
+            for _, row in worst_errors(table[table[COST] > 0]).iterrows():
                 colour = {"links": BLUE, "yade": ORANGE}[row[ENGINE]]
                 bar = [[0.0], [row["bound [%]"] - row["error [%]"]]]
                 of_energy = row["quantity"] == SYMBOLS["energy"]
@@ -599,7 +605,7 @@ class Promises:
                 aside, side = (-5, "right") if of_energy else (5, "left")
                 panel.annotate(text, (row[COST], row["error [%]"]), (aside, 0), textcoords="offset points", ha=side,
                                va="center", color=colour)  # fmt: skip
-            low, high = table[COST].min() / 2, table[COST].max() * 2
+            low, high = (costs.min() / 2, costs.max() * 2) if len(costs) else (1, 10)
             panel.set(title=title, xlabel="processor time per simulated s [s/s]", ylim=(1, 100))
             panel.set(xscale="log", yscale="log", xlim=(low, high))
             for axis in (panel.xaxis, panel.yaxis):
@@ -607,10 +613,9 @@ class Promises:
                 axis.set_major_formatter("{x:g}")
                 axis.set_minor_locator(NullLocator())
         axes[0].set_ylabel("error against the converged fidelity [%]")
-        notes = [
-            "Largest error of φ_0, φ_f, height and ⟨N⟩ (filled), and error of the energy put in (open, E). "
-            "End of the bar: what the seeds do not exclude (95 %)."
-        ]
+        notes = ["Largest error of φ_0, φ_f, height and ⟨N⟩ (filled), and error of the energy put in (open, E)."]
+        if any(panel.containers for panel in axes):
+            notes.append("Error bars: 95 % confidence; their ends are the errors that the seeds do not exclude.")
         return finish(figure, path, notes, footer)
 
 
@@ -689,3 +694,26 @@ def study(rungs: Sequence[Rung], expected_s: Mapping[str, float] = MappingProxyT
         ),
         reference=Reference(statement="the finest rung of each knob", facts={"knobs": " ".join(knobs)}),
     )
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Draw the named fidelities of several ladders side by side, from their published tables."""
+    parser = argparse.ArgumentParser(
+        prog="python -m studies.accuracy",
+        description="Draw fidelities.png of a folder that has the results of one ladder in each of its subfolders.",
+    )
+    parser.add_argument("folder", type=Path, help="such as results/accuracy-links")
+    parser.add_argument("ladders", nargs="+", help="subfolders with a work_precision.csv, one panel each")
+    parser.add_argument("--footer", default="", help="statement on scene, seeds and versions")
+    given = parser.parse_args(arguments)
+    files = {name: given.folder / name / "work_precision.csv" for name in given.ladders}
+    try:
+        tables = {name: pd.read_csv(file, comment="#") for name, file in files.items()}
+    except (OSError, ValueError) as error:
+        parser.error(f"cannot read the tables: {error}")
+    command = f"python -m studies.accuracy {given.folder} {' '.join(given.ladders)}"
+    Promises().compare(given.folder / "fidelities", tables, [*filter(None, [given.footer]), f"{command}."])
+
+
+if __name__ == "__main__":
+    main()

@@ -6,13 +6,13 @@ Sources: https://snakemake.readthedocs.io/en/stable/snakefiles/rules.html, https
 import math
 import shlex
 from collections.abc import Sequence
-from datetime import timedelta
 from pathlib import Path
 
 import jinja2
 
 from dem.errors import InputError
 from dem.record.files import write_text
+from templates.slurm.cluster import format_time
 from templates.slurm.job import LEAST_TIME_S, MEMORY_PER_RUN_MIB, TIME_MARGIN, smarticles_words
 from templates.sweep.folder import Entry, Folder
 
@@ -41,9 +41,7 @@ def workflow(tool: str, name: str, entries: Sequence[Entry]) -> str:
 
 def _walltime(seconds: int) -> str:
     """Return a time as row reads it, such as `2 days, 03:00:00`."""
-    span = timedelta(seconds=seconds)
-    hours, rest = divmod(span.seconds, 3600)
-    return (f"{span.days} days, " if span.days else "") + f"{hours:02d}:{rest // 60:02d}:00"
+    return format_time(seconds).replace("-", " days, ")
 
 
 def write_workflow(folder: Folder, tool: str) -> Path:

@@ -96,6 +96,11 @@ class Bars:
             )
 
     @cached_property
+    def _joints(self) -> Numbers:
+        """(2 S,) of `first_ends`."""
+        return first_ends(self.points)
+
+    @cached_property
     def gaps(self) -> tuple[Numbers, Numbers, Array]:
         """All pairs of bars, as (P,) first, (P,) second and (P,) distances of their axes [m].
 
@@ -103,7 +108,7 @@ class Bars:
         each other have the distance 0.
         """
         first, second = np.triu_indices(len(self.points), 1)
-        joints = first_ends(self.points).reshape(-1, 2)
+        joints = self._joints.reshape(-1, 2)
         one, other = joints[first], joints[second]
         same = one[:, :, None] == other[:, None, :]  # (P, 2, 2) whether an end of one is an end of the other
         apart = segment_distances(self.points[first], self.points[second])
@@ -182,7 +187,7 @@ class Bars:
         """(3, 3) axes of the body's frame in columns, in the frame of `points`."""
         return self._principal[1]
 
-    @property
+    @cached_property
     def frames(self) -> Array:
         """(S, 3, 3) unit vectors along, across and normal to each bar in columns, in the body's frame."""
         return matrix_product(self.rotation.T, self._frames)
@@ -195,7 +200,7 @@ class Bars:
     @cached_property
     def free(self) -> Flags:
         """(S, 2) whether each end of a bar is free: not the end of another bar."""
-        first = first_ends(self.points)
+        first = self._joints
         return np.asarray((np.bincount(first, minlength=len(first))[first] == 1).reshape(-1, 2))
 
     @cached_property
@@ -204,7 +209,7 @@ class Bars:
 
         Each joint has one owner: the first of those bars that are joined at both ends, or else the first bar.
         """
-        return owners(first_ends(self.points), np.repeat((~self.free).all(axis=1), 2)).reshape(-1, 2)
+        return owners(self._joints, np.repeat((~self.free).all(axis=1), 2)).reshape(-1, 2)
 
     def radius(self, rows: int) -> float:
         """Return the radius [m] of the `rows` strands, swept spheres side by side, that represent a bar.

@@ -192,6 +192,16 @@ class Filament:
         return stretching, bending, twisting
 
     @property
+    def stiffest(self) -> tuple[float, float, float]:
+        """Squares of the greatest frequencies of stretching, bending and twisting [1/s²].
+
+        In these modes neighbouring nodes, or segments, move against each other.
+        """
+        length, (stretching, bending, twisting) = self.segment_length, self.stiffnesses
+        mass, inertia = self.mass / (self.nodes - 1), self.axial_inertia
+        return 4 * stretching / length / mass, 16 * bending / length**3 / mass, 4 * twisting / length / inertia
+
+    @property
     def drags(self) -> tuple[float, float, float]:
         """Force per length and speed across and along the axis [Pa s], torque per length and rate of roll [N s].
 

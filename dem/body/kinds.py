@@ -11,7 +11,7 @@ import numpy as np
 from dem.arrays import Array, Numbers
 from dem.body.bars import Bars
 from dem.body.filament import Filament
-from dem.body.particle import HINGE_CLEARANCE, smallest_effective_mass
+from dem.body.particle import HINGE_CLEARANCE, Particle, smallest_effective_mass
 
 
 class Body(Protocol):
@@ -85,6 +85,11 @@ class Kind:
     def size(self) -> float:
         """Length of the longest bar [m]."""
         return float(self.bars.lengths.max())
+
+    @cached_property
+    def length(self) -> float:
+        """Sum of the bars' lengths [m]."""
+        return float(self.bars.lengths.sum())
 
     @property
     def thicknesses(self) -> tuple[float, float]:
@@ -182,6 +187,26 @@ class Mixture:
         """(K,) of the kinds [m³]."""
         return np.array([kind.volume for kind in self.kinds])
 
+    @cached_property
+    def inertias(self) -> Array:
+        """(K, 3) principal moments of the kinds [kg m²]."""
+        return np.array([kind.inertia for kind in self.kinds])
+
+    @cached_property
+    def sizes(self) -> Numbers:
+        """(K,) numbers of bars of the kinds."""
+        return np.array([len(kind.bars.points) for kind in self.kinds], dtype=np.int64)
+
+    @cached_property
+    def ends(self) -> Array:
+        """(B, 2, 3) both ends of all bars of all kinds, in the frames of the kinds [m]."""
+        return np.concatenate([kind.bars.ends for kind in self.kinds])
+
+    @cached_property
+    def normals(self) -> Array:
+        """(B, 3) normals of all bars of all kinds, in the frames of the kinds; zeros where the section is round [1]."""
+        return np.concatenate([(not kind.bars.round) * kind.bars.frames[:, :, 2] for kind in self.kinds])
+
     @property
     def mass(self) -> float:
         """Mean mass of the bodies [kg]."""
@@ -222,6 +247,16 @@ class Mixture:
     def spheres(self) -> Array:
         """(K, S, 3) centres of the spheres of each kind in its frame [m]; the last sphere fills up the rows."""
         return padded([kind.centres for kind in self.kinds])
+
+
+def bodies_of(model: Particle | Mixture) -> tuple[Particle | Kind, ...]:
+    """Return one body of each kind."""
+    return (model,) if isinstance(model, Particle) else model.kinds
+
+
+def body_of(model: Particle | Mixture, kinds: Sequence[int] | Numbers, number: int) -> Particle | Kind:
+    """Return what the body of a number is, given the kinds of all bodies of a mixture."""
+    return model if isinstance(model, Particle) else model.kinds[kinds[number]]
 
 
 def padded(rows: Sequence[Array]) -> Array:

@@ -59,8 +59,7 @@ def place_layer(
     Raises:
         RunError: some bodies found no room although the slab was made higher `MOST_GROWTH` times.
     """
-    each = list(bodies) if isinstance(bodies, Sequence) else [bodies]
-    each *= 1 if len(each) == count else count
+    each = bodies if isinstance(bodies, Sequence) else [bodies] * count
     thickest = max(thickest, *(body.radius for body in each))
     spacing = 2 * thickest * (1 + CLEARANCE)
     margin = thickest * (1 + 2 * CLEARANCE)

@@ -125,13 +125,13 @@ class BarState:
     @cached_property
     def body(self) -> Numbers:
         """(M,) the body that each bar belongs to."""
-        sizes = np.array([len(kind.bars.points) for kind in self.mixture.kinds], dtype=np.int64)
-        return np.repeat(np.arange(self.count), sizes[self.kind])
+        return np.repeat(np.arange(self.count), self.mixture.sizes[self.kind])
 
     @cached_property
     def bar(self) -> Numbers:
         """(M,) number of each bar in its body."""
-        return np.concatenate([np.zeros(0, np.int64), *(np.arange(len(k.bars.points)) for k in self._kinds)])
+        sizes = self.mixture.sizes[self.kind]
+        return np.arange(len(self.body)) - np.repeat(np.cumsum(sizes) - sizes, sizes)
 
     @property
     def _kinds(self) -> list[Kind]:
@@ -179,18 +179,22 @@ class RigidState(BarState):
     spins: Array  #: (N, 3) angular velocities [rad/s]
 
     @cached_property
+    def _bar_of_kind(self) -> Numbers:
+        """(M,) number of each bar among the bars of all kinds, see `Mixture.ends`."""
+        sizes = self.mixture.sizes
+        return (np.cumsum(sizes) - sizes)[self.kind[self.body]] + self.bar
+
+    @cached_property
     def segments(self) -> Array:
         """(M, 2, 3) both ends of all bars [m]."""
-        local = np.concatenate([np.zeros((0, 2, 3)), *(kind.bars.ends for kind in self._kinds)])
+        local = self.mixture.ends[self._bar_of_kind]
         turned = matrix_product(self.rotations[self.body, None], local[..., None])[..., 0]
         return np.asarray(turned + self.positions[self.body, None])
 
     @cached_property
     def normals(self) -> Array:
         """(M, 3) unit vectors along the normal of each bar; zeros where the section is round [1]."""
-        local = np.concatenate(
-            [np.zeros((0, 3)), *((not kind.bars.round) * kind.bars.frames[:, :, 2] for kind in self._kinds)]
-        )
+        local = self.mixture.normals[self._bar_of_kind]
         return matrix_product(self.rotations[self.body], local[..., None])[..., 0]
 
     @cached_property
@@ -212,8 +216,8 @@ class RigidState(BarState):
     @cached_property
     def _own_spins(self) -> tuple[Array, Array]:
         """Principal moments (N, 3) [kg m²], and angular velocities (N, 3) along the principal axes [rad/s]."""
-        inertias = np.array([kind.inertia for kind in self.mixture.kinds])[self.kind]
-        return inertias, matrix_product(np.swapaxes(self.rotations, 1, 2), self.spins[..., None])[..., 0]
+        spins = matrix_product(np.swapaxes(self.rotations, 1, 2), self.spins[..., None])[..., 0]
+        return self.mixture.inertias[self.kind], spins
 
     @cached_property
     def angular_momentum(self) -> Array:
@@ -252,8 +256,7 @@ class FilamentState(BarState):
     @cached_property
     def _begin(self) -> Numbers:
         """(N + 1,) number of each filament's first node."""
-        sizes = np.array([1 + len(kind.bars.points) for kind in self.mixture.kinds], dtype=np.int64)
-        return np.concatenate([[0], np.cumsum(sizes[self.kind])])
+        return np.concatenate([[0], np.cumsum(1 + self.mixture.sizes[self.kind])])
 
     @cached_property
     def _starts(self) -> Numbers:

@@ -78,6 +78,12 @@ class Demand(Protocol):
     def calls_for(self, effect: EffectName) -> bool: ...
 
 
+def mean_spheres(scene: Demand) -> float:
+    """Return the mean number of spheres of a body."""
+    each = [float(len(body.centres)) for body in scene.bodies]
+    return each[0] if scene.mixture is None else scene.mixture.mean(each)
+
+
 def contact_law_of(scene: Demand) -> ContactLaw:
     """Return the contact law of a scene, which does not depend on the engine."""
     return contact_law(scene.bodies[0], scene.contact, scene.fidelity.stiffness_N_per_m)

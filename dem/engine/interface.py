@@ -1,6 +1,6 @@
 """The interface of engines, which compute the physics of a run.
 
-An `Engine` is a running simulation: smarticles are added to a container or a plane, and time is advanced. It has the
+An `Engine` is a running simulation: bodies are added to a container or a plane, and time is advanced. It has the
 parts `boundaries`, `motors`, `strings`, `filaments` and `ledger`. `dem.engine.kinds` lists the engines, with facts that
 are known without a simulation; `tests/double.py` implements the interface in memory.
 
@@ -239,11 +239,11 @@ class EnergyLedger(Protocol):
 
     @property
     def container_work(self) -> float:
-        """Work of moving boundaries, of strings and of grips on the smarticles since the start [J]."""
+        """Work of moving boundaries, of strings and of grips on the bodies since the start [J]."""
 
     @property
     def added(self) -> float:
-        """Energy of smarticles when added [J]: kinetic, gravitational above z = 0, elastic by `take_in`."""
+        """Energy of bodies when added [J]: kinetic, gravitational above z = 0, elastic by `take_in`."""
 
     @property
     def dissipated(self) -> float:
@@ -257,7 +257,7 @@ class EnergyLedger(Protocol):
         """Return the energy in the springs of all contacts, and that in all hinges and in flexible bodies [J]."""
 
     def take_in(self) -> None:
-        """Add the present elastic energy of contacts to `added`, for smarticles that overlap when added."""
+        """Add the present elastic energy of contacts to `added`, for bodies that overlap when added."""
 
 
 class Engine(Protocol):
@@ -314,39 +314,39 @@ class Engine(Protocol):
     def advance(self, steps: int) -> None:
         """Advance by a number of steps, if positive; raise RunError if the engine stops before the last one."""
 
-    # -- smarticles --------------------------------------------------------------------------------------------
+    # -- bodies ------------------------------------------------------------------------------------------------
 
     @property
     def count(self) -> int:
-        """Number of smarticles present, N."""
+        """Number of bodies present, N."""
 
     def add(self, poses: Poses, *, speed: float = 0.0) -> None:
-        """Add welded smarticles in the shape of `particle`, falling at a speed [m/s] without rotation."""
+        """Add bodies, welded smarticles or others, of `particle`, falling at a speed [m/s] without rotation."""
 
     def still(self) -> None:
-        """Set all velocities of welded smarticles to zero; the kinetic energy counts as dissipated."""
+        """Set all velocities to zero, while no barb can turn; the kinetic energy counts as dissipated."""
 
     def state(self) -> PileState:
         """Return poses and velocities of all bodies; raise RunError if one is not finite."""
 
     @property
     def impulse(self) -> float:
-        """Downward momentum that gravity and throwing have given to all smarticles since the start [N s]."""
+        """Downward momentum that gravity and throwing have given to all bodies since the start [N s]."""
 
     def unbalanced_force(self) -> float:
-        """Return the mean net force on a smarticle over its weight [1]: 0 at rest, 1 in free fall.
+        """Return the mean net force on a body over its weight [1]: 0 at rest, 1 in free fall.
 
-        The value is inf without smarticles or without gravity.
+        The value is inf without bodies or without gravity.
         """
 
     def neighbours(self) -> Numbers:
-        """Return (N,) the number of other smarticles that each smarticle touches."""
+        """Return (N,) the number of other bodies that each body touches."""
 
     def touches(self) -> Numbers:
-        """Return (N,) the number of contacts of each smarticle with other smarticles and boundaries."""
+        """Return (N,) the number of contacts of each body with other bodies and boundaries."""
 
     def overlaps(self, limit: float) -> Overlaps:
-        """Return the present overlaps; `Overlaps.deep` marks smarticles with an overlap above `limit` [m]."""
+        """Return the present overlaps; `Overlaps.deep` marks bodies with an overlap above `limit` [m]."""
 
     def contact_forces(self) -> ContactForces:
         """Return the forces at all contacts, one contact per pair of links or of a link and a boundary.
@@ -355,7 +355,7 @@ class Engine(Protocol):
         """
 
     def extremes(self, state: PileState) -> Extremes | None:
-        """Return extremes over all smarticles in their present `state`, faster than a full check.
+        """Return extremes over all bodies in their present `state`, faster than a full check.
 
         None: the engine has no faster way, or a full check is needed in any case.
         """

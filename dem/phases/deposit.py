@@ -1,4 +1,4 @@
-"""The phase that pours smarticles, layer by layer."""
+"""The phase that pours bodies, layer by layer."""
 
 import math
 from collections.abc import Iterator
@@ -33,7 +33,7 @@ class Deposit(Part, Phase):
     at_rest: ClassVar[bool] = True
     pours: ClassVar[bool] = True
     type: Literal["deposit"]
-    per_layer: int = Field(10, ge=1, le=100_000, description="smarticles per layer [1]")
+    per_layer: int = Field(10, ge=1, le=100_000, description="bodies per layer [1]")
     layer_height_w: float = Field(
         1.0,
         ge=1e-3,
@@ -43,7 +43,7 @@ class Deposit(Part, Phase):
     )
     landed_speed_m_per_s: Speed = Field(
         0.2,
-        description="a layer has landed when each of its smarticles touches something and falls slower than this [m/s]",
+        description="a layer has landed when each of its bodies touches something and falls slower than this [m/s]",
     )
     every_s: float | None = Field(
         None,
@@ -53,7 +53,7 @@ class Deposit(Part, Phase):
         "code; default: a layer is poured when the previous one has landed",
     )
     thrown_at_m_per_s: float = Field(
-        0.0, ge=0, le=1000, description="speed that smarticles are thrown down with, 0 to let them fall [m/s]"
+        0.0, ge=0, le=1000, description="speed that bodies are thrown down with, 0 to let them fall [m/s]"
     )
     settle: Settle = Field(default_factory=Settle, description="when the poured pile counts as settled")
 
@@ -61,7 +61,7 @@ class Deposit(Part, Phase):
         if scene.gravity_m_per_s2 == 0:
             yield "gravity_m_per_s2: 0 m/s²; without gravity nothing comes down in phases.0 (deposit)"
         height = scene.container.height_m
-        # The slab that a layer is poured into must end below the wall, with a smarticle that lies flat on its top.
+        # The slab that a layer is poured into must end below the wall, with a body that lies flat on its top.
         slab = self.layer_height_w * scene.model.size
         least = 2 * scene.model.radius + slab + scene.model.reach
         if height is not None and height < least:
@@ -82,7 +82,7 @@ class Deposit(Part, Phase):
 
     def first_memory(self, scene: SceneView) -> Memory:
         rng = np.random.default_rng(scene.seed_for("deposit"))
-        # `left`: smarticles to pour; `layer`: smarticles of the layer that falls; `waited`: time since the pour of that
+        # `left`: bodies to pour; `layer`: bodies of the layer that falls; `waited`: time since the pour of that
         # layer, or since the last one landed [s]; `still`: time for which the pile has been still [s].
         state = rng.bit_generator.state
         return {"left": scene.count, "layer": 0, "waited": 0.0, "still": 0.0, "random": state}
@@ -105,7 +105,8 @@ class Deposit(Part, Phase):
     def _check_layer(self, memory: Memory, engine: Engine, gravity: float) -> None:
         size, limit = memory["layer"], self.landed_speed_m_per_s
         fastest = float(-engine.state().velocities[-size:, 2].min())
-        aloft = int((engine.touches()[-size:] == 0).sum())
+        # Contacts are looked for only where the answer depends on them.
+        aloft = int((engine.touches()[-size:] == 0).sum()) if fastest < limit else 0
         timeout = max(LAYER_TIMEOUT, LANDING_FALLS * math.sqrt(2 * engine.cylinder.height / gravity))
         if fastest < limit and not aloft:
             memory.update(layer=0, waited=0.0)
@@ -123,7 +124,8 @@ class Deposit(Part, Phase):
         size = min(self.per_layer, memory["left"])
         rng = np.random.default_rng()
         rng.bit_generator.state = memory["random"]
-        particle, mixture, state, tops = scene.model, scene.mixture, engine.state(), engine.state().tops
+        particle, mixture, state = scene.model, scene.mixture, engine.state()
+        tops = state.tops
         cylinder, slab = engine.cylinder, self.layer_height_w * particle.size
         if self.every_s is None:
             bottom = tops.max(initial=engine.boundaries.floor) + particle.radius
@@ -135,7 +137,7 @@ class Deposit(Part, Phase):
         poured = scene.count - memory["left"]
         kinds = None if mixture is None else mixture.of[poured : poured + size]
         poses = place_layer(
-            scene.bodies if kinds is None else [scene.bodies[k] for k in kinds],
+            scene.bodies[0] if kinds is None else [scene.bodies[k] for k in kinds],
             count=size,
             radius=float(cylinder.inner_radii(np.array([bottom]))[0]),
             bottom=bottom,

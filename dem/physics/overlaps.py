@@ -11,9 +11,9 @@ APART = 0.1  # of the limit for overlaps: boundaries that have moved apart by le
 
 @dataclass(frozen=True)
 class Held:
-    """A smarticle that touches two boundaries whose distance has changed: only contacts can give way."""
+    """A body that touches two boundaries whose distance has changed: only contacts can give way."""
 
-    smarticle: int  #: Number of the smarticle
+    smarticle: int  #: Number of the body
     between: tuple[str, str]  #: Names of the boundaries
     apart: float  #: Change of their distance since the start [m]
 
@@ -23,14 +23,14 @@ class Overlaps:
     """Overlaps and elastic energy of all contacts and hinges at one instant."""
 
     deepest: float  #: Overlap of the deepest contact [m]
-    deep: Flags  #: (N,) whether a smarticle has a contact deeper than the limit given to `Engine.overlaps`
+    deep: Flags  #: (N,) whether a body has a contact deeper than the limit given to `Engine.overlaps`
     elastic_energy: float  #: Upper bound of the energy in the springs of all contacts and hinges [J]
-    held: tuple[Held, ...] = ()  #: Smarticles with a deep contact that are held between two boundaries
+    held: tuple[Held, ...] = ()  #: Bodies with a deep contact that are held between two boundaries
 
 
 @dataclass(frozen=True, kw_only=True)
 class Extremes:
-    """Extremes over all smarticles at one instant; a value that is NaN fails every check."""
+    """Extremes over all bodies at one instant; a value that is NaN fails every check."""
 
     fastest: float  #: Speed of the fastest link's centre [m/s]
     lowest: float  #: Height of the lowest point of the links' axes [m]
@@ -42,10 +42,10 @@ class Extremes:
 
 
 def held_between(touched: Mapping[int, Collection[str]], raised: Mapping[str, float], least: float) -> tuple[Held, ...]:
-    """Return the smarticles that touch two boundaries whose distance has changed by more than `least` [m].
+    """Return the bodies that touch two boundaries whose distance has changed by more than `least` [m].
 
     Args:
-        touched: names of the boundaries that a smarticle touches, by the smarticle's number.
+        touched: names of the boundaries that a body touches, by the body's number.
         raised: rise of each boundary since the start [m], by its name.
         least: smallest change of distance that counts [m].
     """

@@ -1,9 +1,9 @@
 """Choose engine and fidelity for a scene, from a table of measured errors and costs.
 
-`smarticles accuracy` measures the table on one scene. A row has the errors of one named fidelity, and the ratio of the
-measured processor time to the planned wall time. This ratio corrects the wall times planned for other scenes. Rows
-whose knob is `engine` compare all engines with one reference; rows whose knob is `fidelity` compare the fidelities of
-one engine.
+`smarticles accuracy` measures a table on one scene; the shipped table joins those of three scenes, one for each
+activity that drives the pile. A row has the errors of one named fidelity, and the ratio of the measured processor time
+to the planned wall time. This ratio corrects the wall times planned for other scenes. Rows whose knob is `engine`
+compare all engines with one reference; rows whose knob is `fidelity` compare the fidelities of one engine.
 """
 
 import csv

@@ -25,7 +25,7 @@ ADDS: Mapping[EffectName, Adds] = {
     EffectName.ENERGIES: Adds(series=tuple(columns.ENERGY_COLUMNS)),
     EffectName.ENERGY_ACCOUNT: Adds(series=tuple(columns.LEDGER_COLUMNS)),
     EffectName.SERIES: Adds(
-        series=tuple(columns.COLUMNS), files=("series.h5",), python="reads the state of all smarticles once per sample"
+        series=tuple(columns.COLUMNS), files=("series.h5",), python="reads the state of all bodies once per sample"
     ),
     EffectName.FRAMES: Adds(
         arrays=tuple(columns.FIELDS),
@@ -93,7 +93,7 @@ def _reasons(scene: Scene) -> Mapping[EffectName, tuple[bool, str]]:
     if recording.energies and not recording.energy:
         energies = "recording.dissipation_interval_s is given, and the energy ledger needs them"
     return {
-        EffectName.CONTACT: (True, "every scene has smarticles that touch each other and a floor"),
+        EffectName.CONTACT: (True, "every scene has bodies that touch each other and a floor"),
         EffectName.CONTAINER: (True, f"a wall {1e3 * scene.cylinder.height:.0f} mm high")
         if plane is None
         else (False, "key plane: a table, and walls if it says so"),
@@ -105,7 +105,7 @@ def _reasons(scene: Scene) -> Mapping[EffectName, tuple[bool, str]]:
         ),
         EffectName.FRICTION: (
             contact.friction_smarticle > 0 or contact.friction_wall > 0,
-            f"μ = {contact.friction_smarticle:g} between smarticles, {contact.friction_wall:g} at the container",
+            f"μ = {contact.friction_smarticle:g} between bodies, {contact.friction_wall:g} at the container",
         ),
         EffectName.RESTITUTION: (
             contact.restitution < 1,

@@ -10,7 +10,7 @@ from dem.plan.effects import Decision, decide
 from dem.plan.steps import stable_step, time_steps
 from dem.scene.scene import Scene
 from dem.scene.stiffness import expected_overlaps, too_soft
-from dem.setting.fidelity import Fidelity, fidelities
+from dem.setting.fidelity import Fidelity
 from dem.setting.protocol import PARTS, PROTOCOLS, applies
 
 _LEFT_OUT = {
@@ -53,8 +53,11 @@ class Plan:
     engine: str = "yade"
     fidelity: str = "standard"
     stiffness_N_per_m: float = 0.0
+    named_rows: int = 1  #: `fidelity.rows` that the name of the fidelity has in the scene
+    named_stiffness_N_per_m: float = 0.0  #: Stiffness that the name of the fidelity has
     bodies: str = "smarticles"  #: Kinds of bodies in words
-    strands: int = 0  #: Strands of a link on the engine links; 0 on engines with spheres
+    strands: int = 0  #: `fidelity.rows` on the engine links; 0 on engines with spheres
+    most_strands: int = 0  #: Most strands of a bar, or link, on the engine links; 0 on engines with spheres
     correction: float = 1.0  #: Factor by which wall times were corrected
     protocol: tuple[str, ...] = ()  #: Lines about the keys of the scene's protocol
     compile_s: float = 0.0  #: Expected processor time for code that is not compiled yet
@@ -68,7 +71,8 @@ class Plan:
     def to_text(self) -> str:
         """Return the plan as tables for the terminal."""
         corrected = "" if self.correction == 1 else f", corrected by {self.correction:.3g} as measured at this fidelity"
-        section = f"smooth links of {self._strands}" if self.strands else f"{self.spheres_per_smarticle} spheres"
+        smooth = f"smooth links of {_strands(self.most_strands)}"
+        section = smooth if self.strands else f"{self.spheres_per_smarticle} spheres"
         wall = "in a plane" if self.planar else f"wall {1e3 * self.container_height_m:.0f} mm high"
         lines = [
             f"{self.name}: {self.count} {self.bodies} of {section}, d = {1e3 * self.sphere_diameter_m:.3g} mm, {wall}",
@@ -100,22 +104,17 @@ class Plan:
         lines += [f"warning: {warning}" for warning in self.warnings]
         return "\n".join(lines)
 
-    @property
-    def _strands(self) -> str:
-        return f"{self.strands} strand{'' if self.strands == 1 else 's'}"
-
     def _engine_to_text(self) -> list[str]:
         """Return lines about the engine: knobs that it ignores, and on links the fidelity; none on YADE."""
         idle = ", ".join(engine_kind(self.engine).idle_knobs)
         if not self.strands:
             return [f"engine {self.engine}: {idle} have no meaning here"] if idle else []
-        named = fidelities(self.engine)[self.fidelity]
-        usual = f" (by name {named['rows']}, {named['stiffness_N_per_m']:g} N/m)"
-        if (self.strands, self.stiffness_N_per_m) == (named["rows"], named["stiffness_N_per_m"]):
-            usual = ""
+        named = (self.named_rows, self.named_stiffness_N_per_m)
+        changed = (self.strands, self.stiffness_N_per_m) != named
+        usual = f" (by name {named[0]}, {named[1]:g} N/m)" if changed else ""
         return [
             f"engine {self.engine}: fidelity.rows are strands; {idle} have no meaning here",
-            f"fidelity {self.fidelity}: {self._strands}, {self.stiffness_N_per_m:g} N/m, time step "
+            f"fidelity {self.fidelity}: {_strands(self.strands)}, {self.stiffness_N_per_m:g} N/m, time step "
             f"{self.time_step_s / self.stable_time_step_s:.2g} of the stable one{usual}",
         ]
 
@@ -133,6 +132,16 @@ def _wall_time(wall: float) -> str:
     return f"{wall / 3600:.1f} h" if wall < 10 * 3600 else f"{wall / 3600:.0f} h"
 
 
+def _strands(number: int) -> str:
+    return f"{number} strand{'' if number == 1 else 's'}"
+
+
+def _most_strands(scene: Scene) -> int:
+    if not scene.smooth:
+        return 0
+    return scene.fidelity.rows if scene.mixture is None else max(kind.rows for kind in scene.mixture.kinds)
+
+
 def _bodies(scene: Scene) -> str:
     if scene.mixture is None:
         return "smarticles"
@@ -140,27 +149,30 @@ def _bodies(scene: Scene) -> str:
     return f"bodies ({', '.join(names)})"
 
 
-def plan(scene: Scene) -> Plan:
-    """Compute the plan of a scene: phases, effects, time steps and cost."""
-    kind = engine_kind(scene.engine)
-    steps = time_steps(scene)
-    model = scene.model
-    phases = []
-    for index, (phase, dt) in enumerate(zip(scene.phases, steps, strict=True)):
+def planned_phases(scene: Scene) -> tuple[PlannedPhase, ...]:
+    """Return the phases of a scene with their time steps and expected wall times."""
+    kind, phases = engine_kind(scene.engine), []
+    for index, (phase, dt) in enumerate(zip(scene.phases, time_steps(scene), strict=True)):
         estimate = phase.expected_duration(scene.count)
         wall = kind.seconds_per_second(scene, dt, scene.activity(index)) * estimate
         phases.append(PlannedPhase(index, phase.kind, phase.known_duration, estimate, wall, dt))
+    return tuple(phases)
+
+
+def plan(scene: Scene) -> Plan:
+    """Compute the plan of a scene: phases, effects, time steps and cost."""
+    kind, phases = engine_kind(scene.engine), planned_phases(scene)
     effects = decide(scene)
     engines = Adds.together(effect.adds for effect in effects).engines
     return Plan(
         name=scene.name,
         count=scene.count,
         spheres_per_smarticle=max(len(body.centres) for body in scene.bodies),
-        sphere_diameter_m=model.diameter,
-        time_step_s=min(steps),
+        sphere_diameter_m=scene.model.diameter,
+        time_step_s=min(phase.time_step_s for phase in phases),
         stable_time_step_s=stable_step(scene),
         container_height_m=scene.cylinder.height,
-        phases=tuple(phases),
+        phases=phases,
         effects=effects,
         engines=tuple(sorted(engines, key=kind.order.index)),
         frames=round(sum(phase.estimate_s for phase in phases) / scene.recording.frame_interval_s),
@@ -170,8 +182,11 @@ def plan(scene: Scene) -> Plan:
         engine=scene.engine,
         fidelity=scene.fidelity.base,
         stiffness_N_per_m=scene.fidelity.stiffness_N_per_m,
+        named_rows=scene.named_knobs["rows"],
+        named_stiffness_N_per_m=scene.named_knobs["stiffness_N_per_m"],
         bodies=_bodies(scene),
         strands=scene.fidelity.rows if scene.smooth else 0,
+        most_strands=_most_strands(scene),
         protocol=protocol_lines(scene),
         compile_s=kind.seconds_to_compile(scene),
         overlaps={overlap.cause: overlap.widths for overlap in expected_overlaps(scene)},
@@ -192,8 +207,7 @@ def warnings_of(scene: Scene) -> tuple[str, ...]:
 
 def engine_warnings(scene: Scene) -> tuple[str, ...]:
     """Return a warning in one line about knobs that the scene sets and its engine ignores."""
-    fidelity = scene.fidelity
-    named = fidelities(scene.engine)[fidelity.base]
+    fidelity, named = scene.fidelity, scene.named_knobs
     usual = {key: named.get(key, Fidelity.model_fields[key].default) for key in engine_kind(scene.engine).idle_knobs}
     idle = [f"{key} ({getattr(fidelity, key):g})" for key, value in usual.items() if getattr(fidelity, key) != value]
     if not idle:

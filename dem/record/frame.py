@@ -4,7 +4,7 @@ import contextlib
 import io
 import math
 import warnings
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from types import MappingProxyType
@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dem.arrays import Array, Flags, Numbers
-from dem.body.kinds import Mixture
+from dem.body.kinds import Kind, Mixture
 from dem.body.particle import LINKS, Particle
 from dem.body.state import BarState, PileState
 from dem.record.files import cannot_read
@@ -129,26 +129,20 @@ def segment_mesh(state: BarState, *, contacts: Numbers, time: float, floor: floa
 
 def sphere_mesh(state: PileState, particle: Particle | Mixture) -> meshio.Mesh:
     """Return the spheres of all bodies as points, for ParaView's glyphs."""
+    bodies: Sequence[Particle | Kind]
     if state.bodies is not None:
-        bodies = state.bodies
-        kinds = [bodies.mixture.kinds[k] for k in bodies.kind]
-        sizes, points = [len(kind.centres) for kind in kinds], np.concatenate(bodies.spheres_by_body())
-        own = {
-            "radius_m": np.repeat([kind.radius for kind in kinds], sizes),
-            "smarticle_id": np.repeat(np.arange(state.count), sizes),
-            "link": np.concatenate([kind.links for kind in kinds]),
-        }
-        return meshio.Mesh(points, [("vertex", np.arange(len(points))[:, None])], point_data=own)
-    assert isinstance(particle, Particle)  # a pile of smarticles
-    count, spheres = state.count, len(particle.centres)
-    number = count * spheres
+        bodies = [state.bodies.mixture.kinds[k] for k in state.bodies.kind]
+        points = np.concatenate(state.bodies.spheres_by_body())
+    else:
+        assert isinstance(particle, Particle)  # a pile of smarticles
+        bodies, points = [particle] * state.count, state.smarticles.spheres(particle).reshape(-1, 3)
+    sizes = [len(body.centres) for body in bodies]
     data = {
-        "radius_m": np.full(number, particle.radius),
-        "smarticle_id": np.repeat(np.arange(count), spheres),
-        "link": np.tile(particle.links, count).astype(np.int64),
+        "radius_m": np.repeat([body.radius for body in bodies], sizes),
+        "smarticle_id": np.repeat(np.arange(state.count), sizes),
+        "link": np.concatenate([body.links for body in bodies]),
     }
-    points = state.smarticles.spheres(particle).reshape(-1, 3)
-    return meshio.Mesh(points, [("vertex", np.arange(number)[:, None])], point_data=data)
+    return meshio.Mesh(points, [("vertex", np.arange(len(points))[:, None])], point_data=data)
 
 
 def _lines(count: int) -> Numbers:
@@ -248,25 +242,16 @@ def read_frame(path: Path | str, number: int | None = None) -> Frame:
     points, lines = np.asarray(mesh.points), np.asarray(mesh.cells[0].data)
     data = {name: np.asarray(values[0]) for name, values in mesh.cell_data.items()}
     general = "kind" in data
-    count = len(np.unique(data.get("smarticle_id", ()))) if general else len(lines) // LINKS
-    if count == 0:
-        reject("it holds no smarticle")
-    expected = 2 * len(lines) if general else VERTICES * count
-    if points.shape != (expected, 3):
-        reject(f"{len(lines)} lines need {expected} points of 3 coordinates: got {points.shape}")
-    if not np.array_equal(lines, np.arange(expected).reshape(-1, 2) if general else _lines(count)):
-        reject("its lines do not join tip, hinge, hinge, tip in order")
-    if not np.all(np.isfinite(points)):
-        reject("a point is not finite")
+    form = _form(points, lines, reject, general=general)
 
     def per_link(name: str, kind: Any, *shape: int) -> NDArray[Any]:
         """Return cell data (N, 3, …) of smarticles, or (M, …) of other bodies."""
         values = data.pop(name, None)
         if values is None:
             reject(f"cell data '{name}' is missing")
-        if values.shape != (len(lines) if general else LINKS * count, *shape):
+        if values.shape != (len(lines), *shape):
             reject(f"cell data '{name}' has shape {values.shape}")
-        return frozen(values.astype(kind).reshape(*((-1,) if general else (count, LINKS)), *shape))
+        return frozen(values.astype(kind).reshape(*form, *shape))
 
     def constant(name: str) -> float:
         values = per_link(name, np.float64)
@@ -276,40 +261,66 @@ def read_frame(path: Path | str, number: int | None = None) -> Frame:
         return first
 
     identifiers, links = per_link("smarticle_id", np.int64), per_link("link", np.int64)
-    if general and np.any(np.diff(identifiers) < 0):
-        reject("'smarticle_id' does not go body by body")
-    if not general and np.any((identifiers != identifiers[:, :1]) | (links != np.arange(LINKS))):
-        reject("'smarticle_id' and 'link' are not in smarticle-major order")
     phase = constant("phase")
     if phase < 0 or phase != math.floor(phase):
         reject(f"'phase' must be a whole number, 0 or more: got {phase:g}")
-    vertices, bars, first = np.empty((count, 0, 3)), None, LINKS * np.arange(count)
+    points = frozen(points.astype(np.float64))
     if general:
+        if np.any(np.diff(identifiers) < 0):
+            reject("'smarticle_id' does not go body by body")
         _, first, body = np.unique(identifiers, return_index=True, return_inverse=True)
-        kinds, normals = per_link("kind", np.int64)[first], per_link("normal", np.float64, 3)
-        bars = RecordedBars(frozen(points.astype(np.float64).reshape(-1, 2, 3)), body, links, kinds, normals)
+        bars = RecordedBars(
+            segments=points.reshape(-1, 2, 3),
+            body=frozen(body),
+            number=links,
+            kind=frozen(per_link("kind", np.int64)[first]),
+            normals=per_link("normal", np.float64, 3),
+        )
+        vertices = frozen(np.empty((len(first), 0, 3)))
     else:
-        vertices = points.astype(np.float64).reshape(count, VERTICES, 3)
+        if np.any((identifiers != identifiers[:, :1]) | (links != np.arange(LINKS))):
+            reject("'smarticle_id' and 'link' are not in smarticle-major order")
+        bars, first, vertices = None, LINKS * np.arange(form[0]), points.reshape(-1, VERTICES, 3)
     return Frame(
         path=path,
         number=number,
         time=constant("time_s"),
         floor_z=constant("floor_z_m"),
         phase=int(phase),
-        vertices=frozen(vertices),
+        vertices=vertices,
         smarticle_ids=frozen(identifiers.ravel()[first]),
         link_velocity=per_link("velocity_m_per_s", np.float64, 3),
         link_angular_velocity=per_link("angular_velocity_rad_per_s", np.float64, 3),
         contacts=frozen(per_link("contacts", np.int64).ravel()[first]),
         # `data` now holds only what `per_link` has not removed.
         cell_data=MappingProxyType(
-            {
-                name: frozen(values if general else values.reshape(count, LINKS, *values.shape[1:]))
-                for name, values in data.items()
-            }
+            {name: frozen(values.reshape(*form, *values.shape[1:])) for name, values in data.items()}
         ),
         bars=bars,
     )
+
+
+def _form(
+    points: NDArray[Any], lines: NDArray[Any], reject: Callable[[str], NoReturn], *, general: bool
+) -> tuple[int, ...]:
+    """Return the form of values of links, (N, 3) of smarticles or (M,) of other bodies; reject damaged lines."""
+    form: tuple[int, ...]
+    if general:
+        form, expected, joined = (len(lines),), 2 * len(lines), "its own two points"
+        order = np.arange(expected).reshape(-1, 2)
+    else:
+        count = len(lines) // LINKS
+        form, expected, joined = (count, LINKS), VERTICES * count, "tip, hinge, hinge, tip"
+        order = _lines(count)
+    if form[0] == 0:
+        reject("it holds no smarticle")
+    if points.shape != (expected, 3):
+        reject(f"{len(lines)} lines need {expected} points of 3 coordinates: got {points.shape}")
+    if not np.array_equal(lines, order):
+        reject(f"its lines do not join {joined} in order")
+    if not np.all(np.isfinite(points)):
+        reject("a point is not finite")
+    return form
 
 
 def read_mesh(path: Path, what: str = "frame", remedy: str | None = None, *, number: int = 0) -> Any:

@@ -9,7 +9,7 @@ from time import monotonic
 from dem.errors import RunError
 from dem.record.document import Progress
 from dem.record.names import PROGRESS
-from dem.terminal import ERASE_LINE
+from dem.terminal import ERASE_LINE, redraw, warn
 
 INTERVAL = 1.0  # s of wall time between updates
 
@@ -46,7 +46,7 @@ class ProgressWriter:
     def warn(self, message: str) -> None:
         """Print a warning to standard error."""
         self._erase()
-        sys.stderr.write(f"smarticles: warning: {message}\n")
+        warn(message)
 
     def checkpointed(self, time: float) -> None:
         """Write the simulated time [s] of a new checkpoint at once."""
@@ -100,7 +100,4 @@ class ProgressWriter:
                 # The pile grows, and each layer costs as much as the pile below it: time grows with the square of N.
                 left = f"  about {(wall - wall_resumed) * (1 / fraction**2 - 1):.0f} s left in this phase"
         packing = f"  φ {phi:.3f}" if phi is not None else ""
-        line = f"{phase:<8}{done}  t = {time:.2f} s{packing}{left}"
-        self._erase()
-        sys.stderr.write(line)
-        sys.stderr.flush()
+        redraw(f"{phase:<8}{done}  t = {time:.2f} s{packing}{left}")

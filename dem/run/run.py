@@ -5,7 +5,7 @@ import logging
 import os
 import platform
 import subprocess
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from datetime import UTC, datetime
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
@@ -141,8 +141,22 @@ def _check_scene(scene: Scene, out: Path) -> None:
 def _saved(scene: Scene, out: Path, made_by: tuple[str, str]) -> tuple[Checkpoint, str | None]:
     checkpoint, warning = read_checkpoint(out, scene_sha256=scene_hash(scene), made_by=made_by)
     if scene.recording.frames == "vtkhdf":
-        check_times(out / VTKHDF, checkpoint.state["recorder"]["frames"])
+        with _of_checkpoint(out):
+            check_times(out / VTKHDF, checkpoint.state["recorder"]["frames"])
     return checkpoint, warning
+
+
+@contextlib.contextmanager
+def _of_checkpoint(out: Path) -> Iterator[None]:
+    """Raise InputError for any error that content of a checkpoint causes which no run writes."""
+    try:
+        yield
+    except (InputError, RunError):
+        raise
+    # Such content can fail anywhere.
+    except Exception as error:
+        msg = f"{out}: cannot be resumed, its checkpoint has other content than the run needs ({error!r}); start anew"
+        raise InputError(msg) from error
 
 
 def _restore(simulation: Simulation, saved: tuple[Checkpoint, str | None] | None, threads: int) -> None:
@@ -154,14 +168,8 @@ def _restore(simulation: Simulation, saved: tuple[Checkpoint, str | None] | None
     checkpoint, warning = saved
     if warning:
         simulation.warn(warning)
-    try:
+    with _of_checkpoint(out):
         simulation.restore(checkpoint)
-    except (InputError, RunError):
-        raise
-    # Content that no run writes can fail anywhere.
-    except Exception as error:
-        msg = f"{out}: cannot be resumed, its checkpoint has other content than the run needs ({error!r}); start anew"
-        raise InputError(msg) from error
     earlier = Run(out).manifest.threads
     if earlier != threads:
         workers = engine_kind(simulation.scene.engine).workers
@@ -257,7 +265,7 @@ def _kinds(mixture: Mixture) -> tuple[Kind, ...]:
             bars=len(kind.bars.points),
             mass_kg=kind.mass,
             volume_m3=kind.volume,
-            length_m=float(kind.bars.lengths.sum()),
+            length_m=kind.length,
             thickness_normal_m=kind.bars.thickness_normal,
             thickness_in_plane_m=kind.bars.thickness_in_plane,
             round=kind.bars.round,

@@ -7,7 +7,6 @@ from scipy.spatial.transform import Rotation
 
 from dem.body.chain import Tie
 from dem.body.placement import Poses
-from dem.engine.effect import EffectName
 from dem.engine.interface import Engine
 from dem.engine.kinds import engine_kind
 from dem.physics.contact import StringLaw
@@ -36,7 +35,7 @@ def compile_for(scene: Scene) -> None:
         if scene.pulled_by:
             engine.strings.untie()
         engine.motors.weld()
-    if scene.calls_for(EffectName.WALL_REMOVAL) and any(phase.pushing_speed for phase in scene.phases):
+    if any(phase.frees and phase.pushing_speed(scene.gravity_m_per_s2) for phase in scene.phases):
         engine.boundaries.lift_wall(0.0)
         _step_and_query(engine)
 

@@ -18,7 +18,7 @@ BOTH_HOOKS = ("the lower hook", "the upper hook")
 
 @dataclass(kw_only=True)
 class Watchdog:
-    """Limits that no smarticle may exceed.
+    """Limits that no body may exceed.
 
     Checks take the simulated time [s], and raise RunError beyond a limit with cause, smarticles, time and what to do.
     """
@@ -34,7 +34,7 @@ class Watchdog:
     _ceiling: float = math.inf  # limit of kinetic and potential energy less the work done [J]
 
     def within_limits(self, extremes: Extremes, *, floor: float, raised: float | None = 0.0) -> bool:
-        """Return whether extremes over all smarticles prove that all limits hold, except that of the energy.
+        """Return whether extremes over all bodies prove that all limits hold, except that of the energy.
 
         If the result is false, all limits may hold nevertheless: `check` and `check_depths` must decide. `floor` and
         `raised` are as in `check`.
@@ -63,7 +63,7 @@ class Watchdog:
             floor: height of the floor [m].
             points: (N, P, 3) centres of the spheres, or points of the links' axes [m]; None: centres of mass. They are
                 needed beside overlaps, which YADE underestimates where a centre is beyond wall or floor.
-            raised: rise of the upper hook above the floor [m], by which it may have lifted smarticles; None: the wall
+            raised: rise of the upper hook above the floor [m], by which it may have lifted bodies; None: the wall
                 does not enclose the pile.
             gaps: (N, 2) distances between the links of each hinge [m]; None while welded.
         """
@@ -135,7 +135,7 @@ class Watchdog:
         elastic energy at that time. The lowest of these ceilings is the limit.
 
         Args:
-            state: poses and velocities of the smarticles, to name the fastest ones.
+            state: poses and velocities of the bodies, to name the fastest ones.
             energy: kinetic and potential energy, less all energy added and all work done since the start [J]; NaN if
                 the work is unknown at present, which removes the ceiling.
             elastic: upper bound of the elastic energy of contacts and hinges [J].

@@ -19,7 +19,7 @@ from pydantic import (
 )
 
 from dem.arrays import Array, Numbers
-from dem.body.kinds import Kind, Mixture
+from dem.body.kinds import Kind, Mixture, bodies_of
 from dem.body.particle import Particle, SphereChain, chain_mean_width, mean_width
 from dem.engine.demand import Activity
 from dem.engine.effect import EffectName
@@ -48,14 +48,15 @@ SMOOTH_PITCH = 0.35
 _LEAST_GRAVITY = 1e-6  # m/s²; below it motors, whose torque limit is proportional to gravity, cannot move anything
 
 
-def _named(base: str, given: Mapping[str, Any]) -> Mapping[str, Any]:
-    """Return the knobs of the named fidelity `base`, adapted to given keys of a scene and its fidelity.
+def _named(base: str, given: Mapping[str, Any], diameter: Any = None) -> Mapping[str, Any]:
+    """Return the knobs of the named fidelity `base`, adapted to given parts of a scene.
 
-    On the engine links `rows` is 1 if `given` has a plane or a `diameter_m`, or if t1 is at most t2.
+    On the engine links `rows` is 1 if the scene has a plane, if t1 is at most t2, or if `diameter`, its
+    `fidelity.diameter_m`, is not None.
     """
     engine, smarticle = given.get("engine", ""), given.get("smarticle") or Smarticle()
     narrow = smarticle.thickness_normal_m <= smarticle.thickness_in_plane_m
-    single = given.get("plane") is not None or narrow or given.get("diameter_m") is not None
+    single = given.get("plane") is not None or narrow or diameter is not None
     return {**fidelities(engine)[base], **({"rows": 1} if engine == "links" and single else {})}
 
 
@@ -128,7 +129,7 @@ class Scene(Part):
         base = value.get("base", "standard")
         if not isinstance(base, str) or base not in FIDELITIES:
             raise ValueError(f"unknown fidelity {shown(base)}; {nearest(str(base), FIDELITIES)}")
-        return {"base": base, **_named(base, {**info.data, **value}), **value}
+        return {"base": base, **_named(base, info.data, value.get("diameter_m")), **value}
 
     @field_validator("container", mode="before")
     @classmethod
@@ -162,7 +163,8 @@ class Scene(Part):
     def _pulls_of_body(cls, value: Any, info: ValidationInfo) -> Any:
         if not isinstance(value, list | tuple):
             return value
-        return [with_pull_defaults(phase, _sizes(info.data)) for phase in value]
+        sizes = _sizes(info.data)
+        return [with_pull_defaults(phase, sizes) for phase in value]
 
     @model_validator(mode="wrap")
     @classmethod
@@ -231,9 +233,14 @@ class Scene(Part):
         if mixture is None:
             length = float(self.smarticle.boxes.lengths.sum())
         else:
-            length = mixture.mean([float(kind.bars.lengths.sum()) for kind in mixture.kinds])
+            length = mixture.mean([kind.length for kind in mixture.kinds])
         filling = factor * self.sphere_diameter / length
         return self.count * self.model.volume / (math.pi * self.container.radius_m**2 * filling)
+
+    @property
+    def named_knobs(self) -> Mapping[str, Any]:
+        """Knobs that the name of the fidelity has in this scene, without those that the scene or a rule changes."""
+        return _named(self.fidelity.base, dict(self), self.fidelity.diameter_m)
 
     @property
     def smooth(self) -> bool:
@@ -363,7 +370,7 @@ class Scene(Part):
         if isinstance(shape, Flexible):
             filament = shape.filament(factor, None if self.liquid is None else self.liquid.immersing)
         pitch = self._pitch * diameter
-        return Kind(name=shape.named, bars=bars, rows=rows, diameter=diameter, pitch=pitch, filament=filament)
+        return Kind(name=shape.tag(), bars=bars, rows=rows, diameter=diameter, pitch=pitch, filament=filament)
 
     @property
     def model(self) -> Particle | Mixture:
@@ -373,7 +380,7 @@ class Scene(Part):
     @property
     def bodies(self) -> tuple[Particle | Kind, ...]:
         """One body of each kind; the first is the one to which the contact law refers."""
-        return (self.particle,) if self.mixture is None else self.mixture.kinds
+        return bodies_of(self.model)
 
 
 def _sizes(given: Mapping[str, Any]) -> tuple[float, float]:

@@ -10,6 +10,7 @@ from pydantic import Field, ValidationError
 from dem.errors import shown
 from dem.setting.part import Part
 from dem.strict import explained
+from dem.yaml_text import load_yaml, read_text
 
 PRESET = "preset"  #: Key of `contact` that names a file of contact parameters
 
@@ -57,11 +58,13 @@ def with_preset(data: Any, folder: Path | None) -> Any:
         raise ValueError(f"{where}: {shown(named)} is not text; give the path of a file of contact parameters")
     file = (folder or Path()) / named
     try:
-        values = yaml.safe_load(file.read_text(encoding="utf-8"))
+        values = load_yaml(read_text(file))
     except OSError as error:
         raise ValueError(f"{where}: {file} cannot be read ({error.strerror}); give the path of a preset") from None
-    except (UnicodeDecodeError, yaml.YAMLError):
-        raise ValueError(f"{where}: {file} is not YAML; give a file that `smarticles calibrate` wrote") from None
+    except (UnicodeDecodeError, yaml.YAMLError) as error:
+        cause = " ".join(str(getattr(error, "problem", None) or error).split())
+        msg = f"{where}: {file} is not YAML; give a file that `smarticles calibrate` wrote ({cause})"
+        raise ValueError(msg) from None
     if not isinstance(values, Mapping):
         raise ValueError(f"{where}: {file} holds {shown(values)}, not keys of `contact` with their values; correct it")
     try:

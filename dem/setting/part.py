@@ -46,8 +46,8 @@ class Part(Strict):
 
     @classmethod
     def tag(cls) -> str:
-        """Return the name of this part in a scene file: the value of its `type`, or its key."""
-        kind = cls.model_fields.get("type")
+        """Return the name of this part in a scene file: the value of its `type` or `shape`, or its key."""
+        kind = cls.model_fields.get("type") or cls.model_fields.get("shape")
         return str(get_args(kind.annotation)[0]) if kind else cls.__name__.lower()
 
 

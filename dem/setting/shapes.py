@@ -6,7 +6,7 @@ from typing import Annotated, Any, Literal, Self, get_args
 
 import numpy as np
 from pydantic import BeforeValidator, Field, model_validator
-from scipy.stats import norm
+from scipy.special import ndtri
 
 from dem.arrays import Array
 from dem.body.bars import Bars
@@ -69,20 +69,15 @@ class Shaped(Part):
             for factor in self.factors[[0, -1]]:
                 _ = self.bars(float(factor))
         except InputError as error:
-            raise ValueError(f"shape: {self.named}: {error}") from None
+            raise ValueError(f"shape: {self.tag()}: {error}") from None
         return self
-
-    @property
-    def named(self) -> str:
-        """Name of the shape."""
-        return str(get_args(type(self).model_fields["shape"].annotation)[0])
 
     @property
     def factors(self) -> Array:
         """Factors on the body's lengths [1]: `SIZES` equally frequent ones, or only 1 without a spread."""
         if not self.spread:
             return np.ones(1)
-        values = norm.ppf((np.arange(SIZES) + 0.5) / SIZES)
+        values = ndtri((np.arange(SIZES) + 0.5) / SIZES)
         return np.asarray(1 + self.spread * values / math.sqrt(float((values**2).mean())))
 
     def bars(self, factor: float = 1.0) -> Bars:
@@ -356,7 +351,7 @@ def listed(value: Any) -> Any:
     if value is None or value == "smarticle":
         return None
     if isinstance(value, str):
-        names = ", ".join(get_args(shape.model_fields["shape"].annotation)[0] for shape in SHAPES)
+        names = ", ".join(shape.tag() for shape in SHAPES)
         raise ValueError(f"{value!r} needs its lengths: write {{shape: {value}, …}}; shapes are {names}, or smarticle")
     return [value] if not isinstance(value, list | tuple) else value
 

@@ -83,13 +83,15 @@ def _read_csv(path: Path, unit: str | None) -> tuple[Floats, Whole, Whole, NDArr
         table = pd.read_csv(path, skipinitialspace=True)
     except (OSError, ValueError) as error:
         cannot_read("centre lines", path, error, _REMEDY)
-    headers = [str(name).strip() for name in table.columns]
-    table.columns = pd.Index([name.partition("[")[0].strip().lower() for name in headers])
+    headers = [str(name).partition("[") for name in table.columns]
+    table.columns = pd.Index([name.strip().lower() for name, _, _ in headers])
     missing = [name for name in ("body", "x", "y", "z") if name not in table.columns]
     if missing or table.columns.has_duplicates:
         _reject(path, f"it has no column {', '.join(missing)}" if missing else "two columns have one name")
-    stated = {name.partition("[")[2].rstrip("] ") for name in headers if name[:1].lower() in "xyz" and "[" in name}
-    if len(stated) > 1 or (stated and unit is not None and unit not in stated):
+    units = zip(table.columns, headers, strict=True)
+    stated = {inside.strip("] ") for name, (_, bracket, inside) in units if name in {"x", "y", "z"} and bracket}
+    named = [*stated, *([] if unit is None or not stated else [unit])]
+    if len({UNITS.get(name, name) for name in named}) > 1:
         raise InputError(
             f"{path}: states {', '.join(sorted(stated))} as unit of its columns x, y, z"
             + ("" if unit is None else f", unit is {unit}")

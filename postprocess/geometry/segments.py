@@ -136,12 +136,14 @@ def extents(segments: ArrayLike, body: ArrayLike) -> Extents:
 def inner_axes(segments: Floats, radius: Floats) -> Floats:
     """Return segments (M, 2, 3) [m] whose free ends are moved inwards by radii (M,) [m].
 
-    A sphere of that radius that moves along the result ends at the tips of the body, as in the engines.
+    A sphere of that radius that moves along the result ends at the tips of the body, as in the engines. No end moves
+    beyond the middle of its segment.
     """
     corners = _corner_numbers(segments)
     free = np.bincount(corners.ravel())[corners] == 1
     along = segments[:, 1] - segments[:, 0]
-    moved = (radius[:, None] * free)[..., None] * (along / np.linalg.norm(along, axis=1, keepdims=True))[:, None]
+    fraction = np.minimum(radius / np.linalg.norm(along, axis=1), 0.5)
+    moved = (fraction[:, None] * free)[..., None] * along[:, None]
     inner: Floats = segments + moved * np.array([1.0, -1.0])[:, None]
     return inner
 

@@ -216,9 +216,10 @@ def _directions(count: int) -> Floats:
 
 
 def _cages_of(frame: Frame, run: Run) -> tuple[float, float, float]:
-    axes, body, diameter = strands_of(frame, run)
+    axes, body, _, diameter = strands_of(frame, run)
+    real = np.any(axes[:, 0] != axes[:, 1], axis=1)  # barbs of length 0 are no segments
     # Recorded positions are rounded, which would lose contacts of zero overlap.
-    found = cages(axes, body, diameter=diameter, gap=1e-9 * float(diameter.max()))
+    found = cages(axes[real], body[real], diameter=diameter[real], gap=1e-9 * float(diameter.max()))
     return float(found.translation.mean()), float(found.motion.mean()), float(found.contacts.mean())
 
 

@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike
 from scipy.spatial import cKDTree
 
 from dem.errors import InputError
+from dem.record.document import Kind
 from dem.record.frame import Frame
 from dem.record.run import Run
 from postprocess.geometry.links import (
@@ -104,8 +105,9 @@ def chain_of(run: Run) -> Chain:
 class Strands(NamedTuple):
     """K axes of the swept spheres that represent the bodies of a frame in an engine."""
 
-    axes: Floats  #: (K, 2, 3) float64 [m], both ends of each axis
+    axes: Floats  #: (K, 2, 3) float64 [m], both ends of each axis; they coincide for links of length 0
     body: Whole  #: (K,) int64, index of the body
+    link: Whole  #: (K,) int64, number of the link, or bar, in its body
     diameter: Floats  #: (K,) float64 [m], of the sphere
 
 
@@ -117,20 +119,29 @@ def strands_of(frame: Frame, run: Run) -> Strands:
     chain = chain_of(run)
     if frame.bars is None:
         each = strands(checked_vertices(frame.vertices), chain)
-        axes = np.stack([each[:, :, :-1], each[:, :, 1:]], axis=3).reshape(-1, 2, 3)
-        body, diameter = np.repeat(np.arange(frame.count), 3 * chain.rows), np.full(len(axes), chain.diameter)
-    else:
-        kinds = run.manifest.kinds or ()
-        sizes = np.array([(kind.sphere_diameter_m, kind.thickness_normal_m, kind.round) for kind in kinds])
-        thick, normal, round_ = sizes[frame.kind[frame.body]].T
-        caps = np.array([kind.flexible for kind in kinds])[frame.kind[frame.body]]
-        inner = inner_axes(frame.segments, np.where(caps, 0.0, thick / 2))
-        reach = np.where((round_ == 1) | (chain.rows == 1), 0.0, (normal - thick) / 2)
-        offsets = np.linspace(-reach, reach, chain.rows, axis=1)[..., None] * frame.bars.normals[:, None]
-        axes = (inner[:, None] + offsets[:, :, None]).reshape(-1, 2, 3)
-        body, diameter = np.repeat(frame.body, chain.rows), np.repeat(thick, chain.rows)
-    real = np.any(axes[:, 0] != axes[:, 1], axis=1)
-    return Strands(axes[real], body[real], diameter[real])
+        axes = np.stack([each[:, :, :-1], each[:, :, 1:]], axis=3)
+        body, _, link = np.indices(axes.shape[:3]).reshape(3, -1)
+        return Strands(axes.reshape(-1, 2, 3), body, link, np.full(len(body), chain.diameter))
+    kinds, kind = run.manifest.kinds or (), frame.kind[frame.body]
+    diameter = np.array([one.sphere_diameter_m for one in kinds])[kind]
+    offsets = [_offsets(one, chain.rows) for one in kinds]
+    own = np.repeat(np.arange(len(kind)), [len(offsets[k]) for k in kind])
+    aside = np.concatenate([np.zeros(0), *(offsets[k] for k in kind)])
+    # The round caps of filaments reach beyond their ends.
+    caps = np.array([one.flexible for one in kinds])[kind]
+    inner = inner_axes(frame.segments, np.where(caps, 0.0, diameter / 2))
+    axes = inner[own] + (aside[:, None] * frame.bars.normals[own])[:, None]
+    return Strands(axes, frame.body[own], frame.link[own], diameter[own])
+
+
+def _offsets(kind: Kind, rows: int) -> Floats:
+    """Return the offsets of a bar's strands along its normal [m]: rows have a meaning only across a wide flat side.
+
+    Source:
+        `dem.scene.scene.Scene.mixture`, `dem.engine.links.shapes.rigid_shape`.
+    """
+    reach = (kind.thickness_normal_m - kind.sphere_diameter_m) / 2
+    return np.linspace(-reach, reach, rows) if rows > 1 and reach > 0 and not kind.round else np.zeros(1)
 
 
 def pairs_of_spheres(centres: Floats, diameter: float) -> ContactPairs:

@@ -44,13 +44,14 @@ def averaged(group: pd.DataFrame, quantities: Iterable[str]) -> dict[str, float]
     return found
 
 
-def means_by(table: pd.DataFrame, by: Sequence[str]) -> pd.DataFrame:
+def means_by(table: pd.DataFrame, by: Sequence[str], *, intervals: bool = False) -> pd.DataFrame:
     """Average the rows of each group of a table, with standard errors from the scatter of the rows.
 
     Args:
         table: One row per run, or per run and phase; names of quantities end with their unit in brackets. Standard
             errors within a run ("… SE […]") are ignored.
         by: Columns whose values define the groups.
+        intervals: Whether to add the half-widths "… 95 % […]" of confidence intervals.
 
     Returns:
         One row per group, in the order of its first row: the columns `by`, `RUNS`, then each quantity with its standard
@@ -67,8 +68,10 @@ def means_by(table: pd.DataFrame, by: Sequence[str]) -> pd.DataFrame:
     for values, group in table.groupby(list(by), sort=False, dropna=False):
         row: dict[str, object] = {**dict(zip(by, values, strict=True)), RUNS: len(group)}
         for name in quantities:
-            mean = mean_over_seeds(group[name])
-            row |= {name: mean.value, marked(name, "SE"): mean.standard_error}
+            columns = mean_columns(name, mean_over_seeds(group[name]))
+            if not intervals:
+                del columns[marked(name, "95 %")]
+            row |= columns
         rows.append(row)
     return pd.DataFrame(rows)
 

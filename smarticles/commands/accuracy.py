@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import argparse
-import sys
 from collections.abc import Mapping
 from functools import partial
 from typing import TYPE_CHECKING
 
 from dem.errors import InputError
+from dem.terminal import warn
 from smarticles.command_line import Commands, add_options, columns, positive_number, scene_settings
 from smarticles.commands.study import compute_and_analyse
 from smarticles.sweeps import expected_wall_s, folder_of
@@ -88,8 +88,7 @@ def run_accuracy(arguments: argparse.Namespace) -> int:
         raise InputError("accuracy: --out DIR is missing; give a directory, or --dry-run to only show the ladder")
     print(_listing(ladder, expected_s, len(seeds), arguments.jobs), flush=True)
     if len(seeds) < 2:
-        warning = "the scatter is unknown with one seed, so that no error can be resolved; give --seeds 1,2,3"
-        print(f"smarticles: warning: {warning}", file=sys.stderr)
+        warn("the scatter is unknown with one seed, so that no error can be resolved; give --seeds 1,2,3")
     if arguments.dry_run:
         return 0
     folder = folder_of(sweep, points, arguments.out, arguments.command_line, extend=True)
@@ -113,7 +112,7 @@ def _listing(ladder: Ladder, expected_s: Mapping[str, float], seeds: int, jobs: 
     for rung in ladder.rungs:
         planned = plan(ladder.scenes[rung.setting])
         note = "reference" if references[rung.knob] == rung else ""
-        section = f"{planned.strands} strands" if planned.strands else f"{planned.spheres_per_smarticle} spheres"
+        section = f"{planned.most_strands} strands" if planned.strands else f"{planned.spheres_per_smarticle} spheres"
         shape = [planned.time_step_s, section]
         rows.append([rung.knob, rung.label, rung.setting, note, *shape, round(expected_s[rung.setting])])
     header = ["knob", "value", "setting", "", "time step s", "section", "expected wall s"]

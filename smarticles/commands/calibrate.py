@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,6 +10,7 @@ from typing import TYPE_CHECKING
 
 from dem.errors import InputError
 from dem.record.names import OF_SWEEP
+from dem.terminal import warn
 from smarticles import sweeps
 from smarticles.command_line import Commands, add_options, columns
 
@@ -161,10 +161,7 @@ class SweepSimulator:
             return None
         for status in folder.status():
             if status.state != "done":
-                print(
-                    f"smarticles: warning: {status.directory} is left out: {status.cause or status.state}",
-                    file=sys.stderr,
-                )
+                warn(f"{status.directory} is left out: {status.cause or status.state}")
         return self._measured(folder)
 
     def _complete(self, waiting: Folder) -> bool:

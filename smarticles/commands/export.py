@@ -5,7 +5,7 @@ import sys
 from pathlib import Path
 
 from dem.errors import InputError
-from dem.terminal import ERASE_LINE
+from dem.terminal import redraw
 from smarticles.command_line import Commands, add_options, names
 
 _FORMATS = ("vtp", "gsd", "stl", "obj", "gltf", "glb")
@@ -121,8 +121,7 @@ def export_run(arguments: argparse.Namespace) -> int:
 
     def show_progress(done: int, count: int) -> None:
         if sys.stderr.isatty() and count > 1:
-            sys.stderr.write(ERASE_LINE)
-            print(f"frame {done} of {count}", end="\n" if done == count else "", file=sys.stderr, flush=True)
+            redraw(f"frame {done} of {count}", last=done == count)
 
     written = export.export_run(
         arguments.directory,

@@ -11,13 +11,13 @@ from textwrap import wrap
 from typing import TYPE_CHECKING
 
 from dem.errors import InputError
+from dem.terminal import redraw, warn
 from smarticles.command_line import Cell, Commands, add_options, as_json, columns, names, reject_existing
 from smarticles.measuring import grouped, measured, of_phase, sources
 
 if TYPE_CHECKING:
     import pandas as pd
 
-_RUNS = "runs [-]"
 _COMPARED = "second-highest-com"
 _WIDTH = 100  # characters of a terminal
 _Column = tuple[str, str, str, float]  #: Heading, column of the full table, number format, unit conversion factor
@@ -95,7 +95,7 @@ def measure_runs(arguments: argparse.Namespace) -> int:
     by = _groups(arguments)
     directories = list(sources(arguments.directories))
     for warning in filter(None, (open_run(directory).lost_series for directory in directories)):
-        print(f"smarticles: warning: {warning}", file=sys.stderr)
+        warn(warning)
     jobs = arguments.jobs or usable_cores()
     table = measured(
         arguments.directories, frames=arguments.frames, also=arguments.also, jobs=jobs, progress=_Progress()
@@ -141,12 +141,10 @@ class _Progress:
         if runs > 1 and (terminal or now - self._last > 10):
             self._last = now
             text = f"measured {done} of {runs} runs"
-            print(
-                f"\r{text}" if terminal else text,
-                end="\n" * (done == runs or not terminal),
-                file=sys.stderr,
-                flush=True,
-            )
+            if terminal:
+                redraw(text, last=done == runs)
+            else:
+                print(text, file=sys.stderr, flush=True)
 
 
 def _groups(arguments: argparse.Namespace) -> Sequence[str]:
@@ -177,7 +175,9 @@ def _shown(table: pd.DataFrame, *, per_frame: bool) -> list[_Column]:
 
 def _text(table: pd.DataFrame, by: Sequence[str], shown: Sequence[_Column]) -> str:
     """Return the printed table: one row per group with `by`, otherwise a block of rows per run."""
-    named = [*by, _RUNS] if by else []
+    from postprocess.statistics.points import RUNS  # noqa: PLC0415
+
+    named = [*by, RUNS] if by else []
     rows = [
         [
             *(row[name] for name in named),

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 from dem.errors import InputError
 from dem.record.names import MANIFEST, SCENE
 from dem.run.stop import StopRequest, StopRequestedError
+from dem.terminal import warn
 from smarticles import sweeps
 from smarticles.command_line import Commands, add_options, scene_settings
 
@@ -191,6 +192,6 @@ def _set_parallelism(scene: Scene, out: Path, *, resume: bool, threads: int | No
         check_ranks(wanted)
         os.environ[RANKS], wanted = str(wanted), 1
     elif (warning := threads_warning(wanted)) is not None:
-        print(f"smarticles: warning: {warning}", file=sys.stderr)
+        warn(warning)
     # Replaces the value of a batch system, which may be all cores of the node.
     os.environ["OMP_NUM_THREADS"] = str(wanted)

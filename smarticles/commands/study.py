@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from studies.framework.study import Study
     from templates.sweep.expand import Point
     from templates.sweep.folder import Entry, Folder
+    from templates.sweep.render import Value
 
 _ABOUT = "\n\n".join(f"{name}: {study.about}" for name, study in registry.STUDIES.items())
 
@@ -165,8 +166,8 @@ def _fidelity(name: str, file: Path, fidelity: str) -> dict[str, str]:
         raise InputError(f"--fidelity {fidelity}: is not known; known: {', '.join(FIDELITIES)}")
     sweep, changed = load_sweep(file), {"fidelity": fidelity}
     shipped = sweep.content.constants.get("fidelity")
-    if shipped == fidelity:
-        return changed
+    if fidelity == (shipped["base"] if isinstance(shipped, Mapping) else shipped):
+        return {}  # the study's own fidelity of this name, with its changes to single knobs
     try:
         scenes = [{point.scene_sha256 for point in expand(s)} for s in (sweep, with_constants(sweep, changed))]
     except InputError as error:
@@ -212,7 +213,10 @@ def differences(quick: Sequence[Point], full: Sequence[Point]) -> list[str]:
 
 def _distinct(points: Sequence[Point], name: str) -> str:
     """Return the distinct values of a variable as text, numbers in ascending order."""
-    values = list(dict.fromkeys(point.values[name] for point in points if name in point.values))
+    values: list[Value] = []
+    for value in (point.values[name] for point in points if name in point.values):
+        if value not in values:  # mappings cannot be in a set
+            values.append(value)
     if all(isinstance(value, int | float) for value in values):
         values.sort()
-    return ", ".join(map(str, values))
+    return ", ".join(value.get("base", str(value)) if isinstance(value, dict) else str(value) for value in values)

@@ -16,6 +16,7 @@ from smarticles.command_line import Commands, add_options, columns, positive_int
 if TYPE_CHECKING:
     from templates.slurm.submission import Draft
     from templates.sweep.expand import Point
+    from templates.sweep.folder import Entry
 
 _FILE_HELP = """
 A sweep file describes many scenes by one template and lists of values:
@@ -83,19 +84,24 @@ def run_sweep(arguments: argparse.Namespace) -> int:
         raise InputError(
             f"--to {arguments.to}: leaves the start of the runs to this tool; leave --submit and --cluster out"
         )
+    if arguments.out is None and (for_cluster or not arguments.dry_run):
+        raise InputError("sweep: --out DIR is missing; give a directory, or --dry-run to only list the runs")
+    if for_cluster:
+        _check_ranks(points, arguments.ranks)
+    expected = [sweeps.expected_wall_s(point.scene) for point in points]
+    entries = [entry_of(point, wall) for point, wall in zip(points, expected, strict=True)]
     # Rendered before anything is written, so that a rejected request leaves no files.
-    draft = _draft(sweep.content.name, points, arguments) if for_cluster else None
+    draft = _draft(sweep.content.name, entries, arguments) if for_cluster else None
     if arguments.dry_run:
-        print(_listing(points))
+        print(_listing(points, expected))
         if draft is not None:
             job = f"jobs/{draft.submission.number}"
             print(f"{draft.request.to_text()}\n\n--- {job}/runs.txt\n{draft.run_list}")
             print(f"--- {job}/array.sh\n{draft.script}")
         if arguments.to:
-            entries = [entry_of(point, sweeps.expected_wall_s(point.scene)) for point in points]
             print(f"\n--- {TOOLS[arguments.to]}\n{workflow(arguments.to, sweep.content.name, entries)}")
         return 0
-    folder = sweeps.folder_of(sweep, points, _required_out(arguments), arguments.command_line)
+    folder = sweeps.folder_of(sweep, points, arguments.out, arguments.command_line, expected_s=expected)
     if for_cluster:
         return sweeps.enqueue(folder, arguments)
     if arguments.to:
@@ -108,36 +114,30 @@ def run_sweep(arguments: argparse.Namespace) -> int:
     return sweeps.complete_here(folder, arguments)
 
 
-def _required_out(arguments: argparse.Namespace) -> Path:
-    out: Path | None = arguments.out
-    if out is None:
-        raise InputError("sweep: --out DIR is missing; give a directory, or --dry-run to only list the runs")
-    return out
-
-
-def _draft(name: str, points: Sequence[Point], arguments: argparse.Namespace) -> Draft:
-    """Render the submission of all runs of a new sweep, or of the missing runs of an existing sweep."""
-    from templates.slurm.submission import submissions, tasks_of_runs, to_submit  # noqa: PLC0415
-    from templates.sweep.folder import entry_of, open_folder  # noqa: PLC0415
-
-    out = _required_out(arguments)
-    if arguments.ranks and (serial := {point.scene.engine for point in points} - {"lammps"}):
+def _check_ranks(points: Sequence[Point], ranks: int | None) -> None:
+    if ranks and (serial := {point.scene.engine for point in points} - {"lammps"}):
         raise InputError(
-            f"--ranks {arguments.ranks}: engine: {', '.join(sorted(serial))} is one process; leave it out, or give "
+            f"--ranks {ranks}: engine: {', '.join(sorted(serial))} is one process; leave it out, or give "
             "--engine lammps"
         )
-    entries = [entry_of(point, sweeps.expected_wall_s(point.scene)) for point in points]
+
+
+def _draft(name: str, entries: Sequence[Entry], arguments: argparse.Namespace) -> Draft:
+    """Render the submission of all runs of a new sweep, or of the missing runs of an existing sweep."""
+    from templates.slurm.submission import submissions, tasks_of_runs, to_submit  # noqa: PLC0415
+    from templates.sweep.folder import open_folder  # noqa: PLC0415
+
+    out: Path = arguments.out
     if (out / OF_SWEEP).exists():
         # If no run is missing, the request of all runs is checked against the limits of the cluster.
         entries = to_submit(open_folder(out), tasks_of_runs(submissions(out))) or entries
     return sweeps.draft_of(out, name, entries, arguments)
 
 
-def _listing(points: Sequence[Point]) -> str:
+def _listing(points: Sequence[Point], expected: Sequence[float]) -> str:
     """Return a table of the runs with their variables and expected wall times [s]."""
     from templates.local import duration  # noqa: PLC0415
 
-    expected = [sweeps.expected_wall_s(point.scene) for point in points]
     names = list(points[0].values)
     rows = [
         [point.name, *(point.values[name] for name in names), round(wall)]

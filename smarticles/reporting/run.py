@@ -21,7 +21,6 @@ from dem.record.names import LOG, SCENE
 from dem.record.run import Run, open_run
 from dem.scene.reading import load_scene
 from dem.scene.scene import Scene
-from dem.setting.fidelity import fidelities
 from postprocess.measures.registry import Shown, shown_quantities
 from postprocess.statistics.points import format_with_error, marked
 from smarticles.command_line import format_cell
@@ -242,8 +241,7 @@ def accuracy_blocks(scene: Scene | None, path: Path | None) -> list[Markup]:
     """
     if scene is None:
         return []
-    base = scene.fidelity.base
-    named = fidelities(scene.engine)[base]
+    base, named = scene.fidelity.base, scene.named_knobs
     knobs = scene.fidelity.model_dump(exclude={"base"})
     caption = f"Knobs of fidelity {base} on {scene.engine}"
     rows = [[knob, value, named.get(knob)] for knob, value in knobs.items()]

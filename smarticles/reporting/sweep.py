@@ -11,7 +11,6 @@ from typing import Any
 
 import pandas as pd
 from markupsafe import Markup
-from scipy.special import stdtrit
 
 from dem.errors import InputError
 from dem.record.run import Run
@@ -20,7 +19,6 @@ from dem.scene.scene import Scene
 from postprocess.measures.entanglement import link_crossings
 from postprocess.measures.registry import in_space, shown_quantities
 from postprocess.statistics.points import RUNS, marked
-from postprocess.statistics.seeds import CONFIDENCE
 from smarticles.command_line import format_cell
 from smarticles.measuring import follows, grouped, has_frames, measured, values_in
 from smarticles.reporting.charts import against_variable
@@ -133,7 +131,8 @@ def _measured(folder: Folder, varied: Mapping[str, Sequence[Any]], *, jobs: int)
             by.append(name)
     by = [name for name in by if name in runs.columns]
     means = grouped(runs, by)
-    final = means[means["phase"] == means["phase"].max()]
+    last = means["phase"].max()
+    final = means[means["phase"] == last]
     kind = str(final["phase type"].iloc[0])
     caption = f"Means over runs ± standard error, phase {final['phase'].iloc[0]} ({kind}).{_few(final)}"
     tables = [
@@ -141,7 +140,8 @@ def _measured(folder: Folder, varied: Mapping[str, Sequence[Any]], *, jobs: int)
         frame_table(means, "All phases and measures, means over runs"),
         frame_table(runs.drop(columns=["scene_sha256"]), "All runs"),
     ]
-    return [("Result", tables), ("Figures", _figures(final, by, varied, kind))]
+    with_intervals = grouped(runs[runs["phase"] == last], by, intervals=True)
+    return [("Result", tables), ("Figures", _figures(with_intervals, by, varied, kind))]
 
 
 def _figures(final: pd.DataFrame, by: Sequence[str], varied: Mapping[str, Sequence[Any]], kind: str) -> list[Markup]:
@@ -166,8 +166,8 @@ def _figures(final: pd.DataFrame, by: Sequence[str], varied: Mapping[str, Sequen
         groups = {}
         for value, group in [("all", part)] if curve_name is None else part.groupby(curve_name, sort=False):
             rows = group.sort_values(x_name)
-            means, errors = (shown.factor * rows[n] for n in (quantity.header, marked(quantity.header, "SE")))
-            half_widths = stdtrit((rows[RUNS] - 1).clip(lower=1), (1 + CONFIDENCE) / 2) * errors
+            columns = quantity.header, marked(quantity.header, "95 %")
+            means, half_widths = (shown.factor * rows[column] for column in columns)
             name = "all" if curve_name is None else f"{curve_name} = {value}"
             groups[name] = (rows[x_name].tolist(), means.tolist(), half_widths.tolist())
         heading = shown.heading if "[" in shown.heading else f"{shown.heading} [-]"

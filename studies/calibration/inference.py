@@ -148,18 +148,19 @@ def calibrate(problem: Problem, simulator: Simulator, say: Callable[[str], None]
     tables: list[pd.DataFrame] = []
     waves: list[dict[str, float]] = []
     warnings: list[str] = []
-    share = 1.0
+    share, candidates, distances = 1.0, _candidates(problem), np.empty(0)
     for wave in range(1, problem.content.waves + 1):
         theta = simulator.planned(wave)
         if theta is None:
-            theta = first_points(problem, size) if wave == 1 else _next(problem, emulators, size)
+            theta = first_points(problem, size) if wave == 1 else _next(candidates, distances, size)
         found = simulator.run(wave, theta)
         if found is None:
             return None
         missing = [values for values, measured in found if not measured]
         tables.append(pd.DataFrame([{"wave": wave, **values, **(measured or {})} for values, measured in found]))
         emulators = emulate(problem, pd.concat(tables, ignore_index=True))
-        before, share = share, float(np.mean(implausibility(problem, emulators, _candidates(problem)) < CUTOFF))
+        distances = implausibility(problem, emulators, candidates)
+        before, share = share, float(np.mean(distances < CUTOFF))
         waves.append({"wave": wave, "points": len(theta), "runs": len(found), "failed": len(missing)})
         waves[-1] |= {"prior not ruled out before [%]": 100 * before, "and after [%]": 100 * share}
         say(f"wave {wave}: {len(theta)} points, {len(found)} runs, {len(missing)} of them failed and left out; "
@@ -203,15 +204,14 @@ def first_points(problem: Problem, size: int) -> Array:
     return _rounded(problem.from_unit(sequence.random_base2((size - 1).bit_length())[:size]))
 
 
-def _next(problem: Problem, emulators: Sequence[Emulator | None], size: int) -> Array:
+def _next(candidates: Array, distances: Array, size: int) -> Array:
     """Return the first `size` candidates that are not ruled out, (size, d); if there are fewer, the least implausible.
 
+    `distances` are the implausibilities of the candidates.
     A part of a Sobol sequence within a region is spread as evenly in it as the whole is in its cube.
     """
-    candidates = _candidates(problem)
-    found = implausibility(problem, emulators, candidates)
-    limit = max(CUTOFF, float(np.partition(found, size - 1)[size - 1]))
-    return _rounded(candidates[found <= limit][:size])
+    limit = max(CUTOFF, float(np.partition(distances, size - 1)[size - 1]))
+    return _rounded(candidates[distances <= limit][:size])
 
 
 def _rounded(theta: Array) -> Array:

@@ -12,16 +12,15 @@ from pathlib import Path
 from typing import Any, Self
 
 import numpy as np
-import yaml
 from numpy.typing import NDArray
 from pydantic import Field, ValidationError, model_validator
 from scipy import stats
 
 from dem.errors import InputError, shown
-from dem.scene.reading import apply_override
 from dem.strict import Strict, explained
 from dem.yaml_text import parse_yaml
 from templates.sweep.expand import Point, points_of
+from templates.sweep.from_scene import as_template
 from templates.sweep.render import Value
 from templates.sweep.sweep_file import SEED, Sweep, SweepFile, parse_table, read_text
 
@@ -230,11 +229,11 @@ class Problem:
             text=self.text,
             content=SweepFile.model_validate(described),
             template=file,
-            template_text=text if content.template else self._template(text, file, [*runs[0]]),
+            template_text=text if content.template else self._template(text, file),
         )
         return sweep, points_of(sweep, runs)
 
-    def _template(self, text: str, file: Path, variables: Sequence[str]) -> str:
+    def _template(self, text: str, file: Path) -> str:
         """Return the text of a scene as a template with a variable for each of `keys`, and one for the seed."""
         data = parse_yaml(text, str(file))
         if not isinstance(data, dict):
@@ -244,12 +243,7 @@ class Problem:
             raise InputError(f"{self.path}: keys: {name!r} is missing; give the key of {file} that it changes")
         for name in set(self.content.keys) - own:
             raise InputError(f"{self.path}: keys.{name}: is no variable; there are {', '.join(sorted(own))}")
-        for name, key in {**self.content.keys, SEED: SEED}.items():
-            apply_override(data, f"{key}=_variable_{name}_")
-        plain = str(yaml.safe_dump(data, sort_keys=False, allow_unicode=True))
-        for name in variables:
-            plain = plain.replace(f"_variable_{name}_", f"{{{{ {name} }}}}")
-        return plain
+        return as_template(data, {key: name for name, key in {**self.content.keys, SEED: SEED}.items()}, str(file))
 
 
 def load_problem(path: Path) -> Problem:

@@ -607,8 +607,13 @@ def finish(figure: Canvas, path: Path, notes: Sequence[str], footer: Sequence[st
 
     Axes are widened until they show everything. The footer explains error bars by `bars` if the figure has any.
     """
-    fullest = max(figure.axes, key=lambda axes: len(axes.get_legend_handles_labels()[1]))
-    entries = {label: handle for handle, label in zip(*fullest.get_legend_handles_labels(), strict=True)}
+    legends = [
+        {label: handle for handle, label in zip(*axes.get_legend_handles_labels(), strict=True)} for axes in figure.axes
+    ]
+    entries: dict[str, Any] = {}
+    for legend in sorted(legends, key=len, reverse=True):  # the fullest panel has its entries first
+        for label, handle in legend.items():
+            entries.setdefault(label, handle)
     if len(entries) > 1:
         columns = 2 if figure.get_size_inches()[0] < 1.5 * style.COLUMN_WIDTH else 4
         figure.legend(entries.values(), entries.keys(), loc="outside upper center", ncols=columns)

@@ -8,7 +8,7 @@ DIR/jobs/               submissions to a queue, see `templates.slurm.submission`
 """
 
 import fcntl
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
@@ -22,7 +22,6 @@ from dem.record.names import MANIFEST as RUN
 from dem.record.names import OF_SWEEP as MANIFEST
 from dem.record.run import Run, Status
 from dem.scene.reading import dump_scene
-from dem.scene.scene import Scene
 from templates.sweep.expand import Point
 from templates.sweep.sweep_file import SEED, Sweep
 
@@ -183,14 +182,14 @@ def create_folder(
     *,
     command: str,
     versions: Mapping[str, str],
-    expected_s: Callable[[Scene], float],
+    expected_s: Sequence[float],
     extend: bool = False,
 ) -> Folder:
     """Create the directory of a sweep, or open a directory that already holds this sweep.
 
     Args:
         path: The directory, which is absent, empty, or holds this sweep.
-        expected_s: Returns the expected wall time [s] of a scene.
+        expected_s: Expected wall time of each point [s].
         extend: Whether to add the missing runs to a directory that holds some of these runs and no others.
 
     Raises:
@@ -207,7 +206,7 @@ def create_folder(
         versions=versions,
         files=files,
         seed_by_seed=sweep.content.repeats is not None and sweep.content.repeats.seed_by_seed,
-        points=tuple(entry_of(point, expected_s(point.scene)) for point in points),
+        points=tuple(entry_of(point, wall) for point, wall in zip(points, expected_s, strict=True)),
     )
     if (path / MANIFEST).exists():
         wanted = {entry.name: entry.scene_sha256 for entry in manifest.points}

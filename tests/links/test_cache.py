@@ -18,6 +18,7 @@ from dem.engine.links import cache, world
 from dem.engine.links.compiler import kernel
 from dem.engine.links.cost import COMPILE_FIRST, COMPILE_MORE
 from dem.engine.links.kind import OPTIONAL, _present
+from dem.engine.links.stepping import advance
 from dem.plan.outlook import plan
 from dem.run import warm
 from dem.scene.reading import load_scene
@@ -51,6 +52,12 @@ print(tiny(3.0), flush=True)
 HERE = Path(__file__)
 WAITS = "another process compiles the links engine; waiting"
 MINUTE = 60.0
+
+
+@pytest.fixture
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.setattr(cache, "folder", lambda: tmp_path)
+    return tmp_path
 
 
 @contextmanager
@@ -114,31 +121,32 @@ def test_a_process_that_has_waited_too_long_compiles_by_itself(tmp_path: Path) -
 
 @pytest.mark.parametrize(("kind", "example", "changes"), doctor._COMPILED)
 def test_the_kinds_of_code_that_a_scene_needs_are_known(
-    kind: str, example: str, changes: tuple[str, ...], monkeypatch: pytest.MonkeyPatch
+    kind: str, example: str, changes: tuple[str, ...], folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    called = set()
+    called, stored = set(), cache.KernelCache(advance.py_func)
 
-    def advance(steps: int, clock: object, system: object, scratch: object, totals: object) -> int:
-        called.add(frozenset(cache._lacking(numba.typeof(system), "system")))
+    def store(steps: int, *others: object) -> int:
+        """Name and store code as for the kernel."""
+        path = stored.path([numba.typeof(each) for each in (steps, *others)])
+        assert path is not None
+        path.touch()
+        called.add(frozenset(cache._lacking(numba.typeof(others[1]), "system")))
         return steps
 
     # Neither this kernel nor queries are compiled, which would take long.
-    monkeypatch.setattr(world, "advance", advance)
+    monkeypatch.setattr(world, "advance", store)
     monkeypatch.setattr(warm, "_step_and_query", lambda engine: engine.advance(1))
     scene = load_scene(path_of(example), changes)
-    warm.compile_for(scene)
     needed = [OPTIONAL - present for present in _present(scene)]
     lifted = [needed[0] - {"rims"}] if "lifted" in kind else []
-    assert called == {*needed, *lifted}
 
     # What the cache holds decides what is planned.
-    kept: set[frozenset[str]] = set()
-    monkeypatch.setattr("dem.engine.links.kind.is_kept", kept.__contains__)
     cold = plan(scene)
     seconds = COMPILE_FIRST + COMPILE_MORE * (len(needed) - 1 + scene.calls_for(EffectName.WALL_REMOVAL))
     assert cold.compile_s == seconds
     assert f"compiling, once {seconds:.0f} s" in " ".join(cold.to_text().split())
-    kept.update(needed)
+    warm.compile_for(scene)
+    assert called == {*needed, *lifted}
     assert plan(scene).compile_s == 0.0
     assert plan(scene).wall_s == cold.wall_s
     assert "compiling" not in plan(scene).to_text()
@@ -159,12 +167,6 @@ def call(function: Callable[[float], float]) -> tuple[float, int]:
     """What a kernel returns for 3, made anew, and how often it was read from its file."""
     made: Any = kernel(function)
     return made(3.0), sum(made.stats.cache_hits.values())
-
-
-@pytest.fixture
-def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    monkeypatch.setattr(cache, "folder", lambda: tmp_path)
-    return tmp_path
 
 
 def flipped(content: bytes, place: int) -> bytes:

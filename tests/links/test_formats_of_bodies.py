@@ -1,28 +1,34 @@
 """Frames in one file, and capsules for GSD, of bodies that are no smarticles."""
 
+import importlib.util
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 from scenes import small
 from scipy.spatial.transform import Rotation
 
 from dem.body.placement import Poses
 from dem.body.state import RigidState
 from dem.engine.links.shapes import rigid_shape
-from dem.record.frame import segment_mesh
+from dem.record.frame import RecordedBars, segment_mesh
 from dem.record.names import MANIFEST, SCENE
 from dem.record.run import Run
 from dem.record.vtkhdf import read_step
 from dem.run.build import _frame_writer, build_engine
 from dem.run.run import manifest
 from dem.scene.reading import dump_scene
-from postprocess.trajectory import capsules_of, orientations, shapes_of
+from postprocess.measures.caging import cages
+from postprocess.measures.contacts import strands_of
+from postprocess.trajectory import capsules_of, orientations, shapes_of, write_trajectory
 from smarticles.commands.compare import compare_bits
 
 SHAPES: dict[str, dict[str, Any]] = {
     "rod": {"length_m": 0.014},
+    "round rod": {"shape": "rod", "length_m": 0.014, "diameter_m": 0.8e-3},
     "staple": {"crown_m": 0.01, "leg_m": [0.007, 0.005], "angle_deg": [70, 110], "twist_deg": [0, 40]},
     "z": {"middle_m": 0.01, "arm_m": 0.006, "angle_deg": 60, "diameter_m": 0.8e-3},
     "ring": {"radius_m": 0.005},
@@ -30,17 +36,27 @@ SHAPES: dict[str, dict[str, Any]] = {
 }
 
 
-def written(out: Path, *names: str, count: int, frames: str) -> tuple[RigidState, Run]:
-    """Bodies at random orientations, and a run directory with one frame of them."""
+def written(
+    out: Path,
+    *names: str,
+    count: int,
+    frames: str = "vtkhdf",
+    fidelity: str = "draft",
+    places: NDArray[np.float64] | None = None,
+    turns: Rotation | None = None,
+) -> tuple[RigidState, Run]:
+    """Bodies, apart and at random orientations if not given, and a run directory with one frame of them."""
     particle = [{"shape": name, **SHAPES[name]} for name in names]
-    scene = small({"engine": "links", "count": count, "particle": particle, "recording.frames": frames})
+    changes = {"count": count, "particle": particle, "recording.frames": frames, "fidelity": fidelity}
+    scene = small({"engine": "links", **changes})
     out.mkdir(exist_ok=True)
     steps = [1e-5] * len(scene.phases)
     manifest(scene, out, steps=steps, command="test", made_by=("links", "1"), threads=1).write(out / MANIFEST)
     (out / SCENE).write_text(dump_scene(scene), encoding="utf-8")
-    engine, turns = build_engine(scene, 1e-5), Rotation.random(count, rng=np.random.default_rng(1))
+    engine = build_engine(scene, 1e-5)
     assert scene.mixture is not None
-    places = np.arange(1, count + 1)[:, None] * [0.0, 0.0, 0.05]
+    turns = Rotation.random(count, rng=np.random.default_rng(1)) if turns is None else turns
+    places = np.arange(1, count + 1)[:, None] * [0.0, 0.0, 0.05] if places is None else places
     engine.add(Poses(places, tuple(turns), scene.mixture.of))
     state = engine.state().bodies
     assert state is not None
@@ -66,9 +82,18 @@ def test_frames_in_one_file_are_those_in_many(tmp_path: Path) -> None:
         assert radii == pytest.approx((width if flat else kind.sphere_diameter_m) / 2)
 
 
+def test_frames_of_bodies_are_read_only(tmp_path: Path) -> None:
+    (frame,) = written(tmp_path / "run", *SHAPES, count=10, frames="vtu")[1].frames
+    assert frame.bars is not None
+    arrays = [value for part in (frame, frame.bars) for value in vars(part).values() if isinstance(value, np.ndarray)]
+    assert len(arrays) == 10
+    assert not any(array.flags.writeable for array in arrays)
+
+
 @pytest.mark.parametrize("name", SHAPES)
-def test_capsules_are_the_strands_of_the_engine(name: str, tmp_path: Path) -> None:
-    state, run = written(tmp_path, name, count=2, frames="vtkhdf")
+@pytest.mark.parametrize("fidelity", ["draft", "standard"])
+def test_capsules_are_the_strands_of_the_engine(name: str, fidelity: str, tmp_path: Path) -> None:
+    state, run = written(tmp_path, name, count=2, fidelity=fidelity)
     (kind,) = state.mixture.kinds
     found = capsules_of(run.frames[0], run)
     lines = rigid_shape(kind.bars, kind.rows, kind.radius).lines
@@ -87,3 +112,39 @@ def test_capsules_are_the_strands_of_the_engine(name: str, tmp_path: Path) -> No
     apart = np.minimum(*(np.abs(placed - each).max(axis=(1, 2)) for each in (found.ends, found.ends[:, ::-1])))
     assert apart.max() < 1e-9
     assert len(set(found.types)) == len(found.types) == len(kind.bars.points)
+
+
+def test_round_rods_that_cross_touch_once_at_any_fidelity(tmp_path: Path) -> None:
+    for fidelity in ("draft", "standard", "reference"):
+        crossing = Rotation.from_euler("z", [[0.0], [90.0]], degrees=True)
+        places = np.array([[0.0, 0.0, 0.01], [0.001, 0.001, 0.0102]])
+        _, run = written(tmp_path / fidelity, "round rod", count=2, fidelity=fidelity, places=places, turns=crossing)
+        strands = strands_of(run.frames[0], run)
+        assert cages(strands.axes, strands.body, diameter=strands.diameter).contacts.tolist() == [1, 1], fidelity
+
+
+@pytest.mark.skipif(importlib.util.find_spec("gsd") is None, reason="the package gsd is not installed")
+def test_a_trajectory_has_the_shapes_of_kinds_that_are_poured_later(tmp_path: Path) -> None:
+    import gsd.hoomd  # noqa: PLC0415
+
+    _, run = written(tmp_path, "rod", "cross", count=4)
+    last = run.frames[0]
+    assert last.bars is not None
+    bars = np.flatnonzero(last.body == 0)
+    alone = RecordedBars(*(getattr(last.bars, name)[bars] for name in ("segments", "body", "number")),
+                         last.bars.kind[:1], last.bars.normals[bars])  # fmt: skip
+    early = replace(
+        last,
+        vertices=last.vertices[:1],
+        smarticle_ids=last.smarticle_ids[:1],
+        link_velocity=last.link_velocity[bars],
+        bars=alone,
+    )
+    assert len(set(last.kind)) == 2
+    frames = [early, last]
+    assert write_trajectory(tmp_path / "all.gsd", run, enumerate(frames), [], first=frames) == 2
+    with gsd.hoomd.open(tmp_path / "all.gsd", "r") as file:
+        assert [frame.particles.N for frame in file] == [len(capsules_of(frame, run).ends) for frame in frames]
+        for frame in file:
+            assert [len(shape["vertices"]) for shape in frame.particles.type_shapes] == [2] * 5  # no points
+            assert frame.particles.type_shapes == shapes_of(capsules_of(last, run))

@@ -32,7 +32,7 @@ def run(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory
 
 def test_strands_that_touch_are_the_contacts_that_the_engine_counted(run: Run) -> None:
     for frame in (run.frames[len(run.frames) // 2], run.frames[-1]):
-        axes, body, diameter = strands_of(frame, run)
+        axes, body, _, diameter = strands_of(frame, run)
         found = contact_normals(axes, body, diameter=diameter, gap=1e-9 * float(diameter.max()))
         first, second = found.body.reshape(2, -1)
         pairs = np.unique(np.sort(np.stack([first, second], axis=1), axis=1), axis=0)

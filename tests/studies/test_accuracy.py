@@ -1,6 +1,7 @@
 """The study of accuracy: verdicts from made-up numbers, published tables, and an analysis of made-up runs."""
 
 import math
+import shutil
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -24,10 +25,13 @@ from studies.accuracy import (
     TIME_STEP,
     VARIANT,
     WALL,
+    Promises,
     Rung,
     advise,
+    main,
     study,
     work_precision,
+    worst_errors,
 )
 from studies.framework.findings import Outcome
 from studies.framework.runs import ENGINE, read_runs
@@ -194,3 +198,39 @@ def test_scenes_with_a_hook_are_compared_by_its_peak_force_too(tmp_path: Path) -
     assert table.loc["base", COMPARED["hook_force"]] == pytest.approx(3.15 / run().count)
     assert table.loc["base", "hook_force error [%]"] == pytest.approx(100 * (3.15 / 2.15 - 1))
     assert table.loc["base", "hook_force resolved"]
+
+
+ON_LINKS = RESULTS / "accuracy-links"
+
+
+def ladder_of_fidelities() -> pd.DataFrame:
+    return pd.read_csv(ON_LINKS / "shaken" / "work_precision.csv", comment="#")
+
+
+def test_an_error_without_a_band_is_not_the_largest() -> None:
+    table = ladder_of_fidelities()
+    known = worst_errors(table)
+    assert known["quantity"].tolist()[0] == "⟨N⟩"
+    table["phi_0 error 95 % [%]"] = math.nan
+    found = worst_errors(table)
+    assert np.isfinite(found[["error [%]", "bound [%]"]].to_numpy()).all()
+    assert found["quantity"].tolist()[0] == "⟨N⟩"
+
+
+@pytest.mark.parametrize("cost", [0.0, math.nan])
+def test_fidelities_without_a_cost_are_drawn_nowhere(cost: float, tmp_path: Path) -> None:
+    table = ladder_of_fidelities()
+    table.loc[0, COST] = cost
+    assert Promises().compare(tmp_path / "one", {"shaken": table}, ["A footer."])
+    table[COST] = cost
+    assert Promises().compare(tmp_path / "all", {"shaken": table}, ["A footer."])
+
+
+def test_the_figure_of_several_ladders_is_drawn_from_their_tables(tmp_path: Path) -> None:
+    for name in ("shaken", "oscillation"):
+        (tmp_path / name).mkdir()
+        shutil.copy(ON_LINKS / name / "work_precision.csv", tmp_path / name)
+    main([str(tmp_path), "shaken", "oscillation"])
+    assert (tmp_path / "fidelities.png").is_file()
+    with pytest.raises(SystemExit):
+        main([str(tmp_path), "absent"])

@@ -244,6 +244,16 @@ def test_wrong_files_are_rejected(tmp_path: Path, keys: str, stated: str) -> Non
     assert str(tmp_path / "calibration.yaml") in str(caught.value)
 
 
+def test_a_scene_that_a_template_would_run_is_rejected(tmp_path: Path) -> None:
+    (tmp_path / "scene.yaml").write_text(
+        "{schema_version: 1, name: '{{ 7 * 7 }}', seed: 1, count: 5, phases: [{type: deposit}]}"
+    )
+    keys = "budget: 90\nscene: scene.yaml\nkeys: {friction: contact.friction_smarticle, wall: contact.friction_wall, "
+    problem = written(tmp_path, (0.5, 0.6), keys=keys + "l_over_w: smarticle.aspect_ratio}")
+    with pytest.raises(InputError, match=r"scene.yaml: contains '\{\{', which is template syntax; remove it"):
+        problem.sweep(1, np.array([[0.5, 0.6]]))
+
+
 @pytest.mark.parametrize(
     ("row", "stated"),
     [

@@ -12,7 +12,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from postprocess.report import figures
-from studies.framework.figures import BARS, draw_bounds, draw_means, finish, marker
+from studies.framework.figures import BARS, draw_bounds, draw_means, finish, marker, panels
 from studies.framework.shaken import gravish_note
 from studies.framework.study import format_numbers
 
@@ -39,6 +39,17 @@ def test_error_bars_are_named_once_and_only_where_there_are_any(tmp_path: Path) 
     points(axes, [1.0, 2.0], [np.nan, np.nan])
     draw_bounds(axes, [0.0, 1.0], [1.0, np.nan], 0.2, properties=PROPERTIES)
     assert footer(figure, tmp_path) == " ".join(ORIGIN)
+
+
+def test_the_legend_has_the_entries_of_all_panels_the_fullest_first(tmp_path: Path) -> None:
+    figure, (first, second, third) = panels(3, columns=3)
+    labels = {first: "cb", second: "dca", third: "e"}
+    for axes, own in labels.items():
+        for label in own:
+            axes.plot([0, 1], [0, 1], label=label)
+    finish(figure, tmp_path / "figure", [], ORIGIN)
+    (legend,) = figure.legends
+    assert "".join(text.get_text() for text in legend.get_texts()) == "dcabe"
 
 
 def test_limits_are_widened_to_what_is_drawn(tmp_path: Path) -> None:

@@ -38,14 +38,14 @@ def studies(tmp_path: Path) -> Path:
     (tmp_path / "two.yaml").write_text(SWEEP)
     (tmp_path / "scene.yaml.j2").write_text(SCENE)
     sweep = load_sweep(tmp_path / "two.yaml")
-    folder = tmp_path / "paper"
+    folder, points = tmp_path / "paper", expand(sweep)
     create_folder(
         folder / "two",
         sweep,
-        expand(sweep),
+        points,
         command="smarticles sweep",
         versions={},
-        expected_s=lambda scene: 36.0 if scene.engine == "links" else 3600.0,
+        expected_s=[36.0 if point.scene.engine == "links" else 3600.0 for point in points],
     )
     (folder / "beside").mkdir()
     for name, seconds in (("links_seed1", 18.0), ("yade_seed2", 7200.0)):

@@ -1,5 +1,6 @@
 """The shipped sweeps: they expand on either engine, and variants differ in what they say alone."""
 
+import ast
 import subprocess
 import sys
 from functools import cache
@@ -8,7 +9,7 @@ import pytest
 from sweeps import of_one_seed
 
 from dem.phases.shake import Shake
-from studies.registry import STUDIES, shipped
+from studies.registry import FOLDER, STUDIES, shipped
 from templates.sweep.expand import Point, expand
 from templates.sweep.sweep_file import load_sweep, on_engine
 
@@ -66,6 +67,14 @@ def test_a_study_by_the_papers_code_differs_in_the_protocol_alone(name: str) -> 
             else:
                 assert phase == twin
         assert one.scene.seed_for("poses") == other.scene.seed_for("poses")
+
+
+def test_help_has_the_first_paragraph_of_each_script() -> None:
+    scripts = [study for study in STUDIES.values() if not study.variants]
+    for study in scripts:
+        docstring = ast.get_docstring(ast.parse((FOLDER / f"{study.module}.py").read_text(encoding="utf-8")))
+        assert docstring
+        assert study.about == docstring.split("\n\n")[0]
 
 
 def test_the_registry_of_studies_loads_nothing_large() -> None:

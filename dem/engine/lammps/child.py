@@ -154,10 +154,10 @@ def explain(log: str, output: str, status: int | None) -> tuple[str, str]:
     return f"exit status {status} ({lines[-1].strip() if lines else 'no output'})", "see its log"
 
 
-_APART = "smarticles fly apart: lower fidelity.time_step_fraction, or raise fidelity.stiffness_N_per_m"
+_APART = "bodies fly apart: lower fidelity.time_step_fraction, or raise fidelity.stiffness_N_per_m"
 _WAYS_OUT = (
     ("Lost atoms|Non-numeric|[Oo]ut of range atoms|not exist on|missing", _APART),
-    ("memory|allocate", "memory is short: fewer smarticles on this machine, or more machines"),
+    ("memory|allocate", "memory is short: fewer bodies on this machine, or more machines"),
     ("Unknown|Illegal|Unrecognized|Invalid", f"this LAMMPS lacks commands of the engine: {INSTALL} on Debian 12"),
 )
 

@@ -18,14 +18,14 @@ class Contacts:
     """All contacts at one instant."""
 
     count: int  #: Number of bodies, N
-    pairs: Numbers  #: (C, 2) the two smarticles of each pair of touching spheres
+    pairs: Numbers  #: (C, 2) the two bodies of each pair of touching spheres
     depths: Array  #: (C,) overlaps of these pairs [m]
-    fixed: Numbers  #: (F,) the smarticle at each contact of a sphere with floor or wall
+    fixed: Numbers  #: (F,) the body at each contact of a sphere with floor or wall
     fixed_depths: Array  #: (F,) overlaps at these contacts [m]
 
     @classmethod
     def of(cls, spheres: Iterable[Array], radius: float | Array, boundaries: LammpsBoundaries) -> Self:
-        """Find the contacts of spheres of different smarticles, and of spheres with floor and wall.
+        """Find the contacts of spheres of different bodies, and of spheres with floor and wall.
 
         Args:
             spheres: (S, 3) centres of the spheres of each of N bodies [m].
@@ -41,7 +41,7 @@ class Contacts:
         found = found[owners[found[:, 0]] != owners[found[:, 1]]]
         apart = np.linalg.norm(centres[found[:, 0]] - centres[found[:, 1]], axis=1)
         reach = radii[found].sum(axis=1)
-        found, apart, reach = (each[apart <= reach] for each in (found, apart, reach))
+        meeting = apart <= reach
         beside = [radii - (centres[:, 2] - boundaries.floor)]
         if boundaries.walled:
             high = (centres[:, 2] > boundaries.wall_bottom) & (centres[:, 2] < boundaries.wall_top)
@@ -50,8 +50,8 @@ class Contacts:
         touching = [np.flatnonzero(depths > 0) for depths in beside]
         return cls(
             count=count,
-            pairs=owners[found],
-            depths=reach - apart,
+            pairs=owners[found[meeting]],
+            depths=(reach - apart)[meeting],
             fixed=owners[np.concatenate(touching)],
             fixed_depths=np.concatenate([depths[k] for depths, k in zip(beside, touching, strict=True)]),
         )

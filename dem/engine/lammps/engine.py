@@ -14,7 +14,7 @@ from scipy.spatial.transform import Rotation
 
 from dem.arrays import Array, Numbers
 from dem.body.chain import Tie
-from dem.body.kinds import Kind, Mixture
+from dem.body.kinds import Kind, Mixture, bodies_of, body_of
 from dem.body.particle import Particle
 from dem.body.placement import Poses
 from dem.body.state import PileState, RigidState, State, spheres_of
@@ -197,7 +197,7 @@ class LammpsEngine:
         if self.count:
             self._run(steps)
         elif self._box:
-            raise RunError("engine: lammps lost its smarticles")
+            raise RunError("engine: lammps lost its bodies")
         self.steps += steps
         self.time += steps * self.time_step
         self._seconds += steps * self.time_step * float(self._relative_masses.sum())
@@ -234,7 +234,7 @@ class LammpsEngine:
         rows = np.array(lines[HEAD].split(), dtype=np.float64).reshape(-1, len(text.WRITTEN.split()))
         file.unlink()
         if len(rows) != self.count:
-            raise RunError(f"LAMMPS wrote {len(rows)} of {self.count} smarticles at step {step}")
+            raise RunError(f"LAMMPS wrote {len(rows)} of {self.count} bodies at step {step}")
         return np.asarray(rows[np.argsort(rows[:, 0])])
 
     @property
@@ -280,11 +280,11 @@ class LammpsEngine:
     @property
     def _reference(self) -> Particle | Kind:
         """The body whose dashpots the contact law has."""
-        return self.particle if isinstance(self.particle, Particle) else self.particle.kinds[0]
+        return bodies_of(self.particle)[0]
 
     def _body(self, number: int) -> Particle | Kind:
         """Return the particle, or the kind, that a body is."""
-        return self.particle if isinstance(self.particle, Particle) else self.particle.kinds[self._kinds[number]]
+        return body_of(self.particle, self._kinds, number)
 
     @property
     def _relative_masses(self) -> Array:

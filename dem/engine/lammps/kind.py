@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 
 from dem.engine.cores import ranks
-from dem.engine.demand import Activity, Demand, contact_law_of
+from dem.engine.demand import Activity, Demand, contact_law_of, mean_spheres
 from dem.engine.effect import Adds, EffectName
 from dem.engine.lammps.child import lammps_version
 from dem.engine.lammps.engine import LammpsEngine
@@ -50,9 +50,7 @@ class LammpsKind:
         return min(stable_time_step(body, contact_law_of(scene)) for body in scene.bodies)
 
     def seconds_per_second(self, scene: Demand, time_step: float, activity: Activity) -> float:
-        each = [float(len(body.centres)) for body in scene.bodies]
-        mean = each[0] if scene.mixture is None else scene.mixture.mean(each)
-        spheres, per_sphere = mean * scene.count, STEP.get(activity, STEP[Activity.SHAKE])
+        spheres, per_sphere = mean_spheres(scene) * scene.count, STEP.get(activity, STEP[Activity.SHAKE])
         steps = per_sphere * spheres * (1 + LONGER * min(1.0, spheres / MANY)) / time_step
         return steps + (SAMPLE[0] + SAMPLE[1] * scene.count) / scene.recording.series_interval_s
 

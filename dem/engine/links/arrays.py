@@ -1,6 +1,6 @@
 """Arrays that kernels read and write, and functions that make them.
 
-All arrays are contiguous, and none is made in a step.
+All arrays are contiguous, and none is made in a step. Kernels are compiled without fields that are None.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ FLOOR, WALL, LOWER, UPPER, CHANNEL = range(5)  # rows of `Ground.force`; the cha
 BINS = 4  # of the search for neighbours, per link
 LEDGER = 10  # numbers of a row of the ledger, see `dem.engine.links.contact.pairs.enter`
 SLOTS = 3  # points at which a pair of segments can touch, see `dem.engine.links.contact.meeting`
-# Columns of a rigid part: velocity at a point [m/s], angular velocity [rad/s], that point [m].
+# Columns of a part: velocity at a point [m/s], angular velocity [rad/s], that point [m].
 VELOCITY, SPIN, ORIGIN, MOTION = 0, 3, 6, 9
 # Columns of a part that stretches: its axis [1], rate of strain [1/s], first moment of axial forces [N m].
 AXIS, STRAIN_RATE, MOMENT, STRETCH = 0, 3, 4, 5
@@ -36,11 +36,11 @@ class Bodies(NamedTuple):
     turn: Array  #: (N, 4) unit quaternions (w, x, y, z) from the frame of the body to the laboratory frame [1]
     velocity: Array  #: (N, 3) velocities of the centres of mass [m/s]
     momentum: Array  #: (N, 3) angular momenta about the centres of mass, in the laboratory frame [kg m²/s]
-    alpha: Array  #: (N, 2) angles of a smarticle's barbs [rad]; of no meaning for rigid bodies
+    alpha: Array  #: (N, 2) angles of a smarticle's barbs [rad]; of no meaning for other bodies
     rate: Array  #: (N, 2) rates of these angles [rad/s]; 0 while welded
     shape: Indices  #: (N,) number of each body's shape in `Shapes`
     #: (N, PLANE) plane geometry of smarticles, see `dem.engine.links.motion.planar.lay_out`; of rigid bodies only the
-    #: inertia, in columns 14 to 17
+    #: inertia, in columns 14 to 17; of no meaning for filaments
     plane: Array
     spin: Array  #: (N, 3) angular velocities of the bodies' frames, in the laboratory frame [rad/s]
     axes: Array  #: (N, 3, 3) rotation matrices from the frame of the body to the laboratory frame [1]
@@ -49,7 +49,7 @@ class Bodies(NamedTuple):
 
 
 class Parts(NamedTuple):
-    """R rigid parts of bodies: one of a rigid body, three of a smarticle.
+    """R parts of bodies: one of a rigid body, three of a smarticle, one for each segment of a filament.
 
     While smarticles are welded, the first part of a smarticle stands for the whole smarticle.
     """
@@ -69,8 +69,8 @@ class Segments(NamedTuple):
     line: Array  #: (Q, LINE) segments in the laboratory frame; for the columns see `dem.engine.links.shapes.START`
     begin: Indices  #: (N + 1,) number of the first segment of each body, then Q
     body: Indices  #: (Q,) number of the body to which each segment belongs
-    part: Indices  #: (Q,) number of the rigid part with which each segment moves
-    shared: NDArray[np.uint8]  #: (Q,) which ends are ends of earlier segments, as bits `shapes.AT_START` and `AT_END`
+    part: Indices  #: (Q,) number of the part with which each segment moves
+    shared: NDArray[np.uint8]  #: (Q,) which ends belong to other segments, as bits `shapes.AT_START` and `AT_END`
     first: Indices  #: (L + 1,) number of the first segment of each link, then Q
     bends: Any  #: `Bends`; None where no body is flexible
 
@@ -156,9 +156,8 @@ class Ground(NamedTuple):
     bottoms: Array
     radii: Array  #: (tiers,) radii of the tiers [m]
     top: float  #: Height of the wall's upper end above `place` of the wall [m]
-    flags: NDArray[
-        np.int64
-    ]  #: (2,) whether the wall exists; whether it was lifted, so that links can touch its outside
+    #: (2,) whether the wall exists; whether it was lifted, so that links can touch its outside
+    flags: NDArray[np.int64]
     place: Array  #: (4,) heights [m]; of the wall: its rise since the start
     speed: Array  #: (4,) vertical velocities [m/s]
     base: Array  #: (4,) heights at which the shaking began [m]
@@ -269,7 +268,7 @@ class System(NamedTuple):
     law: Law  #: Law of contacts between bodies
     wall_law: Law  #: Law of contacts with boundaries
     bodies: Bodies  #: The bodies
-    parts: Parts  #: Rigid parts of the bodies, with motion and loads
+    parts: Parts  #: Parts of the bodies, with motion and loads
     segments: Segments  #: Segments of the bodies
     pairs: Pairs  #: Lists of near segments
     kept: Kept  #: Memory of contacts with boundaries

@@ -147,12 +147,12 @@ class LinksBoundaries:
 
     @property
     def container_force(self) -> Array:
-        """(3,) force of the smarticles on floor and wall in the last step [N]."""
+        """(3,) force of the bodies on floor and wall in the last step [N]."""
         force: Array = self._ground.force[: WALL + 1].sum(axis=0)
         return force
 
     def parts(self) -> dict[str, tuple[int, float]]:
-        """Return the boundaries between which smarticles can be held, by name; none without hooks.
+        """Return the boundaries between which bodies can be held, by name; none without hooks.
 
         A value has the boundary's index in `Ground.place`, and its rise above the floor since the start [m].
         """

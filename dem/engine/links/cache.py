@@ -4,7 +4,8 @@
 Numba's own cache is beside the source, which may be read-only. It does not notice changes of a function in another file
 that a kernel calls, executes damaged files, and lets all processes of a sweep compile at once. This cache is a folder
 of the user, whose name is a hash of everything that the code depends on, so that another version of the package never
-loads the code. A checksum rejects damaged files. If the cache cannot be used, a run compiles without it.
+loads the code. A file's name says for which types of arguments, and which fields that are None, the code was compiled.
+A checksum rejects damaged files. If the cache cannot be used, a run compiles without it.
 """
 
 from __future__ import annotations

@@ -48,12 +48,13 @@ COMPILE_FIRST, COMPILE_MORE = 13.0, 7.0
 
 def seconds_per_second(scene: Demand, time_step: float, activity: Activity) -> float:
     """Return the estimate of `dem.engine.kinds.EngineKind.seconds_per_second`."""
-    count, strands, recording = scene.count, scene.fidelity.rows, scene.recording
+    count, recording, mixture = scene.count, scene.recording, scene.mixture
     rates = RATES[activity]
-    if scene.mixture is None:
-        links = 1.0 if scene.smarticle.boxes.barb_length > 0 else 1 / 3
+    if mixture is None:
+        links, strands = 1.0 if scene.smarticle.boxes.barb_length > 0 else 1 / 3, float(scene.fidelity.rows)
     else:  # bars of a body, over a smarticle's three
-        links = scene.mixture.mean([len(kind.bars.points) / 3 for kind in scene.mixture.kinds])
+        links = mixture.mean([len(kind.bars.points) / 3 for kind in mixture.kinds])
+        strands = mixture.mean([kind.rows for kind in mixture.kinds])
     per_step = rates.step * (1 + MORE_CONTACTS * (1 - 1 / strands)) + RIM * strands * len(scene.cylinder.upper)
     each = links * (per_step / time_step + rates.second * strands**MORE_PAIRS)
     if activity is Activity.ACTUATE:

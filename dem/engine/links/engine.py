@@ -40,7 +40,7 @@ Array = NDArray[np.float64]
 
 # Of a diameter; links whose axes come nearer than the rest of a diameter may have passed through each other.
 PASSES = 0.9
-# Of a diameter; a smarticle between two boundaries that move apart is held where a contact is deeper, far beyond the
+# Of a diameter; a body between two boundaries that move apart is held where a contact is deeper, far beyond the
 # linear range: nothing but the contacts can give way.
 HOLDS = 0.5
 FORMAT = "links-4"
@@ -210,9 +210,9 @@ class LinksEngine:
         return self._world.contacts().touches
 
     def overlaps(self, limit: float) -> Overlaps:
-        """Return the present overlaps; `Overlaps.deep` marks smarticles with an overlap above `limit` [m].
+        """Return the present overlaps; `Overlaps.deep` marks bodies with an overlap above `limit` [m].
 
-        Overlaps since the last check count as well if links may have passed through each other (`PASSES`). A smarticle
+        Overlaps since the last check count as well if links may have passed through each other (`PASSES`). A body
         that is held between two boundaries is marked from an overlap of `HOLDS` diameters on.
         """
         found, world = self._world.contacts(), self._world
@@ -244,11 +244,10 @@ class LinksEngine:
     def extremes(self, state: PileState) -> Extremes | None:
         """Return the extremes; None if an overlap needs a full check. The gap is 0, since hinges are rigid."""
         if state.bodies is None:
-            velocities = state.smarticles.link_velocities
-        else:  # three bars to a row, as of links
-            each = state.bodies.bar_velocities
-            velocities = np.concatenate([each, np.zeros((-len(each) % 3, 3))]).reshape(-1, 3, 3)
-        found, bodies = self._world.extremes(velocities), self._world.bodies
+            velocities = state.smarticles.link_velocities.reshape(-1, 3)
+        else:
+            velocities = state.bodies.bar_velocities
+        found, bodies = self._world.extremes(np.ascontiguousarray(velocities)), self._world.bodies
         if not (found[BETWEEN] <= PASSES and found[DEEPEST] <= HOLDS):
             return None
         bodies.deepest[:] = 0.0
@@ -263,11 +262,11 @@ class LinksEngine:
         )
 
     def _held(self, held: NDArray[np.bool_], deep: NDArray[np.bool_], least: float) -> tuple[Held, ...]:
-        """Return the deep smarticles that touch two boundaries whose distance has changed.
+        """Return the deep bodies that touch two boundaries whose distance has changed.
 
         Args:
-            held: (N, 6) whether each smarticle touches each boundary.
-            deep: (N,) whether each smarticle has a deep contact.
+            held: (N, 6) whether each body touches each boundary.
+            deep: (N,) whether each body has a deep contact.
             least: smallest change of distance that counts [m].
         """
         parts = self.boundaries.parts() if deep.any() else {}

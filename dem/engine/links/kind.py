@@ -15,8 +15,9 @@ from dem.engine.links.engine import LinksEngine
 from dem.engine.links.shapes import kind_shape
 from dem.engine.links.stable_step import filament_stable_time_step, links_stable_time_step, rigid_stable_time_step
 
-# Groups of arrays without which `advance` is compiled where a scene has none of them.
-OPTIONAL = frozenset({"channel", "cords", "filaments", "hooks", "ledger", "motors", "rims"})
+# Groups of arrays without which `advance` is compiled where a scene has none of them. No scene has those of filaments.
+OF_FILAMENTS = frozenset({"bends", "filaments", "flexible", "stretch"})
+OPTIONAL = OF_FILAMENTS | {"channel", "cords", "hooks", "ledger", "motors", "rims"}
 
 
 class LinksKind:

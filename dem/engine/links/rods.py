@@ -26,12 +26,12 @@ def rod_of(filament: Filament) -> Array:
     """Return the constants (ROD,) of a filament for the kernels, see `dem.engine.links.motion.bending`."""
     length, (stretching, bend, twist) = filament.segment_length, filament.stiffnesses
     across, along, roll = filament.drags
-    stiffest = 16 * bend / length**3 / (filament.mass / (filament.nodes - 1))
+    _, stiffest, stiffest_twist = filament.stiffest
     return np.array(
         [
             length, stretching / length, bend / length, twist / length, filament.stretching_time, filament.bending_time,
             filament.axial_inertia, across * length / 2, along * length / 2, roll * length, filament.weight_share,
-            stiffest, 4 * twist / length / filament.axial_inertia,
+            stiffest, stiffest_twist,
         ]
     )  # fmt: skip
 

@@ -17,11 +17,13 @@ from dem.body.filament import Filament
 from dem.body.linear import matrix_product, positive_definite
 from dem.body.particle import Particle
 from dem.engine.links.arrays import PLANE
+from dem.engine.links.motion.bending import RESOLVED
 from dem.engine.links.motion.planar import lay_out
 from dem.engine.links.shapes import AT_END, AT_START, RADIUS, Shape, filament_shape, smarticle_shape
 from dem.physics.contact import ContactLaw
 
 Array = NDArray[np.float64]
+Mode = tuple[Array, Array]  # stiffness and damping (k, k) of the degrees of freedom of a body
 
 # Contacts that push a tip along the same line at the same time; more act along different directions.
 CONTACTS_AT_A_TIP = 2
@@ -30,7 +32,6 @@ AGAINST_NEIGHBOURS = 4
 SHAPES = 8  # angles that are tried where motors may turn the barbs, from straight to beyond the U
 WIDEST = math.radians(105.0)
 PRECISE = 1e-12  # of a step
-RESOLVED = 1.4  # greatest ω dt of a mode, of the 2 up to which leapfrog is stable without dashpots
 
 
 def links_stable_time_step(
@@ -76,15 +77,12 @@ def filament_stable_time_step(filament: Filament, law: ContactLaw, effective_mas
         effective_mass: that the law's dashpots are for, of a smarticle [kg].
     """
     length, mass = filament.segment_length, filament.mass / (filament.nodes - 1)
-    stretching, bending, twisting = filament.stiffnesses
-    across = filament.drags[0]
     share = math.sqrt(filament_shape(filament).effective_mass / effective_mass)
     cn = max(2 * law.normal_damping, law.wall_damping) * share / mass
     kn, ks, cs = 2 * law.normal_stiffness / mass, 2 * law.tangential_stiffness / mass, cn * law.tangential_damping
     # A tip has half the mass of a node; contacts a diameter apart share their push between neighbouring nodes.
     tip, side = 2 * CONTACTS_AT_A_TIP, max(CONTACTS_AT_A_TIP, length / filament.diameter)
-    along, bent = 4 * stretching / (length * mass), 16 * bending / (length**3 * mass)
-    twisted = 4 * twisting / (length * filament.axial_inertia)
+    along, bent, twisted = filament.stiffest
     # Squares of frequencies [1/s²] and rates of damping [1/s]; a push on the side of a filament that can roll meets a
     # third of its mass.
     modes = (
@@ -93,7 +91,7 @@ def filament_stable_time_step(filament: Filament, law: ContactLaw, effective_mas
         (bent + 3 * side * ks, filament.bending_time * bent + 3 * side * cs),
         (twisted + 2 * side * ks, filament.stretching_time * twisted + 2 * side * cs),
     )
-    drag = across * length / mass
+    drag = filament.drags[0] * length / mass
     return min(min((math.sqrt((c + drag) ** 2 + 4 * k) - (c + drag)) / k, RESOLVED / math.sqrt(k)) for k, c in modes)
 
 
@@ -105,8 +103,6 @@ def _step_of(
     row = np.zeros(PLANE)
     lay_out(shape.planar, float(angles[0]), float(angles[1]), row)
     mass = _mass(shape, row, free)
-    kn, ks, cn, cw = law.normal_stiffness, law.tangential_stiffness, law.normal_damping, law.wall_damping
-    cs = law.tangential_damping
     # Strands of a link lie one above the other along the normal: a tip's are pushed together from the side, but the
     # highest and the lowest one alone touch the links that lie flat above and below.
     ends, radius = _ends(shape), float(shape.lines[:, RADIUS].max())
@@ -117,13 +113,7 @@ def _step_of(
     tips = sum((matrix_product(push.T, push) for push in tip), np.zeros_like(mass))
     heave = sum((matrix_product(push[2:].T, push[2:]) for push in top), np.zeros_like(mass))
     rub = sum((matrix_product(push[:2].T, push[:2]) for push in top), np.zeros_like(mass))
-    damping = max(cn, cw / 2)
-    modes = [
-        (2 * CONTACTS_AT_A_TIP * kn * tips, 2 * CONTACTS_AT_A_TIP * cn * tips),
-        (CONTACTS_AT_A_TIP * kn * tips, CONTACTS_AT_A_TIP * cw * tips),
-        (AGAINST_NEIGHBOURS * kn * heave, AGAINST_NEIGHBOURS * damping * heave),
-        (AGAINST_NEIGHBOURS * ks * rub, AGAINST_NEIGHBOURS * damping * cs * rub),
-    ]
+    modes = [*_modes_of_end(law, tips), *_modes_of_pile(law, heave, rub)]
     modes += [(stiffness * tips, damping * tips) for stiffness, damping in strings]
     return _step_of_modes(mass, modes)
 
@@ -140,21 +130,16 @@ def rigid_stable_time_step(shapes: Sequence[Shape], law: ContactLaw) -> float:
 
 def _rigid_step(shape: Shape, law: ContactLaw) -> float:
     mass = np.diag([*[shape.mass] * 3, *shape.inertia[:3]])
-    kn, ks, cn, cw = law.normal_stiffness, law.tangential_stiffness, law.normal_damping, law.wall_damping
-    cs, damping = law.tangential_damping, max(cn, cw / 2)
     places: dict[tuple[int, int], list[Array]] = {}  # strands at each end of each bar
     for line, link, shared in zip(shape.lines, shape.link, shape.shared, strict=True):
         for bit, place in ((AT_END, line[:3] + line[3:6]), (AT_START, line[:3])):
             if not shared & bit:
                 places.setdefault((int(link), bit), []).append(place)
     ends = list(places.values())
-    modes = []
+    modes: list[Mode] = []
     for strands in ends:
         tips = sum((matrix_product(push.T, push) for push in map(_motion, strands)), np.zeros((6, 6)))
-        modes += [
-            (2 * CONTACTS_AT_A_TIP * kn * tips, 2 * CONTACTS_AT_A_TIP * cn * tips),
-            (CONTACTS_AT_A_TIP * kn * tips, CONTACTS_AT_A_TIP * cw * tips),
-        ]
+        modes += _modes_of_end(law, tips)
     # The broad side is across the axis along which the bars reach least: strands lie one above the other there.
     spread = np.ptp([np.mean(strands, axis=0) for strands in ends], axis=0)
     within = np.sum([np.ptp(strands, axis=0) for strands in ends], axis=0)
@@ -166,11 +151,35 @@ def _rigid_step(shape: Shape, law: ContactLaw) -> float:
         push = _motion(top)
         heave += matrix_product(push[[up]].T, push[[up]])
         rub += matrix_product(push[across].T, push[across])
-    modes += [
+    return _step_of_modes(mass, [*modes, *_modes_of_pile(law, heave, rub)])
+
+
+def _modes_of_end(law: ContactLaw, tips: Array) -> list[Mode]:
+    """Return the modes of an end against another end, and against a boundary.
+
+    Args:
+        tips: sum of Jᵀ J over the strands at the end, with J from velocities of the body to those of a point.
+    """
+    kn, cn, cw = law.normal_stiffness, law.normal_damping, law.wall_damping
+    return [
+        (2 * CONTACTS_AT_A_TIP * kn * tips, 2 * CONTACTS_AT_A_TIP * cn * tips),
+        (CONTACTS_AT_A_TIP * kn * tips, CONTACTS_AT_A_TIP * cw * tips),
+    ]
+
+
+def _modes_of_pile(law: ContactLaw, heave: Array, rub: Array) -> list[Mode]:
+    """Return the modes of bodies that lie on each other, which heave or rub.
+
+    Args:
+        heave: sum of Jᵀ J over all contacts, for motion across the broad side.
+        rub: the same for motion along it.
+    """
+    kn, ks, cs = law.normal_stiffness, law.tangential_stiffness, law.tangential_damping
+    damping = max(law.normal_damping, law.wall_damping / 2)
+    return [
         (AGAINST_NEIGHBOURS * kn * heave, AGAINST_NEIGHBOURS * damping * heave),
         (AGAINST_NEIGHBOURS * ks * rub, AGAINST_NEIGHBOURS * damping * cs * rub),
     ]
-    return _step_of_modes(mass, modes)
 
 
 def _motion(place: Array) -> Array:
@@ -179,7 +188,7 @@ def _motion(place: Array) -> Array:
     return np.column_stack([np.eye(3), [[0, z, -y], [-z, 0, x], [y, -x, 0]]])
 
 
-def _step_of_modes(mass: Array, modes: Sequence[tuple[Array, Array]]) -> float:
+def _step_of_modes(mass: Array, modes: Sequence[Mode]) -> float:
     stiffness, resisting = (np.array(each) for each in zip(*modes, strict=True))
     # Without dashpots the longest stable step would resolve a contact by three steps, and energy would drift.
     return min(

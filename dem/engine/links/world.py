@@ -456,7 +456,7 @@ class World:
         """Return the 7 extremes of `queries.find_extremes`, at the instant of the last call of `state`.
 
         Args:
-            velocities: (N, 3, 3) velocities of the links' centres in this state [m/s].
+            velocities: (M, 3) velocities of the centres of all links, or bars, in this state [m/s].
         """
         found, (query, _, energy) = np.empty(7), self._query()
         find_extremes(self.bodies, self.segments, query.depth, velocities, energy, found)

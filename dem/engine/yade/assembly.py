@@ -11,7 +11,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from dem.arrays import Array
-from dem.body.kinds import Kind, Mixture
+from dem.body.kinds import Kind, Mixture, body_of
 from dem.body.particle import LINKS, Particle
 from dem.body.placement import Poses
 from dem.body.state import PileState, RigidState, State
@@ -66,7 +66,7 @@ class Assembly:
 
     def _body(self, number: int) -> Particle | Kind:
         """Return the particle, or the kind, that a body is."""
-        return self._model if isinstance(self._model, Particle) else self._model.kinds[self._kinds[number]]
+        return body_of(self._model, self._kinds, number)
 
     @property
     def each(self) -> int:

@@ -1,6 +1,6 @@
 """Facts about YADE as an engine, and the function that builds its simulations."""
 
-from dem.engine.demand import Activity, Demand, contact_law_of, motor_law_of
+from dem.engine.demand import Activity, Demand, contact_law_of, mean_spheres, motor_law_of
 from dem.engine.effect import EffectName
 from dem.engine.yade.construction import ADDS, ORDER
 from dem.engine.yade.engine import YadeEngine
@@ -38,9 +38,7 @@ class YadeKind:
         return stable
 
     def seconds_per_second(self, scene: Demand, time_step: float, activity: Activity) -> float:
-        spheres = [float(len(body.centres)) for body in scene.bodies]
-        each = spheres[0] if scene.mixture is None else scene.mixture.mean(spheres)
-        per_step = COST_PER_SPHERE_STEP * each * scene.count
+        per_step = COST_PER_SPHERE_STEP * mean_spheres(scene) * scene.count
         return per_step / time_step * FACTORS.get(activity, 1.0)
 
     def seconds_to_compile(self, scene: Demand) -> float:

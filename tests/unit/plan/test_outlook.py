@@ -7,7 +7,9 @@ from typing import Any
 import pytest
 from scenes import small
 
+from dem.engine.demand import Activity
 from dem.engine.effect import Adds
+from dem.engine.kinds import engine_kind
 from dem.plan.effects import ADDS, decide
 from dem.plan.outlook import Plan, plan, warnings_of
 from dem.record.columns import (
@@ -67,6 +69,13 @@ def test_each_effect_is_called_for_by_its_own_part_of_the_scene(changes: dict[st
     assert json.loads(json.dumps(asdict(planned)))["effects"][0]["adds"]["engines"] == list(plain.engines)
 
 
+def test_knobs_are_compared_with_those_of_the_name_in_this_scene() -> None:
+    narrow = {"engine": "links", "fidelity": "standard", "smarticle": {"thickness_normal_m": 5e-4}}
+    assert "fidelity standard: 1 strand, 1000 N/m, time step 0.92 of the stable one\n" in plan(small(narrow)).to_text()
+    two = plan(small({"engine": "links", "fidelity": {"base": "standard", "rows": 2, "diameter_m": 4e-4}})).to_text()
+    assert "fidelity standard: 2 strands, 1000 N/m, time step 0.92 of the stable one (by name 1, 1000 N/m)\n" in two
+
+
 def test_every_column_belongs_to_one_effect() -> None:
     declared = [name for adds in ADDS.values() for name in adds.series]
     tables = (COLUMNS, MOTOR_COLUMNS, ENERGY_COLUMNS, LEDGER_COLUMNS, HOOK_COLUMNS, RELEASE_COLUMNS, STRAIN_COLUMNS)
@@ -124,3 +133,26 @@ def bench(activity: dict[str, object], fidelity: str = "standard", count: int = 
 )
 def test_costs_are_those_measured(made: Plan, kind: str, measured: float) -> None:
     assert rates(made)[kind] == pytest.approx(measured, rel=0.25)
+
+
+@pytest.mark.parametrize(("sections", "least", "most"), [("r", 1.0, 1.0), ("f", 1.05, 2.0), ("rf", 1.02, 1.5)])
+def test_strands_are_those_of_each_body(sections: str, least: float, most: float) -> None:
+    """Bars with a round section have one strand, whatever the fidelity says."""
+    rods = {"f": {"shape": "rod", "length_m": 0.01}}
+    rods["r"] = {**rods["f"], "diameter_m": 0.001}
+    one, two = (
+        small(
+            {
+                "engine": "links",
+                "particle": [rods[key] for key in sections],
+                "fidelity": {"base": "draft", "rows": rows},
+            }
+        )
+        for rows in (1, 2)
+    )
+    assert "bodies (rod) of smooth links of 1 strand," in plan(one).to_text()
+    strands = "1 strand," if sections == "r" else "2 strands,"
+    assert f"bodies (rod) of smooth links of {strands}" in plan(two).to_text()
+    assert "fidelity draft: 2 strands" in plan(two).to_text()
+    cost = [engine_kind("links").seconds_per_second(scene, 1e-5, Activity.SHAKE) for scene in (one, two)]
+    assert least <= cost[1] / cost[0] <= most

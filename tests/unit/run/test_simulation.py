@@ -5,6 +5,7 @@ import os
 import shutil
 import signal
 import subprocess
+import zipfile
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -318,6 +319,32 @@ def test_a_run_whose_frames_are_damaged_is_not_continued_and_not_changed(
         file.write_bytes(whole)
     run(scene, tmp_path, resume=True)
     assert (tmp_path / "done.json").exists()
+
+
+@pytest.mark.parametrize("recording", [{}, ONE_FILE])
+@pytest.mark.parametrize(
+    "forge", [lambda state: state.pop("recorder"), lambda state: state["recorder"].update(frames=1)]
+)
+def test_a_forged_checkpoint_is_rejected_in_one_line(
+    kind: KindDouble,
+    interrupted: Callable[[int], None],
+    tmp_path: Path,
+    recording: dict[str, str],
+    forge: Callable[[Any], None],
+) -> None:
+    scene, file = scene_of("rested", **recording), tmp_path / "checkpoint.zip"
+    interrupted(1)
+    with pytest.raises(KeyboardInterrupt):
+        run(scene, tmp_path)
+    with zipfile.ZipFile(file) as archive:
+        parts = {name: archive.read(name) for name in archive.namelist()}
+    state = json.loads(parts["state.json"])
+    forge(state)
+    with zipfile.ZipFile(file, "w") as archive:
+        for name, part in {**parts, "state.json": json.dumps(state)}.items():
+            archive.writestr(name, part)
+    with pytest.raises(InputError, match=r"its checkpoint has other content than the run needs .*; start anew"):
+        run(scene, tmp_path, resume=True)
 
 
 # -- directories that are not a run's ----------------------------------------------------------------------------------

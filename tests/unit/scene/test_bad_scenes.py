@@ -55,6 +55,8 @@ SCENE: Bad = [
     ({"smarticle.aspect_ration": 0.5}, "smarticle", "unknown key 'aspect_ration'"),
     ({"cont": 3}, "", "unknown key 'cont'"),
     ({"fidelity": {"base": ["draft"]}}, "fidelity", "unknown fidelity ['draft']"),
+    ({"fidelity": {"smarticle": 1}}, "fidelity", "unknown key 'smarticle'"),
+    ({"fidelity": {"engine": [1]}}, "fidelity", "unknown key 'engine'"),
     ({"smarticle.aspect_ratio": 2, "smarticle.angles_deg": [105, 105]}, "smarticle.angles_deg", "105"),
     ({"schema_version": 2}, "schema_version", "2"),
     ({"fidelity": {"rows": 2, "diameter_m": 0.002}}, "fidelity.rows", "2"),

@@ -30,12 +30,19 @@ def test_the_hash_is_that_of_the_values(tmp_path: Path) -> None:
     assert json_schema()["$defs"]["Contact"]["properties"]["preset"]["type"] == "string"
 
 
+def test_a_preset_is_read_as_a_scene_is(tmp_path: Path) -> None:
+    (tmp_path / "preset.yaml").write_text("friction_wall: 5e-1\n")
+    assert hashed(tmp_path, "contact: {preset: preset.yaml}") == hashed(tmp_path, "contact: {friction_wall: 5e-1}")
+
+
 @pytest.mark.parametrize(
     ("text", "stated"),
     [
         (None, "preset.yaml cannot be read (No such file or directory); give the path of a preset"),
         ("", "holds null, not keys of `contact` with their values"),
         ("[1", "is not YAML; give a file that `smarticles calibrate` wrote"),
+        ("friction_wall: 1\nfriction_wall: 2", "key 'friction_wall' is given twice; keep one of the two"),
+        ("friction_wall: 1 #" + 200_000 * "x", "more than 200000 characters"),
         ("friction_wal: 1", "unknown key 'friction_wal'; did you mean 'friction_wall'?"),
         ("friction_wall: 20", "friction_wall: 20 is out of range; use at most 10"),
         ("preset: other.yaml", "unknown key 'preset'"),

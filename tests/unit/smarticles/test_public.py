@@ -98,9 +98,40 @@ def test_what_follows_from_a_scene_follows_anew_where_it_varies(tmp_path: Path) 
     assert fidelities("yade")["draft"] != fidelities("links")["draft"]
 
 
+def test_rows_and_stiffness_follow_what_varies(tmp_path: Path) -> None:
+    thrown = {"type": "deposit", "thrown_at_m_per_s": 3.0}
+    scene = smarticles.Scene(seed=1, count=5, engine="links", fidelity="standard", phases=[thrown])
+    assert scene.fidelity.stiffness_N_per_m > scene.named_knobs["stiffness_N_per_m"] == 1000.0
+    file = write_sweep(scene, {"phases.0.thrown_at_m_per_s": [0.0, 3.0]}, tmp_path)
+    gentle, hard = (point.scene.fidelity for point in expand(load_sweep(file)))
+    assert (gentle.stiffness_N_per_m, hard) == (1000.0, scene.fidelity)
+    narrow = scene_of(engine="links", fidelity="standard", smarticle={"thickness_normal_m": 5e-4})
+    file = write_sweep(narrow, {"smarticle.thickness_normal_m": [5e-4, 1.27e-3]}, tmp_path)
+    assert [point.scene.fidelity.rows for point in expand(load_sweep(file))] == [1, 2]
+
+
+def test_knobs_of_a_scene_are_kept_in_its_sweep(tmp_path: Path) -> None:
+    scene = scene_of(
+        engine="links", fidelity={"base": "standard", "rows": 2, "diameter_m": 4e-4, "stiffness_N_per_m": 3000.0}
+    )
+    for point in expand(load_sweep(write_sweep(scene, {"count": [4, 5]}, tmp_path))):
+        assert point.scene.fidelity == scene.fidelity
+
+
 def test_a_scene_that_a_template_would_run_is_rejected(tmp_path: Path) -> None:
     with pytest.raises(InputError, match=r"contains '\{\{', which is template syntax"):
         write_sweep(scene_of(name="{{ 7 * 7 }}"), {"count": [1, 2]}, tmp_path)
+
+
+def test_a_preset_is_found_beside_the_scene_file(tmp_path: Path) -> None:
+    (tmp_path / "own").mkdir()
+    (tmp_path / "own" / "contact.yaml").write_text("friction_wall: 0.25\n")
+    scene = tmp_path / "own" / "scene.yaml"
+    scene.write_text(
+        "schema_version: 1\nseed: 1\ncount: 5\ncontact: {preset: contact.yaml}\nphases: [{type: deposit}]\n"
+    )
+    points = expand(load_sweep(write_sweep(scene, {"count": [4, 5]}, tmp_path)))
+    assert [point.scene.contact.friction_wall for point in points] == [0.25, 0.25]
 
 
 def test_keys_that_end_alike_keep_all_their_words(tmp_path: Path) -> None:

@@ -17,8 +17,9 @@ from dem.scene.reading import dump_scene
 from dem.scene.scene import Scene
 from postprocess.pictures import render
 from postprocess.report import figures
+from postprocess.statistics.points import means_by
 from smarticles.reporting.charts import Groups, against_variable, thinned
-from smarticles.reporting.run import effect_blocks
+from smarticles.reporting.run import accuracy_blocks, effect_blocks
 from smarticles.reporting.sweep import _figures
 from smarticles.sweeps import make_folder
 from studies.registry import shipped
@@ -99,6 +100,13 @@ def test_the_page_of_a_run_has_everything(run: Path, smarticles: Smarticles) -> 
     assert "smarticles run pile/scene.yaml --out pile-again" in page.text
     assert str(run.parent) not in (run / "report.html").read_text(encoding="utf-8")
     assert len(page.of("img")) >= 3
+
+
+def test_knobs_that_follow_from_the_scene_are_no_changes() -> None:
+    square = {"thickness_normal_m": 5e-4, "thickness_in_plane_m": 5e-4}
+    blocks = "".join(accuracy_blocks(small({"engine": "links", "fidelity": "standard", "smarticle": square}), None))
+    assert "this run" in blocks
+    assert "This scene changes" not in blocks
 
 
 def test_nothing_leaves_the_page_and_nothing_runs_in_it(run: Path, smarticles: Smarticles) -> None:
@@ -232,12 +240,14 @@ def test_a_study_is_analysed_drawn_and_reported(tmp_path: Path, write_run: Write
 
 
 def test_charts_of_several_variables_have_intervals_and_a_part_for_each_combination() -> None:
+    # Two and three values with a standard error of 0.1; a run without a value does not count for the interval.
+    scatters = {0: (-0.1, 0.1), 6: (-math.sqrt(0.03), 0.0, math.sqrt(0.03), math.nan)}
     rows = [
-        {"theta": theta, "omega": omega, "l_over_w": aspect, "runs [-]": 3 if omega else 2}
-        | {"crossings mean [-]": theta + omega + aspect, "crossings mean SE [-]": 0.1}
+        {"theta": theta, "omega": omega, "l_over_w": aspect, "crossings mean [-]": theta + omega + aspect + scatter}
         for theta in (5, 10, 15)
         for omega in (0, 6)
         for aspect in (0.4, 0.7)
+        for scatter in scatters[omega]
     ]
     varied = {"theta": [5, 10, 15], "omega": [0, 6], "l_over_w": [0.4, 0.7]}
     drawn = {}
@@ -248,7 +258,7 @@ def test_charts_of_several_variables_have_intervals_and_a_part_for_each_combinat
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("smarticles.reporting.sweep.against_variable", noted)
-        blocks = _figures(pd.DataFrame(rows), list(varied), varied, "relax")
+        blocks = _figures(means_by(pd.DataFrame(rows), list(varied), intervals=True), list(varied), varied, "relax")
     assert len(blocks) == 2  # a chart for each l/w
     assert "against theta, l_over_w = 0.4" in blocks[0]
     assert "95 % intervals" in blocks[0]
@@ -256,7 +266,7 @@ def test_charts_of_several_variables_have_intervals_and_a_part_for_each_combinat
     assert list(drawn[1]) == ["omega = 0", "omega = 6"]
     xs, means, half_widths = drawn[1]["omega = 6"]
     assert (list(xs), means) == ([5, 10, 15], pytest.approx([11.7, 16.7, 21.7]))
-    assert half_widths == pytest.approx([4.303 * 0.1] * 3, rel=1e-3)  # Student's t, three runs
+    assert half_widths == pytest.approx([4.303 * 0.1] * 3, rel=1e-3)  # Student's t, three values
     assert drawn[1]["omega = 0"][2] == pytest.approx([12.706 * 0.1] * 3, rel=1e-3)  # two runs
 
 

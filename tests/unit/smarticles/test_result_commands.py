@@ -2,6 +2,7 @@
 
 import csv
 import json
+import sys
 from pathlib import Path
 
 import pandas as pd
@@ -31,6 +32,15 @@ def test_measure_writes_a_profile_of_each_run_beside_the_table(
     assert (again.status, "exists" in again.err) == (2, True)
     both = smarticles("measure", runs[0], "--profile", tmp_path / "x.csv", "--table", tmp_path / "x.csv")
     assert (both.status, "is the file of --table too" in both.err) == (2, True)
+
+
+def test_measure_replaces_its_line_of_progress(
+    tmp_path: Path, write_run: WriteRun, smarticles: Smarticles, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    runs = [write_run(tmp_path / "a"), write_run(tmp_path / "b", seed=2)]
+    monkeypatch.setattr(sys.stderr, "isatty", lambda: True)
+    said = smarticles("measure", *runs, "--jobs", "1")
+    assert said.err == "\r\x1b[Kmeasured 1 of 2 runs\r\x1b[Kmeasured 2 of 2 runs\n"
 
 
 def test_measure_gives_json_without_nan(tmp_path: Path, write_run: WriteRun, smarticles: Smarticles) -> None:
@@ -69,6 +79,21 @@ def test_measure_adds_measures_on_request_alone(tmp_path: Path, write_run: Write
     unknown = smarticles("measure", run, "--also", "caging,crossing")
     assert unknown.status == 2
     assert "also: 'crossing' is no measure on request; did you mean 'crossing-number'?" in unknown.err
+
+
+def test_measure_takes_a_sweep_whose_fidelity_is_a_mapping(
+    tmp_path: Path, sweep_file: Path, write_run: WriteRun, smarticles: Smarticles
+) -> None:
+    out = tmp_path / "out"
+    mapping = "constants: {fidelity: {base: draft, rows: 1}}\npoints:"
+    sweep_file.write_text(sweep_file.read_text().replace("points:", mapping))
+    smarticles("sweep", sweep_file, "--out", out)
+    for name in ("n5", "n6"):
+        write_run(out / "runs" / name)
+    said = smarticles("measure", out, "--table", tmp_path / "table.csv")
+    assert said.status == 0, said.err
+    swept = pd.read_csv(tmp_path / "table.csv", comment="#")["fidelity (swept)"]
+    assert set(swept) == {'{"base": "draft", "rows": 1}'}
 
 
 def test_measure_has_the_variables_of_a_sweep_and_means_by_them(

@@ -7,6 +7,8 @@ import pytest
 from command_cases import Smarticles, WriteRun
 from synthetic import write_ended
 
+from dem.plan.steps import time_steps
+from dem.scene.scene import Scene
 from studies.registry import shipped
 from templates.sweep.folder import open_folder
 
@@ -27,6 +29,26 @@ def test_a_dry_run_lists_and_writes_nothing(sweep_file: Path, smarticles: Smarti
     assert [line.split()[:2] for line in lines[1:3]] == [["n5", "5"], ["n6", "6"]]
     assert lines[3].startswith("2 runs, about ")
     assert sorted(sweep_file.parent.iterdir()) == before
+
+
+@pytest.mark.parametrize(
+    "options", ["--to snakemake --dry-run", "--to row --out out", "--cluster local-slurm --out out"]
+)
+def test_each_run_is_planned_once(
+    options: str, sweep_file: Path, tmp_path: Path, smarticles: Smarticles, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Plans take far longer than all else: 0.2 s for a scene with motors."""
+    monkeypatch.chdir(tmp_path)
+    planned: list[Scene] = []
+
+    def noted(scene: Scene) -> tuple[float, ...]:
+        planned.append(scene)
+        return time_steps(scene)
+
+    monkeypatch.setattr("dem.plan.outlook.time_steps", noted)
+    said = smarticles("sweep", sweep_file, *options.split())
+    assert said.status == 0, said.err
+    assert len(planned) == 2
 
 
 def test_a_sweep_is_written_and_started_later(sweep_file: Path, tmp_path: Path, smarticles: Smarticles) -> None:
@@ -106,6 +128,22 @@ def test_what_a_study_does_not_have_is_rejected(
     assert said.err.startswith(f"smarticles: error: {message}")
     assert len(said.err.splitlines()) == 1
     assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize(
+    ("words", "note"),
+    [
+        ("friction --quick", "fidelity: draft instead of standard; relax_s: 0.25 instead of 0.5"),
+        ("casting --fidelity draft", "not the full study: fidelity: draft instead of standard"),
+        ("casting --fidelity standard", "the full study as shipped"),
+    ],
+)
+def test_a_fidelity_with_other_knobs_is_named_by_its_base(
+    words: str, note: str, tmp_path: Path, smarticles: Smarticles
+) -> None:
+    said = smarticles("study", *words.split(), "--out", tmp_path / "out", "--analyse")
+    assert "no run of " in said.err
+    assert note in said.out.splitlines()[0]
 
 
 def test_a_sweep_runs_on_the_engine_that_is_asked_for(sweep_file: Path, tmp_path: Path, smarticles: Smarticles) -> None:

@@ -31,13 +31,14 @@ def make_folder(tmp_path: Path, write_sweep: WriteSweep) -> MakeFolder:
 
     def make(sweep: str = SWEEP, out: str = "out") -> Folder:
         loaded = load_sweep(write_sweep(sweep))
+        points = expand(loaded)
         return create_folder(
             tmp_path / out,
             loaded,
-            expand(loaded),
+            points,
             command="smarticles sweep sweep.yaml --out out",
             versions={"smarticles": "0"},
-            expected_s=lambda scene: float(scene.count),
+            expected_s=[float(point.scene.count) for point in points],
         )
 
     return make

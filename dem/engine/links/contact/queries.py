@@ -131,20 +131,19 @@ def find_extremes(
 
     Args:
         depths: (N,) see `Found.depth`.
-        velocities: (N, 3, 3) velocities of the links' centres [m/s].
+        velocities: (M, 3) velocities of the centres of all links, or bars [m/s].
         energy: energy of all springs of contacts [J].
-        extremes: (7,) written: largest speed of a link [m/s], NaN if any speed or overlap is not finite; heights of the
+        extremes: (7,) written: largest of these speeds [m/s], NaN if any speed or overlap is not finite; heights of the
             lowest and of the highest end of an axis [m]; largest distance of such an end from the container's axis [m];
             largest overlap now, and since the last query, over that at which axes meet [1]; `energy`.
     """
     line = segments.line
     fastest, total = 0.0, 0.0
     for i in range(velocities.shape[0]):
-        for link in range(3):
-            velocity = vector(velocities[i, link], 0)
-            square = dot(velocity, velocity)
-            total += square
-            fastest = max(fastest, square)
+        velocity = vector(velocities[i], 0)
+        square = dot(velocity, velocity)
+        total += square
+        fastest = max(fastest, square)
     lowest, highest, widest = math.inf, -math.inf, 0.0
     for p in range(line.shape[0]):
         for end in range(2):

@@ -52,7 +52,7 @@ PSI, RATE, SENSE, REVERSALS, WAIT, DRAWN, SEED, NUMBER, FACTOR, TARGET, CHANGE, 
 # Work [J]: what internal damping and the liquid's drag took, what activity and grips gave.
 DAMPED, DRAGGED, ACTIVE, GRIPPED, SUMS = range(5)
 GRIP = 8  # `Filaments.grip` is the grip's number times this, plus the directions that it holds
-RESOLVED = 1.4  # ω dt, as in `dem.engine.links.stable_step`
+RESOLVED = 1.4  # greatest ω dt of a mode, of the 2 up to which leapfrog is stable without dashpots
 
 
 # -- from nodes to segments --------------------------------------------------------------------------------------

@@ -35,6 +35,20 @@ def test_rows_of_a_table_are_joined_in_their_order(tmp_path):
 
 
 @pytest.mark.parametrize(
+    ("header", "unit"),
+    [
+        ("body,x [mm],y [mm],z [mm],yield [MPa]", None),
+        ("body,x [ mm ],y [mm],z [mm],more", None),
+        ("body,x [µm],y [um],z [μm],more", "um"),
+    ],
+)
+def test_units_are_those_of_the_coordinates_in_any_spelling(tmp_path, header, unit):
+    (tmp_path / "a.csv").write_text(f"{header}\n1,0,0,0,5\n1,1,0,0,5\n", encoding="utf-8")
+    found = read_centrelines(tmp_path / "a.csv", unit=unit)
+    assert found.segments[0, 1, 0] == pytest.approx(1e-6 if unit else 1e-3)
+
+
+@pytest.mark.parametrize(
     ("text", "unit", "message"),
     [
         (CSV.replace(" [mm]", ""), None, "states no unit of length; give unit='mm', or another one of m, cm, mm, um"),

@@ -1,0 +1,33 @@
+"""Make the template of a sweep from a scene."""
+
+from collections.abc import Mapping
+from typing import Any
+
+import yaml
+
+from dem.errors import InputError
+from dem.scene.reading import apply_override
+
+
+def as_template(data: Any, names: Mapping[str, str], source: str) -> str:
+    """Return the data of a scene as a template with variables; InputError for text that a template would run.
+
+    Args:
+        data: data of the scene; the keys of `names` are changed in place.
+        names: name of the variable of each key of the scene, with dots for nested keys.
+        source: scene or its file, for messages.
+    """
+    text = _dumped(data)
+    for mark in ("{{", "{%", "{#"):
+        if mark in text:
+            raise InputError(f"{source}: contains {mark!r}, which is template syntax; remove it")
+    for key, name in names.items():
+        apply_override(data, f"{key}='{{{{ {name} }}}}'")
+    text = _dumped(data)
+    for name in names.values():
+        text = text.replace(f"'{{{{ {name} }}}}'", f"{{{{ {name} }}}}")
+    return text
+
+
+def _dumped(data: Any) -> str:
+    return str(yaml.safe_dump(data, sort_keys=False, allow_unicode=True))
