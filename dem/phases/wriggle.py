@@ -9,7 +9,7 @@ from pydantic import Field
 from dem.body.filament import Activity
 from dem.engine.interface import Engine
 from dem.phases.phase import Memory, Phase, SceneView, Stage
-from dem.setting.part import Duration, Frequency, Length, Part
+from dem.setting.part import Duration, Length, Part
 
 TIGHTEST = 0.5  # of a filament's curvature times its diameter: a bend in which it would touch itself
 
@@ -24,7 +24,9 @@ class Wriggle(Part, Phase):
     type: Literal["wriggle"]
     duration_s: Duration = Field(..., description="length of the phase [s]")
     curvature_per_m: float = Field(..., ge=0, le=1e5, description="amplitude of the preferred curvature [1/m]")
-    frequency_Hz: Frequency = Field(1.0, description="turns of the wave per second [Hz]")
+    frequency_Hz: float = Field(
+        1.0, ge=0, le=1e4, description="turns of the wave per second; 0: filaments hold the bends that they have [Hz]"
+    )
     wavelength_m: Length | None = Field(
         None, description="wavelength along the filament [m]; default: equal along it, so that it bends into an arc"
     )
