@@ -62,15 +62,15 @@ MOTOR_COLUMNS = _columns(
 # In scenes that ask for energy.
 ENERGY_COLUMNS = _columns(
     gravitational_energy_J="gravitational energy of all smarticles, zero at the floor's height at the start",
-    container_work_J="work of the moving container, hook, strings or grips on the smarticles since the start, "
-    "without the weight of hook and container",
+    container_work_J="work of the moving container, hook or strings on the smarticles since the start, without "
+    "the weight of hook and container",
 )
 # In scenes that sample dissipation.
 LEDGER_COLUMNS = _columns(
     whole_names=True,
     added_energy_J="energy of smarticles when they were added, zero at the floor's height at the start",
     contact_elastic_energy_J="energy in the springs of all contacts",
-    hinge_elastic_energy_J="energy in the pins and dampers of all hinges, and in deformed filaments",
+    hinge_elastic_energy_J="energy in the pins and dampers of all hinges",
     dissipated_energy_J="energy dissipated by contacts, hinges and welding since the start, sampled",
     energy_residual_J="added energy and work less all energy stored and dissipated: the ledger's error",
 )
@@ -103,12 +103,13 @@ STRAIN_COLUMNS = _columns(
 )
 # In scenes with filaments.
 FILAMENT_COLUMNS = _columns(
-    stretching_energy_J="energy of stretched filaments",
-    bending_energy_J="energy of filaments bent away from the curvature that they prefer",
-    twisting_energy_J="energy of twisted filaments",
+    stretching_energy_J="energy of stretched filaments; hinge_elastic_energy_J has it, too",
+    bending_energy_J="energy of filaments bent away from the curvature that they prefer; hinge_elastic_energy_J "
+    "has it, too",
+    twisting_energy_J="energy of twisted filaments; hinge_elastic_energy_J has it, too",
     active_work_J="work of filaments that bend by themselves, since the start",
-    grip_work_J="work of grips on filaments since the start",
-    drag_loss_J="energy taken by the liquid's drag since the start",
+    grip_work_J="work of grips on filaments since the start; container_work_J has it, too",
+    drag_loss_J="energy taken by the liquid's drag since the start; dissipated_energy_J has it, too",
     grip_force_N="force of all grips on the filaments (x, y, z), in the last step",
     gripped_count="filaments that a grip holds",
 )
