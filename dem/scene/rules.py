@@ -66,7 +66,7 @@ def _of_particle(scene: SceneView) -> Iterator[str]:
     if scene.smarticle != Smarticle():
         yield "smarticle: describes smarticles, but particle has other shapes; leave smarticle or particle out"
     if scene.motor != Motor() and scene.protocol is None:
-        yield "motor: only smarticles have hinges; leave motor or particle out"
+        yield "motor: other shapes have no hinges; leave motor or particle out"
     if scene.plane is not None:
         yield "plane: motion in a plane is that of smarticles; leave plane or particle out"
     for index, phase in enumerate(scene.phases):

@@ -84,7 +84,7 @@ def test_a_plan_has_their_step_and_effects() -> None:
     ({"particle": None, "liquid": None}, "phases.1: wriggle needs filaments"),
     ({"recording": {"contact_forces": True}}, "recording.contact_forces: forces at contacts of filaments"),
     ({"plane": {}}, "plane: motion in a plane is that of smarticles"),
-    ({"motor": {"law": "stall"}}, "motor: only smarticles have hinges"),
+    ({"motor": {"law": "stall"}}, "motor: other shapes have no hinges"),
     ({"phases.2.duration_s": 1}, "phases.2.duration_s: 1 s is too short to raise by distance_m = 0.015 m"),
     ({"phases.2.speed_m_per_s": 0}, "phases.2.speed_m_per_s: 0 m/s is out of range"),
     ({"phases.1.frequency_Hz": -1}, "phases.1.frequency_Hz: -1 is out of range; use at least 0"),
