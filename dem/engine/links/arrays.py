@@ -15,7 +15,7 @@ from dem.engine.links.shapes import LINE, Shapes
 Array = NDArray[np.float64]
 Indices = NDArray[np.int32]
 
-PLANE = 22  # numbers that describe the plane geometry of a smarticle, see `dem.engine.links.motion.planar`
+PLANE = 27  # numbers that describe the plane geometry of a smarticle, see `dem.engine.links.motion.planar`
 FLOOR, WALL, LOWER, UPPER, CHANNEL = range(5)  # rows of `Ground.force`; the channel has two
 BINS = 4  # of the search for neighbours, per link
 LEDGER = 10  # numbers of a row of the ledger, see `dem.engine.links.contact.pairs.enter`

@@ -27,7 +27,7 @@ RATES: Mapping[Activity, Rates] = {
     Activity.POUR: Rates(1.35e-7, 1.3e-3),
     Activity.REST: Rates(4.0e-7, 0.0),
     Activity.SHAKE: Rates(1.5e-7, 2.6e-3),
-    Activity.ACTUATE: Rates(3.8e-7, 3.0e-3),
+    Activity.ACTUATE: Rates(5.4e-7, 2.0e-3),
 }
 LOOK = 2.4e-7  # s per control update of a smarticle
 RIM = 1.1e-7  # s per edge of a wall of tiers, smarticle and step

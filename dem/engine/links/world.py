@@ -54,7 +54,7 @@ from dem.engine.links.contact.queries import (
     query_all,
 )
 from dem.engine.links.motion.bending import pose_filaments_from_python
-from dem.engine.links.motion.planar import lay_out
+from dem.engine.links.motion.planar import invert, lay_out
 from dem.engine.links.motion.poses import find_links, pose_all
 from dem.engine.links.rods import apart, filaments_at, none_of
 from dem.engine.links.shapes import LINE, RADIUS, Shape, kind_shape, smarticle_shape, table_of
@@ -204,11 +204,13 @@ class World:
         for i, turn in enumerate(turns):
             kind = self.kinds[fresh.shape[i]]
             fresh.turn[i] = quaternion_of(turn)
-            fresh.plane[i, 14:18] = kind.inertia
             if kind.planar is not None:
                 assert self.particle is not None  # the shape of smarticles follows from it
                 fresh.alpha[i] = self.particle.boxes.angles
                 lay_out(kind.planar, *self.particle.boxes.angles, fresh.plane[i])
+            elif kind.filament is None:
+                fresh.plane[i, 14:18] = kind.inertia
+                invert(fresh.plane[i])
         self.bodies = joined(self.bodies, fresh)
         self._lay_out_parts()
         old = self.pairs

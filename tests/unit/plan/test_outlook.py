@@ -126,8 +126,9 @@ def bench(activity: dict[str, object], fidelity: str = "standard", count: int = 
         (bench({"type": "shake"}, "draft"), "shake", 1.10),
         (bench({"type": "shake"}), "shake", 2.30),
         (bench({"type": "shake"}, "reference"), "shake", 4.43),
-        (bench({"type": "internal-oscillation", "theta_deg": 10.0}), "internal-oscillation", 4.17),
-        (bench({"type": "internal-oscillation", "theta_deg": 10.0}, "reference"), "internal-oscillation", 7.6),
+        (bench({"type": "internal-oscillation", "theta_deg": 10.0}, "draft"), "internal-oscillation", 3.2),
+        (bench({"type": "internal-oscillation", "theta_deg": 10.0}), "internal-oscillation", 5.9),
+        (bench({"type": "internal-oscillation", "theta_deg": 10.0}, "reference"), "internal-oscillation", 11.0),
         (bench({"type": "relax"}), "relax", 1.9),
     ],
 )

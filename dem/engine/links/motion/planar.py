@@ -52,7 +52,9 @@ def lay_out(planar: Planar, alpha1: float, alpha2: float, row: Array) -> None:
         alpha2: angle of barb 2 [rad].
         row: (PLANE,) written. 0 to 1: centre of mass from the middle link's centre [m]; 2 to 5: centres of barb 1 and
             barb 2 from the centre of mass [m]; 6 to 9: u_1 and u_2 [m]; 10 to 13: directions of barb 1 and barb 2 [1];
-            14 to 17: inertia xx, yy, zz, xy [kg m²]; 18 to 19: b [kg m²]; 20: A_11 = A_22, 21: A_12 [kg m²].
+            14 to 17: inertia xx, yy, zz, xy [kg m²]; 18 to 19: b [kg m²]; 20: A_11 = A_22, 21: A_12 [kg m²]; 22 to
+            23: see `invert`; 24 to 26: elements 11, 22 and 12 of the mobility (A - b bᵀ/I_zz)⁻¹ [1/(kg m²)]: changes
+            of the rates of a free smarticle over impulses of its motors.
     """
     lay_out_at(planar, alpha1, alpha2, row)
 
@@ -109,6 +111,27 @@ def lay_out_directions(planar: Planar, c1: float, s1: float, c2: float, s2: floa
     row[19] = planar.barb_zz + mb * (x2 * u2y - y2 * u2x)
     row[20] = planar.barb_zz + mb * (1 - share) * arm * arm
     row[21] = -share * mb * (u1x * u2x + u1y * u2y)
+    invert_at(row)
+    b1, b2, normal = row[18], row[19], row[22]
+    a, b, c = row[20] - b1 * b1 * normal, row[20] - b2 * b2 * normal, row[21] - b1 * b2 * normal
+    inverse = 1 / (a * b - c * c)
+    row[24], row[25], row[26] = b * inverse, a * inverse, -c * inverse
+
+
+@kernel
+def invert(row: Array) -> None:
+    """Complete the plane geometry of a rigid body, whose inertia is known (columns 14 to 17).
+
+    Args:
+        row: (PLANE,) written. 22: 1/I_zz [1/(kg m²)]; 23: inverse determinant of the in-plane inertia [1/(kg² m⁴)].
+    """
+    invert_at(row)
+
+
+@inlined
+def invert_at(row: Array) -> None:
+    """Complete the plane geometry like `invert`, inlined into other kernels."""
+    row[22], row[23] = 1 / row[16], 1 / (row[14] * row[15] - row[17] * row[17])
 
 
 @inlined
@@ -144,8 +167,7 @@ def spin_of(row: Array, lx: float, ly: float, lz: float, internal: float) -> tup
         lz: z component of L [kg m²/s].
         internal: h = b·α̇ [kg m²/s].
     """
-    flat, normal = 1 / (row[14] * row[15] - row[17] * row[17]), 1 / row[16]
-    xx, yy, xy = row[14], row[15], row[17]
+    xx, yy, xy, normal, flat = row[14], row[15], row[17], row[22], row[23]
     return (yy * lx - xy * ly) * flat, (xx * ly - xy * lx) * flat, (lz - internal) * normal
 
 
@@ -159,27 +181,16 @@ def momenta(row: Array, normal: float, rate1: float, rate2: float) -> tuple[floa
         rate1: α̇_1 [rad/s].
         rate2: α̇_2 [rad/s].
     """
-    wz = (normal - row[18] * rate1 - row[19] * rate2) / row[16]
+    wz = (normal - row[18] * rate1 - row[19] * rate2) * row[22]
     return row[18] * wz + row[20] * rate1 + row[21] * rate2, row[19] * wz + row[21] * rate1 + row[20] * rate2
-
-
-@inlined
-def mobility(row: Array) -> tuple[float, float, float]:
-    """Return the elements 11, 22 and 12 of the mobility (A - b bᵀ/I_zz)⁻¹ [1/(kg m²)].
-
-    Multiplied with impulses of the motors, the mobility gives the changes of the rates of a free smarticle.
-    """
-    a, b, c = row[20] - row[18] ** 2 / row[16], row[20] - row[19] ** 2 / row[16], row[21] - row[18] * row[19] / row[16]
-    determinant = a * b - c * c
-    return b / determinant, a / determinant, -c / determinant
 
 
 @inlined
 def rates(row: Array, normal: float, p1: float, p2: float) -> tuple[float, float]:
     """Return the rates α̇ [rad/s] for momenta p1 and p2 [kg m²/s]; inverse of `momenta`."""
-    m1, m2, m12 = mobility(row)
-    q1, q2 = p1 - row[18] * normal / row[16], p2 - row[19] * normal / row[16]
-    return m1 * q1 + m12 * q2, m12 * q1 + m2 * q2
+    wz = normal * row[22]
+    q1, q2 = p1 - row[18] * wz, p2 - row[19] * wz
+    return row[24] * q1 + row[26] * q2, row[26] * q1 + row[25] * q2
 
 
 @inlined
