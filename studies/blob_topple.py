@@ -25,9 +25,8 @@ from postprocess.statistics.seeds import mean_over_seeds
 from studies.framework.figures import Histories, History, one_by_one
 from studies.framework.findings import Effect, Finding
 from studies.framework.runs import Key, Row, declare, last_columns, run_columns
-from studies.framework.study import Study
+from studies.framework.study import COUNT, Study
 
-RADIUS = "radius of the glass [m]"
 FALL, AWAY, CLUSTER = "fall of the centre of mass [m]", "way sideways [m]", "largest cluster [-]"
 BEFORE, SLENDER, AFTER = "height before [m]", "slenderness before [-]", "slenderness after [-]"
 TOUCHING = 1.05  #: Largest distance of the axes of worms that touch, in diameters
@@ -61,7 +60,6 @@ def measure(run: Run) -> Row:
     one, other = centre(held), centre(last)
     return {
         **{name: cell for name, cell in run_columns(run).items() if name != ASPECT},
-        RADIUS: run.manifest.container_radius_m,
         BEFORE: one[2] - held.floor_z,
         FALL: one[2] - other[2],
         AWAY: float(np.hypot(*(other - one)[:2])),
@@ -103,9 +101,9 @@ def _falls(table: pd.DataFrame) -> list[Effect]:
 
 
 def _sideways(table: pd.DataFrame) -> list[Effect]:
-    return [
-        Effect(label="way sideways over the fall", value=mean_over_seeds(table[AWAY] / table[FALL]), threshold=SIDE)
-    ]
+    tallest = table[table[COUNT] == table[COUNT].max()]
+    value = mean_over_seeds(tallest[AWAY] / tallest[FALL])
+    return [Effect(label="way sideways over the fall, of the tallest blob", value=value, threshold=SIDE)]
 
 
 def _whole(table: pd.DataFrame) -> list[Effect]:
@@ -131,8 +129,8 @@ STUDY = Study(
     title="A tall blob of worms whose tails let go",
     measure=measure,
     same_count=(),
-    keys=(Key(column=RADIUS, label="glass", form="g", unit=" mm", scale=1e3),),
-    order=(RADIUS, SEED),
+    keys=(Key(column=COUNT, label="worms", form="g"),),
+    order=(COUNT, SEED),
     quantities=tuple(QUANTITIES.values()),
     findings=(
         Finding(id="falls", says="The blob falls when its tails let go, and is less slender then", outcome=_falls),
@@ -143,14 +141,14 @@ STUDY = Study(
         Histories(
             name="height_time",
             history=_history,
-            split=one_by_one(RADIUS, lambda radius: f"glass of {1e3 * radius:g} mm"),
+            split=one_by_one(COUNT, "{:g} worms".format),
             x_label="time since tails let go [s]",
             quantities={"": "height of the centre of mass [mm]"},
         ),
         Histories(
             name="sideways_time",
             history=_path,
-            split=one_by_one(RADIUS, lambda radius: f"glass of {1e3 * radius:g} mm"),
+            split=one_by_one(COUNT, "{:g} worms".format),
             x_label="time since tails let go [s]",
             quantities={"": "way of the centre of mass sideways [mm]"},
             width=0.2,
@@ -160,5 +158,5 @@ STUDY = Study(
         "Worms are filaments of 30 × 0.8 mm in water that hold helical bends (250 1/m, wavelength 60 mm). Tails are "
         "the last nodes of all worms; they are held where the tangling left them, and raised by 3 mm.",
     ),
-    pictured={"radius_m": 0.0075},
+    pictured={"count": 80},
 )
