@@ -128,7 +128,7 @@ STUDY = Study(
     name="blob-topple",
     title="A tall blob of worms whose tails let go",
     measure=measure,
-    same_count=(),
+    same_count=(COUNT,),
     keys=(Key(column=COUNT, label="worms", form="g"),),
     order=(COUNT, SEED),
     quantities=tuple(QUANTITIES.values()),
