@@ -164,7 +164,10 @@ def _text(kind: str, message: str, value: Any, context: Mapping[str, Any], unit:
         return f"{message[0].lower()}{message[1:]}, got {shown(value)}"
     number = isinstance(value, int | float)
     choices, chosen = context.get("expected_tags", context.get("expected", "")), context.get("tag", value)
-    close = difflib.get_close_matches(chosen, re.findall("'([^']*)'", choices), 1) if isinstance(chosen, str) else []
+    words = re.findall("'([^']*)'", choices)
+    # Of several near words the one that begins alike is meant: relax, not release, by 'relaks'.
+    close = difflib.get_close_matches(chosen, words) if isinstance(chosen, str) else []
+    close.sort(key=lambda word: -sum(str(chosen).startswith(word[: k + 1]) for k in range(len(word))))
     length = len(value) if hasattr(value, "__len__") else 0
     items, least, most = (
         f"{count} item" + ("s" if count != 1 else "")

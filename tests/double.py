@@ -222,6 +222,7 @@ class EngineDouble:
     steps: int = 0
     cpu_elsewhere: float = 0.0
     calls: Calls = field(default_factory=list)
+    filaments: None = None
     ledger: LedgerDouble = field(default_factory=LedgerDouble)
 
     def __post_init__(self) -> None:

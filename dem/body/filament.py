@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -48,6 +49,45 @@ class PreferredCurvature:
         for name in ("amplitudes", "phases", "rate"):
             if not np.isfinite(getattr(self, name)).all():
                 raise InputError(f"{name}: {getattr(self, name)}; give finite numbers")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Activity:
+    """How filaments bend by themselves: a wave of preferred curvature that travels along them and turns."""
+
+    curvature: float  #: Amplitude [1/m]
+    wavelength: float = math.inf  #: [m]; infinite: equal along the filament
+    rate: float = 0.0  #: α, rate at which the plane of the wave turns about the filament [rad/s]
+    reversal_rate: float = 0.0  #: λ, mean number of reversals per second; 0: none [1/s]
+
+
+class FilamentEnergies(NamedTuple):
+    """Energies of all filaments [J]; work since the start."""
+
+    kinetic: float  #: Of nodes and of rolling, half a step before
+    potential: float  #: Weight less buoyancy times height above z = 0
+    stretching: float
+    bending: float  #: Against the preferred curvature
+    twisting: float
+    damped: float  #: Taken by internal damping; summed only where the engine keeps a ledger
+    dragged: float  #: Taken by the liquid's drag
+    active: float  #: Given by changes of the preferred curvature
+    gripped: float  #: Given by grips
+
+    @property
+    def elastic(self) -> float:
+        """[J]."""
+        return self.stretching + self.bending + self.twisting
+
+    @property
+    def stored(self) -> float:
+        """[J]."""
+        return self.kinetic + self.potential + self.stretching + self.bending + self.twisting
+
+    @property
+    def residual(self) -> float:
+        """What is stored, less what was given, plus what was taken; constant without contacts [J]."""
+        return self.stored + self.damped + self.dragged - self.active - self.gripped
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -130,6 +170,11 @@ class Filament:
         found = np.full(self.nodes, self.mass / (self.nodes - 1))
         found[[0, -1]] /= 2
         return found
+
+    @property
+    def effective_mass(self) -> float:
+        """Typical effective mass of a contact [kg]: a push at s moves two nodes by (1 - s)²/m and s²/m, 2/3 in mean."""
+        return 1.5 * self.mass / (self.nodes - 1)
 
     @property
     def axial_inertia(self) -> float:

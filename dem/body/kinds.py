@@ -1,4 +1,4 @@
-"""Kinds of rigid bodies in a pile, with the spheres that represent them, and the kind of each body."""
+"""Kinds of bodies in a pile, with the spheres that represent them, and the kind of each body."""
 
 import math
 from collections.abc import Sequence
@@ -10,11 +10,16 @@ import numpy as np
 
 from dem.arrays import Array, Numbers
 from dem.body.bars import Bars
+from dem.body.filament import Filament
 from dem.body.particle import HINGE_CLEARANCE, Particle, smallest_effective_mass
 
 
 class Body(Protocol):
     """What a smarticle and a kind of other bodies have in common. SI throughout."""
+
+    @property
+    def filament(self) -> Filament | None:
+        """What a flexible body is made of; None: it is rigid."""
 
     @property
     def mass(self) -> float:
@@ -51,13 +56,15 @@ class Body(Protocol):
 
 @dataclass(frozen=True, kw_only=True)
 class Kind:
-    """One kind of rigid body: its bars, and the spheres that represent them in contacts."""
+    """One kind of body: its bars, and the spheres that represent them in contacts."""
 
     name: str
     bars: Bars
     rows: int  #: Rows of spheres, or strands, side by side along the normal of each bar; 1 for a round section
     diameter: float  #: Of a sphere, or strand [m]
     pitch: float  #: Largest distance of neighbouring spheres along a bar [m]
+    #: What the body is made of if it is flexible; its bars are then its segments as they are poured. None: rigid
+    filament: Filament | None = None
 
     @property
     def mass(self) -> float:
@@ -102,13 +109,22 @@ class Kind:
         """
         length, d = float(self.bars.lengths[bar]), self.diameter
         free, owned = self.bars.free[bar], self.bars.owned[bar]
-        insets = np.where(free, d / 2, np.where(owned, 0.0, d * (1 + HINGE_CLEARANCE)))
+        # The round caps of a filament reach beyond its ends.
+        tip = d / 2 if self.filament is None else 0.0
+        insets = np.where(free, tip, np.where(owned, 0.0, d * (1 + HINGE_CLEARANCE)))
         start, end = float(insets[0]), length - float(insets[1])
         if end <= start:
             # A short bar with a free end keeps the sphere at its tip.
             tips = [place for place, at in ((end, free[1]), (start, free[0])) if at and 0 < place < length]
             return np.array(tips[:1])
         return np.linspace(start, end, max(2, math.ceil((end - start) / self.pitch - 1e-9) + 1))
+
+    @cached_property
+    def stations(self) -> Array:
+        """(S,) distance of each sphere from the start of its bar, over the bar's length [1]."""
+        lengths = self.bars.lengths
+        each = [np.repeat(self._stations(k) / lengths[k], self.rows) for k in range(len(lengths))]
+        return np.concatenate(each)
 
     @cached_property
     def _layout(self) -> tuple[Array, Numbers]:
@@ -146,7 +162,7 @@ class Kind:
 
 @dataclass(frozen=True)
 class Mixture:
-    """The kinds of rigid bodies of a pile, and which kind each body is, in the order of pouring."""
+    """The kinds of bodies of a pile that are no smarticles, and which kind each body is, in the order of pouring."""
 
     kinds: tuple[Kind, ...]
     of: Numbers = field(repr=False)  #: (N,) number of each body's kind
@@ -155,6 +171,11 @@ class Mixture:
         """Return the mean of a number of each kind over all bodies, or over bodies of `kinds` (n,)."""
         each = np.array(values)[self.of if kinds is None else kinds]
         return float(each.mean()) if len(each) else float("nan")
+
+    @property
+    def flexible(self) -> bool:
+        """Whether the bodies are filaments; a pile has either filaments or rigid bodies."""
+        return self.kinds[0].filament is not None
 
     @cached_property
     def masses(self) -> Array:

@@ -247,6 +247,10 @@ class Particle:
                 f"use at most half its length, {w / 2:g} m"
             )
 
+    @property
+    def filament(self) -> None:
+        """None: links are rigid."""
+
     @cached_property
     def _rows(self) -> Array:
         """(rows,) [m]: offsets along the normal; outermost spheres reach exactly ±t1/2."""

@@ -1,4 +1,4 @@
-"""Poses and velocities of all bodies at one instant: of smarticles, or of rigid bodies of other kinds."""
+"""Poses and velocities of all bodies at one instant: of smarticles, of rigid bodies of other kinds, of filaments."""
 
 from __future__ import annotations
 
@@ -9,7 +9,8 @@ from typing import Protocol, Self
 import numpy as np
 
 from dem.arrays import Array, Numbers
-from dem.body.kinds import Mixture
+from dem.body.filament import Filament
+from dem.body.kinds import Kind, Mixture, padded
 from dem.body.linear import matrix_product
 from dem.body.particle import LINKS, Boxes, Particle
 from dem.errors import InputError
@@ -62,20 +63,44 @@ class PileState(Protocol):
         """The state of a pile of smarticles; raises InputError for other bodies, which have no barbs."""
 
     @property
-    def bodies(self) -> RigidState | None:
-        """The state of a pile of rigid bodies that are no smarticles; None for smarticles."""
+    def bodies(self) -> BarState | None:
+        """The state of a pile of bodies that are no smarticles; None for smarticles."""
 
 
-@dataclass(frozen=True)
-class RigidState:
-    """Poses and velocities of N rigid bodies of several kinds, with M bars in all, in the laboratory frame."""
+class BarState:
+    """What states of bodies of bars have in common, with M bars in all, in the laboratory frame.
+
+    Subclasses are dataclasses with `mixture`, `kind`, `positions` and `velocities`.
+    """
 
     mixture: Mixture
-    kind: Numbers  #: (N,) kind of each body
-    positions: Array  #: (N, 3) centres of mass [m]
-    rotations: Array  #: (N, 3, 3) body frame to laboratory frame [1]
-    velocities: Array  #: (N, 3) of the centres of mass [m/s]
-    spins: Array  #: (N, 3) angular velocities [rad/s]
+    kind: Numbers
+    positions: Array
+    velocities: Array
+
+    @property
+    def segments(self) -> Array:
+        """(M, 2, 3) both ends of all bars [m]."""
+        raise NotImplementedError
+
+    @property
+    def normals(self) -> Array:
+        """(M, 3) unit vectors along the normal of each bar; zeros where the section is round [1]."""
+        raise NotImplementedError
+
+    @property
+    def bar_velocities(self) -> Array:
+        """(M, 3) velocities of the bars' centres [m/s]."""
+        raise NotImplementedError
+
+    @property
+    def bar_spins(self) -> Array:
+        """(M, 3) angular velocities of the bars [rad/s]."""
+        raise NotImplementedError
+
+    def spheres(self) -> Array:
+        """Return (N, S, 3) centres of all spheres [m]; the last one of a body fills up its row."""
+        raise NotImplementedError
 
     @property
     def count(self) -> int:
@@ -88,7 +113,7 @@ class RigidState:
         raise InputError("particle: these bodies are no smarticles, and have no barbs; leave particle out")
 
     @property
-    def bodies(self) -> RigidState:
+    def bodies(self) -> Self:
         """This state."""
         return self
 
@@ -107,6 +132,51 @@ class RigidState:
         """(M,) number of each bar in its body."""
         sizes = self.mixture.sizes[self.kind]
         return np.arange(len(self.body)) - np.repeat(np.cumsum(sizes) - sizes, sizes)
+
+    @property
+    def _kinds(self) -> list[Kind]:
+        return [self.mixture.kinds[k] for k in self.kind]
+
+    @cached_property
+    def tops(self) -> Array:
+        """(N,) heights of the highest point of each body's axes [m]."""
+        return self._largest(self.segments[..., 2].max(axis=1))
+
+    @cached_property
+    def speeds(self) -> Array:
+        """(N,) speed of the fastest centre of a bar of each body [m/s]."""
+        return self._largest(np.linalg.norm(self.bar_velocities, axis=1))
+
+    def _largest(self, values: Array) -> Array:
+        """Return the largest (N,) of the values (M,) of each body's bars."""
+        found = np.full(self.count, -np.inf)
+        np.maximum.at(found, self.body, values)
+        return found
+
+    def spheres_by_body(self) -> list[Array]:
+        """Return (S, 3) centres of the spheres of each body [m]."""
+        return [row[: len(kind.centres)] for row, kind in zip(self.spheres(), self._kinds, strict=True)]
+
+    @cached_property
+    def _masses(self) -> Array:
+        return self.mixture.masses[self.kind]
+
+    @cached_property
+    def momentum(self) -> Array:
+        """(3,) momentum of all bodies [kg m/s]."""
+        return np.asarray((self._masses[:, None] * self.velocities).sum(axis=0))
+
+
+@dataclass(frozen=True)
+class RigidState(BarState):
+    """Poses and velocities of N rigid bodies of several kinds, with M bars in all, in the laboratory frame."""
+
+    mixture: Mixture
+    kind: Numbers  #: (N,) kind of each body
+    positions: Array  #: (N, 3) centres of mass [m]
+    rotations: Array  #: (N, 3, 3) body frame to laboratory frame [1]
+    velocities: Array  #: (N, 3) of the centres of mass [m/s]
+    spins: Array  #: (N, 3) angular velocities [rad/s]
 
     @cached_property
     def _bar_of_kind(self) -> Numbers:
@@ -134,39 +204,14 @@ class RigidState:
         return self.velocities[self.body] + np.cross(self.spins[self.body], arms)
 
     @cached_property
-    def tops(self) -> Array:
-        """(N,) heights of the highest point of each body's axes [m]."""
-        return self._largest(self.segments[..., 2].max(axis=1))
-
-    @cached_property
-    def speeds(self) -> Array:
-        """(N,) speed of the fastest centre of a bar of each body [m/s]."""
-        return self._largest(np.linalg.norm(self.bar_velocities, axis=1))
-
-    def _largest(self, values: Array) -> Array:
-        """Return the largest (N,) of the values (M,) of each body's bars."""
-        found = np.full(self.count, -np.inf)
-        np.maximum.at(found, self.body, values)
-        return found
+    def bar_spins(self) -> Array:
+        """(M, 3) angular velocities of the bars [rad/s]."""
+        return self.spins[self.body]
 
     def spheres(self) -> Array:
         """Return (N, S, 3) centres of all spheres [m]; the last one of a body fills up its row."""
         local = self.mixture.spheres[self.kind]
         return matrix_product(local, np.swapaxes(self.rotations, 1, 2)) + self.positions[:, None]
-
-    def spheres_by_body(self) -> list[Array]:
-        """Return (S, 3) centres of the spheres of each body [m]."""
-        kinds = [self.mixture.kinds[k] for k in self.kind]
-        return [row[: len(kind.centres)] for row, kind in zip(self.spheres(), kinds, strict=True)]
-
-    @cached_property
-    def _masses(self) -> Array:
-        return self.mixture.masses[self.kind]
-
-    @cached_property
-    def momentum(self) -> Array:
-        """(3,) momentum of all bodies [kg m/s]."""
-        return np.asarray((self._masses[:, None] * self.velocities).sum(axis=0))
 
     @cached_property
     def _own_spins(self) -> tuple[Array, Array]:
@@ -191,6 +236,113 @@ class RigidState:
     def potential_energy(self, gravity: float, floor: float) -> float:
         """Return the gravitational energy [J] of all bodies, 0 at the height `floor` [m]; gravity in m/s²."""
         return float((self._masses * gravity * (self.positions[:, 2] - floor)).sum())
+
+
+@dataclass(frozen=True)
+class FilamentState(BarState):
+    """Places and velocities of N filaments of several kinds, with M segments in all, in the laboratory frame."""
+
+    mixture: Mixture
+    kind: Numbers  #: (N,) kind of each filament
+    nodes: Array  #: (M + N, 3) places of the nodes, filament by filament [m]
+    node_velocities: Array  #: (M + N, 3) [m/s]
+    rolls: Array  #: (M + N,) rates of roll of the segments about their axes, one unused after each last [rad/s]
+
+    @property
+    def count(self) -> int:
+        """Number of filaments, N."""
+        return len(self.kind)
+
+    @cached_property
+    def _begin(self) -> Numbers:
+        """(N + 1,) number of each filament's first node."""
+        return np.concatenate([[0], np.cumsum(1 + self.mixture.sizes[self.kind])])
+
+    @cached_property
+    def _starts(self) -> Numbers:
+        """(M,) number of the node at which each segment starts."""
+        return np.delete(np.arange(len(self.nodes)), self._begin[1:] - 1)
+
+    @cached_property
+    def node_masses(self) -> Array:
+        """(M + N,) of the nodes [kg]."""
+        return np.concatenate([np.zeros(0), *(filament.masses for filament in self._filaments)])
+
+    @property
+    def _filaments(self) -> list[Filament]:
+        return [kind.filament for kind in self._kinds if kind.filament is not None]
+
+    def _mean(self, values: Array) -> Array:
+        """Return the means (N, 3) over the mass of each filament, of values (M + N, 3) at nodes."""
+        sums = np.add.reduceat(self.node_masses[:, None] * values, self._begin[:-1]) if self.count else values[:0]
+        return np.asarray(sums / self._masses[:, None])
+
+    @cached_property
+    def positions(self) -> Array:  # type: ignore[override]
+        """(N, 3) centres of mass [m]."""
+        return self._mean(self.nodes)
+
+    @cached_property
+    def velocities(self) -> Array:  # type: ignore[override]
+        """(N, 3) velocities of the centres of mass [m/s]."""
+        return self._mean(self.node_velocities)
+
+    @cached_property
+    def segments(self) -> Array:
+        """(M, 2, 3) both ends of all segments [m]."""
+        return np.stack([self.nodes[self._starts], self.nodes[self._starts + 1]], axis=1)
+
+    @property
+    def normals(self) -> Array:
+        """(M, 3) zeros, since sections are round [1]."""
+        return np.zeros((len(self._starts), 3))
+
+    @cached_property
+    def bar_velocities(self) -> Array:
+        """(M, 3) velocities of the segments' centres [m/s]."""
+        return 0.5 * (self.node_velocities[self._starts] + self.node_velocities[self._starts + 1])
+
+    @cached_property
+    def bar_spins(self) -> Array:
+        """(M, 3) angular velocities of the segments [rad/s]."""
+        edges = self.segments[:, 1] - self.segments[:, 0]
+        opening = self.node_velocities[self._starts + 1] - self.node_velocities[self._starts]
+        squares = (edges**2).sum(axis=1)
+        rolls = (self.rolls[self._starts] / np.sqrt(squares))[:, None] * edges
+        return np.asarray(rolls + np.cross(edges, opening) / squares[:, None])
+
+    def spheres(self) -> Array:
+        """Return (N, S, 3) centres of all spheres [m]; the last one of a body fills up its row."""
+        first, rows = self._begin[:-1] - np.arange(self.count), []
+        for start, kind in zip(first, self._kinds, strict=True):
+            ends = self.segments[start + kind.links]
+            rows.append(ends[:, 0] + kind.stations[:, None] * (ends[:, 1] - ends[:, 0]))
+        return padded(rows) if rows else np.zeros((0, 1, 3))
+
+    @cached_property
+    def _rolling(self) -> Array:
+        """(M,) angular momenta of the segments about their axes [kg m²/s]."""
+        inertias = [np.full(f.nodes - 1, f.axial_inertia) for f in self._filaments]
+        return np.concatenate([np.zeros(0), *inertias]) * self.rolls[self._starts]
+
+    @cached_property
+    def angular_momentum(self) -> Array:
+        """(3,) angular momentum of all filaments about the origin [kg m²/s]."""
+        edges = self.segments[:, 1] - self.segments[:, 0]
+        tangents = edges / np.sqrt((edges**2).sum(axis=1))[:, None]
+        orbital = np.cross(self.nodes, self.node_masses[:, None] * self.node_velocities)
+        return np.asarray(orbital.sum(axis=0) + (self._rolling[:, None] * tangents).sum(axis=0))
+
+    @cached_property
+    def kinetic_energy(self) -> float:
+        """Kinetic energy of all nodes and of the roll of all segments [J]."""
+        moving = (self.node_masses[:, None] * self.node_velocities**2).sum()
+        return float(0.5 * (moving + (self._rolling * self.rolls[self._starts]).sum()))
+
+    def potential_energy(self, gravity: float, floor: float) -> float:
+        """Return the gravitational energy less that of buoyancy [J], 0 at the height `floor` [m]; gravity in m/s²."""
+        shares = np.array([filament.weight_share for filament in self._filaments])
+        return float((self._masses * shares * gravity * (self.positions[:, 2] - floor)).sum())
 
 
 @dataclass(frozen=True)

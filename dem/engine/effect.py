@@ -24,6 +24,7 @@ class EffectName(StrEnum):
     TORQUE_CAP = "torque cap"
     HOOKS = "hooks"
     WALL_REMOVAL = "wall removal"
+    FILAMENTS = "filaments"
     ENERGIES = "energies"
     ENERGY_ACCOUNT = "energy account"
     SERIES = "series"

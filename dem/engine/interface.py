@@ -1,8 +1,8 @@
 """The interface of engines, which compute the physics of a run.
 
 An `Engine` is a running simulation: bodies are added to a container or a plane, and time is advanced. It has the
-parts `boundaries`, `motors`, `strings` and `ledger`. `dem.engine.kinds` lists the engines, with facts that are known
-without a simulation; `tests/double.py` implements the interface in memory.
+parts `boundaries`, `motors`, `strings`, `filaments` and `ledger`. `dem.engine.kinds` lists the engines, with facts that
+are known without a simulation; `tests/double.py` implements the interface in memory.
 
 Heights, velocities and forces are in the laboratory frame. Engines sum some forces over all steps: the difference of
 two sums, divided by the number of steps in between, is a mean force that misses no impact.
@@ -15,6 +15,7 @@ from typing import Any, Protocol
 
 from dem.arrays import Array, Flags, Numbers
 from dem.body.chain import Tie
+from dem.body.filament import Activity, FilamentEnergies
 from dem.body.forces import ContactForces
 from dem.body.kinds import Mixture
 from dem.body.particle import Particle
@@ -194,12 +195,51 @@ class Strings(Protocol):
         """(2, 3) positions of the points at which strings are tied [m]; (0, 3) without strings."""
 
 
+class Filaments(Protocol):
+    """What flexible bodies do by themselves, and grips that hold nodes of them."""
+
+    def act(self, activity: Activity | None, *, ramp: float = 0.0) -> None:
+        """Let filaments bend by themselves from now on.
+
+        Args:
+            activity: what they do; None: they return to the curvature that they prefer at rest.
+            ramp: time in which the new curvature grows from 0 [s].
+        """
+
+    def points(self, filament: int) -> Array:
+        """Return the nodes (n, 3) of a filament [m]."""
+
+    def grip(self, nodes: Mapping[int, Sequence[int]]) -> int:
+        """Hold nodes by a new grip, which is at rest; return its number.
+
+        Args:
+            nodes: for each filament, its nodes that are held; negative numbers count from its end.
+        """
+
+    def move(self, grip: int, velocity: tuple[float, float, float]) -> None:
+        """Move a grip with a velocity [m/s] from now on."""
+
+    def release(self, grip: int | None = None) -> None:
+        """Let go of all nodes that a grip holds; None: all grips."""
+
+    @property
+    def held(self) -> int:
+        """Number of filaments that a grip holds."""
+
+    def force(self, grip: int | None = None) -> Array:
+        """Return the force (3,) of a grip on its nodes in the last step [N]; None: of all grips together."""
+
+    @property
+    def energies(self) -> FilamentEnergies:
+        """Energies of all filaments at present, and work on them since the start."""
+
+
 class EnergyLedger(Protocol):
     """Energy ledger: work and dissipation, summed step by step as far as the scene records them."""
 
     @property
     def container_work(self) -> float:
-        """Work of moving boundaries, and of strings, on the bodies since the start [J]."""
+        """Work of moving boundaries, of strings and of grips on the bodies since the start [J]."""
 
     @property
     def added(self) -> float:
@@ -211,10 +251,10 @@ class EnergyLedger(Protocol):
 
     @property
     def given(self) -> float:
-        """Sum of `added` and `container_work` [J]; NaN while boundaries move whose work is not recorded."""
+        """Sum of `added`, `container_work` and the work of activity [J]; NaN where a boundary's work is unknown."""
 
     def elastic(self) -> tuple[float, float]:
-        """Return the energy in the springs of all contacts and the energy in those of all hinges [J]."""
+        """Return the energy in the springs of all contacts, and that in all hinges and in flexible bodies [J]."""
 
     def take_in(self) -> None:
         """Add the present elastic energy of contacts to `added`, for bodies that overlap when added."""
@@ -241,6 +281,10 @@ class Engine(Protocol):
     @property
     def strings(self) -> Strings:
         """Strings that pull a chain."""
+
+    @property
+    def filaments(self) -> Filaments | None:
+        """Filaments; None where bodies are rigid."""
 
     @property
     def ledger(self) -> EnergyLedger:

@@ -7,12 +7,14 @@ from pydantic import Field
 from dem.phases.actuate import Actuate, InternalOscillation, ShapeChange
 from dem.phases.arrange import Arrange
 from dem.phases.deposit import Deposit
+from dem.phases.lift import Lift, Release
 from dem.phases.pull_hook import PullHook
 from dem.phases.relax import Relax
 from dem.phases.remove_container import RemoveContainer
 from dem.phases.shake import Shake
 from dem.phases.strain import Strain
 from dem.phases.take_over import TakeOver
+from dem.phases.wriggle import Wriggle
 
 AnyPhase = Annotated[
     Deposit
@@ -25,7 +27,10 @@ AnyPhase = Annotated[
     | RemoveContainer
     | PullHook
     | Arrange
-    | Strain,
+    | Strain
+    | Wriggle
+    | Lift
+    | Release,
     Field(discriminator="type"),
 ]
 KINDS = get_args(get_args(AnyPhase)[0])

@@ -10,7 +10,7 @@ from dem.setting.part import Duration, Part
 
 
 class Relax(Part, Phase):
-    """Let the pile rest under gravity, with smarticles welded."""
+    """Let the pile rest under gravity, with smarticles welded and filaments quiet."""
 
     planar: ClassVar[bool | None] = None
     at_rest: ClassVar[bool] = True
@@ -25,4 +25,6 @@ class Relax(Part, Phase):
             return 0.0
         stage.memory["begun"] = True
         engine.motors.weld()
+        if engine.filaments is not None:
+            engine.filaments.act(None)
         return self.duration_s

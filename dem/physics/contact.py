@@ -29,6 +29,8 @@ def typical_effective_mass(body: Body) -> float:
     The average is a harmonic mean. The inverse of the effective mass at a point r from the centre of mass in the
     direction n is the mobility 1/m + (r × n)·I⁻¹(r × n). Its mean over n is a third of the trace of its tensor.
     """
+    if body.filament is not None:  # only what is near the contact gives way
+        return body.filament.effective_mass
     inverse = 1.0 / body.inertia
     x, y, z = body.centres.T
     rotation = (inverse[0] * (y**2 + z**2) + inverse[1] * (x**2 + z**2) + inverse[2] * (x**2 + y**2)) / 3

@@ -21,6 +21,7 @@ ADDS: Mapping[EffectName, Adds] = {
     EffectName.WALL_REMOVAL: Adds(
         series=tuple(columns.RELEASE_COLUMNS), python="checks the pile's top every 10 ms while the wall is lifted"
     ),
+    EffectName.FILAMENTS: Adds(series=tuple(columns.FILAMENT_COLUMNS)),
     EffectName.ENERGIES: Adds(series=tuple(columns.ENERGY_COLUMNS)),
     EffectName.ENERGY_ACCOUNT: Adds(series=tuple(columns.LEDGER_COLUMNS)),
     EffectName.SERIES: Adds(
@@ -114,6 +115,7 @@ def _reasons(scene: Scene) -> Mapping[EffectName, tuple[bool, str]]:
         **_motors(scene, by_phases.get(EffectName.ARTICULATION, [])),
         EffectName.HOOKS: _hooks(scene, ", ".join(by_phases.get(EffectName.HOOKS, []))),
         EffectName.WALL_REMOVAL: phases(EffectName.WALL_REMOVAL, "no phase of type remove-container"),
+        EffectName.FILAMENTS: _filaments(scene),
         EffectName.ENERGIES: (recording.energies, energies),
         EffectName.ENERGY_ACCOUNT: every("dissipation_interval_s", "dissipation is sampled"),
         EffectName.SERIES: every("series_interval_s", "a sample"),
@@ -155,6 +157,17 @@ def _motors(scene: Scene, numbers: list[str]) -> dict[EffectName, tuple[bool, st
         ),
         EffectName.TORQUE_CAP: (True, f"τ_max = {scene.torque_limit:.3g} N m, law {motor.law}{beyond}"),
     }
+
+
+def _filaments(scene: Scene) -> tuple[bool, str]:
+    if scene.mixture is None or not scene.mixture.flexible:
+        return False, "particle has no shape filament"
+    liquid = scene.liquid
+    around = "no liquid"
+    if liquid is not None:
+        around = f"a liquid of {liquid.density_kg_per_m3:g} kg/m³ and {liquid.viscosity_Pa_s:g} Pa s"
+    segments = scene.mixture.mean([len(kind.bars.points) for kind in scene.mixture.kinds])
+    return True, f"{segments:g} segments each; {around}"
 
 
 def _hooks(scene: Scene, pulls: str) -> tuple[bool, str]:

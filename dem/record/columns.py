@@ -101,9 +101,21 @@ STRAIN_COLUMNS = _columns(
     chain_length_m="distance along x between the two points where strings are tied",
     chain_width_m="extent of all links along y, with their thickness",
 )
+# In scenes with filaments.
+FILAMENT_COLUMNS = _columns(
+    stretching_energy_J="energy of stretched filaments; hinge_elastic_energy_J has it, too",
+    bending_energy_J="energy of filaments bent away from the curvature that they prefer; hinge_elastic_energy_J "
+    "has it, too",
+    twisting_energy_J="energy of twisted filaments; hinge_elastic_energy_J has it, too",
+    active_work_J="work of filaments that bend by themselves, since the start",
+    grip_work_J="work of grips on filaments since the start; container_work_J has it, too",
+    drag_loss_J="energy taken by the liquid's drag since the start; dissipated_energy_J has it, too",
+    grip_force_N="force of all grips on the filaments (x, y, z), in the last step",
+    gripped_count="filaments that a grip holds",
+)
 EVERY: Columns = {
     **{**COLUMNS, **MOTOR_COLUMNS, **ENERGY_COLUMNS, **LEDGER_COLUMNS},
-    **{**HOOK_COLUMNS, **RELEASE_COLUMNS, **STRAIN_COLUMNS},
+    **{**HOOK_COLUMNS, **RELEASE_COLUMNS, **STRAIN_COLUMNS, **FILAMENT_COLUMNS},
 }
 """Columns of all scenes together."""
 

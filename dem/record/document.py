@@ -69,6 +69,11 @@ class Kind(Document):
     round: bool
     sphere_diameter_m: PositiveFloat  #: Of the spheres, or strands, that represent it
 
+    @property
+    def flexible(self) -> bool:
+        """Whether the bodies are filaments, which bend, and whose round caps reach beyond their ends."""
+        return self.shape == "filament"
+
 
 class Manifest(Document):
     """Manifest of a run, `run.json`: how it was made, and numbers of its scene."""

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from dem.arrays import Array, Flags, Numbers
 from dem.body.kinds import Kind, Mixture
 from dem.body.particle import LINKS, Particle
-from dem.body.state import PileState, RigidState
+from dem.body.state import BarState, PileState
 from dem.record.files import cannot_read
 from dem.record.names import FRAME, SCENE, VTKHDF, collection
 from dem.record.vtkhdf import REMEDY, read_step
@@ -100,8 +100,8 @@ def motor_fields(
     return found | {"halted": np.nan_to_num(found["halted"]).astype(np.int64)}
 
 
-def segment_mesh(state: RigidState, *, contacts: Numbers, time: float, floor: float, phase: int) -> meshio.Mesh:
-    """Return one frame of rigid bodies of any shape as a mesh of lines, one for each of their M bars.
+def segment_mesh(state: BarState, *, contacts: Numbers, time: float, floor: float, phase: int) -> meshio.Mesh:
+    """Return one frame of bodies of any shape as a mesh of lines, one for each of their M bars.
 
     Args:
         contacts: (N,) number of other bodies that each body touches.
@@ -114,7 +114,7 @@ def segment_mesh(state: RigidState, *, contacts: Numbers, time: float, floor: fl
         "smarticle_id": body,
         "link": state.bar,
         "velocity_m_per_s": state.bar_velocities,
-        "angular_velocity_rad_per_s": state.spins[body],
+        "angular_velocity_rad_per_s": state.bar_spins,
         "contacts": contacts[body],
         "time_s": np.full(number, time),
         "floor_z_m": np.full(number, floor),

@@ -11,7 +11,7 @@ from dem.arrays import Array
 from dem.body.chain import extent
 from dem.body.state import PileState
 from dem.engine.effect import EffectName
-from dem.engine.interface import Engine
+from dem.engine.interface import Engine, Filaments
 from dem.plan.effects import ADDS
 from dem.record.columns import COLUMNS, EVERY, STRAIN_COLUMNS, Columns
 from dem.record.packing import packing_fraction
@@ -73,6 +73,8 @@ class Sampler:
         }
         if EffectName.MOTORS in self.effects:
             row |= _motor_row(engine, state)
+        if engine.filaments is not None:
+            row |= _filament_row(engine.filaments)
         if EffectName.ENERGIES in self.effects:
             row |= {
                 "gravitational_energy_J": state.potential_energy(engine.gravity, 0.0),
@@ -148,9 +150,24 @@ def _motor_row(engine: Engine, state: PileState) -> dict[str, Any]:
     }
 
 
+def _filament_row(filaments: Filaments) -> dict[str, Any]:
+    energies = filaments.energies
+    return {
+        "stretching_energy_J": energies.stretching,
+        "bending_energy_J": energies.bending,
+        "twisting_energy_J": energies.twisting,
+        "active_work_J": energies.active,
+        "grip_work_J": energies.gripped,
+        "drag_loss_J": energies.dragged,
+        "grip_force_N": filaments.force(),
+        "gripped_count": filaments.held,
+    }
+
+
 def _ledger_row(engine: Engine, row: Mapping[str, Any]) -> dict[str, Any]:
     contacts, hinges = engine.ledger.elastic()
     given = engine.ledger.added + row.get("motor_work_J", 0.0) + row["container_work_J"]
+    given += row.get("active_work_J", 0.0)
     stored = row["kinetic_energy_J"] + row["gravitational_energy_J"] + contacts + hinges
     return {
         "added_energy_J": engine.ledger.added,

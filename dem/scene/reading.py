@@ -129,7 +129,7 @@ def _plain(scene: Scene) -> dict[str, Any]:
     data = scene.model_dump(mode="json")
     smarticle = data["smarticle"]
     optional: list[tuple[dict[str, Any], Mapping[str, Any]]] = [
-        (data, {"engine": DEFAULT_ENGINE, "particle": None}),
+        (data, {"engine": DEFAULT_ENGINE, "particle": None, "liquid": None}),
         (data["recording"], {"contact_forces": False, "frames": "vtu"}),
         (smarticle, {"middle_thickness_in_plane_m": None}),
     ]

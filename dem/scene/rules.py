@@ -17,6 +17,7 @@ def problems(scene: SceneView, engine: str) -> Iterator[str]:
     """Yield an error message for each problem of a scene on an engine: key, value and what to do."""
     if scene.mixture is not None:
         yield from _of_particle(scene)
+    yield from _of_filaments(scene, engine)
     if scene.plane is None:
         yield from _of_order(scene)
         yield from _of_container(scene)
@@ -61,19 +62,44 @@ def _of_plane(scene: SceneView) -> Iterator[str]:
 
 
 def _of_particle(scene: SceneView) -> Iterator[str]:
-    """Yield what has no meaning for rigid bodies that are no smarticles."""
+    """Yield what has no meaning for bodies that are no smarticles."""
     if scene.smarticle != Smarticle():
         yield "smarticle: describes smarticles, but particle has other shapes; leave smarticle or particle out"
     if scene.motor != Motor() and scene.protocol is None:
-        yield "motor: rigid shapes have no hinges; leave motor or particle out"
+        yield "motor: other shapes have no hinges; leave motor or particle out"
     if scene.plane is not None:
         yield "plane: motion in a plane is that of smarticles; leave plane or particle out"
     for index, phase in enumerate(scene.phases):
         if phase.actuates or phase.of_smarticles:
             yield (
-                f"phases.{index}: {phase.kind} needs smarticles, which have barbs, but particle has rigid shapes; "
+                f"phases.{index}: {phase.kind} needs smarticles, which have barbs, but particle has other shapes; "
                 "leave the phase or particle out"
             )
+
+
+def _of_filaments(scene: SceneView, engine: str) -> Iterator[str]:
+    """Yield what filaments cannot have, and what only filaments have."""
+    mixture = scene.mixture
+    flexible = [kind.filament is not None for kind in mixture.kinds] if mixture is not None else [False]
+    if not any(flexible):
+        if scene.liquid is not None:
+            yield "liquid: only filaments float in it; add particle: {shape: filament, …}, or leave liquid out"
+        for index, phase in enumerate(scene.phases):
+            if phase.of_filaments:
+                yield (
+                    f"phases.{index}: {phase.kind} needs filaments; add particle: {{shape: filament, …}}, or leave the "
+                    "phase out"
+                )
+        return
+    if engine != "links":
+        yield f"particle: filament on engine: {engine}, whose bodies are rigid; use engine: links"
+    if not all(flexible):
+        yield "particle: filaments and rigid shapes do not mix; use shapes that are all filament, or none of them"
+    if scene.recording.contact_forces:
+        yield "recording.contact_forces: forces at contacts of filaments are not recorded; leave it out"
+    for index, phase in enumerate(scene.phases):
+        if phase.kind == "take-over":
+            yield f"phases.{index}: take-over reads runs of rigid bodies only; pour the filaments by 'deposit'"
 
 
 def _of_section(scene: SceneView) -> Iterator[str]:

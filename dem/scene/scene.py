@@ -32,12 +32,13 @@ from dem.setting.contact import Contact, with_preset
 from dem.setting.container import Container, Cylinder
 from dem.setting.fidelity import FIDELITIES, Fidelity, fidelities
 from dem.setting.hooks import Hooks, with_hook_defaults
+from dem.setting.liquid import Liquid
 from dem.setting.motor import Motor
 from dem.setting.part import REFERENCE_ASPECT_RATIO, Part
 from dem.setting.plane import Channel, Plane
 from dem.setting.protocol import Protocol, with_protocol
 from dem.setting.recording import Recording
-from dem.setting.shapes import AnyShape, Shaped, listed, numbers_of_shapes
+from dem.setting.shapes import AnyShape, Flexible, Shaped, listed, numbers_of_shapes
 from dem.setting.smarticle import Smarticle
 from dem.strict import explained
 
@@ -92,6 +93,7 @@ class Scene(Part):
         None, description="plane that all motion is confined to, between two walls instead of a container; null: none"
     )
     hooks: Hooks | None = Field(None, description="hooks in the pile, for phases that pull one; default: none")
+    liquid: Liquid | None = Field(None, description="liquid around filaments; default: none")
     contact: Contact = Field(default_factory=Contact, description="friction and restitution")
     motor: Motor = Field(default_factory=Motor, description="the motors of the hinges, for phases that actuate")
     gravity_m_per_s2: float = Field(9.81, ge=0, le=1000, description="g, downwards [m/s²]; 0 or from 1e-6")
@@ -292,6 +294,11 @@ class Scene(Part):
         return 1 + spread * rng.uniform(-1, 1, (self.count, 2))
 
     @property
+    def wave_seed(self) -> int:
+        """Seed of the waves of filaments that bend by themselves."""
+        return self.seed_for("waves") % 2**32  # exact in an array of floats
+
+    @property
     def channel(self) -> Channel | None:
         """Table and walls of a scene in a plane; None in a container."""
         if self.plane is None:
@@ -359,7 +366,11 @@ class Scene(Part):
         # Rows have a meaning only across the wide side of a flat section.
         rows = self.fidelity.rows if normal > (self.fidelity.diameter_m or in_plane) and not bars.round else 1
         diameter = self._diameter_of(normal, in_plane, rows, disc=bars.round)
-        return Kind(name=shape.tag(), bars=bars, rows=rows, diameter=diameter, pitch=self._pitch * diameter)
+        filament = None
+        if isinstance(shape, Flexible):
+            filament = shape.filament(factor, None if self.liquid is None else self.liquid.immersing)
+        pitch = self._pitch * diameter
+        return Kind(name=shape.tag(), bars=bars, rows=rows, diameter=diameter, pitch=pitch, filament=filament)
 
     @property
     def model(self) -> Particle | Mixture:

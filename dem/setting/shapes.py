@@ -1,4 +1,4 @@
-"""Shapes of rigid bodies other than smarticles: the key `particle` of a scene."""
+"""Shapes of bodies other than smarticles: the key `particle` of a scene."""
 
 import math
 from collections.abc import Sequence
@@ -10,6 +10,7 @@ from scipy.special import ndtri
 
 from dem.arrays import Array
 from dem.body.bars import Bars
+from dem.body.filament import Filament, Liquid, PreferredCurvature
 from dem.errors import InputError
 from dem.setting.part import LONGEST_LENGTH, Density, Length, Part
 
@@ -295,8 +296,51 @@ class Free(Shaped):
         return data
 
 
+class Flexible(Shaped):
+    """A round filament that stretches, bends and twists, on the engine links."""
+
+    shape: Literal["filament"]
+    length_m: Length = Field(..., description="length along its axis; round caps reach beyond [m]")
+    diameter_m: Length = Field(..., description="diameter [m]")
+    segments: Segments = Field(12, description="straight segments, between nodes that bend [1]")
+    density_kg_per_m3: Density = Field(1060.0, description="density [kg/m³]")
+    young_modulus_Pa: float = Field(..., ge=1.0, le=1e12, description="E, of stretching, bending and twisting [Pa]")
+    stretching_time_s: float = Field(
+        0.0, ge=0, le=1.0, description="time τ of internal damping E τ dε/dt of stretching and twisting [s]"
+    )
+    bending_time_s: float = Field(0.0, ge=0, le=1.0, description="time τ of internal damping of bending [s]")
+    curvature_per_m: float = Field(
+        0.0, ge=0, le=1e5, description="curvature that it prefers at rest, in a plane that turns with it [1/m]"
+    )
+    poured_bend_deg: float = Field(
+        0.0, ge=0, le=300, description="angle of the arc as which it is poured, 0 straight [deg]"
+    )
+
+    def layout(self) -> tuple[Array, Array]:  # noqa: D102
+        bend = math.radians(self.poured_bend_deg)
+        if not bend:
+            return _path([self.length_m / self.segments] * self.segments, [0.0] * self.segments)
+        return _path(*_arc(self.length_m / bend, bend, self.segments))
+
+    def filament(self, factor: float, liquid: Liquid | None) -> Filament:
+        """Return what the body is made of, its length multiplied by a factor [1], in a liquid."""
+        assert self.diameter_m is not None
+        rest = PreferredCurvature(amplitudes=self.curvature_per_m) if self.curvature_per_m else None
+        return Filament(
+            nodes=self.segments + 1,
+            length=factor * self.length_m,
+            diameter=self.diameter_m,
+            density=self.density_kg_per_m3,
+            young_modulus=self.young_modulus_Pa,
+            stretching_time=self.stretching_time_s,
+            bending_time=self.bending_time_s,
+            curvature=rest,
+            liquid=liquid,
+        )
+
+
 AnyShape = Annotated[
-    Rod | Staple | Z | S | Hook | C | Cross | Star | Ring | Free,
+    Rod | Staple | Z | S | Hook | C | Cross | Star | Ring | Free | Flexible,
     Field(discriminator="shape"),
 ]
 SHAPES = get_args(get_args(AnyShape)[0])

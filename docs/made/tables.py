@@ -23,6 +23,7 @@ _SETS = (
     ("In scenes with hooks", "HOOK_COLUMNS"),
     ("In scenes that take the container away", "RELEASE_COLUMNS"),
     ("In scenes that strain a chain", "STRAIN_COLUMNS"),
+    ("In scenes of filaments", "FILAMENT_COLUMNS"),
 )
 
 

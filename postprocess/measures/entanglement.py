@@ -37,7 +37,7 @@ from postprocess.geometry.links import (
     plane_frames,
 )
 from postprocess.geometry.segments import Curve, checked_segments, curves, segments_of
-from postprocess.measures.registry import FrameMeasure, Quantity, Shown, any_in_space
+from postprocess.measures.registry import FrameMeasure, Quantity, Shown, rigid_in_space
 
 STRAIGHT = 0.99  #: Tip-to-tip distance over unfolded length above which a body counts as straight [-]
 FLAT = 0.1  #: Largest distance of a corner from the plane of its body, over the body's radius, for a flat body [-]
@@ -318,6 +318,6 @@ MEASURES = (
             Quantity("planes", "-"),
         ),
         take=_entanglement_of,
-        available_for=any_in_space,
+        available_for=rigid_in_space,
     ),
 )

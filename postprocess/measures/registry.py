@@ -108,6 +108,16 @@ def any_in_space(run: Run) -> bool:
     return not run.manifest.planar
 
 
+def rigid_in_space(run: Run) -> bool:
+    """Return whether the bodies of a run keep their shape, so that it may span a plane, and move in space."""
+    return any_in_space(run) and not is_flexible(run)
+
+
+def is_flexible(run: Run) -> bool:
+    """Return whether the bodies of a run are filaments."""
+    return any(kind.flexible for kind in run.manifest.kinds or ())
+
+
 def in_space(run: Run) -> bool:
     """Return whether the bodies of a run are smarticles and move in three dimensions, not in a plane."""
     return any_in_space(run) and run.manifest.kinds is None

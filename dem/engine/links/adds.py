@@ -21,17 +21,24 @@ ADDS: Mapping[EffectName, Adds] = {
     EffectName.MOTORS: Adds(python="one control update of all motors per control period"),
     EffectName.HOOKS: Adds(shapes=("square bars",)),
     EffectName.WALL_REMOVAL: Adds(python="the lower edge of a wall, while it is lifted"),
+    EffectName.FILAMENTS: Adds(
+        engines=("move_segments", "push_nodes", "kick_nodes", "drift_nodes"), python="bends between all segments"
+    ),
     EffectName.ENERGY_ACCOUNT: Adds(engines=("settle",), python="every contact's velocity twice in a step"),
     EffectName.CHECKPOINTS: Adds(python="copies all arrays once per checkpoint"),
 }
 
 ORDER = (
     "pose",
+    "move_segments",
     "update_lists",
     "push_apart",
     "push_boundaries",
     "pull",
+    "push_nodes",
     "kick",
+    "kick_nodes",
     "settle",
     "drift",
+    "drift_nodes",
 )

@@ -21,6 +21,7 @@ from dem.engine.interface import Saved
 from dem.engine.links.boundaries import LinksBoundaries, ground_for
 from dem.engine.links.contact import queries
 from dem.engine.links.contact.queries import BETWEEN, DEEPEST, ELASTIC, FASTEST, HIGHEST, LOWEST, WIDEST
+from dem.engine.links.filaments import LinksFilaments
 from dem.engine.links.ledger import LinksLedger
 from dem.engine.links.motors import LinksMotors
 from dem.engine.links.stepping import LOST
@@ -49,7 +50,7 @@ class LinksEngine:
     """`dem.engine.interface.Engine` on links.
 
     Args:
-        particle: one smarticle, or a mixture of rigid bodies.
+        particle: one smarticle, or a mixture of rigid bodies or of filaments.
         cylinder: the container; its floor is at z = 0 at the start.
         law: contact law.
         gravity: g, downwards [m/s²].
@@ -60,6 +61,7 @@ class LinksEngine:
         hooks: the lower and the upper hook; None: no hooks.
         channel: table and walls instead of the container; all motion is then confined to a plane.
         strengths: (N, 2) factors on torque limit and stiffness of the motors [1]; None: 1 for all motors.
+        wave_seed: seed of the waves of filaments that bend by themselves.
     """
 
     def __init__(
@@ -76,6 +78,7 @@ class LinksEngine:
         hooks: tuple[Cross, Cross] | None = None,
         channel: Channel | None = None,
         strengths: Array | None = None,
+        wave_seed: int = 0,
     ) -> None:
         self.particle = particle
         self.cylinder = cylinder
@@ -89,6 +92,7 @@ class LinksEngine:
             gravity=gravity,
             planar=channel is not None,
             keep_ledger=keep_ledger,
+            wave_seed=wave_seed,
         )
         if hooks is not None:
             self._world.add_hooks([cross.bars for cross in hooks])
@@ -96,7 +100,8 @@ class LinksEngine:
             self._world.add_rim(height, radius)
         if channel is not None:
             self._world.channel = np.array([math.inf if channel.width is None else channel.width / 2])
-        self.ledger = LinksLedger(self._world)
+        self.filaments = LinksFilaments(self._world) if self._world.filaments is not None else None
+        self.ledger = LinksLedger(self._world, self.filaments)
         self.boundaries = LinksBoundaries(self._world, cylinder, shaken=shaken, removed=self.ledger.removed)
         self.motors = LinksMotors(self._world, motor_law, strengths)
         self.strings = LinksStrings(self._world)
@@ -130,7 +135,10 @@ class LinksEngine:
     def advance(self, steps: int) -> None:
         if steps > 0:
             self._world.advance(steps)
-            self._smarticle_seconds += steps * self.time_step * float(self._relative_masses.sum())
+            weights = self._relative_masses
+            if self.filaments is not None:
+                weights = weights * self._weight_shares
+            self._smarticle_seconds += steps * self.time_step * float(weights.sum())
 
     # -- smarticles --------------------------------------------------------------------------------------------
 
@@ -139,11 +147,14 @@ class LinksEngine:
         return self._world.count
 
     def add(self, poses: Poses, *, speed: float = 0.0) -> None:
+        before = self.ledger.deformation
         self._world.add(poses, speed=speed)
         mass, heights = self._first_mass, poses.positions[:, 2]
         relative = self._relative_masses[-len(heights) :] if len(heights) else np.zeros(0)
         new = float(relative.sum())
-        self.ledger.added += mass * (self.gravity * float((relative * heights).sum()) + new * speed**2 / 2)
+        weights = relative * self._weight_shares[-len(heights) :] if self.filaments is not None else relative
+        self.ledger.added += mass * (self.gravity * float((weights * heights).sum()) + new * speed**2 / 2)
+        self.ledger.added += self.ledger.deformation - before
         self._thrown += mass * new * speed
 
     @property
@@ -157,7 +168,14 @@ class LinksEngine:
         masses = self._world.shapes.mass
         return np.asarray((masses / masses[0])[self._world.bodies.shape])
 
+    @property
+    def _weight_shares(self) -> Array:
+        """(N,) weights of filaments in the liquid over those without it [1]."""
+        rods = [kind.filament for kind in self._world.kinds]
+        return np.array([1.0 if rod is None else rod.weight_share for rod in rods])[self._world.bodies.shape]
+
     def still(self) -> None:
+        assert self.filaments is None  # only the bodies of another run are stopped, and no run hands filaments on
         assert not self.motors.articulated  # links that are at rest would be told otherwise by their motors
         world = self._world
         world.totals[LOST] += self.state().kinetic_energy
@@ -174,12 +192,16 @@ class LinksEngine:
     def unbalanced_force(self) -> float:
         if not self.count or not self.gravity:
             return math.inf
+        if self.filaments is not None:
+            return self.filaments.mean_unbalanced()
         weight, relative = self._first_mass * self.gravity, self._relative_masses
         forces = self._world.bodies.load[:, :3] - weight * relative[:, None] * [0.0, 0.0, 1.0]
         return float(np.linalg.norm(forces, axis=1).mean() / (weight * float(relative.mean())))
 
     def neighbours(self) -> NDArray[np.int64]:
         pairs = self._world.contacts().pairs
+        if self.filaments is not None:  # which may touch themselves
+            pairs = pairs[pairs[:, 0] != pairs[:, 1]]
         # Two numbers as one: rows are sorted twenty times slower.
         both = np.unique(pairs[:, 0] * self.count + pairs[:, 1])
         return np.bincount(np.concatenate(np.divmod(both, max(1, self.count))), minlength=self.count)
@@ -202,7 +224,8 @@ class LinksEngine:
         deep = ~(depths <= limit)
         held = self._held(found.held, ~(depths <= min(limit, HOLDS * diameter)), APART * diameter)
         deep[[one.smarticle for one in held]] = True
-        return Overlaps(float(depths.max(initial=0.0)), deep, found.elastic_energy, held)
+        elastic = found.elastic_energy + self.ledger.deformation
+        return Overlaps(float(depths.max(initial=0.0)), deep, elastic, held)
 
     def contact_forces(self) -> ContactForces:
         """Return the forces with which the next step begins."""
@@ -235,7 +258,7 @@ class LinksEngine:
             widest=found[WIDEST],
             gap=0.0,
             deepest=found[DEEPEST] * self.particle.diameter,
-            elastic_energy=found[ELASTIC],
+            elastic_energy=found[ELASTIC] + self.ledger.deformation,
         )
 
     def _held(self, held: NDArray[np.bool_], deep: NDArray[np.bool_], least: float) -> tuple[Held, ...]:

@@ -3,45 +3,22 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
-from typing import NamedTuple
+from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
+from dem.body.filament import Activity, Filament, FilamentEnergies, PreferredCurvature
 from dem.engine.links.arrays import Filaments
 from dem.engine.links.motion import bending
+from dem.engine.links.rods import wave_of
 from dem.engine.links.world import World
 
 Array = NDArray[np.float64]
 
 
-class FilamentEnergies(NamedTuple):
-    """Energies of all filaments [J]; work since the start."""
-
-    kinetic: float  #: Of nodes and of rolling, half a step before
-    potential: float  #: Weight less buoyancy times height above z = 0
-    stretching: float
-    bending: float  #: Against the preferred curvature
-    twisting: float
-    damped: float  #: Taken by internal damping
-    dragged: float  #: Taken by the liquid's drag
-    active: float  #: Given by changes of the preferred curvature
-    gripped: float  #: Given by grips
-
-    @property
-    def stored(self) -> float:
-        """[J]."""
-        return self.kinetic + self.potential + self.stretching + self.bending + self.twisting
-
-    @property
-    def residual(self) -> float:
-        """What is stored, less what was given, plus what was taken; constant without contacts [J]."""
-        return self.stored + self.damped + self.dragged - self.active - self.gripped
-
-
 class LinksFilaments:
-    """What a run does with the filaments of a world, which `World.add_filaments` adds, and asks of them."""
+    """`dem.engine.interface.Filaments` on links: what a run does with the filaments of a world, and asks of them."""
 
     def __init__(self, world: World) -> None:
         self._world = world
@@ -82,34 +59,63 @@ class LinksFilaments:
         """Move a grip with a velocity [m/s] from now on: a path is a list of these."""
         self._all.grip_speed[grip] = velocity
 
-    def release(self, grip: int) -> None:
-        """Let go of all nodes that a grip holds."""
-        held = (self._all.grip != 0) & (self._all.grip // bending.GRIP == grip)
-        self._all.grip[held] = 0
+    def release(self, grip: int | None = None) -> None:
+        """Let go of all nodes that a grip holds; None: all grips."""
+        own = self._all.grip
+        own[(own != 0) & ((grip is None) | (own // bending.GRIP == grip))] = 0
 
-    def force(self, grip: int) -> Array:
-        """Return the force (3,) of a grip on its nodes in the last step [N]."""
-        force: Array = self._all.grip_force[grip].copy()
+    @property
+    def held(self) -> int:
+        """Number of filaments that a grip holds."""
+        own = self._all
+        return len(np.unique(np.searchsorted(own.begin, np.flatnonzero(own.grip), side="right")))
+
+    def force(self, grip: int | None = None) -> Array:
+        """Return the force (3,) of a grip on its nodes in the last step [N]; None: of all grips together."""
+        forces = self._all.grip_force
+        force: Array = forces.sum(axis=0) if grip is None else forces[grip].copy()
         return force
 
-    def act(
-        self, factor: float, *, rate: float | None = None, reversal_rate: float | None = None, ramp: float = 0.0
-    ) -> None:
-        """Change how filaments bend by themselves.
+    def act(self, activity: Activity | None, *, ramp: float = 0.0) -> None:
+        """Let filaments bend by themselves from now on; the turn of each wave and its reversals go on.
 
         Args:
-            factor: on the amplitudes of their preferred curvatures [1]; 0: quiet.
-            rate: α [rad/s]; None: as it is.
-            reversal_rate: λ [1/s]; None: as it is.
-            ramp: time in which the factor changes [s].
+            activity: what they do; None: they return to the curvature that they prefer at rest.
+            ramp: time in which the new curvature grows from 0 [s].
         """
         gait = self._all.gait
-        gait[:, bending.TARGET] = factor
-        gait[:, bending.CHANGE] = math.inf if ramp == 0 else np.abs(factor - gait[:, bending.FACTOR]) / ramp
-        if rate is not None:
-            gait[:, bending.RATE] = rate
-        if reversal_rate is not None:
-            gait[:, bending.REVERSALS], gait[:, bending.WAIT] = reversal_rate, math.inf
+        for number, filament in self._kinds_of():
+            own = filament.curvature or PreferredCurvature(amplitudes=0.0)
+            if activity is not None:
+                turn = 2 * math.pi * filament.segment_length / activity.wavelength
+                own = PreferredCurvature(
+                    amplitudes=activity.curvature,
+                    phases=turn * np.arange(filament.nodes - 2, dtype=np.float64),
+                    rate=activity.rate,
+                    reversal_rate=activity.reversal_rate,
+                )
+            self._all.wave[self._nodes(number)] = wave_of(filament, own)
+            gait[number, bending.RATE], gait[number, bending.REVERSALS] = own.rate, own.reversal_rate
+        gait[:, bending.WAIT] = math.inf
+        gait[:, bending.FACTOR] = 1.0 if ramp == 0 else 0.0
+        gait[:, bending.TARGET] = 1.0
+        gait[:, bending.CHANGE] = math.inf if ramp == 0 else 1.0 / ramp
+
+    def _kinds_of(self) -> Iterator[tuple[int, Filament]]:
+        """Yield the number of each filament and what it is made of."""
+        world = self._world
+        for number, body in enumerate(self._all.body):
+            filament = world.kinds[world.bodies.shape[body]].filament
+            assert filament is not None
+            yield number, filament
+
+    def mean_unbalanced(self) -> float:
+        """Return the mean net force on a filament over its weight in the liquid [1], without nodes that are held."""
+        own, world = self._all, self._world
+        forces = (own.force + own.damping + own.drag)[:, :3] * (own.grip == 0)[:, None]
+        net = np.linalg.norm(np.add.reduceat(forces, own.begin[:-1]), axis=1)
+        weights = [f.mass * abs(f.weight_share) * world.gravity for _, f in self._kinds_of()]
+        return float(net.mean() / np.mean(weights))
 
     @property
     def energies(self) -> FilamentEnergies:

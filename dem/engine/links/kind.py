@@ -13,7 +13,7 @@ from dem.engine.links.cache import announce, is_kept, stamp
 from dem.engine.links.cost import COMPILE_FIRST, COMPILE_MORE, seconds_per_second
 from dem.engine.links.engine import LinksEngine
 from dem.engine.links.shapes import kind_shape
-from dem.engine.links.stable_step import links_stable_time_step, rigid_stable_time_step
+from dem.engine.links.stable_step import filament_stable_time_step, links_stable_time_step, rigid_stable_time_step
 
 # Groups of arrays without which `advance` is compiled where a scene has none of them. No scene has those of filaments.
 OF_FILAMENTS = frozenset({"bends", "filaments", "flexible", "stretch"})
@@ -40,8 +40,11 @@ class LinksKind:
 
     def stable_step(self, scene: Demand, *, articulated: bool) -> float:
         if scene.mixture is not None:
-            shapes = [kind_shape(kind) for kind in scene.mixture.kinds]
-            return rigid_stable_time_step(shapes, contact_law_of(scene))
+            shapes, law = [kind_shape(kind) for kind in scene.mixture.kinds], contact_law_of(scene)
+            rods = [shape.filament for shape in shapes if shape.filament is not None]
+            if rods:
+                return min(filament_stable_time_step(rod, law, shapes[0].effective_mass) for rod in rods)
+            return rigid_stable_time_step(shapes, law)
         return links_stable_time_step(
             scene.particle,
             contact_law_of(scene),
@@ -73,6 +76,7 @@ class LinksKind:
             hooks=None if scene.hooks is None else scene.hooks.crosses,
             channel=scene.channel,
             strengths=scene.motor_strengths,
+            wave_seed=scene.wave_seed,
         )
 
 
@@ -80,6 +84,7 @@ def _present(scene: Demand) -> Iterator[frozenset[str]]:
     """Yield the groups of arrays that are present in each kind of phase of a scene."""
     known = {
         "channel": scene.channel is not None,
+        "filaments": scene.mixture is not None and scene.mixture.flexible,
         "hooks": scene.hooks is not None,
         "ledger": scene.recording.dissipation_interval_s is not None,
         "rims": scene.channel is None and bool(scene.cylinder.upper),

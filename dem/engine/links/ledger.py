@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+from dem.engine.links.filaments import LinksFilaments
 from dem.engine.links.stepping import LOST, WORK
 from dem.engine.links.world import World
 
@@ -11,26 +12,38 @@ from dem.engine.links.world import World
 class LinksLedger:
     """`dem.engine.interface.EnergyLedger` on links."""
 
-    def __init__(self, world: World) -> None:
+    def __init__(self, world: World, filaments: LinksFilaments | None) -> None:
         self._world = world
+        self._filaments = filaments
         self.added = 0.0
 
     @property
     def container_work(self) -> float:
-        return float(self._world.totals[WORK])
+        own = float(self._world.totals[WORK])
+        return own if self._filaments is None else own + self._filaments.energies.gripped
 
     @property
     def dissipated(self) -> float:
-        """Energy dissipated since the start [J], by welding and stopping, and by contacts if recorded."""
-        return float(self._world.totals[LOST])
+        """Energy dissipated since the start [J], by welding, stopping and drag; by contacts and bends if recorded."""
+        lost = float(self._world.totals[LOST])
+        if self._filaments is None:
+            return lost
+        energies = self._filaments.energies
+        return lost + energies.damped + energies.dragged
 
     @property
     def given(self) -> float:
-        return self.added + self.container_work
+        given = self.added + self.container_work
+        return given if self._filaments is None else given + self._filaments.energies.active
+
+    @property
+    def deformation(self) -> float:
+        """Energy of stretched, bent and twisted filaments [J]; 0 without filaments."""
+        return 0.0 if self._filaments is None else self._filaments.energies.elastic
 
     def elastic(self) -> tuple[float, float]:
-        """Return the energy in the springs of all contacts [J], and 0, since hinges have no springs."""
-        return self._world.contacts().elastic_energy, 0.0
+        """Return the energy in the springs of all contacts and that of deformed filaments [J]; hinges are rigid."""
+        return self._world.contacts().elastic_energy, self.deformation
 
     def take_in(self) -> None:
         self.added += self.elastic()[0]

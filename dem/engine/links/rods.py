@@ -7,7 +7,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from dem.body.filament import Filament
+from dem.body.filament import Filament, PreferredCurvature
 from dem.engine.links.arrays import Filaments
 from dem.engine.links.motion import bending
 
@@ -34,6 +34,16 @@ def rod_of(filament: Filament) -> Array:
             stiffest, stiffest_twist,
         ]
     )  # fmt: skip
+
+
+def wave_of(filament: Filament, curvature: PreferredCurvature | None) -> Array:
+    """Return the preferred curvature (nodes, 3) of a filament: amplitude, cosine and sine of the phase at each node."""
+    wave = np.zeros((filament.nodes, 3))
+    if curvature is not None:
+        # A curvature 1/R turns a segment by the angle ℓ/R, and κ is twice the tangent of half of it.
+        wave[1:-1, 0] = 2 * np.tan(np.asarray(curvature.amplitudes) * filament.segment_length / 2)
+        wave[1:-1, 1], wave[1:-1, 2] = np.cos(curvature.phases), np.sin(curvature.phases)
+    return wave
 
 
 def none_of() -> Filaments:
@@ -64,7 +74,6 @@ def filaments_at(
     edges = np.diff(points, axis=1)
     extents = np.sqrt((edges**2).sum(axis=2))
     tangents = edges / extents[:, :, None]
-    wave = np.zeros((nodes, 3))
     gait = np.zeros((count, bending.GAIT))
     gait[:, bending.SENSE] = gait[:, bending.FACTOR] = gait[:, bending.TARGET] = 1.0
     gait[:, bending.WAIT] = math.inf
@@ -73,9 +82,6 @@ def filaments_at(
     if filament.curvature is not None:
         own = filament.curvature
         gait[:, bending.RATE], gait[:, bending.REVERSALS] = own.rate, own.reversal_rate
-        # A curvature 1/R turns a segment by the angle ℓ/R, and κ is twice the tangent of half of it.
-        wave[1:-1, 0] = 2 * np.tan(np.asarray(own.amplitudes) * filament.segment_length / 2)
-        wave[1:-1, 1], wave[1:-1, 2] = np.cos(own.phases), np.sin(own.phases)
 
     def per_node(values: Array) -> Array:
         """Return values of segments (F, nodes - 1, …) with a row of zeros for each last node."""
@@ -87,7 +93,7 @@ def filaments_at(
         begin=(len(old.mass) + nodes * np.arange(1, count + 1)).astype(np.int32),
         rod=np.tile(rod_of(filament), (count, 1)),
         gait=gait,
-        wave=np.tile(wave, (count, 1)),
+        wave=np.tile(wave_of(filament, filament.curvature), (count, 1)),
         preferred=np.zeros((total, 2)),
         mass=np.tile(filament.masses, count),
         position=points.reshape(total, 3).copy(),

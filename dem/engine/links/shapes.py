@@ -152,7 +152,9 @@ def offsets_of(particle: Particle) -> Array:
 
 
 def kind_shape(kind: Kind) -> Shape:
-    """Return the shape of a kind of rigid body."""
+    """Return the shape of a kind of body."""
+    if kind.filament is not None:
+        return filament_shape(kind.filament)
     shape = rigid_shape(kind.bars, kind.rows, kind.radius)
     return replace(shape, effective_mass=typical_effective_mass(kind))
 
@@ -195,8 +197,7 @@ def filament_shape(filament: Filament) -> Shape:
         lines=_lines(axes, filament.diameter / 2),
         link=np.arange(count),
         shared=np.where(np.arange(count) > 0, AT_START, 0).astype(np.uint8),
-        # A push at s moves the two nodes by (1 - s)²/m and s²/m, 2/3 in the mean.
-        effective_mass=1.5 * filament.mass / count,
+        effective_mass=filament.effective_mass,
         filament=filament,
     )
 

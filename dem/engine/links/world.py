@@ -15,7 +15,7 @@ from dem.body.kinds import Mixture
 from dem.body.linear import matrix_product
 from dem.body.particle import LINKS, Particle
 from dem.body.placement import Poses
-from dem.body.state import PileState, RigidState, State
+from dem.body.state import FilamentState, PileState, RigidState, State
 from dem.engine.links.arrays import (
     LEDGER,
     MOTION,
@@ -101,7 +101,8 @@ class World:
     planar: bool  #: Whether all motion is confined to the plane z = 0
     keep_ledger: bool  #: Whether to sum the energy that contacts dissipate
     more: tuple[Shape, ...] = ()  #: Shapes of bodies that are not smarticles
-    mixture: Mixture | None = None  #: Kinds of rigid bodies
+    mixture: Mixture | None = None  #: Kinds of bodies that are no smarticles
+    wave_seed: int = 0  #: Seed of the waves of filaments: where they begin, and when they reverse
     steps: int = 0  #: Number of steps made since the start
     time_step: float = math.nan  #: dt [s]
     motors: Motoring | None = None  #: The motors; None before the first articulation
@@ -176,6 +177,9 @@ class World:
     def add(self, poses: Poses, *, speed: float = 0.0) -> None:
         """Add welded bodies that fall at a speed [m/s] without rotation."""
         turns = np.array([rotation.as_matrix() for rotation in poses.rotations]).reshape(-1, 3, 3)
+        if self.filaments is not None:
+            self._add_posed_filaments(poses, turns, speed)
+            return
         if poses.kinds is not None:
             self.add_bodies(poses.kinds, poses.positions, turns, speed=speed)
             return
@@ -216,6 +220,19 @@ class World:
         self.forget_places()
         self._make_room_at_boundaries()
         self.make_room()
+
+    def _add_posed_filaments(self, poses: Poses, turns: Array, speed: float) -> None:
+        """Add filaments of a mixture in the shape in which they are poured, one after another."""
+        assert self.mixture is not None
+        assert poses.kinds is not None
+        rng = np.random.default_rng([self.wave_seed, self.count])
+        for shape, position, turn in zip(poses.kinds, poses.positions, turns, strict=True):
+            ends = self.mixture.kinds[shape].bars.ends
+            points = matrix_product(np.concatenate([ends[:, 0], ends[-1:, 1]]), turn.T) + position
+            velocities = np.zeros_like(points)
+            velocities[:, 2] = -speed
+            start = rng.uniform(0, 2 * math.pi, 1)
+            self.add_filaments(int(shape), points[None], velocities=velocities[None], starts=start, seed=self.wave_seed)
 
     def add_filaments(
         self, shape: int, points: Array, *, velocities: Array | None = None, starts: Array | None = None, seed: int = 0
@@ -398,6 +415,13 @@ class World:
             "positions or velocities are no numbers, the simulation has blown up",
             "lower fidelity.time_step_fraction",
         )
+        if self.mixture is not None and self.filaments is not None:
+            own = self.filaments
+            return FilamentState(
+                self.mixture,
+                bodies.shape.astype(np.int64),
+                *(each.copy() for each in (own.position, own.velocity, own.spin)),
+            )
         if self.mixture is not None:
             moving = (bodies.position.copy(), bodies.axes.copy(), bodies.velocity.copy(), bodies.spin.copy())
             return RigidState(self.mixture, bodies.shape.astype(np.int64), *moving)

@@ -1,0 +1,71 @@
+"""The phase in which filaments bend by themselves."""
+
+import math
+from collections.abc import Sequence
+from typing import ClassVar, Literal
+
+from pydantic import Field
+
+from dem.body.filament import Activity
+from dem.engine.interface import Engine
+from dem.phases.phase import Memory, Phase, SceneView, Stage
+from dem.setting.part import Duration, Length, Part
+
+TIGHTEST = 0.5  # of a filament's curvature times its diameter: a bend in which it would touch itself
+
+
+class Wriggle(Part, Phase):
+    """Let filaments bend by themselves: a wave of preferred curvature travels along each and turns about it.
+
+    Waves begin at random phases, and go on in later phases until the next `wriggle` or `relax`.
+    """
+
+    of_filaments: ClassVar[bool] = True
+    type: Literal["wriggle"]
+    duration_s: Duration = Field(..., description="length of the phase [s]")
+    curvature_per_m: float = Field(..., ge=0, le=1e5, description="amplitude of the preferred curvature [1/m]")
+    frequency_Hz: float = Field(
+        1.0, ge=0, le=1e4, description="turns of the wave per second; 0: filaments hold the bends that they have [Hz]"
+    )
+    wavelength_m: Length | None = Field(
+        None, description="wavelength along the filament [m]; default: equal along it, so that it bends into an arc"
+    )
+    turns_between_reversals: float | None = Field(
+        None,
+        ge=1e-3,
+        le=1e6,
+        description="γ = α/2πλ, mean number of turns between two reversals, which come at random times [1]; default: "
+        "no reversals",
+    )
+    ramp_s: float = Field(0.2, ge=0, le=1e6, description="time in which the curvature grows from 0 [s]")
+
+    def warnings(self, scene: SceneView, index: int) -> Sequence[str]:
+        most = TIGHTEST / scene.sphere_diameter
+        if self.curvature_per_m <= most:
+            return ()
+        return (
+            f"phases.{index}.curvature_per_m: {self.curvature_per_m:g} bends a filament of {scene.sphere_diameter:g} m "
+            f"into itself; use less than {most:.3g}",
+        )
+
+    def first_memory(self, scene: SceneView) -> Memory:
+        return {"begun": False}
+
+    @property
+    def activity(self) -> Activity:
+        """What the filaments do."""
+        turns = self.turns_between_reversals
+        return Activity(
+            curvature=self.curvature_per_m,
+            wavelength=math.inf if self.wavelength_m is None else self.wavelength_m,
+            rate=2 * math.pi * self.frequency_Hz,
+            reversal_rate=0.0 if turns is None else self.frequency_Hz / turns,
+        )
+
+    def proceed(self, stage: Stage, engine: Engine) -> float:
+        if stage.memory["begun"]:
+            return 0.0
+        stage.memory["begun"] = True
+        assert engine.filaments is not None  # the scene was checked
+        engine.filaments.act(self.activity, ramp=self.ramp_s)
+        return self.duration_s

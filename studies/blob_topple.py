@@ -1,0 +1,162 @@
+"""Does a tall blob of worms topple in one piece when all tails let go of the surface at once?
+
+Savoie, Tuazon, Tiwari, Bhamla and Goldman, "Amorphous entangled active matter", Soft Matter 2023, show a blob of living
+blackworms that stands tall and narrow, held up by tails at the surface of the water. A flash of ultraviolet light makes
+all worms retract their tails: the blob falls onto its side and stays entangled (one trial). Here worms are flexible
+filaments that tangle in a narrow glass. Then all tails are held and raised a little, the glass is taken away, and all
+tails are let go.
+
+The model assumes that worms hold the bends in which they tangled, that tails are held rigidly, and that letting go is
+instantaneous. It has no surface of the water, no retraction of tails, no escape from light, and no touch or slime.
+"""
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from dem.body.bars import segment_distances
+from dem.record.frame import Frame
+from dem.record.run import Run
+from postprocess.geometry.bars import body_centres
+from postprocess.geometry.segments import close_segments
+from postprocess.measures.clusters import joined_clusters
+from postprocess.statistics.points import ASPECT, SEED
+from postprocess.statistics.seeds import mean_over_seeds
+from studies.framework.figures import Histories, History, one_by_one
+from studies.framework.findings import Effect, Finding
+from studies.framework.runs import Key, Row, declare, last_columns, run_columns
+from studies.framework.study import COUNT, Study
+
+FALL, AWAY, CLUSTER = "fall of the centre of mass [m]", "way sideways [m]", "largest cluster [-]"
+BEFORE, SLENDER, AFTER = "height before [m]", "slenderness before [-]", "slenderness after [-]"
+TOUCHING = 1.05  #: Largest distance of the axes of worms that touch, in diameters
+SIDE = 0.5  #: Least way sideways over the fall of a blob that falls onto its side
+WHOLE = 0.9  #: Least share of the worms in the largest cluster of a blob in one piece
+
+QUANTITIES = declare(
+    {
+        BEFORE: ("height [mm]", ".2f", "height of the centre of mass while tails are held and the glass is gone"),
+        FALL: ("fall [mm]", ".2f", "by how much the centre of mass is lower at the end"),
+        AWAY: ("sideways [mm]", ".2f", "horizontal way of the centre of mass from the release to the end"),
+        SLENDER: ("slender before", ".2f", "spread of all segments along z over that along x and y, tails held"),
+        AFTER: ("after", ".2f", "this ratio at the end"),
+        CLUSTER: ("one cluster", ".2f", "share of worms in the largest cluster of worms that touch, at the end"),
+    },
+    scales={BEFORE: 1e3, FALL: 1e3, AWAY: 1e3},
+)
+
+
+def _stages(run: Run) -> tuple[Frame, Frame, float]:
+    """Return the last frame with held tails, the last frame, and the time of the release [s]."""
+    place = next(phase.index for phase in run.phases if phase.type == "release")
+    frames = list(run.frames)
+    begin = float(run.series.time[run.series["phase"] > place][0])
+    return [frame for frame in frames if frame.phase < place][-1], frames[-1], begin
+
+
+def measure(run: Run) -> Row:
+    """Measure how a blob fell, and whether it stayed in one piece."""
+    held, last, _ = _stages(run)
+    one, other = centre(held), centre(last)
+    return {
+        **{name: cell for name, cell in run_columns(run).items() if name != ASPECT},
+        BEFORE: one[2] - held.floor_z,
+        FALL: one[2] - other[2],
+        AWAY: float(np.hypot(*(other - one)[:2])),
+        SLENDER: slenderness(held),
+        AFTER: slenderness(last),
+        CLUSTER: largest_cluster(last, run.manifest.sphere_diameter_m),
+        **last_columns(run),
+    }
+
+
+def centre(frame: Frame) -> NDArray[np.float64]:
+    """Return the centre of mass (3,) [m] of equal bodies."""
+    return np.asarray(body_centres(frame).mean(axis=0))
+
+
+def slenderness(frame: Frame) -> float:
+    """Return the standard deviation of the segments' middles along z over that along one horizontal direction."""
+    x, y, z = np.var(frame.segments.mean(axis=1), axis=0)
+    return float(np.sqrt(2 * z / (x + y)))
+
+
+def largest_cluster(frame: Frame, diameter: float) -> float:
+    """Return the share of bodies in the largest cluster of bodies that touch."""
+    segments, reach = frame.segments, TOUCHING * diameter
+    i, j = close_segments(segments[:, 0], segments[:, 1], frame.body, reach)
+    touch = segment_distances(segments[i], segments[j]) <= reach
+    return joined_clusters(frame.count, frame.body[i[touch]], frame.body[j[touch]]).largest
+
+
+def _falls(table: pd.DataFrame) -> list[Effect]:
+    return [
+        Effect(
+            label="height before over height after",
+            value=mean_over_seeds(table[BEFORE] / (table[BEFORE] - table[FALL])),
+            threshold=1.0,
+        ),
+        Effect(label="slenderness before less after", value=mean_over_seeds(table[SLENDER] - table[AFTER])),
+    ]
+
+
+def _sideways(table: pd.DataFrame) -> list[Effect]:
+    tallest = table[table[COUNT] == table[COUNT].max()]
+    value = mean_over_seeds(tallest[AWAY] / tallest[FALL])
+    return [Effect(label="way sideways over the fall, of the tallest blob", value=value, threshold=SIDE)]
+
+
+def _whole(table: pd.DataFrame) -> list[Effect]:
+    return [Effect(label="share of worms in one cluster", value=mean_over_seeds(table[CLUSTER]), threshold=WHOLE)]
+
+
+def _history(run: Run) -> History:
+    _, _, begin = _stages(run)
+    own = run.series.time >= begin - 1.0
+    return History(times=run.series.time[own] - begin, values=1e3 * run.series["com_height_m"][own])
+
+
+def _path(run: Run) -> History:
+    _, _, begin = _stages(run)
+    frames = [frame for frame in run.frames if frame.time >= begin - 1.0]
+    centres = np.array([centre(frame) for frame in frames])
+    away = np.hypot(*(centres - centres[0])[:, :2].T)
+    return History(times=np.array([frame.time - begin for frame in frames]), values=1e3 * away)
+
+
+STUDY = Study(
+    name="blob-topple",
+    title="A tall blob of worms whose tails let go",
+    measure=measure,
+    same_count=(COUNT,),
+    keys=(Key(column=COUNT, label="worms", form="g"),),
+    order=(COUNT, SEED),
+    quantities=tuple(QUANTITIES.values()),
+    findings=(
+        Finding(id="falls", says="The blob falls when its tails let go, and is less slender then", outcome=_falls),
+        Finding(id="sideways", says="It falls onto its side", outcome=_sideways),
+        Finding(id="in-one-piece", says="It stays in one piece", outcome=_whole),
+    ),
+    figures=(
+        Histories(
+            name="height_time",
+            history=_history,
+            split=one_by_one(COUNT, "{:g} worms".format),
+            x_label="time since tails let go [s]",
+            quantities={"": "height of the centre of mass [mm]"},
+        ),
+        Histories(
+            name="sideways_time",
+            history=_path,
+            split=one_by_one(COUNT, "{:g} worms".format),
+            x_label="time since tails let go [s]",
+            quantities={"": "way of the centre of mass sideways [mm]"},
+            width=0.2,
+        ),
+    ),
+    remarks=(
+        "Worms are filaments of 30 × 0.8 mm in water that hold helical bends (250 1/m, wavelength 60 mm). Tails are "
+        "the last nodes of all worms; they are held where the tangling left them, and raised by 3 mm.",
+    ),
+    pictured={"count": 80},
+)

@@ -1,0 +1,66 @@
+"""Known answers of the measures of blobs of worms, on curves that are made by hand."""
+
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from postprocess.statistics.points import SEED
+from studies import blob_lift, blob_topple
+
+SHARES = (blob_lift.SHARE, blob_lift.OTHERS)
+
+
+def frame(starts: np.ndarray, step: tuple[float, float, float], bodies: int) -> Any:
+    segments = np.stack([starts, starts + np.array(step)], axis=1)
+    return SimpleNamespace(segments=segments, body=np.arange(bodies), count=bodies, time=0.0)
+
+
+def test_slenderness_is_that_of_a_column() -> None:
+    rng = np.random.default_rng(1)
+    places = rng.normal(size=(20_000, 3)) * [1e-3, 1e-3, 4e-3]
+    assert blob_topple.slenderness(frame(places, (0.0, 0.0, 0.0), 20_000)) == pytest.approx(4, rel=0.02)
+
+
+def test_worms_that_touch_are_one_cluster() -> None:
+    # Four parallel worms: three a diameter apart, one far away.
+    starts = np.array([[0, 0, 0], [0, 1e-3, 0], [0, 2e-3, 0], [0, 9e-3, 0]], dtype=float)
+    assert blob_topple.largest_cluster(frame(starts, (0.01, 0.0, 0.0), 4), 1e-3) == 0.75
+    assert blob_topple.largest_cluster(frame(2 * starts, (0.01, 0.0, 0.0), 4), 1e-3) == 0.25
+
+
+def test_gripped_worms_are_those_that_move_with_the_end_piece() -> None:
+    starts = np.array([[0, 0, 0], [0.02, 0, 0], [0.04, 0, 0]], dtype=float)
+    one, other = frame(starts, (0.01, 0, 0), 3), frame(starts, (0.01, 0, 0), 3)
+    one.time, other.time = 10.2, 10.6
+    other.segments[0, 1] += [0, 0, 5e-3 * 0.4]  # one node held
+    other.segments[1] += [0, 0, 1.9e-3]  # drawn along
+    run: Any = SimpleNamespace(
+        phases=[SimpleNamespace(index=0, type="deposit"), SimpleNamespace(index=1, type="lift")],
+        scene={"phases": [{}, {"distance_m": 0.015, "speed_m_per_s": 5e-3}]},
+        frames=[one, other],
+        series=SimpleTimes({"phase": np.array([0, 1])}, np.array([9.0, 10.0])),
+    )
+    np.testing.assert_array_equal(blob_lift.gripped(run), [True, False, False])
+
+
+class SimpleTimes(dict[str, np.ndarray]):
+    """Series of a run that has times."""
+
+    def __init__(self, data: dict[str, np.ndarray], time: np.ndarray) -> None:
+        super().__init__(data)
+        self.time = time
+
+
+def test_findings_compare_the_quiet_blob_with_the_most_active_one_seed_by_seed() -> None:
+    rows = [
+        {SEED: seed, blob_lift.ACTIVE: hertz, blob_lift.RISE: rise + 1e-3 * seed} | dict.fromkeys(SHARES, share)
+        for hertz, rise, share in ((0.0, 0.013, 0.97), (1.0, 0.009, 0.5), (2.0, 0.008, 0.3))
+        for seed in (1, 2, 3)
+    ]
+    found = blob_lift._above(pd.DataFrame(rows))
+    assert found[0].value.value == pytest.approx(0.005)
+    assert found[0].value.count == 3
+    assert found[1].value.value == pytest.approx(0.67)

@@ -1,0 +1,98 @@
+"""Reading scenes of filaments: what they become, and what is refused in one line."""
+
+from typing import Any
+
+import pytest
+from scenes import SMALL, changed, small
+
+from dem.errors import InputError
+from dem.phases.wriggle import Wriggle
+from dem.plan.outlook import plan
+from dem.scene.reading import dump_scene, parse_scene, scene_hash
+
+WORM: dict[str, Any] = {"shape": "filament", "length_m": 0.03, "diameter_m": 8e-4, "young_modulus_Pa": 5e4}
+POUR = {"type": "deposit", "per_layer": 5}
+LIFT = {"type": "lift", "distance_m": 0.015, "speed_m_per_s": 0.005}
+WRIGGLE = {"type": "wriggle", "duration_s": 1, "curvature_per_m": 100}
+BLOB = {
+    "engine": "links",
+    "particle": WORM,
+    "liquid": {},
+    "fidelity": {"base": "standard", "stiffness_N_per_m": 10},
+    "phases": [POUR, WRIGGLE, LIFT, {"type": "release"}],
+}
+
+
+def refused(changes: dict[str, Any]) -> str:
+    with pytest.raises(InputError) as raised:
+        parse_scene(changed({**SMALL, **BLOB}, changes), source="blob.yaml")
+    return str(raised.value).removeprefix("blob.yaml: ")
+
+
+def test_a_filament_is_what_its_keys_say() -> None:
+    filament = small(BLOB).bodies[0].filament
+    assert filament is not None
+    assert (filament.nodes, filament.length, filament.diameter) == (13, 0.03, 8e-4)
+    assert filament.weight_share == pytest.approx(1 - 1000 / 1060)
+    assert small(BLOB).model.mass == pytest.approx(filament.mass, rel=1e-12)
+    assert small({**BLOB, "liquid": None}).bodies[0].filament.weight_share == 1  # type: ignore[union-attr]
+
+
+def test_it_is_poured_as_an_arc_of_its_length() -> None:
+    bars = small({**BLOB, "particle.poured_bend_deg": 180}).bodies[0].bars  # type: ignore[union-attr]
+    assert bars.lengths.sum() == pytest.approx(0.03)
+    assert abs(bars.points[0, 0] - bars.points[-1, 1]).max() == pytest.approx(2 * 0.03 / 3.14159, rel=0.02)
+
+
+def test_a_scene_reads_what_it_writes_and_liquid_counts() -> None:
+    scene = small(BLOB)
+    import yaml  # noqa: PLC0415 - only here
+
+    again = parse_scene(yaml.safe_load(dump_scene(scene)), source="again")
+    assert scene_hash(again) == scene_hash(scene)
+    assert scene_hash(small({**BLOB, "liquid": None})) != scene_hash(scene)
+    assert "liquid" not in dump_scene(small({}))
+
+
+def test_a_wriggle_says_what_filaments_do() -> None:
+    phase = Wriggle(type="wriggle", duration_s=1, curvature_per_m=80, frequency_Hz=2, turns_between_reversals=0.25)
+    activity = phase.activity
+    assert activity.rate == pytest.approx(4 * 3.14159265)
+    # γ = α/2πλ
+    assert activity.rate / (2 * 3.14159265 * activity.reversal_rate) == pytest.approx(0.25)
+
+
+def test_a_plan_has_their_step_and_effects() -> None:
+    found = plan(small(BLOB))
+    assert found.time_step_s < found.stable_time_step_s < 1e-3
+    assert any(each.name == "filaments" and each.on for each in found.effects)
+    assert not any(each.name == "filaments" and each.on for each in plan(small({"engine": "links"})).effects)
+    stiff = plan(small({**BLOB, "particle.young_modulus_Pa": 1e11}))
+    assert any("particle.young_modulus_Pa" in line for line in stiff.warnings)
+    tight = plan(small({**BLOB, "phases.1.curvature_per_m": 1000}))
+    assert any("phases.1.curvature_per_m" in line for line in tight.warnings)
+
+
+@pytest.mark.parametrize(("changes", "message"), [
+    ({"engine": "yade"}, "particle: filament on engine: yade, whose bodies are rigid; use engine: links"),
+    ({"engine": "lammps"}, "particle: filament on engine: lammps, whose bodies are rigid; use engine: links"),
+    ({"particle.segments": 60}, "particle.shape: filament: bar 0: 0.0005 m long; make it longer than its thickness"),
+    ({"particle.young_modulus_Pa": -1}, "particle.young_modulus_Pa: -1 is out of range; use at least 1"),
+    ({"particle": {**WORM, "thickness_in_plane_m": 1e-3}}, "particle.diameter_m: a round section has no thicknesses"),
+    ({"particle": [WORM, {"shape": "rod", "length_m": 0.01}]}, "particle: filaments and rigid shapes do not mix"),
+    ({"particle": None}, "liquid: only filaments float in it"),
+    ({"particle": None, "liquid": None}, "phases.1: wriggle needs filaments"),
+    ({"recording": {"contact_forces": True}}, "recording.contact_forces: forces at contacts of filaments"),
+    ({"plane": {}}, "plane: motion in a plane is that of smarticles"),
+    ({"motor": {"law": "stall"}}, "motor: other shapes have no hinges"),
+    ({"phases.2.duration_s": 1}, "phases.2.duration_s: 1 s is too short to raise by distance_m = 0.015 m"),
+    ({"phases.2.speed_m_per_s": 0}, "phases.2.speed_m_per_s: 0 m/s is out of range"),
+    ({"phases.1.frequency_Hz": -1}, "phases.1.frequency_Hz: -1 is out of range; use at least 0"),
+    ({"container.radius_m": 0.01}, "container.radius_m: 0.01 m is narrower than a body"),
+    ({"phases.2": {"type": "internal-oscillation", "theta_deg": 5, "duration_s": 1}},
+     "phases.2: internal-oscillation needs smarticles, which have barbs, but particle has other shapes"),
+])  # fmt: skip
+def test_one_line_says_what_is_wrong_and_what_to_do(changes: dict[str, Any], message: str) -> None:
+    found = refused(changes)
+    assert found.startswith(message)
+    assert "\n" not in found
