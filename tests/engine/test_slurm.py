@@ -112,14 +112,14 @@ def test_a_sweep_of_six_with_a_failure_and_a_time_limit(
     log = out / "jobs" / "001" / f"{task}.txt"
     wait_until(lambda: "queued again" in log.read_text(), log.read_text)
     assert "ended by USR1" in log.read_text()
+    stopped = json.loads((out / "runs/long/failed.json").read_text())  # gone when the run goes on
+    assert (stopped["status"], "stopped as requested" in stopped["cause"]) == ("interrupted", True)
     others = {**dict.fromkeys(["a", "b", "c", "d"], "done"), "fails": "failed"}
     wait_until(lambda: {**states(smarticles, out), **others} == states(smarticles, out), lambda: "the others not done")
     assert states(smarticles, out)["long"] in ("queued", "running")
     # What failed has no result; what waits in the queue is left there.
     assert ": 1 of 6 runs, 1 tasks of 1 run" in smarticles("resume", out, "--submit", "slurm", *request)
     assert (out / "jobs/002/runs.txt").read_text() == "fails\n"
-    stopped = json.loads((out / "runs/long/failed.json").read_text())
-    assert (stopped["status"], "stopped as requested" in stopped["cause"]) == ("interrupted", True)
     # Slurm lets two minutes pass before it starts a task again.
     label = f"{record['job_id']}_{task}"
     wait_until(lambda: "PENDING" in slurm.call("squeue", "--noheader", f"--jobs={label}", "--format=%T"), log.read_text)
