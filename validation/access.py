@@ -161,8 +161,6 @@ class LinksAccess(_Access):
     """Rotation of `ball` with which a single point is lowest, and two balls along z touch at their ends."""
     arm_share = 0.5
     """Point of action of the floor's force within the overlap [1]: 0 at the surface of the body, 1 at the floor."""
-    spring_shafts: ClassVar[dict[str, Any]] = {"law": "slip"}  # with law `halt` shafts are rigid
-    """Keys of `motor` in a scene with which shafts are springs."""
 
     def motors_of(self, scene: Scene) -> dict[str, Any]:
         return {"motor_law": motor_law_of(scene)}
@@ -314,7 +312,6 @@ class YadeAccess(_Access):
     engine = YadeEngine
     ball_turn = Rotation.identity()
     arm_share = 1.0
-    spring_shafts: ClassVar[dict[str, Any]] = {}
 
     def motors_of(self, scene: Scene) -> dict[str, Any]:
         return {"hinge_law": hinge_law(scene), "motor_law": motor_law_of(scene)}

@@ -35,7 +35,7 @@ def hinged(
     Angles are those of the barbs [deg]; `motor` has keys of `motor` in a scene.
     """
     smarticle = {"aspect_ratio": aspect_ratio, "angles_deg": list(angles)}
-    return scene(access, shape_change(), fidelity=fidelity, smarticle=smarticle, motor=access.spring_shafts | motor)
+    return scene(access, shape_change(), fidelity=fidelity, smarticle=smarticle, motor=motor)
 
 
 def upright(access: EngineAccess, one: Scene, *, gravity: float, dt: float | None = None) -> Engine:

@@ -84,7 +84,7 @@ def pair_work(access: EngineAccess, *, law: str, damping: float = 0.0) -> list[A
     start = engine.state().kinetic_energy
     gains, works = np.array([(engine.state().kinetic_energy - start, engine.motors.work) for _ in swinging]).T
     what, worst = "work of the motors less gain of energy, worst [J]", float(np.abs(gains - works).max())
-    reason = "second order in the time step where they drive; jumps of a rate are counted exactly"
+    reason = "second order in the time step"
     return [Answer(what, 0.0, worst, 1e-3, reason, scale=float(np.abs(gains).max()))]
 
 

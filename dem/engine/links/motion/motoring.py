@@ -57,45 +57,34 @@ def engage(shapes: Shapes, bodies: Bodies, motors: Motoring) -> None:
 
 @kernel
 def release(shapes: Shapes, bodies: Bodies, motors: Motoring) -> float:
-    """Stop all barbs, which makes smarticles rigid; `bodies.rate` is written, and `motors` as by `note`.
+    """Stop all barbs, which makes smarticles rigid; `bodies.rate`, `bodies.axes` and `motors` are written.
 
     Returns:
         Lost kinetic energy of the links' relative motion [J].
     """
     lost = 0.0
-    note(shapes, bodies, motors)
     for i in range(bodies.position.shape[0]):
         if not shapes.hinged[bodies.shape[i]]:
             continue
+        _average(motors, i)
+        turn_axes(bodies, i)
         row, normal = bodies.plane[i], along_normal(bodies, i)
-        p1, p2 = momenta(row, normal, bodies.rate[i, 0], bodies.rate[i, 1])
+        r1, r2 = rates(row, normal, motors.momentum[i, 0], motors.momentum[i, 1])
+        p1, p2 = momenta(row, normal, r1, r2)
         q1, q2 = momenta(row, normal, 0.0, 0.0)
-        lost += 0.5 * (bodies.rate[i, 0] * (p1 - q1) + bodies.rate[i, 1] * (p2 - q2))
+        lost += 0.5 * (r1 * (p1 - q1) + r2 * (p2 - q2))
         bodies.rate[i, 0] = bodies.rate[i, 1] = 0.0
+    motors.elapsed[0] = 0.0
     return lost
 
 
-@kernel
-def note(shapes: Shapes, bodies: Bodies, motors: Motoring) -> None:
-    """Compute mean torques since the last control update; `motors`, `bodies.rate` and `bodies.axes` are written."""
-    _note(shapes, bodies, motors)
-
-
 @inlined
-def _note(shapes: Shapes, bodies: Bodies, motors: Motoring) -> None:
-    elapsed = motors.elapsed[0]
-    for i in range(bodies.position.shape[0]):
-        if not shapes.hinged[bodies.shape[i]]:
-            continue
-        row = bodies.plane[i]
-        turn_axes(bodies, i)
-        normal = along_normal(bodies, i)
-        bodies.rate[i, 0], bodies.rate[i, 1] = rates(row, normal, motors.momentum[i, 0], motors.momentum[i, 1])
-        for k in range(2):
-            if elapsed > 0.0:
-                motors.torque[i, k] = motors.impulse[i, k] / elapsed
-            motors.impulse[i, k] = 0.0
-    motors.elapsed[0] = 0.0
+def _average(motors: Motoring, i: int) -> None:
+    """Compute the mean torques of smarticle `i` since the last control update, and begin a new mean."""
+    for k in range(2):
+        if motors.elapsed[0] > 0.0:
+            motors.torque[i, k] = motors.impulse[i, k] / motors.elapsed[0]
+        motors.impulse[i, k] = 0.0
 
 
 @part
@@ -105,15 +94,14 @@ def update(shapes: Shapes, bodies: Bodies, motors: Motoring) -> None:
     The targets are the row of `motors.targets` that is due; after the last row this row is used again.
 
     Args:
-        bodies: the smarticles; `rate` and `axes` are written.
         motors: the motors; written.
     """
     now, interval = min(motors.due[0], motors.targets.shape[0] - 1), motors.interval
     motors.due[0], motors.due[1] = now + 1, motors.period
-    _note(shapes, bodies, motors)
     for i in range(bodies.position.shape[0]):
         if not shapes.hinged[bodies.shape[i]]:
             continue
+        _average(motors, i)
         for k in range(2):
             target, torque = motors.targets[now, i, k], motors.torque[i, k]
             over = abs(torque) >= motors.limit[i, k] * (1 - 1e-9)
@@ -124,6 +112,7 @@ def update(shapes: Shapes, bodies: Bodies, motors: Motoring) -> None:
             if motors.law >= SLIP or not motors.halted[i, k]:
                 motors.command[i, k] += advance
             motors.schedule[i, k] = target
+    motors.elapsed[0] = 0.0
 
 
 @inlined
