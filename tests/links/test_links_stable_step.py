@@ -6,7 +6,7 @@ import builds
 import numpy as np
 import pytest
 
-from dem.engine.links.stable_step import links_stable_time_step
+from dem.engine.links.stable_step import SHAPES, WIDEST, links_stable_time_step
 
 
 def test_it_goes_with_the_root_of_the_stiffness_and_shrinks_with_damping() -> None:
@@ -15,7 +15,10 @@ def test_it_goes_with_the_root_of_the_stiffness_and_shrinks_with_damping() -> No
     hard = links_stable_time_step(p, replace(builds.ELASTIC, normal_stiffness=2000.0, tangential_stiffness=1640.0))
     assert soft / hard == pytest.approx(2.0)
     assert links_stable_time_step(p, replace(builds.ELASTIC, normal_damping=0.2, wall_damping=0.2)) < soft
-    assert links_stable_time_step(p, builds.ELASTIC, articulated=True) < soft
+    # Free barbs are lighter at their tips than the same shapes while they are welded.
+    welded = [builds.particle(angles=(angle, angle)) for angle in np.linspace(0.0, WIDEST, SHAPES)]
+    least = min(links_stable_time_step(each, builds.ELASTIC) for each in welded)
+    assert links_stable_time_step(p, builds.ELASTIC, articulated=True) < 0.95 * least
     assert links_stable_time_step(p, builds.ELASTIC, strings=[(1e6, 0.0)]) < soft
 
 
