@@ -28,7 +28,7 @@ from dem.setting.fidelity import Fidelity, fidelities
 from postprocess.measures.packing import DEFINITIONS
 from postprocess.measures.pull import PULL, has_pull, peak, read_pull, weight_of_one
 from postprocess.measures.table import LAST_FRAMES, summarise_run
-from postprocess.report.figures import BLUE, GREY, ORANGE
+from postprocess.report.figures import BLUE, GREY, ORANGE, style
 from postprocess.statistics.points import ASPECT, SEED, SEEDS, format_with_error, marked, seeds_of
 from postprocess.statistics.seeds import Scatter, mean_over_seeds, pooled_scatter, relative_difference
 from studies.framework.figures import POOLED, Analysis, Means, finish, marker, one_by_one, panels
@@ -712,7 +712,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
     except (OSError, ValueError) as error:
         parser.error(f"cannot read the tables: {error}")
     command = f"python -m studies.accuracy {given.folder} {' '.join(given.ladders)}"
-    Promises().compare(given.folder / "fidelities", tables, [*filter(None, [given.footer]), f"{command}."])
+    with style():
+        Promises().compare(given.folder / "fidelities", tables, [*filter(None, [given.footer]), f"{command}."])
 
 
 if __name__ == "__main__":
