@@ -593,8 +593,8 @@ class Promises:
                 panel.axhline(promise, color=GREY, linewidth=0.6, linestyle=":")
                 panel.annotate(f"{name}: {promise:g} %", (0.01, promise), (0, 1), xycoords=("axes fraction", "data"),
                                textcoords="offset points", color=GREY, fontsize=5.5)  # fmt: skip
-            costs = table[COST][table[COST] > 0]
-            for _, row in worst_errors(table[table[COST] > 0]).iterrows():
+            known = table[table[COST] > 0]
+            for _, row in worst_errors(known).iterrows():
                 colour = {"links": BLUE, "yade": ORANGE}[row[ENGINE]]
                 bar = [[0.0], [row["bound [%]"] - row["error [%]"]]]
                 of_energy = row["quantity"] == SYMBOLS["energy"]
@@ -605,7 +605,7 @@ class Promises:
                 aside, side = (-5, "right") if of_energy else (5, "left")
                 panel.annotate(text, (row[COST], row["error [%]"]), (aside, 0), textcoords="offset points", ha=side,
                                va="center", color=colour)  # fmt: skip
-            low, high = (costs.min() / 2, costs.max() * 2) if len(costs) else (1, 10)
+            low, high = (known[COST].min() / 2, known[COST].max() * 2) if len(known) else (1, 10)
             panel.set(title=title, xlabel="processor time per simulated s [s/s]", ylim=(1, 100))
             panel.set(xscale="log", yscale="log", xlim=(low, high))
             for axis in (panel.xaxis, panel.yaxis):

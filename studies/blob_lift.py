@@ -17,11 +17,11 @@ from dem.record.run import Run
 from postprocess.geometry.bars import body_centres
 from postprocess.measures.crossing_number import average_crossing_numbers
 from postprocess.report import figures as style
-from postprocess.statistics.points import ASPECT, SEED
+from postprocess.statistics.points import ASPECT, SEED, paired_differences
 from postprocess.statistics.seeds import mean_over_seeds
 from studies.framework.figures import Histories, History, Means, Series, marker, one_by_one
-from studies.framework.findings import Effect, Finding, slope, unit_of
-from studies.framework.runs import Key, Row, declare, last_columns, run_columns
+from studies.framework.findings import Effect, Finding, mean, slope, unit_of
+from studies.framework.runs import Key, Row, declare, last_columns, phase_of, run_columns
 from studies.framework.study import Study
 
 ACTIVE = "active [Hz]"  #: Frequency of the worms' turns from the end of tangling on; 0: they hold their bends
@@ -52,8 +52,8 @@ QUANTITIES = declare(
 
 
 def _lift(run: Run) -> tuple[int, float, float]:
-    """Return the place of the phase that lifts, its beginning [s], and the distance [m]."""
-    place = next(phase.index for phase in run.phases if phase.type == "lift")
+    """Return the index of the phase that lifts, its first recorded time [s], and the distance [m]."""
+    place = phase_of(run, "lift")
     times = run.series.time[run.series["phase"] == place]
     return place, float(times[0]), float(run.scene["phases"][place]["distance_m"])
 
@@ -95,40 +95,33 @@ def gripped(run: Run) -> np.ndarray:
     return np.bincount(one.body[with_it], minlength=one.count) > 0
 
 
-def _paired(table: pd.DataFrame, quantity: str) -> pd.Series:
-    """Return by seed the value of the quiet blob less that of the most active one."""
-    wide = table.pivot(index=SEED, columns=ACTIVE, values=quantity)
-    return wide[wide.columns.min()] - wide[wide.columns.max()] if wide.shape[1] > 1 else wide.iloc[:0, 0]
-
-
 def _above(table: pd.DataFrame) -> list[Effect]:
     labels = {
         RISE: "rise of the quiet blob less that of the most active one",
         SHARE: "share lifted",
         OTHERS: "of those not gripped",
     }
+    most, quiet = table[ACTIVE].max(), table[ACTIVE].min()
+    others = table if most > quiet else table.iloc[:0]
     return [
-        Effect(label=label, value=mean_over_seeds(_paired(table, name)), unit=unit_of(name))
+        Effect(
+            label=label,
+            value=mean_over_seeds(paired_differences(others, name, ACTIVE, (most, quiet), [SEED])[name]),
+            unit=unit_of(name),
+        )
         for name, label in labels.items()
     ]
 
 
-def _as_a_whole(table: pd.DataFrame) -> list[Effect]:
-    value = mean_over_seeds(table.loc[table[ACTIVE] == 0, SHARE])
-    return [Effect(label="share of worms of the quiet blob that are lifted", value=value, threshold=WHOLE)]
-
-
-def _is_left(table: pd.DataFrame) -> list[Effect]:
-    value = mean_over_seeds(table.loc[table[ACTIVE] == table[ACTIVE].max(), OTHERS])
-    label = "share lifted of the worms of the most active blob that are not gripped"
-    return [Effect(label=label, value=value, sign=-1, threshold=LEFT)]
+def height_around(run: Run, begin: float) -> History:
+    """Read the height of the centre of mass [mm] from 1 s before a time [s] on, which is time 0 of the history."""
+    own = run.series.time >= begin - 1.0
+    return History(times=run.series.time[own] - begin, values=1e3 * run.series["com_height_m"][own])
 
 
 def _history(run: Run) -> History:
     _, begin, _ = _lift(run)
-    series = run.series
-    own = series.time >= begin - 1.0
-    return History(times=series.time[own] - begin, values=1e3 * series["com_height_m"][own])
+    return height_around(run, begin)
 
 
 STUDY = Study(
@@ -140,10 +133,13 @@ STUDY = Study(
     order=(ACTIVE, SEED),
     quantities=tuple(QUANTITIES.values()),
     findings=(
-        Finding(
-            id="as-a-whole",
-            says="A quiet blob is entangled tightly enough to be lifted as a whole",
-            outcome=_as_a_whole,
+        mean(
+            "as-a-whole",
+            "A quiet blob is entangled tightly enough to be lifted as a whole",
+            lambda quiet: quiet[SHARE],
+            "share of worms of the quiet blob that are lifted",
+            rows=lambda table: table[table[ACTIVE] == 0],
+            threshold=WHOLE,
         ),
         Finding(
             id="quiet-above-active",
@@ -151,10 +147,14 @@ STUDY = Study(
             outcome=_above,
         ),
         slope("falls", "The more active the blob, the fewer of its worms come along", SHARE, ACTIVE, sign=-1),
-        Finding(
-            id="left-behind",
-            says="An active blob is left behind by the end piece",
-            outcome=_is_left,
+        mean(
+            "left-behind",
+            "An active blob is left behind by the end piece",
+            lambda most: most[OTHERS],
+            "share lifted of the worms of the most active blob that are not gripped",
+            rows=lambda table: table[table[ACTIVE] == table[ACTIVE].max()],
+            sign=-1,
+            threshold=LEFT,
         ),
     ),
     figures=(

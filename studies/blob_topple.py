@@ -22,9 +22,10 @@ from postprocess.geometry.segments import close_segments
 from postprocess.measures.clusters import joined_clusters
 from postprocess.statistics.points import ASPECT, SEED
 from postprocess.statistics.seeds import mean_over_seeds
+from studies.blob_lift import height_around
 from studies.framework.figures import Histories, History, one_by_one
-from studies.framework.findings import Effect, Finding
-from studies.framework.runs import Key, Row, declare, last_columns, run_columns
+from studies.framework.findings import Effect, Finding, mean
+from studies.framework.runs import Key, Row, declare, last_columns, phase_of, run_columns
 from studies.framework.study import COUNT, Study
 
 FALL, AWAY, CLUSTER = "fall of the centre of mass [m]", "way sideways [m]", "largest cluster [-]"
@@ -46,17 +47,15 @@ QUANTITIES = declare(
 )
 
 
-def _stages(run: Run) -> tuple[Frame, Frame, float]:
-    """Return the last frame with held tails, the last frame, and the time of the release [s]."""
-    place = next(phase.index for phase in run.phases if phase.type == "release")
-    frames = list(run.frames)
-    begin = float(run.series.time[run.series["phase"] > place][0])
-    return [frame for frame in frames if frame.phase < place][-1], frames[-1], begin
+def _released(run: Run) -> float:
+    """Return the first recorded time after the release of the tails [s]."""
+    return float(run.series.time[run.series["phase"] > phase_of(run, "release")][0])
 
 
 def measure(run: Run) -> Row:
     """Measure how a blob fell, and whether it stayed in one piece."""
-    held, last, _ = _stages(run)
+    place = phase_of(run, "release")
+    held, last = run.frames.in_phase(place - 1)[-1], run.frames[-1]
     one, other = centre(held), centre(last)
     return {
         **{name: cell for name, cell in run_columns(run).items() if name != ASPECT},
@@ -100,24 +99,12 @@ def _falls(table: pd.DataFrame) -> list[Effect]:
     ]
 
 
-def _sideways(table: pd.DataFrame) -> list[Effect]:
-    tallest = table[table[COUNT] == table[COUNT].max()]
-    value = mean_over_seeds(tallest[AWAY] / tallest[FALL])
-    return [Effect(label="way sideways over the fall, of the tallest blob", value=value, threshold=SIDE)]
-
-
-def _whole(table: pd.DataFrame) -> list[Effect]:
-    return [Effect(label="share of worms in one cluster", value=mean_over_seeds(table[CLUSTER]), threshold=WHOLE)]
-
-
 def _history(run: Run) -> History:
-    _, _, begin = _stages(run)
-    own = run.series.time >= begin - 1.0
-    return History(times=run.series.time[own] - begin, values=1e3 * run.series["com_height_m"][own])
+    return height_around(run, _released(run))
 
 
 def _path(run: Run) -> History:
-    _, _, begin = _stages(run)
+    begin = _released(run)
     frames = [frame for frame in run.frames if frame.time >= begin - 1.0]
     centres = np.array([centre(frame) for frame in frames])
     away = np.hypot(*(centres - centres[0])[:, :2].T)
@@ -134,8 +121,21 @@ STUDY = Study(
     quantities=tuple(QUANTITIES.values()),
     findings=(
         Finding(id="falls", says="The blob falls when its tails let go, and is less slender then", outcome=_falls),
-        Finding(id="sideways", says="It falls onto its side", outcome=_sideways),
-        Finding(id="in-one-piece", says="It stays in one piece", outcome=_whole),
+        mean(
+            "sideways",
+            "It falls onto its side",
+            lambda tallest: tallest[AWAY] / tallest[FALL],
+            "way sideways over the fall, of the tallest blob",
+            rows=lambda table: table[table[COUNT] == table[COUNT].max()],
+            threshold=SIDE,
+        ),
+        mean(
+            "in-one-piece",
+            "It stays in one piece",
+            lambda table: table[CLUSTER],
+            "share of worms in one cluster",
+            threshold=WHOLE,
+        ),
     ),
     figures=(
         Histories(

@@ -121,9 +121,8 @@ def local_crossings(frame: Frame, *, length: float, radius: float, top: float) -
 
 def spanning_level(field: NDArray[np.float64]) -> float:
     """Return the largest value of a field (X, Y, Z) whose region, at or above it, joins bottom and top; 0 if none."""
-    values = np.unique(field)
-    spanning = [value for value in values if region_spans(field >= value, 2)]
-    return float(max(spanning, default=0.0))
+    falling = np.unique(field)[::-1]
+    return next((float(value) for value in falling if region_spans(field >= value, 2)), 0.0)
 
 
 def thresholds(runs: pd.DataFrame, column: str) -> dict[str, Profile]:
@@ -188,13 +187,13 @@ def ratio_of(runs: pd.DataFrame, column: str, one: str, other: str) -> tuple[flo
 
 def one_level(runs: pd.DataFrame, *, other: str) -> Outcome:
     """Judge whether piles of another series begin to stand at the spanning level of shaken piles."""
+    ratios = {column: ratio_of(runs, column, other, SHAKEN) for column in (LEVEL, SLENDER, DENSITY)}
     cells = []
-    for column in (LEVEL, SLENDER, DENSITY):
-        value, half, chance = ratio_of(runs, column, other, SHAKEN)
+    for column, (value, half, chance) in ratios.items():
         low, middle, high = (math.exp(value + part) for part in (-half, 0.0, half))
         name = column.partition(" [")[0]
         cells.append(f"{name}: {middle:.3g} ({low:.3g} to {high:.3g} at 95 %; alike: p = {chance:.2g})")
-    value, half, chance = ratio_of(runs, LEVEL, other, SHAKEN)
+    value, half, chance = ratios[LEVEL]
     levels = ", ".join(f"{series} {math.exp(one.best):.3g}" for series, one in thresholds(runs, LEVEL).items())
     note = f"at the onset, {other} over {SHAKEN}: {'; '.join(cells)}; spanning levels: {levels}"
     verdict = decide(abs(value) + half <= LIKE, chance < REJECTED, data=not math.isnan(value))

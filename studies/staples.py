@@ -25,8 +25,8 @@ from postprocess.geometry.bars import body_centres
 from postprocess.measures.entanglement import polygon_crossings
 from postprocess.measures.graph import entanglement_graph
 from postprocess.measures.pull import PULL, WINDOW, held_fast, moving_mean, peak, read_pull, weight_of_one
-from postprocess.statistics.points import SEED
-from postprocess.statistics.seeds import mean_over_seeds
+from postprocess.statistics.points import SEED, paired_differences
+from postprocess.statistics.seeds import SeedMean, mean_over_seeds
 from studies.framework.figures import Histories, History, Means, one_by_one
 from studies.framework.findings import Effect, Finding, Outcome, means_by
 from studies.framework.provenance import Reference
@@ -179,16 +179,15 @@ def force_history(run: Run) -> History:
 def ratio(table: pd.DataFrame, gamma: float, *, times: float) -> Effect:
     """Return the mean over seeds of ln(peak force at 20° / at 90°) after one vibration, against the ln of a factor."""
     own = table[table[GAMMA] == gamma]
-    narrow, square = own[own[ANGLE] == NARROW].set_index(SEED), own[own[ANGLE] == SQUARE].set_index(SEED)
-    mean = mean_over_seeds((np.log(narrow[PEAK]) - np.log(square[PEAK])).dropna().tolist())
+    mean = narrow_less_square(own.assign(log=np.log(own[PEAK])), "log")
     low, middle, high = (math.exp(mean.value + half) for half in (-mean.half_width, 0.0, mean.half_width))
     return Effect(
         label=f"Γ = {gamma:g}: peak force at 20° over that at 90°",
         value=mean,
         threshold=math.log(times),
         text=f"{middle:.3g} ({low:.3g} to {high:.3g} at 95 %; n = {mean.count})" if mean.count else "no data",
-        may_be_higher=bool(narrow[HELD_FAST].any()),
-        may_be_lower=bool(square[HELD_FAST].any()),
+        may_be_higher=bool(own.loc[own[ANGLE] == NARROW, HELD_FAST].any()),
+        may_be_lower=bool(own.loc[own[ANGLE] == SQUARE, HELD_FAST].any()),
     )
 
 
@@ -211,51 +210,45 @@ def stronger(table: pd.DataFrame, *, times: float) -> Outcome:
     return Outcome(effects=[ratio(table, gamma, times=times) for gamma in vibrated(table)], note=note)
 
 
-def by_angle(table: pd.DataFrame, values: pd.Series, gamma: float, label: str, sign: int) -> Effect:
-    """Return the mean difference of a value between 20° and 90° at one vibration, paired by seed."""
-    own = pd.DataFrame({SEED: table[SEED], ANGLE: table[ANGLE], "value": values})[table[GAMMA] == gamma]
-    both = own.pivot_table(index=SEED, columns=ANGLE, values="value")
-    known = {NARROW, SQUARE} <= set(both.columns)
-    differences = (both[NARROW] - both[SQUARE]).dropna().tolist() if known else []
-    return Effect(label=f"{label}, 20° less 90°", value=mean_over_seeds(differences), sign=sign)
+def narrow_less_square(table: pd.DataFrame, column: str) -> SeedMean:
+    """Return the mean over seeds of a column at 20° less that at 90°; the table has one vibration."""
+    return mean_over_seeds(paired_differences(table, column, ANGLE, (SQUARE, NARROW), [SEED])[column])
 
 
 def poured_more(table: pd.DataFrame) -> Outcome:
     """Judge whether poured staples of 90° have more links than those of 20°."""
     note = f"by angle: {means_by(table, POURED, ANGLE, '.2f')}"
     gamma = 0.0 if (table[GAMMA] == 0).any() else float(table[GAMMA].min())
-    return Outcome(effects=[by_angle(table, table[POURED], gamma, "links per staple", -1)], note=note)
+    value = narrow_less_square(table[table[GAMMA] == gamma], POURED)
+    return Outcome(effects=[Effect(label="links per staple, 20° less 90°", value=value, sign=-1)], note=note)
 
 
 def entangles_faster(table: pd.DataFrame, *, relative: bool) -> Outcome:
     """Judge whether vibration adds more links per staple at 20° than at 90°, absolutely or over those poured."""
     gain = table[LINKS] / table[POURED] - 1 if relative else table[LINKS] - table[POURED]
     what = "links gained over those poured" if relative else "links gained per staple"
-    effects = [by_angle(table, gain, gamma, f"Γ = {gamma:g}: {what}", 1) for gamma in vibrated(table)]
-    parts = [
-        f"Γ = {gamma:g} by angle: {means_by(table[table[GAMMA] == gamma].assign(gain=gain), 'gain', ANGLE, '.2f')}"
-        for gamma in vibrated(table)
-    ]
+    effects, parts = [], []
+    for gamma in vibrated(table):
+        own = table.assign(gain=gain)[table[GAMMA] == gamma]
+        value = narrow_less_square(own, "gain")
+        effects.append(Effect(label=f"Γ = {gamma:g}: {what}, 20° less 90°", value=value))
+        parts.append(f"Γ = {gamma:g} by angle: {means_by(own, 'gain', ANGLE, '.2f')}")
     return Outcome(effects=effects, note="; ".join(parts))
 
 
 def grows(table: pd.DataFrame, *, angle: float) -> Outcome:
     """Judge whether vibration makes bundles of one angle stronger, paired by seed."""
     own = table[table[ANGLE] == angle]
-    still = own[own[GAMMA] == 0]
-    effects = []
-    for gamma in vibrated(own):
-        after = own[own[GAMMA] == gamma]
-        both = after.set_index(SEED)[LOG_PEAK] - still.set_index(SEED)[LOG_PEAK]
-        mean = mean_over_seeds(both.dropna().tolist())
-        effects.append(
-            Effect(
-                label=f"Γ = {gamma:g}: log10 of the peak force, vibrated less poured",
-                value=mean,
-                may_be_higher=bool(after[HELD_FAST].any()),
-                may_be_lower=bool(still[HELD_FAST].any()),
-            )
+    held = set(own.loc[own[HELD_FAST] > 0, GAMMA])
+    effects = [
+        Effect(
+            label=f"Γ = {gamma:g}: log10 of the peak force, vibrated less poured",
+            value=mean_over_seeds(paired_differences(own, LOG_PEAK, GAMMA, (0.0, gamma), [SEED])[LOG_PEAK]),
+            may_be_higher=gamma in held,
+            may_be_lower=0.0 in held,
         )
+        for gamma in vibrated(own)
+    ]
     return Outcome(effects=effects, note=f"peak force by Γ [W]: {means_by(own, PEAK, GAMMA, '.3g')}")
 
 

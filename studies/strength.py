@@ -276,7 +276,6 @@ FIGURES = (
         x=UPPER,
         transform=lambda x: 1e3 * x,
         x_label="hook above the floor [mm]",
-        ticks=True,
         split=by_procedure(apart=0.3, line=False),
     ),
     Scatter(

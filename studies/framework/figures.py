@@ -130,7 +130,6 @@ class Means:
     log: bool = False  #: Whether y is logarithmic; it stays linear if a value is 0 or less
     log_x: bool = False  #: Whether x is logarithmic
     marks: Sequence[float] = ()  #: Places of vertical broken lines, in the unit of the x axis
-    ticks: bool = False  #: Whether the x axis has ticks only where there are values
     share_y: bool = False  #: Whether all panels of one quantity, or of one line of panels, have one y axis
     #: Computes the horizontal lines of a panel from its rows: y by label; a line at NaN is left out
     levels: Callable[[pd.DataFrame], Mapping[str, float]] = lambda _: {}
@@ -202,22 +201,19 @@ class Means:
                     draw_bounds(
                         axes, x, least, 0.05 * least.abs() + 0.2, properties={**properties, "markerfacecolor": "white"}
                     )
-        self._label(axes, quantity, table)
+        self._label(axes, quantity)
         axes.set_xscale("log" if self.log_x else "linear")
         if self.log and positive:
             axes.set_yscale("log")
         elif positive:
             axes.set_ylim(bottom=0)
 
-    def _label(self, axes: Axes, quantity: Quantity, table: pd.DataFrame) -> None:
+    def _label(self, axes: Axes, quantity: Quantity) -> None:
         place = axes.get_subplotspec()
         # A line of panels of one quantity has one label; panels of several quantities have a label each.
         if not (self.share_y and self.panels) or place is None or place.is_first_col():
             axes.set_ylabel(quantity.axis or quantity.column)
         axes.set_xlabel(self.x_label)
-        if self.ticks:
-            places = self.transform(np.unique(table[self.x].dropna()))
-            axes.set_xticks(places, labels=[f"{place:g}" for place in places])
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -305,11 +305,12 @@ def mean(
     label: str,
     *,
     rows: Rows = lambda table: table,
+    sign: int = 1,
     threshold: float = 0.0,
     shown: Sequence[str] = (),
     by: str = PROCEDURE,
 ) -> Finding:
-    """Make the finding that the mean of a value over all rows is above a threshold.
+    """Make the finding that the mean of a value over all rows is above a threshold (sign +1) or below it (−1).
 
     Args:
         threshold: in the unit of the value.
@@ -318,7 +319,7 @@ def mean(
     """
 
     def outcome(table: pd.DataFrame) -> Outcome:
-        effect = Effect(label=label, value=mean_over_seeds(values(table)), threshold=threshold)
+        effect = Effect(label=label, value=mean_over_seeds(values(table)), sign=sign, threshold=threshold)
         note = "; ".join(f"{symbol(column)}: {means_by(table, column, by, '.3g')}" for column in shown)
         return Outcome(effects=[effect], note=note)
 

@@ -362,6 +362,14 @@ def duration(phase: Phase) -> float:
     return phase.end_s - phase.start_s
 
 
+def phase_of(run: Run, type_: str) -> int:
+    """Return the index of the first phase of a type; InputError if a run has no such phase."""
+    for phase in run.phases:
+        if phase.type == type_:
+            return phase.index
+    raise InputError(f"{run.path}: has no phase {type_}; leave it out")
+
+
 def run_columns(run: Run) -> dict[str, object]:
     """Return aspect ratio, seed, count and fidelity of a run, by column."""
     return {

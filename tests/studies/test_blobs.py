@@ -7,6 +7,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from dem.errors import InputError
 from postprocess.statistics.points import SEED
 from studies import blob_lift, blob_topple
 
@@ -60,7 +61,16 @@ def test_findings_compare_the_quiet_blob_with_the_most_active_one_seed_by_seed()
         for hertz, rise, share in ((0.0, 0.013, 0.97), (1.0, 0.009, 0.5), (2.0, 0.008, 0.3))
         for seed in (1, 2, 3)
     ]
-    found = blob_lift._above(pd.DataFrame(rows))
+    (finding,) = (one for one in blob_lift.STUDY.findings if one.id == "quiet-above-active")
+    found = finding.outcome(pd.DataFrame(rows))
+    assert isinstance(found, list)
     assert found[0].value.value == pytest.approx(0.005)
     assert found[0].value.count == 3
     assert found[1].value.value == pytest.approx(0.67)
+
+
+@pytest.mark.parametrize(("study", "phase"), [(blob_lift, "lift"), (blob_topple, "release")])
+def test_other_runs_are_left_out(study: Any, phase: str) -> None:
+    run: Any = SimpleNamespace(path="run", phases=[SimpleNamespace(index=0, type="deposit")])
+    with pytest.raises(InputError, match=f"has no phase {phase}; leave it out"):
+        study.measure(run)
