@@ -76,7 +76,7 @@ class FilamentEnergies(NamedTuple):
 
     @property
     def elastic(self) -> float:
-        """[J]."""
+        """Of stretched, bent and twisted filaments [J]."""
         return self.stretching + self.bending + self.twisting
 
     @property

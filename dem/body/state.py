@@ -292,6 +292,11 @@ class FilamentState(BarState):
         """(M, 2, 3) both ends of all segments [m]."""
         return np.stack([self.nodes[self._starts], self.nodes[self._starts + 1]], axis=1)
 
+    @cached_property
+    def _edges(self) -> Array:
+        """(M, 3) end of each segment less its start [m]."""
+        return self.segments[:, 1] - self.segments[:, 0]
+
     @property
     def normals(self) -> Array:
         """(M, 3) zeros, since sections are round [1]."""
@@ -305,7 +310,7 @@ class FilamentState(BarState):
     @cached_property
     def bar_spins(self) -> Array:
         """(M, 3) angular velocities of the segments [rad/s]."""
-        edges = self.segments[:, 1] - self.segments[:, 0]
+        edges = self._edges
         opening = self.node_velocities[self._starts + 1] - self.node_velocities[self._starts]
         squares = (edges**2).sum(axis=1)
         rolls = (self.rolls[self._starts] / np.sqrt(squares))[:, None] * edges
@@ -328,7 +333,7 @@ class FilamentState(BarState):
     @cached_property
     def angular_momentum(self) -> Array:
         """(3,) angular momentum of all filaments about the origin [kg m²/s]."""
-        edges = self.segments[:, 1] - self.segments[:, 0]
+        edges = self._edges
         tangents = edges / np.sqrt((edges**2).sum(axis=1))[:, None]
         orbital = np.cross(self.nodes, self.node_masses[:, None] * self.node_velocities)
         return np.asarray(orbital.sum(axis=0) + (self._rolling[:, None] * tangents).sum(axis=0))

@@ -8,9 +8,8 @@ from pydantic import Field, model_validator
 
 from dem.engine.interface import Engine, Filaments
 from dem.phases.phase import Memory, Phase, SceneView, Stage, time_left
+from dem.setting.hooks import TOLERANCE
 from dem.setting.part import Duration, Length, Part, Speed
-
-SHORT = 1e-9  # by so much of itself a duration may be too short
 
 
 class Lift(Part, Phase):
@@ -46,7 +45,7 @@ class Lift(Part, Phase):
     @model_validator(mode="after")
     def _arrives(self) -> Self:
         needed = self.distance_m / self.speed_m_per_s
-        if self.duration_s < needed * (1 - SHORT):
+        if self.duration_s < needed * (1 - TOLERANCE):
             raise ValueError(
                 f"duration_s: {self.duration_s:g} s is too short to raise by distance_m = {self.distance_m:g} m at "
                 f"speed_m_per_s = {self.speed_m_per_s:g} m/s; use at least {needed:.6g} s"

@@ -21,7 +21,8 @@ def compile_for(scene: Scene) -> None:
     engine = engine_kind(scene.engine).build(scene, min(time_steps(scene)))
     places = np.zeros((scene.count, 3))
     places[:, 0 if scene.plane is not None else 2] = APART * (1 + np.arange(scene.count))
-    engine.add(Poses(places, (Rotation.identity(),) * scene.count))
+    kinds = None if scene.mixture is None else scene.mixture.of
+    engine.add(Poses(places, (Rotation.identity(),) * scene.count, kinds))
     # A chain is pulled from the start on.
     if not scene.pulled_by:
         _step_and_query(engine)

@@ -14,5 +14,5 @@ class Liquid(Part):
 
     @property
     def immersing(self) -> Immersing:
-        """The liquid as filaments take it."""
+        """The liquid around a `dem.body.filament.Filament`."""
         return Immersing(viscosity=self.viscosity_Pa_s, density=self.density_kg_per_m3)

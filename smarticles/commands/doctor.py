@@ -104,6 +104,8 @@ _COMPILED = (
     ("wall that is lifted", "melting", ("phases.3.speed_m_per_s=0.1",)),
     ("tiers, motors", "casting", ()),
     ("chain of robots, strings", "chain", ("fidelity.rows=1",)),
+    ("filaments", "worms", ()),
+    ("filaments; dissipation recorded", "worms", (_LEDGER,)),
 )
 
 

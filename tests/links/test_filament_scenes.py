@@ -10,6 +10,8 @@ from stopping import assert_equal_frames, run_until
 
 from dem.body.bars import segment_distances
 from dem.body.state import FilamentState
+from dem.engine.links.engine import LinksEngine
+from dem.engine.links.motion.bending import PSI, SEED
 from dem.record.run import Run
 from dem.record.series import read_series
 from dem.run.build import build_engine
@@ -145,6 +147,21 @@ def test_without_liquid_and_contacts_momentum_is_that_of_gravity() -> None:
     engine.advance(100)
     momentum = engine.state().momentum
     np.testing.assert_allclose(momentum, [0, 0, -engine.impulse], rtol=0, atol=1e-12 * engine.impulse)
+
+
+def test_waves_begin_where_the_seed_of_the_scene_puts_them() -> None:
+    begun = []
+    for seed in (1, 1, 2):
+        scene = worms(count=4, seed=seed)
+        engine = build_engine(scene, 2e-5)
+        scene.phases[0].begin(scene, 0).proceed(engine)
+        assert isinstance(engine, LinksEngine)
+        assert engine._world.filaments is not None
+        begun.append(engine._world.filaments.gait[:, [PSI, SEED]])
+    first, again, other = begun
+    np.testing.assert_array_equal(first, again)
+    assert len(set(first[:, 0])) == 4
+    assert not np.isin(first, other).any()
 
 
 def test_tails_are_the_last_nodes() -> None:

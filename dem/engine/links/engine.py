@@ -6,6 +6,7 @@ import io
 import json
 import math
 import zipfile
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -135,10 +136,7 @@ class LinksEngine:
     def advance(self, steps: int) -> None:
         if steps > 0:
             self._world.advance(steps)
-            weights = self._relative_masses
-            if self.filaments is not None:
-                weights = weights * self._weight_shares
-            self._smarticle_seconds += steps * self.time_step * float(weights.sum())
+            self._smarticle_seconds += steps * self.time_step * float(self._relative_weights.sum())
 
     # -- smarticles --------------------------------------------------------------------------------------------
 
@@ -150,9 +148,9 @@ class LinksEngine:
         before = self.ledger.deformation
         self._world.add(poses, speed=speed)
         mass, heights = self._first_mass, poses.positions[:, 2]
-        relative = self._relative_masses[-len(heights) :] if len(heights) else np.zeros(0)
-        new = float(relative.sum())
-        weights = relative * self._weight_shares[-len(heights) :] if self.filaments is not None else relative
+        first = self.count - len(heights)
+        new = float(self._relative_masses[first:].sum())
+        weights = self._relative_weights[first:]
         self.ledger.added += mass * (self.gravity * float((weights * heights).sum()) + new * speed**2 / 2)
         self.ledger.added += self.ledger.deformation - before
         self._thrown += mass * new * speed
@@ -168,11 +166,16 @@ class LinksEngine:
         masses = self._world.shapes.mass
         return np.asarray((masses / masses[0])[self._world.bodies.shape])
 
+    @cached_property
+    def _weights_of_kinds(self) -> Array:
+        """(K,) weights of the kinds, those of filaments less buoyancy, over that of the first without it [1]."""
+        rods, masses = [kind.filament for kind in self._world.kinds], self._world.shapes.mass
+        return np.asarray(masses / masses[0] * [1.0 if rod is None else rod.weight_share for rod in rods])
+
     @property
-    def _weight_shares(self) -> Array:
-        """(N,) weights of filaments in the liquid over those without it [1]."""
-        rods = [kind.filament for kind in self._world.kinds]
-        return np.array([1.0 if rod is None else rod.weight_share for rod in rods])[self._world.bodies.shape]
+    def _relative_weights(self) -> Array:
+        """(N,) weights of the bodies, as `_weights_of_kinds` [1]; of smarticles exactly 1."""
+        return np.asarray(self._weights_of_kinds[self._world.bodies.shape])
 
     def still(self) -> None:
         assert self.filaments is None  # only the bodies of another run are stopped, and no run hands filaments on

@@ -15,7 +15,7 @@ from dem.engine.links.engine import LinksEngine
 from dem.engine.links.shapes import kind_shape
 from dem.engine.links.stable_step import filament_stable_time_step, links_stable_time_step, rigid_stable_time_step
 
-# Groups of arrays without which `advance` is compiled where a scene has none of them. No scene has those of filaments.
+# Groups of arrays without which `advance` is compiled where a scene has none of them.
 OF_FILAMENTS = frozenset({"bends", "filaments", "flexible", "stretch"})
 OPTIONAL = OF_FILAMENTS | {"channel", "cords", "hooks", "ledger", "motors", "rims"}
 
@@ -84,7 +84,7 @@ def _present(scene: Demand) -> Iterator[frozenset[str]]:
     """Yield the groups of arrays that are present in each kind of phase of a scene."""
     known = {
         "channel": scene.channel is not None,
-        "filaments": scene.mixture is not None and scene.mixture.flexible,
+        **dict.fromkeys(OF_FILAMENTS, scene.mixture is not None and scene.mixture.flexible),
         "hooks": scene.hooks is not None,
         "ledger": scene.recording.dissipation_interval_s is not None,
         "rims": scene.channel is None and bool(scene.cylinder.upper),

@@ -4,9 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+from dem.body.filament import FilamentEnergies
 from dem.engine.links.filaments import LinksFilaments
 from dem.engine.links.stepping import LOST, WORK
 from dem.engine.links.world import World
+
+NONE = FilamentEnergies(*(0.0,) * len(FilamentEnergies._fields))  #: Energies of no filaments
 
 
 class LinksLedger:
@@ -18,28 +21,27 @@ class LinksLedger:
         self.added = 0.0
 
     @property
+    def _energies(self) -> FilamentEnergies:
+        return NONE if self._filaments is None else self._filaments.energies
+
+    @property
     def container_work(self) -> float:
-        own = float(self._world.totals[WORK])
-        return own if self._filaments is None else own + self._filaments.energies.gripped
+        return float(self._world.totals[WORK]) + self._energies.gripped
 
     @property
     def dissipated(self) -> float:
         """Energy dissipated since the start [J], by welding, stopping and drag; by contacts and bends if recorded."""
-        lost = float(self._world.totals[LOST])
-        if self._filaments is None:
-            return lost
-        energies = self._filaments.energies
-        return lost + energies.damped + energies.dragged
+        energies = self._energies
+        return float(self._world.totals[LOST]) + energies.damped + energies.dragged
 
     @property
     def given(self) -> float:
-        given = self.added + self.container_work
-        return given if self._filaments is None else given + self._filaments.energies.active
+        return self.added + self.container_work + self._energies.active
 
     @property
     def deformation(self) -> float:
         """Energy of stretched, bent and twisted filaments [J]; 0 without filaments."""
-        return 0.0 if self._filaments is None else self._filaments.energies.elastic
+        return self._energies.elastic
 
     def elastic(self) -> tuple[float, float]:
         """Return the energy in the springs of all contacts and that of deformed filaments [J]; hinges are rigid."""
