@@ -189,8 +189,8 @@ def test_the_torque_at_a_stop_is_that_of_the_shaft_however_stiff_contacts_are(la
     made.add(builds.at([0, 0, 5.0]))
     made.motors.articulate()
     torques = []
-    for look in range(5000):
-        made.motors.actuate(np.full((1, 1, 2), max(0.0, math.pi / 2 - 2e-4 * look)), 2e-4)
+    for update in range(5000):
+        made.motors.actuate(np.full((1, 1, 2), max(0.0, math.pi / 2 - 2e-4 * update)), 2e-4)
         made.advance(20)
         assert made.motors.readings is not None
         torques.append(made.motors.readings.torques.copy())
