@@ -98,7 +98,8 @@ def test_a_sweep_of_six_with_a_failure_and_a_time_limit(
     out, held = place / "out", tmp_path / "held"
     for name, value in gate("runs/long/checkpoint.zip", 2, "SIGSTOP", once=str(held)).items():
         monkeypatch.setitem(slurm.environment, name, value)
-    request = ("--runs-per-task", "1", "--memory", "900", "--time", "2")
+    # Runs are asked to stop after 110 s, which the short ones do not need even on a busy machine.
+    request = ("--runs-per-task", "1", "--memory", "900", "--time", "3")
     said = smarticles(
         "sweep", place / "sweep.yaml", "--out", out, "--submit", "slurm", *request, "--cluster", place / "here.toml"
     )
@@ -112,7 +113,11 @@ def test_a_sweep_of_six_with_a_failure_and_a_time_limit(
     log = out / "jobs" / "001" / f"{task}.txt"
     wait_until(lambda: "queued again" in log.read_text(), log.read_text)
     assert "ended by USR1" in log.read_text()
-    stopped = json.loads((out / "runs/long/failed.json").read_text())  # gone when the run goes on
+    # Slurm lets two minutes pass before it starts a task again: not long enough for what follows on a busy machine.
+    label = f"{record['job_id']}_{task}"
+    wait_until(lambda: "PENDING" in slurm.call("squeue", "--noheader", f"--jobs={label}", "--format=%T"), log.read_text)
+    slurm.call("scontrol", "update", f"JobId={label}", "StartTime=now+1hour")
+    stopped = json.loads((out / "runs/long/failed.json").read_text())
     assert (stopped["status"], "stopped as requested" in stopped["cause"]) == ("interrupted", True)
     others = {**dict.fromkeys(["a", "b", "c", "d"], "done"), "fails": "failed"}
     wait_until(lambda: {**states(smarticles, out), **others} == states(smarticles, out), lambda: "the others not done")
@@ -120,9 +125,6 @@ def test_a_sweep_of_six_with_a_failure_and_a_time_limit(
     # What failed has no result; what waits in the queue is left there.
     assert ": 1 of 6 runs, 1 tasks of 1 run" in smarticles("resume", out, "--submit", "slurm", *request)
     assert (out / "jobs/002/runs.txt").read_text() == "fails\n"
-    # Slurm lets two minutes pass before it starts a task again.
-    label = f"{record['job_id']}_{task}"
-    wait_until(lambda: "PENDING" in slurm.call("squeue", "--noheader", f"--jobs={label}", "--format=%T"), log.read_text)
     slurm.call("scontrol", "update", f"JobId={label}", "StartTime=now")
 
     expected = {**others, "long": "done"}
