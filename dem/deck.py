@@ -38,7 +38,7 @@ DEEPEST = 0.05
 
 
 def passive(scene: Scene) -> State:
-    """Return the initial state of a scene, at rest, after checking that a deck can describe the scene.
+    """Return the initial state of a scene, at rest, after a check that a deck can describe the scene.
 
     Raises:
         InputError: LAMMPS cannot compute parts of the scene, which the message lists; or spheres of different
@@ -71,7 +71,7 @@ def passive(scene: Scene) -> State:
 
 
 def _foreign(scene: Scene) -> Iterator[str]:
-    """Yield the parts of a scene that LAMMPS cannot compute, by key and name."""
+    """Yield the parts of a scene that LAMMPS cannot compute, each as its key and name."""
     if scene.smooth:
         yield f"engine: {scene.engine} takes links as they are, a deck has chains of spheres (use engine: yade)"
     if scene.mixture is not None:

@@ -16,7 +16,7 @@ JOINED = 1e-9  # of the longest bar: ends that are nearer are one joint
 
 
 def first_ends(points: Array) -> Numbers:
-    """Return for each end of S segments the number of the first end at the same place, (2 S,).
+    """Return (2 S,) for each end of segments the lowest number of all ends at its place.
 
     Args:
         points: (S, 2, 3) ends of the segments [m]. End e of segment s has the number 2 s + e.
@@ -27,11 +27,13 @@ def first_ends(points: Array) -> Numbers:
 
 
 def owners(first: Numbers, inner: Flags) -> Flags:
-    """Return for each end of segments whether its segment owns the place: the first inner one there, or the first one.
+    """Return (2 S,) whether each end owns the joint, or free end, at its place; each has one owner.
+
+    The owner is the first end whose segment is joined at both ends, or else the first end at the place.
 
     Args:
-        first: (2 S,) from `first_ends`.
-        inner: (2 S,) whether the segment of an end is joined at both ends.
+        first: (2 S,) place of each end, from `first_ends`.
+        inner: (2 S,) whether the segment of each end is joined to other segments at both of its ends.
     """
     order = np.lexsort((np.arange(len(first)), ~inner, first))
     found = np.zeros(len(first), np.bool_)
@@ -40,9 +42,11 @@ def owners(first: Numbers, inner: Flags) -> Flags:
 
 
 def segment_distances(one: Array, other: Array) -> Array:
-    """Return distances (P,) between segments (P, 2, 3) and (P, 2, 3), pair by pair, in their unit of length.
+    """Return (P,) distances between segments `one` (P, 2, 3) and `other` (P, 2, 3), pair by pair.
 
-    Segments may have no length. Source: Ericson, Real-Time Collision Detection, section 5.1.9.
+    Distances have the unit of the coordinates. Segments may have length 0.
+
+    Source: Ericson, Real-Time Collision Detection, section 5.1.9.
     """
     p, q = one[:, 0], other[:, 0]
     u, v, w = one[:, 1] - p, other[:, 1] - q, p - q
@@ -64,20 +68,20 @@ def segment_distances(one: Array, other: Array) -> Array:
 class Bars:
     """S straight bars of one cross-section that form a rigid body.
 
-    Mass and inertia are the sums over one box, or cylinder, per bar. These overlap at joints, where mass counts twice,
+    Mass and inertia are the sums over one box, or cylinder, per bar. Boxes overlap at joints, where mass counts twice,
     as in the paper.
 
     Raises:
-        InputError: a bar is too short for its thickness, its normal is along it, or bars cross or touch apart from
-            their joints.
+        InputError: a bar is not longer than its thickness, a normal is along its bar, or bars cross or touch
+            elsewhere than at their joints.
     """
 
     points: Array  #: (S, 2, 3) both ends of each bar [m], in any frame
-    normals: Array  #: (S, 3) direction of the thickness along the normal, need not be of unit length [1]
-    thickness_normal: float  #: [m]
-    thickness_in_plane: float  #: [m]
+    normals: Array  #: (S, 3) normal of each bar, along which `thickness_normal` is measured, of any length [1]
+    thickness_normal: float  #: Thickness of all bars along their normals [m]
+    thickness_in_plane: float  #: Thickness of all bars across length and normal [m]
     density: float  #: [kg/m³]
-    round: bool = False  #: Whether the section is a disc, of the diameter that both thicknesses give
+    round: bool = False  #: Whether the section is a disc; both thicknesses are then its diameter
 
     def __post_init__(self) -> None:
         least = self.thickness_in_plane
@@ -97,15 +101,15 @@ class Bars:
 
     @cached_property
     def _joints(self) -> Numbers:
-        """(2 S,) of `first_ends`."""
+        """(2 S,) lowest number of all ends at the place of each end, see `first_ends`."""
         return first_ends(self.points)
 
     @cached_property
     def gaps(self) -> tuple[Numbers, Numbers, Array]:
-        """All pairs of bars, as (P,) first, (P,) second and (P,) distances of their axes [m].
+        """Numbers of both bars of all P pairs, each (P,), and distances (P,) between their axes [m].
 
-        The distance of two bars with a common joint is that of either's other end from the other bar; bars that lie on
-        each other have the distance 0.
+        Of two bars with a common joint, the distance is that between one bar and the far end of the other bar, the
+        smaller of the two values; it is 0 for bars that lie on each other.
         """
         first, second = np.triu_indices(len(self.points), 1)
         joints = self._joints.reshape(-1, 2)
@@ -194,7 +198,7 @@ class Bars:
 
     @cached_property
     def ends(self) -> Array:
-        """(S, 2, 3) both ends of each bar in the body's frame: centre of mass, principal axes [m]."""
+        """(S, 2, 3) both ends of each bar in the body's frame [m]: from the centre of mass, along principal axes."""
         return applied(self.rotation.T, self.points - self._centre_of_mass)
 
     @cached_property
@@ -205,7 +209,7 @@ class Bars:
 
     @cached_property
     def owned(self) -> Flags:
-        """(S, 2) whether a bar owns the joint, or free end, at its end.
+        """(S, 2) whether each bar owns the joint, or free end, at its start and at its end.
 
         Each joint has one owner: the first of those bars that are joined at both ends, or else the first bar.
         """
@@ -229,7 +233,7 @@ class Bars:
             radius: radius of a strand [m], by which free ends are moved inwards.
 
         Raises:
-            InputError: nothing of a bar is left between its ends.
+            InputError: a bar is so short that nothing is left of its axis.
         """
         pulled = radius * self.free
         if not (self.lengths > pulled.sum(axis=1)).all():

@@ -38,13 +38,13 @@ class Chain:
     def offset(self) -> float:
         """Distance in y [m] between the centrelines of the two rows of middle links.
 
-        Barb tips of one row end a gap before the middle links of the other row.
+        Between the barb tips of one row and the middle links of the other row is a gap of `gap`.
         """
         return self.particle.boxes.barb_length + self.gap + self._half
 
     @property
     def _half(self) -> float:
-        """Distance of a middle link's faces from its axis [m]."""
+        """Half the thickness of a middle link in the plane [m]."""
         return self.particle.boxes.bulge + self.particle.radius
 
     @property
@@ -95,7 +95,10 @@ def extent(state: State, diameter: float) -> float:
 
 
 def _corners(state: State) -> Array:
-    """Return (N, V, 3) tips and hinges [m]; for thicker middle links also the ends of their outer rows."""
+    """Return (N, V, 3) points of each smarticle's outline [m], half the barbs' thickness inside it.
+
+    The V points are the barb tips and hinges, and for middle links thicker than barbs four corners of the middle link.
+    """
     bulge, vertices = state.boxes.bulge, state.vertices
     if not bulge:
         return vertices

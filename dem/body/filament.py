@@ -14,13 +14,13 @@ LEAST_NODES = 3  # one place that bends
 
 @dataclass(frozen=True, kw_only=True)
 class Liquid:
-    """A liquid at rest, which filaments are immersed in.
+    """A liquid at rest, in which filaments are immersed.
 
     Raises:
         InputError: a number is negative or not finite.
     """
 
-    viscosity: float  #: μ [Pa s]
+    viscosity: float  #: Dynamic viscosity μ [Pa s]
     density: float  #: [kg/m³]
 
     def __post_init__(self) -> None:
@@ -29,9 +29,9 @@ class Liquid:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class PreferredCurvature:
-    """The curvature that a filament bends to by itself: a wave along it, whose plane turns about its axis.
+    """Curvature of a filament without loads: a wave along it, whose plane turns about its axis.
 
-    At inner node k and time t the two components in the frame of the filament's material are
+    At inner node k and time t the two components of curvature in the frame of the filament's material are
     amplitude_k (cos(ψ + phase_k), sin(ψ + phase_k)), with dψ/dt = ± rate; the sign changes at random times. Phases that
     grow along the filament make a helix. γ = rate/(2π reversal_rate) is the mean number of turns between reversals.
 
@@ -39,10 +39,10 @@ class PreferredCurvature:
         InputError: a number is not finite, or the reversal rate is negative.
     """
 
-    amplitudes: float | Array  #: [1/m], one for all inner nodes or (nodes - 2,)
-    phases: float | Array = 0.0  #: [rad], one for all inner nodes or (nodes - 2,)
-    rate: float = 0.0  #: α [rad/s]
-    reversal_rate: float = 0.0  #: λ, mean number of reversals per second; 0: none [1/s]
+    amplitudes: float | Array  #: Amplitude [1/m]: a number for all inner nodes, or (nodes - 2,)
+    phases: float | Array = 0.0  #: Phase [rad]: a number for all inner nodes, or (nodes - 2,)
+    rate: float = 0.0  #: α, rate at which ψ rises or falls [rad/s]
+    reversal_rate: float = 0.0  #: λ, mean number of reversals of the turn per second; 0: none [1/s]
 
     def __post_init__(self) -> None:
         _check(reversal_rate=self.reversal_rate)
@@ -53,68 +53,68 @@ class PreferredCurvature:
 
 @dataclass(frozen=True, kw_only=True)
 class Activity:
-    """How filaments bend by themselves: a wave of preferred curvature that travels along them and turns."""
+    """Active bending of filaments: a wave of preferred curvature along them, whose plane turns."""
 
-    curvature: float  #: Amplitude [1/m]
-    wavelength: float = math.inf  #: [m]; infinite: equal along the filament
+    curvature: float  #: Amplitude of the preferred curvature [1/m]
+    wavelength: float = math.inf  #: Wavelength along the filament [m]; inf: equal curvature at all nodes
     rate: float = 0.0  #: α, rate at which the plane of the wave turns about the filament [rad/s]
-    reversal_rate: float = 0.0  #: λ, mean number of reversals per second; 0: none [1/s]
+    reversal_rate: float = 0.0  #: λ, mean number of reversals of the turn per second; 0: none [1/s]
 
 
 class FilamentEnergies(NamedTuple):
-    """Energies of all filaments [J]; work since the start."""
+    """Present energies of all filaments, and energies exchanged with them since the start [J]."""
 
-    kinetic: float  #: Of nodes and of rolling, half a step before
-    potential: float  #: Weight less buoyancy times height above z = 0
-    stretching: float
-    bending: float  #: Against the preferred curvature
-    twisting: float
-    damped: float  #: Taken by internal damping; summed only where the engine keeps a ledger
-    dragged: float  #: Taken by the liquid's drag
-    active: float  #: Given by changes of the preferred curvature
-    gripped: float  #: Given by grips
+    kinetic: float  #: Kinetic energy of nodes and of rolling segments, half a step before the present time
+    potential: float  #: Weight less buoyancy, times height above z = 0
+    stretching: float  #: Elastic energy of stretching
+    bending: float  #: Elastic energy of bending, 0 at the preferred curvature
+    twisting: float  #: Elastic energy of twisting
+    damped: float  #: Dissipated by internal damping; 0 unless the engine keeps an energy ledger
+    dragged: float  #: Dissipated by the liquid's drag
+    active: float  #: Work of changes of the preferred curvature
+    gripped: float  #: Work of grips
 
     @property
     def elastic(self) -> float:
-        """Of stretched, bent and twisted filaments [J]."""
+        """Elastic energy of stretching, bending and twisting [J]."""
         return self.stretching + self.bending + self.twisting
 
     @property
     def stored(self) -> float:
-        """[J]."""
+        """Present kinetic, potential and elastic energy [J]."""
         return self.kinetic + self.potential + self.stretching + self.bending + self.twisting
 
     @property
     def residual(self) -> float:
-        """What is stored, less what was given, plus what was taken; constant without contacts [J]."""
+        """Stored and dissipated energy, less the work done [J]; constant without contacts."""
         return self.stored + self.damped + self.dragged - self.active - self.gripped
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Filament:
-    """One kind of flexible filament: nodes at equal distances along a round rod, straight unless it is told otherwise.
+    """A kind of flexible filament: nodes at equal distances along a round rod.
 
     A stiffness that is left out follows from Young's modulus. Damping is that of a Kelvin–Voigt material: stress is
-    E (ε + τ dε/dt), with a time τ for stretching and twisting, whose waves are fast, and another one for bending.
+    E (ε + τ dε/dt), with the strain ε and two relaxation times τ: one for stretching and twisting, one for bending.
 
     Raises:
-        InputError: a number is out of its range, or neither a modulus nor the three stiffnesses are there.
+        InputError: a number is out of its range, or neither Young's modulus nor all three stiffnesses are given.
     """
 
-    nodes: int  #: n, at least 3
-    length: float  #: L, from the first node to the last; round caps reach by half a diameter beyond [m]
-    diameter: float  #: d [m]
+    nodes: int  #: Number of nodes, at least 3
+    length: float  #: L, from the first to the last node, without the round caps of radius d/2 [m]
+    diameter: float  #: Diameter d [m]
     density: float  #: [kg/m³]
-    young_modulus: float | None = None  #: E [Pa]
+    young_modulus: float | None = None  #: Young's modulus E [Pa]
     poisson_ratio: float = 0.5  #: [1]
     stretching_stiffness: float | None = None  #: EA [N]
     bending_stiffness: float | None = None  #: EI [N m²]
     twisting_stiffness: float | None = None  #: GJ [N m²]
-    stretching_time: float = 0.0  #: τ of stretching and twisting [s]
-    bending_time: float = 0.0  #: τ of bending [s]
-    curvature: PreferredCurvature | None = None  #: None: it prefers to be straight
-    liquid: Liquid | None = None  #: None: no buoyancy, no drag
-    #: Torque per length and rate that resists rolling about its own axis, besides the liquid's: that of bristles [N s]
+    stretching_time: float = 0.0  #: Relaxation time τ of stretching and twisting [s]
+    bending_time: float = 0.0  #: Relaxation time τ of bending [s]
+    curvature: PreferredCurvature | None = None  #: Preferred curvature; None: straight
+    liquid: Liquid | None = None  #: Liquid around the filament; None: no buoyancy, no drag
+    #: Torque per length and rate of rolling about the axis, e.g. of bristles, in addition to the liquid's drag [N s]
     roll_drag: float = 0.0
 
     def __post_init__(self) -> None:
@@ -146,34 +146,38 @@ class Filament:
 
     @property
     def segment_length(self) -> float:
-        """[m]."""
+        """Distance between neighbouring nodes at rest [m]."""
         return self.length / (self.nodes - 1)
 
     @property
     def area(self) -> float:
-        """A [m²]."""
+        """Area A of the section [m²]."""
         return math.pi * self.diameter**2 / 4
 
     @property
     def second_moment(self) -> float:
-        """I of the section about a diameter [m⁴]."""
+        """Second moment of area I of the section about a diameter [m⁴]."""
         return math.pi * self.diameter**4 / 64
 
     @property
     def mass(self) -> float:
-        """Of the whole filament, without caps [kg]."""
+        """Mass of the filament, without its round caps [kg]."""
         return self.density * self.area * self.length
 
     @property
     def masses(self) -> Array:
-        """(nodes,) at the nodes [kg]: each end has half of what an inner node has."""
+        """(nodes,) masses of the nodes [kg]; an end node has half the mass of an inner node."""
         found = np.full(self.nodes, self.mass / (self.nodes - 1))
         found[[0, -1]] /= 2
         return found
 
     @property
     def effective_mass(self) -> float:
-        """Typical effective mass of a contact [kg]: a push at s moves two nodes by (1 - s)²/m and s²/m, 2/3 in mean."""
+        """Typical effective mass of the filament at a contact [kg].
+
+        A force at the place s (0 to 1) along a segment acts on two nodes of mass m. The mobility there is
+        ((1 - s)² + s²)/m, with the mean 2/(3 m) over s.
+        """
         return 1.5 * self.mass / (self.nodes - 1)
 
     @property
@@ -183,7 +187,7 @@ class Filament:
 
     @property
     def stiffnesses(self) -> tuple[float, float, float]:
-        """EA [N], EI [N m²] and GJ [N m²]."""
+        """Stiffnesses of stretching EA [N], bending EI [N m²] and twisting GJ [N m²]."""
         modulus = self.young_modulus or 0.0
         shear = modulus / (2 * (1 + self.poisson_ratio))
         by_modulus = modulus * self.area, modulus * self.second_moment, shear * 2 * self.second_moment
@@ -193,9 +197,9 @@ class Filament:
 
     @property
     def stiffest(self) -> tuple[float, float, float]:
-        """Squares of the greatest frequencies of stretching, bending and twisting [1/s²].
+        """Squares of the highest angular frequencies of stretching, bending and twisting [1/s²].
 
-        In these modes neighbouring nodes, or segments, move against each other.
+        In these modes neighbouring nodes, or segments, move in opposite directions.
         """
         length, (stretching, bending, twisting) = self.segment_length, self.stiffnesses
         mass, inertia = self.mass / (self.nodes - 1), self.axial_inertia
@@ -203,10 +207,12 @@ class Filament:
 
     @property
     def drags(self) -> tuple[float, float, float]:
-        """Force per length and speed across and along the axis [Pa s], torque per length and rate of roll [N s].
+        """Drag coefficients, for motion across and along the axis [Pa s] and for rolling about it [N s].
 
-        Source: 4πμ/(ln(L/d) + 1/2) across and half of it along, slender bodies at low Reynolds number, Cox, J. Fluid
-        Mech. 44, 791 (1970); πμd² for a cylinder that turns about its axis.
+        They are force per length and speed, and torque per length and rate of rolling.
+
+        Source: Cox, J. Fluid Mech. 44, 791 (1970), slender bodies at low Reynolds number: 4πμ/(ln(L/d) + 1/2) across,
+        and half of this along; πμd² for a cylinder that turns about its axis.
         """
         if self.liquid is None:
             return 0.0, 0.0, self.roll_drag
@@ -215,7 +221,7 @@ class Filament:
 
     @property
     def weight_share(self) -> float:
-        """Weight in the liquid over weight [1]."""
+        """Weight less buoyancy, over weight [1]."""
         return 1.0 if self.liquid is None else 1.0 - self.liquid.density / self.density
 
 

@@ -26,21 +26,27 @@ class ContactForces:
     """The M contacts that carry a force at one instant."""
 
     smarticles: Numbers  #: (M, 2) the two smarticles, the lower number first; the second one is -1 for a boundary
-    links: Numbers  #: (M, 2) their links: 0 barb 1, 1 middle link, 2 barb 2; -1 for a boundary
+    links: Numbers  #: (M, 2) links in contact: 0 barb 1, 1 middle link, 2 barb 2; -1 for a boundary
     boundaries: Numbers  #: (M,) index of the boundary in `BOUNDARIES`; -1 for a contact between smarticles
     points: Array  #: (M, 3) mean of the points of contact, weighted by their normal forces [m]
     normal: Array  #: (M,) sum of the normal forces at the points, positive [N]
-    tangential: Array  #: (M,) size of the sum of the tangential forces at the points [N]
+    tangential: Array  #: (M,) magnitude of the vector sum of the tangential forces at the points [N]
     forces: Array  #: (M, 3) total force on the first smarticle, summed over the points [N]
 
 
 def at_links(smarticle: Number, link: Number, each: int = LINKS) -> Number:
-    """Return the codes of links, 0 or above, for `contacts_of_points`; `each`: most links of a body."""
+    """Return codes of links, 0 or above, for `contacts_of_points`.
+
+    Args:
+        smarticle: numbers of the bodies.
+        link: number of each link in its body.
+        each: largest number of links of a body, which is the difference between the codes of two bodies.
+    """
     return each * smarticle + link
 
 
 def at_boundaries(part: Number) -> Number:
-    """Return the codes of boundaries, below 0, for `contacts_of_points`, from indices of `BOUNDARIES`."""
+    """Return codes of boundaries, below 0, for `contacts_of_points`; `part`: indices of `BOUNDARIES`."""
     return -1 - part
 
 
@@ -58,7 +64,8 @@ def contacts_of_points(
 
     Args:
         first: (P,) codes of links, from `at_links`.
-        second: (P,) codes of what the links of `first` touch: links from `at_links`, boundaries from `at_boundaries`.
+        second: (P,) codes of the links or boundaries that touch the links of `first`, from `at_links` and
+            `at_boundaries`.
         loads: (P,) normal forces, 0 or above [N]; a contact whose points all have 0 is left out.
         points: (P, 3) positions [m].
         friction: (P, 3) tangential forces on the links of `first` [N].

@@ -15,11 +15,11 @@ from dem.body.particle import HINGE_CLEARANCE, Particle, smallest_effective_mass
 
 
 class Body(Protocol):
-    """What a smarticle and a kind of other bodies have in common. SI throughout."""
+    """Interface of a smarticle and of a kind of other bodies, in SI units."""
 
     @property
     def filament(self) -> Filament | None:
-        """What a flexible body is made of; None: it is rigid."""
+        """Filament that a flexible body consists of; None for a rigid body."""
 
     @property
     def mass(self) -> float:
@@ -35,7 +35,7 @@ class Body(Protocol):
 
     @property
     def size(self) -> float:
-        """Length of the longest bar [m]; of a smarticle that of its middle link, w."""
+        """Length of the longest bar [m]; of a smarticle the length w of its middle link."""
 
     @property
     def thicknesses(self) -> tuple[float, float]:
@@ -51,7 +51,7 @@ class Body(Protocol):
 
     @property
     def reach(self) -> float:
-        """Largest distance of any material point, bars or spheres, from the centre of mass [m]."""
+        """Largest distance of a point of bars or spheres from the centre of mass [m]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -61,9 +61,9 @@ class Kind:
     name: str
     bars: Bars
     rows: int  #: Rows of spheres, or strands, side by side along the normal of each bar; 1 for a round section
-    diameter: float  #: Of a sphere, or strand [m]
+    diameter: float  #: Diameter of a sphere, or strand [m]
     pitch: float  #: Largest distance of neighbouring spheres along a bar [m]
-    #: What the body is made of if it is flexible; its bars are then its segments as they are poured. None: rigid
+    #: Filament of a flexible body, whose `bars` are its segments in the shape in which it is poured; None: rigid
     filament: Filament | None = None
 
     @property
@@ -104,8 +104,8 @@ class Kind:
     def _stations(self, bar: int) -> Array:
         """Return (n,) distances of a bar's spheres from its start [m].
 
-        A joint has a sphere of the bar that owns it; other bars begin a diameter and `HINGE_CLEARANCE` away. The last
-        sphere's surface is the tip of a free end. Source: `dem.body.particle.Particle`.
+        At a joint only the owner has a sphere; other bars begin 1 + `HINGE_CLEARANCE` diameters away from it. At a free
+        end the last sphere ends at the tip, that of a filament has its centre there. See `dem.body.particle.Particle`.
         """
         length, d = float(self.bars.lengths[bar]), self.diameter
         free, owned = self.bars.free[bar], self.bars.owned[bar]
@@ -144,31 +144,36 @@ class Kind:
 
     @property
     def links(self) -> Numbers:
-        """(S,) bar of each sphere."""
+        """(S,) number of the bar to which each sphere belongs."""
         return self._layout[1]
 
     @property
     def reach(self) -> float:
-        """Largest distance of any material point, bars or spheres, from the centre of mass [m]."""
+        """Largest distance of a point of bars or spheres from the centre of mass [m]."""
         spheres = float(np.linalg.norm(self.centres, axis=1).max()) + self.radius
         half = self.diameter / 2 if self.bars.round else math.hypot(*self.thicknesses) / 2
         return max(spheres, float(np.linalg.norm(self.bars.ends, axis=2).max()) + half)
 
     @cached_property
     def smallest_effective_mass(self) -> float:
-        """Smallest effective mass of the body at any sphere's centre, in any direction [kg]."""
+        """Smallest effective mass of the body over all spheres' centres and all directions [kg]."""
         return smallest_effective_mass(self.mass, self.inertia, self.centres)
 
 
 @dataclass(frozen=True)
 class Mixture:
-    """The kinds of bodies of a pile that are no smarticles, and which kind each body is, in the order of pouring."""
+    """K kinds of bodies of a pile without smarticles, and the kind of each of N bodies in order of pouring."""
 
     kinds: tuple[Kind, ...]
-    of: Numbers = field(repr=False)  #: (N,) number of each body's kind
+    of: Numbers = field(repr=False)  #: (N,) index in `kinds` for each body
 
     def mean(self, values: Sequence[float], kinds: Numbers | None = None) -> float:
-        """Return the mean of a number of each kind over all bodies, or over bodies of `kinds` (n,)."""
+        """Return the mean over bodies of a quantity that each kind has; NaN without bodies.
+
+        Args:
+            values: (K,) value of the quantity for each kind.
+            kinds: (n,) kind of each body; None: all bodies of the pile.
+        """
         each = np.array(values)[self.of if kinds is None else kinds]
         return float(each.mean()) if len(each) else float("nan")
 
@@ -179,32 +184,32 @@ class Mixture:
 
     @cached_property
     def masses(self) -> Array:
-        """(K,) of the kinds [kg]."""
+        """(K,) mass of a body of each kind [kg]."""
         return np.array([kind.mass for kind in self.kinds])
 
     @cached_property
     def volumes(self) -> Array:
-        """(K,) of the kinds [m³]."""
+        """(K,) solid volume of a body of each kind [m³]."""
         return np.array([kind.volume for kind in self.kinds])
 
     @cached_property
     def inertias(self) -> Array:
-        """(K, 3) principal moments of the kinds [kg m²]."""
+        """(K, 3) principal moments of inertia of a body of each kind [kg m²]."""
         return np.array([kind.inertia for kind in self.kinds])
 
     @cached_property
     def sizes(self) -> Numbers:
-        """(K,) numbers of bars of the kinds."""
+        """(K,) number of bars of a body of each kind."""
         return np.array([len(kind.bars.points) for kind in self.kinds], dtype=np.int64)
 
     @cached_property
     def ends(self) -> Array:
-        """(B, 2, 3) both ends of all bars of all kinds, in the frames of the kinds [m]."""
+        """(B, 2, 3) both ends of the bars of one body of each kind, in its body frame [m]."""
         return np.concatenate([kind.bars.ends for kind in self.kinds])
 
     @cached_property
     def normals(self) -> Array:
-        """(B, 3) normals of all bars of all kinds, in the frames of the kinds; zeros where the section is round [1]."""
+        """(B, 3) normals of the bars of `ends`, in the body frame; zeros where the section is round [1]."""
         return np.concatenate([(not kind.bars.round) * kind.bars.frames[:, :, 2] for kind in self.kinds])
 
     @property
@@ -219,47 +224,55 @@ class Mixture:
 
     @property
     def size(self) -> float:
-        """Length of the longest bar of all kinds [m]."""
+        """Length of the longest bar of any kind [m]."""
         return max(kind.size for kind in self.kinds)
 
     @property
     def thicknesses(self) -> tuple[float, float]:
-        """Smallest thickness along the normal and in the plane of all kinds [m]."""
+        """Smallest thickness along the normal, and smallest thickness in the plane, of all kinds [m]."""
         normal, in_plane = np.min([kind.thicknesses for kind in self.kinds], axis=0).tolist()
         return normal, in_plane
 
     @property
     def radius(self) -> float:
-        """Radius of the thickest spheres [m]."""
+        """Radius of the largest spheres of all kinds [m]."""
         return max(kind.radius for kind in self.kinds)
 
     @property
     def diameter(self) -> float:
-        """Diameter of the thinnest spheres, or strands, to which all overlaps refer [m]."""
+        """Diameter of the smallest spheres, or strands, of all kinds; overlaps are compared with it [m]."""
         return min(kind.diameter for kind in self.kinds)
 
     @property
     def reach(self) -> float:
-        """Largest distance of any material point from the centre of mass of its body [m]."""
+        """Largest distance of a point of any body from the centre of mass of this body [m]."""
         return max(kind.reach for kind in self.kinds)
 
     @cached_property
     def spheres(self) -> Array:
-        """(K, S, 3) centres of the spheres of each kind in its frame [m]; the last sphere fills up the rows."""
+        """(K, S, 3) centres of the spheres of each kind in its body frame [m].
+
+        S is the largest number of spheres of a kind; shorter rows repeat the kind's last sphere.
+        """
         return padded([kind.centres for kind in self.kinds])
 
 
 def bodies_of(model: Particle | Mixture) -> tuple[Particle | Kind, ...]:
-    """Return one body of each kind."""
+    """Return one body of each kind: the smarticle, or the kinds of a mixture."""
     return (model,) if isinstance(model, Particle) else model.kinds
 
 
 def body_of(model: Particle | Mixture, kinds: Sequence[int] | Numbers, number: int) -> Particle | Kind:
-    """Return what the body of a number is, given the kinds of all bodies of a mixture."""
+    """Return the smarticle, or in a mixture the kind of a body.
+
+    Args:
+        kinds: (N,) kind of each body of the mixture.
+        number: index of the body in `kinds`.
+    """
     return model if isinstance(model, Particle) else model.kinds[kinds[number]]
 
 
 def padded(rows: Sequence[Array]) -> Array:
-    """Return arrays (n, …) of different lengths as one, each filled up with its last item."""
+    """Return k arrays (n, …) of different n as one array (k, longest n, …); shorter ones repeat their last item."""
     longest = max(map(len, rows))
     return np.array([row[np.minimum(np.arange(longest), len(row) - 1)] for row in rows])

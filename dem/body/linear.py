@@ -20,7 +20,7 @@ def matrix_product(a: Array, b: Array) -> Array:
 
 
 def applied(matrix: Array, points: Array) -> Array:
-    """Multiply matrices (…, i, j) with points (…, n, j), or the same points (n, j); return (…, n, i)."""
+    """Return points (…, n, j), or (n, j) for all matrices, multiplied by matrices (…, i, j), as (…, n, i)."""
     return matrix_product(points, np.swapaxes(matrix, -1, -2))
 
 

@@ -95,12 +95,12 @@ class Boxes:
 
     @property
     def bulge(self) -> float:
-        """Half the difference between the in-plane thicknesses of middle link and barbs [m]."""
+        """Half the difference of the thicknesses in the plane, middle link less barbs [m]."""
         return (self.thicknesses_in_plane[1] - self.thickness_in_plane) / 2
 
     @property
     def _weights(self) -> Array:
-        """(3,) [m]: lengths that the links would have with their own masses and the barbs' thickness."""
+        """(3,) [m]: length of a link with the barbs' thickness that has the mass of each link."""
         return self.lengths * (np.array(self.thicknesses_in_plane) / self.thickness_in_plane)
 
     @property
@@ -182,7 +182,7 @@ class Boxes:
 
     @property
     def link_inertias(self) -> Array:
-        """(3, 3) float64 [kg m²]: principal moments of links about their centres, axes as in `link_rotations`."""
+        """(3, 3) float64 [kg m²]: principal moments of the links about their centres, along their own axes."""
         t1, length = self.thickness_normal, self.lengths
         t2_squared = np.array([t2**2 for t2 in self.thicknesses_in_plane])
         squares = np.stack([t1**2 + t2_squared, length**2 + t1**2, length**2 + t2_squared], axis=1)
@@ -253,7 +253,7 @@ class Particle:
 
     @cached_property
     def _rows(self) -> Array:
-        """(rows,) [m]: offsets along the normal; outermost spheres reach exactly ±t1/2."""
+        """(rows,) [m]: offsets of the rows of spheres along the normal; outermost spheres reach to ±t1/2."""
         if self.chain.rows == 1:
             return np.zeros(1)
         reach = (self.boxes.thickness_normal - self.chain.diameter) / 2
@@ -282,7 +282,7 @@ class Particle:
         return (self.boxes.bulge + start) / math.cos(INWARDS) if self.boxes.bulge else start
 
     def _stations(self, link: int) -> Array:
-        """Return (n,) distances [m] of a link's sphere centres from its start: the barb's hinge, or hinge 1."""
+        """Return (n,) distances [m] of a link's sphere centres from its start: a barb's hinge, or hinge 1."""
         d, pitch = self.chain.diameter, self.chain.pitch
         if link == 1:
             # The spheres at the hinges belong to the middle link and are centred on the hinge axes. A bar without
@@ -337,14 +337,14 @@ class Particle:
 
     @property
     def reach(self) -> float:
-        """Largest distance [m] of any material point, boxes or spheres, from the centre of mass."""
+        """Largest distance [m] of a point of boxes or spheres from the centre of mass."""
         spheres = float(np.linalg.norm(self.centres, axis=1).max()) + self.radius
         half = math.hypot(self.boxes.thickness_normal, max(self.boxes.thicknesses_in_plane)) / 2
         return max(spheres, float(np.linalg.norm(self.boxes.vertices, axis=1).max()) + half)
 
     @cached_property
     def smallest_effective_mass(self) -> float:
-        """Smallest effective mass of the smarticle at any sphere's centre, in any direction [kg]."""
+        """Smallest effective mass of the smarticle over all spheres' centres and all directions [kg]."""
         return smallest_effective_mass(self.boxes.mass, self.boxes.inertia, self.centres)
 
     @property
@@ -379,7 +379,7 @@ class Particle:
 
 
 def smallest_effective_mass(mass: float, inertia: Array, centres: Array) -> float:
-    """Return the smallest effective mass [kg] of a rigid body at any of several points, in any direction.
+    """Return the smallest effective mass [kg] of a rigid body over several points and all directions.
 
     A force F in the direction n at a point r from the centre of mass accelerates that point along n by
     (1/m + (r × n)·I⁻¹(r × n)) F. The effective mass is the inverse of the largest eigenvalue of this mobility. It
@@ -388,7 +388,7 @@ def smallest_effective_mass(mass: float, inertia: Array, centres: Array) -> floa
     Args:
         mass: [kg].
         inertia: (3,) principal moments [kg m²].
-        centres: (n, 3) the points, from the centre of mass, along the principal axes [m].
+        centres: (n, 3) points, from the centre of mass, along the principal axes [m].
     """
     inverse, (x, y, z) = 1.0 / inertia, centres.T
     # A push on a sphere acts at its surface, but the normal passes through the centre.

@@ -26,7 +26,7 @@ class Poses:
 
     positions: Array  #: (k, 3) centres of mass [m]
     rotations: tuple[Rotation, ...]  #: k rotations from the body frame to the laboratory frame
-    kinds: Numbers | None = None  #: (k,) numbers of their kinds in a mixture; None: smarticles
+    kinds: Numbers | None = None  #: (k,) kind of each body in a mixture; None: smarticles
 
 
 def place_layer(
@@ -43,21 +43,21 @@ def place_layer(
 ) -> Poses:
     """Return random poses of `count` bodies without overlap, in a slab of a cylinder.
 
-    Orientations are drawn uniformly from all rotations, centres from the disc, and the heights of the lowest points
-    from the slab. Poses that overlap are drawn again. A slab that is too full is made higher.
+    Orientations are uniform over all rotations, centres uniform over the cylinder's section, and heights of the lowest
+    points uniform over the slab. Poses that overlap are drawn again. A slab that is too full is made higher.
 
     Args:
-        bodies: a body, of which all are copies, or as many bodies as `count`.
+        bodies: one body, which is placed `count` times, or `count` bodies.
         radius: inner radius of the cylinder [m].
         bottom: height of the slab's lower face [m]; no sphere reaches below it.
         height: height of the slab [m].
         obstacles: (n, 3) centres of spheres that are already there [m].
         narrower: function from heights (n,) to inner radii (n,) of the cylinder [m], which must not increase with
             height; None: `radius` everywhere.
-        thickest: radius of the thickest obstacles, if they are thicker than all of `bodies` [m].
+        thickest: radius of the largest obstacles, if it is above the radii of all `bodies` [m].
 
     Raises:
-        RunError: some bodies found no room although the slab was made higher `MOST_GROWTH` times.
+        RunError: some bodies still overlap after the slab was made higher `MOST_GROWTH` times.
     """
     each = bodies if isinstance(bodies, Sequence) else [bodies] * count
     thickest = max(thickest, *(body.radius for body in each))
@@ -102,7 +102,7 @@ def place_layer(
 
 
 def fitted_poses(boxes: Boxes, vertices: Array) -> tuple[Poses, Array]:
-    """Fit the pose of one shape to the given vertices of each smarticle, by least squares.
+    """Fit the pose of a rigid shape to the given vertices of each smarticle, by least squares.
 
     Vertices do not determine the rotation of a straight shape about its length. The angle of this rotation is then
     arbitrary, but equal vertices give equal angles.

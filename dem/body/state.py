@@ -17,7 +17,7 @@ from dem.errors import InputError
 
 
 class PileState(Protocol):
-    """What states of all kinds of bodies have in common, in the laboratory frame."""
+    """Interface of the states of piles of any bodies, in the laboratory frame."""
 
     @property
     def count(self) -> int:
@@ -33,15 +33,15 @@ class PileState(Protocol):
 
     @property
     def volume(self) -> float:
-        """Mean solid volume of the bodies present [m³]; of all bodies where none is present."""
+        """Mean solid volume of the bodies present, or of all bodies of the scene if none is present [m³]."""
 
     @property
     def tops(self) -> Array:
-        """(N,) heights of the highest point of each body's axes [m]."""
+        """(N,) height of the highest point on the axes of each body's bars, or links [m]."""
 
     @property
     def speeds(self) -> Array:
-        """(N,) speed of the fastest centre of a bar, or link, of each body [m/s]."""
+        """(N,) largest speed of the centres of each body's bars, or links [m/s]."""
 
     @property
     def momentum(self) -> Array:
@@ -60,15 +60,15 @@ class PileState(Protocol):
 
     @property
     def smarticles(self) -> State:
-        """The state of a pile of smarticles; raises InputError for other bodies, which have no barbs."""
+        """This state, if the bodies are smarticles; raises InputError for other bodies."""
 
     @property
     def bodies(self) -> BarState | None:
-        """The state of a pile of bodies that are no smarticles; None for smarticles."""
+        """This state, if the bodies are no smarticles; None for smarticles."""
 
 
 class BarState:
-    """What states of bodies of bars have in common, with M bars in all, in the laboratory frame.
+    """Base of the states of bodies that consist of bars, M bars in all, in the laboratory frame.
 
     Subclasses are dataclasses with `mixture`, `kind`, `positions` and `velocities`.
     """
@@ -99,7 +99,7 @@ class BarState:
         raise NotImplementedError
 
     def spheres(self) -> Array:
-        """Return (N, S, 3) centres of all spheres [m]; the last one of a body fills up its row."""
+        """Return (N, S, 3) centres of all spheres [m]; a body with fewer than S spheres repeats its last one."""
         raise NotImplementedError
 
     @property
@@ -119,12 +119,12 @@ class BarState:
 
     @property
     def volume(self) -> float:
-        """Mean solid volume of the bodies present [m³]; of all bodies where none is present."""
+        """Mean solid volume of the bodies present, or of all bodies of the scene if none is present [m³]."""
         return self.mixture.mean(self.mixture.volumes.tolist(), self.kind if self.count else None)
 
     @cached_property
     def body(self) -> Numbers:
-        """(M,) the body that each bar belongs to."""
+        """(M,) number of the body to which each bar belongs."""
         return np.repeat(np.arange(self.count), self.mixture.sizes[self.kind])
 
     @cached_property
@@ -139,16 +139,16 @@ class BarState:
 
     @cached_property
     def tops(self) -> Array:
-        """(N,) heights of the highest point of each body's axes [m]."""
+        """(N,) height of the highest point on the axes of each body's bars, or links [m]."""
         return self._largest(self.segments[..., 2].max(axis=1))
 
     @cached_property
     def speeds(self) -> Array:
-        """(N,) speed of the fastest centre of a bar of each body [m/s]."""
+        """(N,) largest speed of the centres of each body's bars [m/s]."""
         return self._largest(np.linalg.norm(self.bar_velocities, axis=1))
 
     def _largest(self, values: Array) -> Array:
-        """Return the largest (N,) of the values (M,) of each body's bars."""
+        """Return (N,) the largest value of each body, from values (M,) of the bars."""
         found = np.full(self.count, -np.inf)
         np.maximum.at(found, self.body, values)
         return found
@@ -174,13 +174,13 @@ class RigidState(BarState):
     mixture: Mixture
     kind: Numbers  #: (N,) kind of each body
     positions: Array  #: (N, 3) centres of mass [m]
-    rotations: Array  #: (N, 3, 3) body frame to laboratory frame [1]
-    velocities: Array  #: (N, 3) of the centres of mass [m/s]
+    rotations: Array  #: (N, 3, 3) rotations from body frame to laboratory frame [1]
+    velocities: Array  #: (N, 3) velocities of the centres of mass [m/s]
     spins: Array  #: (N, 3) angular velocities [rad/s]
 
     @cached_property
     def _bar_of_kind(self) -> Numbers:
-        """(M,) number of each bar among the bars of all kinds, see `Mixture.ends`."""
+        """(M,) index of each bar in `Mixture.ends`, the bars of all kinds."""
         sizes = self.mixture.sizes
         return (np.cumsum(sizes) - sizes)[self.kind[self.body]] + self.bar
 
@@ -209,7 +209,7 @@ class RigidState(BarState):
         return self.spins[self.body]
 
     def spheres(self) -> Array:
-        """Return (N, S, 3) centres of all spheres [m]; the last one of a body fills up its row."""
+        """Return (N, S, 3) centres of all spheres [m]; a body with fewer than S spheres repeats its last one."""
         local = self.mixture.spheres[self.kind]
         return matrix_product(local, np.swapaxes(self.rotations, 1, 2)) + self.positions[:, None]
 
@@ -240,13 +240,14 @@ class RigidState(BarState):
 
 @dataclass(frozen=True)
 class FilamentState(BarState):
-    """Places and velocities of N filaments of several kinds, with M segments in all, in the laboratory frame."""
+    """Positions and velocities of N filaments of several kinds, with M segments in all, in the laboratory frame."""
 
     mixture: Mixture
     kind: Numbers  #: (N,) kind of each filament
-    nodes: Array  #: (M + N, 3) places of the nodes, filament by filament [m]
-    node_velocities: Array  #: (M + N, 3) [m/s]
-    rolls: Array  #: (M + N,) rates of roll of the segments about their axes, one unused after each last [rad/s]
+    nodes: Array  #: (M + N, 3) positions of the nodes, filament by filament [m]
+    node_velocities: Array  #: (M + N, 3) velocities of the nodes [m/s]
+    #: (M + N,) rate at which the segment after each node rolls about its axis [rad/s]; unused at a filament's last node
+    rolls: Array
 
     @property
     def count(self) -> int:
@@ -255,7 +256,7 @@ class FilamentState(BarState):
 
     @cached_property
     def _begin(self) -> Numbers:
-        """(N + 1,) number of each filament's first node."""
+        """(N + 1,) number of each filament's first node, then M + N."""
         return np.concatenate([[0], np.cumsum(1 + self.mixture.sizes[self.kind])])
 
     @cached_property
@@ -265,7 +266,7 @@ class FilamentState(BarState):
 
     @cached_property
     def node_masses(self) -> Array:
-        """(M + N,) of the nodes [kg]."""
+        """(M + N,) masses of the nodes [kg]."""
         return np.concatenate([np.zeros(0), *(filament.masses for filament in self._filaments)])
 
     @property
@@ -273,7 +274,7 @@ class FilamentState(BarState):
         return [kind.filament for kind in self._kinds if kind.filament is not None]
 
     def _mean(self, values: Array) -> Array:
-        """Return the means (N, 3) over the mass of each filament, of values (M + N, 3) at nodes."""
+        """Return (N, 3) the mean of each filament, weighted by mass, from values (M + N, 3) at nodes."""
         sums = np.add.reduceat(self.node_masses[:, None] * values, self._begin[:-1]) if self.count else values[:0]
         return np.asarray(sums / self._masses[:, None])
 
@@ -294,7 +295,7 @@ class FilamentState(BarState):
 
     @cached_property
     def _edges(self) -> Array:
-        """(M, 3) end of each segment less its start [m]."""
+        """(M, 3) vectors from start to end of the segments [m]."""
         return self.segments[:, 1] - self.segments[:, 0]
 
     @property
@@ -317,7 +318,7 @@ class FilamentState(BarState):
         return np.asarray(rolls + np.cross(edges, opening) / squares[:, None])
 
     def spheres(self) -> Array:
-        """Return (N, S, 3) centres of all spheres [m]; the last one of a body fills up its row."""
+        """Return (N, S, 3) centres of all spheres [m]; a body with fewer than S spheres repeats its last one."""
         first, rows = self._begin[:-1] - np.arange(self.count), []
         for start, kind in zip(first, self._kinds, strict=True):
             ends = self.segments[start + kind.links]
@@ -340,12 +341,12 @@ class FilamentState(BarState):
 
     @cached_property
     def kinetic_energy(self) -> float:
-        """Kinetic energy of all nodes and of the roll of all segments [J]."""
+        """Kinetic energy of all nodes and of the rolling of all segments about their axes [J]."""
         moving = (self.node_masses[:, None] * self.node_velocities**2).sum()
         return float(0.5 * (moving + (self._rolling * self.rolls[self._starts]).sum()))
 
     def potential_energy(self, gravity: float, floor: float) -> float:
-        """Return the gravitational energy less that of buoyancy [J], 0 at the height `floor` [m]; gravity in m/s²."""
+        """Return the potential energy of weight less buoyancy [J], 0 at the height `floor` [m]; gravity in m/s²."""
         shares = np.array([filament.weight_share for filament in self._filaments])
         return float((self._masses * shares * gravity * (self.positions[:, 2] - floor)).sum())
 
@@ -415,21 +416,21 @@ class State:
 
     @property
     def bodies(self) -> None:
-        """None: these are smarticles."""
+        """None, since the bodies are smarticles."""
 
     @property
     def volume(self) -> float:
-        """Mean solid volume of the bodies present [m³]; of all bodies where none is present."""
+        """Mean solid volume of the bodies present, or of all bodies of the scene if none is present [m³]."""
         return self.boxes.volume
 
     @property
     def tops(self) -> Array:
-        """(N,) heights of the highest point of each body's axes [m]."""
+        """(N,) height of the highest point on the axes of each body's bars, or links [m]."""
         return np.asarray(self.vertices[..., 2].max(axis=1))
 
     @property
     def speeds(self) -> Array:
-        """(N,) speed of the fastest centre of a bar of each body [m/s]."""
+        """(N,) largest speed of the centres of each smarticle's links [m/s]."""
         return np.asarray(np.linalg.norm(self.link_velocities, axis=-1).max(axis=-1))
 
     @cached_property
@@ -449,7 +450,7 @@ class State:
         return np.stack([np.arctan2(across1, -along1), np.arctan2(across2, along2)], axis=1)
 
     def spheres(self, particle: Particle, which: Numbers | None = None) -> Array:
-        """Return (N, S, 3) centres of all spheres [m], or (N, len(which), 3) of the spheres `which`."""
+        """Return (N, S, 3) centres of all spheres [m], or (N, n, 3) of the n spheres with numbers `which`."""
         links, local = particle.links, particle.local_centres
         if which is not None:
             links, local = links[which], local[which]
@@ -488,7 +489,10 @@ class State:
 
 
 def spheres_of(state: PileState, model: Particle | Mixture) -> Array:
-    """Return (N, S, 3) centres of all spheres of all bodies [m]; in a mixture the last one of a body fills its row."""
+    """Return (N, S, 3) centres of all spheres of all bodies [m].
+
+    In a mixture, a body with fewer than S spheres repeats its last one.
+    """
     if isinstance(model, Mixture):
         assert state.bodies is not None  # a pile of these kinds has no smarticles
         return state.bodies.spheres()

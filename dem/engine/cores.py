@@ -1,10 +1,10 @@
-"""Number of cores that this process may use, and checks of threads and ranks against it."""
+"""Number of cores that this process may use, and checks of numbers of threads and ranks."""
 
 import os
 
 from dem.errors import InputError
 
-RANKS = "SMARTICLES_RANKS"  #: Environment variable: ranks of LAMMPS, set by a command before an engine is built
+RANKS = "SMARTICLES_RANKS"  #: Environment variable with the number of ranks of LAMMPS; a command sets it before it builds an engine
 
 
 def usable_cores() -> int:
@@ -30,7 +30,7 @@ def ranks() -> int:
 
 
 def check_ranks(wanted: int) -> None:
-    """Raise InputError if there are more ranks than cores, since ranks wait for each other at every step."""
+    """Raise InputError if more ranks are wanted than cores are there: ranks wait for each other at every step."""
     # On this machine, or on the nodes of a batch job.
     tasks = os.environ.get("SLURM_NTASKS", "")
     most = max(usable_cores(), int(tasks) if tasks.isdecimal() else 0)

@@ -22,7 +22,7 @@ from dem.setting.smarticle import Smarticle
 
 
 class Activity(Enum):
-    """Kinds of phases that differ in their cost per step."""
+    """Kinds of phases, which differ in the cost of a time step."""
 
     POUR = auto()
     REST = auto()

@@ -38,13 +38,13 @@ class EffectName(StrEnum):
 class Adds:
     """Objects, data and work that an effect adds to a run; a run without the effect has none of them."""
 
-    engines: tuple[str, ...] = ()  #: Parts of an engine that run in every step, by the engine's own names
-    functors: tuple[str, ...] = ()  #: YADE's functors
-    materials: tuple[str, ...] = ()  #: YADE's materials
+    engines: tuple[str, ...] = ()  #: Names of YADE's engines, or of kernels, that run in every step
+    functors: tuple[str, ...] = ()  #: Names of YADE's functors
+    materials: tuple[str, ...] = ()  #: Names of YADE's materials
     shapes: tuple[str, ...] = ()  #: Kinds of bodies
-    series: tuple[str, ...] = ()  #: Datasets of `series.h5`
-    arrays: tuple[str, ...] = ()  #: Cell data of every frame
-    files: tuple[str, ...] = ()  #: Files of the run directory
+    series: tuple[str, ...] = ()  #: Names of datasets of `series.h5`
+    arrays: tuple[str, ...] = ()  #: Names of cell data of every frame
+    files: tuple[str, ...] = ()  #: Names of files of the run directory
     python: str = ""  #: Work in Python with its frequency, and other costs, in words
 
     @staticmethod

@@ -28,10 +28,10 @@ from dem.setting.container import Cylinder
 
 @dataclass(frozen=True, kw_only=True)
 class Saved:
-    """A saved simulation."""
+    """The state of an engine, as `Engine.save` returns it."""
 
-    content: bytes  #: State of the engine, in the engine's own format
-    memory: Mapping[str, Any]  #: The rest of the state, as plain data that JSON stores without loss
+    content: bytes  #: Part of the state in the engine's own format
+    memory: Mapping[str, Any]  #: Rest of the state, as plain data that JSON stores without loss
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -39,10 +39,10 @@ class MotorReadings:
     """State of all motors at one instant, as (N, 2) arrays for barb 1 and barb 2 of every smarticle."""
 
     schedule: Array  #: Angles of the schedule at the last control update [rad]
-    commands: Array  #: Angles that the motors hold [rad]; those of halted motors lag behind the schedule
-    torques: Array  #: Torques on the barbs since the last control update [N m]; positive ones raise the angle
+    commands: Array  #: Angles that the motors hold [rad]; commands of halted motors lag behind the schedule
+    torques: Array  #: Torques on the barbs since the last control update [N m]; positive torques increase the angle
     work: Array  #: Work on the links since the start, ∫ τ dα up to the last control update [J]
-    halted: Flags  #: Whether a motor was stopped at the last control update; for "slip" and "servo": was at its limit
+    halted: Flags  #: Whether the last control update halted a motor, or under "slip" and "servo" found it at its limit
 
 
 class Boundaries(Protocol):
@@ -60,7 +60,7 @@ class Boundaries(Protocol):
 
     @property
     def walled(self) -> bool:
-        """Whether the container's wall exists, lifted or not."""
+        """Whether the container's wall exists; a lifted wall exists, a removed one does not."""
 
     @property
     def wall_bottom(self) -> float:
@@ -68,11 +68,11 @@ class Boundaries(Protocol):
 
     @property
     def enclosed(self) -> bool:
-        """Whether nothing can leave the container: the wall exists, and its lower edge is below the floor."""
+        """Whether bodies cannot leave the container: the wall exists, and its lower edge is below the floor."""
 
     @property
     def raised(self) -> float | None:
-        """Rise of the upper hook above the floor since the start [m], 0 or more; 0 without hooks.
+        """Increase of the upper hook's height above the floor since the start [m], 0 or more; 0 without hooks.
 
         None if the wall does not enclose the pile: the wall is removed, its lower edge is above the floor, the upper
         hook is above its top, or the scene is in a plane.
@@ -106,7 +106,7 @@ class Boundaries(Protocol):
         """Stop all boundaries at their present heights."""
 
     def remove_wall(self) -> None:
-        """Remove the wall, moving or not; the elastic energy of its contacts counts as dissipated."""
+        """Remove the wall; the elastic energy of its contacts counts as dissipated."""
 
     # -- forces on them ----------------------------------------------------------------------------------------
 
@@ -116,7 +116,7 @@ class Boundaries(Protocol):
 
     @property
     def channel_sums(self) -> Array:
-        """(2, 3) forces on the channel's lower and upper wall [N], summed over all steps; (0, 3): no walls."""
+        """(2, 3) forces on the channel's lower and upper wall [N], summed over all steps; (0, 3) without walls."""
 
 
 class Motors(Protocol):
@@ -144,7 +144,7 @@ class Motors(Protocol):
         """Largest number of control updates that one call of `actuate` takes."""
 
     def actuate(self, targets: Array, interval: float) -> None:
-        """Make a control update now, and plan further ones at the ends of the following control periods.
+        """Make a control update now, and schedule one more at the end of each following control period.
 
         Args:
             targets: (U, N, 2) angles of the schedule at the ends of U control periods [rad]; U is at most
@@ -161,7 +161,7 @@ class Motors(Protocol):
         """Work of all motors on the links since the start, up to now [J]."""
 
     def gaps(self) -> Array:
-        """Return the gaps of the hinges (N, 2), distances between joined ends of links [m]; 0 while welded."""
+        """Return (N, 2) gaps of the hinges: distances between the link ends that a hinge joins [m]; 0 while welded."""
 
 
 class Strings(Protocol):
@@ -196,38 +196,38 @@ class Strings(Protocol):
 
 
 class Filaments(Protocol):
-    """What flexible bodies do by themselves, and grips that hold nodes of them."""
+    """Filaments: their active bending, the grips that hold their nodes, and their energies."""
 
     def act(self, activity: Activity | None, *, ramp: float = 0.0) -> None:
-        """Let filaments bend by themselves from now on.
+        """Set the preferred curvature of all filaments from now on.
 
         Args:
-            activity: what they do; None: they return to the curvature that they prefer at rest.
-            ramp: time in which the new curvature grows from 0 [s].
+            activity: wave of preferred curvature; None: the filaments' own preferred curvature.
+            ramp: time in which the new preferred curvature grows from 0 [s].
         """
 
     def points(self, filament: int) -> Array:
         """Return the nodes (n, 3) of a filament [m]."""
 
     def grip(self, nodes: Mapping[int, Sequence[int]]) -> int:
-        """Hold nodes by a new grip, which is at rest; return its number.
+        """Hold nodes by a new grip, which is at rest; return the number of the grip.
 
         Args:
-            nodes: for each filament, its nodes that are held; negative numbers count from its end.
+            nodes: numbers of the held nodes, by the number of their filament; -1 is a filament's last node.
         """
 
     def move(self, grip: int, velocity: tuple[float, float, float]) -> None:
         """Move a grip with a velocity [m/s] from now on."""
 
     def release(self, grip: int | None = None) -> None:
-        """Let go of all nodes that a grip holds; None: all grips."""
+        """Release all nodes that a grip holds; None: the nodes of all grips."""
 
     @property
     def held(self) -> int:
-        """Number of filaments that a grip holds."""
+        """Number of filaments of which at least one node is held by a grip."""
 
     def force(self, grip: int | None = None) -> Array:
-        """Return the force (3,) of a grip on its nodes in the last step [N]; None: of all grips together."""
+        """Return the force (3,) of a grip on its nodes in the last step [N]; None: the sum over all grips."""
 
     @property
     def energies(self) -> FilamentEnergies:
@@ -235,7 +235,7 @@ class Filaments(Protocol):
 
 
 class EnergyLedger(Protocol):
-    """Energy ledger: work and dissipation, summed step by step as far as the scene records them."""
+    """Energy ledger: work and dissipation, summed step by step; only what the scene records is summed."""
 
     @property
     def container_work(self) -> float:
@@ -243,7 +243,10 @@ class EnergyLedger(Protocol):
 
     @property
     def added(self) -> float:
-        """Energy of bodies when added [J]: kinetic, gravitational above z = 0, elastic by `take_in`."""
+        """Energy that bodies had when they were added [J].
+
+        It is kinetic and gravitational energy, 0 at z = 0, and elastic energy if `take_in` was called.
+        """
 
     @property
     def dissipated(self) -> float:
@@ -254,14 +257,14 @@ class EnergyLedger(Protocol):
         """Sum of `added`, `container_work` and the work of activity [J]; NaN where a boundary's work is unknown."""
 
     def elastic(self) -> tuple[float, float]:
-        """Return the energy in the springs of all contacts, and that in all hinges and in flexible bodies [J]."""
+        """Return the elastic energy of all contacts, and the elastic energy of all hinges and flexible bodies [J]."""
 
     def take_in(self) -> None:
-        """Add the present elastic energy of contacts to `added`, for bodies that overlap when added."""
+        """Add the present elastic energy of contacts to `added`; called if bodies overlapped when added."""
 
 
 class Engine(Protocol):
-    """A running simulation; one per process, since an engine may be a process-wide singleton."""
+    """A running simulation; a process has one at most, since an engine may be a process-wide singleton."""
 
     cylinder: Cylinder  #: The container
     gravity: float  #: g, downwards [m/s²]
@@ -312,7 +315,7 @@ class Engine(Protocol):
         """Set the length of all further steps [s]."""
 
     def advance(self, steps: int) -> None:
-        """Advance by a number of steps, if positive; raise RunError if the engine stops before the last one."""
+        """Make a number of steps, none if it is negative; raise RunError if the engine stops before the last one."""
 
     # -- bodies ------------------------------------------------------------------------------------------------
 
@@ -321,17 +324,17 @@ class Engine(Protocol):
         """Number of bodies present, N."""
 
     def add(self, poses: Poses, *, speed: float = 0.0) -> None:
-        """Add bodies, welded smarticles or others, of `particle`, falling at a speed [m/s] without rotation."""
+        """Add bodies of `particle`, smarticles welded, that fall at a speed [m/s] without rotation."""
 
     def still(self) -> None:
-        """Set all velocities to zero, while no barb can turn; the kinetic energy counts as dissipated."""
+        """Set all velocities to zero; the kinetic energy counts as dissipated. Smarticles must be welded."""
 
     def state(self) -> PileState:
         """Return poses and velocities of all bodies; raise RunError if one is not finite."""
 
     @property
     def impulse(self) -> float:
-        """Downward momentum that gravity and throwing have given to all bodies since the start [N s]."""
+        """Downward momentum from gravity, and from initial speeds of added bodies, since the start [N s]."""
 
     def unbalanced_force(self) -> float:
         """Return the mean net force on a body over its weight [1]: 0 at rest, 1 in free fall.
@@ -357,7 +360,7 @@ class Engine(Protocol):
     def extremes(self, state: PileState) -> Extremes | None:
         """Return extremes over all bodies in their present `state`, faster than a full check.
 
-        None: the engine has no faster way, or a full check is needed in any case.
+        None: the engine has no faster way, or the extremes are not enough for a decision.
         """
 
     # -- checkpoints -------------------------------------------------------------------------------------------

@@ -1,4 +1,4 @@
-"""List of the engines, with facts about them that are known without a simulation."""
+"""List of the engines, with facts about each engine that are known before a simulation exists."""
 
 from collections.abc import Mapping
 from typing import Protocol
@@ -13,7 +13,7 @@ class EngineKind(Protocol):
     """Facts about an engine, costs of scenes on it, and the function that builds its simulations."""
 
     name: str  #: Name in scenes
-    workers: str  #: Unit of parallel work: "threads", or "ranks", which are processes
+    workers: str  #: Noun for parallel workers in messages: "threads", or "ranks", which are processes
     damps_once_per_update: bool
     """Whether dampers of servos use rates of the last control update, and so need an update in every step."""
     idle_knobs: tuple[str, ...]  #: Knobs of the fidelity that have no effect on the engine
@@ -24,22 +24,22 @@ class EngineKind(Protocol):
         """All names in `Adds.engines`, in the order in which a step runs them."""
 
     def version(self) -> str:
-        """Return the version on which results depend; raise RunError if the engine is not installed."""
+        """Return the engine's version, on which results depend; raise RunError if it is not installed."""
 
     def threads(self) -> int:
-        """Return the number of threads, or ranks, of runs that this process starts."""
+        """Return the number of threads, or ranks, that a run in this process uses."""
 
     def stable_step(self, scene: Demand, *, articulated: bool) -> float:
         """Return the largest stable time step [s]; `articulated`: whether barbs can turn or have turned."""
 
     def seconds_per_second(self, scene: Demand, time_step: float, activity: Activity) -> float:
-        """Return an estimate of the wall time per simulated time [1] on one core, for a time step [s]."""
+        """Return the estimated wall time per simulated time [1] on one core, for a time step [s]."""
 
     def seconds_to_compile(self, scene: Demand) -> float:
-        """Return an estimate of the processor time for code that a scene needs and that is not compiled yet [s]."""
+        """Return the estimated processor time [s] to compile the code that a scene needs and the cache lacks."""
 
     def build(self, scene: Demand, time_step: float) -> Engine:
-        """Return a simulation without smarticles.
+        """Return a simulation of a scene, without bodies yet.
 
         Args:
             time_step: shortest time step of all phases [s]; whether it is stable is not checked.
