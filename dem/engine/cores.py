@@ -4,7 +4,7 @@ import os
 
 from dem.errors import InputError
 
-RANKS = "SMARTICLES_RANKS"  #: Environment variable with the number of ranks of LAMMPS; a command sets it before it builds an engine
+RANKS = "SMARTICLES_RANKS"  #: Environment variable with the number of ranks of LAMMPS
 
 
 def usable_cores() -> int:

@@ -38,10 +38,10 @@ class EffectName(StrEnum):
 class Adds:
     """Objects, data and work that an effect adds to a run; a run without the effect has none of them."""
 
-    engines: tuple[str, ...] = ()  #: Names of YADE's engines, or of kernels, that run in every step
+    engines: tuple[str, ...] = ()  #: Parts of the engine that run in every step, in the engine's own terms
     functors: tuple[str, ...] = ()  #: Names of YADE's functors
     materials: tuple[str, ...] = ()  #: Names of YADE's materials
-    shapes: tuple[str, ...] = ()  #: Kinds of bodies
+    shapes: tuple[str, ...] = ()  #: Geometries that represent bodies and boundaries, in words
     series: tuple[str, ...] = ()  #: Names of datasets of `series.h5`
     arrays: tuple[str, ...] = ()  #: Names of cell data of every frame
     files: tuple[str, ...] = ()  #: Names of files of the run directory

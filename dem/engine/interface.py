@@ -360,7 +360,7 @@ class Engine(Protocol):
     def extremes(self, state: PileState) -> Extremes | None:
         """Return extremes over all bodies in their present `state`, faster than a full check.
 
-        None: the engine has no faster way, or the extremes are not enough for a decision.
+        None: the engine has no faster way, or extremes alone cannot show that all limits hold.
         """
 
     # -- checkpoints -------------------------------------------------------------------------------------------

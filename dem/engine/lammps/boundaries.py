@@ -1,4 +1,4 @@
-"""Floor and wall on LAMMPS, whose heights are variables of LAMMPS and are computed here as well."""
+"""Floor and wall on LAMMPS, whose heights are variables in LAMMPS and are also computed here."""
 
 import math
 from collections.abc import Callable, Iterator, Mapping

@@ -14,7 +14,7 @@ from pathlib import Path
 from dem.errors import RunError
 
 LMP, MPIRUN = "lmp", "mpirun"
-NEEDED = ("rigid/small", "gran/hooke/history", "wall/gran/region", "rigid/local")  #: Styles of LAMMPS in use
+NEEDED = ("rigid/small", "gran/hooke/history", "wall/gran/region", "rigid/local")  #: Styles that LAMMPS must include
 INSTALL = "install it with `make setup-mpi` or `apt-get install lammps openmpi-bin`"
 LOG, OUTPUT, ANSWERS = "log.lammps", "mpirun.txt", "answers"
 POLL_S = 0.2  # s between checks whether a child that has not answered yet is alive
@@ -28,7 +28,7 @@ _OPTIONS = (*"--bind-to none --mca btl_vader_single_copy_mechanism none --mca mp
 
 
 def lammps_version() -> str:
-    """Return LAMMPS's version; raise RunError if it or mpirun is missing, does not start or lacks a style."""
+    """Return LAMMPS's version; raise RunError if LAMMPS or mpirun is missing or fails, or a style is missing."""
     for program, what in ((LMP, "LAMMPS"), (MPIRUN, "Open MPI")):
         if shutil.which(program) is None:
             raise RunError(
@@ -60,7 +60,7 @@ def _version(program: str) -> str:
 
 
 class Child:
-    """LAMMPS on a number of ranks, which reads commands until it is closed or this process ends.
+    """A process of LAMMPS on a number of ranks, which reads commands until it is closed or this process ends.
 
     Raises:
         RunError: mpirun does not start.
@@ -68,7 +68,7 @@ class Child:
 
     def __init__(self, ranks: int) -> None:
         self.ranks = ranks
-        self.scratch = Path(tempfile.mkdtemp(prefix="smarticles-lammps-"))  #: Folder of LAMMPS's files
+        self.scratch = Path(tempfile.mkdtemp(prefix="smarticles-lammps-"))  #: Folder of LAMMPS's input and output
         fifo = self.scratch / ANSWERS
         os.mkfifo(fifo)
         # Opened for writing as well, so that reading never meets an end of file.
@@ -124,7 +124,7 @@ class Child:
         os.read(self._answers, 4096)
 
     def _why_it_ended(self) -> str:
-        """Return the cause of LAMMPS's end in one line, and keep its log."""
+        """Return the cause of LAMMPS's end in one line, and save LAMMPS's log."""
         status = self._process.returncode
         log, output = (_text(self.scratch / name) for name in (LOG, OUTPUT))
         cause, way_out = explain(log, output, status)
@@ -135,7 +135,13 @@ class Child:
 
 
 def explain(log: str, output: str, status: int | None) -> tuple[str, str]:
-    """Return the cause of LAMMPS's end, and what to do, from its log, mpirun's output and exit status."""
+    """Return the cause of LAMMPS's end, and advice to the user, in words.
+
+    Args:
+        log: content of LAMMPS's log file.
+        output: output of mpirun.
+        status: exit status of mpirun; None: it still runs.
+    """
     errors = re.findall(r"^ERROR(?: on proc \d+)?: (.+)", f"{log}\n{output}", re.MULTILINE)
     if errors:
         cause = re.sub(r"\s*\([^()]*\.(?:cpp|h):\d+\)\s*$", "", errors[0]).strip()

@@ -15,13 +15,13 @@ from dem.physics.overlaps import Overlaps
 
 @dataclass(frozen=True)
 class Contacts:
-    """All contacts at one instant."""
+    """All contacts of spheres at one instant."""
 
     count: int  #: Number of bodies, N
-    pairs: Numbers  #: (C, 2) the two bodies of each pair of touching spheres
-    depths: Array  #: (C,) overlaps of these pairs [m]
-    fixed: Numbers  #: (F,) the body at each contact of a sphere with floor or wall
-    fixed_depths: Array  #: (F,) overlaps at these contacts [m]
+    pairs: Numbers  #: (C, 2) numbers of the two bodies of each pair of touching spheres
+    depths: Array  #: (C,) overlap of each pair of `pairs` [m]
+    fixed: Numbers  #: (F,) number of the body at each contact of a sphere with floor or wall
+    fixed_depths: Array  #: (F,) overlap at each contact of `fixed` [m]
 
     @classmethod
     def of(cls, spheres: Iterable[Array], radius: float | Array, boundaries: LammpsBoundaries) -> Self:
@@ -29,7 +29,7 @@ class Contacts:
 
         Args:
             spheres: (S, 3) centres of the spheres of each of N bodies [m].
-            radius: radius of the spheres, one or (N,) one for each body [m].
+            radius: radius of the spheres: a number for all bodies, or (N,) [m].
         """
         bodies = list(spheres)
         count, sizes = len(bodies), [len(body) for body in bodies]

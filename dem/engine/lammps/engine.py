@@ -37,7 +37,7 @@ HEAD = 9  # lines of a dump before its rows
 
 
 def absent(what: str) -> NoReturn:
-    """Raise RunError for a feature that the engine lacks; scenes that need it are rejected before a run."""
+    """Raise RunError for a feature that the engine lacks, `what`; scenes that need it are rejected before a run."""
     raise RunError(f"engine: lammps has no {what}")
 
 
@@ -142,9 +142,9 @@ class LammpsEngine:
         )
 
     def _send(self, commands: Iterator[str]) -> None:
-        """Send commands, and have LAMMPS set up its next run anew.
+        """Send commands, and make LAMMPS set up forces anew in its next run.
 
-        Before LAMMPS has a simulation box nothing is sent, since `_scene` will yield these commands.
+        Without a simulation box in LAMMPS nothing is sent: `_scene` yields these commands when the box is made.
         """
         self._contacts = None
         if self._box:
@@ -152,7 +152,11 @@ class LammpsEngine:
             self._fresh = True
 
     def _scene(self, box: str) -> Iterator[str]:
-        """Yield all commands for a new LAMMPS except those for bodies; the command `box` reads the spheres."""
+        """Yield all commands for a new process of LAMMPS, except those for rigid bodies.
+
+        Args:
+            box: command that makes the simulation box and reads the spheres.
+        """
         between, at_wall = text.contact_terms(self._law, self._reference.mass)
         yield from text.before_box(self.particle)
         # Vertical cuts divide the pile among ranks: above a horizontal cut there would be little work.
@@ -175,7 +179,7 @@ class LammpsEngine:
         yield from text.body_dump("bodies.*.dump", when="v_when")
 
     def _balanced(self) -> Iterator[str]:
-        """Yield the command that balances spheres among ranks; up to two ranks need none."""
+        """Yield the command that distributes spheres evenly among ranks; none for one or two ranks."""
         if self.child.ranks > 2:
             yield "balance 1.02 shift xy 20 1.01"
 
@@ -228,7 +232,7 @@ class LammpsEngine:
         )
 
     def _read(self, step: int) -> Array:
-        """Return (N, 20) values of all bodies at a step, in columns `text.WRITTEN`, and remove their file."""
+        """Return (N, 20) values of all bodies at a step, in columns `text.WRITTEN`, and remove the file read."""
         file = self.child.scratch / f"bodies.{step}.dump"
         lines = file.read_text(encoding="ascii").split("\n", HEAD)
         rows = np.array(lines[HEAD].split(), dtype=np.float64).reshape(-1, len(text.WRITTEN.split()))
@@ -279,16 +283,16 @@ class LammpsEngine:
 
     @property
     def _reference(self) -> Particle | Kind:
-        """The body whose dashpots the contact law has."""
+        """Body to whose mass the damping of the contact law belongs: the smarticle, or the first kind."""
         return bodies_of(self.particle)[0]
 
     def _body(self, number: int) -> Particle | Kind:
-        """Return the particle, or the kind, that a body is."""
+        """Return the smarticle, or the kind of a body in a mixture, for the number of the body."""
         return body_of(self.particle, self._kinds, number)
 
     @property
     def _relative_masses(self) -> Array:
-        """(N,) masses of the bodies, over the mean mass of all kinds' bodies [1]; of smarticles exactly 1."""
+        """(N,) masses of the bodies, over the mean mass of the scene's bodies [1]; exactly 1 for smarticles."""
         if isinstance(self.particle, Particle):
             return np.ones(self.count)
         return np.asarray(self.particle.masses[self._kinds] / self.particle.mass)
@@ -330,7 +334,7 @@ class LammpsEngine:
 
     @property
     def contacts(self) -> Contacts:
-        """All contacts at present."""
+        """Present contacts."""
         if self._contacts is None:
             radii = np.array([self._body(k).radius for k in range(self.count)])
             self._contacts = Contacts.of(self._spheres(self.state()), radii, self.boundaries)
@@ -383,7 +387,7 @@ class LammpsEngine:
         return saved
 
     def load(self, saved: Saved, scratch: Path) -> None:
-        """Replace the state; raise InputError if another engine or version saved it, or it is damaged."""
+        """Replace the state; raise InputError if `saved` is of another engine or version, or damaged."""
         memory = saved.memory
         if memory.get("format") != FORMAT:
             raise InputError(
@@ -421,5 +425,5 @@ class LammpsEngine:
 
 
 def _turns(rows: Array) -> Array:
-    """Return rotation matrices (N, 3, 3) from rows whose quaternions (w, x, y, z) begin at column 7."""
+    """Return (N, 3, 3) rotation matrices from quaternions (w, x, y, z) in columns 7 to 10 of rows (N, 20)."""
     return np.asarray(Rotation.from_quat(rows[:, [8, 9, 10, 7]]).as_matrix())

@@ -1,4 +1,4 @@
-"""Facts about LAMMPS as an engine, and the function that builds its simulations."""
+"""Facts about the engine on LAMMPS, and the function that builds its simulations."""
 
 from collections.abc import Mapping
 

@@ -25,26 +25,26 @@ WRITTEN = "mol x y z vx vy vz quatw quati quatj quatk omegax omegay omegaz angmo
 
 @dataclass(frozen=True)
 class Moving:
-    """N bodies at one instant, in the laboratory frame."""
+    """Motion of N bodies at one instant, in the laboratory frame."""
 
     positions: Array  #: (N, 3) centres of mass [m]
     turns: Array  #: (N, 3, 3) rotations from the body frame to the laboratory frame [1]
     velocities: Array  #: (N, 3) velocities of the centres of mass [m/s]
     spins: Array  #: (N, 3) angular velocities [rad/s]
     momenta: Array  #: (N, 3) angular momenta about the centres of mass [kg m²/s]
-    forces: Array  #: (N, 3) forces of contacts and weight [N]
+    forces: Array  #: (N, 3) sums of contact forces and weight [N]
 
     @classmethod
     def none(cls) -> Self:
-        """Return arrays for N = 0."""
+        """Return the motion of no bodies: arrays for N = 0."""
         empty = np.zeros((0, 3))
         return cls(empty, np.zeros((0, 3, 3)), empty, empty, empty, empty)
 
 
 def sphere_masses(body: Particle | Kind) -> Array:
-    """Return masses (S,) of the spheres [kg] that have the smarticle's mass and centre of mass.
+    """Return (S,) masses of a body's spheres [kg] that together have the body's mass and centre of mass.
 
-    Weights of the spheres then exert no torque. The masses are as equal as possible, by least squares.
+    The weights of the spheres then exert no torque. The masses are as equal as possible, by least squares.
     """
     count = len(body.centres)
     # Conditions: the masses sum to the smarticle's mass, the first moments to zero.
@@ -65,12 +65,13 @@ def sphere_lines(
 ) -> Iterator[str]:
     """Yield the lines of a file of spheres, for the command `read_data`.
 
-    Each sphere has number, type, position, diameter, density and number of its smarticle.
+    A line has number, type, position, diameter and density of a sphere, and the number of its body.
 
     Args:
         bodies: the N bodies.
         spheres: (S, 3) centres of the spheres of each body [m].
-        first: number of smarticles that LAMMPS has already.
+        first: number of bodies that LAMMPS has already.
+        first_sphere: number of spheres that LAMMPS has already.
     """
     d = max(body.diameter for body in bodies)
     yield title
@@ -93,8 +94,8 @@ def sphere_lines(
 def body_lines(bodies: Sequence[Particle | Kind], moving: Moving) -> Iterator[str]:
     """Yield the lines of a file of bodies, for `infile` of `fix rigid/small`.
 
-    Each body has number, mass, centre of mass, inertia tensor (xx yy zz xy xz yz), velocity, angular momentum and three
-    image flags.
+    A line has number, mass, centre of mass, inertia tensor (xx yy zz xy xz yz), velocity, angular momentum and three
+    image flags of a body.
     """
     inertias = np.array([np.diag(body.inertia) for body in bodies]).reshape(-1, 3, 3)
     tensors = moving.turns @ inertias @ np.swapaxes(moving.turns, 1, 2)

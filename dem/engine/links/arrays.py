@@ -55,16 +55,17 @@ class Parts(NamedTuple):
     """
 
     begin: Indices  #: (N + 1,) number of the first part of each body, then R
-    #: (R, MOTION) velocity at a point, angular velocity and this point, in the columns from `VELOCITY` on
+    #: (R, MOTION) velocity at a reference point of the part [m/s], angular velocity [rad/s] and the reference point
+    #: [m], in the columns from `VELOCITY`, `SPIN` and `ORIGIN` on
     motion: Array
-    load: Array  #: (R, 6) force [N] and torque about `ORIGIN` [N m] of contacts in this step
-    #: (R, STRETCH) of parts that stretch along an axis: the axis [1], rate of strain [1/s], first moment along the axis
-    #: of the axial forces of contacts [N m]; None where no body is flexible
+    load: Array  #: (R, 6) force [N] and torque about the reference point [N m] of contacts in this step
+    #: (R, STRETCH) of parts that stretch: axis [1], rate of strain along the axis [1/s], and sum over contacts of axial
+    #: force times axial distance from the reference point [N m]; None if no body is flexible
     stretch: Any
 
 
 class Segments(NamedTuple):
-    """Q segments of all bodies. The segments are the strands of L links."""
+    """Q segments of all bodies: the strands of L links."""
 
     line: Array  #: (Q, LINE) segments in the laboratory frame; for the columns see `dem.engine.links.shapes.START`
     begin: Indices  #: (N + 1,) number of the first segment of each body, then Q
@@ -76,10 +77,10 @@ class Segments(NamedTuple):
 
 
 class Bends(NamedTuple):
-    """What is known besides of the segments of flexible bodies."""
+    """Further data of segments, for flexible bodies; Q is the number of segments of all bodies."""
 
-    apart: Indices  #: (Q,) by how much numbers of segments of one body differ at least if they can touch; 0: never
-    ends: Array  #: (Q, 6) velocities of start and end of a segment of a flexible body [m/s]
+    apart: Indices  #: (Q,) least difference between the numbers of two segments of one body that can touch; 0: none can
+    ends: Array  #: (Q, 6) velocities of start and end of each segment of flexible bodies [m/s]
 
 
 class Pairs(NamedTuple):
@@ -91,12 +92,12 @@ class Pairs(NamedTuple):
     first: Indices  #: (P,) number of the segment with the lower number
     second: Indices  #: (P,) number of the other segment
     slip: Array  #: (P, SLOTS, 4) stretch of the tangential spring at each point of contact [m], and its energy [J]
-    used: NDArray[np.uint8]  #: (P,) which of the points touched in the last step, as bits
+    used: NDArray[np.uint8]  #: (P,) points of contact that touched in the last step, as bits
     near: Indices  #: (P,) tight list: indices of pairs that can touch soon
-    touching: Indices  #: (P,) indices of the pairs that touch or did so in the last step
+    touching: Indices  #: (P,) indices of the pairs that touch, or touched in the last step
     #: (P, 2) places s and t (0 to 1) of the nearest points along both segments of the pairs in `touching`
     nearest: Array
-    counts: NDArray[np.int64]  #: (4,) pairs of the wide list, pairs of the tight list, number of times each was built
+    counts: NDArray[np.int64]  #: (4,) number of pairs of the wide list and of the tight list, number of builds of each
     wide_marks: Array  #: (Q, 7) starts and ends of all segments when the wide list was built, and their skins [m]
     near_marks: Array  #: (Q, 7) starts and ends of all segments when the tight list was built, and their skins [m]
     wide_centres: Array  #: (N, 3) centres of mass when the wide list was built [m]
@@ -104,7 +105,7 @@ class Pairs(NamedTuple):
 
 
 class Cells(NamedTuple):
-    """Arrays of the search for neighbours. A group is all pairs of the list that have one first segment."""
+    """Arrays of the search for neighbours. A group consists of all pairs that have the same first segment."""
 
     keys: Indices  #: (L,) bin of each link
     order: Indices  #: (L,) numbers of the links sorted by bin, and within a bin by number
@@ -112,11 +113,11 @@ class Cells(NamedTuple):
     marks: Array  #: (Q, 7) starts and ends of all segments at the search, and their skins [m]
     centres: Array  #: (N, 3) centres of mass at the search [m]
     own: Array  #: (L, 6) lower and upper corner of the box about each link [m]
-    boxes: Array  #: (6, L) these corners in the order of `order`; a row has one coordinate of all boxes [m]
+    boxes: Array  #: (6, L) corners of `own`, in the order of `order`; a row has one coordinate of all boxes [m]
     strands: Indices  #: (L + 1,) index in `lines` of the first segment of each link, in the order of `order`
     lines: Array  #: (Q, LINE + 1) segments and their skins [m], in the order of `order`
     numbers: Indices  #: (Q,) number of the segment in each row of `lines`
-    close: Indices  #: (2 L,) indices in `order` of links whose boxes overlap the box of one link; second half: scratch
+    close: Indices  #: (2 L,) indices in `order` of links whose boxes overlap one link's box; second half: scratch
     places: Indices  #: (Q,) number of the group of each segment
     rows: Indices  #: (Q + 2,) index of the first pair of each group
     lower: Indices  #: (P,) segment with the lower number of each pair, in the order in which pairs are found
@@ -128,17 +129,20 @@ class Cells(NamedTuple):
 
 
 class Law(NamedTuple):
-    """Spring, dashpot and friction of a contact: between bodies, or of a body and a boundary."""
+    """Spring, dashpot and friction of contacts: those between bodies, or those of bodies with boundaries."""
 
-    stiffness: float  #: kn [N/m]
-    shear: float  #: ks [N/m]
-    damping: Array  #: (K, K) cn by the shapes of both bodies, or (K, 1) by the shape at boundaries [N s/m]
-    shear_damping: float  #: cs over cn while the contact sticks [1]
+    stiffness: float  #: Normal stiffness kn [N/m]
+    shear: float  #: Tangential stiffness ks [N/m]
+    damping: Array  #: (K, K) normal damping cn by the shapes of both bodies, or (K, 1) at boundaries [N s/m]
+    shear_damping: float  #: Tangential over normal damping, cs/cn, while the contact sticks [1]
     friction: float  #: Coulomb coefficient [1]
 
 
 class Kept(NamedTuple):
-    """Memory of contacts with boundaries; for the slots of a segment see `contact.boundaries.SLOT`."""
+    """Memory of contacts with boundaries.
+
+    Each possible contact of a segment has a fixed place, its slot; `contact.boundaries.slots_for` counts the slots.
+    """
 
     slip: Array  #: (Q, slots, 4) stretch of the tangential spring [m], and its energy [J]
     used: NDArray[np.uint8]  #: (Q, slots) whether there was a contact in the last step
@@ -156,15 +160,15 @@ class Ground(NamedTuple):
     bottoms: Array
     radii: Array  #: (tiers,) radii of the tiers [m]
     top: float  #: Height of the wall's upper end above `place` of the wall [m]
-    #: (2,) whether the wall exists; whether it was lifted, so that links can touch its outside
+    #: (2,) whether the wall exists, and whether it was lifted, so that links can touch its outside
     flags: NDArray[np.int64]
-    place: Array  #: (4,) heights [m]; of the wall: its rise since the start
+    place: Array  #: (4,) heights [m]; for the wall the rise since the start
     speed: Array  #: (4,) vertical velocities [m/s]
     base: Array  #: (4,) heights at which the shaking began [m]
     shaken: NDArray[np.int64]  #: (4,) whether a boundary is shaken
     wave: Array  #: (3,) amplitude [m], angular frequency 2πf [rad/s] and time of the beginning [s] of the shaking
     force: Array  #: (6, 3) forces of the bodies on the boundaries in the last step [N]
-    sums: Array  #: (6, 3) these forces, summed over all steps [N]
+    sums: Array  #: (6, 3) forces of the bodies on the boundaries, summed over all steps [N]
 
 
 class Hooks(NamedTuple):
@@ -194,7 +198,7 @@ class Boundaries(NamedTuple):
 
 
 class Cords(NamedTuple):
-    """k strings. One end of each, the knot, is tied to a link; the other end is the anchor."""
+    """k strings. One end of a string, the knot, is tied to a link; the other end is the anchor."""
 
     owner: NDArray[np.int64]  #: (k, 2) smarticle and link of each knot
     along: Array  #: (k,) distance of the knot from the link's centre towards the link's end [m]
@@ -207,10 +211,10 @@ class Cords(NamedTuple):
 
 
 class Motoring(NamedTuple):
-    """Two motors of each of N bodies; the motors of rigid bodies do nothing."""
+    """Two motors of each of N bodies; entries of bodies without hinges are unused."""
 
-    law: int  #: 0 halt, 1 stall, 2 ease, 3 slip, 4 servo
-    speed: float  #: ω, the greatest speed [rad/s]
+    law: int  #: Law of the motors at the torque limit: 0 halt, 1 stall, 2 ease, 3 slip, 4 servo
+    speed: float  #: Greatest speed of a command, ω [rad/s]
     limit: Array  #: (N, 2) torque limits τ_max [N m]
     stiffness: Array  #: (N, 2) twist stiffness of the shafts [N m/rad]
     damping: float  #: Derivative gain of servos [N m s/rad]
@@ -220,45 +224,45 @@ class Motoring(NamedTuple):
     work: Array  #: (N, 2) work on the links up to now [J]
     halted: NDArray[
         np.bool_
-    ]  #: (N, 2) whether a motor was stopped at the last update; slip and servo: was at its limit
-    momentum: Array  #: (N, 2) momenta p that belong to the angles, see `motion.planar` [kg m²/s]
+    ]  #: (N, 2) whether the last update halted the motor, or under slip and servo found it at its limit
+    momentum: Array  #: (N, 2) momenta p conjugate to the angles, see `motion.planar` [kg m²/s]
     impulse: Array  #: (N, 2) time integral of the torques since the last control update [N m s]
     elapsed: Array  #: (1,) time since the last control update [s]
     interval: float  #: Time between two control updates, the control period [s]
     period: int  #: Number of steps in a control period
     targets: Array  #: (updates, N, 2) angles of the schedule at the ends of the next control periods [rad]
-    #: (2,) row of `targets` for the next control update, and number of steps until then; below 0: no update is planned
+    #: (2,) row of `targets` for the next control update, and number of steps until then; below 0: none is planned
     due: NDArray[np.int64]
-    #: (N,) number of barbs in a row found at τ_max, barb 1 and barb 2 of a smarticle in turn; for ease
+    #: (N,) number of consecutive updates, of barb 1 and barb 2 in turn, that found the torque at τ_max; for ease
     over: NDArray[np.int64]
 
 
 class Filaments(NamedTuple):
-    """F flexible bodies with n nodes in all. A segment has the number of the node that it starts at.
+    """F filaments with n nodes in all, and G grips. A segment has the number of the node at its start.
 
-    See `dem.engine.links.motion.bending` for the columns.
+    Entries of segments are unused at the last node of a filament. For columns see `dem.engine.links.motion.bending`.
     """
 
-    body: Indices  #: (F,) body that each filament is
-    begin: Indices  #: (F + 1,) where the nodes of each begin
-    rod: Array  #: (F, ROD) constants of each
-    gait: Array  #: (F, GAIT) of preferred curvature
-    wave: Array  #: (n, 3) preferred angle at a node [rad], cosine and sine of its phase
-    preferred: Array  #: (n, 2) preferred angles at nodes now [rad]
-    mass: Array  #: (n,) [kg]
-    position: Array  #: (n, 3) [m]
-    velocity: Array  #: (n, 3) [m/s]
-    spin: Array  #: (n,) rate of roll of a segment about its axis [rad/s]
-    tangent: Array  #: (n, 3) direction of a segment [1]
-    extent: Array  #: (n,) length of a segment [m]
-    director: Array  #: (n, 3) direction across a segment, which turns with its material [1]
-    force: Array  #: (n, 4) on a node [N], and torque about a segment's axis [N m]; all but the next two
-    damping: Array  #: (n, 4) of internal damping
-    drag: Array  #: (n, 4) of the liquid
-    grip: NDArray[np.int64]  #: (n,) grip that holds a node, times 8, plus 1, 2, 4 for held x, y, z; 0: free
+    body: Indices  #: (F,) number of each filament among all bodies
+    begin: Indices  #: (F + 1,) number of the first node of each filament, then n
+    rod: Array  #: (F, ROD) constants of each filament, columns from `bending.LENGTH` on
+    gait: Array  #: (F, GAIT) state of the wave of preferred curvature, columns from `bending.PSI` on
+    wave: Array  #: (n, 3) amplitude of the preferred κ at each node, cosine and sine of its phase [1]
+    preferred: Array  #: (n, 2) present preferred κ1 and κ2 at each node [1]
+    mass: Array  #: (n,) masses of the nodes [kg]
+    position: Array  #: (n, 3) positions of the nodes [m]
+    velocity: Array  #: (n, 3) velocities of the nodes [m/s]
+    spin: Array  #: (n,) rate at which each segment rolls about its axis [rad/s]
+    tangent: Array  #: (n, 3) unit vector along each segment [1]
+    extent: Array  #: (n,) length of each segment [m]
+    director: Array  #: (n, 3) first director: unit vector across each segment that turns with its material [1]
+    force: Array  #: (n, 4) force on each node [N] and torque about each segment's axis [N m], less `damping` and `drag`
+    damping: Array  #: (n, 4) force and torque of internal damping, if a ledger is kept [N, N m]
+    drag: Array  #: (n, 4) force of the liquid's drag; torque unused [N]
+    grip: NDArray[np.int64]  #: (n,) 8 times the grip that holds the node, plus 1, 2, 4 for held x, y, z; 0: free
     grip_speed: Array  #: (G, 3) velocities of the grips [m/s]
     grip_force: Array  #: (G, 3) forces of the grips on their nodes in the last step [N]
-    sums: Array  #: (SUMS,) see `dem.engine.links.motion.bending.DAMPED`
+    sums: Array  #: (SUMS,) energies exchanged since the start [J], see `bending.DAMPED`
 
 
 class System(NamedTuple):
@@ -302,12 +306,18 @@ def bodies_for(count: int) -> Bodies:
 
 
 def joined(one: Bodies, other: Bodies) -> Bodies:
-    """Return the bodies of `one` followed by those of `other`."""
+    """Return the bodies of `one`, then the bodies of `other`, as arrays of all."""
     return Bodies(*(np.concatenate([a, b]) for a, b in zip(one, other, strict=True)))
 
 
 def pairs_for(bodies: int, segments: int, capacity: int) -> Pairs:
-    """Return empty lists with room for `capacity` pairs; `bodies` and `segments` are the numbers of these."""
+    """Return empty lists of near segments.
+
+    Args:
+        bodies: number of bodies.
+        segments: number of segments.
+        capacity: number of pairs for which there is room.
+    """
     return Pairs(
         np.zeros(capacity, np.int32),
         np.zeros(capacity, np.int32),
@@ -325,7 +335,7 @@ def pairs_for(bodies: int, segments: int, capacity: int) -> Pairs:
 
 
 def cells_for(bodies: int, links: int, segments: int, capacity: int) -> Cells:
-    """Return arrays for a search among so many bodies, links and segments, for up to `capacity` pairs."""
+    """Return arrays for the search; arguments are numbers of bodies, links, segments and, at most, pairs."""
     return Cells(
         np.zeros(links, np.int32),
         np.zeros(links, np.int32),

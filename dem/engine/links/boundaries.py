@@ -1,4 +1,4 @@
-"""Rigid boundaries on the engine links: an exact cylinder or several tiers, hooks, or a channel."""
+"""Rigid boundaries on the engine links: floor, round wall of one or several tiers, hooks, or a channel."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ Array = NDArray[np.float64]
 
 
 def ground_for(cylinder: Cylinder, hooks: tuple[Cross, Cross] | None, channel: Channel | None) -> Ground:
-    """Return the boundaries at the start: floor at z = 0, or the table of a plane."""
+    """Return the arrays of floor, wall, hooks and channel at the start of a run; the floor is at z = 0."""
     place = np.zeros(4)
     if channel is not None:
         place[FLOOR] = channel.table
@@ -46,7 +46,7 @@ class LinksBoundaries:
     Args:
         cylinder: the container.
         shaken: whether the scene shakes the container.
-        removed: function of the energy ledger that calls its argument, a function that removes contacts.
+        removed: `LinksLedger.removed`, which calls a function that removes contacts, and counts their energy.
     """
 
     def __init__(

@@ -1,11 +1,11 @@
 # mypy: allow-untyped-calls
-"""Keep compiled code for later processes, and let other processes wait while one compiles.
+"""Keep compiled code for later processes, and let other processes wait while one process compiles.
 
 Numba's own cache is beside the source, which may be read-only. It does not notice changes of a function in another file
 that a kernel calls, executes damaged files, and lets all processes of a sweep compile at once. This cache is a folder
 of the user, whose name is a hash of everything that the code depends on, so that another version of the package never
-loads the code. A file's name says for which types of arguments, and which fields that are None, the code was compiled.
-A checksum rejects damaged files. If the cache cannot be used, a run compiles without it.
+loads the code. A file's name states the types of arguments, and the fields that are None, for which the code was
+compiled. A checksum rejects damaged files. If the cache cannot be used, a run compiles without it.
 """
 
 from __future__ import annotations
@@ -53,7 +53,7 @@ DIGEST = hashlib.sha256().digest_size  # bytes
 
 @cache
 def stamp() -> str:
-    """Return the hash of all that results depend on: sources, versions of Numba and NumPy."""
+    """Return a hash of the sources and of the versions of Numba and NumPy, on which results depend."""
     digest = hashlib.sha256()
     for path in (*sorted(Path(__file__).parent.rglob("*.py")), Path(motor.__file__)):
         digest.update(path.name.encode() + b"\0" + path.read_bytes() + b"\0")
@@ -97,7 +97,11 @@ def folder() -> Path | None:
 
 
 def is_kept(without: frozenset[str]) -> bool:
-    """Return whether the cache has code for simulations that lack some groups of arrays."""
+    """Return whether the cache has code for simulations in which groups of arrays are None.
+
+    Args:
+        without: names of these groups, such as "motors".
+    """
     where = folder()
     return where is not None and any(where.glob(f"{_title(LONGEST, without)}.*.code"))
 
@@ -107,7 +111,12 @@ def _title(kernel: str, without: frozenset[str]) -> str:
 
 
 def _lacking(kind: Any, name: str) -> Iterator[str]:
-    """Yield the name of an argument that is None, or those of its fields that are, at any depth."""
+    """Yield the names of all fields that are None, at any depth, from the Numba type of an argument.
+
+    Args:
+        kind: the type; if it is that of None, the argument's name is yielded.
+        name: name of the argument.
+    """
     if isinstance(kind, types.NoneType):
         yield name
     elif isinstance(kind, types.NamedTuple | types.NamedUniTuple):
@@ -127,7 +136,7 @@ class KernelCache(NullCache):
         self._enabled = True
 
     def path(self, types_: Any) -> Path | None:
-        """Return the file for the types of the arguments; None where nothing can be kept."""
+        """Return the file for some types of the arguments; None if the cache has no folder."""
         where = folder() if self._enabled else None
         named = zip(types_, self._arguments, strict=True)
         lacking = frozenset(chain.from_iterable(_lacking(kind, name) for kind, name in named))
@@ -193,7 +202,10 @@ def _cause(error: Exception) -> str:
 
 @contextmanager
 def _locked(path: Path) -> Iterator[None]:
-    """Hold the lock of a file; the system releases it if this process dies. Go on without it after `PATIENCE`."""
+    """Hold the lock of a file during a block; after waiting for `PATIENCE`, run the block without the lock.
+
+    The system releases the lock if this process dies.
+    """
     file = None
     try:
         if fcntl is not None:
@@ -222,7 +234,11 @@ def _wait_for(file: int) -> None:
 
 
 def announce(seconds: float = math.nan) -> None:
-    """Report once per process that it compiles, and the expected processor time [s] if known."""
+    """Report, once per process, that the process compiles.
+
+    Args:
+        seconds: expected processor time [s]; NaN: unknown.
+    """
     if not _ANNOUNCED.is_set():
         _ANNOUNCED.set()
         about = "" if math.isnan(seconds) else f", about {seconds:.0f} s of processor time"

@@ -102,7 +102,7 @@ class _KernelCompiler(_PartCompiler):
 
 
 def part(function: F, **options: Any) -> F:
-    """Compile a function that only kernels call; a call from Python crashes the process."""
+    """Mark a function that only kernels call, for compilation; a call from Python crashes the process."""
     compiled = numba.njit(**OPTIONS, **NOT_FROM_PYTHON, **options, pipeline_class=_PartCompiler)(function)
     template = compiled.get_call_template
 

@@ -127,8 +127,8 @@ class LinksEngine:
     def set_time_step(self, time_step: float) -> None:
         """Set the length of all further steps [s].
 
-        Velocities are those at the middles of steps. A change of the length by Δ causes an error of Δ/2 times the
-        present acceleration, which is negligible in a pile at rest.
+        Velocities belong to the middles of steps. A change of the length by Δ [s] causes an error of velocities of Δ/2
+        times the present acceleration, which is negligible in a pile at rest.
         """
         if time_step != self.time_step:
             self._world.set_time_step(time_step)
@@ -162,19 +162,22 @@ class LinksEngine:
 
     @property
     def _relative_masses(self) -> Array:
-        """(N,) masses of the bodies, over that of the first kind [1]; of smarticles exactly 1."""
+        """(N,) masses of the bodies, over the mass of a body of the first kind [1]; exactly 1 for smarticles."""
         masses = self._world.shapes.mass
         return np.asarray((masses / masses[0])[self._world.bodies.shape])
 
     @cached_property
     def _weights_of_kinds(self) -> Array:
-        """(K,) weights of the kinds, those of filaments less buoyancy, over that of the first without it [1]."""
+        """(K,) weights of the kinds' bodies, over the weight of a body of the first kind [1].
+
+        Weights of filaments are less buoyancy, except for the weight by which all are divided.
+        """
         rods, masses = [kind.filament for kind in self._world.kinds], self._world.shapes.mass
         return np.asarray(masses / masses[0] * [1.0 if rod is None else rod.weight_share for rod in rods])
 
     @property
     def _relative_weights(self) -> Array:
-        """(N,) weights of the bodies, as `_weights_of_kinds` [1]; of smarticles exactly 1."""
+        """(N,) weights of the bodies, over the weight that `_weights_of_kinds` takes [1]; exactly 1 for smarticles."""
         return np.asarray(self._weights_of_kinds[self._world.bodies.shape])
 
     def still(self) -> None:
@@ -215,8 +218,8 @@ class LinksEngine:
     def overlaps(self, limit: float) -> Overlaps:
         """Return the present overlaps; `Overlaps.deep` marks bodies with an overlap above `limit` [m].
 
-        Overlaps since the last check count as well if links may have passed through each other (`PASSES`). A body
-        that is held between two boundaries is marked from an overlap of `HOLDS` diameters on.
+        An overlap since the last check counts as well if links may have passed through each other, which is possible
+        above `PASSES`. A body that is held between two boundaries is marked above an overlap of `HOLDS` diameters.
         """
         found, world = self._world.contacts(), self._world
         between = world.bodies.deepest.copy()
@@ -231,7 +234,7 @@ class LinksEngine:
         return Overlaps(float(depths.max(initial=0.0)), deep, elastic, held)
 
     def contact_forces(self) -> ContactForces:
-        """Return the forces with which the next step begins."""
+        """Return the contact forces at the beginning of the next step."""
         rows = self._world.forces()
         first, second = rows[:, : queries.PRESSED].astype(np.int64).T
         return contacts_of_points(
@@ -245,7 +248,7 @@ class LinksEngine:
         )
 
     def extremes(self, state: PileState) -> Extremes | None:
-        """Return the extremes; None if an overlap needs a full check. The gap is 0, since hinges are rigid."""
+        """Return the extremes; None if an overlap needs a full check. `Extremes.gap` is 0: hinges are rigid."""
         if state.bodies is None:
             velocities = state.smarticles.link_velocities.reshape(-1, 3)
         else:

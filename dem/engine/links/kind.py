@@ -1,4 +1,4 @@
-"""Facts about links as an engine, and the function that builds its simulations."""
+"""Facts about the engine links, and the function that builds its simulations."""
 
 from __future__ import annotations
 
@@ -81,7 +81,7 @@ class LinksKind:
 
 
 def _present(scene: Demand) -> Iterator[frozenset[str]]:
-    """Yield the groups of arrays that are present in each kind of phase of a scene."""
+    """Yield the names of the groups of arrays that are not None, for each kind of phase of a scene."""
     known = {
         "channel": scene.channel is not None,
         **dict.fromkeys(OF_FILAMENTS, scene.mixture is not None and scene.mixture.flexible),

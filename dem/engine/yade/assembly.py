@@ -22,7 +22,7 @@ from dem.errors import reject
 
 
 class Assembly:
-    """All smarticles as bodies of YADE; arguments as in `YadeEngine`."""
+    """All bodies of a pile as bodies of YADE; arguments as in `YadeEngine`."""
 
     def __init__(
         self,
@@ -44,7 +44,7 @@ class Assembly:
         self._ids: list[int] = []
         self._to_body: list[Any] = []
         self._states: list[Any] = []
-        self.smarticle_of: dict[int, int] = {}  #: Number of the smarticle by the id of a sphere
+        self.smarticle_of: dict[int, int] = {}  #: Number of a sphere's body, by the sphere's id in YADE
         # Link poses in the frames of welded bodies; of no meaning while articulated.
         self._arms: Array = np.empty((0, LINKS, 3))
         self._turns: Array = np.empty((0, LINKS, 3, 3))
@@ -55,7 +55,7 @@ class Assembly:
 
     @property
     def bodies(self) -> Sequence[int]:
-        """Ids of the rigid bodies in the order of smarticles: one per welded, three per articulated smarticle."""
+        """Ids of the rigid bodies in the order of smarticles: one of a welded, three of an articulated smarticle."""
         return self._ids
 
     @property
@@ -65,19 +65,19 @@ class Assembly:
         return self._model
 
     def _body(self, number: int) -> Particle | Kind:
-        """Return the particle, or the kind, that a body is."""
+        """Return the smarticle, or the kind of a body in a mixture, for the number of the body."""
         return body_of(self._model, self._kinds, number)
 
     @property
     def each(self) -> int:
-        """Most links of a body, 3 at least."""
+        """Largest number of links of a body, but at least 3."""
         if isinstance(self._model, Particle):
             return LINKS
         return max(LINKS, *(len(kind.bars.points) for kind in self._model.kinds))
 
     @property
     def link_of(self) -> Mapping[int, tuple[int, int]]:
-        """(body, link) of each sphere, by the sphere's id."""
+        """Number of the body and number of the link to which a sphere belongs, by the sphere's id."""
         return {
             sphere: (k, link)
             for k, spheres in enumerate(self._spheres)
@@ -86,7 +86,7 @@ class Assembly:
 
     @property
     def masses(self) -> Array:
-        """(N,) of the bodies [kg]."""
+        """(N,) masses of the bodies [kg]."""
         if isinstance(self._model, Particle):
             return np.full(self.count, self._model.mass)
         return self._model.masses[np.array(self._kinds, dtype=np.int64)]
@@ -295,7 +295,10 @@ class Assembly:
 
 
 def _tensors(state: State) -> tuple[Array, Array]:
-    """Return smarticles' inertia tensors (N, 3, 3) [kg m²] and links' arms (N, 3, 3) [m], laboratory axes."""
+    """Return (N, 3, 3) inertia tensors [kg m²], and positions of links from the centre of mass [m].
+
+    Positions are (N, 3, 3), one row for each link; both are in the axes of the laboratory.
+    """
     boxes = state.boxes
     arms = state.link_positions - state.positions[:, None]
     own = np.einsum("nkij,kj,nklj->nil", state.link_rotations, boxes.link_inertias, state.link_rotations)
@@ -329,7 +332,7 @@ def clump(
         rotation: (3, 3) rotation from the principal frame to the laboratory frame.
         velocity: (3,) velocity of the centre of mass [m/s].
         angular_momentum: (3,) angular momentum about the centre of mass [kg m²/s].
-        planar: whether the body moves along x and y and turns about z only; z is then its third principal axis.
+        planar: whether the body moves along x and y and turns about z only; z is then the body's third principal axis.
 
     Returns:
         The id of the body, and the quaternion q from YADE's principal frame of the clump to the body's principal frame:

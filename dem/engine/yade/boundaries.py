@@ -20,7 +20,7 @@ from dem.setting.plane import Channel
 class YadeBoundaries:
     """`dem.engine.interface.Boundaries` on YADE.
 
-    `hooks` are the lower and the upper hook; a channel replaces the container. The floor begins at z = 0.
+    `hooks` are the lower and the upper hook; a channel replaces the container. At the start the floor is at z = 0.
     """
 
     def __init__(
@@ -216,7 +216,7 @@ def _ring(cylinder: Cylinder, radius: float) -> Array:
 
 
 def _band(yade: Yade, one: tuple[Array, float], other: tuple[Array, float]) -> Iterator[Any]:
-    """Yield facets between two rings of corners, each given with its height [m]."""
+    """Yield facets between two rings; a ring consists of its corners (n + 1, 2) and its height [m]."""
     for (start, end), (above_start, above_end) in zip(pairwise(one[0]), pairwise(other[0]), strict=True):
         a, b = yade.vector(*start, one[1]), yade.vector(*end, one[1])
         c, d = yade.vector(*above_end, other[1]), yade.vector(*above_start, other[1])
@@ -225,7 +225,10 @@ def _band(yade: Yade, one: tuple[Array, float], other: tuple[Array, float]) -> I
 
 
 def add_channel(yade: Yade, channel: Channel) -> list[int]:
-    """Add walls, if any, and table for centrelines at z = 0; return ids: lower wall, upper wall, table."""
+    """Add the table, and the walls of a channel if it has any; return the ids of their bodies.
+
+    Ids are of the lower wall, upper wall and table. Centrelines of links on the table are at z = 0.
+    """
     bodies = []
     if channel.width is not None:
         # Each wall always pushes to its inner side, like the container's floor.

@@ -1,4 +1,4 @@
-"""Materials, engines and functors that each effect needs on YADE, and their construction."""
+"""Construct the materials, engines and functors that each effect needs on YADE."""
 
 import math
 from collections.abc import Mapping

@@ -62,7 +62,7 @@ def contact_forces(yade: Yade, assembly: Assembly, boundaries: YadeBoundaries) -
 def measure_overlaps(
     yade: Yade, assembly: Assembly, boundaries: YadeBoundaries, law: ContactLaw, limit: float
 ) -> Overlaps:
-    """Return the overlaps; `Overlaps.deep` marks smarticles with an overlap above `limit` [m]."""
+    """Return the present overlaps; `Overlaps.deep` marks bodies with an overlap above `limit` [m]."""
     hinges = assembly.hinges
     # Called often: without hinges all interactions are contacts, so that their bodies need not be looked up.
     contacts = contacts_of(yade, assembly) if hinges is not None else (c for c in yade.omega.interactions if c.isReal)
@@ -84,7 +84,12 @@ def measure_overlaps(
 
 
 def _held(yade: Yade, assembly: Assembly, boundaries: YadeBoundaries, deep: Flags, least: float) -> tuple[Held, ...]:
-    """Return the smarticles of `deep` (N,) between boundaries whose distance changed by over `least` [m]."""
+    """Return the bodies that touch two boundaries whose distance has changed.
+
+    Args:
+        deep: (N,) whether each body has a deep contact; others are left out.
+        least: smallest change of distance that counts [m].
+    """
     parts = boundaries.parts()
     part_of = {body: name for name, (bodies, _) in parts.items() for body in bodies}
     touched: dict[int, set[str]] = defaultdict(set)

@@ -39,7 +39,7 @@ class YadeEngine:
     Args:
         gravity: g, downwards [m/s²].
         time_step: dt of the first steps [s].
-        shaken: whether the container will be shaken, for which YADE needs an engine of its own.
+        shaken: whether the container will be shaken, which needs a further engine of YADE.
         hinge_law: law of the hinges; None if smarticles stay welded.
         motor_law: law of the motors; None if smarticles stay welded.
         track_work: whether to sum the work of moving boundaries.
@@ -156,8 +156,8 @@ class YadeEngine:
     def set_time_step(self, time_step: float) -> None:
         """Set the length of all further steps [s].
 
-        Velocities are those at the middles of steps. A change of the length by Δ causes an error of Δ/2 times the
-        present acceleration, which is negligible in a pile at rest.
+        Velocities belong to the middles of steps. A change of the length by Δ [s] causes an error of velocities of Δ/2
+        times the present acceleration, which is negligible in a pile at rest.
         """
         self.time_step = self._omega.dt = time_step
         self.ledger.set_time_step(time_step)
@@ -204,7 +204,7 @@ class YadeEngine:
 
     @property
     def _relative_masses(self) -> Array:
-        """(N,) masses of the bodies, over the mean mass of all kinds' bodies [1]; of smarticles exactly 1."""
+        """(N,) masses of the bodies, over the mean mass of the scene's bodies [1]; exactly 1 for smarticles."""
         return self._assembly.masses / self.particle.mass
 
     def still(self) -> None:

@@ -39,7 +39,7 @@ class HingeLaw:
     pin_stiffness: float  #: Stiffness against a gap between the links [N/m]
     tilt_stiffness: float  #: Stiffness against rotation of a link out of the common plane [N m/rad]
     shaft_stiffness: float  #: Twist stiffness of the motor's shaft [N m/rad]
-    torque_cap: float | None  #: Torque at which a shaft slips [N m]; None: it does not slip
+    torque_cap: float | None  #: Torque at which a shaft slips [N m]; None: shafts do not slip
     shaft_damping: float = 0.0  #: Derivative gain of the motors [N m s/rad]; only the stable time step uses it
     damper_time: float = DAMPER_TIME  #: Least relaxation time of the dampers [s], at least a time step
 
@@ -55,7 +55,7 @@ class HingeLaw:
 
 
 def hinge_nodes(boxes: Boxes, link: int) -> Array:
-    """Return the hinge nodes (n, 3) of a link in its own frame [m].
+    """Return (n, 3) positions of a link's hinge nodes, in the frame of the link [m].
 
     A barb has one hinge, at its start, with a node at the centre and one at the end of the axis, half the thickness t1
     above the plane; the middle link has a node at the centre of each of its two hinges.
@@ -100,7 +100,11 @@ class Hinges:
         self._updates = 0
 
     def make(self, strengths: Array | None = None) -> None:
-        """Make the bonds, with factors (N, 2) on the shafts' stiffness and torque cap [1]; None: 1."""
+        """Make the bonds of all hinges.
+
+        Args:
+            strengths: (N, 2) factors on stiffness and torque cap of the shafts [1]; None: 1 for all.
+        """
         factors = np.ones_like(self._angles) if strengths is None else strengths
         for (barb_centre, barb_end, middle_centre), factor in zip(self._hinges(), factors.flat, strict=True):
             self._bond(barb_centre, middle_centre, self._law.pin_stiffness)
@@ -108,7 +112,7 @@ class Hinges:
         self.bind()
 
     def bind(self) -> None:
-        """Keep references to the bonds of hinges in YADE, which loading a simulation replaces."""
+        """Look up the bonds of the hinges in YADE again, after loading has replaced them."""
         interactions = self._yade.omega.interactions
         self._pins = [interactions[centre, middle].geom for centre, _, middle in self._hinges()]
         shafts = [interactions[end, middle] for _, end, middle in self._hinges()]
@@ -124,7 +128,7 @@ class Hinges:
         self._pins, self._shafts, self._ends = [], [], []
 
     def _hinges(self) -> Iterator[tuple[int, int, int]]:
-        """Yield the ids of each hinge's nodes: the barb's at centre and axis end, the middle link's."""
+        """Yield the ids of each hinge's nodes: two of the barb, at centre and axis end, one of the middle link."""
         for links in self._nodes:
             for hinge, barb in enumerate(BARBS):
                 centre, end = links[barb]
@@ -153,7 +157,7 @@ class Hinges:
             phys.maxTwistPl = strength * law.torque_cap / SHAFT_FORCE
 
     def moved(self) -> None:
-        """Discard the loaded twists and gaps, since a step has made YADE compute them."""
+        """Discard the twists and gaps that were loaded; YADE has computed them anew in a step."""
         self._loaded = None
 
     def _twists(self) -> Array:
@@ -169,7 +173,7 @@ class Hinges:
         return np.asarray(self._angles + SENSE * self._twists().reshape(-1, 2))
 
     def rates(self) -> Array:
-        """Return the rates (N, 2) of the barbs' angles [rad/s], half a step behind the angles."""
+        """Return the rates (N, 2) of the barbs' angles [rad/s], half a step before the angles."""
         up = self._yade.vector(0, 0, 1)
         turning = [(barb.angVel - middle.angVel).dot(middle.ori * up) for barb, middle in self._ends]
         return np.asarray(-SENSE * np.array(turning).reshape(-1, 2))

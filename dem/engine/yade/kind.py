@@ -1,4 +1,4 @@
-"""Facts about YADE as an engine, and the function that builds its simulations."""
+"""Facts about the engine on YADE, and the function that builds its simulations."""
 
 from dem.engine.demand import Activity, Demand, contact_law_of, mean_spheres, motor_law_of
 from dem.engine.effect import EffectName

@@ -24,11 +24,11 @@ _SUMS = ("container_work", "added", "dissipated")
 
 @dataclass(frozen=True)
 class Contacts:
-    """M contacts in one step."""
+    """M contacts of pairs of bodies in one time step."""
 
     normals: Array  #: (M, 3) unit vectors from the first body to the second [1]
     before: Array  #: (M, 3) velocities of second bodies relative to first bodies at the contacts before the step [m/s]
-    after: Array  #: (M, 3) relative velocities at the contacts after the step, with which the bodies move [m/s]
+    after: Array  #: (M, 3) velocities of second bodies relative to first bodies at the contacts after the step [m/s]
     overlaps: Array  #: (M,) overlaps [m]
     viscous: Array  #: (M,) normal viscous forces of the step, positive where bodies approach [N]
     shear: Array  #: (M, 3) elastic tangential forces [N]
@@ -66,10 +66,12 @@ class Contacts:
         return float(normal.sum() + shear.sum())
 
     def _split(self, velocities: Array) -> tuple[Array, Array]:
-        """Split relative velocities (M, 3) into approach speeds (M,) and tangential velocities (M, 3) [m/s].
+        """Return approach speeds (M,) and tangential velocities (M, 3) at the contacts [m/s].
 
-        Velocities to split are those of the second body relative to the first; the tangential velocities are those of
-        the first body relative to the second.
+        Tangential velocities are those of first bodies relative to second bodies.
+
+        Args:
+            velocities: (M, 3) velocities of second bodies relative to first bodies [m/s].
         """
         closing = -np.einsum("mi,mi->m", velocities, self.normals)
         return closing, -(velocities + closing[:, None] * self.normals)
@@ -131,7 +133,7 @@ class YadeLedger:
         return math.nan if self._boundaries.moving and not self._works else self.added + self.container_work
 
     def book_removal(self, remove: Callable[[], None]) -> None:
-        """Call a function that removes contacts; their elastic energy counts as dissipated."""
+        """Call `remove`, which removes contacts; the elastic energy of these contacts counts as dissipated."""
         stored = self.elastic()[0] if self._every else 0.0
         remove()
         if self._every:
@@ -146,7 +148,11 @@ class YadeLedger:
         return found
 
     def _contacts(self, before: Velocities) -> Contacts:
-        """Return all contacts; a new contact, absent in `before`, counts with its present velocity."""
+        """Return all contacts after a step.
+
+        Args:
+            before: relative velocities before the step; a contact that is absent in it gets its present velocity.
+        """
         rows = []
         for contact in contacts_of(self._yade, self._assembly):
             geom, phys = contact.geom, contact.phys

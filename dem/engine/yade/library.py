@@ -1,4 +1,4 @@
-"""Import of the YADE that the Linux distribution ships; no other module imports `yade`."""
+"""Import YADE from the packages of the Linux distribution; no other module imports `yade`."""
 
 import contextlib
 import importlib
@@ -22,13 +22,13 @@ class Yade:
 
     classes: Any
     utils: Any
-    omega: Any  #: The simulation; YADE has one per process
+    omega: Any  #: YADE's simulation, one per process
     vector: Any  #: Constructor of a vector from three numbers
     quaternion: Any  #: Constructor of a unit quaternion from (w, x, y, z)
 
 
 def rows_of(vectors: Iterable[Any]) -> Array:
-    """Return (n, 3) components of YADE's vectors, five times faster than NumPy's own conversion."""
+    """Return the components (n, 3) of n vectors of YADE, five times faster than NumPy's conversion."""
     return np.array([(v[0], v[1], v[2]) for v in vectors], dtype=np.float64).reshape(-1, 3)
 
 
@@ -58,7 +58,7 @@ def yade_threads() -> int:
 
 
 def import_yade() -> Any:
-    """Import the distribution's YADE into this process; raise RunError if it is not installed."""
+    """Return the module `yade` of the Linux distribution; raise RunError if it is not installed."""
     # Threads that find no free core spin; a run of seconds would take minutes.
     os.environ.setdefault("OMP_NUM_THREADS", "1")
     for folder in Path("/usr/lib").glob("*/yade*/py"):

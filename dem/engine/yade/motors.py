@@ -32,7 +32,7 @@ class YadeMotors:
         self._ledger = ledger
         self._law = law
         self._strengths = strengths
-        self.control: Motors | None = None  #: Commands, torques and work; None before the first articulation
+        self.control: Motors | None = None  #: State of all motors; None before the first articulation
 
     @property
     def present(self) -> bool:

@@ -1,4 +1,4 @@
-"""The stable time step on YADE, from masses and inertias of smarticles instead of sphere sizes."""
+"""Stable time steps on YADE, from masses and inertias of bodies; YADE's own estimate takes sphere sizes."""
 
 import math
 from collections.abc import Iterable, Sequence
@@ -28,8 +28,8 @@ def stable_time_step(body: Particle | Kind, law: ContactLaw) -> float:
 
     - the lightest points of two smarticles against each other, or of one against the container, with
       `CONTACTS_AT_A_TIP` contacts;
-    - a pile of smarticles that lie flat, where every sphere touches neighbours above and below that move in the
-      opposite direction, the stiffest mode of such a pile;
+    - a pile of smarticles that lie flat, where every sphere touches spheres above and below that move in the
+      opposite direction;
     - a flat pile where all smarticles roll in one sense and rub against those above and below. This mode is the
       stiffest below l/w = 0.2, where smarticles have little inertia about their length.
 
@@ -125,7 +125,10 @@ def planar_stable_time_step(
 
 
 def _roll_shape(particle: Particle) -> Array:
-    """Return the stiffness matrix (18, 18) of tangential springs of 1 N/m at all spheres' highest points."""
+    """Return the stiffness matrix (18, 18) of tangential springs of 1 N/m at the top of every sphere.
+
+    Degrees of freedom are those of `_mass_matrix`.
+    """
     shape = np.zeros((6 * LINKS, 6 * LINKS))
     for link, height in zip(particle.links, particle.centres[:, 2] + particle.radius, strict=True):
         about = slice(6 * int(link) + 3, 6 * int(link) + 5)
@@ -142,7 +145,10 @@ def _stable_step(mass: Array, stiffness: Array, damping: Array) -> float:
 
 
 def _mass_matrix(boxes: Boxes) -> Array:
-    """Return the mass matrix (18, 18) for velocity and angular velocity of each link, in the body frame."""
+    """Return the mass matrix (18, 18) of three free links.
+
+    Degrees of freedom are velocity and angular velocity of each link, in the body frame.
+    """
     blocks = []
     for moved, moments, rotation in zip(boxes.link_masses, boxes.link_inertias, boxes.link_rotations, strict=True):
         blocks += [moved * np.eye(3), rotation @ np.diag(moments) @ rotation.T]
@@ -150,7 +156,7 @@ def _mass_matrix(boxes: Boxes) -> Array:
 
 
 def _velocity_of(boxes: Boxes, link: int, point: Array) -> Array:
-    """Return the matrix (3, 18) that maps the velocities of all links to that of a point of `link`.
+    """Return the matrix (3, 18) from the degrees of freedom of `_mass_matrix` to the velocity of a point of a link.
 
     Args:
         point: (3,) the point in the body frame [m].
@@ -182,7 +188,7 @@ def _hinge_stiffness(boxes: Boxes, law: HingeLaw) -> Array:
 
 
 def _twist(barb: int) -> Array:
-    """Return the matrix (1, 18) that maps the velocities of all links to the rate of a barb's angle."""
+    """Return the matrix (1, 18) from the degrees of freedom of `_mass_matrix` to the rate of a barb's angle."""
     row = np.zeros((1, 6 * LINKS))
     row[0, 6 * barb + 5], row[0, 11] = 1, -1
     return row
@@ -194,7 +200,12 @@ def _twist_shape() -> Array:
 
 
 def _push_shape(particle: Particle, spheres: Iterable[int], directions: Array) -> Array:
-    """Return the stiffness matrix (18, 18) of springs of 1 N/m at some spheres, along directions (k, 3)."""
+    """Return the stiffness matrix (18, 18) of springs of 1 N/m at the centres of spheres.
+
+    Args:
+        spheres: numbers of the spheres.
+        directions: (k, 3) unit vectors along which k springs act at each sphere.
+    """
     shape = np.zeros((6 * LINKS, 6 * LINKS))
     for sphere in spheres:
         rows = directions @ _velocity_of(particle.boxes, int(particle.links[sphere]), particle.centres[sphere])

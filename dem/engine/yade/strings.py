@@ -1,7 +1,7 @@
-"""The two strings that pull a chain on YADE, as forces set before every step.
+"""Strings that pull a chain on YADE, as forces that are set before every step.
 
 The far end of each string, its anchor, is a point in space that may move. Forces use the positions and velocities that
-YADE's contact laws use, and so have the stability of such a contact.
+YADE's contact laws use, so that a string is as stable as a contact of equal stiffness.
 """
 
 import math
@@ -23,7 +23,7 @@ class End:
     """One string: the point at which it is tied to a link, and its anchor."""
 
     body: int  #: Id of the link's body
-    arm: Sequence[float]  #: (3,) tied point in YADE's frame of the body [m]
+    arm: Sequence[float]  #: (3,) point at which the string is tied, in YADE's frame of the body [m]
     anchor: Sequence[float]  #: (3,) position of the anchor at the start [m]
     speed: float  #: Velocity of the anchor along x [m/s]
 

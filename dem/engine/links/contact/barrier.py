@@ -2,16 +2,17 @@
 
 A contact's energy is kn/2 u(δ)², with the overlap δ and the stretched overlap u. The room is the overlap at which the
 axes of two links, or an axis and a surface, would meet. Up to a quarter of the room u = δ, so that ordinary contacts
-are linear. Beyond it u grows without bound as δ approaches the room:
+are linear. Beyond a quarter u grows without bound as δ approaches the room:
 
     u = δ + room x³ / (1 - x),   x = (δ - room/4) / (3/4 room),
 
 which has two continuous derivatives. The force is kn u u', the stiffness kn h² with h² = u'² + u u''. Dashpots are
 scaled by the hardening h, which keeps the damping ratio and the restitution constant (Tsuji et al., Powder Technol. 71,
 239 (1992)). No load can push axes through each other, as in incremental potential contact (Li et al., ACM Trans. Graph.
-39, 49 (2020)); its logarithm is replaced by a rational function that joins a linear spring.
+39, 49 (2020)); the logarithm of that method is replaced by a rational function, which joins a linear spring.
 
-Time steps are stable for the linear spring. A step is divided into sub-steps if a contact is stiffer or closes fast.
+Time steps are stable for the linear spring. A step is divided into sub-steps if a contact is stiffer than this spring
+or closes fast.
 """
 
 from __future__ import annotations
@@ -31,14 +32,14 @@ SLACK = 1.2  # factor by which sub-steps may be longer than needed, since a step
 
 
 class Step(NamedTuple):
-    """Times at one evaluation of forces, and the number of sub-steps that the forces need.
+    """Times at an evaluation of forces, and the number of sub-steps that these forces need.
 
-    The length of the next sub-step, for which the forces act, follows from `need`.
+    Forces act during the next sub-step, whose length follows from `need`.
     """
 
     past: float  #: Time since the last evaluation, over which tangential springs have stretched [s]
     whole: float  #: Length of an undivided time step [s]
-    need: Array  #: (1,) number of sub-steps per time step that contacts and speeds need; kernels raise it
+    need: Array  #: (1,) number of sub-steps per time step that contacts and speeds need; kernels increase it
 
 
 @inlined
@@ -84,10 +85,10 @@ def _demand(depth: float, room: float, closing: float, whole: float) -> float:
 
 @inlined
 def resolve(step: Step, depth: float, room: float, closing: float) -> None:
-    """Raise `step.need` if a contact is beyond the linear range, or gets there within a time step.
+    """Increase `step.need` if a contact is beyond the linear range, or gets there within a time step.
 
     Args:
-        step: `need` is raised.
+        step: `need` is increased.
         depth: overlap [m].
         room: overlap at which axes meet [m].
         closing: rate at which the overlap grows [m/s].
@@ -101,7 +102,7 @@ def ticks_for(need: float, tick: int) -> int:
     """Return the length of the next sub-step in ticks; a time step has `FINEST` ticks.
 
     Args:
-        need: number of sub-steps per time step that are needed.
+        need: number of sub-steps per time step, as `Step.need`.
         tick: ticks of the step that have passed; sub-steps begin at multiples of their own length.
     """
     ticks = FINEST

@@ -4,7 +4,7 @@
 that it writes.
 
 A straight link touches a plane, and the inside of a round wall, with its ends: no other point is nearer. A joint counts
-once, as an end of the first segment that has it. A link touches a round edge with one point. The bars of hooks are
+once, as an end of the first of the joined segments. A link touches a round edge with one point. The bars of hooks are
 swept segments, so that links touch them as they touch other links. The force along a link that slides off the end of a
 bar is left out; it is less than a hundredth of the normal force.
 """
@@ -63,7 +63,16 @@ def slots_for(hooks: Hooks | None, rims: Rims | None) -> int:
 def _note(
     rows: Array, count: int, slot: int, part_of: int, depth: float, room: float, point: Vector, normal: Vector
 ) -> int:
-    """Write a full contact (SHARE 1) at a point of a link's axis; return the new number of rows."""
+    """Write a contact with SHARE 1 into row `count` of `rows`; return the new number of rows.
+
+    Args:
+        slot: place of the contact in the memory of contacts, see `Kept`.
+        part_of: index of the boundary in `Ground.force`.
+        depth: overlap [m].
+        room: overlap at which the link's axis would meet the surface [m].
+        point: point on the link's axis [m].
+        normal: unit vector from the boundary to the link [1].
+    """
     row = rows[count]
     row[SLOT], row[PART], row[DEPTH], row[SHARE], row[FACTOR], row[ROOM] = slot, part_of, depth, 1.0, 1.0, room
     put(row, AXIS, point)
@@ -83,8 +92,8 @@ def contacts_of_segment(
         channel: (1,) half the distance of a channel's walls [m]; None in a container.
         hooks: the hooks; None: no hooks.
         rims: edges of the wall that links can reach; None: no such edges.
-        p: number of the segment; contacts at a joint belong to the first segment that has the joint.
-        rows: (slots, COLUMNS) written; for the columns see `SLOT`.
+        p: number of the segment; contacts at a joint belong to the first of the joined segments.
+        rows: (slots, COLUMNS) written, one contact per row; for the columns see `SLOT`.
         met: scratch of `meeting.meet`.
 
     Returns:
@@ -125,7 +134,10 @@ def contacts_of_segment(
 
 @inlined
 def _contacts_with_wall(radius: float, ground: Ground, slot: int, point: Vector, rows: Array, count: int) -> int:
-    """Find the contacts of a link's end with wall and ceilings; return the new number of rows."""
+    """Find the contacts of a link's end with the wall, its edges and the undersides of its tiers.
+
+    Contacts are written from row `count` of `rows` on; the new number of rows is returned.
+    """
     x, y, z = point
     height, r, tiers = z - ground.place[WALL], math.sqrt(x * x + y * y), ground.radii.shape[0]
     lifted = ground.flags[1] != 0
@@ -159,7 +171,10 @@ def _contacts_with_wall(radius: float, ground: Ground, slot: int, point: Vector,
 
 @inlined
 def _contacts_with_rims(link: Array, ground: Ground, rims: Rims, first: int, rows: Array, count: int) -> int:
-    """Find the contacts of a link, without its ends, with the wall's edges; return the new number of rows."""
+    """Find the contacts of a link's inner points with the wall's edges.
+
+    Contacts are written from row `count` of `rows` on, in slots from `first` on; the new number of rows is returned.
+    """
     if ground.flags[0] == 0:
         return count
     z, uz, radius = link[2], link[5], link[RADIUS]
@@ -180,7 +195,10 @@ def _contacts_with_rims(link: Array, ground: Ground, rims: Rims, first: int, row
 
 @inlined
 def _contacts_with_hooks(link: Array, ground: Ground, hooks: Hooks, rows: Array, count: int, met: Array) -> int:
-    """Find the contacts of a segment with the bars of both hooks; return the new number of rows."""
+    """Find the contacts of a segment with the bars of both hooks.
+
+    Contacts are written from row `count` of `rows` on; the new number of rows is returned.
+    """
     reach = link[RADIUS] + hooks.radius
     for hook in range(2):
         height = ground.place[LOWER + hook]
@@ -230,7 +248,7 @@ def contacts_with_boundaries(
 def place_and_motion(
     radius: float, parts: Parts, ground: Ground, row: int, contact: Array
 ) -> tuple[Vector, Vector, float, float]:
-    """Return position and motion at a contact of a segment with a boundary.
+    """Return the position of a contact of a segment with a boundary, and the velocities there.
 
     Args:
         radius: radius of the segment [m].
@@ -256,9 +274,9 @@ def push_boundaries(
 
     Args:
         law: law of contacts with boundaries.
-        bodies: `deepest` is raised.
+        bodies: `deepest` is increased where an overlap is larger.
         parts: forces are added to `load`.
-        kept: memory of the contacts, which is updated.
+        kept: memory of the contacts; updated.
         ground: forces of the bodies on boundaries are added to `force`.
         rows: scratch of `contacts_of_segment`.
         met: scratch of `meeting.meet`.

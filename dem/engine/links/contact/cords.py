@@ -28,7 +28,7 @@ def find_knot(bodies: Bodies, cords: Cords, k: int) -> None:
 
 @kernel
 def find_knots(bodies: Bodies, cords: Cords) -> None:
-    """Write the positions of all knots into `cords.knot`; bodies must be posed before."""
+    """Write the positions of all knots into `cords.knot`; `pose` must have been called before."""
     for k in range(cords.along.shape[0]):
         find_knot(bodies, cords, k)
 

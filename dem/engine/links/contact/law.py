@@ -13,9 +13,10 @@ from dem.engine.links.vectors import Vector, add, along, cross, dot, put, scale,
 def share_of_step(depth: float, closing: float, dt: float) -> float:
     """Return a factor on the spring's force [1], below 1 in the first and the last step of a contact.
 
-    In these steps the bodies are in contact for a part of the step only. The leapfrog scheme conserves kn/2 δ_n δ_n+1
-    of consecutive overlaps. With this factor a contact does no work in total, whatever its first and last overlap are.
-    With the factor 1 in all steps it would dissipate (ω dt)²/12 of its energy, ω being its angular frequency.
+    In the first and the last step bodies are in contact for a part of the step only. The leapfrog scheme conserves kn/2
+    δ_n δ_n+1 of consecutive overlaps. With this factor the spring does no work in total, whatever its first and last
+    overlap are. With the factor 1 in all steps it would dissipate (ω dt)²/12 of its energy, ω being its angular
+    frequency.
 
     Args:
         depth: overlap [m].
@@ -39,7 +40,7 @@ def resist(
 
     Args:
         cn: damping coefficient of the normal dashpot [N s/m].
-        load: force of the normal spring at this point [N], 0 or more.
+        load: force of the normal spring at this point, on which friction depends [N], 0 or more.
         share: fraction of a full contact's springs and dashpots that acts at this point [1].
         hardening: factor on the normal dashpot, see `barrier.stretch` [1].
         normal: unit vector from the second body to the first [1].

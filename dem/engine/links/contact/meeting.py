@@ -1,8 +1,8 @@
-"""Compute where two segments push each other apart, and with which forces, from one energy.
+"""Compute the points at which two segments push each other apart, and the forces there, from one energy.
 
 Two swept segments have their greatest overlap δ0 at their nearest points. They lie along each other over a stretch of
 length ℓ. δ1 and δ2 are the overlaps at the two ends of this stretch, between the end of one link and the nearest point
-of the other; they are 0 if these points do not touch. With the stretched overlap u(δ) of
+of the other link; they are 0 if these two points do not touch. With the stretched overlap u(δ) of
 `dem.engine.links.contact.barrier` the energy is
 
     E = kn/2 (u0² + g(ℓ) (u1 u2 / u0)²),   g from 0 to 1 as ℓ grows from 0 to a diameter.
@@ -10,17 +10,18 @@ of the other; they are 0 if these points do not touch. With the stretched overla
 Ordinary contacts have u = δ. Links that cross have δ1 δ2 = 0 and one contact. Parallel links have δ0 = δ1 = δ2 and two
 contacts, at the ends of the stretch. Tilted links have δ0 = δ1 and two contacts, with δ1 and δ2, so that a bar that
 rests on a bar resists tilting. Between these cases the energy is smooth: at no angle does a force jump. The forces are
-the derivatives of the energy. Since nearest points and ends are extremal or fixed, the forces act along the normals of
-the three pairs of points, and along the first link if ℓ changes:
+the derivatives of the energy. Nearest points are extremal and ends are fixed on the links. So forces act along the
+normals of the three pairs of points, and, where ℓ changes, along the first link:
 
     f0 = kn u0 u0' (1 - g x1² x2²),  f1 = kn g u1 u1' x2²,  f2 = kn g u2 u2' x1²,  x = u/u0,
     f_ℓ = kn/2 (u1 u2/u0)² g'.
 
 At a joint two segments of a body have a common end. If both touch another segment, the overlap at the joint would count
-twice. From the energy E of the later segment therefore kn/2 u_h² is subtracted, with the overlap of the joint itself
-and the other segment, which is in the energy of the earlier segment. If joints of both bodies are near each other, this
-is done for both, and the energy of joint against joint is added. The rest of E goes to zero as the point of contact
-moves to the joint, so that a bend is as stiff as a straight bar.
+twice. It counts in the energy of the earlier segment; from the energy E of the later segment kn/2 u_h² is subtracted,
+with u_h from the overlap between the joint and the other segment. If joints of both bodies are near each other, a term
+is subtracted for each joint, and the energy between both joints is added. The rest of E goes to zero as the point of
+contact moves to the joint, so that a bend is as stiff as a straight bar. Forces from f_ℓ and from joints are bare
+forces: they have no friction and no dashpot.
 """
 
 from __future__ import annotations
@@ -68,7 +69,7 @@ def meet(p: Array, q: Array, stiffness: float, shared_p: int, shared_q: int, out
         q: (LINE,) the second segment.
         stiffness: kn [N/m].
         shared_p: ends of the first segment that are ends of earlier segments of its body, see `shapes.AT_START`.
-        shared_q: such ends of the second segment.
+        shared_q: ends of the second segment that are ends of earlier segments of its body.
         out: (ROWS, COLUMNS) written; for the columns see `PLACE`.
 
     Returns:
@@ -88,17 +89,17 @@ def meet_at(
     both: Lines, s: float, t: float, gap: Vector, distance: float, diameter: float, stiffness: float,
     shared_p: int, shared_q: int, out: Array,
 ) -> int:  # fmt: skip
-    """Do what `meet` does for segments that touch; return the number of bare forces.
+    """Find points of contact and forces like `meet`, for segments that touch; return the number of bare forces.
 
     Args:
         s: place of the nearest point along the first segment, 0 to 1.
         t: place of the nearest point along the second segment, 0 to 1.
-        gap: vector from the second segment's nearest point to that of the first [m].
+        gap: vector from the nearest point of the second segment to the nearest point of the first [m].
         distance: length of `gap` [m].
         diameter: sum of both radii [m].
         stiffness: kn [N/m].
-        shared_p: joints of the first segment, as in `meet`.
-        shared_q: joints of the second segment, as in `meet`.
+        shared_p: as in `meet`.
+        shared_q: as in `meet`.
         out: (ROWS, COLUMNS) written.
     """
     deepest = diameter - distance
@@ -124,9 +125,9 @@ def meet_at(
 
 @inlined
 def meets_elsewhere(both: Lines, reach: float, shared_p: int, shared_q: int) -> int:
-    """Count places besides the nearest points at which `meet_at` may find forces.
+    """Return the number of places, besides the nearest points, at which `meet_at` may find forces.
 
-    Most segments that touch have no such place. The code has no branches, since a mispredicted branch takes as long as
+    For most segments it is 0. The code has no branches, since a mispredicted branch takes as long as
     the whole function. Numbers are bitwise equal to those of `_lie_along` and `_joint`. A joint at the end of a
     segment, which is rare, always counts.
 
@@ -162,7 +163,7 @@ def _square(a: Vector) -> float:
 
 @inlined
 def _halfway(both: Lines, s: float, t: float) -> Vector:
-    """Return the point half way between p + s u and q + t v [m]."""
+    """Return the point half way between the point s of the first and the point t of the second axis [m]."""
     return scale(0.5, along(add(along(both.p, s, both.u), both.q), t, both.v))
 
 
@@ -183,7 +184,14 @@ def _note(
 def _lie_along(
     both: Lines, deepest: float, u: float, slope: float, diameter: float, stiffness: float, out: Array
 ) -> int:
-    """Write the contacts at both ends of the stretch over which links lie along each other.
+    """Write the contacts at both ends of the stretch over which two segments lie along each other.
+
+    Args:
+        deepest: overlap δ0 at the nearest points [m].
+        u: stretched overlap at the nearest points [m].
+        slope: u' at the nearest points [1].
+        diameter: sum of both radii [m].
+        out: rows 0 to 2 and the energy are updated, bare forces are written.
 
     Returns:
         Number of bare forces.

@@ -1,4 +1,4 @@
-"""Forces of bodies on each other."""
+"""Kernels of contact forces between bodies."""
 
 from __future__ import annotations
 
@@ -59,7 +59,12 @@ ROWS, POINT, PUSH, POWER, GAIN = 0, 2, 5, 8, 9
 
 @inlined
 def _extended(stretch: Any, row: int, velocity: Vector, arm: Vector) -> Vector:
-    """Add the velocity that a part's stretching gives to a point at `arm` [m] from the part's origin."""
+    """Return a point's velocity [m/s]: `velocity` of the rigid motion, plus that of the part's stretching.
+
+    Args:
+        row: number of the part.
+        arm: vector from the part's reference point to the point [m].
+    """
     if stretch is None:
         return velocity
     axis = vector(stretch[row], AXIS)
@@ -68,7 +73,12 @@ def _extended(stretch: Any, row: int, velocity: Vector, arm: Vector) -> Vector:
 
 @inlined
 def _extend(stretch: Any, row: int, arm: Vector, force: Vector) -> None:
-    """Let a force at `arm` [m] from a part's origin stretch the part."""
+    """Add axial force times axial distance of a force on a part to `stretch`.
+
+    Args:
+        row: number of the part.
+        arm: vector from the part's reference point to the point where the force acts [m].
+    """
     if stretch is None:
         return
     axis = vector(stretch[row], AXIS)
@@ -98,10 +108,10 @@ def enter(ledger: Array, rows: tuple[int, int], place: Vector, force: Vector, po
 
     Args:
         ledger: (n, LEDGER); row 0 begins with the number of rows in use.
-        rows: numbers of both parts; -1 for a boundary.
+        rows: numbers of the two parts in contact; -1 for a boundary.
         place: point of contact [m].
         force: force on the first part [N].
-        power: half of the power of this force with the velocities before the kick [W].
+        power: half of the power of `force` with the velocities before the kick [W].
         gain: energy that the tangential spring took up [J].
     """
     n = int(ledger[0, 0]) + 1
@@ -123,7 +133,7 @@ def velocity_at(parts: Parts, row: int, place: Vector) -> Vector:
 
 @inlined
 def motion_at(parts: Parts, rows: tuple[int, int], place: Vector, normal: Vector) -> tuple[Vector, float]:
-    """Return the relative velocity of two parts at a point, and the sum of their rotations about a normal.
+    """Return the relative velocity of two parts at a point, and the sum of their spins about a normal.
 
     Args:
         rows: numbers of both parts.
@@ -160,10 +170,10 @@ def _rub(
         normal: unit vector from the second segment to the first [1].
         depth: overlap [m].
         load: force of the normal spring [N].
-        carried: the part of `load` that friction and dashpot follow [N].
+        carried: part of `load` that sets the friction limit [N]; 0: no friction and no dashpot here.
         share: fraction of a full contact's springs and dashpots that acts here [1].
         hardening: factor on the dashpot [1].
-        slip: (4,) stretch [m] and energy [J] of the tangential spring, which are updated.
+        slip: (4,) stretch [m] and energy [J] of the tangential spring; updated.
 
     Returns:
         Rate at which the overlap grows [m/s].
@@ -189,7 +199,7 @@ def push_apart(
     """Add the forces of all pairs that touch.
 
     Args:
-        bodies: `deepest` is raised.
+        bodies: `deepest` is increased where an overlap is larger.
         parts: forces are added to `load`.
         pairs: pairs that may touch; `slip` and `used` are updated.
         out: (ROWS, COLUMNS) scratch.
@@ -256,9 +266,9 @@ def push_apart(
 
 @inlined
 def _find_touching(line: Array, pairs: Pairs) -> int:
-    """Find the near pairs that touch or did so in the last step; return their number.
+    """Find the pairs of the tight list that touch, or touched in the last step; return their number.
 
-    `touching` and `nearest` of `pairs` are written, without a branch, which would be mispredicted.
+    `touching` and `nearest` of `pairs` are written. The code has no branches, which would be mispredicted.
     """
     count = 0
     for k in range(pairs.counts[1]):
@@ -274,14 +284,14 @@ def _find_touching(line: Array, pairs: Pairs) -> int:
 
 @inlined
 def _forget(pairs: Pairs, pair: int, points: int) -> float:
-    """End contacts of a pair: reset their tangential springs.
+    """End contacts of a pair: set their tangential springs to zero.
 
     Args:
         pair: index of the pair.
-        points: bits of the points at which contacts end.
+        points: points at which contacts end, as bits.
 
     Returns:
-        Energy that these springs had [J].
+        Energy that the tangential springs had [J].
     """
     energy = 0.0
     for slot in range(POINTS):

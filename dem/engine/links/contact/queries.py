@@ -1,8 +1,8 @@
-"""Query the contacts at one instant: which bodies touch, extremes, energies, and forces for output.
+"""Query the contacts at one instant: touching bodies, extremes, energies, and forces for output.
 
-A query changes nothing in the simulation. The wide list must be valid at this instant. Forces are computed like those
-at the beginning of the next step, but with a time step of 0 and on copies of the tangential springs, so that springs
-are not stretched. Bare forces (see `meeting`) are recorded as points of the contact of their pair.
+A query changes nothing in the simulation. The wide list must be valid at this instant. Forces are computed as
+at the beginning of the next step, but with a time step of 0 and with copies of the tangential springs, so that no
+spring is stretched. Bare forces (see `meeting`) are recorded as points of the contact of their pair.
 """
 
 from __future__ import annotations
@@ -50,7 +50,7 @@ class Found(NamedTuple):
     met: Indices  #: (P, 2) numbers of the two bodies of each pair of segments that touch
     touches: Any  #: (N,) number of points of contact of each body
     held: Any  #: (N, 6) whether each body touches each boundary, in the order of `Ground.force`
-    depth: Array  #: (N,) largest overlap of each body, over that at which axes, or an axis and a surface, meet [1]
+    depth: Array  #: (N,) largest overlap of each body over its room, the overlap at which axes meet [1]
     out: Array  #: Scratch of `meet`
     rows: Array  #: Scratch of `contacts_of_segment`
 
@@ -127,15 +127,15 @@ def query_all(
 def find_extremes(
     bodies: Bodies, segments: Segments, depths: Array, velocities: Array, energy: float, extremes: Array
 ) -> None:
-    """Find extremes over all bodies, which prove in most cases that no limit of the watchdog is exceeded.
+    """Compute extremes over all bodies, which show in most cases that no limit of the watchdog is exceeded.
 
     Args:
         depths: (N,) see `Found.depth`.
         velocities: (M, 3) velocities of the centres of all links, or bars [m/s].
         energy: energy of all springs of contacts [J].
-        extremes: (7,) written: largest of these speeds [m/s], NaN if any speed or overlap is not finite; heights of the
-            lowest and of the highest end of an axis [m]; largest distance of such an end from the container's axis [m];
-            largest overlap now, and since the last query, over that at which axes meet [1]; `energy`.
+        extremes: (7,) written: largest speed of `velocities` [m/s], NaN if any speed or overlap is not finite; heights
+            of the lowest and of the highest end of an axis [m]; largest distance of an end from the container's axis
+            [m]; largest overlap now, and since the last query, over the overlap at which axes meet [1]; `energy`.
     """
     line = segments.line
     fastest, total = 0.0, 0.0
@@ -183,16 +183,16 @@ def _write(
     rows: Array, count: int, first: float, second: float, load: float, carried: float, place: Vector, normal: Vector,
     force: Vector,
 ) -> int:  # fmt: skip
-    """Write one point of contact if there is room; return `count` + 1.
+    """Write a point of contact into row `count`, if `rows` has this row; return `count` + 1.
 
     Args:
         rows: (…, WIDTH) written; for the columns see `FIRST`.
         count: number of the row.
-        first: code of the first link, see `dem.body.forces.at_links`.
+        first: code of the first link in contact, see `dem.body.forces.at_links`.
         second: code of the second link or of the boundary.
         load: force of the normal spring [N].
-        carried: the part of `load` that dashpot and friction follow [N].
-        place: the point [m].
+        carried: part of `load` that sets the friction limit [N].
+        place: point of contact [m].
         normal: normal of the contact, towards the first link [1].
         force: force on the first link without that of the normal spring [N].
     """
