@@ -24,13 +24,13 @@ Offsets = Annotated[
 
 
 def _length_of_motions(data: dict[str, Any]) -> float:
-    """Return the duration of the longest motion that is given [s]; inf if it has no end."""
+    """Return the longest duration of the motions in `data` [s]; inf if one has no end."""
     motions = [data[key] for key in ("barbs", "barb_1", "barb_2") if data.get(key) is not None]
     return max((motion.duration for motion in motions), default=math.inf)
 
 
 class Actuate(Part, ActuatedPhase):
-    """Move the barbs: one motion for both, `barbs`, or one for each, `barb_1` and `barb_2`."""
+    """Move the barbs: by one motion for both, key `barbs`, or by two motions, `barb_1` and `barb_2`."""
 
     type: Literal["actuate"]
     barbs: Motion | None = Field(None, description="motion of both barbs")
@@ -107,7 +107,7 @@ class Actuate(Part, ActuatedPhase):
 
 
 class ShapeChange(Part, ActuatedPhase):
-    """Straighten both barbs, and turn them back to the angles at which the phase began."""
+    """Straighten both barbs, then turn them back to their angles at the beginning of the phase."""
 
     type: Literal["shape-change"]
     straight_deg: HingeAngle = Field(0.0, description="angle that the barbs are turned to [deg]")

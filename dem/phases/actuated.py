@@ -36,14 +36,14 @@ class Gait:
     """Motions of the barbs in a phase, and the smarticles that make them."""
 
     motions: tuple[Motion, Motion]  #: Motions of barb 1 and barb 2
-    keys: tuple[str, str] = ("barbs", "barbs")  #: Keys by which `ActuatedPhase.source_of` names the two motions
+    keys: tuple[str, str] = ("barbs", "barbs")  #: Keys of the two motions, for `ActuatedPhase.source_of`
     duration: float  #: Length of the phase [s]
     active_fraction: float = 1.0  #: Fraction of the smarticles that move [1]
     offsets: Literal["none", "random"] = "none"  #: "random": each smarticle begins at a random point of the period
 
     @property
     def period(self) -> float | None:
-        """Longer period of the two motions [s]; None if neither is periodic."""
+        """Longer one of the two motions' periods [s]; None if neither motion is periodic."""
         return max((motion.period for motion in self.motions if motion.period is not None), default=None)
 
     def active_count(self, count: int) -> int:
@@ -61,10 +61,10 @@ class ActuatedPhase(Phase):
         raise NotImplementedError
 
     def source_of(self, key: str) -> tuple[str, float | None]:
-        """Return the key of this phase that sets a key of the gait's motions, and its value.
+        """Return the key of this phase that decides a key of the gait's motions, and the value of the former.
 
         Args:
-            key: key in the motions with dots for nesting, such as `barbs.steps.0.duration_s`.
+            key: key of a motion with dots for nesting, such as `barbs.steps.0.duration_s`.
         """
         raise NotImplementedError
 
@@ -103,7 +103,7 @@ class ActuatedPhase(Phase):
         """Articulate smarticles, and make the control updates that are due.
 
         Args:
-            check_every: number of updates after which the caller wants to check the pile; None: no checks.
+            check_every: largest number of updates in a call, since the caller checks the pile between calls; None: any.
 
         Returns:
             The simulated time until the next call [s]; 0 at the end of the phase.
@@ -133,9 +133,9 @@ class ActuatedPhase(Phase):
 
 @dataclass(frozen=True, eq=False)
 class _Track:
-    span: slice  #: The K entries of `Drive` that the motion sets
-    course: Course  #: The motion from K starting angles
-    shifts: Array  #: (1,) or (K,) time by which the motion is ahead at the beginning of the phase [s]
+    span: slice  #: Indices of the motion's K angles in `Drive._entries`
+    course: Course  #: Function from times to K angles, for K starting angles
+    shifts: Array  #: (1,) or (K,) time within the motion at the beginning of the phase [s]
 
 
 @dataclass(frozen=True, eq=False)
@@ -143,7 +143,7 @@ class Drive:
     """Target angles of an actuated phase over time."""
 
     duration: float  #: Length of the phase [s]
-    active: Flags  #: (N,) bool, which smarticles move
+    active: Flags  #: (N,) whether each smarticle moves
     start: Array  #: (N, 2) target angles at the end of the previous actuated phase, or `smarticle.angles_deg` [rad]
     # Barbs whose targets are always equal share an entry of `_entries`: first come those of barbs that do not move,
     # then those of each track. `_which` (N, 2) is the number of each barb's entry.
@@ -211,9 +211,9 @@ def _starting_angles(scene: SceneView, index: int) -> Array:
 
 
 def overshoot(scene: SceneView) -> float:
-    """Return the torque, in units of τ_max [1], that a motor can gain between two control updates.
+    """Return the largest increase of a motor's torque between two control updates, over τ_max [1].
 
-    It is 0 for the laws "slip" and "servo", which cap the torque.
+    The laws "slip" and "servo" cap the torque; for them 0 is returned.
     """
     motor = scene.motor
     added = motor.stiffness_N_m_per_rad * motor.speed_limit_rad_per_s * scene.fidelity.control_interval_s
@@ -278,7 +278,7 @@ def _of_control(scene: SceneView) -> Iterator[str]:
 
 
 def _whole_fraction(whole: float, parts: int) -> str:
-    """Return as text a time [s] divided by `parts`, or by a slightly higher number that gives few digits."""
+    """Return, as text, a time [s] divided by `parts` or more, so that the result has few digits."""
     for more in range(parts, min(10 * parts, parts + MOST_PARTS) + 1):
         text = f"{whole / more:.3g}"
         if math.isclose(float(text) * more, whole, rel_tol=TOLERANCE):
@@ -287,9 +287,9 @@ def _whole_fraction(whole: float, parts: int) -> str:
 
 
 def _of_motions(scene: SceneView, index: int) -> Generator[str, None, tuple[float, float]]:
-    """Yield errors of the motions' range and speed; return the highest angles of barb 1 and barb 2 [deg].
+    """Yield errors of angles out of the hinges' range and of too high speeds.
 
-    The highest angles are those of all smarticles, whether they move or not.
+    Return the highest angles of barb 1 and of barb 2 [deg] over all smarticles, moving or not.
     """
     phase, gait, driven = scene.phases[index], _gait(scene, index), drive(scene, index)
     assert isinstance(phase, ActuatedPhase)
@@ -320,7 +320,7 @@ def _of_range(place: str, present: float, swing: Sine | Triangle, reached: tuple
 
     Args:
         place: key that sets the amplitude of the swing.
-        present: value of this key [deg].
+        present: value of the key `place` [deg].
         reached: lowest and highest angle of the swing [deg].
     """
     lowest, highest = HINGE_RANGE
@@ -352,8 +352,8 @@ def _of_speed(place: str, motion: SimpleMotion, speed: float, limit: float) -> I
 def _of_first_spheres(scene: SceneView, index: int, angle: float) -> Iterator[str]:
     """Yield an error if the first sphere of a barb at `angle` [deg] touches spheres of the middle link.
 
-    At the angle α a barb's sphere at the distance s from the hinge is √(s² + m² + 2 s m cos α) from the middle link's
-    sphere at m, so that they are clear of each other while -cos α ≤ (s² + m² - d²) / (2 s m).
+    At the angle α the distance between a barb's sphere at s from the hinge and a middle link's sphere at m from the
+    hinge is √(s² + m² + 2 s m cos α). Spheres of diameter d do not touch while -cos α ≤ (s² + m² - d²) / (2 s m).
     """
     if angle <= 90 or scene.smooth:
         return
@@ -376,12 +376,12 @@ def _of_first_spheres(scene: SceneView, index: int, angle: float) -> Iterator[st
 
 
 def _up(value: float, digits: int = 3) -> str:
-    """Return a positive number rounded up to some significant digits."""
+    """Return, as text, a positive number rounded up to a number of significant digits."""
     scale = 10.0 ** (digits - 1 - math.floor(math.log10(value)))
     return f"{math.ceil(value * scale * (1 - TOLERANCE)) / scale:g}"
 
 
 def _down(value: float, digits: int = 3) -> str:
-    """Return a positive number rounded down to some significant digits."""
+    """Return, as text, a positive number rounded down to a number of significant digits."""
     scale = 10.0 ** (digits - 1 - math.floor(math.log10(value)))
     return f"{math.floor(value * scale * (1 + TOLERANCE)) / scale:g}"

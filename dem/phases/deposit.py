@@ -25,8 +25,8 @@ LAYER_SECONDS = 0.125  # s, typical time between two layers of a pour; measured 
 class Deposit(Part, Phase):
     """Pour smarticles, or other bodies, in layers of random, non-overlapping poses, then wait until the pile settles.
 
-    A layer is poured just above the pile when the previous layer has landed, or, with `every_s`, at fixed intervals
-    from the top of the wall.
+    A layer is poured just above the pile after the previous layer has landed. If `every_s` is given, layers are poured
+    from the top of the wall at this interval.
     """
 
     begins: ClassVar[bool] = True

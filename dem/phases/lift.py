@@ -1,4 +1,4 @@
-"""Phases that grip parts of filaments, raise them, and let them go."""
+"""Phases that grip parts of filaments, raise them, and release them."""
 
 import math
 from typing import ClassVar, Literal, Self
@@ -15,7 +15,7 @@ from dem.setting.part import Duration, Length, Part, Speed
 class Lift(Part, Phase):
     """Grip parts of filaments, raise them at constant speed, and hold them until a `release`.
 
-    Activity goes on. The end piece itself touches nothing: it is where nodes are gripped.
+    Filaments go on to bend actively. No body is added for the end piece that grips, so that no contact with it exists.
     """
 
     of_filaments: ClassVar[bool] = True
@@ -84,7 +84,7 @@ class Lift(Part, Phase):
         return time_left(engine, memory["end"])
 
     def _held(self, engine: Engine, filaments: Filaments) -> dict[int, list[int]]:
-        """Return the numbers of the nodes that are gripped, for each filament that has any."""
+        """Return the numbers of the nodes that are gripped, by the number of their filament."""
         floor, state = engine.boundaries.floor, engine.state()
         least = self.above_m
         if least is None:
@@ -102,7 +102,7 @@ class Lift(Part, Phase):
 
 
 class Release(Part, Phase):
-    """Let go of everything that earlier phases grip; takes no time."""
+    """Release all nodes that earlier phases grip; takes no simulated time."""
 
     of_filaments: ClassVar[bool] = True
     type: Literal["release"]

@@ -1,4 +1,4 @@
-"""Interface of phases, the stage that is a phase while it runs, and the criterion for a settled pile.
+"""Interface of phases and of their stages, which are phases that run; criterion for a settled pile.
 
 `proceed` is called again whenever the time that it returned has passed; in between, the simulation advances and the
 recorder writes. The memory of a stage is plain data, so that a run can stop between any two steps and be resumed.
@@ -35,7 +35,7 @@ class Stage:
     phase: Phase
     scene: SceneView
     index: int  #: Index of the phase in the scene
-    memory: Memory  #: Plain data for JSON; its key `warning` is reported at the end of the phase
+    memory: Memory  #: Plain data for JSON; the text under its key `warning` is reported at the end of the phase
 
     @cached_property
     def prepared(self) -> Any:
@@ -47,17 +47,17 @@ class Stage:
 
 
 class Phase:
-    """Base of all kinds of phases, which override what differs from these defaults."""
+    """Base of all kinds of phases, with defaults that kinds override."""
 
     actuates: ClassVar[bool] = False  #: Whether motors move or hold the barbs
-    begins: ClassVar[bool] = False  #: Whether the phase adds the smarticles; a run begins with one such phase
-    of_smarticles: ClassVar[bool] = False  #: Whether the phase has no meaning for other bodies than smarticles
-    of_filaments: ClassVar[bool] = False  #: Whether the phase has no meaning for other bodies than filaments
+    begins: ClassVar[bool] = False  #: Whether the phase adds the bodies; the first phase of a run must, and no other
+    of_smarticles: ClassVar[bool] = False  #: Whether the phase needs smarticles
+    of_filaments: ClassVar[bool] = False  #: Whether the phase needs filaments
     sources: ClassVar[frozenset[str]] = frozenset()
     """Keys that say where content is found that another key fixes by its hash; the scene's hash omits them."""
     at_rest: ClassVar[bool] = False
     """Whether nothing drives the smarticles; φ_0 and φ_f are measured before and after phases that drive them."""
-    pours: ClassVar[bool] = False  #: Whether the phase pours the smarticles
+    pours: ClassVar[bool] = False  #: Whether the phase pours bodies
     frees: ClassVar[bool] = False  #: Whether the phase takes the container away
     planar: ClassVar[bool | None] = False
     """Whether the phase is possible in a plane only (True), in a container only (False), or in both (None)."""
@@ -75,15 +75,15 @@ class Phase:
         yield from ()
 
     def ready(self, scene: SceneView) -> None:
-        """Raise InputError before a run if the source of the phase's content is missing or has changed."""
+        """Raise InputError before a run if a source of the phase, such as another run, is missing or has changed."""
 
     @property
     def origin(self) -> Mapping[str, Any] | None:
-        """Data about the run from which smarticles are taken, for the manifest; None without such a run."""
+        """Data about the other run from which smarticles are taken, for the manifest; None without another run."""
         return None
 
     def warnings(self, scene: SceneView, index: int) -> Sequence[str]:
-        """Return warnings about accepted but suspicious values: one line each with key and what to do."""
+        """Return warnings about suspicious values that are not rejected: one line each with key and what to do."""
         return ()
 
     @property
@@ -92,10 +92,10 @@ class Phase:
         return getattr(self, "duration_s", None)
 
     def expected_duration(self, count: int) -> float:
-        """Return the simulated time of the phase [s]; if a criterion ends it, an estimate from `count`."""
+        """Return the simulated time of the phase [s]; an estimate for `count` bodies if a criterion ends the phase."""
         return self.known_duration or 0.0
 
-    speed_key: ClassVar[str] = "speed_m_per_s"  #: Key that `pushing_speed` is proportional to
+    speed_key: ClassVar[str] = "speed_m_per_s"  #: Key of the phase to which `pushing_speed` is proportional
 
     def pushing_speed(self, gravity: float) -> float:
         """Return the greatest speed [m/s] of the boundary that the phase moves; 0 if it moves none.
@@ -106,7 +106,7 @@ class Phase:
         return 0.0
 
     def peak_speed(self, gravity: float) -> float:
-        """Return the greatest speed [m/s] that the phase itself gives to smarticles; falls do not count.
+        """Return the greatest speed [m/s] that the phase gives to smarticles, without speeds from falls.
 
         Args:
             gravity: acceleration of gravity [m/s²].
@@ -115,7 +115,7 @@ class Phase:
 
     @property
     def raises(self) -> float:
-        """Distance by which the phase raises a hook [m]."""
+        """Distance by which the phase raises a hook or a grip [m]; 0 if it raises none."""
         return 0.0
 
     @property
@@ -124,7 +124,7 @@ class Phase:
         return None
 
     def calls(self, scene: SceneView, index: int) -> Mapping[EffectName, str]:
-        """Return the effects that the phase needs, each with the reason in words."""
+        """Return the effects that the phase needs: the reason in words, by the name of the effect."""
         return {}
 
     def begin(self, scene: SceneView, index: int) -> Stage:
@@ -139,7 +139,9 @@ class Phase:
         """Return data that follow from the scene alone, for `Stage.prepared`."""
 
     def proceed(self, stage: Stage, engine: Engine) -> float:
-        """Do what is due; return the simulated time [s] until the next call, or 0 when the phase is over.
+        """Do the actions of the phase that are due now; return the simulated time [s] until the next call.
+
+        The value is 0 when the phase is over.
 
         Raises:
             RunError: the phase cannot go on, or its criterion was not met in time; one line with values and limits.
@@ -189,8 +191,8 @@ def has_settled(settle: Settle, memory: Memory, engine: Engine) -> bool:
     """Return whether the pile has settled; to be called every `CHECK_INTERVAL`.
 
     Args:
-        memory: memory of the stage, with `waited`, the time since the wait began [s], which the stage adds up, and
-            `still`, the time for which both limits have held [s], which this function updates.
+        memory: memory of the stage. Its `waited` is the time since the wait began [s], which the phase updates; `still`
+            is the time for which both limits have held [s], which this function updates.
 
     Raises:
         RunError: the pile has not settled within `settle.timeout_s`.

@@ -10,7 +10,7 @@ from dem.setting.part import Duration, Part
 
 
 class Relax(Part, Phase):
-    """Let the pile rest under gravity, with smarticles welded and filaments quiet."""
+    """Let the pile rest under gravity, with smarticles welded and without active bending of filaments."""
 
     planar: ClassVar[bool | None] = None
     at_rest: ClassVar[bool] = True

@@ -15,7 +15,7 @@ class RemoveContainer(Part, Phase):
     """Take the container's wall away, with smarticles welded; the pile rests on an unbounded floor.
 
     Smarticles may then roll away without limit; the series count those outside the container's radius. A later shake
-    moves the whole floor, under these smarticles too.
+    moves the whole floor.
     """
 
     frees: ClassVar[bool] = True

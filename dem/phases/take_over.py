@@ -1,8 +1,8 @@
-"""The phase that takes over the smarticles of another run, made on any engine.
+"""The phase that takes over the smarticles of another run, which any engine may have computed.
 
-A frame holds poses to the last bit, and no contacts: friction springs are lost, and smarticles begin at rest. On
+A frame holds exact poses, but no contacts: tangential springs are lost, and smarticles begin at rest. On
 another engine, or at another fidelity, these poses may overlap: spheres of one chain lie partly in the gaps of another
-chain, smooth links do not. Such overlaps are relaxed first, with velocities set to zero every few steps.
+chain, smooth links do not. Such overlaps are reduced first, by steps in which velocities are often set to zero.
 """
 
 import hashlib
@@ -39,7 +39,7 @@ _SHAPE = ("aspect_ratio", "middle_length_m", "thickness_normal_m", "thickness_in
 
 @dataclass(frozen=True)
 class Taken:
-    """A frame of another run, whose smarticles are taken over."""
+    """A frame of another run from which smarticles are taken over."""
 
     run: Run
     number: int
@@ -141,7 +141,7 @@ class TakeOver(Part, Phase):
     @model_validator(mode="wrap")
     @classmethod
     def _pinned(cls, data: Any, handler: ModelWrapValidatorHandler[Self]) -> Self:
-        """Fill in the number of the last frame, and the hash of the frame's content."""
+        """Return the validated phase, with the number of the frame instead of `LAST`, and the frame's hash."""
         made = handler(data)
         if made.sha256 is not None and made.frame != LAST:
             return made
@@ -257,7 +257,7 @@ def _mean_height(engine: Engine) -> float:
 
 
 def poses_of(scene: SceneView, taken: Taken) -> Poses:
-    """Return the poses of a scene's smarticles in a taken frame; raise InputError if they do not fit."""
+    """Return the poses of a scene's smarticles from a frame; raise InputError if the frame does not fit the scene."""
     for mismatch in _mismatches(scene, taken):
         raise InputError(mismatch)
     return fitted_poses(scene.particle.boxes, taken.vertices)[0]
@@ -345,9 +345,9 @@ def _within_tips(vertices: Array, radius: float) -> Array:
 
 
 def _in_cross(cross: Cross, vertices: Array) -> Flags:
-    """Return (N,) whether the axis of a link of each smarticle passes through a bar of a hook.
+    """Return (N,) whether the axis of any link of a smarticle passes through a bar of a hook.
 
-    Axes are sampled at points that are at most a quarter of the bars' side apart.
+    Axes are sampled at points at most a quarter of the bars' thickness apart.
     """
     ends = np.stack([vertices[:, :-1], vertices[:, 1:]], axis=2)  # (N, 3, 2, 3)
     longest = float(np.linalg.norm(ends[:, :, 1] - ends[:, :, 0], axis=-1).max())

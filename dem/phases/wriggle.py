@@ -1,4 +1,4 @@
-"""The phase in which filaments bend by themselves."""
+"""The phase in which filaments bend actively."""
 
 import math
 from collections.abc import Sequence
@@ -15,7 +15,7 @@ TIGHTEST = 0.5  # of a filament's curvature times its diameter: a bend in which 
 
 
 class Wriggle(Part, Phase):
-    """Let filaments bend by themselves: a wave of preferred curvature travels along each and turns about it.
+    """Let filaments bend actively: in each, a wave of preferred curvature turns about the axis.
 
     Waves begin at random phases, and go on in later phases until the next `wriggle` or `relax`.
     """
@@ -53,7 +53,7 @@ class Wriggle(Part, Phase):
 
     @property
     def activity(self) -> Activity:
-        """What the filaments do."""
+        """Wave of preferred curvature that the filaments follow."""
         turns = self.turns_between_reversals
         return Activity(
             curvature=self.curvature_per_m,

@@ -12,22 +12,23 @@ from dem.setting.contact import Contact
 
 @dataclass(frozen=True, kw_only=True)
 class ContactLaw:
-    """Linear spring, dashpot and Coulomb friction of one contact."""
+    """Parameters of contacts: linear springs, dashpots and Coulomb friction."""
 
-    normal_stiffness: float  #: kn [N/m]
-    tangential_stiffness: float  #: ks [N/m]
-    normal_damping: float  #: cn between smarticles [N s/m]
-    wall_damping: float  #: cn against the container [N s/m]
-    tangential_damping: float  #: cs over cn [1]
-    friction: float  #: Coulomb coefficient between smarticles [1]
-    wall_friction: float  #: Coulomb coefficient against the container [1]
+    normal_stiffness: float  #: Normal stiffness kn [N/m]
+    tangential_stiffness: float  #: Tangential stiffness ks [N/m]
+    normal_damping: float  #: Normal damping cn between bodies [N s/m]
+    wall_damping: float  #: Normal damping cn at boundaries [N s/m]
+    tangential_damping: float  #: Tangential over normal damping, cs/cn [1]
+    friction: float  #: Coulomb coefficient between bodies [1]
+    wall_friction: float  #: Coulomb coefficient at boundaries [1]
 
 
 def typical_effective_mass(body: Body) -> float:
     """Return the effective mass [kg] of a body at a contact, averaged over spheres and directions.
 
     The average is a harmonic mean. The inverse of the effective mass at a point r from the centre of mass in the
-    direction n is the mobility 1/m + (r × n)·I⁻¹(r × n). Its mean over n is a third of the trace of its tensor.
+    direction n is the mobility 1/m + (r × n)·I⁻¹(r × n). Its mean over n is a third of the trace of the mobility
+    tensor.
     """
     if body.filament is not None:  # only what is near the contact gives way
         return body.filament.effective_mass
@@ -65,8 +66,8 @@ def damping_ratio(restitution: float) -> float:
 def contact_law(body: Body, contact: Contact, stiffness: float) -> ContactLaw:
     """Return the contact law of a body for a scene's contact parameters and a normal stiffness kn [N/m].
 
-    Dashpots give `contact.restitution` in collisions at the typical effective mass: of two bodies, or of one with
-    the container.
+    The damping is such that collisions have `contact.restitution`, at the typical effective mass of two bodies, or of a
+    body and the container.
     """
     single = typical_effective_mass(body)
     zeta = damping_ratio(contact.restitution)

@@ -1,4 +1,4 @@
-"""Motors at the hinges, velocity-controlled and with a torque limit: what a control update computes."""
+"""Control updates of motors at the hinges, which are velocity-controlled and have a torque limit."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -21,7 +21,7 @@ class MotorLaw:
     """Parameters that all motors of a scene share."""
 
     torque_limit: float  #: Torque limit τ_max [N m]
-    speed_limit: float  #: ω, the greatest speed of a command [rad/s]
+    speed_limit: float  #: Greatest speed of a command, ω [rad/s]
     stiffness: float  #: Twist stiffness of the shaft between motor and barb [N m/rad]
     law: Law  #: What a motor does when its torque reaches τ_max, as `dem.setting.motor.Motor.law` describes it
     damping: float = 0.0  #: A servo's derivative gain [N m s/rad]
@@ -37,15 +37,15 @@ def speed_factor(law: int, over: Any) -> Any:
 
 
 def halts(law: int, over: Any, advance: Any, torque: Any, findings: Any) -> Any:
-    """Return whether a motor stops advancing; for "slip" and "servo", which never stop, return `over`.
+    """Return whether a motor halts; under the laws "slip" and "servo", which never halt, return `over`.
 
     Args:
         law: number of the law in `LAWS`.
         over: whether the torque has reached its limit.
-        advance: change of the command that the schedule wants [rad], or its rate [rad/s]; only the sign matters.
+        advance: change of the command that the schedule requires [rad], or its rate [rad/s]; only the sign matters.
         torque: torque on the barb since the last control update [N m].
-        findings: number of barbs in a row found at the limit, this barb included; barb 1 and barb 2 of the smarticle
-            are counted in turn.
+        findings: number of consecutive updates, of barb 1 and barb 2 in turn, that found the torque at its limit; the
+            present update included.
     """
     if law == HALT:
         return over & (advance * torque > 0.0)
@@ -76,13 +76,13 @@ class Motors:
         self.engage(angles)
 
     def engage(self, angles: Array) -> None:
-        """Start anew with commands at (N, 2) actual angles [rad], so that torques are 0."""
+        """Reset commands to actual angles (N, 2) [rad], so that torques are 0."""
         self.commands: Array = angles.copy()  #: (N, 2) angles that the motors hold at present [rad]
         self.schedule: Array = angles.copy()  #: (N, 2) angles of the schedule at the last control update [rad]
         self.angles: Array = angles.copy()  #: (N, 2) actual angles at the last control update [rad]
-        self.torques: Array = np.zeros_like(angles)  #: (N, 2) torques since that update [N m]; above 0: angles rise
+        self.torques: Array = np.zeros_like(angles)  #: (N, 2) torques; positive torques raise angles [N m]
         self.halted: Flags = np.zeros(angles.shape, dtype=bool)
-        """(N, 2) whether a motor was stopped at the last control update; for "slip" and "servo": was at its limit."""
+        """(N, 2) whether the last control update halted a motor, or under "slip" and "servo" found it at its limit."""
         self._begun: Array = angles.copy()
         self._rates: Array = np.zeros_like(angles)
 
@@ -96,7 +96,7 @@ class Motors:
             targets: (N, 2) angles at the end of the period according to the schedule [rad].
             interval: length of the period [s].
             time_step: dt of the integration [s].
-            rates: (N, 2) rates of the angles [rad/s], for the dampers of servos; None: those given before.
+            rates: (N, 2) rates of the angles [rad/s], for the dampers of servos; None: the rates of the previous call.
         """
         before = self._torque(angles)
         # The new torque acts from the middle of the step on, where the leapfrog scheme changes velocities. Between
@@ -121,7 +121,7 @@ class Motors:
         return self.torques
 
     def work_until(self, angles: Array) -> float:
-        """Return the work of all motors since the start, up to (N, 2) angles between two control updates [J]."""
+        """Return the work of all motors since the start [J]; `angles`: (N, 2) present actual angles [rad]."""
         return float((self.work + self._work_since_update(angles)).sum())
 
     def _work_since_update(self, angles: Array) -> Array:
@@ -134,7 +134,7 @@ class Motors:
         return torque if self.law.law not in ("slip", "servo") else np.clip(torque, -self._limit, self._limit)
 
     def _kept(self) -> dict[str, str]:
-        """Return the names of the attributes that `memory` holds, by its keys."""
+        """Return the names of attributes that `memory` stores, by their keys in `memory`."""
         kept = {name: name for name in ("commands", "schedule", "angles", "torques", "work", "halted")}
         own = {"servo": {"rates": "_rates"}, "ease": {"over": "_over"}}
         return kept | {"begun": "_begun"} | own.get(self.law.law, {})

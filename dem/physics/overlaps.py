@@ -11,11 +11,11 @@ APART = 0.1  # of the limit for overlaps: boundaries that have moved apart by le
 
 @dataclass(frozen=True)
 class Held:
-    """A body that touches two boundaries whose distance has changed: only contacts can give way."""
+    """A body held between two boundaries whose distance has changed, so that its contacts are squeezed."""
 
     smarticle: int  #: Number of the body
     between: tuple[str, str]  #: Names of the boundaries
-    apart: float  #: Change of their distance since the start [m]
+    apart: float  #: Change of the distance between the boundaries since the start [m]
 
 
 @dataclass(frozen=True)
@@ -30,7 +30,7 @@ class Overlaps:
 
 @dataclass(frozen=True, kw_only=True)
 class Extremes:
-    """Extremes over all bodies at one instant; a value that is NaN fails every check."""
+    """Extremes over all bodies at one instant; NaN exceeds every limit."""
 
     fastest: float  #: Speed of the fastest link's centre [m/s]
     lowest: float  #: Height of the lowest point of the links' axes [m]

@@ -1,4 +1,4 @@
-"""What a run does with filaments on the links engine, and asks of them."""
+"""Grips, active bending and energies of filaments on the engine links."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ Array = NDArray[np.float64]
 
 
 class LinksFilaments:
-    """`dem.engine.interface.Filaments` on links: what a run does with the filaments of a world, and asks of them."""
+    """`dem.engine.interface.Filaments` on links."""
 
     def __init__(self, world: World) -> None:
         self._world = world
@@ -29,7 +29,7 @@ class LinksFilaments:
         return self._world.filaments
 
     def points(self, filament: int) -> Array:
-        """Return a view of the nodes (nodes, 3) of a filament [m]."""
+        """Return the positions (nodes, 3) of a filament's nodes [m], as a view of the engine's array."""
         return self._all.position[self._nodes(filament)]
 
     def _nodes(self, filament: int) -> slice:
@@ -40,9 +40,9 @@ class LinksFilaments:
         """Hold nodes by a new grip, which is at rest.
 
         Args:
-            nodes: for each filament, its nodes that are held; negative numbers count from its end. Two neighbours
-                that are held in all directions clamp the segment between them, which does not roll either.
-            directions: of x, y and z, those in which nodes are held; they are free in the others.
+            nodes: numbers of the held nodes, by the number of their filament; -1 is a filament's last node. If two
+                neighbouring nodes are held in all directions, the segment between them does not roll either.
+            directions: letters of the directions in which nodes are held; in other directions nodes are free.
 
         Returns:
             Number of the grip.
@@ -56,32 +56,32 @@ class LinksFilaments:
         return number
 
     def move(self, grip: int, velocity: tuple[float, float, float]) -> None:
-        """Move a grip with a velocity [m/s] from now on: a path is a list of these."""
+        """Move a grip with a velocity (x, y, z) [m/s] from now on."""
         self._all.grip_speed[grip] = velocity
 
     def release(self, grip: int | None = None) -> None:
-        """Let go of all nodes that a grip holds; None: all grips."""
+        """Release all nodes that a grip holds; None: the nodes of all grips."""
         own = self._all.grip
         own[(own != 0) & ((grip is None) | (own // bending.GRIP == grip))] = 0
 
     @property
     def held(self) -> int:
-        """Number of filaments that a grip holds."""
+        """Number of filaments of which at least one node is held by a grip."""
         own = self._all
         return len(np.unique(np.searchsorted(own.begin, np.flatnonzero(own.grip), side="right")))
 
     def force(self, grip: int | None = None) -> Array:
-        """Return the force (3,) of a grip on its nodes in the last step [N]; None: of all grips together."""
+        """Return the force (3,) of a grip on its nodes in the last step [N]; None: the sum over all grips."""
         forces = self._all.grip_force
         force: Array = forces.sum(axis=0) if grip is None else forces[grip].copy()
         return force
 
     def act(self, activity: Activity | None, *, ramp: float = 0.0) -> None:
-        """Let filaments bend by themselves from now on; the turn of each wave and its reversals go on.
+        """Set the preferred curvature of all filaments from now on; the present angle ψ of each wave is kept.
 
         Args:
-            activity: what they do; None: they return to the curvature that they prefer at rest.
-            ramp: time in which the new curvature grows from 0 [s].
+            activity: wave of preferred curvature; None: the filaments' own preferred curvature.
+            ramp: time in which the new preferred curvature grows from 0 [s].
         """
         gait = self._all.gait
         for number, filament in self._kinds_of():
@@ -102,7 +102,7 @@ class LinksFilaments:
         gait[:, bending.CHANGE] = math.inf if ramp == 0 else 1.0 / ramp
 
     def _kinds_of(self) -> Iterator[tuple[int, Filament]]:
-        """Yield the number of each filament and what it is made of."""
+        """Yield the number and the kind of each filament."""
         world = self._world
         for number, body in enumerate(self._all.body):
             filament = world.kinds[world.bodies.shape[body]].filament
@@ -110,7 +110,7 @@ class LinksFilaments:
             yield number, filament
 
     def mean_unbalanced(self) -> float:
-        """Return the mean net force on a filament over its weight in the liquid [1], without nodes that are held."""
+        """Return the mean net force on a filament over its weight less buoyancy [1], held nodes left out."""
         own, world = self._all, self._world
         forces = (own.force + own.damping + own.drag)[:, :3] * (own.grip == 0)[:, None]
         net = np.linalg.norm(np.add.reduceat(forces, own.begin[:-1]), axis=1)
@@ -119,7 +119,7 @@ class LinksFilaments:
 
     @property
     def energies(self) -> FilamentEnergies:
-        """Energies at this instant, and work up to it."""
+        """Present energies, and energies exchanged up to now."""
         found = np.zeros(5)
         bending.measure(self._all, self._world.gravity, found)
         return FilamentEnergies(*(float(value) for value in (*found, *self._all.sums)))

@@ -1,4 +1,4 @@
-"""The energy ledger on the engine links, which kernels sum exactly, in every step."""
+"""Energy ledger of the engine links, from sums that kernels add up in every step."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from dem.engine.links.filaments import LinksFilaments
 from dem.engine.links.stepping import LOST, WORK
 from dem.engine.links.world import World
 
-NONE = FilamentEnergies(*(0.0,) * len(FilamentEnergies._fields))  #: Energies of no filaments
+NONE = FilamentEnergies(*(0.0,) * len(FilamentEnergies._fields))  #: Energies of a pile without filaments
 
 
 class LinksLedger:
@@ -30,7 +30,11 @@ class LinksLedger:
 
     @property
     def dissipated(self) -> float:
-        """Energy dissipated since the start [J], by welding, stopping and drag; by contacts and bends if recorded."""
+        """Energy dissipated since the start [J].
+
+        It is that of welding, of stopping and of drag; if dissipation is recorded, also that of contacts and of the
+        internal damping of filaments.
+        """
         energies = self._energies
         return float(self._world.totals[LOST]) + energies.damped + energies.dragged
 
@@ -40,18 +44,18 @@ class LinksLedger:
 
     @property
     def deformation(self) -> float:
-        """Energy of stretched, bent and twisted filaments [J]; 0 without filaments."""
+        """Elastic energy of filaments [J]; 0 without filaments."""
         return self._energies.elastic
 
     def elastic(self) -> tuple[float, float]:
-        """Return the energy in the springs of all contacts and that of deformed filaments [J]; hinges are rigid."""
+        """Return the elastic energy of all contacts and that of filaments [J]; hinges are rigid, without energy."""
         return self._world.contacts().elastic_energy, self.deformation
 
     def take_in(self) -> None:
         self.added += self.elastic()[0]
 
     def removed(self, remove: Callable[[], None]) -> None:
-        """Call a function that removes contacts; if the ledger is kept, their energy counts as dissipated."""
+        """Call `remove`, which removes contacts; their elastic energy counts as dissipated if that is recorded."""
         counted = self._world.ledger is not None
         stored = self.elastic()[0] if counted else 0.0
         remove()

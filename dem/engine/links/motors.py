@@ -69,7 +69,7 @@ class LinksMotors:
             world.set_articulated(False)
 
     def actuate(self, targets: Array, interval: float) -> None:
-        """Set the schedule; its first control update is made in the next step, between forces and kick."""
+        """Set the schedule; the first control update is made in the next step, between forces and kick."""
         world = self._world
         assert world.motors is not None  # only articulated smarticles are actuated
         world.motors = world.motors._replace(
@@ -131,7 +131,7 @@ class LinksMotors:
 
     @property
     def arrays(self) -> dict[str, Array]:
-        """Arrays of the motors by name, for `restore`; none before the first articulation."""
+        """Arrays of the motors' state by name, for `restore`; empty before the first articulation."""
         motors, found = self._world.motors, {}
         if motors is not None:
             found = {name: value for name, value in motors._asdict().items() if isinstance(value, np.ndarray)}
@@ -139,7 +139,7 @@ class LinksMotors:
         return found
 
     def restore(self, arrays: dict[str, Array]) -> None:
-        """Restore the state that `arrays` returned; the smarticles must have been restored before."""
+        """Restore the state of motors that `arrays` returned; the state of bodies must have been restored before."""
         world = self._world
         world.motors = None
         if "command" in arrays:

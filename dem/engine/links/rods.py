@@ -1,4 +1,4 @@
-"""Arrays of filaments, as the kernels of `dem.engine.links.motion.bending` want them."""
+"""Make the arrays of filaments for the kernels of `dem.engine.links.motion.bending`."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ TIGHTEST = math.pi / 2  # arc between them, in diameters
 
 
 def apart(filament: Filament) -> int:
-    """Return by how much the numbers of two segments differ at least that can touch each other."""
+    """Return the least difference between the numbers of two segments of a filament that can touch."""
     return 1 + max(1, math.ceil(TIGHTEST * filament.diameter / filament.segment_length))
 
 
 def rod_of(filament: Filament) -> Array:
-    """Return the constants (ROD,) of a filament for the kernels, see `dem.engine.links.motion.bending`."""
+    """Return (ROD,) constants of a filament, in the columns from `bending.LENGTH` on."""
     length, (stretching, bend, twist) = filament.segment_length, filament.stiffnesses
     across, along, roll = filament.drags
     _, stiffest, stiffest_twist = filament.stiffest
@@ -37,7 +37,7 @@ def rod_of(filament: Filament) -> Array:
 
 
 def wave_of(filament: Filament, curvature: PreferredCurvature | None) -> Array:
-    """Return the preferred curvature (nodes, 3) of a filament: amplitude, cosine and sine of the phase at each node."""
+    """Return `Filaments.wave` of one filament, (nodes, 3): amplitude, cosine and sine of the phase [1]."""
     wave = np.zeros((filament.nodes, 3))
     if curvature is not None:
         # A curvature 1/R turns a segment by the angle ℓ/R, and κ is twice the tangent of half of it.
@@ -47,7 +47,7 @@ def wave_of(filament: Filament, curvature: PreferredCurvature | None) -> Array:
 
 
 def none_of() -> Filaments:
-    """Return the arrays of no filaments."""
+    """Return arrays for a pile without filaments."""
     f = np.zeros
     return Filaments(
         f(0, np.int32), f(1, np.int32), f((0, bending.ROD)), f((0, bending.GAIT)), f((0, 3)), f((0, 2)), f(0),
@@ -65,10 +65,11 @@ def filaments_at(
     starts: Array | None,
     seed: int,
 ) -> Filaments:
-    """Return the filaments of `old` and new ones; see `World.add_filaments`.
+    """Return arrays of the filaments of `old` and of F new ones; other arguments as in `World.add_filaments`.
 
     Args:
-        bodies: (F,) numbers of the new ones among all bodies.
+        filament: kind of the new filaments.
+        bodies: (F,) numbers of the new filaments among all bodies.
     """
     count, nodes, _ = points.shape
     edges = np.diff(points, axis=1)
@@ -84,7 +85,7 @@ def filaments_at(
         gait[:, bending.RATE], gait[:, bending.REVERSALS] = own.rate, own.reversal_rate
 
     def per_node(values: Array) -> Array:
-        """Return values of segments (F, nodes - 1, …) with a row of zeros for each last node."""
+        """Return values (F, nodes - 1, …) of segments as (F nodes, …), with zeros at each last node."""
         return np.concatenate([values, np.zeros_like(values[:, :1])], axis=1).reshape(count * nodes, *values.shape[2:])
 
     total = count * nodes
@@ -110,7 +111,7 @@ def filaments_at(
 
 
 def _untwisted(tangents: Array) -> Array:
-    """Return directors (F, S, 3) [1] of segments with tangents (F, S, 3), carried along without twist."""
+    """Return first directors (F, S, 3) [1] of filaments without twist, from tangents (F, S, 3) of segments."""
     found = np.zeros_like(tangents)
     for f, own in enumerate(tangents):
         least = np.zeros(3)

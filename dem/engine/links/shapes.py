@@ -29,21 +29,21 @@ AT_START, AT_END = 1, 2  # bits: the segment starts, or ends, at a joint that an
 
 
 class Planar(NamedTuple):
-    """Three hinged links in a plane. Lengths in m, masses in kg, inertias in kg m²."""
+    """Geometry of three hinged links in a plane. Lengths in m, masses in kg, inertias in kg m²."""
 
     mass: float  #: Mass of a smarticle
     middle_mass: float  #: Mass of the middle link
     barb_mass: float  #: Mass of one barb
     half: float  #: Half the length of the middle link: distance of the hinges from its centre
     arm: float  #: Half the length of a barb: distance of its centre of mass from the hinge
-    end: float  #: Distance of the ends of the middle link's axis from its centre: `half`, less a radius without barbs
+    end: float  #: Distance of the ends of the middle link's axis from its centre: `half`; without barbs, a radius less
     tip: float  #: Distance of the end of a barb's axis from the hinge: the barb's length less the radius
-    middle_xx: float  #: Inertia of the middle link about its centre, about the axis along the link
-    middle_yy: float  #: Inertia of the middle link about the axis across the link in the plane
-    middle_zz: float  #: Inertia of the middle link about the normal
-    barb_xx: float  #: Inertia of a barb about its centre, about the axis along the barb
-    barb_yy: float  #: Inertia of a barb about the axis across the barb in the plane
-    barb_zz: float  #: Inertia of a barb about the normal
+    middle_xx: float  #: Inertia of the middle link about its length, through its centre
+    middle_yy: float  #: Inertia of the middle link about the in-plane axis across it, through its centre
+    middle_zz: float  #: Inertia of the middle link about the normal, through its centre
+    barb_xx: float  #: Inertia of a barb about its length, through its centre
+    barb_yy: float  #: Inertia of a barb about the in-plane axis across it, through its centre
+    barb_zz: float  #: Inertia of a barb about the normal, through its centre
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -55,14 +55,14 @@ class Shape:
     """
 
     mass: float  #: Mass of the body [kg]
-    #: (4,) xx, yy, zz and xy of a rigid body [kg m²]; 0 for a smarticle, whose inertia depends on angles
+    #: (4,) inertia xx, yy, zz and xy of a rigid body [kg m²]; 0 for a smarticle, whose inertia depends on angles
     inertia: Array
-    lines: Array  #: (M, LINE) segments, the strands of a link one after the other; for the columns see `START`
+    lines: Array  #: (M, LINE) segments, link by link; for the columns see `START`
     link: NDArray[np.int64]  #: (M,) link of each segment; for a smarticle 0 barb 1, 1 middle link, 2 barb 2
-    shared: NDArray[np.uint8]  #: (M,) which ends belong to other segments, as bits `AT_START` and `AT_END`
-    effective_mass: float  #: Harmonic mean of the effective mass over points and directions [kg], for the dashpots
-    planar: Planar | None = None  #: Geometry of a smarticle; None: another body
-    filament: Filament | None = None  #: Of a flexible body; None: a rigid body or a smarticle
+    shared: NDArray[np.uint8]  #: (M,) ends that count with another segment, which has them too; bits of `AT_START`, `AT_END`
+    effective_mass: float  #: Harmonic mean of the effective mass over points and directions [kg]; damping depends on it
+    planar: Planar | None = None  #: Geometry of a smarticle; None for other bodies
+    filament: Filament | None = None  #: Kind of filament of a flexible body; None for rigid bodies and smarticles
 
     @property
     def reach(self) -> float:
@@ -77,17 +77,17 @@ class Shapes(NamedTuple):
     mass: Array  #: (K,) masses of the bodies [kg]
     radius: Array  #: (K,) radii of the thinnest segments [m]
     reach: Array  #: (K,) largest distances of the links' axes from the centre of mass [m]
-    hinged: NDArray[np.uint8]  #: (K,) whether barbs can turn
+    hinged: NDArray[np.uint8]  #: (K,) whether the shape is a smarticle, whose barbs can turn
     planar: Array  #: (K, 13) fields of `Planar`; 0 for rigid bodies
     first: NDArray[np.int64]  #: (K + 1,) index in `lines` of the first segment of each shape, then M
     lines: Array  #: (M, LINE) segments in the frame of the body; for the columns see `START`
     link: NDArray[np.int64]  #: (M,) link of each segment
-    flexible: Any  #: (K,) whether `dem.engine.links.motion.bending` moves such bodies; None where it moves none
+    flexible: Any  #: (K,) whether the body is a filament, which `motion.bending` moves; None if no shape is
 
 
 @inlined
 def is_flexible(flexible: Any, kind: int) -> bool:
-    """Return whether bodies of a kind are flexible; takes `Shapes.flexible`."""
+    """Return whether bodies of shape `kind` are flexible; `flexible`: `Shapes.flexible`."""
     if flexible is None:
         return False
     return bool(flexible[kind] != 0)
@@ -146,7 +146,7 @@ def smarticle_shape(particle: Particle) -> Shape:
 
 
 def offsets_of(particle: Particle) -> Array:
-    """Return the offsets (S,) of a link's strands along the normal [m]; several reach to both faces."""
+    """Return the offsets (S,) of a link's strands along the normal [m]; several strands reach to both faces."""
     reach = (particle.boxes.thickness_normal - particle.chain.diameter) / 2
     return np.zeros(1) if particle.chain.rows == 1 else np.linspace(-reach, reach, particle.chain.rows)
 
@@ -165,7 +165,7 @@ def rigid_shape(bars: Bars, rows: int = 1, radius: float | None = None) -> Shape
     Args:
         rows: number of strands of each bar. The diameter of a single strand is the mean width of the section; that of
             several strands is the bar's thickness in the plane.
-        radius: of the strands [m]; None: that of `Bars.radius`.
+        radius: radius of the strands [m]; None: from `Bars.radius`.
     """
     radius = bars.radius(rows) if radius is None else radius
     reach = 0.0 if rows == 1 else bars.thickness_normal / 2 - radius
@@ -203,7 +203,7 @@ def filament_shape(filament: Filament) -> Shape:
 
 
 def _lines(axes: Array, radius: float) -> Array:
-    """Return segments (M, LINE) from axes (M, 6), start and vector to the end [m], and a radius [m]."""
+    """Return segments (M, LINE) of a radius [m] from axes (M, 6): start, and vector from start to end [m]."""
     squares = (axes[:, 3:6] ** 2).sum(axis=1)
     inverses = np.divide(1.0, squares, out=np.zeros(len(axes)), where=squares > 0)
     return np.column_stack([axes, inverses, np.full(len(axes), radius)])

@@ -1,7 +1,7 @@
-"""The stable time step on the engine links, from the stiffest modes.
+"""Stable time steps on the engine links, from the stiffest modes of vibration.
 
 Leapfrog takes the velocities of dashpots half a step late. With the matrices M of mass, K of stiffness and C of damping
-of a smarticle in a mode, a step dt is stable while K dt² + 2 C dt - 4 M has no positive eigenvalue.
+of a body in a mode, a step dt is stable while K dt² + 2 C dt - 4 M has no positive eigenvalue.
 """
 
 from __future__ import annotations
@@ -41,17 +41,17 @@ def links_stable_time_step(
     articulated: bool = False,
     strings: Sequence[tuple[float, float]] = (),
 ) -> float:
-    """Return the largest time step [s] that is stable for the stiffest modes of a smarticle in a pile.
+    """Return the largest stable time step [s] over the stiffest modes of a smarticle in a pile.
 
     The modes are:
 
     - a barb's tip against another tip, or against a boundary;
-    - a pile of smarticles that lie flat on each other, with contacts at all ends of all links, which move in the
-      opposite direction of those above and below;
-    - such a pile in which links roll against those above and below;
+    - a pile of smarticles that lie flat on each other, with contacts at all ends of all links; a smarticle moves up
+      while its neighbours above and below move down;
+    - a flat pile in which links rub against links above and below;
     - a tip with a string.
 
-    Angles that motors may turn are free, which reduces the effective mass of a tip.
+    If motors may turn the barbs, the angles are free, which reduces the effective mass of a tip.
 
     Args:
         articulated: whether motors may turn the barbs.
@@ -66,15 +66,15 @@ def links_stable_time_step(
 
 
 def filament_stable_time_step(filament: Filament, law: ContactLaw, effective_mass: float) -> float:
-    """Return the largest stable time step [s] over the stiffest modes of a filament among others.
+    """Return the largest stable time step [s] over the stiffest modes of a filament among filaments.
 
-    Neighbouring nodes that move against each other: along the filament, across it, about its axis. To the stiffness of
-    stretching, bending and twisting comes that of contacts, which lie on both sides, a diameter apart, and a tip's: all
-    as if they were at one node, and what they touch moves against it.
+    In these modes neighbouring nodes move in opposite directions: along the filament, across it, or about its axis. The
+    stiffness is that of stretching, bending or twisting plus that of contacts. Contacts are assumed at a tip, and on
+    both sides of the filament a diameter apart; they act on one node, and the bodies touched move against the node.
 
     Args:
-        law: of the contacts.
-        effective_mass: that the law's dashpots are for, of a smarticle [kg].
+        law: law of the contacts.
+        effective_mass: effective mass of a body [kg] for which the damping in `law` was computed.
     """
     length, mass = filament.segment_length, filament.mass / (filament.nodes - 1)
     share = math.sqrt(filament_shape(filament).effective_mass / effective_mass)
@@ -121,9 +121,9 @@ def _step_of(
 def rigid_stable_time_step(shapes: Sequence[Shape], law: ContactLaw) -> float:
     """Return the largest stable time step [s] over the stiffest modes of rigid bodies of several shapes.
 
-    They are those of `links_stable_time_step`: any end of a bar, with all its strands, against another such end and
-    against a boundary; and a pile of bodies that lie on their broad side, with a contact at every end, which heaves or
-    rubs.
+    The modes are: an end of a bar, with all its strands, against another such end or against a boundary; and a pile of
+    bodies that lie on their broad side, with a contact at every end, in which neighbours above and below move in
+    opposite directions, across or along the broad side.
     """
     return min(_rigid_step(shape, law) for shape in shapes)
 
@@ -155,10 +155,11 @@ def _rigid_step(shape: Shape, law: ContactLaw) -> float:
 
 
 def _modes_of_end(law: ContactLaw, tips: Array) -> list[Mode]:
-    """Return the modes of an end against another end, and against a boundary.
+    """Return the modes of a bar's end against another end, and against a boundary.
 
     Args:
-        tips: sum of Jᵀ J over the strands at the end, with J from velocities of the body to those of a point.
+        tips: (k, k) sum of Jᵀ J over the strands at the end; J is the matrix from the k velocities of the body to the
+            velocity of a strand's end.
     """
     kn, cn, cw = law.normal_stiffness, law.normal_damping, law.wall_damping
     return [
@@ -168,11 +169,11 @@ def _modes_of_end(law: ContactLaw, tips: Array) -> list[Mode]:
 
 
 def _modes_of_pile(law: ContactLaw, heave: Array, rub: Array) -> list[Mode]:
-    """Return the modes of bodies that lie on each other, which heave or rub.
+    """Return the modes of a pile of bodies that lie on their broad side, with J as in `_modes_of_end`.
 
     Args:
-        heave: sum of Jᵀ J over all contacts, for motion across the broad side.
-        rub: the same for motion along it.
+        heave: (k, k) sum of Jᵀ J over all contacts, with the rows of J across the broad side.
+        rub: (k, k) sum of Jᵀ J over all contacts, with the rows of J along the broad side.
     """
     kn, ks, cs = law.normal_stiffness, law.tangential_stiffness, law.tangential_damping
     damping = max(law.normal_damping, law.wall_damping / 2)
@@ -183,7 +184,11 @@ def _modes_of_pile(law: ContactLaw, heave: Array, rub: Array) -> list[Mode]:
 
 
 def _motion(place: Array) -> Array:
-    """Return (3, 6): velocity of a point of a rigid body from its velocity and angular velocity; place in m."""
+    """Return the matrix (3, 6) from a rigid body's velocity and angular velocity to the velocity of a point.
+
+    Args:
+        place: (3,) the point, from the centre of mass [m].
+    """
     x, y, z = place
     return np.column_stack([np.eye(3), [[0, z, -y], [-z, 0, x], [y, -x, 0]]])
 
@@ -199,7 +204,7 @@ def _step_of_modes(mass: Array, modes: Sequence[Mode]) -> float:
 def _mass(shape: Shape, row: Array, free: bool) -> Array:
     """Return the mass matrix (6, 6), with free angles (8, 8), of a smarticle with plane geometry `row`.
 
-    Its rows are for velocity, angular velocity in the middle link's axes, and rates of free angles.
+    Rows are for velocity, angular velocity in the middle link's axes and, if `free`, rates of the angles.
     """
     mass = np.zeros((8, 8))
     mass[:3, :3] = shape.mass * np.eye(3)
@@ -211,7 +216,7 @@ def _mass(shape: Shape, row: Array, free: bool) -> Array:
 
 
 def _ends(shape: Shape) -> list[tuple[int, tuple[float, float, float]]]:
-    """Return link and position from the centre of mass [m] of all ends of segments, joints once."""
+    """Return link and position from the centre of mass [m] of each end of a segment; a joint occurs once."""
     ends = []
     for line, link, shared in zip(shape.lines, shape.link, shape.shared, strict=True):
         for bit, place in ((AT_END, line[:3] + line[3:6]), (AT_START, line[:3])):
@@ -222,17 +227,19 @@ def _ends(shape: Shape) -> list[tuple[int, tuple[float, float, float]]]:
 
 
 def _tip_of(ends: list[tuple[int, tuple[float, float, float]]]) -> tuple[int, float, float]:
-    """Return link, x and y [m] of the first tip, which is that of barb 1 if there are barbs."""
+    """Return link, x and y [m] of a tip: of barb 1, or without barbs of the middle link."""
     link, (x, y, _) = ends[0]
     return link, x, y
 
 
 def _motion_of(shape: Shape, row: Array, link: int, place: tuple[float, float, float], free: bool) -> Array:
-    """Return the matrix (3, 6), with free angles (3, 8), that gives the velocity of a point of a link.
+    """Return the matrix (3, 6), with free angles (3, 8), from velocities of a smarticle to that of a point.
+
+    Columns are as the rows of `_mass`.
 
     Args:
         row: plane geometry of the smarticle.
-        link: link of the point.
+        link: number of the link to which the point belongs.
         place: position of the point from the centre of mass [m].
     """
     planar, (x, y, z) = shape.planar, place

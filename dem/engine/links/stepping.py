@@ -28,7 +28,7 @@ from dem.engine.links.vectors import dot, vector
 
 
 class Clock(NamedTuple):
-    """Time in terms of steps of equal length: begin + made dt."""
+    """Time after steps of equal length: begin + made dt."""
 
     begin: float  #: Time at which steps of this length began [s]
     made: int  #: Number of steps of this length made before the call
@@ -59,12 +59,12 @@ def settle(
 ) -> float:  # fmt: skip
     """Return the energy that the forces in the ledger dissipated in a kick [J]; called after the kick.
 
-    A force changes the kinetic energy by its work along the mean of the velocities before and after the kick.
+    The work of a force in a kick is that along the mean of the velocities before and after the kick.
 
     Args:
         bodies: `spin` is written.
         parts: `motion` is written.
-        ledger: forces, see `dem.engine.links.contact.pairs.enter`; it is emptied.
+        ledger: forces, see `dem.engine.links.contact.pairs.enter`; emptied.
         motors: the motors; None while smarticles are welded.
         dt: time over which the forces acted [s].
     """
@@ -91,7 +91,7 @@ def act(
     """Make one sub-step, whose length follows from the forces at its beginning.
 
     Args:
-        system: the simulation, posed, with valid lists.
+        system: all data of the simulation, after `pose`, with valid lists of near segments.
         totals: (TOTALS,) sums and state of the sub-steps, which are updated; for the indices see `LOST`.
         tick: ticks of the time step that have passed.
         dt: length of an undivided time step [s].
@@ -154,14 +154,14 @@ def act(
 
 @part
 def count_down(motors: Any) -> None:
-    """Count a step towards the next control update."""
+    """Reduce the number of steps until the next control update by one."""
     if motors is not None:
         motors.due[1] -= 1
 
 
 @kernel
 def advance(steps: int, clock: Clock, system: System, scratch: Scratch, totals: Array) -> int:
-    """Make steps.
+    """Advance a simulation by time steps.
 
     Args:
         steps: number of steps.

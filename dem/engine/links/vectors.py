@@ -1,4 +1,4 @@
-"""Vectors as tuples of three numbers, which cost no memory, and nearest points of two segments."""
+"""Vectors as tuples of three numbers, which need no allocation, and nearest points of two segments."""
 
 from __future__ import annotations
 
@@ -110,23 +110,23 @@ def turned_back(bodies: Bodies, i: int, a: Vector) -> Vector:
 class Lines(NamedTuple):
     """Two segments p + s u and q + t v, with s and t from 0 to 1, and products of their vectors."""
 
-    p: Vector  #: Start of the first one [m]
-    q: Vector  #: Start of the second one [m]
-    u: Vector  #: Vector to the end of the first one [m]
-    v: Vector  #: Vector to the end of the second one [m]
+    p: Vector  #: Start of the first segment [m]
+    q: Vector  #: Start of the second segment [m]
+    u: Vector  #: Vector from start to end of the first segment [m]
+    v: Vector  #: Vector from start to end of the second segment [m]
     w: Vector  #: p - q [m]
     a: float  #: u · u [m²]
     b: float  #: u · v [m²]
     c: float  #: v · v [m²]
     d: float  #: u · w [m²]
     e: float  #: v · w [m²]
-    inverse_a: float  #: 1/a [1/m²], from the segment's row, since divisions would take half of the time
+    inverse_a: float  #: 1/a [1/m²], stored with the segment, since a division is slow
     inverse_c: float  #: 1/c [1/m²]
 
 
 @inlined
 def lines(p: Array, q: Array) -> Lines:
-    """Return two segments (LINE,) as `Lines`."""
+    """Return two segments, rows (LINE,) as in `shapes`, as `Lines`."""
     start, other, u, v = vector(p, START), vector(q, START), vector(p, VECTOR), vector(q, VECTOR)
     w = sub(start, other)
     return Lines(
@@ -142,7 +142,7 @@ def between(both: Lines, s: float, t: float) -> Vector:
 
 @inlined
 def clamp(value: float) -> float:
-    """Return the number from 0 to 1 that is nearest to a value."""
+    """Return a value limited to the range from 0 to 1."""
     return min(1.0, max(0.0, value))
 
 

@@ -82,7 +82,7 @@ class Contacts:
     #: (M, 2) numbers of two bodies that touch, the lower number first; a pair may occur more than once
     pairs: NDArray[np.int64]
     touches: NDArray[np.int64]  #: (N,) number of points of contact of each body
-    depths: Array  #: (N,) largest overlap of each body, over that at which axes, or an axis and a surface, meet [1]
+    depths: Array  #: (N,) largest overlap of each body over the overlap at which axes meet [1]
     held: NDArray[np.bool_]  #: (N, 6) whether each body touches each boundary, in the order of `Ground.force`
     elastic_energy: float  #: Energy in the springs of all contacts [J]
 
@@ -91,20 +91,20 @@ class Contacts:
 class World:
     """All data of a simulation, and methods that change it between calls of the kernels.
 
-    Kinds of bodies are smarticles, if there are any, then those of a mixture, then `more`.
+    Kinds of bodies are smarticles, if there are any, then the kinds of `mixture`, then the shapes of `more`.
     """
 
-    particle: Particle | None  #: One smarticle; None: there are none
+    particle: Particle | None  #: Smarticle of which all smarticles are copies; None: a pile without smarticles
     contact: ContactLaw  #: The contact law
-    ground: Ground  #: The boundaries
+    ground: Ground  #: Floor and wall, and the motion of all boundaries
     gravity: float  #: g, downwards [m/s²]
     planar: bool  #: Whether all motion is confined to the plane z = 0
     keep_ledger: bool  #: Whether to sum the energy that contacts dissipate
-    more: tuple[Shape, ...] = ()  #: Shapes of bodies that are not smarticles
-    mixture: Mixture | None = None  #: Kinds of bodies that are no smarticles
-    wave_seed: int = 0  #: Seed of the waves of filaments: where they begin, and when they reverse
+    more: tuple[Shape, ...] = ()  #: Shapes of further kinds of bodies
+    mixture: Mixture | None = None  #: Kinds of bodies other than smarticles
+    wave_seed: int = 0  #: Seed of the waves of filaments, for initial phases and times of reversals
     steps: int = 0  #: Number of steps made since the start
-    time_step: float = math.nan  #: dt [s]
+    time_step: float = math.nan  #: Length of further steps, dt [s]
     motors: Motoring | None = None  #: The motors; None before the first articulation
     articulated: bool = False  #: Whether barbs can turn at present
     begin: float = 0.0  #: Time at which steps of the present length began [s]
@@ -115,7 +115,7 @@ class World:
     rims: Rims | None = None
     channel: Array | None = None
     cords: Cords | None = None
-    filaments: Filaments | None = None  #: None where no shape is flexible
+    filaments: Filaments | None = None  #: Arrays of filaments; None if no shape is flexible
 
     def __post_init__(self) -> None:
         own = () if self.particle is None else (smarticle_shape(self.particle),)
@@ -147,12 +147,12 @@ class World:
 
     @property
     def count(self) -> int:
-        """Number of bodies."""
+        """Number of bodies present."""
         return len(self.bodies.position)
 
     @property
     def each(self) -> int:
-        """Most links of a body, 3 at least."""
+        """Largest number of links of a body, but at least 3."""
         return max(LINKS, 1 + max(int(kind.link.max()) for kind in self.kinds))
 
     @property
@@ -175,7 +175,7 @@ class World:
         self.skins[[2, 5]] = NEAR_STEPS * time_step, WIDE_STEPS * time_step
 
     def add(self, poses: Poses, *, speed: float = 0.0) -> None:
-        """Add welded bodies that fall at a speed [m/s] without rotation."""
+        """Add bodies that fall at a speed [m/s] without rotation; smarticles are welded."""
         turns = np.array([rotation.as_matrix() for rotation in poses.rotations]).reshape(-1, 3, 3)
         if self.filaments is not None:
             self._add_posed_filaments(poses, turns, speed)
@@ -189,7 +189,7 @@ class World:
         self.add_bodies(0, poses.positions, matrix_product(turns, middle), speed=speed)
 
     def add_bodies(self, shape: int | NDArray[np.int64], positions: Array, turns: Array, *, speed: float = 0.0) -> None:
-        """Add bodies.
+        """Add bodies that fall without rotation.
 
         Args:
             shape: number of the shape in `kinds`, or (n,) one for each body.
@@ -222,7 +222,7 @@ class World:
         self.make_room()
 
     def _add_posed_filaments(self, poses: Poses, turns: Array, speed: float) -> None:
-        """Add filaments of a mixture in the shape in which they are poured, one after another."""
+        """Add filaments of a mixture in the shape in which they are poured; other arguments as in `add_bodies`."""
         assert self.mixture is not None
         assert poses.kinds is not None
         rng = np.random.default_rng([self.wave_seed, self.count])
@@ -237,14 +237,14 @@ class World:
     def add_filaments(
         self, shape: int, points: Array, *, velocities: Array | None = None, starts: Array | None = None, seed: int = 0
     ) -> None:
-        """Add filaments of one shape.
+        """Add F filaments of one shape.
 
         Args:
             shape: number of the shape, as in `add_bodies`.
-            points: (F, nodes, 3) of the nodes [m].
-            velocities: (F, nodes, 3) [m/s]; None: at rest.
-            starts: (F,) ψ of the preferred curvatures at the start [rad]; None: 0.
-            seed: of the times at which preferred curvatures reverse, together with the numbers of the filaments.
+            points: (F, nodes, 3) positions of the nodes [m].
+            velocities: (F, nodes, 3) velocities of the nodes [m/s]; None: at rest.
+            starts: (F,) initial angle ψ of each filament's preferred curvature [rad]; None: 0.
+            seed: seed of the times at which preferred curvatures reverse, together with the filament's number.
         """
         filament = self.kinds[shape].filament
         assert filament is not None
@@ -273,7 +273,7 @@ class World:
         fresh = np.append(True, (np.diff(own) != 0) | (np.diff(body) != 0)) if len(own) else np.zeros(0, np.bool_)
         hinged, bent = np.repeat(self.shapes.hinged[shapes], sizes), np.repeat(flexible, sizes)
         moved = hinged if self.articulated else 0  # links that move by themselves
-        #: (Q,) code of each segment's link in recorded contacts
+        #: (Q,) code of each segment's link, from `at_links`
         self.links = at_links(body.astype(np.int64), own, self.each).astype(np.int32)
         self.segments = Segments(
             line=np.concatenate([np.zeros((0, LINE)), *(kinds[k].lines for k in shapes)]),
@@ -286,20 +286,20 @@ class World:
         )
 
     def _bends(self, sizes: NDArray[np.int64]) -> Bends:
-        """Return `Segments.bends` of bodies with so many segments each."""
+        """Return `Segments.bends` for the present bodies; `sizes`: (N,) number of segments of each."""
         rods = [kind.filament for kind in self.kinds]
         least = np.array([0 if rod is None else apart(rod) for rod in rods], dtype=np.int32)
         return Bends(np.repeat(least[self.bodies.shape], sizes), np.zeros((int(sizes.sum()), 6)))
 
     def _make_room_at_boundaries(self) -> None:
-        """Enlarge the memory of contacts with boundaries for the present segments and boundaries."""
+        """Enlarge the memory of contacts with boundaries to the present number of segments and boundaries."""
         old, new = self.kept, no_contacts(len(self.segments.line), slots_for(self.hooks, self.rims))
         rows, slots = old.used.shape
         new.slip[:rows, :slots], new.used[:rows, :slots], new.contacts[:rows] = old.slip, old.used, old.contacts
         self.kept = new
 
     def add_hooks(self, hooks: Sequence[Sequence[Bar]]) -> None:
-        """Add the bars of the lower and the upper hook; must be called before bodies and rims are added."""
+        """Add two hooks, given by their bars, the lower hook first; call this before bodies and rims are added."""
         assert not self.count
         counts = np.array([len(bars) for bars in hooks])
         most = int(counts.max())
@@ -336,7 +336,7 @@ class World:
         self.kept = Kept(self.kept.slip[:, :first].copy(), self.kept.used[:, :first].copy(), self.kept.contacts)
 
     def set_articulated(self, articulated: bool) -> None:
-        """Let each link of a smarticle move as a part of its own, or the whole smarticle as one part."""
+        """Make each link of a smarticle a part of its own, or the whole smarticle one part."""
         self.articulated = articulated
         self._lay_out_parts()
 
@@ -360,7 +360,7 @@ class World:
                 self.ledger = np.zeros((entries, LEDGER))
 
     def advance(self, steps: int) -> None:
-        """Make steps, with as many calls of the kernel as they need."""
+        """Advance by a number of steps; lists of pairs are enlarged whenever they are full."""
         target = self.made + steps
         while self.made < target:
             made = self._call(target - self.made)
@@ -394,14 +394,14 @@ class World:
         return Scratch(self.cells, self.meeting, rows, self.plane)
 
     def posed(self) -> Bodies:
-        """Return the bodies, after computing all that follows from their state."""
+        """Return the bodies, after computing axes, spins, motion of parts and positions of segments."""
         pose_all(self.shapes, self.bodies, self.parts, self.segments, self.hinged)
         if self.filaments is not None:
             pose_filaments_from_python(self.filaments, self.bodies, self.parts, self.segments)
         return self.bodies
 
     def state(self) -> PileState:
-        """Return poses and velocities of all bodies of a pile, of smarticles or of a mixture.
+        """Return poses and velocities of all bodies.
 
         Raises:
             RunError: a position or velocity is not finite.
@@ -432,7 +432,7 @@ class World:
         return State(self.particle.boxes, places, frames, velocities, spins)
 
     def contacts(self) -> Contacts:
-        """Return all contacts at this instant, without a change of the simulation.
+        """Return all present contacts; the simulation is not changed.
 
         The wide list is still valid after the last step; contacts of bodies that were added since are missing.
         """
@@ -455,7 +455,7 @@ class World:
         )  # fmt: skip
 
     def extremes(self, velocities: Array) -> list[float]:
-        """Return the 7 extremes of `queries.find_extremes`, at the instant of the last call of `state`.
+        """Return the 7 numbers that `queries.find_extremes` writes, for the last state that `state` returned.
 
         Args:
             velocities: (M, 3) velocities of the centres of all links, or bars, in this state [m/s].
@@ -489,7 +489,7 @@ class World:
 
     @property
     def arrays(self) -> dict[str, NDArray[Any]]:
-        """All arrays that `restore` needs, by name."""
+        """Arrays of the simulation's state by name, for `restore`."""
         found: dict[str, NDArray[Any]] = {"totals": self.totals, "fast": self.skins}
         pairs, near = int(self.pairs.counts[0]), int(self.pairs.counts[1])
         for group, values in self._groups().items():
@@ -517,7 +517,7 @@ class World:
 
     @property
     def memory(self) -> dict[str, Any]:
-        """Plain data that `restore` needs besides the arrays."""
+        """Numbers of the simulation's state by name, for `restore`."""
         return {
             "steps": self.steps,
             "time_step": self.time_step,
@@ -566,18 +566,18 @@ def quaternion_of(matrix: Array) -> Array:
 
 
 def no_contacts(segments: int, slots: int) -> Kept:
-    """Return the memory of segments that touch no boundary, with `slots` contacts of each at most."""
+    """Return an empty memory of contacts with boundaries; `slots`: most contacts of a segment."""
     return Kept(np.zeros((segments, slots, 4)), np.zeros((segments, slots), np.uint8), np.zeros(segments, np.uint8))
 
 
 def longer(array: NDArray[Any], length: int) -> NDArray[Any]:
-    """Return the array with zeros appended up to a length."""
+    """Return the array (n, …) with rows of zeros appended up to `length` rows."""
     more = np.zeros((length - len(array), *array.shape[1:]), array.dtype)
     return np.concatenate([array, more])
 
 
 def _rows(write: Callable[[Array], int]) -> Array:
-    """Return the rows that a kernel writes, after making room for all.
+    """Return all rows that a kernel writes into an array (…, WIDTH) that is enlarged as needed.
 
     Args:
         write: function that writes as many rows as fit into its argument, and returns the number of rows needed.

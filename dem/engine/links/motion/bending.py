@@ -5,12 +5,13 @@ ACM Trans. Graph. 27, 63 (2008) and 29, 116 (2010), has the angles
 
     κ1 = b·(d2 + d2')/2,   κ2 = -b·(d1 + d1')/2,   ν = 2 tan(m/2),   b = 2 t × t'/(1 + t·t'),
 
-m the twist, and with ℓ the length at rest the energy (EI/2ℓ) |κ - κ̄|² + (GJ/2ℓ) ν² + (EA/2ℓ) (|e| - ℓ)². Forces and
-torques are its derivatives: forces add up to nothing, and neither do moments of forces and torques about axes.
-Directors turn with their segments without twist, and besides by the roll, which has an inertia of its own, so that
-friction rolls a filament as it does a rigid bar.
+with the twist m between the directors of both segments. With the length ℓ of a segment at rest, its vector e and the
+preferred values κ̄, the energy is (EI/2ℓ) |κ - κ̄|² + (GJ/2ℓ) ν² + (EA/2ℓ) (|e| - ℓ)². Forces and torques are its
+derivatives. So the sum of all forces is zero, and so is the sum of their moments and of all torques about axes.
 
-Leapfrog, as for rigid bodies: velocities belong to the middles of sub-steps.
+Directors follow the tangent of their segment without twist, and turn about it as the segment rolls. Rolling has an
+inertia of its own, so that friction rolls a filament like a rigid bar. As for rigid bodies the scheme is leapfrog:
+velocities belong to the middles of sub-steps.
 """
 
 from __future__ import annotations
@@ -60,7 +61,7 @@ RESOLVED = 1.4  # greatest ω dt of a mode, of the 2 up to which leapfrog is sta
 
 @part
 def move_segments(filaments: Any, parts: Parts, segments: Segments) -> None:
-    """Write how the segments of all filaments move, from the velocities of their nodes.
+    """Compute the motion of the segments of all filaments from the velocities of the nodes.
 
     Args:
         parts: `motion` and `stretch` are written.
@@ -84,7 +85,7 @@ def move_segments(filaments: Any, parts: Parts, segments: Segments) -> None:
 
 @part
 def pose_filaments(filaments: Any, bodies: Bodies, parts: Parts, segments: Segments) -> None:
-    """Bring everything up to date that follows from the nodes of filaments.
+    """Compute positions and motion of filaments and their segments from the nodes.
 
     Args:
         bodies: `position` and `velocity` are written.
@@ -121,7 +122,7 @@ def pose_filaments(filaments: Any, bodies: Bodies, parts: Parts, segments: Segme
 
 @kernel
 def pose_filaments_from_python(filaments: Filaments, bodies: Bodies, parts: Parts, segments: Segments) -> None:
-    """Call `pose_filaments` from Python."""
+    """Do what `pose_filaments` does, for calls from Python."""
     pose_filaments(filaments, bodies, parts, segments)
 
 
@@ -129,18 +130,18 @@ def pose_filaments_from_python(filaments: Filaments, bodies: Bodies, parts: Part
 
 
 class Piece(NamedTuple):
-    """One segment."""
+    """Direction and motion of one segment."""
 
     t: Vector  #: Tangent [1]
     d: Vector  #: First director [1]
-    e: Vector  #: Second one, t × d [1]
-    inverse: float  #: 1 over its length [1/m]
-    opening: Vector  #: Velocity of its end against its start, over its length [1/s]
-    spin: float  #: Rate of its roll [rad/s]
+    e: Vector  #: Second director, t × d [1]
+    inverse: float  #: 1 over the length of the segment [1/m]
+    opening: Vector  #: Velocity of the end relative to the start, over the length of the segment [1/s]
+    spin: float  #: Rate at which the segment rolls about its axis [rad/s]
 
 
 class Bend(NamedTuple):
-    """The angles between two segments."""
+    """Angles between two segments, in the symbols of the module; all are pure numbers [1]."""
 
     k1: float  #: κ1
     k2: float  #: κ2
@@ -149,13 +150,13 @@ class Bend(NamedTuple):
     tangent: Vector  #: Sum of both tangents over 1 + t·t'
     first: Vector  #: Sum of both first directors over 1 + t·t'
     second: Vector  #: Sum of both second directors over 1 + t·t'
-    #: Both directors of the first and of the second segment along b
+    #: Dot products with b: first and second director of the first segment, then of the second segment
     along: tuple[float, float, float, float]
 
 
 @inlined
 def _piece(filaments: Filaments, i: int) -> Piece:
-    """Return a segment."""
+    """Return direction and motion of segment `i`."""
     t, d, inverse = vector(filaments.tangent[i], 0), vector(filaments.director[i], 0), 1 / filaments.extent[i]
     opening = sub(vector(filaments.velocity[i + 1], 0), vector(filaments.velocity[i], 0))
     return Piece(t, d, cross(t, d), inverse, scale(inverse, opening), filaments.spin[i])
@@ -179,10 +180,10 @@ def _bend_of(one: Piece, two: Piece) -> Bend:
 
 @inlined
 def _push_bend(out: Array, i: int, moments: Vector, one: Piece, two: Piece, bend: Bend) -> None:
-    """Add forces and torques of moments between the segments i - 1 and i.
+    """Add the forces and torques of bending moments between the segments i - 1 and i to `out`.
 
     Args:
-        out: (n, 4) added to.
+        out: (n, 4) force on each node [N], torque about each segment's axis [N m].
         moments: derivatives of the energy by κ1, κ2 and the twist [N m].
     """
     m1, m2, twist = moments
@@ -200,7 +201,11 @@ def _push_bend(out: Array, i: int, moments: Vector, one: Piece, two: Piece, bend
 
 @inlined
 def _rates(one: Piece, two: Piece, bend: Bend, slope: float) -> Vector:
-    """Return the rates of κ1 and κ2, and that of ν times its slope by the twist [1/s]."""
+    """Return dκ1/dt, dκ2/dt, and dν/dt times `slope` [1/s].
+
+    Args:
+        slope: derivative of ν by the twist m [1].
+    """
     d1, e1, d2, e2 = bend.along
     both = add(one.opening, two.opening)
     g, growth = sub(cross(one.opening, two.t), cross(two.opening, one.t)), dot(both, bend.tangent)
@@ -215,12 +220,15 @@ def _rates(one: Piece, two: Piece, bend: Bend, slope: float) -> Vector:
 def _push_node(
     filaments: Filaments, i: int, rod: Array, angle: Vector, one: Piece, two: Piece, ledger: Any, step: Step
 ) -> float:
-    """Add forces and torques of bending and twist at an inner node; the work of a change of its preferred angles [J].
+    """Add the forces and torques of bending and twisting at inner node `i`, and update its preferred κ.
 
     Args:
-        angle: cosine and sine of ψ, and the factor on the preferred angles.
-        one: the segment before.
-        two: the segment after.
+        angle: cosine and sine of ψ, and the factor on the preferred κ [1].
+        one: the segment before the node.
+        two: the segment after the node.
+
+    Returns:
+        Work of the change of the preferred κ [J].
     """
     bend = _bend_of(one, two)
     stiffness, twisting, time = rod[BENDING], rod[TWISTING], rod[BENDING_TIME]
@@ -253,12 +261,14 @@ def _push_node(
 def _push_segment(
     filaments: Filaments, i: int, rod: Array, own: Piece, stretch: float, load: Array, out: Array
 ) -> None:
-    """Add forces and torques on a segment: of contacts, stretching and drag, and what keeps its spin along its axis.
+    """Add the forces and torques on segment `i`: of contacts, stretching, drag, and the turn of its spin.
+
+    Rolling has angular momentum along the axis; forces on both nodes turn it with the axis.
 
     Args:
-        stretch: first moment of axial forces of contacts [N m].
-        load: (6,) of contacts.
-        out: (n, 4) to which forces of internal damping are added.
+        stretch: sum over contacts of axial force times axial distance from the centre [N m].
+        load: (6,) force [N] and torque about the centre [N m] of contacts.
+        out: (n, 4) array to which forces of internal damping are added [N].
     """
     t, half, torque = own.t, scale(0.5, vector(load, 0)), vector(load, 3)
     # Of forces ± at both nodes: the couple of contacts, the spin that turns with the axis, the axial spring.
@@ -279,13 +289,13 @@ def _push_segment(
 
 @inlined
 def _stretched(filaments: Filaments, i: int, rod: Array) -> float:
-    """Return by how much a segment is longer than at rest [m]."""
+    """Return the length of segment `i` less its length at rest [m]."""
     return float(filaments.extent[i] - rod[LENGTH])
 
 
 @inlined
 def _damping_of(ledger: Any, force: Array, damping: Array) -> Array:
-    """Return where forces of internal damping go: apart where a ledger is kept, otherwise to all others."""
+    """Return the array for forces of internal damping: `damping` if a ledger is kept, otherwise `force`."""
     if ledger is None:
         return force
     return damping
@@ -297,10 +307,10 @@ def push_nodes(filaments: Any, parts: Parts, gravity: float, ledger: Any, step: 
 
     Args:
         filaments: `force`, `damping`, `drag`, `preferred` and `sums` are written.
-        parts: with the loads of contacts.
+        parts: the parts, with the loads of contacts.
         gravity: g [m/s²].
-        ledger: None where nothing reads it.
-        step: `need` is written.
+        ledger: forces that dissipate energy; None if dissipation is not recorded.
+        step: `need` is increased if bending or twisting is too stiff for a time step.
     """
     if filaments is None:
         return
@@ -325,12 +335,12 @@ def push_nodes(filaments: Any, parts: Parts, gravity: float, ledger: Any, step: 
 
 @part
 def resolve_nodes(filaments: Any, radii: Array, bodies: Bodies, step: Step) -> None:
-    """Ask for sub-steps where a node would move far in a step.
+    """Increase `step.need` if a node would move too far in a time step.
 
     Args:
-        filaments: with the forces of this instant.
-        radii: (K,) of the kinds of bodies [m].
-        step: `need` is written.
+        filaments: the filaments, with their present forces.
+        radii: (K,) radii of the thinnest segments of each shape [m].
+        step: `need` is increased.
     """
     if filaments is None:
         return
@@ -350,11 +360,11 @@ def resolve_nodes(filaments: Any, radii: Array, bodies: Bodies, step: Step) -> N
 
 @part
 def kick_nodes(filaments: Any, dt: float) -> None:
-    """Change the velocities of nodes and the spins of segments by the forces of this instant.
+    """Change the velocities of nodes and the spins of segments by the present forces.
 
     Args:
         filaments: `velocity`, `spin`, `grip_force` and `sums` are written.
-        dt: time over which they act [s].
+        dt: time over which the forces act [s].
     """
     if filaments is None:
         return
@@ -394,9 +404,9 @@ def kick_nodes(filaments: Any, dt: float) -> None:
 
 @inlined
 def _uniform(seed: int, number: int, event: int) -> float:
-    """Return a random number between 0 and 1, which depends on the three numbers alone.
+    """Return a random number between 0 and 1, which depends on the three arguments alone.
 
-    Source: the finalizer of SplitMix64, Steele, Lea and Flood, OOPSLA 2014, once for each number.
+    Source: the finalizer of SplitMix64, Steele, Lea and Flood, OOPSLA 2014, applied once for each argument.
     """
     state = np.uint64(0)
     for key in (seed, number, event):
@@ -409,14 +419,17 @@ def _uniform(seed: int, number: int, event: int) -> float:
 
 @part
 def _wait(gait: Array) -> float:
-    """Draw the time to the next reversal [s]."""
+    """Return a random time to the next reversal of a wave [s]; `gait`: (GAIT,), its `DRAWN` is increased."""
     gait[DRAWN] += 1
     return float(-math.log(_uniform(int(gait[SEED]), int(gait[NUMBER]), int(gait[DRAWN]))) / gait[REVERSALS])
 
 
 @part
 def _turn_wave(gait: Array, dt: float) -> None:
-    """Turn the preferred curvature by a sub-step, reverse it where its time has come, and change its factor."""
+    """Advance the wave of preferred curvature by `dt` [s]: its factor, its angle ψ, and due reversals.
+
+    `gait` (GAIT,) is written.
+    """
     change, rest = gait[CHANGE] * dt, gait[TARGET] - gait[FACTOR]
     gait[FACTOR] = gait[TARGET] if abs(rest) <= change else gait[FACTOR] + math.copysign(change, rest)
     gait[PSI] += gait[SENSE] * gait[RATE] * dt
@@ -433,7 +446,7 @@ def _turn_wave(gait: Array, dt: float) -> None:
 
 @part
 def drift_nodes(filaments: Any, dt: float) -> None:
-    """Move all nodes by a sub-step, and carry the directors along.
+    """Move all nodes by a sub-step, and turn the directors with their segments.
 
     Args:
         filaments: `position`, `tangent`, `extent`, `director` and `gait` are written.
@@ -467,7 +480,7 @@ def drift_nodes(filaments: Any, dt: float) -> None:
 
 @kernel
 def measure(filaments: Filaments, gravity: float, found: Array) -> None:
-    """Add up the energies of all filaments.
+    """Compute the energies of all filaments.
 
     Args:
         gravity: g [m/s²].

@@ -1,13 +1,13 @@
 """Kernels of the motors: control updates, and the torques of shafts on the angles.
 
-A motor turns one end of its shaft to the command, and the barb is at the other end. So the angles are free, and the
-momentum p that belongs to an angle (see `planar`) is part of the state. The torque τ is that of a spring to the
-command, for a servo also of a damper. The laws slip and servo cap τ at τ_max. Under halt, stall and ease the command
-stops while τ is at τ_max or above; τ can exceed τ_max by stiffness × speed × control period, however stiff contacts
-are. The spring acts at the mean of the angles half a step before and half a step after, the damper at the rate after,
-so that both are stable at any stiffness and damping.
+A motor turns one end of its shaft to the command, and the barb is at the other end. So barbs turn freely against a
+spring, and the momentum p conjugate to an angle (see `planar`) is part of the state. The torque τ is that of a spring
+between angle and command, for a servo also of a damper. The laws slip and servo cap τ at τ_max. Under halt, stall and
+ease the command stops while τ is at τ_max or above; τ can exceed τ_max by stiffness × speed × control period, however
+stiff contacts are. The spring takes the mean of the angles half a step before and half a step after, the damper takes
+the rate after the step, so that both are stable at any stiffness and damping.
 
-Work and change of kinetic energy agree to second order in the time step; in kicks they agree exactly.
+The work of the motors and the change of kinetic energy agree to second order in the time step, and exactly in kicks.
 """
 
 from __future__ import annotations
@@ -38,7 +38,10 @@ HINGED_ITERATIONS = 2  # two leave 7e-6 of the energy that a free gait exchanges
 
 @kernel
 def engage(shapes: Shapes, bodies: Bodies, motors: Motoring) -> None:
-    """Start all motors at the present angles, without torque; `motors` and `bodies.rate` are written."""
+    """Start all motors with commands at the present angles, so that torques are 0.
+
+    `motors` and `bodies.rate` are written.
+    """
     for i in range(bodies.position.shape[0]):
         if not shapes.hinged[bodies.shape[i]]:
             continue
@@ -60,7 +63,7 @@ def release(shapes: Shapes, bodies: Bodies, motors: Motoring) -> float:
     """Stop all barbs, which makes smarticles rigid; `bodies.rate`, `bodies.axes` and `motors` are written.
 
     Returns:
-        Lost kinetic energy of the links' relative motion [J].
+        Kinetic energy of the links' relative motion, which is lost [J].
     """
     lost = 0.0
     for i in range(bodies.position.shape[0]):
@@ -80,7 +83,7 @@ def release(shapes: Shapes, bodies: Bodies, motors: Motoring) -> float:
 
 @inlined
 def _average(motors: Motoring, i: int) -> None:
-    """Compute the mean torques of smarticle `i` since the last control update, and begin a new mean."""
+    """Write the mean torques of smarticle `i` since the last control update, and reset their time integrals."""
     for k in range(2):
         if motors.elapsed[0] > 0.0:
             motors.torque[i, k] = motors.impulse[i, k] / motors.elapsed[0]
@@ -91,10 +94,10 @@ def _average(motors: Motoring, i: int) -> None:
 def update(shapes: Shapes, bodies: Bodies, motors: Motoring) -> None:
     """Make a control update: compute commands for the control period that begins.
 
-    The targets are the row of `motors.targets` that is due; after the last row this row is used again.
+    Targets are the row of `motors.targets` that is due; after the last row, the last row is used again.
 
     Args:
-        motors: the motors; written.
+        motors: the motors, whose commands, torques and counters are written.
     """
     now, interval = min(motors.due[0], motors.targets.shape[0] - 1), motors.interval
     motors.due[0], motors.due[1] = now + 1, motors.period
@@ -147,10 +150,10 @@ def _about_hinge(bodies: Bodies, parts: Parts, i: int, row: int, x: float, y: fl
 def free_torques(bodies: Bodies, motors: Motoring, i: int, r1: float, r2: float, dt: float) -> tuple[float, float]:
     """Return the torques of both motors of smarticle `i` [N m].
 
-    The equations are implicit: torques depend on the rates after the step, which the torques change.
+    The equations are implicit: torques depend on rates after the step, and these rates depend on the torques.
 
     Args:
-        bodies: the smarticles; `rate` is that before the step.
+        bodies: the smarticles, with `rate` before the step.
         r1: rate that angle 1 would have after the step without motors [rad/s].
         r2: rate that angle 2 would have after the step without motors [rad/s].
         dt: time step [s].

@@ -39,7 +39,7 @@ def kick(shapes: Shapes, bodies: Bodies, parts: Parts, motors: Any, gravity: flo
 
     Args:
         bodies: `velocity` and `momentum` are written.
-        parts: loads on the parts, of which those on barbs change angles.
+        parts: the parts, with loads; loads on barbs change their angles.
         motors: the motors, of which `impulse`, `momentum` and `work` are written; None while smarticles are welded.
         dt: time for which the forces act [s]: half of the last and half of the next sub-step.
     """
@@ -74,11 +74,11 @@ def kick(shapes: Shapes, bodies: Bodies, parts: Parts, motors: Any, gravity: flo
 def resolve_speeds(
     shapes: Shapes, bodies: Bodies, parts: Parts, segments: Segments, gravity: float, step: Step
 ) -> None:
-    """Raise `step.need` if a segment moves so far in a step that it could enter another one too deeply.
+    """Increase `step.need` if a segment could enter another segment too deeply within a time step.
 
     Args:
         bodies: the bodies, with the present forces in `load`.
-        step: `need` is raised.
+        step: `need` is increased.
     """
     velocity, spin, load = bodies.velocity, bodies.spin, bodies.load
     for i in range(velocity.shape[0]):
@@ -116,7 +116,7 @@ def drift(shapes: Shapes, bodies: Bodies, motors: Any, dt: float, row: Array) ->
     """Move and turn all bodies by a step.
 
     Args:
-        bodies: `position` and `turn` are written, and while articulated what `middle_of_step` writes.
+        bodies: `position` and `turn` are written, while articulated also `alpha`, `plane` and `rate`.
         motors: the motors; None while smarticles are welded.
         dt: time step [s].
         row: (PLANE,) scratch.

@@ -6,8 +6,10 @@ normal: the middle link's axes. With the angular velocity ω of the middle link 
     T = M V²/2 + ω·I(α)ω/2 + ω_z b(α)·α̇ + α̇·A(α)α̇/2
 
 is the kinetic energy, L = I ω + (b·α̇) z the angular momentum about the centre of mass, and p = ∂T/∂α̇ = b ω_z + A α̇
-the momentum that belongs to the angles. All three follow from Σ m c = 0 about the centre of mass; with f = m_b/M, c_k
-the barbs' centres and u_k = ∂(c_k - c_middle)/∂α_k:
+the momentum conjugate to the angles. I, b and A follow from Σ m c = 0, with the centres c of the links from the centre
+of mass. With m_b and I_n the mass of a barb and its inertia about the normal, M the mass of the smarticle, f = m_b/M,
+s_1 = -1 and s_2 = 1, since a rising α_k turns barb 1 clockwise and barb 2 counterclockwise, and u_k = ∂(c_k -
+c_middle)/∂α_k:
 
     b_k = s_k I_n + m_b (c_k × u_k),   A_kk = I_n + m_b (1 - f) u_k²,   A_12 = -f m_b u_1·u_2.
 """
@@ -36,7 +38,7 @@ SMALL = 1e-4  # rad²; up to this square of an angle the series used here are ex
 
 @inlined
 def planar_at(shapes: Shapes, k: int) -> Planar:
-    """Return the fields of `Planar` for shape `k`, which must be a smarticle."""
+    """Return the geometry of shape `k`, which must be a smarticle."""
     row = shapes.planar[k]
     return Planar(
         row[0], row[1], row[2], row[3], row[4], row[5], row[6], row[7], row[8], row[9], row[10], row[11], row[12]
@@ -61,7 +63,7 @@ def lay_out(planar: Planar, alpha1: float, alpha2: float, row: Array) -> None:
 
 @inlined
 def lay_out_at(planar: Planar, alpha1: float, alpha2: float, row: Array) -> None:
-    """Compute the plane geometry like `lay_out`, inlined into other kernels."""
+    """Do what `lay_out` does, inlined into other kernels."""
     c1, s1 = direction(alpha1)
     c2, s2 = direction(alpha2)
     lay_out_directions(planar, c1, s1, c2, s2, row)
@@ -120,7 +122,7 @@ def lay_out_directions(planar: Planar, c1: float, s1: float, c2: float, s2: floa
 
 @kernel
 def invert(row: Array) -> None:
-    """Complete the plane geometry of a rigid body, whose inertia is known (columns 14 to 17).
+    """Compute columns 22 and 23 of a plane geometry from the inertia in columns 14 to 17, see `lay_out`.
 
     Args:
         row: (PLANE,) written. 22: 1/I_zz [1/(kg m²)]; 23: inverse determinant of the in-plane inertia [1/(kg² m⁴)].
@@ -130,7 +132,7 @@ def invert(row: Array) -> None:
 
 @inlined
 def invert_at(row: Array) -> None:
-    """Complete the plane geometry like `invert`, inlined into other kernels."""
+    """Do what `invert` does, inlined into other kernels."""
     row[22], row[23] = 1 / row[16], 1 / (row[14] * row[15] - row[17] * row[17])
 
 
@@ -173,11 +175,11 @@ def spin_of(row: Array, lx: float, ly: float, lz: float, internal: float) -> tup
 
 @inlined
 def momenta(row: Array, normal: float, rate1: float, rate2: float) -> tuple[float, float]:
-    """Return the momenta p = b ω_z + A α̇ that belong to the angles [kg m²/s].
+    """Return the momenta p = b ω_z + A α̇ conjugate to both angles [kg m²/s].
 
     Args:
         row: plane geometry, see `lay_out`.
-        normal: angular momentum along the normal [kg m²/s].
+        normal: component of the angular momentum L along the normal [kg m²/s].
         rate1: α̇_1 [rad/s].
         rate2: α̇_2 [rad/s].
     """
@@ -187,7 +189,7 @@ def momenta(row: Array, normal: float, rate1: float, rate2: float) -> tuple[floa
 
 @inlined
 def rates(row: Array, normal: float, p1: float, p2: float) -> tuple[float, float]:
-    """Return the rates α̇ [rad/s] for momenta p1 and p2 [kg m²/s]; inverse of `momenta`."""
+    """Return the rates α̇ [rad/s] for conjugate momenta p1 and p2 [kg m²/s]; inverse of `momenta`."""
     wz = normal * row[22]
     q1, q2 = p1 - row[18] * wz, p2 - row[19] * wz
     return row[24] * q1 + row[26] * q2, row[26] * q1 + row[25] * q2

@@ -57,7 +57,7 @@ def _move(parts: Parts, row: int, velocity: Vector, spin: Vector, origin: Vector
 
 @inlined
 def find_motion(shapes: Shapes, bodies: Bodies, parts: Parts, i: int, hinged: Any) -> None:
-    """Write the motion of the parts of body `i` into `parts.motion`, for points at its centre of mass."""
+    """Write the motion of the parts of body `i` into `parts.motion`; reference points are its centre of mass."""
     row, position = parts.begin[i], vector(bodies.position[i], 0)
     velocity, spin = vector(bodies.velocity[i], 0), vector(bodies.spin[i], 0)
     if hinged is not None and shapes.hinged[bodies.shape[i]]:
@@ -79,7 +79,10 @@ def find_motion(shapes: Shapes, bodies: Bodies, parts: Parts, i: int, hinged: An
 
 @inlined
 def _planar_line(planar: Planar, plane: Array, link: int) -> tuple[float, float, float, float]:
-    """Return x and y of a link's start, from the centre of mass, and of the vector to its end [m]."""
+    """Return x and y of a link's start, and x and y of the vector from its start to its end [m].
+
+    The start is from the centre of mass.
+    """
     x, y, ux, uy = -planar.end - plane[0], -plane[1], 2 * planar.end, 0.0
     if link == 0:
         x, ux, uy = -planar.half - plane[0], planar.tip * plane[10], planar.tip * plane[11]
@@ -116,10 +119,10 @@ def find_motions(shapes: Shapes, bodies: Bodies, parts: Parts, hinged: Any) -> N
 
 @part
 def pose(shapes: Shapes, bodies: Bodies, parts: Parts, segments: Segments, hinged: Any) -> None:
-    """Compute everything that follows from the state of the bodies that are not flexible.
+    """Compute axes, spins, motion of parts and positions of segments, of bodies that are not flexible.
 
     Args:
-        bodies: `axes` and `spin` are written, and `rate` if angles are free.
+        bodies: `axes` and `spin` are written, while articulated also `rate`.
         parts: `motion` is written.
         segments: `line` is written.
         hinged: the motors; None while smarticles are welded.
@@ -149,8 +152,8 @@ def find_links(
     """Write positions, frames and velocities of all links of smarticles.
 
     Args:
-        bodies: the smarticles, posed.
-        parts: the parts, with their motion.
+        bodies: the smarticles, after a call of `pose`.
+        parts: the parts, after a call of `pose`.
         each: number of parts of a smarticle that move separately: 3 while articulated, 1 while welded.
         places: (N, 3, 3) written: centres of the links [m].
         frames: (N, 3, 3, 3) written: unit vectors along, across and normal to each link, in columns [1].

@@ -18,11 +18,11 @@ NEAR_LEAST, NEAR_MOST, NEAR_TIME, WIDE_LEAST, WIDE_MOST, WIDE_TIME, STRIP = rang
 
 @part
 def update_lists(bodies: Bodies, segments: Segments, pairs: Pairs, cells: Cells, skins: Array) -> int:
-    """Rebuild the lists that are no longer valid since links have moved too far.
+    """Rebuild the lists that are no longer valid because links have moved too far.
 
     Args:
-        skins: (7,) thinnest skin [m], thickest skin [m] and time that a skin should last [s], for the tight list, then
-            for the wide list; then the width of a strip of the search [m].
+        skins: (7,) 0 to 2: thinnest skin [m], thickest skin [m] and time that a skin should last [s] of the tight
+            list; 3 to 5: these of the wide list; 6: width of a strip of the search [m].
 
     Returns:
         GOOD, or FULL if there is no room for all pairs.
@@ -67,7 +67,7 @@ def build(bodies: Bodies, segments: Segments, pairs: Pairs, cells: Cells, skins:
     """Rebuild the wide list, and keep the memory of contacts.
 
     Args:
-        pairs: the lists; all but the tight list is written.
+        pairs: the lists; fields of the tight list are not written.
         skins: see `update_lists`.
 
     Returns:

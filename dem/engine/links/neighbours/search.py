@@ -56,7 +56,10 @@ def near_each_other(line: Array, p: int, q: int, reach: float) -> bool:
 
 @inlined
 def _cannot_touch(bends: Any, p: int, q: int) -> bool:
-    """Return whether two segments of one body never touch: all of a rigid one, neighbours of a flexible one."""
+    """Return whether two segments of one body can never touch.
+
+    Segments of a rigid body never touch, and in a flexible body neighbours do not.
+    """
     if bends is None:
         return True
     return bool((bends.apart[p] == 0) | (abs(p - q) < bends.apart[p]))
@@ -102,7 +105,7 @@ def search(segments: Segments, cells: Cells, bare: float, piece: float) -> int:
 
 @inlined
 def _bin(offset: float, size: float, last: int) -> int:
-    """Return the bin of an offset [m]; `last` beyond the last bin, 0 for negative offsets and NaN."""
+    """Return the number of the bin of an offset [m], at least 0 and at most `last`; NaN gives 0."""
     return int(min(offset / size, float(last))) if offset > 0.0 else 0
 
 
@@ -160,7 +163,7 @@ def sort_bins(cells: Cells, grid: Grid) -> None:
 
 @inlined
 def copy_by_bin(segments: Segments, cells: Cells) -> None:
-    """Copy boxes and segments of links in the order of the bins, and number the groups of the list."""
+    """Copy boxes and segments of links in the order of the bins, and number the groups of pairs."""
     few, n = cells.marks.shape[0] <= FEW, 0
     for m in range(cells.keys.shape[0]):
         link = cells.order[m]
@@ -180,7 +183,7 @@ def _boxed(
     boxes: Array, close: Indices, count: int, start: int, stop: int,
     ly: float, lz: float, hx: float, hy: float, hz: float,
 ) -> int:  # fmt: skip
-    """Append to `close` the indices of boxes from `start` to before `stop` that may overlap a given box.
+    """Append to `close` those indices from `start` to `stop` - 1 whose boxes may overlap a given box.
 
     The first loop is vectorised by the compiler. In the second loop every index is written, and overwritten by the next
     one if its box does not overlap, so that no branch is needed.
@@ -216,8 +219,8 @@ def find_pairs(segments: Segments, cells: Cells, grid: Grid) -> int:
     """Write all near pairs of segments that can touch into `cells.lower` and `cells.upper`.
 
     Args:
-        segments: the body of each segment.
-        cells: links sorted into bins, with copied boxes and segments.
+        segments: the segments, with their bodies.
+        cells: links sorted into bins, with boxes and segments from `copy_by_bin`.
         grid: the bins.
 
     Returns:

@@ -1,4 +1,4 @@
-"""Skins: distances by which segments may move before a list of pairs is rebuilt.
+"""Skins: distances by which segments may move before a list of near segments is rebuilt.
 
 Every segment has a skin: the distance by which its ends, and so all its points, may move relative to the mean motion of
 all bodies. The mean motion does not count, since a shaken pile moves as a whole. Fast segments have thick skins and
@@ -43,7 +43,13 @@ def _square(a: Vector) -> float:
 
 @inlined
 def _at_end(bends: Any, p: int, end: int, mean: Vector, rigid: Vector) -> Vector:
-    """Return the velocity of an end of a segment against `mean`: `rigid` unless its body is flexible."""
+    """Return the velocity of an end of segment `p` relative to the mean motion of all bodies [m/s].
+
+    Args:
+        end: 0 for the start, 1 for the end.
+        mean: mean velocity of all bodies [m/s].
+        rigid: result if the body of the segment is rigid [m/s].
+    """
     if bends is None or bends.apart[p] == 0:
         return rigid
     return sub(vector(bends.ends[p], 3 * end), mean)
@@ -57,7 +63,7 @@ def mark(
 
     Args:
         marks: (Q, 7) written, see `moved`.
-        centres: (N, 3) written.
+        centres: (N, 3) written: centres of mass [m].
         least: the thinnest skin [m].
         most: the thickest skin [m].
         time: time that a skin should last at the present speed [s].
