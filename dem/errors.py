@@ -10,7 +10,7 @@ class InputError(ValueError):
 
 
 class RunError(RuntimeError):
-    """A run failed: it was unstable, did not settle, or found the disk full; exit status 1."""
+    """A run failed, e.g. it was unstable, did not settle, or the disk was full; exit status 1."""
 
 
 def reject(failing: Any, time: float, cause: str, way_out: str) -> None:
@@ -19,7 +19,7 @@ def reject(failing: Any, time: float, cause: str, way_out: str) -> None:
     Args:
         failing: (N,) whether each smarticle fails.
         time: simulated time [s].
-        cause: what is wrong with these smarticles.
+        cause: what is wrong with the smarticles that fail.
         way_out: what the user can do.
     """
     if failing.any():
@@ -29,7 +29,7 @@ def reject(failing: Any, time: float, cause: str, way_out: str) -> None:
 
 
 def shown(value: object) -> str:
-    """Return a value as YAML writes it, in one line, cut after 60 characters with an ellipsis."""
+    """Return a value as YAML in one line; after 60 characters an ellipsis replaces the rest."""
     constants = {None: "null", True: "true", False: "false"}
     try:
         text = constants[value] if value is None or isinstance(value, bool) else repr(value)

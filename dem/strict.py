@@ -68,7 +68,7 @@ class Strict(BaseModel):
 
     @classmethod
     def nearest_key(cls, key: str) -> str:
-        """Return what to do about an unknown key: use the nearest known key, or one of all known keys."""
+        """Return advice about an unknown key: the nearest known key, or else all known keys."""
         return nearest(key, sorted(cls.known_keys()))
 
     @model_validator(mode="before")
@@ -94,7 +94,7 @@ class Strict(BaseModel):
 
 
 def _as_a_number(text: str) -> str:
-    """Return what to do about text where a number is wanted."""
+    """Return advice about text in the place of a number."""
     try:
         return "leave out the quotes" if math.isfinite(float(text)) else "write a finite one"
     except ValueError:
@@ -105,7 +105,7 @@ def _as_a_number(text: str) -> str:
 
 
 def _kind(annotation: Any) -> str:
-    """Describe in words the values that a field with this annotation accepts."""
+    """Return in words the kind of values that a field with this annotation accepts."""
     parts = [annotation] if get_origin(annotation) is None else [*get_args(annotation)]
     parts = [get_args(part)[0] if get_origin(part) is Annotated else part for part in parts]
     if any(part in (int, float) for part in parts) and all(part in (int, float, type(None), ...) for part in parts):
@@ -121,7 +121,7 @@ def explained(error: ValidationError, data: Any, *, described: str) -> str:
 
     Args:
         data: the mapping that was validated.
-        described: where users find a description of the keys.
+        described: command or page that describes the keys, for the message.
     """
     texts: dict[str, str] = {}
     filled: set[str] = set()  # places of values that the file does not hold
@@ -148,7 +148,7 @@ def explained(error: ValidationError, data: Any, *, described: str) -> str:
 
 
 def unit_of(key: str) -> tuple[str, str]:
-    """Return the name and the unit that a key consists of: ("speed", "m/s") for `speed_m_per_s`."""
+    """Split a key into name and unit: ("speed", "m/s") for `speed_m_per_s`."""
     words = key.split("_")
     count = len(words)
     while count > 1 and words[count - 1] in _UNITS:
@@ -157,7 +157,14 @@ def unit_of(key: str) -> tuple[str, str]:
 
 
 def _text(kind: str, message: str, value: Any, context: Mapping[str, Any], unit: str) -> str:
-    """Return what is wrong with a value and what to do; `kind`, `message` and `context` are pydantic's."""
+    """Return in words what is wrong with a value, and advice.
+
+    Args:
+        kind: pydantic's type of the error.
+        message: pydantic's message.
+        context: pydantic's data about the error.
+        unit: unit of the value; "" for none.
+    """
     if kind == "value_error":
         return message.removeprefix("Value error, ")
     if kind not in _TEXTS:

@@ -12,12 +12,12 @@ _ESCAPES = {code: f"\\x{code:02x}" if code < 256 else f"\\u{code:04x}" for code 
 
 
 def escaped(text: str) -> str:
-    r"""Return text with escapes, such as `\x1b`, for all characters that a terminal obeys but tab and newline."""
+    r"""Return text with escapes, such as `\x1b`, for all control characters except tab and newline."""
     return text.translate(_ESCAPES)
 
 
 class Control(str):
-    """Text that the terminal is to obey."""
+    """Text whose control characters are meant for the terminal and are not escaped."""
 
     __slots__ = ()
 
@@ -26,7 +26,7 @@ ERASE_LINE = Control("\r\x1b[K")
 
 
 class Printable:
-    """A text stream that writes control characters as escapes, except in `Control`."""
+    """A text stream that writes control characters as escapes, except in texts of type `Control`."""
 
     def __init__(self, stream: TextIO) -> None:
         self.stream = stream
@@ -53,13 +53,13 @@ def warn(text: str) -> None:
 
 
 def bare(stream: TextIO) -> TextIO:
-    """Return the stream below a `Printable`, for rich, which writes control characters of its own."""
+    """Return the stream that a `Printable` wraps, for the library rich, which writes control characters itself."""
     return stream.stream if isinstance(stream, Printable) else stream
 
 
 @contextmanager
 def printable() -> Iterator[None]:
-    """Write control characters to standard output and error as escapes."""
+    """Make standard output and error write control characters as escapes, during a block."""
     out, error = (cast(TextIO, Printable(stream)) for stream in (sys.stdout, sys.stderr))
     with redirect_stdout(out), redirect_stderr(error):
         yield

@@ -32,7 +32,7 @@ class StrictLoader(yaml.SafeLoader):  # type: ignore[misc]  # PyYAML ships no ty
     """SafeLoader that rejects a key given twice and reads `1e-3` as a number."""
 
     def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Any, Any]:
-        """Return a node's mapping; raise ConstructorError if a key is given twice, or is a list or mapping."""
+        """Return the mapping of a node; raise ConstructorError if a key is given twice, or is a list or mapping."""
         if isinstance(node, yaml.MappingNode):
             self.flatten_mapping(node)
             seen: set[Any] = set()
@@ -58,16 +58,16 @@ StrictLoader.add_implicit_resolver("tag:yaml.org,2002:int", _INT, list("-+012345
 
 
 def read_text(path: Path) -> str:
-    """Return a text in UTF-8, of a longer one than `load_yaml` accepts only the beginning."""
+    """Return the content of a file in UTF-8; if `load_yaml` would reject it as too long, only its beginning."""
     with path.open(encoding="utf-8") as file:
         return file.read(LONGEST + 1)
 
 
 def load_yaml(text: str, loader: type[Any] = StrictLoader) -> Any:
-    """Return the data of a YAML text; raise yaml.YAMLError, which `parse_yaml` explains to users.
+    """Return the data of a YAML text; raise yaml.YAMLError if it is not valid. For users see `parse_yaml`.
 
     Args:
-        loader: `StrictLoader`, a class derived from it, or another safe loader, which makes no Python objects.
+        loader: `StrictLoader`, a subclass of it, or another loader that makes plain data only.
     """
     if len(text) > LONGEST:
         raise yaml.YAMLError(f"more than {LONGEST} characters, which no scene or sweep needs; shorten it")
@@ -91,7 +91,11 @@ def load_yaml(text: str, loader: type[Any] = StrictLoader) -> Any:
 
 
 def _characters(node: yaml.Node, known: dict[yaml.Node, float]) -> float:
-    """Return about the number of characters of a node with all aliases written out; `known` are those of others."""
+    """Return the approximate number of characters of a node with all aliases written out; inf for a loop.
+
+    Args:
+        known: numbers of nodes that were counted already; updated.
+    """
     if node not in known:
         known[node] = math.inf  # of a node that contains itself
         if isinstance(node, yaml.ScalarNode):
@@ -103,7 +107,7 @@ def _characters(node: yaml.Node, known: dict[yaml.Node, float]) -> float:
 
 
 def parse_yaml(text: str, source: str, loader: type[StrictLoader] = StrictLoader) -> Any:
-    """Return the data of a YAML text; raise InputError with `source`, the text's name, and the line."""
+    """Return the data of a YAML text; raise InputError with the text's name, `source`, and the line."""
     try:
         return load_yaml(text, loader)
     except yaml.MarkedYAMLError as error:

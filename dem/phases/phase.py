@@ -54,7 +54,7 @@ class Phase:
     of_smarticles: ClassVar[bool] = False  #: Whether the phase needs smarticles
     of_filaments: ClassVar[bool] = False  #: Whether the phase needs filaments
     sources: ClassVar[frozenset[str]] = frozenset()
-    """Keys that say where content is found that another key fixes by its hash; the scene's hash omits them."""
+    """Keys that locate content, such as `run`; the scene's hash has the content's hash in their place."""
     at_rest: ClassVar[bool] = False
     """Whether nothing drives the smarticles; φ_0 and φ_f are measured before and after phases that drive them."""
     pours: ClassVar[bool] = False  #: Whether the phase pours bodies

@@ -1,9 +1,10 @@
 """Choose engine and fidelity for a scene, from a table of measured errors and costs.
 
-`smarticles accuracy` measures a table on one scene; the shipped table joins those of three scenes, one for each
-activity that drives the pile. A row has the errors of one named fidelity, and the ratio of the measured processor time
-to the planned wall time. This ratio corrects the wall times planned for other scenes. Rows whose knob is `engine`
-compare all engines with one reference; rows whose knob is `fidelity` compare the fidelities of one engine.
+`smarticles accuracy` measures a table on one scene. The shipped table joins the tables of three scenes; an activity,
+which is a list of phases that drive the pile, names each of them. A row has the errors of one named fidelity, and the
+ratio of the measured processor time to the planned wall time. This ratio corrects the wall times planned for other
+scenes. The column `knob` states what a row compares: `engine` all engines with one reference, `fidelity` the fidelities
+of one engine.
 """
 
 import csv
@@ -20,12 +21,12 @@ from dem.scene.reading import parse_scene
 from dem.scene.scene import Scene
 from dem.setting.fidelity import FIDELITIES, fidelities
 
-SHIPPED = Path(__file__).with_name("work_precision.csv")  #: Default table
+SHIPPED = Path(__file__).with_name("work_precision.csv")  #: Default table of measured errors and costs
 
 QUANTITIES = {"phi_0": "φ_0", "phi_f": "φ_f", "crossings": "⟨N⟩"}
 """Quantities with measured errors: symbols by the names in columns and in `--of`."""
 
-PACKING = ("phi_0", "phi_f")  #: Default of `--of`
+PACKING = ("phi_0", "phi_f")  #: Quantities whose errors decide a choice by default, the option `--of`
 
 _HOW = "make one: smarticles accuracy SCENE.yaml --out DIR, then --table DIR/results/work_precision.csv"
 _FINEST = (list(FIDELITIES)[-1], "converged")
@@ -41,7 +42,7 @@ _COLUMNS = (
 class Error:
     """The relative error of a quantity."""
 
-    of: str  #: Symbol of the quantity
+    of: str  #: Symbol of the quantity, such as φ_f
     value: float  #: Relative deviation from the reference fidelity [1]; NaN if unknown
     band: float  #: Half-width of the 95 % interval over seeds [1]; NaN if unknown
 
@@ -60,22 +61,22 @@ class Measured:
     """Errors and cost of one named fidelity of an engine, from the table."""
 
     fidelity: str
-    errors: tuple[Error, ...]  #: Errors of the quantities that were asked for
+    errors: tuple[Error, ...]  #: Errors of the quantities that decide a choice
     engine: str = "yade"
     others: tuple[Error, ...] = ()  #: Errors of all other quantities
     seeds: int  #: Number of seeds
     ratio: float  #: Measured processor time over the planned wall time [1]
-    is_reference: bool  #: Whether errors are relative to this fidelity
-    hours: float = math.nan  #: Expected wall time on the scene at hand, on one core of the table's machine [h]
+    is_reference: bool  #: Whether this fidelity is the reference of all errors
+    hours: float = math.nan  #: Expected wall time of the scene to be planned, on one core of the table's machine [h]
 
     @property
     def name(self) -> str:
-        """Fidelity and engine, as `standard on links`."""
+        """Fidelity and engine in words, such as `standard on links`."""
         return f"{self.fidelity} on {self.engine}"
 
     @property
     def worst(self) -> Error:
-        """The largest error; an unknown one counts as larger than all others."""
+        """Largest error of `errors`; an unknown error counts as larger than all known ones."""
         return max(self.errors, key=lambda error: error.size)
 
 
@@ -85,10 +86,10 @@ class AccuracyTable:
 
     path: Path
     fidelities: tuple[Measured, ...]  #: Fidelities with finished runs, engine by engine, coarse to fine
-    reference: str  #: Name of the reference of all errors
-    aspect_ratio: float  #: Barb length over middle length, l/w, in the scene [1]
-    count: int  #: Number of smarticles in the scene
-    activity: str  #: Types of the scene's phases that are not at rest, separated by spaces
+    reference: str  #: Name of the fidelity to which all errors are relative
+    aspect_ratio: float  #: Barb length over middle length, l/w, in the measured scene [1]
+    count: int  #: Number of smarticles in the measured scene
+    activity: str  #: Types of the measured scene's phases in which something drives the pile, separated by spaces
 
 
 def activity_of(scene: Scene) -> str:
@@ -105,11 +106,11 @@ def read_table(
         path: the table; None: `SHIPPED`.
         of: keys of `QUANTITIES`; the errors of these quantities decide a choice.
         engine: the only engine that may be chosen; None: any.
-        activity: of the scene at hand, see `activity_of`. Of a table with several activities the rows of this one are
-            read, or of the first one if it has no such rows.
+        activity: activity of the scene to be planned, see `activity_of`. Only rows of this activity are read; if the
+            table has none, only rows of its first activity.
 
     Raises:
-        InputError: the file is missing, is no table of work and precision, or has no named fidelities.
+        InputError: the file is missing, is no table of errors and costs, or has no named fidelities.
     """
     file = SHIPPED if path is None else path
     if path is None and not file.is_file():
@@ -157,9 +158,10 @@ def read_table(
 
 
 def _named_fidelities(rows: Sequence[dict[str, str]]) -> dict[tuple[str, str], dict[str, str]]:
-    """Return the rows of named fidelities by engine and name, coarse to fine.
+    """Return the rows of named fidelities by engine and fidelity, from coarse to fine.
 
-    All rows are of one knob, since their errors must have one reference: `engine` if the table has it, else `fidelity`.
+    All rows have one value of the column `knob`, since their errors must have one reference: `engine` if there are such
+    rows, or else `fidelity`.
     """
     named = {row[_VALUE]: row for row in rows if row[_KNOB] == "engine"} or {
         # Older tables lack the column.
@@ -196,12 +198,12 @@ class Choice:
     """The engine and fidelity that were chosen for a scene."""
 
     planned: Plan  #: Plan of the scene with corrected wall times
-    expected: Measured  #: Errors and cost
-    why: str  #: The limit that decided
-    notes: tuple[str, ...]  #: Caveats
+    expected: Measured  #: Errors and cost of the chosen fidelity
+    why: str  #: Limit that decided the choice, in words
+    notes: tuple[str, ...]  #: Caveats in words
 
     def to_dict(self) -> dict[str, Any]:
-        """Return plain data for `--json`."""
+        """Return the choice as plain data, for the option `--json`."""
         return {
             "engine": self.expected.engine,
             "fidelity": self.expected.fidelity,
@@ -213,7 +215,7 @@ class Choice:
         }
 
     def to_text(self) -> str:
-        """Return the choice in words, for the terminal."""
+        """Return the choice as text for the terminal."""
         found = self.expected
         errors = "none by definition" if found.is_reference else ", ".join(map(str, found.errors))
         lines = [
@@ -235,7 +237,7 @@ def choose(
         max_hours: longest wall time on one core [h].
 
     Raises:
-        InputError: no fidelity keeps the limits; the message gives limits that can be kept.
+        InputError: no fidelity is within the limit; the message gives a limit that can be kept.
     """
     plans: dict[str, Plan] = {}
     expected: list[Measured] = []
@@ -259,15 +261,15 @@ def choose(
 def pick(expected: Sequence[Measured], *, max_error: float | None, max_hours: float | None) -> tuple[Measured, str]:
     """Return the fidelity that `choose` takes, and in words the limit that decided.
 
-    If `max_error` is given, this is the cheapest fidelity within it. Otherwise it is the most exact fidelity within
-    `max_hours`: the reference, or if that takes longer, the fidelity with the least known error among each engine's
-    finest one within `max_hours`.
+    If `max_error` is given, the cheapest fidelity within it is returned. Otherwise the reference is returned if it
+    takes at most `max_hours`. If it takes longer, each engine's finest fidelity within `max_hours` is a candidate, and
+    the candidate with the least known error is returned.
 
     Args:
         expected: fidelities of all engines, those of one engine from coarse to fine.
 
     Raises:
-        InputError: no fidelity keeps the limits.
+        InputError: no fidelity is within the limit.
     """
     quick = [one for one in expected if max_hours is None or one.hours <= max_hours]
     if max_error is None:

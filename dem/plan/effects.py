@@ -1,4 +1,4 @@
-"""Effects of a scene: which ones it needs, why, and what each adds to a run."""
+"""Decide which effects a scene needs and why, and list what each effect adds to a run."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -47,12 +47,12 @@ ADDS: Mapping[EffectName, Adds] = {
 
 @dataclass(frozen=True)
 class Decision:
-    """One effect in one scene."""
+    """Decision whether a scene needs an effect."""
 
     name: EffectName
     on: bool  #: Whether the scene needs the effect
     why: str  #: Reason in words
-    adds: Adds  #: Additions to the run; none for an effect that is off
+    adds: Adds  #: Additions to the run; empty for an effect that is off
 
 
 def decide(scene: Scene) -> tuple[Decision, ...]:

@@ -54,15 +54,15 @@ class Plan:
     engine: str = "yade"
     fidelity: str = "standard"
     stiffness_N_per_m: float = 0.0
-    named_rows: int = 1  #: `fidelity.rows` that the name of the fidelity has in the scene
-    named_stiffness_N_per_m: float = 0.0  #: Stiffness that the name of the fidelity has
-    bodies: str = "smarticles"  #: Kinds of bodies in words
+    named_rows: int = 1  #: `fidelity.rows` of the named fidelity, before changes by the scene or a rule
+    named_stiffness_N_per_m: float = 0.0  #: Stiffness of the named fidelity, before changes
+    bodies: str = "smarticles"  #: Noun for the bodies in texts
     strands: int = 0  #: `fidelity.rows` on the engine links; 0 on engines with spheres
-    most_strands: int = 0  #: Most strands of a bar, or link, on the engine links; 0 on engines with spheres
-    correction: float = 1.0  #: Factor by which wall times were corrected
+    most_strands: int = 0  #: Largest number of strands of a bar on the engine links; 0 on engines with spheres
+    correction: float = 1.0  #: Factor by which all wall times were multiplied, see `corrected`
     protocol: tuple[str, ...] = ()  #: Lines about the keys of the scene's protocol
     compile_s: float = 0.0  #: Expected processor time for code that is not compiled yet
-    overlaps: Mapping[str, float] = field(default_factory=dict)  #: Expected overlaps over a link's width, by cause
+    overlaps: Mapping[str, float] = field(default_factory=dict)  #: Expected overlap over a link's mean width, by cause
 
     def corrected(self, factor: float) -> Self:
         """Return this plan with all wall times multiplied by a factor [1]."""
@@ -106,7 +106,7 @@ class Plan:
         return "\n".join(lines)
 
     def _engine_to_text(self) -> list[str]:
-        """Return lines about the engine: knobs that it ignores, and on links the fidelity; none on YADE."""
+        """Return lines about knobs that the engine ignores and, on links, about the fidelity; none on YADE."""
         idle = ", ".join(engine_kind(self.engine).idle_knobs)
         if not self.strands:
             return [f"engine {self.engine}: {idle} have no meaning here"] if idle else []
@@ -126,7 +126,7 @@ class Plan:
 
 
 def _wall_time(wall: float) -> str:
-    """Return a wall time [s] as text, in the unit in which it has two or three digits."""
+    """Return a wall time [s] as text, in seconds, minutes or hours, with two or three digits."""
     for most, unit, name, form in ((10, 1, "s", ".1f"), (600, 1, "s", ".0f"), (7200, 60, "min", ".0f")):
         if wall < most:
             return f"{wall / unit:{form}} {name}"
@@ -208,7 +208,7 @@ def warnings_of(scene: Scene) -> tuple[str, ...]:
 
 
 def _step_warnings(scene: Scene) -> tuple[str, ...]:
-    """Return a warning in one line about filaments whose stiffness or damping needs very short steps."""
+    """Return a one-line warning if stiffness or damping of filaments needs very short steps; () otherwise."""
     if scene.mixture is None or not scene.mixture.flexible:
         return ()
     step = min(time_steps(scene))
@@ -221,7 +221,7 @@ def _step_warnings(scene: Scene) -> tuple[str, ...]:
 
 
 def engine_warnings(scene: Scene) -> tuple[str, ...]:
-    """Return a warning in one line about knobs that the scene sets and its engine ignores."""
+    """Return a one-line warning about knobs that the scene sets and its engine ignores; () without such knobs."""
     fidelity, named = scene.fidelity, scene.named_knobs
     usual = {key: named.get(key, Fidelity.model_fields[key].default) for key in engine_kind(scene.engine).idle_knobs}
     idle = [f"{key} ({getattr(fidelity, key):g})" for key, value in usual.items() if getattr(fidelity, key) != value]
@@ -246,7 +246,7 @@ def recording_warnings(scene: Scene) -> tuple[str, ...]:
 
 
 def protocol_lines(scene: Scene) -> tuple[str, ...]:
-    """Return lines about keys with the protocol's values and with others; () without a protocol."""
+    """Return lines about keys that have, and keys that have not, the protocol's values; () without a protocol."""
     if scene.protocol is None:
         return ()
     kept, other = [], []

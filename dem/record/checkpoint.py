@@ -30,7 +30,7 @@ class Checkpoint:
 
     scene_sha256: str
     made_by: tuple[str, str]  #: Name and version of the engine
-    state: Mapping[str, Any]  #: Plain data of the run
+    state: Mapping[str, Any]  #: State of the run without engine and series, as plain data
     series: Mapping[str, NDArray[Any]]  #: Columns of the series so far
     engine: bytes  #: State of the engine
 
@@ -62,7 +62,11 @@ def write_checkpoint(folder: Path, checkpoint: Checkpoint) -> None:
 
 
 def read_checkpoint(folder: Path, *, scene_sha256: str, made_by: tuple[str, str]) -> tuple[Checkpoint, str | None]:
-    """Read the newest undamaged checkpoint of a run directory, made by an engine (name, version).
+    """Read the newest undamaged checkpoint of a run directory.
+
+    Args:
+        scene_sha256: hash of the scene of which the checkpoint must be.
+        made_by: name and version of the engine that must have made it.
 
     Returns:
         The checkpoint, and a warning if the newest one is damaged and the previous one was read.
@@ -101,7 +105,7 @@ def has_checkpoint(folder: Path) -> bool:
 
 
 def _read(path: Path) -> tuple[object, Checkpoint]:
-    """Return the format of a checkpoint, and its content."""
+    """Return the number of the format of a checkpoint file, and the content."""
     with zipfile.ZipFile(path) as archive:
         reject_inflated(archive, path.stat().st_size)  # it is not compressed
         # Reading a member checks its CRC.

@@ -9,7 +9,7 @@ from dem.strict import unit_of
 class Column(NamedTuple):
     """One dataset of the series, or one field of the frames."""
 
-    unit: str  #: SI; "1" for a pure number
+    unit: str  #: Unit of the SI; "1" for a pure number
     label: str  #: Name in tables, without the unit
     description: str
 
@@ -18,10 +18,11 @@ Columns = Mapping[str, Column]  #: Datasets by name, in the order of the file
 
 
 def _columns(*, whole_names: bool = False, **described: str | tuple[str, str]) -> Columns:
-    """Return columns by name, from descriptions or pairs of label and description.
+    """Return columns by name.
 
-    Units follow from the ends of the names. A label that is not given is the name without its unit, or with
-    `whole_names` the whole name.
+    Args:
+        whole_names: whether a label that is not given is the whole name, and not the name without its unit.
+        described: description, or pair of label and description, by name. Units follow from the ends of the names.
     """
     found = {}
     for name, text in described.items():

@@ -46,7 +46,7 @@ class Phase(Document):
 
     index: NonNegativeInt
     type: str
-    #: Whether nothing drives the smarticles during the phase; absent in files written before the key was added
+    #: Whether nothing drives the smarticles during the phase; if the file lacks it, it follows from `type`
     at_rest: bool = Field(default_factory=lambda data: data.get("type") in ("deposit", "take-over", "relax"))
     time_step_s: PositiveFloat | None = None
     start_s: NonNegativeFloat | None = None
@@ -56,22 +56,22 @@ class Phase(Document):
 
 
 class Kind(Document):
-    """One kind of bodies that are no smarticles."""
+    """A kind of bodies other than smarticles."""
 
     shape: str
     bodies: NonNegativeInt  #: Number of bodies of this kind
     bars: PositiveInt  #: Number of bars of each body
     mass_kg: PositiveFloat
-    volume_m3: PositiveFloat  #: Solid volume; where bars overlap at joints it counts twice
-    length_m: PositiveFloat  #: Length of all bars together
-    thickness_normal_m: PositiveFloat  #: Of a round section its diameter
-    thickness_in_plane_m: PositiveFloat  #: Of a round section its diameter
+    volume_m3: PositiveFloat  #: Solid volume of each body; overlaps of bars at joints count twice
+    length_m: PositiveFloat  #: Sum of the bars' lengths
+    thickness_normal_m: PositiveFloat  #: Thickness along the normal; diameter of a round section
+    thickness_in_plane_m: PositiveFloat  #: Thickness in the plane; diameter of a round section
     round: bool
-    sphere_diameter_m: PositiveFloat  #: Of the spheres, or strands, that represent it
+    sphere_diameter_m: PositiveFloat  #: Diameter of the spheres, or strands, that represent a body
 
     @property
     def flexible(self) -> bool:
-        """Whether the bodies are filaments, which bend, and whose round caps reach beyond their ends."""
+        """Whether the bodies are filaments."""
         return self.shape == "filament"
 
 
@@ -85,32 +85,33 @@ class Manifest(Document):
     command: str
     started: str
     versions: Mapping[str, str]
-    #: Absent in manifests written before the key was added
+    #: Name of the engine; if the file lacks it, it follows from `versions`
     engine: str = Field(default_factory=lambda data: "links" if "links" in data["versions"] else "yade")
-    threads: NonNegativeInt  #: Threads of the engine; ranks on lammps
+    threads: NonNegativeInt  #: Number of threads of the engine, or of ranks on lammps
     fidelity: str  #: Named fidelity that gives the defaults of the scene's knobs
     count: PositiveInt
-    #: Barb length over middle length, l/w [1]. Of bodies that are no smarticles it is 0, `middle_length_m` is the
-    #: longest bar, mass and volume are means, thicknesses and diameter the smallest, spheres the most of all kinds
+    #: Barb length over middle length, l/w [1]; 0 for other bodies than smarticles. For these, `middle_length_m` is the
+    #: length of the longest bar; mass and volume are means over bodies; thicknesses and sphere diameter are the
+    #: smallest ones, and `spheres_per_smarticle` is the largest one, of all kinds
     aspect_ratio: NonNegativeFloat
     middle_length_m: PositiveFloat
     barb_length_m: NonNegativeFloat
     thickness_normal_m: PositiveFloat  #: Thickness t1 along the normal of the smarticle's plane
     thickness_in_plane_m: PositiveFloat  #: Thickness t2 in the smarticle's plane
-    middle_thickness_in_plane_m: PositiveFloat | None = None  #: t2 of the middle link; None: that of the barbs
+    middle_thickness_in_plane_m: PositiveFloat | None = None  #: t2 of the middle link; None: equal to the barbs'
     smarticle_mass_kg: PositiveFloat
     solid_volume_m3: PositiveFloat  #: Volume of one smarticle, t1 t2 (w + 2l), each link with its own t2
-    container_radius_m: PositiveFloat  #: Inner radius, of the widest tier if there are several
-    #: Radius for packing fractions; None: the container's
+    container_radius_m: PositiveFloat  #: Inner radius of the container, or of its widest tier
+    #: Radius for packing fractions; None: `container_radius_m`
     packing_radius_m: PositiveFloat | None = None
-    container_tiers: PositiveInt = 1  #: Cylinders of different radii that stand on each other
+    container_tiers: PositiveInt = 1  #: Number of coaxial cylinders of which the container consists
     planar: bool = False  #: Whether all motion is confined to a plane, without a container
     channel_width_m: PositiveFloat | None = None  #: Distance of the two walls in a plane; None without walls
     sphere_diameter_m: PositiveFloat
     spheres_per_smarticle: PositiveInt
     time_step_s: PositiveFloat  #: Shortest time step of all phases
     phases: tuple[Phase, ...]
-    kinds: tuple[Kind, ...] | None = None  #: Kinds of bodies; None: smarticles
+    kinds: tuple[Kind, ...] | None = None  #: Kinds of bodies; None: the bodies are smarticles
     taken_over: Mapping[str, Any] | None = None  #: `Phase.origin`: the run from which smarticles were taken
 
     @model_validator(mode="after")
@@ -127,7 +128,7 @@ class Manifest(Document):
 
     @property
     def bulge_m(self) -> float:
-        """Half the difference between the in-plane thicknesses of middle link and barbs [m]."""
+        """Half the difference of the thicknesses in the plane, middle link less barbs [m]."""
         return (self.thicknesses_in_plane_m[1] - self.thickness_in_plane_m) / 2
 
     @property
@@ -136,16 +137,16 @@ class Manifest(Document):
         return self.container_radius_m if self.packing_radius_m is None else self.packing_radius_m
 
     def walled(self, phase: int) -> bool:
-        """Return whether the container has a wall throughout a phase, given by its index."""
+        """Return whether the container has its wall during the whole phase with index `phase`."""
         return not self.planar and all(record.type != "remove-container" for record in self.phases[: phase + 1])
 
     def fills_cylinder(self, phase: int) -> bool:
-        """Return whether the pile fills a cylinder in a phase (index), and so has a packing fraction."""
+        """Return whether the pile is in a cylinder in the phase with index `phase`, and so has a packing fraction."""
         return self.container_tiers == 1 and self.walled(phase)
 
 
 class Done(Document):
-    """Times and cost of a run that is done, `done.json`, which is written last."""
+    """Times and cost of a run that is done: the content of `done.json`, the last file that a run writes."""
 
     status: Literal["done"] = "done"
     time_s: NonNegativeFloat
@@ -172,13 +173,13 @@ class Failed(Document):
     checkpoint_s: NonNegativeFloat | None = None  #: Simulated time of the newest checkpoint; None: no checkpoint
 
     def mark(self, out: Path) -> None:
-        """Write `failed.json` into a run directory; errors are ignored, since the terminal has the cause too."""
+        """Write `failed.json` into a run directory; errors are ignored, since the terminal shows the cause too."""
         with suppress(RunError):
             self.write(out / FAILED)
 
 
 class Progress(Document):
-    """Progress of a running run, `progress.json`, at most a second old."""
+    """Progress of a running run, the content of `progress.json`, which is rewritten every second."""
 
     phase: str | None = None  #: Type of the current phase
     time_s: float | None = None  #: Simulated time

@@ -13,7 +13,7 @@ from dem.record.names import partial
 
 @contextlib.contextmanager
 def whole(path: Path, *, before: Path | None = None, shared: bool = False) -> Iterator[Path]:
-    """Yield a temporary path, which is renamed to `path` if the block succeeds, and removed otherwise.
+    """Yield a temporary path for a file, which is renamed to `path` if the block succeeds, or else removed.
 
     Args:
         before: path to which an existing file is moved; None: it is overwritten.
@@ -37,7 +37,7 @@ def write_whole(path: Path, write: Callable[[Path], object], *, make_folder: boo
     """Write or replace a file, completely or not at all.
 
     Args:
-        write: function that writes the content to the temporary path that it is given.
+        write: function that writes the content to a given path, which is temporary.
         make_folder: whether to make the file's folder if it is missing.
 
     Raises:
@@ -66,7 +66,7 @@ def write_text(path: Path, text: str, *, make_folder: bool = True) -> None:
 
 
 def reject_inflated(archive: zipfile.ZipFile | None, most: int) -> None:
-    """Raise ValueError if an archive, which a stranger may have made, would unpack to more than `most` bytes."""
+    """Raise ValueError if an archive would unpack to more than `most` bytes; guards against malicious files."""
     total = sum(member.file_size for member in archive.infolist()) if archive else 0
     if total > most:
         raise ValueError(f"it would unpack to {total} bytes, at most {most} are possible")
@@ -77,7 +77,8 @@ def cannot_read(what: str, path: Path, cause: BaseException | str, remedy: str) 
 
     Args:
         what: kind of the file, for the message.
-        remedy: what to do.
+        cause: what is wrong with the file.
+        remedy: what the user can do.
     """
     if isinstance(cause, BaseException):
         lines = str(cause).strip().splitlines()

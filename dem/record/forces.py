@@ -16,15 +16,15 @@ from dem.record.names import FORCE, collection, member
 
 _HEAD, _EMPTY = 512, b'NumberOfCells="0"'
 NO_FORCES = "a run does where its scene says recording.contact_forces: true"
-"""Text about what to do, for messages about a run without recorded forces."""
+"""Advice for messages about a run without recorded forces."""
 _REMEDY = "run the scene anew; forces are recorded by recording.contact_forces: true"
 
 
 def force_mesh(found: ContactForces, positions: Array, *, time: float, phase: int) -> meshio.Mesh:
-    """Return a mesh of lines, one for each contact.
+    """Return a mesh of lines, one for each contact, for a VTK file.
 
-    A line goes from the first smarticle's centre of mass to that of the second, or to the point of contact at a
-    boundary.
+    A line goes from the centre of mass of the first smarticle to that of the second smarticle, or to the point of
+    contact at a boundary.
 
     Args:
         positions: (N, 3) centres of mass of the smarticles [m].

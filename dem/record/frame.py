@@ -26,7 +26,7 @@ VERTICES = 4
 
 
 def _remedy(path: Path) -> str:
-    """Return what to do about an unreadable frame; a resumed run does not write earlier frames again."""
+    """Return advice about an unreadable frame; to resume the run is none, since it does not write the frame again."""
     if path.suffix == ".vtkhdf":
         return REMEDY.format(path.with_name(SCENE))
     scene = path.parent.parent / SCENE
@@ -53,7 +53,7 @@ def centreline_mesh(
         contacts: (N,) number of other smarticles that each smarticle touches.
         time: simulated time [s].
         floor: height of the container's floor [m].
-        extra: further cell data by name, (3N,) or (3N, 3), such as `motor_fields`.
+        extra: further cell data by name, (3N,) or (3N, 3), such as those of `motor_fields`.
     """
     n, number = len(vertices), LINKS * len(vertices)
     data = {
@@ -128,7 +128,7 @@ def segment_mesh(state: BarState, *, contacts: Numbers, time: float, floor: floa
 
 
 def sphere_mesh(state: PileState, particle: Particle | Mixture) -> meshio.Mesh:
-    """Return the spheres of all bodies as points, for ParaView's glyphs."""
+    """Return the centres of all bodies' spheres as a mesh of points, for ParaView's glyphs."""
     bodies: Sequence[Particle | Kind]
     if state.bodies is not None:
         bodies = [state.bodies.mixture.kinds[k] for k in state.bodies.kind]
@@ -153,12 +153,12 @@ def _lines(count: int) -> Numbers:
 
 @dataclass(frozen=True, eq=False)
 class RecordedBars:
-    """All bars of N bodies that are no smarticles, M of them, body by body."""
+    """All M bars of N bodies that are no smarticles, body by body."""
 
-    segments: Array  #: (M, 2, 3) both ends [m]
-    body: Numbers  #: (M,) index of the body that each belongs to
-    number: Numbers  #: (M,) number of each in its body
-    kind: Numbers  #: (N,) kind of each body, a place in `Manifest.kinds`
+    segments: Array  #: (M, 2, 3) both ends of each bar [m]
+    body: Numbers  #: (M,) number of the body to which each bar belongs
+    number: Numbers  #: (M,) number of each bar in its body
+    kind: Numbers  #: (N,) kind of each body, as index of `Manifest.kinds`
     normals: Array  #: (M, 3) unit vectors along the normal of flat sections; zeros where the section is round [1]
 
 
@@ -171,10 +171,10 @@ class Frame:
     """
 
     path: Path  #: The file
-    number: int  #: Place in the sequence of the run's frames, from 0
+    number: int  #: Index in the sequence of the run's frames
     time: float  #: Simulated time [s]
     floor_z: float  #: Height of the container's floor [m]; heights are measured from it
-    phase: int  #: Index into `Run.phases`
+    phase: int  #: Index of the phase in `Run.phases`
     #: (N, 4, 3) float64 [m], barb tip, hinge, hinge, barb tip of each smarticle, in its shape at that time; (N, 0, 3)
     #: for bodies that are no smarticles
     vertices: Array = field(repr=False)
@@ -187,7 +187,7 @@ class Frame:
     #: Further data of the file, (N, 3, …) or (M, …) one value per link, by name. Frames of scenes that actuate have
     #: `angle_rad`, `motor_torque_N_m` and `motor_work_J`, NaN on the middle link and on welded smarticles, and `halted`
     cell_data: Mapping[str, NDArray[Any]] = field(repr=False)
-    bars: RecordedBars | None = field(repr=False, default=None)  #: Of bodies that are no smarticles
+    bars: RecordedBars | None = field(repr=False, default=None)  #: Bars of other bodies; None for smarticles
 
     @property
     def directory(self) -> Path:
@@ -208,7 +208,7 @@ class Frame:
 
     @property
     def body(self) -> Numbers:
-        """(M,) index of the body that each segment belongs to."""
+        """(M,) number of the body to which each segment belongs."""
         return np.repeat(np.arange(self.count), LINKS) if self.bars is None else self.bars.body
 
     @property
@@ -218,15 +218,15 @@ class Frame:
 
     @property
     def kind(self) -> Numbers:
-        """(N,) kind of each body, a place in `Manifest.kinds`; 0 for smarticles."""
+        """(N,) kind of each body, as index of `Manifest.kinds`; 0 for smarticles."""
         return np.zeros(self.count, np.int64) if self.bars is None else self.bars.kind
 
 
 def read_frame(path: Path | str, number: int | None = None) -> Frame:
-    """Return a frame of a file, `.vtu` or `.vtkhdf`; raise InputError if it is missing or damaged.
+    """Return a frame from a file, `.vtu` or `.vtkhdf`; raise InputError if the frame is missing or damaged.
 
     Args:
-        number: number of the frame in its run; needed for `.vtkhdf`. None: by the name of the file.
+        number: number of the frame in its run; needed for `.vtkhdf`. None: from the name of the file.
     """
     path = Path(path)
     if number is None:
@@ -303,7 +303,13 @@ def read_frame(path: Path | str, number: int | None = None) -> Frame:
 def _form(
     points: NDArray[Any], lines: NDArray[Any], reject: Callable[[str], NoReturn], *, general: bool
 ) -> tuple[int, ...]:
-    """Return the form of values of links, (N, 3) of smarticles or (M,) of other bodies; reject damaged lines."""
+    """Return the shape of an array with a value per link: (N, 3) for smarticles, (M,) for other bodies.
+
+    Points or lines of a damaged frame are rejected by a call of `reject`.
+
+    Args:
+        general: whether the bodies are no smarticles.
+    """
     form: tuple[int, ...]
     if general:
         form, expected, joined = (len(lines),), 2 * len(lines), "its own two points"
@@ -328,8 +334,8 @@ def read_mesh(path: Path, what: str = "frame", remedy: str | None = None, *, num
 
     Args:
         what: kind of the file, for the message.
-        remedy: what to do, for the message; None: advice for frames.
-        number: number of the frame in a file of all frames, `.vtkhdf`.
+        remedy: advice for the message; None: advice for frames.
+        number: number of the frame in its run, for a `.vtkhdf`, which holds all frames.
     """
     if path.suffix == ".vtkhdf":
         return read_step(path, number)

@@ -27,10 +27,10 @@ _GONE = "is gone; put it back and continue with `smarticles resume`, or start th
 
 @dataclass
 class FrameWriter:
-    """Writer of frames into a run directory, which rewrites their list, `frames.pvd`, with each frame."""
+    """Writer of frames into a run directory; with each frame it rewrites `frames.pvd`, the list of frames."""
 
     folder: Path  #: The run directory
-    noun: str = names.FRAME  #: Kind of files; "sphere" gives `spheres.pvd` and `spheres/sphere_000000.vtu`
+    noun: str = names.FRAME  #: Noun for names of files; "sphere" gives `spheres.pvd` and `spheres/sphere_000000.vtu`
     times: list[float] = field(default_factory=list)  #: Times of the frames written so far [s]
 
     def write(self, mesh: meshio.Mesh, time: float) -> None:
@@ -41,7 +41,7 @@ class FrameWriter:
         write_text(self.folder / names.collection(self.noun), self._collection(), make_folder=False)
 
     def check(self) -> None:
-        """Raise RunError if a file that was written is gone."""
+        """Raise RunError if a file that this writer wrote is missing."""
         folder = self.folder / names.folder(self.noun)
         present = {path.name for path in folder.iterdir()} if folder.is_dir() else set()
         for number in range(len(self.times)):
@@ -70,8 +70,8 @@ class FrameWriter:
 class OneFileWriter(FrameWriter):
     """Writer of frames into one file, `frames.vtkhdf`, with the radius of each line."""
 
-    radii: Sequence[float] = ()  #: Radii of all kinds of lines [m]
-    kind: str = "link"  #: Cell data of frames with the kind of each line
+    radii: Sequence[float] = ()  #: Radius of the lines of each kind of body or link [m]
+    kind: str = "link"  #: Name of the cell data with the kind of each line, an index of `radii`
 
     def write(self, mesh: meshio.Mesh, time: float) -> None:
         """Write one frame at a simulated time [s]."""
@@ -85,7 +85,7 @@ class OneFileWriter(FrameWriter):
         self.times.append(time)
 
     def check(self) -> None:
-        """Raise RunError if the file is gone."""
+        """Raise RunError if the file is missing although frames were written."""
         path = self.folder / names.VTKHDF
         if self.times and not path.is_file():
             raise RunError(f"{path}: {_GONE}")
@@ -97,12 +97,12 @@ class OneFileWriter(FrameWriter):
 
 
 class FrameSequence(Sequence[Frame]):
-    """The frames of a run in time order; each access reads a file, and a slice reads none.
+    """The frames of a run in time order; access to a frame reads its file, a slice reads no file.
 
     Attributes:
         times: (n,) float64 [s], as listed in `frames.pvd` or `frames.vtkhdf`.
-        paths: the files, in time order; one file for all frames is repeated.
-        numbers: (n,) numbers of the frames in their run; from 0 if they are not given.
+        paths: (n,) files in time order; a file that holds all frames is repeated.
+        numbers: (n,) numbers of the frames in their run; 0, 1, 2, … by default.
     """
 
     def __init__(self, times: Array, paths: tuple[Path, ...], numbers: Sequence[int] | None = None) -> None:
@@ -137,12 +137,12 @@ class FrameSequence(Sequence[Frame]):
         return int(np.argmin(np.abs(self.times - time)))
 
     def after(self, time: float) -> FrameSequence:
-        """Return the frames later than a time [s], without reading any."""
+        """Return the frames later than a time [s], without reading a file."""
         # Times in the list are rounded to nine digits.
         return self[bisect_right(self.times, time + 1e-8 * max(abs(time), 1.0)) :]
 
     def in_phase(self, phase: int) -> FrameSequence:
-        """Return the frames of a phase, given by its index; a bisection reads only a few frames."""
+        """Return the frames of the phase with index `phase`; bisection reads only a few files."""
         first = bisect_left(self, phase, key=attrgetter("phase"))
         last = bisect_right(self, phase, lo=first, key=attrgetter("phase"))
         return self[first:last]

@@ -1,8 +1,8 @@
-"""A file that is changed in place, and whose changes are made all or not at all; HDF5 by itself offers no such thing.
+"""A file that is changed in place, with changes that are made completely or not at all, which HDF5 lacks.
 
-Changes stay in memory until `Journaled.commit`, which stores the present content of all pages that change beside the
-file, changes the file, and removes the stored pages. A process that ends in between leaves them, and the next one reads
-the file as it was before. A full disk is noticed by `commit`, not inside of the library that writes.
+Changes stay in memory until `Journaled.commit`. It stores the old content of all changed pages in a second file, the
+journal, changes the file, and removes the journal. A process that ends in between leaves the journal, from which the
+next process restores the file. A full disk causes an error in `commit`, not in the HDF5 library.
 
 Source: the rollback journal of SQLite, https://www.sqlite.org/atomiccommit.html
 """
@@ -17,12 +17,12 @@ from typing import Any
 
 from dem.record.files import whole
 
-PAGE = 4096  #: Bytes that are read and stored together
+PAGE = 4096  #: Size of a page, the unit of reading and storing [bytes]
 _NUMBER = 8  # bytes of a whole number in a journal
 
 
 class Journaled(io.RawIOBase):
-    """A file object for reading and writing; see the module for when changes reach the disk.
+    """A file object for reading and writing, which writes changes to the disk in `commit` only.
 
     Raises:
         OSError: the file or its journal cannot be read.
@@ -39,29 +39,29 @@ class Journaled(io.RawIOBase):
         self._pages = {number: bytearray(content) for number, content in pages.items()}
 
     def close(self) -> None:
-        """Close the file; changes that are not committed are forgotten."""
+        """Close the file; changes that were not committed are lost."""
         self._disk.close()
         super().close()
 
     def seek(self, offset: int, whence: int = os.SEEK_SET) -> int:
-        """Move the place of the next read or write, and return it."""
+        """Set the position of the next read or write, and return it."""
         self._place = offset + {os.SEEK_SET: 0, os.SEEK_CUR: self._place, os.SEEK_END: self._size}[whence]
         return self._place
 
     def truncate(self, size: int | None = None) -> int:
-        """Set the size of the file [bytes], and return it."""
+        """Set the size of the file [bytes], and return it; None: to the present position."""
         self._size = self._place if size is None else size
         return self._size
 
     def readinto(self, buffer: Any) -> int:
-        """Read into a buffer; bytes behind the end are zeros, as the HDF5 library expects them."""
+        """Fill a buffer from the present position, and return its size; bytes beyond the file's end are zeros."""
         view = memoryview(buffer).cast("B")
         for number, start, stop, at in self._spans(len(view)):
             view[at : at + stop - start] = self._page(number)[start:stop]
         return len(view)
 
     def write(self, data: Any) -> int:
-        """Change bytes in memory; return their number."""
+        """Write bytes at the present position, in memory; return their number."""
         view = memoryview(data).cast("B")
         for number, start, stop, at in self._spans(len(view)):
             page = self._pages.setdefault(number, self._page(number))
@@ -70,7 +70,11 @@ class Journaled(io.RawIOBase):
         return len(view)
 
     def _spans(self, length: int) -> list[tuple[int, int, int, int]]:
-        """Return page, start and stop in it, and place in the data, of the next bytes, and move behind them."""
+        """Divide the next `length` bytes into pages, and move the position behind them.
+
+        Returns:
+            For each page its number, start and stop in the page, and offset of this part in the `length` bytes.
+        """
         spans, at, end = [], 0, self._place + length
         while self._place < end:
             number, start = divmod(self._place, PAGE)
@@ -81,12 +85,12 @@ class Journaled(io.RawIOBase):
         return spans
 
     def _page(self, number: int) -> bytearray:
-        """Return the present content of a page, filled up with zeros."""
+        """Return the present content of a page; zeros follow the end of the file."""
         found = self._pages.get(number)
         return found or bytearray(os.pread(self._disk.fileno(), PAGE, number * PAGE).ljust(PAGE, b"\0"))
 
     def commit(self) -> None:
-        """Make all changes on the disk; raise OSError if that fails, and leave the file as it was."""
+        """Write all changes to the disk; if that fails, restore the file and raise OSError."""
         disk = self._disk.fileno()
         size = os.fstat(disk).st_size
         changed = self._pages.keys() | range(self._size // PAGE, -(-size // PAGE))  # the latter are cut off
@@ -108,7 +112,7 @@ def journal_of(path: Path) -> Path:
 
 
 def roll_back(path: Path) -> None:
-    """Undo a change that did not come to its end; raises as `Journaled` does."""
+    """Restore a file from its journal, if there is one, and remove the journal; errors as in `Journaled`."""
     found = read_journal(path)
     if found is not None:
         _change(path, *found)
@@ -116,7 +120,7 @@ def roll_back(path: Path) -> None:
 
 
 def read_journal(path: Path) -> tuple[int, dict[int, bytes]] | None:
-    """Return size [bytes] and pages by number that a file had before a change; None where no change is under way."""
+    """Return the content of a file's journal: old size [bytes], and old pages by number; None without journal."""
     try:
         content = journal_of(path).read_bytes()
     except FileNotFoundError:
@@ -147,7 +151,7 @@ def _write_journal(path: Path, size: int, pages: Mapping[int, bytes]) -> None:
 
 
 def _change(path: Path, size: int, pages: Mapping[int, bytes | bytearray]) -> None:
-    """Write pages of a file, and set its size [bytes]."""
+    """Write pages, given by number, into a file, and set the size of the file [bytes]."""
     with path.open("r+b") as file:
         for number in sorted(pages):
             file.seek(number * PAGE)

@@ -22,17 +22,17 @@ CHECKPOINT_FORMAT = 4
 
 
 def folder(noun: str) -> str:
-    """Return the name of the folder for a noun: `frames` for "frame"."""
+    """Return the name of the folder of numbered files: `frames` for the noun "frame"."""
     return f"{noun}s"
 
 
 def collection(noun: str) -> str:
-    """Return the name of the file that lists all files of a noun with times: `frames.pvd` for "frame"."""
+    """Return the name of the list of numbered files and their times: `frames.pvd` for the noun "frame"."""
     return f"{noun}s.pvd"
 
 
 def member(noun: str, number: int) -> str:
-    """Return the path of a numbered file of a noun: `frames/frame_000000.vtu` for "frame" and 0."""
+    """Return the path of a numbered file: `frames/frame_000000.vtu` for the noun "frame" and 0."""
     return f"{noun}s/{noun}_{number:06d}.vtu"
 
 
@@ -43,5 +43,5 @@ def partial(name: str) -> str:
 
 
 def is_partial(name: str) -> bool:
-    """Return whether a name is temporary, as of a file that a killed process has left incomplete."""
+    """Return whether a name is one that `partial` gives, as of a file that a killed process left incomplete."""
     return name.startswith(".") and ".partial." in name

@@ -1,4 +1,4 @@
-"""Packing fraction by the paper's definition, up to the second-highest centre of mass."""
+"""Packing fraction by the paper's definition: up to the height of the second-highest centre of mass."""
 
 import math
 

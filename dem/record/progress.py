@@ -49,14 +49,14 @@ class ProgressWriter:
         warn(message)
 
     def checkpointed(self, time: float) -> None:
-        """Write the simulated time [s] of a new checkpoint at once."""
+        """Write the simulated time [s] of a new checkpoint without delay."""
         progress = self._progress = self._progress.model_copy(update={"checkpoint_s": time})
         if progress.count is not None:
             self._last = -math.inf
             self.update(time=time, phi=math.nan if progress.phi is None else progress.phi, count=progress.count)
 
     def update(self, *, time: float, phi: float, count: int) -> None:
-        """Write simulated time [s], packing fraction [1] and number of smarticles, if a second has passed."""
+        """Write simulated time [s], packing fraction [1] and number of smarticles, at most once per second."""
         wall, known_phi = monotonic(), phi if math.isfinite(phi) else None
         update = {"time_s": time, "phi": known_phi, "count": count, "wall_s": wall - self._begun}
         self._progress = self._progress.model_copy(update=update)

@@ -27,21 +27,21 @@ _PARTS = ("smarticle", "container", "plane", "hooks", "contact", "motor", "fidel
 
 @dataclass(frozen=True, kw_only=True)
 class Status:
-    """State and progress of a run; None for what its files do not hold."""
+    """State and progress of a run; fields that its files do not hold are None."""
 
     state: State
-    cause: str | None = None  #: Why it failed or was interrupted
-    phase: str | None = None  #: Type of its current phase
+    cause: str | None = None  #: Cause of failure or interruption
+    phase: str | None = None  #: Type of the current phase
     time_s: float | None = None  #: Simulated time [s]
-    steps: int | None = None  #: Time steps of a done run
-    wall_s: float | None = None  #: Wall time so far [s]
+    steps: int | None = None  #: Number of time steps of a done run
+    wall_s: float | None = None  #: Wall time of the run so far [s]
     cpu_s: float | None = None  #: Processor time of a done run [s]
-    checkpoint_s: float | None = None  #: Simulated time of the checkpoint from which it can be resumed [s]
+    checkpoint_s: float | None = None  #: Simulated time of the checkpoint from which the run can be resumed [s]
 
 
 @dataclass(frozen=True)
 class Run:
-    """A run directory, finished or not; each part is read once, at the first access.
+    """A run directory, of a finished or unfinished run; each part is read once, at the first access.
 
     Access to a part raises InputError if its file is missing, damaged or of another format.
     """
@@ -133,7 +133,7 @@ class Run:
 
     @property
     def progress(self) -> Progress:
-        """Progress of a running run; empty otherwise."""
+        """Progress of a running run; all fields are None for other runs."""
         try:
             return Progress.read(self.path / PROGRESS)
         except InputError:
@@ -146,7 +146,7 @@ class Run:
 
     @property
     def lost_series(self) -> str | None:
-        """Warning about a missing series of a run that is done; None otherwise."""
+        """Warning if the series of a done run is missing; None otherwise."""
         if self.has_series or not (self.path / DONE).exists():
             return None
         return (
@@ -176,7 +176,7 @@ def _within(path: Path, place: str, value: Any) -> Any:
 
 @dataclass(frozen=True)
 class ForceSequence:
-    """The forces at contacts of a run, one item for each frame, read at each access."""
+    """The forces at contacts of a run, one item for each frame; each access reads a file."""
 
     frames: FrameSequence
 
@@ -188,7 +188,7 @@ class ForceSequence:
 
 
 def _reject_place(path: Path) -> NoReturn:
-    """Raise InputError about a path that is no run directory, with what it is instead."""
+    """Raise InputError about a path that is no run directory; the message states what the path is."""
     remedy = REMEDY
     if not path.exists():
         cause = "no such directory"

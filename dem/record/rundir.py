@@ -22,7 +22,7 @@ class Claim:
 
     @property
     def held(self) -> bool:
-        """Whether the path still leads to the locked directory, which was not deleted, moved or replaced."""
+        """Whether the path still leads to the locked directory, which could have been deleted or moved."""
         try:
             present = (self.out / LOCK).stat()
         except OSError:
@@ -30,7 +30,7 @@ class Claim:
         return os.path.samestat(present, os.fstat(self.lock.fileno()))
 
     def check(self) -> None:
-        """Raise RunError if the directory is not the locked one any more, or has lost its manifest."""
+        """Raise RunError if the path no longer leads to the locked directory, or the manifest is missing."""
         if not self.held:
             raise RunError(
                 f"{self.out}: was deleted, moved or replaced while the run wrote into it (its lock, {LOCK}, is gone or "
@@ -47,7 +47,7 @@ class Claim:
 def claimed(out: Path, *, resume: bool) -> Iterator[Claim]:
     """Lock a run directory while a run writes into it, and make it if needed.
 
-    The lock is held by the kernel and ends with the process, so that it is never stale.
+    The operating system holds the lock and releases it with the end of the process, so that it is never stale.
 
     Args:
         resume: whether the directory must hold a run; otherwise it must be new or empty.

@@ -33,10 +33,10 @@ _REMEDY = "give the directory of a run that has recorded its series, or run it a
 
 @dataclass
 class SeriesWriter:
-    """Writer of the series, which keeps all rows and rewrites the whole of `series.h5`."""
+    """Writer of the series, which keeps all rows in memory and always rewrites `series.h5` completely."""
 
     folder: Path  #: The run directory
-    described: Columns  #: Columns that each row has
+    described: Columns  #: Columns of each row, by name
     attributes: Mapping[str, Any]  #: Attributes of the file
     _rows: dict[str, list[Any]] = field(default_factory=dict)
     _written: float = -math.inf
@@ -57,7 +57,7 @@ class SeriesWriter:
         return {name: np.array(values) for name, values in self._rows.items()}
 
     def restore(self, columns: Mapping[str, NDArray[Any]]) -> None:
-        """Replace all rows by those of `columns`, arrays of the form that the property `columns` has."""
+        """Replace all rows by the rows of `columns`: (n,), (n, 2) or (n, 3) arrays by name."""
         self._rows = {name: list(columns[name]) for name in self.described}
 
     def keep_up(self) -> None:
@@ -177,9 +177,10 @@ def read_series(directory: Path | str) -> Series:
 
 
 def _foreign(file: h5py.File) -> str | None:
-    """Return which dataset of a file does not hold numbers that are stored in the file itself, or None.
+    """Return a message about the first dataset that is unsafe to read, or None if all are safe.
 
-    Links may lead to other files, and a dataset that is compressed or not stored may fill the memory.
+    A safe dataset holds numbers that are stored in the file. Links may lead to other files, and a dataset that is
+    compressed or not stored may fill the memory.
     """
     for name in file:
         linked = not isinstance(file.get(name, getlink=True), h5py.HardLink)
@@ -192,7 +193,7 @@ def _foreign(file: h5py.File) -> str | None:
 
 
 def _wrong(attributes: dict[str, Any], data: dict[str, NDArray[Any]]) -> str | None:
-    """Return what is wrong with the content of a file, or None."""
+    """Return in words what is wrong with the content of a file; None for correct content."""
     for key in ("format", "scene_sha256", "seed"):
         if key not in attributes:
             return f"attribute '{key}' is missing"

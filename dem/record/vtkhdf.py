@@ -1,7 +1,8 @@
 """Frames of a run in one file, `frames.vtkhdf`: a temporal PolyData of VTKHDF 2.0; see docs/reference/files.md.
 
-A step is one mesh of lines with data by name. Steps with the same lines share them. Rows of a step begin a chunk of
-their own, so that a later step changes no chunk of an earlier one; VTK reads by offsets and skips the gaps.
+A step is the frame of one time: a mesh of lines with data by name. Steps with equal lines share them in the file. The
+rows of a step begin a new chunk, so that a later step changes no chunk of an earlier step; VTK reads by offsets and
+skips the gaps.
 
 Source: https://docs.vtk.org/en/latest/vtk_file_formats/vtkhdf_file_format/vtkhdf_specifications.html
 """
@@ -24,8 +25,8 @@ from dem.record.files import cannot_read, write_whole
 from dem.record.journal import Journaled, journal_of, roll_back
 from dem.record.names import SCENE
 
-REMEDY = "put the file back, or run {} anew elsewhere"  #: Text about what to do, for the path of a scene
-RADIUS = "radius_m"  #: Name of the radii of bodies, which ParaView's filter Tube takes
+REMEDY = "put the file back, or run {} anew elsewhere"  #: Advice for messages, to be filled with the path of a scene
+RADIUS = "radius_m"  #: Name of the dataset of radii, for ParaView's filter Tube
 _KINDS = ("Vertices", "Lines", "Polygons", "Strips")  # in the order of VTK's columns of offsets
 _LINES = _KINDS.index("Lines")
 _BY_KIND = ("CellOffsets", "ConnectivityIdOffsets")  # lists with a column per kind
@@ -73,7 +74,7 @@ def append(path: Path, mesh: meshio.Mesh, time: float) -> None:
 
 
 def truncate(path: Path, number: int) -> None:
-    """Keep the first steps, a number of them; raise RunError if the file cannot be written."""
+    """Keep the first `number` steps, and remove later ones; raise RunError if the file cannot be written."""
     if number == 0:
         path.unlink(missing_ok=True)
         journal_of(path).unlink(missing_ok=True)
@@ -92,7 +93,7 @@ def read_step(path: Path, number: int) -> meshio.Mesh:
 
 
 def check_times(path: Path, times: Sequence[float]) -> None:
-    """Raise InputError unless a file can be continued after steps of these times [s], its first ones."""
+    """Raise InputError unless the first steps have the times `times` [s], and a run can continue after them."""
     if not times:
         return
     if not np.array_equal(read_times(path)[: len(times)], times):
@@ -106,7 +107,14 @@ def check_times(path: Path, times: Sequence[float]) -> None:
 
 
 def _make(root: Any, name: str, empty: NDArray[Any], rows: int) -> None:
-    """Create a dataset without rows; lists of steps are not packed, since each step changes them."""
+    """Create a dataset without rows.
+
+    Args:
+        name: path of the dataset below `root`.
+        empty: array with the type and the shape of a row, (0, …).
+        rows: rows of a chunk; chunks of `_CHUNK` rows are compressed, shorter ones are not, since each step changes
+            them.
+    """
     packed = {"compression": 4, "shuffle": True} if rows == _CHUNK else {}
     shape = empty.shape[1:]
     # Rows whose chunk is lost have values that no frame has.
@@ -132,7 +140,12 @@ def _append(root: Any, mesh: meshio.Mesh, time: float) -> None:
 
 
 def _lines(root: Any, lines: NDArray[np.int64], points: int) -> dict[str, Any]:
-    """Add lines (n, 2) of a step, unless those of the step before are equal, and return the offsets of the step."""
+    """Add the lines of a step, unless the previous step has equal lines; return the offsets of the step's lines.
+
+    Args:
+        lines: (n, 2) numbers of the points that lines join.
+        points: number of points of the step.
+    """
     parts, number, stored = len(root["NumberOfPoints"]), len(lines), root["Lines"]
     part, cell, end = parts - 1, len(stored["Offsets"]) - (number + 1), len(stored["Connectivity"]) - 2 * number
     counts = (root["NumberOfPoints"][part], stored["NumberOfCells"][part]) if parts else (0, 0)
@@ -151,7 +164,7 @@ def _lines(root: Any, lines: NDArray[np.int64], points: int) -> dict[str, Any]:
 
 
 def _extend(dataset: Any, values: ArrayLike, *, apart: bool = False) -> int:
-    """Add rows to a dataset, and return the place of the first one; `apart`: in a chunk of their own."""
+    """Add rows to a dataset, and return the index of the first; with `apart` the rows begin a new chunk."""
     start = len(dataset)
     if apart:
         start = -(-start // _CHUNK) * _CHUNK
@@ -195,7 +208,12 @@ def _change(path: Path, change: Callable[[Any], None]) -> None:
 
 
 def _read(path: Path, what: str, take: Callable[[Any], T]) -> T:
-    """Return what is taken from a file, as it was at one moment, although a run may write into it."""
+    """Return the result of `take` for the root of a file, from one moment, although a run may write into it.
+
+    Args:
+        what: noun for the message of an InputError.
+        take: function that reads from the group VTKHDF.
+    """
     for attempt in range(_TRIES):
         before = _stamp(path)
         failed: Exception | None = None
@@ -228,7 +246,7 @@ def _opened(path: Path) -> Iterator[Any]:
 
 
 def _stamp(path: Path) -> tuple[float, ...]:
-    """Return what changes whenever a run begins or ends a change of a file: sizes and times of it and its journal."""
+    """Return sizes and times of a file and its journal, which differ before and after any change."""
     found: list[float] = []
     for each in (path, journal_of(path)):
         try:
@@ -241,7 +259,7 @@ def _stamp(path: Path) -> tuple[float, ...]:
 
 
 def _rows(root: Any, name: str, start: int, number: int) -> NDArray[Any]:
-    """Return rows of a dataset; raise ValueError if the file does not hold them itself.
+    """Return rows `start` to `start + number` of a dataset; raise ValueError if they are not in this file.
 
     HDF5's own functions are called, since h5py's indexing doubles the time for reading a frame.
     """

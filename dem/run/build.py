@@ -89,7 +89,7 @@ def _frame_writer(scene: Scene, out: Path) -> FrameWriter:
 
 
 def watched_points(scene: Scene) -> Callable[[PileState], Array]:
-    """Return a function from states to the points (N, P, 3) [m] that the watchdog checks.
+    """Return a function that gives the points (N, P, 3) [m] of a state that the watchdog checks.
 
     The points are the centres of all spheres, or the ends and middles of smooth links.
     """
@@ -128,7 +128,7 @@ def build_watchdog(scene: Scene) -> Watchdog:
 
 @dataclass(frozen=True)
 class Builders:
-    """Functions that make a run's time steps (one per phase [s]), engine and recorder; tests replace them."""
+    """Functions that make parts of a run: time steps (one per phase [s]), engine, recorder; tests replace them."""
 
     steps: Callable[[Scene], Sequence[float]] = time_steps
     engine: Callable[[Scene, float], Engine] = build_engine

@@ -31,7 +31,7 @@ class Recorder:
     sampler: Sampler
     series: SeriesWriter
     frames: FrameWriter
-    watchdog: Watchdog  #: Checks the state at intervals, at every checkpoint and at the end
+    watchdog: Watchdog  #: Checks the state: at intervals, at every checkpoint and at the end
     points: Callable[[PileState], Array]  #: Returns (N, P, 3) points of a state that must stay inside the container [m]
     progress: ProgressWriter
     interval: float  #: Time between samples [s]
@@ -41,8 +41,8 @@ class Recorder:
     spheres: FrameWriter | None = None  #: Writes the spheres
     sphere_every: int = 1  #: Samples between files of spheres
     samples: int = 0  #: Number of samples so far
-    residual: str | None = None  #: Warning about the energy ledger at the last sample, for the end of the run
-    next_step: int = 0  #: Step of the next sample
+    residual: str | None = None  #: Warning about the energy ledger at the last sample, printed at the end of the run
+    next_step: int = 0  #: Number of the step of the next sample
 
     def record(self, engine: Engine, phase: int) -> None:
         """Take a sample at the present step, and write frames and check the state if they are due."""
@@ -69,11 +69,11 @@ class Recorder:
         self.schedule(engine)
 
     def schedule(self, engine: Engine) -> None:
-        """Set `next_step` to the step nearest to the time of the next sample; needed after each change of dt."""
+        """Set `next_step` to the step nearest to the next sample's time; called after each change of the time step."""
         self.next_step = engine.steps + max(1, round((self.samples * self.interval - engine.time) / engine.time_step))
 
     def watch(self, engine: Engine, state: PileState | None = None) -> None:
-        """Let the watchdog check the state, overlaps and energy; it raises RunError beyond a limit."""
+        """Check state, overlaps and energy by the watchdog; raise RunError beyond a limit."""
         state, time, watchdog = state or engine.state(), engine.time, self.watchdog
         floor, raised, extremes = engine.boundaries.floor, engine.boundaries.raised, engine.extremes(state)
         if extremes is not None and watchdog.within_limits(extremes, floor=floor, raised=raised):
@@ -90,7 +90,7 @@ class Recorder:
 
     @property
     def memory(self) -> dict[str, Any]:
-        """Plain data for `restore`, which also needs the columns of the series."""
+        """Plain data of the recorder's present state, for `restore`."""
         times = {name: writer.times for name, writer in self._writers()}
         return {"samples": self.samples, "next_step": self.next_step, **times, "series": dict(self.sampler.memory)}
 
@@ -108,7 +108,7 @@ class Recorder:
         self.series.write()
 
     def check_files(self) -> None:
-        """Raise RunError if a frame, or a file of forces or spheres, that was written is gone."""
+        """Raise RunError if a file of frames, forces or spheres that was written is missing."""
         for _, writer in self._writers():
             writer.check()
 

@@ -51,11 +51,11 @@ def run_scene(
         command: command line that started the run, for the manifest.
         progress: whether to draw a progress line on the terminal.
         resume: whether to continue from the newest undamaged checkpoint, or from the start if none was written.
-        builders: functions that make the parts of the run; None: the default ones.
-        stop: whether SIGUSR1 has come, also before this call; None: it is noted from the first step on.
+        builders: functions that make the parts of the run; None: default functions.
+        stop: request to stop by SIGUSR1, which may have come before this call; None: signals are noted from now on.
 
     Raises:
-        InputError: `out` holds other files, or another process runs in it.
+        InputError: `out` holds other files, or another process writes into it.
         RunError: the run failed; `failed.json` states the cause, and all files written before stay.
         StopRequestedError: SIGUSR1 came; the run stopped before its first step or at a checkpoint, and can be resumed.
         KeyboardInterrupt: the run was interrupted; all files are complete.
@@ -148,7 +148,10 @@ def _saved(scene: Scene, out: Path, made_by: tuple[str, str]) -> tuple[Checkpoin
 
 @contextlib.contextmanager
 def _of_checkpoint(out: Path) -> Iterator[None]:
-    """Raise InputError for any error that content of a checkpoint causes which no run writes."""
+    """Convert any error in the block, which reads a checkpoint, into an InputError about wrong content.
+
+    InputError and RunError are raised unchanged.
+    """
     try:
         yield
     except (InputError, RunError):
@@ -181,9 +184,10 @@ def _restore(simulation: Simulation, saved: tuple[Checkpoint, str | None] | None
 
 
 def _mark_ended(simulation: Simulation | None, claim: Claim, log: logging.Logger, error: BaseException) -> str:
-    """Write the series and `failed.json`; return the cause, for a failed run with the last checkpoint.
+    """Write the series and `failed.json` after an error; return its cause in words.
 
-    Nothing is written if the directory is no longer the run's own.
+    For a failed run the text also names the last checkpoint. Nothing is written if the run directory was moved or
+    replaced.
     """
     status: Ended = "interrupted" if isinstance(error, StopRequestedError | KeyboardInterrupt) else "failed"
     cause = "interrupted by the user" if isinstance(error, KeyboardInterrupt) else str(error)
@@ -295,7 +299,7 @@ def versions(made_by: tuple[str, str]) -> dict[str, str]:
 
 
 def _processor() -> str:
-    """Return the model of the processor, for output only."""
+    """Return the model of the processor, for the manifest."""
     try:
         lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
     except OSError:
@@ -304,7 +308,7 @@ def _processor() -> str:
 
 
 def _blas() -> str:
-    """Return NumPy's BLAS and the kernels that the environment selects; links does not depend on them."""
+    """Return name and kernels of NumPy's BLAS, for the manifest; results of links do not depend on BLAS."""
     built = np.show_config(mode="dicts")["Build Dependencies"]["blas"]
     forced = os.environ.get("OPENBLAS_CORETYPE", "")
     return f"{built.get('name')} {built.get('version')}, kernels {forced or 'by the processor'}"

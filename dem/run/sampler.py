@@ -21,7 +21,7 @@ from dem.record.packing import packing_fraction
 class Sampler:
     """Compute rows of the series, and keep values of the previous sample for means over time."""
 
-    radius: float  #: Radius for packing fractions [m]; NaN: they have no meaning
+    radius: float  #: Radius for packing fractions [m]; NaN: packing fractions have no meaning
     effects: Set[EffectName] = frozenset()  #: Effects of the scene
     memory: dict[str, Any] = field(default_factory=lambda: dict.fromkeys(("before", "hooks", "strain")))
     """Plain data of the previous sample. `before`: time [s], impulse of gravity [N s], momentum [kg m/s]; `hooks` and
@@ -95,10 +95,11 @@ class Sampler:
         return np.asarray(lost / (time - previous[0]))
 
     def _mean_since(self, name: str, steps: int, sums: Array) -> Array:
-        """Return mean forces [N] over the steps since the previous sample; NaN for the first sample.
+        """Return forces [N], averaged over the steps since the previous sample; NaN for the first sample.
 
         Args:
-            name: key of `memory` under which the sums of the previous sample are kept.
+            name: key of `memory` with the sums of the previous sample.
+            steps: number of steps made since the start.
             sums: forces summed over all steps [N].
         """
         previous = self.memory[name]

@@ -1,4 +1,4 @@
-"""The loop of a run: phases in order, steps from one recording to the next, and checkpoints."""
+"""The loop of a run: phases in order, time steps from one sample to the next, and checkpoints."""
 
 import logging
 import shutil

@@ -1,4 +1,4 @@
-"""Stop a run at its next checkpoint when SIGUSR1 comes, e.g. of a batch system before its time limit."""
+"""Stop a run at its next checkpoint after SIGUSR1, which e.g. a batch system sends before its time limit."""
 
 import signal
 import threading
@@ -12,13 +12,13 @@ class StopRequestedError(Exception):
 
 
 class StopRequest:
-    """Whether SIGUSR1 has come in a block of `listening`."""
+    """A record of whether SIGUSR1 has come while `listening` was active."""
 
     came: bool = False
 
     @contextmanager
     def listening(self) -> Iterator[None]:
-        """Note SIGUSR1, which would otherwise kill the process; only the main thread can receive signals."""
+        """Note SIGUSR1 during a block, instead of being killed by it; without effect outside the main thread."""
         if threading.current_thread() is not threading.main_thread():
             yield
             return

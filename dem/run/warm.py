@@ -17,7 +17,7 @@ APART = 1.0  # m; distance of smarticles, which touch nothing: code is compiled 
 
 
 def compile_for(scene: Scene) -> None:
-    """Call everything that compiles code for a scene, in each kind of its phases: make a step, query, record."""
+    """Compile all code for a scene: make a step, query and record in each kind of its phases."""
     engine = engine_kind(scene.engine).build(scene, min(time_steps(scene)))
     places = np.zeros((scene.count, 3))
     places[:, 0 if scene.plane is not None else 2] = APART * (1 + np.arange(scene.count))

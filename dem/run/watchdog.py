@@ -20,23 +20,23 @@ BOTH_HOOKS = ("the lower hook", "the upper hook")
 class Watchdog:
     """Limits that no body may exceed.
 
-    Checks take the simulated time [s], and raise RunError beyond a limit with cause, smarticles, time and what to do.
+    Checks take the simulated time [s]. Beyond a limit they raise RunError with cause, smarticles, time and advice.
     """
 
     #: The container. A smarticle has escaped if a sphere's centre or a link's axis is beyond the wall or under the
     #: floor, or if its centre of mass is above the wall
     cylinder: Cylinder
-    speed: float  #: Largest speed of a link's centre [m/s], above that of falls and shaking in the scene
+    speed: float  #: Largest speed of a link's centre [m/s]; falls and shaking in the scene cause lower speeds
     gap: float = math.inf  #: Largest gap of a hinge [m]; beyond it the hinge is broken
     depth: float = math.inf  #: Largest overlap [m]; beyond it contacts no longer keep bodies apart
-    energy: float = math.inf  #: Largest rise of the energy without work [J]; beyond it the simulation is unstable
-    missed: float = math.inf  #: Largest fraction of the dissipation that the energy ledger may miss [1]
+    energy: float = math.inf  #: Largest increase of the energy without work [J]; beyond it the simulation is unstable
+    missed: float = math.inf  #: Largest residual of the energy ledger, over the dissipation [1]
     _ceiling: float = math.inf  # limit of kinetic and potential energy less the work done [J]
 
     def within_limits(self, extremes: Extremes, *, floor: float, raised: float | None = 0.0) -> bool:
-        """Return whether extremes over all bodies prove that all limits hold, except that of the energy.
+        """Return whether extremes over all bodies show that all limits hold, except the limit of the energy.
 
-        If the result is false, all limits may hold nevertheless: `check` and `check_depths` must decide. `floor` and
+        If the result is false, the limits may hold nevertheless: `check` and `check_depths` must decide. `floor` and
         `raised` are as in `check`.
         """
         inside = extremes.lowest >= floor
@@ -61,10 +61,10 @@ class Watchdog:
 
         Args:
             floor: height of the floor [m].
-            points: (N, P, 3) centres of the spheres, or points of the links' axes [m]; None: centres of mass. They are
-                needed beside overlaps, which YADE underestimates where a centre is beyond wall or floor.
-            raised: rise of the upper hook above the floor [m], by which it may have lifted bodies; None: the wall
-                does not enclose the pile.
+            points: (N, P, 3) centres of the spheres, or points of the links' axes [m]; None: centres of mass.
+                The check of overlaps does not replace them: YADE underestimates overlaps beyond wall or floor.
+            raised: distance by which the upper hook may have lifted bodies above the wall [m]; None: the wall does not
+                enclose the pile.
             gaps: (N, 2) distances between the links of each hinge [m]; None while welded.
         """
         positions = state.positions
@@ -128,7 +128,7 @@ class Watchdog:
         reject(overlaps.deep, time, cause, way_out)
 
     def check_energy(self, state: PileState, *, energy: float, elastic: float, time: float) -> None:
-        """Check that the energy has not risen by more than work and springs explain.
+        """Check that the energy has not increased by more than work and springs can explain.
 
         Contacts, hinges and welding dissipate energy, and their springs return at most what they store. Kinetic and
         potential energy less the work done can therefore not exceed their value at any earlier time by more than the

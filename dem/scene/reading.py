@@ -32,7 +32,7 @@ def parse_scene(data: Any, *, source: str, folder: Path | None = None) -> Scene:
     """Return the scene that plain data describe, or raise InputError in one line with file, key and value.
 
     Args:
-        source: name of the data in messages.
+        source: name of the data's origin in messages, e.g. a path.
         folder: folder that paths of other runs are relative to; None: the working directory.
     """
     if problem := _not_a_scene(data):
@@ -121,7 +121,7 @@ def apply_override(data: Any, override: str) -> None:
 
 
 def _plain(scene: Scene) -> dict[str, Any]:
-    """Return the resolved scene as plain data, without keys that were added later and have their defaults.
+    """Return the resolved scene as plain data, without keys that were added to the format and have their defaults.
 
     Leaving these keys out keeps the hashes of older scenes. A scene with a protocol keeps `packing_radius_m` and the
     keys of `ADDED_KEYS`, since a protocol may have filled them in.
@@ -165,7 +165,7 @@ def dump_scene(scene: Scene, folder: Path | None = None) -> str:
 def scene_hash(scene: Scene) -> str:
     """Return the SHA-256 hash of a resolved scene, from its canonical JSON.
 
-    Keys in `Phase.sources` do not count: they only say where content is found that another key fixes.
+    Keys in `Phase.sources`, such as paths, are left out; hashes of the content found there are included.
     """
     data = _plain(scene)
     for dumped, phase in zip(data["phases"], scene.phases, strict=True):
@@ -185,9 +185,9 @@ def difference(there: Scene, here: Scene) -> str:
 
 
 def flattened(value: Any, place: str = "") -> dict[str, Any]:
-    """Return the leaves of nested data by their dotted keys, such as `phases.0.type`.
+    """Return the plain values of nested data by their dotted keys, such as `phases.0.type`.
 
-    A list of plain values is one leaf. `place` is put before all keys.
+    A list of plain values counts as a plain value. `place` is put before all keys.
     """
     if isinstance(value, list) and any(isinstance(item, Mapping | list) for item in value):
         value = {str(index): item for index, item in enumerate(value)}

@@ -1,4 +1,4 @@
-"""Check parts of a scene against each other and against what the engine can compute."""
+"""Check that the parts of a scene fit together, and that the engine can compute them."""
 
 import math
 from collections.abc import Iterator
@@ -62,7 +62,7 @@ def _of_plane(scene: SceneView) -> Iterator[str]:
 
 
 def _of_particle(scene: SceneView) -> Iterator[str]:
-    """Yield what has no meaning for bodies that are no smarticles."""
+    """Yield an error for each key or phase that needs smarticles, in a scene of other bodies."""
     if scene.smarticle != Smarticle():
         yield "smarticle: describes smarticles, but particle has other shapes; leave smarticle or particle out"
     if scene.motor != Motor() and scene.protocol is None:
@@ -78,7 +78,7 @@ def _of_particle(scene: SceneView) -> Iterator[str]:
 
 
 def _of_filaments(scene: SceneView, engine: str) -> Iterator[str]:
-    """Yield what filaments cannot have, and what only filaments have."""
+    """Yield an error for each key or phase that filaments exclude, and for each that needs filaments."""
     mixture = scene.mixture
     flexible = [kind.filament is not None for kind in mixture.kinds] if mixture is not None else [False]
     if not any(flexible):

@@ -49,10 +49,13 @@ _LEAST_GRAVITY = 1e-6  # m/s²; below it motors, whose torque limit is proportio
 
 
 def _named(base: str, given: Mapping[str, Any], diameter: Any = None) -> Mapping[str, Any]:
-    """Return the knobs of the named fidelity `base`, adapted to given parts of a scene.
+    """Return the knobs of the named fidelity `base`, adapted to a scene.
 
-    On the engine links `rows` is 1 if the scene has a plane, if t1 is at most t2, or if `diameter`, its
-    `fidelity.diameter_m`, is not None.
+    On the engine links `rows` is 1 if the scene has a plane, if t1 is at most t2, or if `diameter` is given.
+
+    Args:
+        given: parts of the scene that are validated already, by their names in the model.
+        diameter: `fidelity.diameter_m` of the scene.
     """
     engine, smarticle = given.get("engine", ""), given.get("smarticle") or Smarticle()
     narrow = smarticle.thickness_normal_m <= smarticle.thickness_in_plane_m
@@ -169,7 +172,7 @@ class Scene(Part):
     @model_validator(mode="wrap")
     @classmethod
     def _stiff_enough(cls, data: Any, handler: ModelWrapValidatorHandler[Self]) -> Self:
-        """On links, raise the stiffness of a named fidelity if the scene's loads and speeds need more."""
+        """Return the validated scene; on links, increase the named stiffness if loads and speeds need more."""
         scene = handler(data)
         given = data.get("fidelity") if isinstance(data, Mapping) else scene.fidelity
         chosen = given is not None and not isinstance(given, str | Mapping)
@@ -189,7 +192,7 @@ class Scene(Part):
 
     @cached_property
     def cylinder(self) -> Cylinder:
-        """The container of the simulation, with `ample_height` if the scene gives no height."""
+        """The container of the simulation; its height is `ample_height` if the scene gives none."""
         container, upper = self.container, []
         tiers, bottom = container.tiers or (), 0.0
         for below, tier in pairwise(tiers):
@@ -228,7 +231,7 @@ class Scene(Part):
         return self._height_at(2.4)
 
     def _height_at(self, factor: float) -> float:
-        """Return the height [m] of a pile of φ = `factor` d/L in the container."""
+        """Return the height [m] of a pile with the packing fraction `factor` d/L, see `ample_height`."""
         mixture = self.mixture
         if mixture is None:
             length = float(self.smarticle.boxes.lengths.sum())
@@ -239,7 +242,7 @@ class Scene(Part):
 
     @property
     def named_knobs(self) -> Mapping[str, Any]:
-        """Knobs that the name of the fidelity has in this scene, without those that the scene or a rule changes."""
+        """Knobs of the named fidelity for this scene, as they are before the scene or a rule changes them."""
         return _named(self.fidelity.base, dict(self), self.fidelity.diameter_m)
 
     @property
@@ -251,7 +254,7 @@ class Scene(Part):
     def sphere_diameter(self) -> float:
         """Sphere diameter [m]: `fidelity.diameter_m`, or the default that its description states.
 
-        Of a mixture it is that of the thinnest spheres.
+        In a mixture it is the diameter of the smallest spheres.
         """
         if self.mixture is not None:
             return self.mixture.diameter
@@ -259,7 +262,14 @@ class Scene(Part):
         return self._diameter_of(smarticle.thickness_normal_m, smarticle.thickness_in_plane_m, rows)
 
     def _diameter_of(self, normal: float, in_plane: float, rows: int, *, disc: bool = False) -> float:
-        """Return the diameter [m] of spheres for a section of two thicknesses [m], flat or a disc."""
+        """Return the diameter [m] of spheres, or strands, for a section of a bar.
+
+        Args:
+            normal: thickness along the normal [m].
+            in_plane: thickness in the plane [m].
+            rows: number of rows of spheres along the normal.
+            disc: whether the section is a disc.
+        """
         if self.fidelity.diameter_m is not None:
             return self.fidelity.diameter_m
         if rows > 1:
@@ -307,16 +317,16 @@ class Scene(Part):
 
     @property
     def actuates(self) -> bool:
-        """Whether any phase moves or holds barbs by motors, so that smarticles have hinges."""
+        """Whether motors move or hold barbs in any phase, so that smarticles have hinges."""
         return any(phase.actuates for phase in self.phases)
 
     @property
     def pulled_by(self) -> tuple[tuple[float, float], ...]:
-        """(stiffness [N/m], damping [N s/m]) of the strings, for each phase that has strings."""
+        """Stiffness [N/m] and damping [N s/m] of the strings, for each phase with strings."""
         return tuple(phase.pulled_by for phase in self.phases if phase.pulled_by is not None)
 
     def calls_for(self, effect: EffectName) -> bool:
-        """Return whether any phase needs an effect."""
+        """Return whether any phase of the scene needs an effect."""
         return any(effect in phase.calls(self, index) for index, phase in enumerate(self.phases))
 
     def activity(self, index: int) -> Activity:
@@ -348,7 +358,7 @@ class Scene(Part):
 
     @cached_property
     def mixture(self) -> Mixture | None:
-        """Kinds of the bodies and the kind of each, from the key `particle`; None for smarticles."""
+        """Kinds of bodies and the kind of each body, from the key `particle`; None for smarticles."""
         if self.shapes is None:
             return None
         rng = np.random.default_rng(self.seed_for("shapes"))
@@ -379,7 +389,7 @@ class Scene(Part):
 
     @property
     def bodies(self) -> tuple[Particle | Kind, ...]:
-        """One body of each kind; the first is the one to which the contact law refers."""
+        """One body of each kind; damping in the contact law is for the effective mass of the first."""
         return bodies_of(self.model)
 
 

@@ -1,9 +1,9 @@
-"""Estimates of overlaps in a scene from its loads and speeds, and of the stiffness that it needs.
+"""Estimate the overlaps in a scene from its loads and speeds, and the stiffness that it needs.
 
 Three loads are estimated:
 
-- the hardest impact: the typical effective mass hits at the greatest speed that a phase or a motor causes, increased by
-  a fall from the height w;
+- the hardest impact: of the typical effective mass, at the greatest speed that a phase or a motor causes plus the speed
+  of a fall from the height w;
 - the pile's weight times 1 + Γ, shared by two contacts of each smarticle that can lie on the floor;
 - the pile's weight on the four contacts of a hook that lifts it.
 
@@ -28,13 +28,13 @@ LIMIT = 0.5  # largest overlap over a link's mean width that is accepted
 class Overlap(NamedTuple):
     """An expected overlap."""
 
-    cause: str  #: The load in words
+    cause: str  #: Load that causes the overlap, in words
     widths: float  #: Overlap over the mean width of a link's section, 2 (t1 + t2)/π [1]
     stiffness: float  #: kn at which `widths` would be `WANTED` for the scene's fidelity [N/m]
 
 
 def expected_overlaps(scene: SceneView) -> tuple[Overlap, ...]:
-    """Return the expected overlaps of a scene: for impact, weight, and a hook if one is pulled."""
+    """Return the expected overlaps of a scene: by impact, by weight, and by a hook if a phase pulls it."""
     gravity, stiffness, model = scene.gravity_m_per_s2, scene.fidelity.stiffness_N_per_m, scene.model
     width, thickness = model.size, min(mean_width(*body.thicknesses) for body in scene.bodies)
     speeds = [phase.peak_speed(gravity) for phase in scene.phases]
@@ -65,7 +65,7 @@ def stiffness_for(scene: SceneView) -> float:
 
 
 def too_soft(scene: SceneView) -> str | None:
-    """Return a message about too soft contacts if an expected overlap exceeds `LIMIT`; None otherwise."""
+    """Return a message that contacts are too soft, if an expected overlap exceeds `LIMIT`; None otherwise."""
     worst = max(expected_overlaps(scene), key=lambda overlap: overlap.widths)
     if worst.widths <= LIMIT:
         return None

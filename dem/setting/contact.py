@@ -1,4 +1,4 @@
-"""Contact parameters of a scene, and files of such parameters that scenes name."""
+"""Contact parameters of a scene, which may be read from a file that the scene names."""
 
 from collections.abc import Mapping
 from pathlib import Path

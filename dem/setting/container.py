@@ -80,15 +80,15 @@ class Container(Part):
 class Cylinder:
     """The container of a simulation, its wall made of flat facets. Lengths in m."""
 
-    radius: float  #: Inner radius, of the lowest tier if there are several
+    radius: float  #: Inner radius of the wall, or of its lowest tier
     height: float  #: Height of the wall's top above the floor
-    facets: int  #: Flat facets around the wall
-    #: (height of the lower end above the floor, radius) of each tier above the lowest one, from below
+    facets: int  #: Number of flat facets around the wall
+    #: Height of the lower end above the floor, and radius, of each tier except the lowest, from below
     upper: tuple[tuple[float, float], ...] = ()
 
     @property
     def corner_radius(self) -> float:
-        """Distance of the wall's vertical edges from the axis [m]; the polygon has the circle's area."""
+        """Distance of the wall's vertical edges from the axis [m]; the polygon has the area of a circle of `radius`."""
         return self.corner_radius_of(self.radius)
 
     def corner_radius_of(self, radius: float) -> float:
@@ -103,13 +103,13 @@ class Cylinder:
 
     @property
     def bottom(self) -> float:
-        """Height [m] of the wall's lower edge above the floor at the start; negative, so below the floor."""
+        """Height [m] of the wall's lower edge above the floor at the start; negative, since it is below the floor."""
         return -0.1 * self.radius
 
     def radii(self, heights: Array) -> Array:
         """Return the container's radii [m] at heights above the floor [m], in the shape of `heights`.
 
-        At the height of a step the radius is that of the tier below the step.
+        At the height where two tiers meet, the radius is that of the lower tier.
         """
         steps, radii = [bottom for bottom, _ in self.upper], [self.radius, *(radius for _, radius in self.upper)]
         return np.asarray(np.array(radii)[np.searchsorted(steps, heights, side="left")])

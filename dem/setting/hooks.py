@@ -75,8 +75,8 @@ def with_defaults(data: Any, defaults: Mapping[str, tuple[int, int]], sizes: tup
 class Bar(NamedTuple):
     """One bar of a hook."""
 
-    middle: tuple[float, float]  #: (x, y) of its centre, from the container's axis [m]
-    half: tuple[float, float, float]  #: Half the lengths of its edges along x, y, z [m]
+    middle: tuple[float, float]  #: (x, y) of the bar's centre, from the container's axis [m]
+    half: tuple[float, float, float]  #: Half the lengths of the bar's edges along x, y, z [m]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -85,7 +85,7 @@ class Cross:
 
     height: float  #: Height of the centre above the floor
     side: float  #: Side of the bars' square section
-    length: float  #: With one bar along each axis: its length; with more: diameter of the disc at whose edge bars end
+    length: float  #: Length of the bars if `count` is 1; otherwise diameter of the disc at whose edge bars end
     count: int = 1  #: Number of bars along x, which is also the number of bars along y; bars are evenly spaced
 
     @property
@@ -104,7 +104,7 @@ class Cross:
         return max(math.hypot(abs(x) + a, abs(y) + b) for (x, y), (a, b, _) in self.bars)
 
     def obstacles(self, diameter: float) -> Array:
-        """Return (n, 3) points in the bars [m], as obstacles for spheres of a diameter [m].
+        """Return (n, 3) points in the bars [m], which stand for the bars when spheres of `diameter` [m] are placed.
 
         A sphere whose centre is at least a diameter away from all points touches no bar.
         """

@@ -7,12 +7,12 @@ from dem.setting.part import Part
 
 
 class Liquid(Part):
-    """A liquid at rest that fills the container: buoyancy and drag of filaments, but no flow and no surface."""
+    """A liquid at rest everywhere, which causes buoyancy and drag of filaments; it has no flow and no surface."""
 
     density_kg_per_m3: float = Field(1000.0, ge=0, le=25000, description="density [kg/m³]")
     viscosity_Pa_s: float = Field(1e-3, ge=0, le=1e4, description="dynamic viscosity [Pa s]")
 
     @property
     def immersing(self) -> Immersing:
-        """The liquid around a `dem.body.filament.Filament`."""
+        """This liquid, as a filament's data, `dem.body.filament.Liquid`."""
         return Immersing(viscosity=self.viscosity_Pa_s, density=self.density_kg_per_m3)

@@ -1,7 +1,7 @@
 """Motions of a barb: its angle as a function of time, as data.
 
 A motion begins at the barb's present angle and may depend on it. Each step of a sequence begins at the angle at which
-the previous step ended. Angles are computed for many smarticles at once, at any time, without a state in between.
+the previous step ended. A motion has no state: angles of many smarticles are computed at once, for any time.
 
 Angles are in degrees in a scene file, and in radians in this module's functions.
 """
@@ -27,16 +27,16 @@ Course = Callable[[Array], Array]  # function from times since the beginning of 
 
 @dataclass(frozen=True)
 class Leg:
-    """One simple motion within a motion."""
+    """A simple motion that is part of a motion, such as a step of a sequence."""
 
-    key: str  #: Key of the simple motion within the whole: "" for the whole, or e.g. "steps.1"
+    key: str  #: Key of the simple motion in the whole motion, e.g. "steps.1"; "" if it is the whole motion
     motion: SimpleMotion
     start: Array  #: Angles at the beginning of the leg [rad]
     home: Array  #: Angles at the beginning of the phase [rad]
     until: float  #: Duration of the leg [s]
 
     def extent(self) -> tuple[Array, Array, float]:
-        """Return lowest and highest angle [rad] for each of `start`, and the greatest speed of all [rad/s]."""
+        """Return lowest and highest angle [rad] for each angle of `start`, and the greatest speed [rad/s]."""
         low, high, speed = self.motion.extent(self.start, self.home, self.until)
         return low + np.zeros_like(self.start), high + np.zeros_like(self.start), float(np.max(speed))
 
@@ -53,11 +53,11 @@ class BaseMotion(Part):
 
     @property
     def period(self) -> float | None:
-        """Period after which the motion repeats itself [s]; None where it does not."""
+        """Period after which the motion repeats itself [s]; None for a motion without repetition."""
         return None
 
     def course(self, start: Array, home: Array) -> Course:
-        """Return the function from times [s] since the beginning of the motion to angles [rad].
+        """Return a function from the time [s] since the beginning of the motion to the angles [rad].
 
         Args:
             start: angles at the beginning of the motion [rad].
@@ -66,9 +66,9 @@ class BaseMotion(Part):
         raise NotImplementedError
 
     def legs(self, start: Array, home: Array, until: float) -> Iterator[Leg]:
-        """Yield the simple motions within the motion in order, up to the time `until` [s].
+        """Yield the simple motions of which the motion consists, in order, up to the time `until` [s].
 
-        A repeated sequence yields its first two repetitions only, since all others are equal to the second.
+        A repeated sequence yields its first two repetitions only, since all later ones are equal to the second.
         """
         raise NotImplementedError
 
@@ -116,7 +116,7 @@ class Hold(_Endless):
 
 
 class _Straight(SimpleMotion):
-    """Turn at a constant speed to an angle, and stay there."""
+    """Turn at a constant speed to an angle, and keep this angle."""
 
     duration_s: Duration = Field(..., description="time that the turn takes [s]")
 
@@ -163,9 +163,9 @@ class Return(_Straight):
 
 
 class _Wave(_Endless):
-    """Swing about an angle; the scheduled angle jumps to the first angle of the swing when the motion begins.
+    """Swing about an angle; when the motion begins, the scheduled angle jumps to the swing's first angle.
 
-    With `cycles_offset` 0 the swing begins at the centre, upwards.
+    With `cycles_offset` 0 the swing begins at the centre, with rising angle.
     """
 
     centre_deg: HingeAngle = Field(..., description="angle that the barb swings about [deg]")
@@ -191,7 +191,7 @@ class _Wave(_Endless):
         raise NotImplementedError
 
     def swing(self, cycles: Array) -> Array:
-        """Return the deviation from the centre in amplitudes [1], from -1 to 1, after numbers of cycles [1]."""
+        """Return the deviation from the centre over the amplitude [1], after numbers of cycles [1]."""
         raise NotImplementedError
 
     def course(self, start: Array, home: Array) -> Course:

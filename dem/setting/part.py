@@ -27,7 +27,7 @@ class Part(Strict):
 
     @classmethod
     def nearest_key(cls, key: str) -> str:
-        """Return what to do about an unknown key: use a key of similar spelling, or put it into another part."""
+        """Return advice about an unknown key: use a key of similar spelling, or move it to another part."""
         # Most often the unit, or the second half of a name, was left out.
         known = cls.known_keys()
         similar = [name for name in known if name.startswith(f"{key}_")]
@@ -46,7 +46,7 @@ class Part(Strict):
 
     @classmethod
     def tag(cls) -> str:
-        """Return the name of this part in a scene file: the value of its `type` or `shape`, or its key."""
+        """Return the name of this part in scene files: the value of its `type` or `shape`, or else its key."""
         kind = cls.model_fields.get("type") or cls.model_fields.get("shape")
         return str(get_args(kind.annotation)[0]) if kind else cls.__name__.lower()
 
@@ -60,7 +60,7 @@ def in_hinge_range(angle: float) -> float:
 
 
 def reject_wrong_unit(value: float) -> float:
-    """Return a length [m]; raise ValueError if it must have been meant in millimetres."""
+    """Return a length [m]; raise ValueError if it is so large that it must be in millimetres."""
     if value > LONGEST_LENGTH:
         raise ValueError(
             f"{value:g} means {value:g} m, which no smarticle scene needs; "
@@ -70,7 +70,7 @@ def reject_wrong_unit(value: float) -> float:
 
 
 def reject_density_in_other_units(value: float) -> float:
-    """Return a density [kg/m³]; raise ValueError if it is none of a solid."""
+    """Return a density [kg/m³]; raise ValueError if no solid has it, as after a mistake in the unit."""
     if not 50 <= value <= 25000:
         msg = f"{value:g} kg/m³ is outside 50 … 25000 kg/m³; density is in kg/m³: steel is 7850, not 7.85"
         raise ValueError(msg)

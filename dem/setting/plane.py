@@ -12,7 +12,7 @@ from dem.setting.part import Length, Part
 
 
 class Plane(Part):
-    """Smarticles lie flat on a table without friction and stay in its plane; there is no container."""
+    """A horizontal plane without container: smarticles lie flat on a table without friction."""
 
     width_m: Length | None = Field(
         None, description="H, distance between two walls along x that confine them [m]; null: no walls"

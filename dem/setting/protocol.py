@@ -1,4 +1,4 @@
-"""Protocols: the values of scene keys on which the paper's text and the paper's own code disagree.
+"""Protocols: values of those scene keys for which the paper's text and the paper's own code differ.
 
 Savoie, Tuazon, Bhamla and Goldman, "Amorphous Entangled Active Matter", Soft Matter 2023: the text states one set of
 rules, the sources and run scripts in the public repository `wsavoie/SmarticleSim` (of January 2019) another. A protocol
@@ -44,7 +44,7 @@ def applies(part: str, *, plane: bool, tiers: bool) -> bool:
 
 
 def with_protocol(data: Any) -> Any:
-    """Return a scene's data, not yet validated, with the keys that its protocol fills in."""
+    """Return a scene's unvalidated data, with values of its protocol for keys that are not given."""
     rules = PROTOCOLS.get(str(data.get("protocol"))) if isinstance(data, Mapping) else None
     if rules is None:
         return data

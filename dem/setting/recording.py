@@ -48,7 +48,7 @@ class Recording(Part):
     )
 
     def samples_in(self, interval_s: float | None) -> int:
-        """Return the number of samples of the series within an interval [s], rounded; 0 for None."""
+        """Return how often the series is sampled in an interval [s], rounded; 0 for None."""
         return round((interval_s or 0.0) / self.series_interval_s)
 
     @property

@@ -37,7 +37,7 @@ Segments = Annotated[int, Field(ge=2, le=200)]
 
 
 class Shaped(Part):
-    """Section, material and frequency that all shapes have."""
+    """Base of all shapes: section, material, and frequency in a mixture."""
 
     thickness_normal_m: Length | None = Field(
         None, description="thickness along the normal of a flat section [m]; default: 1.27e-3, the paper's t1"
@@ -74,14 +74,14 @@ class Shaped(Part):
 
     @property
     def factors(self) -> Array:
-        """Factors on the body's lengths [1]: `SIZES` equally frequent ones, or only 1 without a spread."""
+        """Factors on the body's lengths [1]: `SIZES` equally frequent values, or only 1 if `spread` is 0."""
         if not self.spread:
             return np.ones(1)
         values = ndtri((np.arange(SIZES) + 0.5) / SIZES)
         return np.asarray(1 + self.spread * values / math.sqrt(float((values**2).mean())))
 
     def bars(self, factor: float = 1.0) -> Bars:
-        """Return the body, its lengths multiplied by a factor [1]; raise InputError if its bars collide."""
+        """Return the bars of the body, lengths multiplied by a factor [1]; raise InputError if bars touch or cross."""
         points, normals = self.layout()
         flat = (self.thickness_normal_m or NORMAL, self.thickness_in_plane_m or IN_PLANE)
         normal, in_plane = flat if self.diameter_m is None else (self.diameter_m, self.diameter_m)
@@ -95,7 +95,7 @@ class Shaped(Part):
         )
 
     def layout(self) -> tuple[Array, Array]:
-        """Return both ends (S, 2, 3) [m] and a direction across (S, 3) [1] of all bars, in any frame."""
+        """Return both ends (S, 2, 3) [m] and normals (S, 3) [1] of all bars, in any frame."""
         raise NotImplementedError
 
 
@@ -107,7 +107,13 @@ def _path(lengths: Sequence[float], headings: Sequence[float]) -> tuple[Array, A
 
 
 def _arc(radius: float, angle: float, segments: int) -> tuple[list[float], list[float]]:
-    """Return lengths [m] and headings [rad] of bars that are as long as an arc of an angle [rad] together."""
+    """Return lengths [m] and headings from x [rad] of bars, end to end, with the length of an arc.
+
+    Args:
+        radius: radius of the arc [m].
+        angle: angle of the arc [rad].
+        segments: number of bars.
+    """
     step = angle / segments
     return [abs(radius * step)] * segments, [(k + 0.5) * step for k in range(segments)]
 
@@ -123,7 +129,7 @@ class Rod(Shaped):
 
 
 class Staple(Shaped):
-    """A crown with a leg at each end; legs of 90° make the U shape of a smarticle, which does not move."""
+    """A crown with a leg at each end; legs at 90° give the U of a smarticle, without hinges."""
 
     shape: Literal["staple"]
     crown_m: Length = Field(..., description="length of the crown, the middle bar [m]")
@@ -142,7 +148,12 @@ class Staple(Shaped):
 def _three_bars(
     middle: float, arms: tuple[float, float], angles: tuple[float, float], twists: tuple[float, float]
 ) -> tuple[Array, Array]:
-    """Return the layout of a middle bar [m] along x with arms [m]; angles and twists in degrees."""
+    """Return the layout of a middle bar [m] along x with an arm [m] at each end.
+
+    Args:
+        angles: angle of each arm to the middle bar, 0 straight [deg].
+        twists: rotation of each arm about the middle bar [deg].
+    """
     joints = np.array([[-middle / 2, 0.0, 0.0], [middle / 2, 0.0, 0.0]])
     bars, normals = [], []
     for joint, arm, angle, twist, sign in zip(joints, arms, angles, twists, (-1.0, 1.0), strict=True):
@@ -257,7 +268,7 @@ class Star(Shaped):
 
 
 class Free(Shaped):
-    """Any points, and the bars that join them: trees and closed rings included."""
+    """Any points and bars that join them, also trees and closed rings."""
 
     shape: Literal["segments"]
     points_m: tuple[Point, ...] = Field(..., min_length=2, max_length=400, description="points (x, y, z) [m]")
@@ -323,7 +334,7 @@ class Flexible(Shaped):
         return _path(*_arc(self.length_m / bend, bend, self.segments))
 
     def filament(self, factor: float, liquid: Liquid | None) -> Filament:
-        """Return what the body is made of, its length multiplied by a factor [1], in a liquid."""
+        """Return the filament, its length multiplied by a factor [1], in a liquid; None: no liquid."""
         assert self.diameter_m is not None
         rest = PreferredCurvature(amplitudes=self.curvature_per_m) if self.curvature_per_m else None
         return Filament(
@@ -347,7 +358,7 @@ SHAPES = get_args(get_args(AnyShape)[0])
 
 
 def listed(value: Any) -> Any:
-    """Return the value of the key `particle` as a list of shapes; None for smarticles."""
+    """Return the unvalidated value of the key `particle` as a list of shapes; None for smarticles."""
     if value is None or value == "smarticle":
         return None
     if isinstance(value, str):
@@ -357,10 +368,10 @@ def listed(value: Any) -> Any:
 
 
 def numbers_of_shapes(shapes: Sequence[Shaped], count: int) -> list[int]:
-    """Return how many of `count` bodies have each shape.
+    """Return the number of bodies of each shape, of `count` bodies in all.
 
     Raises:
-        ValueError: shapes have counts that do not add up to `count`, or only some of them have one.
+        ValueError: counts of the shapes do not add up to `count`, or only some shapes have a count.
     """
     counts = [shape.count for shape in shapes]
     given = [number for number in counts if number is not None]

@@ -62,9 +62,9 @@ class Smarticle(Part):
         return self
 
     def tip_clearance(self, angles_deg: tuple[float, float]) -> float:
-        """Return the gap between the barb tips [m] at angles [deg]; negative: the barbs cross.
+        """Return the gap between the barb tips [m] at angles of barb 1 and 2 [deg]; negative: the barbs cross.
 
-        An angle below 90° counts as 90°.
+        An angle below 90° is taken as 90°.
         """
         inward = -sum(math.cos(math.radians(angle)) for angle in angles_deg if angle > 90)
         return self.middle_length_m * (1 - self.aspect_ratio * inward) - self.thickness_in_plane_m

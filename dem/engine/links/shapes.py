@@ -59,7 +59,7 @@ class Shape:
     inertia: Array
     lines: Array  #: (M, LINE) segments, link by link; for the columns see `START`
     link: NDArray[np.int64]  #: (M,) link of each segment; for a smarticle 0 barb 1, 1 middle link, 2 barb 2
-    shared: NDArray[np.uint8]  #: (M,) ends that count with another segment, which has them too; bits of `AT_START`, `AT_END`
+    shared: NDArray[np.uint8]  #: (M,) ends that count with another segment, bits of `AT_START`, `AT_END`
     effective_mass: float  #: Harmonic mean of the effective mass over points and directions [kg]; damping depends on it
     planar: Planar | None = None  #: Geometry of a smarticle; None for other bodies
     filament: Filament | None = None  #: Kind of filament of a flexible body; None for rigid bodies and smarticles

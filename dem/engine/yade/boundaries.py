@@ -30,7 +30,7 @@ class YadeBoundaries:
         self._top, self._bottom = cylinder.height, cylinder.bottom
         self._planar = channel is not None
         self.container = add_container(yade, cylinder) if channel is None else add_channel(yade, channel)
-        """Ids of the container's bodies that exist, the floor last."""
+        """Ids of the present bodies of the container, the floor last."""
         self.hooks: tuple[tuple[int, ...], ...] = tuple(add_cross(yade, cross) for cross in hooks or ())
         """Ids of the bars of the lower and the upper hook."""
         self._upper_start = hooks[1].height if hooks else 0.0
