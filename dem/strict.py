@@ -157,12 +157,10 @@ def unit_of(key: str) -> tuple[str, str]:
 
 
 def _text(kind: str, message: str, value: Any, context: Mapping[str, Any], unit: str) -> str:
-    """Return in words what is wrong with a value, and advice.
+    """Return what is wrong with a value, and advice to the user.
 
     Args:
-        kind: pydantic's type of the error.
-        message: pydantic's message.
-        context: pydantic's data about the error.
+        kind: pydantic's type of the error; `message` and `context` are pydantic's, too.
         unit: unit of the value; "" for none.
     """
     if kind == "value_error":

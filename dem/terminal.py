@@ -53,7 +53,7 @@ def warn(text: str) -> None:
 
 
 def bare(stream: TextIO) -> TextIO:
-    """Return the stream that a `Printable` wraps, for the library rich, which writes control characters itself."""
+    """Return the stream below a `Printable`, for the library rich, which writes control characters itself."""
     return stream.stream if isinstance(stream, Printable) else stream
 
 

@@ -32,7 +32,7 @@ class StrictLoader(yaml.SafeLoader):  # type: ignore[misc]  # PyYAML ships no ty
     """SafeLoader that rejects a key given twice and reads `1e-3` as a number."""
 
     def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Any, Any]:
-        """Return the mapping of a node; raise ConstructorError if a key is given twice, or is a list or mapping."""
+        """Return the mapping of a node; raise ConstructorError if a key occurs twice, or is a list or mapping."""
         if isinstance(node, yaml.MappingNode):
             self.flatten_mapping(node)
             seen: set[Any] = set()
@@ -58,7 +58,7 @@ StrictLoader.add_implicit_resolver("tag:yaml.org,2002:int", _INT, list("-+012345
 
 
 def read_text(path: Path) -> str:
-    """Return the content of a file in UTF-8; if `load_yaml` would reject it as too long, only its beginning."""
+    """Return the text of a UTF-8 file, cut off where it is longer than `load_yaml` accepts."""
     with path.open(encoding="utf-8") as file:
         return file.read(LONGEST + 1)
 
@@ -91,10 +91,10 @@ def load_yaml(text: str, loader: type[Any] = StrictLoader) -> Any:
 
 
 def _characters(node: yaml.Node, known: dict[yaml.Node, float]) -> float:
-    """Return the approximate number of characters of a node with all aliases written out; inf for a loop.
+    """Return about how many characters a node has with all aliases written out; inf if it contains itself.
 
     Args:
-        known: numbers of nodes that were counted already; updated.
+        known: results for nodes that were counted before; updated.
     """
     if node not in known:
         known[node] = math.inf  # of a node that contains itself

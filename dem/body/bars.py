@@ -44,9 +44,7 @@ def owners(first: Numbers, inner: Flags) -> Flags:
 def segment_distances(one: Array, other: Array) -> Array:
     """Return (P,) distances between segments `one` (P, 2, 3) and `other` (P, 2, 3), pair by pair.
 
-    Distances have the unit of the coordinates. Segments may have length 0.
-
-    Source: Ericson, Real-Time Collision Detection, section 5.1.9.
+    Segments may have length 0. Source: Ericson, Real-Time Collision Detection, section 5.1.9.
     """
     p, q = one[:, 0], other[:, 0]
     u, v, w = one[:, 1] - p, other[:, 1] - q, p - q
@@ -198,7 +196,7 @@ class Bars:
 
     @cached_property
     def ends(self) -> Array:
-        """(S, 2, 3) both ends of each bar in the body's frame [m]: from the centre of mass, along principal axes."""
+        """(S, 2, 3) both ends of each bar [m], in the body's frame: centre of mass, principal axes."""
         return applied(self.rotation.T, self.points - self._centre_of_mass)
 
     @cached_property

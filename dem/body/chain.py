@@ -95,10 +95,7 @@ def extent(state: State, diameter: float) -> float:
 
 
 def _corners(state: State) -> Array:
-    """Return (N, V, 3) points of each smarticle's outline [m], half the barbs' thickness inside it.
-
-    The V points are the barb tips and hinges, and for middle links thicker than barbs four corners of the middle link.
-    """
+    """Return (N, V, 3) tips, hinges, and corners of middle links thicker than barbs, on link axes [m]."""
     bulge, vertices = state.boxes.bulge, state.vertices
     if not bulge:
         return vertices

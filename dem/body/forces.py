@@ -35,13 +35,7 @@ class ContactForces:
 
 
 def at_links(smarticle: Number, link: Number, each: int = LINKS) -> Number:
-    """Return codes of links, 0 or above, for `contacts_of_points`.
-
-    Args:
-        smarticle: numbers of the bodies.
-        link: number of each link in its body.
-        each: largest number of links of a body, which is the difference between the codes of two bodies.
-    """
+    """Return codes of links, 0 or above; `each` is the largest number of links of a body."""
     return each * smarticle + link
 
 

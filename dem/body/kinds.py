@@ -162,7 +162,7 @@ class Kind:
 
 @dataclass(frozen=True)
 class Mixture:
-    """K kinds of bodies of a pile without smarticles, and the kind of each of N bodies in order of pouring."""
+    """K kinds of bodies of a pile without smarticles, and the kind of each of N bodies, as poured."""
 
     kinds: tuple[Kind, ...]
     of: Numbers = field(repr=False)  #: (N,) index in `kinds` for each body
@@ -250,10 +250,7 @@ class Mixture:
 
     @cached_property
     def spheres(self) -> Array:
-        """(K, S, 3) centres of the spheres of each kind in its body frame [m].
-
-        S is the largest number of spheres of a kind; shorter rows repeat the kind's last sphere.
-        """
+        """(K, S, 3) centres of the spheres of each kind in its frame [m]; shorter rows repeat the last sphere."""
         return padded([kind.centres for kind in self.kinds])
 
 
@@ -263,16 +260,16 @@ def bodies_of(model: Particle | Mixture) -> tuple[Particle | Kind, ...]:
 
 
 def body_of(model: Particle | Mixture, kinds: Sequence[int] | Numbers, number: int) -> Particle | Kind:
-    """Return the smarticle, or in a mixture the kind of a body.
+    """Return the smarticle or, in a mixture, the kind of one body.
 
     Args:
-        kinds: (N,) kind of each body of the mixture.
-        number: index of the body in `kinds`.
+        kinds: (N,) index of each body's kind in the mixture.
+        number: number of the body.
     """
     return model if isinstance(model, Particle) else model.kinds[kinds[number]]
 
 
 def padded(rows: Sequence[Array]) -> Array:
-    """Return k arrays (n, …) of different n as one array (k, longest n, …); shorter ones repeat their last item."""
+    """Return k arrays (n, …) as one (k, largest n, …), in which shorter ones repeat their last item."""
     longest = max(map(len, rows))
     return np.array([row[np.minimum(np.arange(longest), len(row) - 1)] for row in rows])

@@ -1,4 +1,4 @@
-"""Poses and velocities of all bodies at one instant: of smarticles, of rigid bodies of other kinds, of filaments."""
+"""Poses and velocities of all bodies at one instant, for smarticles, other rigid bodies and filaments."""
 
 from __future__ import annotations
 
@@ -169,7 +169,7 @@ class BarState:
 
 @dataclass(frozen=True)
 class RigidState(BarState):
-    """Poses and velocities of N rigid bodies of several kinds, with M bars in all, in the laboratory frame."""
+    """Poses and velocities of N rigid bodies of several kinds with M bars in all, laboratory frame."""
 
     mixture: Mixture
     kind: Numbers  #: (N,) kind of each body
@@ -240,7 +240,7 @@ class RigidState(BarState):
 
 @dataclass(frozen=True)
 class FilamentState(BarState):
-    """Positions and velocities of N filaments of several kinds, with M segments in all, in the laboratory frame."""
+    """Positions and velocities of N filaments of several kinds with M segments in all, laboratory frame."""
 
     mixture: Mixture
     kind: Numbers  #: (N,) kind of each filament
@@ -346,7 +346,7 @@ class FilamentState(BarState):
         return float(0.5 * (moving + (self._rolling * self.rolls[self._starts]).sum()))
 
     def potential_energy(self, gravity: float, floor: float) -> float:
-        """Return the potential energy of weight less buoyancy [J], 0 at the height `floor` [m]; gravity in m/s²."""
+        """Return the potential energy of weight less buoyancy [J], 0 at `floor` [m]; gravity in m/s²."""
         shares = np.array([filament.weight_share for filament in self._filaments])
         return float((self._masses * shares * gravity * (self.positions[:, 2] - floor)).sum())
 
@@ -489,10 +489,7 @@ class State:
 
 
 def spheres_of(state: PileState, model: Particle | Mixture) -> Array:
-    """Return (N, S, 3) centres of all spheres of all bodies [m].
-
-    In a mixture, a body with fewer than S spheres repeats its last one.
-    """
+    """Return (N, S, 3) centres of all spheres [m]; in a mixture shorter rows repeat the last sphere."""
     if isinstance(model, Mixture):
         assert state.bodies is not None  # a pile of these kinds has no smarticles
         return state.bodies.spheres()

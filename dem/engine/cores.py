@@ -30,7 +30,7 @@ def ranks() -> int:
 
 
 def check_ranks(wanted: int) -> None:
-    """Raise InputError if more ranks are wanted than cores are there: ranks wait for each other at every step."""
+    """Raise InputError if `wanted` ranks are more than cores: ranks wait for each other in every step."""
     # On this machine, or on the nodes of a batch job.
     tasks = os.environ.get("SLURM_NTASKS", "")
     most = max(usable_cores(), int(tasks) if tasks.isdecimal() else 0)

@@ -116,7 +116,7 @@ class Boundaries(Protocol):
 
     @property
     def channel_sums(self) -> Array:
-        """(2, 3) forces on the channel's lower and upper wall [N], summed over all steps; (0, 3) without walls."""
+        """(2, 3) forces on the channel's lower and upper wall [N], summed over all steps; (0, 3): no walls."""
 
 
 class Motors(Protocol):
@@ -161,7 +161,7 @@ class Motors(Protocol):
         """Work of all motors on the links since the start, up to now [J]."""
 
     def gaps(self) -> Array:
-        """Return (N, 2) gaps of the hinges: distances between the link ends that a hinge joins [m]; 0 while welded."""
+        """Return (N, 2) gaps of the hinges, distances between the joined ends of links [m]; 0 while welded."""
 
 
 class Strings(Protocol):
@@ -245,7 +245,7 @@ class EnergyLedger(Protocol):
     def added(self) -> float:
         """Energy that bodies had when they were added [J].
 
-        It is kinetic and gravitational energy, 0 at z = 0, and elastic energy if `take_in` was called.
+        It is kinetic energy, gravitational energy above z = 0 and, if `take_in` was called, elastic energy.
         """
 
     @property
@@ -254,10 +254,10 @@ class EnergyLedger(Protocol):
 
     @property
     def given(self) -> float:
-        """Sum of `added`, `container_work` and the work of activity [J]; NaN where a boundary's work is unknown."""
+        """Sum of `added`, `container_work` and work of activity [J]; NaN if a boundary's work is unknown."""
 
     def elastic(self) -> tuple[float, float]:
-        """Return the elastic energy of all contacts, and the elastic energy of all hinges and flexible bodies [J]."""
+        """Return the elastic energy of all contacts, and that of all hinges and flexible bodies [J]."""
 
     def take_in(self) -> None:
         """Add the present elastic energy of contacts to `added`; called if bodies overlapped when added."""
@@ -315,7 +315,7 @@ class Engine(Protocol):
         """Set the length of all further steps [s]."""
 
     def advance(self, steps: int) -> None:
-        """Make a number of steps, none if it is negative; raise RunError if the engine stops before the last one."""
+        """Make `steps` steps, none if negative; raise RunError if the engine stops before the last one."""
 
     # -- bodies ------------------------------------------------------------------------------------------------
 

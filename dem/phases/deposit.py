@@ -23,7 +23,7 @@ LAYER_SECONDS = 0.125  # s, typical time between two layers of a pour; measured 
 
 
 class Deposit(Part, Phase):
-    """Pour smarticles, or other bodies, in layers of random, non-overlapping poses, then wait until the pile settles.
+    """Pour bodies in layers of random poses without overlaps, then wait until the pile settles.
 
     A layer is poured just above the pile after the previous layer has landed. If `every_s` is given, layers are poured
     from the top of the wall at this interval.

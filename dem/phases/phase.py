@@ -75,15 +75,15 @@ class Phase:
         yield from ()
 
     def ready(self, scene: SceneView) -> None:
-        """Raise InputError before a run if a source of the phase, such as another run, is missing or has changed."""
+        """Raise InputError before a run if a source of the phase, such as another run, is missing or changed."""
 
     @property
     def origin(self) -> Mapping[str, Any] | None:
-        """Data about the other run from which smarticles are taken, for the manifest; None without another run."""
+        """Data about the other run from which smarticles are taken, for the manifest; None if none are."""
         return None
 
     def warnings(self, scene: SceneView, index: int) -> Sequence[str]:
-        """Return warnings about suspicious values that are not rejected: one line each with key and what to do."""
+        """Return warnings about suspicious values that are accepted: one line each with key and advice."""
         return ()
 
     @property
@@ -92,7 +92,7 @@ class Phase:
         return getattr(self, "duration_s", None)
 
     def expected_duration(self, count: int) -> float:
-        """Return the simulated time of the phase [s]; an estimate for `count` bodies if a criterion ends the phase."""
+        """Return the simulated time of the phase [s], estimated from `count` bodies if a criterion ends it."""
         return self.known_duration or 0.0
 
     speed_key: ClassVar[str] = "speed_m_per_s"  #: Key of the phase to which `pushing_speed` is proportional
@@ -139,9 +139,7 @@ class Phase:
         """Return data that follow from the scene alone, for `Stage.prepared`."""
 
     def proceed(self, stage: Stage, engine: Engine) -> float:
-        """Do the actions of the phase that are due now; return the simulated time [s] until the next call.
-
-        The value is 0 when the phase is over.
+        """Do what is due now; return the simulated time [s] until the next call, 0 at the end of the phase.
 
         Raises:
             RunError: the phase cannot go on, or its criterion was not met in time; one line with values and limits.

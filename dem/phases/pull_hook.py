@@ -15,7 +15,7 @@ HELD_SECONDS = 0.1  # s, time for which the force is measured on a hook that the
 
 
 class PullHook(Part, Phase):
-    """Raise the upper hook at constant speed, with smarticles welded, so that the force on it can be measured."""
+    """Raise the upper hook at constant speed, with smarticles welded, to measure the force on the hook."""
 
     type: Literal["pull-hook"]
     which: Literal["upper"] = Field("upper", description="the hook that is raised; the lower one stays")
@@ -123,10 +123,10 @@ _DEFAULTS = {"distance_m": (2, 0), "speed_m_per_s": (1, 0)}
 
 
 def with_pull_defaults(phase: Any, sizes: tuple[float, float]) -> Any:
-    """Return unvalidated data of a phase, with missing keys of a pull-hook computed from `sizes`.
+    """Return unvalidated data of a phase; missing keys of a pull-hook are computed from `sizes`.
 
     Args:
-        phase: data of a phase of any kind; data of other kinds are not changed.
+        phase: data of a phase of any type.
         sizes: as in `with_defaults`.
     """
     pulls = isinstance(phase, Mapping) and phase.get("type") == "pull-hook"
@@ -134,6 +134,6 @@ def with_pull_defaults(phase: Any, sizes: tuple[float, float]) -> Any:
 
 
 def _force_sum(engine: Engine) -> list[float]:
-    """Return the force (x, y, z) on the upper hook, summed over all steps [N]; constant while nothing touches it."""
+    """Return the force (x, y, z) on the upper hook, summed over all steps [N]; constant without contact."""
     total: list[float] = engine.boundaries.hook_sums[1].tolist()
     return total

@@ -257,7 +257,7 @@ def _mean_height(engine: Engine) -> float:
 
 
 def poses_of(scene: SceneView, taken: Taken) -> Poses:
-    """Return the poses of a scene's smarticles from a frame; raise InputError if the frame does not fit the scene."""
+    """Return the poses of a scene's smarticles from a frame; raise InputError if it does not fit them."""
     for mismatch in _mismatches(scene, taken):
         raise InputError(mismatch)
     return fitted_poses(scene.particle.boxes, taken.vertices)[0]

@@ -221,7 +221,7 @@ def _step_warnings(scene: Scene) -> tuple[str, ...]:
 
 
 def engine_warnings(scene: Scene) -> tuple[str, ...]:
-    """Return a one-line warning about knobs that the scene sets and its engine ignores; () without such knobs."""
+    """Return a warning, in one line, about knobs that the scene sets and its engine ignores; () for none."""
     fidelity, named = scene.fidelity, scene.named_knobs
     usual = {key: named.get(key, Fidelity.model_fields[key].default) for key in engine_kind(scene.engine).idle_knobs}
     idle = [f"{key} ({getattr(fidelity, key):g})" for key, value in usual.items() if getattr(fidelity, key) != value]
@@ -246,7 +246,7 @@ def recording_warnings(scene: Scene) -> tuple[str, ...]:
 
 
 def protocol_lines(scene: Scene) -> tuple[str, ...]:
-    """Return lines about keys that have, and keys that have not, the protocol's values; () without a protocol."""
+    """Return lines about keys that have, or have not, the protocol's values; () without a protocol."""
     if scene.protocol is None:
         return ()
     kept, other = [], []

@@ -65,8 +65,8 @@ def read_checkpoint(folder: Path, *, scene_sha256: str, made_by: tuple[str, str]
     """Read the newest undamaged checkpoint of a run directory.
 
     Args:
-        scene_sha256: hash of the scene of which the checkpoint must be.
-        made_by: name and version of the engine that must have made it.
+        scene_sha256: hash of the run's scene.
+        made_by: name and version of the present engine.
 
     Returns:
         The checkpoint, and a warning if the newest one is damaged and the previous one was read.

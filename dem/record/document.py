@@ -141,7 +141,7 @@ class Manifest(Document):
         return not self.planar and all(record.type != "remove-container" for record in self.phases[: phase + 1])
 
     def fills_cylinder(self, phase: int) -> bool:
-        """Return whether the pile is in a cylinder in the phase with index `phase`, and so has a packing fraction."""
+        """Return whether, in phase number `phase`, the pile is in a cylinder and has a packing fraction."""
         return self.container_tiers == 1 and self.walled(phase)
 
 
@@ -173,7 +173,7 @@ class Failed(Document):
     checkpoint_s: NonNegativeFloat | None = None  #: Simulated time of the newest checkpoint; None: no checkpoint
 
     def mark(self, out: Path) -> None:
-        """Write `failed.json` into a run directory; errors are ignored, since the terminal shows the cause too."""
+        """Write `failed.json` into a run directory; errors are ignored, as the terminal shows the cause too."""
         with suppress(RunError):
             self.write(out / FAILED)
 

@@ -13,7 +13,7 @@ from dem.record.names import partial
 
 @contextlib.contextmanager
 def whole(path: Path, *, before: Path | None = None, shared: bool = False) -> Iterator[Path]:
-    """Yield a temporary path for a file, which is renamed to `path` if the block succeeds, or else removed.
+    """Yield a temporary path, which is renamed to `path` if the block succeeds, and is removed otherwise.
 
     Args:
         before: path to which an existing file is moved; None: it is overwritten.
@@ -66,7 +66,7 @@ def write_text(path: Path, text: str, *, make_folder: bool = True) -> None:
 
 
 def reject_inflated(archive: zipfile.ZipFile | None, most: int) -> None:
-    """Raise ValueError if an archive would unpack to more than `most` bytes; guards against malicious files."""
+    """Raise ValueError if an archive, which may be malicious, would unpack to more than `most` bytes."""
     total = sum(member.file_size for member in archive.infolist()) if archive else 0
     if total > most:
         raise ValueError(f"it would unpack to {total} bytes, at most {most} are possible")

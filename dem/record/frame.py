@@ -26,7 +26,7 @@ VERTICES = 4
 
 
 def _remedy(path: Path) -> str:
-    """Return advice about an unreadable frame; to resume the run is none, since it does not write the frame again."""
+    """Return advice about an unreadable frame, which a resumed run would not write again."""
     if path.suffix == ".vtkhdf":
         return REMEDY.format(path.with_name(SCENE))
     scene = path.parent.parent / SCENE
@@ -223,7 +223,7 @@ class Frame:
 
 
 def read_frame(path: Path | str, number: int | None = None) -> Frame:
-    """Return a frame from a file, `.vtu` or `.vtkhdf`; raise InputError if the frame is missing or damaged.
+    """Return a frame of a `.vtu` or `.vtkhdf` file; raise InputError if it is missing or damaged.
 
     Args:
         number: number of the frame in its run; needed for `.vtkhdf`. None: from the name of the file.
@@ -303,11 +303,10 @@ def read_frame(path: Path | str, number: int | None = None) -> Frame:
 def _form(
     points: NDArray[Any], lines: NDArray[Any], reject: Callable[[str], NoReturn], *, general: bool
 ) -> tuple[int, ...]:
-    """Return the shape of an array with a value per link: (N, 3) for smarticles, (M,) for other bodies.
-
-    Points or lines of a damaged frame are rejected by a call of `reject`.
+    """Return the shape of an array of link values: (N, 3) for smarticles, (M,) for other bodies.
 
     Args:
+        reject: function that is called if the points or lines of the frame are damaged.
         general: whether the bodies are no smarticles.
     """
     form: tuple[int, ...]

@@ -1,4 +1,4 @@
-"""A file that is changed in place, with changes that are made completely or not at all, which HDF5 lacks.
+"""A file that is changed in place, completely or not at all, which HDF5 itself does not offer.
 
 Changes stay in memory until `Journaled.commit`. It stores the old content of all changed pages in a second file, the
 journal, changes the file, and removes the journal. A process that ends in between leaves the journal, from which the
@@ -73,7 +73,7 @@ class Journaled(io.RawIOBase):
         """Divide the next `length` bytes into pages, and move the position behind them.
 
         Returns:
-            For each page its number, start and stop in the page, and offset of this part in the `length` bytes.
+            For each page its number, start and stop in the page, and the offset of these bytes in the data.
         """
         spans, at, end = [], 0, self._place + length
         while self._place < end:
@@ -120,7 +120,7 @@ def roll_back(path: Path) -> None:
 
 
 def read_journal(path: Path) -> tuple[int, dict[int, bytes]] | None:
-    """Return the content of a file's journal: old size [bytes], and old pages by number; None without journal."""
+    """Return old size [bytes] and old pages, by number, from a file's journal; None without a journal."""
     try:
         content = journal_of(path).read_bytes()
     except FileNotFoundError:

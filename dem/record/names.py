@@ -43,5 +43,5 @@ def partial(name: str) -> str:
 
 
 def is_partial(name: str) -> bool:
-    """Return whether a name is one that `partial` gives, as of a file that a killed process left incomplete."""
+    """Return whether a name is one that `partial` gives, as of a file that a killed process left."""
     return name.startswith(".") and ".partial." in name

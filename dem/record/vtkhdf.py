@@ -1,8 +1,8 @@
-"""Frames of a run in one file, `frames.vtkhdf`: a temporal PolyData of VTKHDF 2.0; see docs/reference/files.md.
+"""Frames of a run in one file, `frames.vtkhdf`, a temporal PolyData of VTKHDF 2.0.
 
-A step is the frame of one time: a mesh of lines with data by name. Steps with equal lines share them in the file. The
-rows of a step begin a new chunk, so that a later step changes no chunk of an earlier step; VTK reads by offsets and
-skips the gaps.
+docs/reference/files.md describes the file. A step is the frame of one time: a mesh of lines with data by name. Steps
+with equal lines share them in the file. The rows of a step begin a new chunk, so that a later step changes no chunk of
+an earlier step; VTK reads by offsets and skips the gaps.
 
 Source: https://docs.vtk.org/en/latest/vtk_file_formats/vtkhdf_file_format/vtkhdf_specifications.html
 """
@@ -93,7 +93,7 @@ def read_step(path: Path, number: int) -> meshio.Mesh:
 
 
 def check_times(path: Path, times: Sequence[float]) -> None:
-    """Raise InputError unless the first steps have the times `times` [s], and a run can continue after them."""
+    """Raise InputError unless the first steps have these times [s] and a run can continue after them."""
     if not times:
         return
     if not np.array_equal(read_times(path)[: len(times)], times):
@@ -110,10 +110,8 @@ def _make(root: Any, name: str, empty: NDArray[Any], rows: int) -> None:
     """Create a dataset without rows.
 
     Args:
-        name: path of the dataset below `root`.
-        empty: array with the type and the shape of a row, (0, …).
-        rows: rows of a chunk; chunks of `_CHUNK` rows are compressed, shorter ones are not, since each step changes
-            them.
+        empty: array with the type and the shape of rows, (0, …).
+        rows: rows of a chunk; only chunks of `_CHUNK` rows are compressed, since each step changes shorter ones.
     """
     packed = {"compression": 4, "shuffle": True} if rows == _CHUNK else {}
     shape = empty.shape[1:]
@@ -140,12 +138,7 @@ def _append(root: Any, mesh: meshio.Mesh, time: float) -> None:
 
 
 def _lines(root: Any, lines: NDArray[np.int64], points: int) -> dict[str, Any]:
-    """Add the lines of a step, unless the previous step has equal lines; return the offsets of the step's lines.
-
-    Args:
-        lines: (n, 2) numbers of the points that lines join.
-        points: number of points of the step.
-    """
+    """Add a step's lines (n, 2) unless the previous step has equal ones; return the step's offsets."""
     parts, number, stored = len(root["NumberOfPoints"]), len(lines), root["Lines"]
     part, cell, end = parts - 1, len(stored["Offsets"]) - (number + 1), len(stored["Connectivity"]) - 2 * number
     counts = (root["NumberOfPoints"][part], stored["NumberOfCells"][part]) if parts else (0, 0)
@@ -208,12 +201,7 @@ def _change(path: Path, change: Callable[[Any], None]) -> None:
 
 
 def _read(path: Path, what: str, take: Callable[[Any], T]) -> T:
-    """Return the result of `take` for the root of a file, from one moment, although a run may write into it.
-
-    Args:
-        what: noun for the message of an InputError.
-        take: function that reads from the group VTKHDF.
-    """
+    """Return what `take` reads from a file, in a consistent state although a run may write into it."""
     for attempt in range(_TRIES):
         before = _stamp(path)
         failed: Exception | None = None

@@ -128,7 +128,7 @@ def build_watchdog(scene: Scene) -> Watchdog:
 
 @dataclass(frozen=True)
 class Builders:
-    """Functions that make parts of a run: time steps (one per phase [s]), engine, recorder; tests replace them."""
+    """Functions that make a run's time steps (one per phase [s]), engine and recorder; tests replace them."""
 
     steps: Callable[[Scene], Sequence[float]] = time_steps
     engine: Callable[[Scene, float], Engine] = build_engine

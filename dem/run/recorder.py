@@ -69,7 +69,7 @@ class Recorder:
         self.schedule(engine)
 
     def schedule(self, engine: Engine) -> None:
-        """Set `next_step` to the step nearest to the next sample's time; called after each change of the time step."""
+        """Set `next_step` to the step nearest to the next sample's time; called after each change of dt."""
         self.next_step = engine.steps + max(1, round((self.samples * self.interval - engine.time) / engine.time_step))
 
     def watch(self, engine: Engine, state: PileState | None = None) -> None:

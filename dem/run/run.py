@@ -148,10 +148,7 @@ def _saved(scene: Scene, out: Path, made_by: tuple[str, str]) -> tuple[Checkpoin
 
 @contextlib.contextmanager
 def _of_checkpoint(out: Path) -> Iterator[None]:
-    """Convert any error in the block, which reads a checkpoint, into an InputError about wrong content.
-
-    InputError and RunError are raised unchanged.
-    """
+    """Raise InputError in place of any other error of a block that reads a checkpoint, except RunError."""
     try:
         yield
     except (InputError, RunError):
@@ -184,10 +181,9 @@ def _restore(simulation: Simulation, saved: tuple[Checkpoint, str | None] | None
 
 
 def _mark_ended(simulation: Simulation | None, claim: Claim, log: logging.Logger, error: BaseException) -> str:
-    """Write the series and `failed.json` after an error; return its cause in words.
+    """Write the series and `failed.json` after an error; return the cause in words.
 
-    For a failed run the text also names the last checkpoint. Nothing is written if the run directory was moved or
-    replaced.
+    If the run failed, the text also has the last checkpoint. Nothing is written if the run directory was moved.
     """
     status: Ended = "interrupted" if isinstance(error, StopRequestedError | KeyboardInterrupt) else "failed"
     cause = "interrupted by the user" if isinstance(error, KeyboardInterrupt) else str(error)

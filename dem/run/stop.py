@@ -1,4 +1,4 @@
-"""Stop a run at its next checkpoint after SIGUSR1, which e.g. a batch system sends before its time limit."""
+"""Stop a run at its next checkpoint after SIGUSR1, e.g. from a batch system before its time limit."""
 
 import signal
 import threading

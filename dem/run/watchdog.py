@@ -63,7 +63,7 @@ class Watchdog:
             floor: height of the floor [m].
             points: (N, P, 3) centres of the spheres, or points of the links' axes [m]; None: centres of mass.
                 The check of overlaps does not replace them: YADE underestimates overlaps beyond wall or floor.
-            raised: distance by which the upper hook may have lifted bodies above the wall [m]; None: the wall does not
+            raised: distance by which the upper hook may have lifted bodies since the start [m]; None: the wall does not
                 enclose the pile.
             gaps: (N, 2) distances between the links of each hinge [m]; None while welded.
         """

@@ -121,10 +121,10 @@ def apply_override(data: Any, override: str) -> None:
 
 
 def _plain(scene: Scene) -> dict[str, Any]:
-    """Return the resolved scene as plain data, without keys that were added to the format and have their defaults.
+    """Return the resolved scene as plain data, without keys of `ADDED_KEYS` and others at their defaults.
 
-    Leaving these keys out keeps the hashes of older scenes. A scene with a protocol keeps `packing_radius_m` and the
-    keys of `ADDED_KEYS`, since a protocol may have filled them in.
+    These keys were added to the format later; without them the hashes of older scenes stay. A scene with a protocol
+    keeps `packing_radius_m` and the keys of `ADDED_KEYS`, since a protocol may have filled them in.
     """
     data = scene.model_dump(mode="json")
     smarticle = data["smarticle"]

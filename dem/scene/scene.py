@@ -49,13 +49,10 @@ _LEAST_GRAVITY = 1e-6  # m/s²; below it motors, whose torque limit is proportio
 
 
 def _named(base: str, given: Mapping[str, Any], diameter: Any = None) -> Mapping[str, Any]:
-    """Return the knobs of the named fidelity `base`, adapted to a scene.
+    """Return the knobs of the named fidelity `base`, adapted to the validated parts `given` of a scene.
 
-    On the engine links `rows` is 1 if the scene has a plane, if t1 is at most t2, or if `diameter` is given.
-
-    Args:
-        given: parts of the scene that are validated already, by their names in the model.
-        diameter: `fidelity.diameter_m` of the scene.
+    On the engine links `rows` is 1 if the scene has a plane, if t1 is at most t2, or if `diameter`, its
+    `fidelity.diameter_m`, is not None.
     """
     engine, smarticle = given.get("engine", ""), given.get("smarticle") or Smarticle()
     narrow = smarticle.thickness_normal_m <= smarticle.thickness_in_plane_m

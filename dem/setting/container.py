@@ -88,7 +88,7 @@ class Cylinder:
 
     @property
     def corner_radius(self) -> float:
-        """Distance of the wall's vertical edges from the axis [m]; the polygon has the area of a circle of `radius`."""
+        """Distance of the wall's vertical edges from the axis [m]; polygon and circle have equal areas."""
         return self.corner_radius_of(self.radius)
 
     def corner_radius_of(self, radius: float) -> float:
@@ -103,7 +103,7 @@ class Cylinder:
 
     @property
     def bottom(self) -> float:
-        """Height [m] of the wall's lower edge above the floor at the start; negative, since it is below the floor."""
+        """Height [m] of the wall's lower edge from the floor at the start; negative, so below the floor."""
         return -0.1 * self.radius
 
     def radii(self, heights: Array) -> Array:

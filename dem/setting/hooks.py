@@ -104,9 +104,11 @@ class Cross:
         return max(math.hypot(abs(x) + a, abs(y) + b) for (x, y), (a, b, _) in self.bars)
 
     def obstacles(self, diameter: float) -> Array:
-        """Return (n, 3) points in the bars [m], which stand for the bars when spheres of `diameter` [m] are placed.
+        """Return (n, 3) points in the bars [m], which stand for the bars when bodies are placed.
 
-        A sphere whose centre is at least a diameter away from all points touches no bar.
+        Args:
+            diameter: diameter of spheres [m]. A sphere whose centre is a diameter or more away from all points touches
+                no bar.
         """
         # No point of a bar is farther than √3/2 of the spacing from the grid, less than the radius that is kept away.
         points: list[tuple[float, ...]] = []

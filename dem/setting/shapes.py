@@ -81,7 +81,7 @@ class Shaped(Part):
         return np.asarray(1 + self.spread * values / math.sqrt(float((values**2).mean())))
 
     def bars(self, factor: float = 1.0) -> Bars:
-        """Return the bars of the body, lengths multiplied by a factor [1]; raise InputError if bars touch or cross."""
+        """Return the body, lengths multiplied by a factor [1]; raise InputError if its bars touch or cross."""
         points, normals = self.layout()
         flat = (self.thickness_normal_m or NORMAL, self.thickness_in_plane_m or IN_PLANE)
         normal, in_plane = flat if self.diameter_m is None else (self.diameter_m, self.diameter_m)
@@ -107,13 +107,7 @@ def _path(lengths: Sequence[float], headings: Sequence[float]) -> tuple[Array, A
 
 
 def _arc(radius: float, angle: float, segments: int) -> tuple[list[float], list[float]]:
-    """Return lengths [m] and headings from x [rad] of bars, end to end, with the length of an arc.
-
-    Args:
-        radius: radius of the arc [m].
-        angle: angle of the arc [rad].
-        segments: number of bars.
-    """
+    """Return lengths [m] and headings [rad] of bars along an arc, from its radius [m] and angle [rad]."""
     step = angle / segments
     return [abs(radius * step)] * segments, [(k + 0.5) * step for k in range(segments)]
 
@@ -148,10 +142,10 @@ class Staple(Shaped):
 def _three_bars(
     middle: float, arms: tuple[float, float], angles: tuple[float, float], twists: tuple[float, float]
 ) -> tuple[Array, Array]:
-    """Return the layout of a middle bar [m] along x with an arm [m] at each end.
+    """Return the layout of a middle bar along x with an arm at each end; lengths in m.
 
     Args:
-        angles: angle of each arm to the middle bar, 0 straight [deg].
+        angles: angle between each arm and the middle bar, 180 straight [deg].
         twists: rotation of each arm about the middle bar [deg].
     """
     joints = np.array([[-middle / 2, 0.0, 0.0], [middle / 2, 0.0, 0.0]])

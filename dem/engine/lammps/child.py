@@ -28,7 +28,7 @@ _OPTIONS = (*"--bind-to none --mca btl_vader_single_copy_mechanism none --mca mp
 
 
 def lammps_version() -> str:
-    """Return LAMMPS's version; raise RunError if LAMMPS or mpirun is missing or fails, or a style is missing."""
+    """Return LAMMPS's version; raise RunError if it, mpirun or a style of `NEEDED` is missing or fails."""
     for program, what in ((LMP, "LAMMPS"), (MPIRUN, "Open MPI")):
         if shutil.which(program) is None:
             raise RunError(
@@ -60,7 +60,7 @@ def _version(program: str) -> str:
 
 
 class Child:
-    """A process of LAMMPS on a number of ranks, which reads commands until it is closed or this process ends.
+    """A process of LAMMPS on some ranks, which reads commands until it is closed or this process ends.
 
     Raises:
         RunError: mpirun does not start.
@@ -135,12 +135,12 @@ class Child:
 
 
 def explain(log: str, output: str, status: int | None) -> tuple[str, str]:
-    """Return the cause of LAMMPS's end, and advice to the user, in words.
+    """Return the cause of LAMMPS's end, and advice to the user.
 
     Args:
         log: content of LAMMPS's log file.
         output: output of mpirun.
-        status: exit status of mpirun; None: it still runs.
+        status: exit status of mpirun.
     """
     errors = re.findall(r"^ERROR(?: on proc \d+)?: (.+)", f"{log}\n{output}", re.MULTILINE)
     if errors:

@@ -37,7 +37,7 @@ HEAD = 9  # lines of a dump before its rows
 
 
 def absent(what: str) -> NoReturn:
-    """Raise RunError for a feature that the engine lacks, `what`; scenes that need it are rejected before a run."""
+    """Raise RunError for a feature `what` that the engine lacks; scenes that need it are rejected before."""
     raise RunError(f"engine: lammps has no {what}")
 
 
@@ -152,11 +152,7 @@ class LammpsEngine:
             self._fresh = True
 
     def _scene(self, box: str) -> Iterator[str]:
-        """Yield all commands for a new process of LAMMPS, except those for rigid bodies.
-
-        Args:
-            box: command that makes the simulation box and reads the spheres.
-        """
+        """Yield all commands for a new LAMMPS except those for rigid bodies; `box` is the command for spheres."""
         between, at_wall = text.contact_terms(self._law, self._reference.mass)
         yield from text.before_box(self.particle)
         # Vertical cuts divide the pile among ranks: above a horizontal cut there would be little work.

@@ -139,10 +139,7 @@ class Law(NamedTuple):
 
 
 class Kept(NamedTuple):
-    """Memory of contacts with boundaries.
-
-    Each possible contact of a segment has a fixed place, its slot; `contact.boundaries.slots_for` counts the slots.
-    """
+    """Memory of contacts with boundaries; each possible contact of a segment has a fixed column, its slot."""
 
     slip: Array  #: (Q, slots, 4) stretch of the tangential spring [m], and its energy [J]
     used: NDArray[np.uint8]  #: (Q, slots) whether there was a contact in the last step
@@ -311,13 +308,7 @@ def joined(one: Bodies, other: Bodies) -> Bodies:
 
 
 def pairs_for(bodies: int, segments: int, capacity: int) -> Pairs:
-    """Return empty lists of near segments.
-
-    Args:
-        bodies: number of bodies.
-        segments: number of segments.
-        capacity: number of pairs for which there is room.
-    """
+    """Return empty lists of near segments; arguments are numbers of bodies, segments and, at most, pairs."""
     return Pairs(
         np.zeros(capacity, np.int32),
         np.zeros(capacity, np.int32),

@@ -1,4 +1,4 @@
-"""Rigid boundaries on the engine links: floor, round wall of one or several tiers, hooks, or a channel."""
+"""Rigid boundaries on the engine links: floor, round wall of one or more tiers, hooks, or a channel."""
 
 from __future__ import annotations
 

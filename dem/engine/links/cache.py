@@ -73,7 +73,7 @@ def _folders() -> Iterator[Path]:
 
 @cache
 def folder() -> Path | None:
-    """Return the folder of code for this processor, made if needed; log a warning and return None if that fails."""
+    """Return the folder of code for this processor, made if needed; None, and a warning, if that fails."""
     causes = []
     machine = repr((sys.implementation.cache_tag, cpu_target.target_context.codegen().magic_tuple()))
     for base in _folders():
@@ -97,11 +97,7 @@ def folder() -> Path | None:
 
 
 def is_kept(without: frozenset[str]) -> bool:
-    """Return whether the cache has code for simulations in which groups of arrays are None.
-
-    Args:
-        without: names of these groups, such as "motors".
-    """
+    """Return whether the cache has code for simulations in which the groups of arrays `without` are None."""
     where = folder()
     return where is not None and any(where.glob(f"{_title(LONGEST, without)}.*.code"))
 
@@ -111,11 +107,11 @@ def _title(kernel: str, without: frozenset[str]) -> str:
 
 
 def _lacking(kind: Any, name: str) -> Iterator[str]:
-    """Yield the names of all fields that are None, at any depth, from the Numba type of an argument.
+    """Yield the names of all fields that are None in an argument of a kernel, at any depth.
 
     Args:
-        kind: the type; if it is that of None, the argument's name is yielded.
-        name: name of the argument.
+        kind: Numba's type of the argument, or of a field.
+        name: name of the argument, or of the field, yielded if it is None itself.
     """
     if isinstance(kind, types.NoneType):
         yield name
@@ -202,10 +198,7 @@ def _cause(error: Exception) -> str:
 
 @contextmanager
 def _locked(path: Path) -> Iterator[None]:
-    """Hold the lock of a file during a block; after waiting for `PATIENCE`, run the block without the lock.
-
-    The system releases the lock if this process dies.
-    """
+    """Hold the lock of a file during a block, which runs without the lock after waiting for `PATIENCE`."""
     file = None
     try:
         if fcntl is not None:
@@ -234,11 +227,7 @@ def _wait_for(file: int) -> None:
 
 
 def announce(seconds: float = math.nan) -> None:
-    """Report, once per process, that the process compiles.
-
-    Args:
-        seconds: expected processor time [s]; NaN: unknown.
-    """
+    """Report, once per process, that it compiles, and if known the expected processor time [s]."""
     if not _ANNOUNCED.is_set():
         _ANNOUNCED.set()
         about = "" if math.isnan(seconds) else f", about {seconds:.0f} s of processor time"

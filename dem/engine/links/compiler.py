@@ -124,7 +124,7 @@ def inlined(function: F) -> F:
 
 
 def callable_from_python(function: Callable[..., Any]) -> Any:
-    """Compile a function and all functions that it calls at its first call from Python; the code is not stored."""
+    """Compile a function, with all that it calls, at its first call from Python; the code is not stored."""
     return numba.njit(**OPTIONS, **NOT_FROM_C, pipeline_class=_KernelCompiler)(function)
 
 

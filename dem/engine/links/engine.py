@@ -168,16 +168,13 @@ class LinksEngine:
 
     @cached_property
     def _weights_of_kinds(self) -> Array:
-        """(K,) weights of the kinds' bodies, over the weight of a body of the first kind [1].
-
-        Weights of filaments are less buoyancy, except for the weight by which all are divided.
-        """
+        """(K,) weights, less buoyancy, of bodies of each kind, over the full weight of the first kind [1]."""
         rods, masses = [kind.filament for kind in self._world.kinds], self._world.shapes.mass
         return np.asarray(masses / masses[0] * [1.0 if rod is None else rod.weight_share for rod in rods])
 
     @property
     def _relative_weights(self) -> Array:
-        """(N,) weights of the bodies, over the weight that `_weights_of_kinds` takes [1]; exactly 1 for smarticles."""
+        """(N,) weights, less buoyancy, of the bodies, over the full weight of a body of the first kind [1]."""
         return np.asarray(self._weights_of_kinds[self._world.bodies.shape])
 
     def still(self) -> None:

@@ -30,10 +30,9 @@ class LinksLedger:
 
     @property
     def dissipated(self) -> float:
-        """Energy dissipated since the start [J].
+        """Energy dissipated since the start [J]: by welding, by stopping and by drag.
 
-        It is that of welding, of stopping and of drag; if dissipation is recorded, also that of contacts and of the
-        internal damping of filaments.
+        If dissipation is recorded, that of contacts and of internal damping of filaments is added.
         """
         energies = self._energies
         return float(self._world.totals[LOST]) + energies.damped + energies.dragged
@@ -48,14 +47,14 @@ class LinksLedger:
         return self._energies.elastic
 
     def elastic(self) -> tuple[float, float]:
-        """Return the elastic energy of all contacts and that of filaments [J]; hinges are rigid, without energy."""
+        """Return the elastic energy of all contacts and that of filaments [J]; rigid hinges have none."""
         return self._world.contacts().elastic_energy, self.deformation
 
     def take_in(self) -> None:
         self.added += self.elastic()[0]
 
     def removed(self, remove: Callable[[], None]) -> None:
-        """Call `remove`, which removes contacts; their elastic energy counts as dissipated if that is recorded."""
+        """Call `remove`, which removes contacts; if recorded, their elastic energy counts as dissipated."""
         counted = self._world.ledger is not None
         stored = self.elastic()[0] if counted else 0.0
         remove()

@@ -139,7 +139,7 @@ class LinksMotors:
         return found
 
     def restore(self, arrays: dict[str, Array]) -> None:
-        """Restore the state of motors that `arrays` returned; the state of bodies must have been restored before."""
+        """Restore the state of motors that `arrays` returned; the bodies must be restored before."""
         world = self._world
         world.motors = None
         if "command" in arrays:

@@ -65,10 +65,9 @@ def filaments_at(
     starts: Array | None,
     seed: int,
 ) -> Filaments:
-    """Return arrays of the filaments of `old` and of F new ones; other arguments as in `World.add_filaments`.
+    """Return arrays of the filaments of `old` and of F new ones; see also `World.add_filaments`.
 
     Args:
-        filament: kind of the new filaments.
         bodies: (F,) numbers of the new filaments among all bodies.
     """
     count, nodes, _ = points.shape
@@ -111,7 +110,7 @@ def filaments_at(
 
 
 def _untwisted(tangents: Array) -> Array:
-    """Return first directors (F, S, 3) [1] of filaments without twist, from tangents (F, S, 3) of segments."""
+    """Return first directors (F, S, 3) [1] of filaments without twist, whose tangents are (F, S, 3)."""
     found = np.zeros_like(tangents)
     for f, own in enumerate(tangents):
         least = np.zeros(3)

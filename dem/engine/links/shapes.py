@@ -146,7 +146,7 @@ def smarticle_shape(particle: Particle) -> Shape:
 
 
 def offsets_of(particle: Particle) -> Array:
-    """Return the offsets (S,) of a link's strands along the normal [m]; several strands reach to both faces."""
+    """Return the offsets (S,) of a link's strands along the normal [m]; several reach from face to face."""
     reach = (particle.boxes.thickness_normal - particle.chain.diameter) / 2
     return np.zeros(1) if particle.chain.rows == 1 else np.linspace(-reach, reach, particle.chain.rows)
 

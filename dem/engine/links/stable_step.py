@@ -184,11 +184,7 @@ def _modes_of_pile(law: ContactLaw, heave: Array, rub: Array) -> list[Mode]:
 
 
 def _motion(place: Array) -> Array:
-    """Return the matrix (3, 6) from a rigid body's velocity and angular velocity to the velocity of a point.
-
-    Args:
-        place: (3,) the point, from the centre of mass [m].
-    """
+    """Return the matrix (3, 6) from a body's velocity and spin to the velocity of a point; place in m."""
     x, y, z = place
     return np.column_stack([np.eye(3), [[0, z, -y], [-z, 0, x], [y, -x, 0]]])
 
@@ -233,9 +229,7 @@ def _tip_of(ends: list[tuple[int, tuple[float, float, float]]]) -> tuple[int, fl
 
 
 def _motion_of(shape: Shape, row: Array, link: int, place: tuple[float, float, float], free: bool) -> Array:
-    """Return the matrix (3, 6), with free angles (3, 8), from velocities of a smarticle to that of a point.
-
-    Columns are as the rows of `_mass`.
+    """Return the matrix (3, 6), with free angles (3, 8), from the rates of `_mass` to a point's velocity.
 
     Args:
         row: plane geometry of the smarticle.

@@ -222,7 +222,7 @@ class World:
         self.make_room()
 
     def _add_posed_filaments(self, poses: Poses, turns: Array, speed: float) -> None:
-        """Add filaments of a mixture in the shape in which they are poured; other arguments as in `add_bodies`."""
+        """Add filaments of a mixture at poses, in the shape in which they are poured, one by one."""
         assert self.mixture is not None
         assert poses.kinds is not None
         rng = np.random.default_rng([self.wave_seed, self.count])
@@ -299,7 +299,7 @@ class World:
         self.kept = new
 
     def add_hooks(self, hooks: Sequence[Sequence[Bar]]) -> None:
-        """Add two hooks, given by their bars, the lower hook first; call this before bodies and rims are added."""
+        """Add the lower and the upper hook, given by their bars; call this before bodies and rims are added."""
         assert not self.count
         counts = np.array([len(bars) for bars in hooks])
         most = int(counts.max())

@@ -55,7 +55,7 @@ class Assembly:
 
     @property
     def bodies(self) -> Sequence[int]:
-        """Ids of the rigid bodies in the order of smarticles: one of a welded, three of an articulated smarticle."""
+        """Ids of the rigid bodies, smarticle by smarticle: one while welded, three while articulated."""
         return self._ids
 
     @property
@@ -295,9 +295,9 @@ class Assembly:
 
 
 def _tensors(state: State) -> tuple[Array, Array]:
-    """Return (N, 3, 3) inertia tensors [kg m²], and positions of links from the centre of mass [m].
+    """Return inertia tensors (N, 3, 3) [kg m²], and arms of links (N, 3, 3) [m], in laboratory axes.
 
-    Positions are (N, 3, 3), one row for each link; both are in the axes of the laboratory.
+    An arm is the vector from the centre of mass of the smarticle to the centre of a link.
     """
     boxes = state.boxes
     arms = state.link_positions - state.positions[:, None]

@@ -225,10 +225,7 @@ def _band(yade: Yade, one: tuple[Array, float], other: tuple[Array, float]) -> I
 
 
 def add_channel(yade: Yade, channel: Channel) -> list[int]:
-    """Add the table, and the walls of a channel if it has any; return the ids of their bodies.
-
-    Ids are of the lower wall, upper wall and table. Centrelines of links on the table are at z = 0.
-    """
+    """Add the channel with centrelines at z = 0; return ids of lower and upper wall, if any, and table."""
     bodies = []
     if channel.width is not None:
         # Each wall always pushes to its inner side, like the container's floor.

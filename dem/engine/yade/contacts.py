@@ -84,12 +84,7 @@ def measure_overlaps(
 
 
 def _held(yade: Yade, assembly: Assembly, boundaries: YadeBoundaries, deep: Flags, least: float) -> tuple[Held, ...]:
-    """Return the bodies that touch two boundaries whose distance has changed.
-
-    Args:
-        deep: (N,) whether each body has a deep contact; others are left out.
-        least: smallest change of distance that counts [m].
-    """
+    """Return the bodies of `deep` that touch boundaries whose distance changed by over `least` [m]."""
     parts = boundaries.parts()
     part_of = {body: name for name, (bodies, _) in parts.items() for body in bodies}
     touched: dict[int, set[str]] = defaultdict(set)

@@ -100,11 +100,7 @@ class Hinges:
         self._updates = 0
 
     def make(self, strengths: Array | None = None) -> None:
-        """Make the bonds of all hinges.
-
-        Args:
-            strengths: (N, 2) factors on stiffness and torque cap of the shafts [1]; None: 1 for all.
-        """
+        """Make the bonds; `strengths` (N, 2): factors on stiffness and torque cap of shafts [1], None: 1."""
         factors = np.ones_like(self._angles) if strengths is None else strengths
         for (barb_centre, barb_end, middle_centre), factor in zip(self._hinges(), factors.flat, strict=True):
             self._bond(barb_centre, middle_centre, self._law.pin_stiffness)
@@ -128,7 +124,7 @@ class Hinges:
         self._pins, self._shafts, self._ends = [], [], []
 
     def _hinges(self) -> Iterator[tuple[int, int, int]]:
-        """Yield the ids of each hinge's nodes: two of the barb, at centre and axis end, one of the middle link."""
+        """Yield the ids of each hinge's nodes: of the barb at centre and at axis end, of the middle link."""
         for links in self._nodes:
             for hinge, barb in enumerate(BARBS):
                 centre, end = links[barb]

@@ -148,11 +148,7 @@ class YadeLedger:
         return found
 
     def _contacts(self, before: Velocities) -> Contacts:
-        """Return all contacts after a step.
-
-        Args:
-            before: relative velocities before the step; a contact that is absent in it gets its present velocity.
-        """
+        """Return all contacts after a step; a contact absent in `before` gets its present velocity for it."""
         rows = []
         for contact in contacts_of(self._yade, self._assembly):
             geom, phys = contact.geom, contact.phys

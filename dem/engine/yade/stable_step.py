@@ -1,4 +1,7 @@
-"""Stable time steps on YADE, from masses and inertias of bodies; YADE's own estimate takes sphere sizes."""
+"""Stable time steps on YADE, from masses and inertias of bodies, not from sphere sizes.
+
+The 18 degrees of freedom of three links are velocity and angular velocity of each link, in the body frame.
+"""
 
 import math
 from collections.abc import Iterable, Sequence
@@ -125,10 +128,7 @@ def planar_stable_time_step(
 
 
 def _roll_shape(particle: Particle) -> Array:
-    """Return the stiffness matrix (18, 18) of tangential springs of 1 N/m at the top of every sphere.
-
-    Degrees of freedom are those of `_mass_matrix`.
-    """
+    """Return the stiffness matrix (18, 18) of tangential springs of 1 N/m at the top of every sphere."""
     shape = np.zeros((6 * LINKS, 6 * LINKS))
     for link, height in zip(particle.links, particle.centres[:, 2] + particle.radius, strict=True):
         about = slice(6 * int(link) + 3, 6 * int(link) + 5)
@@ -145,10 +145,7 @@ def _stable_step(mass: Array, stiffness: Array, damping: Array) -> float:
 
 
 def _mass_matrix(boxes: Boxes) -> Array:
-    """Return the mass matrix (18, 18) of three free links.
-
-    Degrees of freedom are velocity and angular velocity of each link, in the body frame.
-    """
+    """Return the mass matrix (18, 18) of three free links."""
     blocks = []
     for moved, moments, rotation in zip(boxes.link_masses, boxes.link_inertias, boxes.link_rotations, strict=True):
         blocks += [moved * np.eye(3), rotation @ np.diag(moments) @ rotation.T]
@@ -156,7 +153,7 @@ def _mass_matrix(boxes: Boxes) -> Array:
 
 
 def _velocity_of(boxes: Boxes, link: int, point: Array) -> Array:
-    """Return the matrix (3, 18) from the degrees of freedom of `_mass_matrix` to the velocity of a point of a link.
+    """Return the matrix (3, 18) from velocities of all links to the velocity of a point of `link`.
 
     Args:
         point: (3,) the point in the body frame [m].
@@ -188,7 +185,7 @@ def _hinge_stiffness(boxes: Boxes, law: HingeLaw) -> Array:
 
 
 def _twist(barb: int) -> Array:
-    """Return the matrix (1, 18) from the degrees of freedom of `_mass_matrix` to the rate of a barb's angle."""
+    """Return the matrix (1, 18) from velocities of all links to the rate of a barb's angle."""
     row = np.zeros((1, 6 * LINKS))
     row[0, 6 * barb + 5], row[0, 11] = 1, -1
     return row

@@ -65,13 +65,7 @@ def _note(
 ) -> int:
     """Write a contact with SHARE 1 into row `count` of `rows`; return the new number of rows.
 
-    Args:
-        slot: place of the contact in the memory of contacts, see `Kept`.
-        part_of: index of the boundary in `Ground.force`.
-        depth: overlap [m].
-        room: overlap at which the link's axis would meet the surface [m].
-        point: point on the link's axis [m].
-        normal: unit vector from the boundary to the link [1].
+    Other arguments are the columns of the row, see `SLOT`; `part_of` is the index of the boundary.
     """
     row = rows[count]
     row[SLOT], row[PART], row[DEPTH], row[SHARE], row[FACTOR], row[ROOM] = slot, part_of, depth, 1.0, 1.0, room
@@ -134,10 +128,7 @@ def contacts_of_segment(
 
 @inlined
 def _contacts_with_wall(radius: float, ground: Ground, slot: int, point: Vector, rows: Array, count: int) -> int:
-    """Find the contacts of a link's end with the wall, its edges and the undersides of its tiers.
-
-    Contacts are written from row `count` of `rows` on; the new number of rows is returned.
-    """
+    """Append a link end's contacts with the wall and its tiers to `rows`; return their new number."""
     x, y, z = point
     height, r, tiers = z - ground.place[WALL], math.sqrt(x * x + y * y), ground.radii.shape[0]
     lifted = ground.flags[1] != 0
@@ -171,10 +162,7 @@ def _contacts_with_wall(radius: float, ground: Ground, slot: int, point: Vector,
 
 @inlined
 def _contacts_with_rims(link: Array, ground: Ground, rims: Rims, first: int, rows: Array, count: int) -> int:
-    """Find the contacts of a link's inner points with the wall's edges.
-
-    Contacts are written from row `count` of `rows` on, in slots from `first` on; the new number of rows is returned.
-    """
+    """Append contacts of a link's inner points with the wall's edges to `rows`; return their new number."""
     if ground.flags[0] == 0:
         return count
     z, uz, radius = link[2], link[5], link[RADIUS]
@@ -195,10 +183,7 @@ def _contacts_with_rims(link: Array, ground: Ground, rims: Rims, first: int, row
 
 @inlined
 def _contacts_with_hooks(link: Array, ground: Ground, hooks: Hooks, rows: Array, count: int, met: Array) -> int:
-    """Find the contacts of a segment with the bars of both hooks.
-
-    Contacts are written from row `count` of `rows` on; the new number of rows is returned.
-    """
+    """Append a segment's contacts with the bars of both hooks to `rows`; return their new number."""
     reach = link[RADIUS] + hooks.radius
     for hook in range(2):
         height = ground.place[LOWER + hook]

@@ -13,10 +13,9 @@ from dem.engine.links.vectors import Vector, add, along, cross, dot, put, scale,
 def share_of_step(depth: float, closing: float, dt: float) -> float:
     """Return a factor on the spring's force [1], below 1 in the first and the last step of a contact.
 
-    In the first and the last step bodies are in contact for a part of the step only. The leapfrog scheme conserves kn/2
-    δ_n δ_n+1 of consecutive overlaps. With this factor the spring does no work in total, whatever its first and last
-    overlap are. With the factor 1 in all steps it would dissipate (ω dt)²/12 of its energy, ω being its angular
-    frequency.
+    Then bodies are in contact for a part of the step only. The leapfrog scheme conserves kn/2 δ_n δ_n+1 of consecutive
+    overlaps. With this factor the spring does no work in total, whatever its first and last overlap are. With the
+    factor 1 in all steps it would dissipate (ω dt)²/12 of its energy, ω being its angular frequency.
 
     Args:
         depth: overlap [m].

@@ -1,4 +1,4 @@
-"""Compute the points at which two segments push each other apart, and the forces there, from one energy.
+"""Compute the points where two segments push each other apart, and the forces there, from one energy.
 
 Two swept segments have their greatest overlap δ0 at their nearest points. They lie along each other over a stretch of
 length ℓ. δ1 and δ2 are the overlaps at the two ends of this stretch, between the end of one link and the nearest point
@@ -89,7 +89,7 @@ def meet_at(
     both: Lines, s: float, t: float, gap: Vector, distance: float, diameter: float, stiffness: float,
     shared_p: int, shared_q: int, out: Array,
 ) -> int:  # fmt: skip
-    """Find points of contact and forces like `meet`, for segments that touch; return the number of bare forces.
+    """Find points of contact and forces of segments that touch; return the number of bare forces.
 
     Args:
         s: place of the nearest point along the first segment, 0 to 1.
@@ -184,14 +184,12 @@ def _note(
 def _lie_along(
     both: Lines, deepest: float, u: float, slope: float, diameter: float, stiffness: float, out: Array
 ) -> int:
-    """Write the contacts at both ends of the stretch over which two segments lie along each other.
+    """Write contacts at both ends of the stretch over which two segments lie along each other.
 
     Args:
-        deepest: overlap δ0 at the nearest points [m].
-        u: stretched overlap at the nearest points [m].
-        slope: u' at the nearest points [1].
-        diameter: sum of both radii [m].
-        out: rows 0 to 2 and the energy are updated, bare forces are written.
+        deepest: overlap δ0 [m].
+        u: stretched overlap u0 [m].
+        slope: u0' [1].
 
     Returns:
         Number of bare forces.

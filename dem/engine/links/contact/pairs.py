@@ -59,12 +59,7 @@ ROWS, POINT, PUSH, POWER, GAIN = 0, 2, 5, 8, 9
 
 @inlined
 def _extended(stretch: Any, row: int, velocity: Vector, arm: Vector) -> Vector:
-    """Return a point's velocity [m/s]: `velocity` of the rigid motion, plus that of the part's stretching.
-
-    Args:
-        row: number of the part.
-        arm: vector from the part's reference point to the point [m].
-    """
+    """Return `velocity` plus that of a part's stretching, at `arm` [m] from the part's reference point."""
     if stretch is None:
         return velocity
     axis = vector(stretch[row], AXIS)
@@ -73,11 +68,9 @@ def _extended(stretch: Any, row: int, velocity: Vector, arm: Vector) -> Vector:
 
 @inlined
 def _extend(stretch: Any, row: int, arm: Vector, force: Vector) -> None:
-    """Add axial force times axial distance of a force on a part to `stretch`.
+    """Add the stretching moment of a force on a part to `stretch`.
 
-    Args:
-        row: number of the part.
-        arm: vector from the part's reference point to the point where the force acts [m].
+    It is axial force times axial component of `arm`, the vector from the part's reference point to the force [m].
     """
     if stretch is None:
         return

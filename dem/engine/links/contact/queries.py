@@ -127,7 +127,7 @@ def query_all(
 def find_extremes(
     bodies: Bodies, segments: Segments, depths: Array, velocities: Array, energy: float, extremes: Array
 ) -> None:
-    """Compute extremes over all bodies, which show in most cases that no limit of the watchdog is exceeded.
+    """Compute extremes over all bodies, which mostly suffice to show that the watchdog's limits hold.
 
     Args:
         depths: (N,) see `Found.depth`.

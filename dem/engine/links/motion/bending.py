@@ -1,4 +1,4 @@
-"""Motion of flexible bodies: nodes with mass, segments that stretch and roll, bending and twist between segments.
+"""Motion of filaments: nodes with mass, segments that stretch and roll, bending and twist in between.
 
 Between two segments with tangents t, t', directors d1, d1' and d2 = t × d1, the discrete elastic rod of Bergou et al.,
 ACM Trans. Graph. 27, 63 (2008) and 29, 116 (2010), has the angles
@@ -201,11 +201,7 @@ def _push_bend(out: Array, i: int, moments: Vector, one: Piece, two: Piece, bend
 
 @inlined
 def _rates(one: Piece, two: Piece, bend: Bend, slope: float) -> Vector:
-    """Return dκ1/dt, dκ2/dt, and dν/dt times `slope` [1/s].
-
-    Args:
-        slope: derivative of ν by the twist m [1].
-    """
+    """Return dκ1/dt, dκ2/dt, and dν/dt times `slope`, the derivative of ν by the twist [1/s]."""
     d1, e1, d2, e2 = bend.along
     both = add(one.opening, two.opening)
     g, growth = sub(cross(one.opening, two.t), cross(two.opening, one.t)), dot(both, bend.tangent)
@@ -426,10 +422,7 @@ def _wait(gait: Array) -> float:
 
 @part
 def _turn_wave(gait: Array, dt: float) -> None:
-    """Advance the wave of preferred curvature by `dt` [s]: its factor, its angle ψ, and due reversals.
-
-    `gait` (GAIT,) is written.
-    """
+    """Advance a filament's wave (GAIT,) by `dt` [s]: its factor, its angle ψ, and due reversals."""
     change, rest = gait[CHANGE] * dt, gait[TARGET] - gait[FACTOR]
     gait[FACTOR] = gait[TARGET] if abs(rest) <= change else gait[FACTOR] + math.copysign(change, rest)
     gait[PSI] += gait[SENSE] * gait[RATE] * dt

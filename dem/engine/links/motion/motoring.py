@@ -38,10 +38,7 @@ HINGED_ITERATIONS = 2  # two leave 7e-6 of the energy that a free gait exchanges
 
 @kernel
 def engage(shapes: Shapes, bodies: Bodies, motors: Motoring) -> None:
-    """Start all motors with commands at the present angles, so that torques are 0.
-
-    `motors` and `bodies.rate` are written.
-    """
+    """Start all motors with commands at the present angles; `motors` and `bodies.rate` are written."""
     for i in range(bodies.position.shape[0]):
         if not shapes.hinged[bodies.shape[i]]:
             continue
@@ -83,7 +80,7 @@ def release(shapes: Shapes, bodies: Bodies, motors: Motoring) -> float:
 
 @inlined
 def _average(motors: Motoring, i: int) -> None:
-    """Write the mean torques of smarticle `i` since the last control update, and reset their time integrals."""
+    """Write the mean torques of smarticle `i` since the last control update, and reset their integrals."""
     for k in range(2):
         if motors.elapsed[0] > 0.0:
             motors.torque[i, k] = motors.impulse[i, k] / motors.elapsed[0]

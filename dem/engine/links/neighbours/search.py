@@ -58,7 +58,7 @@ def near_each_other(line: Array, p: int, q: int, reach: float) -> bool:
 def _cannot_touch(bends: Any, p: int, q: int) -> bool:
     """Return whether two segments of one body can never touch.
 
-    Segments of a rigid body never touch, and in a flexible body neighbours do not.
+    These are all segments of a rigid body, and segments of a filament with near numbers, see `Bends.apart`.
     """
     if bends is None:
         return True

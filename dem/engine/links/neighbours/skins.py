@@ -43,12 +43,11 @@ def _square(a: Vector) -> float:
 
 @inlined
 def _at_end(bends: Any, p: int, end: int, mean: Vector, rigid: Vector) -> Vector:
-    """Return the velocity of an end of segment `p` relative to the mean motion of all bodies [m/s].
+    """Return the velocity of a segment's end less the mean velocity of all bodies [m/s].
 
     Args:
         end: 0 for the start, 1 for the end.
-        mean: mean velocity of all bodies [m/s].
-        rigid: result if the body of the segment is rigid [m/s].
+        rigid: this velocity in a rigid body, returned unless the body is flexible [m/s].
     """
     if bends is None or bends.apart[p] == 0:
         return rigid
