@@ -144,7 +144,7 @@ class Bars:
 
     @property
     def volume(self) -> float:
-        """Sum of the bars' volumes [m³]; where they overlap at joints it counts twice, as in the paper."""
+        """Sum of the bars' volumes [m³]; overlaps at joints count twice, as in the paper."""
         return self.mass / self.density
 
     @cached_property

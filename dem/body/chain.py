@@ -83,7 +83,7 @@ class Chain:
 
 
 def parted(state: State, diameter: float) -> bool:
-    """Return whether a line across the chain separates two neighbours; `diameter`: thickness of links [m]."""
+    """Return whether a line across the chain separates two neighbours; `diameter`: links' thickness [m]."""
     along = _corners(state)[..., 0]
     return bool((along[:-1].max(axis=1) + diameter < along[1:].min(axis=1)).any())
 

@@ -35,7 +35,7 @@ class ContactForces:
 
 
 def at_links(smarticle: Number, link: Number, each: int = LINKS) -> Number:
-    """Return codes of links, 0 or above; `each` is the largest number of links of a body."""
+    """Return codes `each` × `smarticle` + `link`, 0 or above; `each`: largest number of links of a body."""
     return each * smarticle + link
 
 

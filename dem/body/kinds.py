@@ -105,7 +105,8 @@ class Kind:
         """Return (n,) distances of a bar's spheres from its start [m].
 
         At a joint only the owner has a sphere; other bars begin 1 + `HINGE_CLEARANCE` diameters away from it. At a free
-        end the last sphere ends at the tip, that of a filament has its centre there. See `dem.body.particle.Particle`.
+        end the last sphere reaches just to the tip; in a filament its centre is at the tip. See
+        `dem.body.particle.Particle`.
         """
         length, d = float(self.bars.lengths[bar]), self.diameter
         free, owned = self.bars.free[bar], self.bars.owned[bar]

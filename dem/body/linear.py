@@ -1,7 +1,7 @@
 """Linear algebra of small matrices, with identical bits on every processor.
 
-BLAS and LAPACK choose their kernels by the processor and differ in the last digit, which changes all poses of a pile
-within a second: it is chaotic. Here everything consists of NumPy's elementwise operations and sums in a fixed order.
+BLAS and LAPACK choose their kernels by the processor and differ in the last digit. A pile is chaotic, so that this
+changes all poses within a second. Here everything consists of NumPy's elementwise operations and sums in a fixed order.
 """
 
 import numpy as np
@@ -20,7 +20,7 @@ def matrix_product(a: Array, b: Array) -> Array:
 
 
 def applied(matrix: Array, points: Array) -> Array:
-    """Return points (…, n, j), or (n, j) for all matrices, multiplied by matrices (…, i, j), as (…, n, i)."""
+    """Return matrices (…, i, j) times points (…, n, j), or times common points (n, j), as (…, n, i)."""
     return matrix_product(points, np.swapaxes(matrix, -1, -2))
 
 

@@ -75,7 +75,7 @@ class Boundaries(Protocol):
         """Increase of the upper hook's height above the floor since the start [m], 0 or more; 0 without hooks.
 
         None if the wall does not enclose the pile: the wall is removed, its lower edge is above the floor, the upper
-        hook is above its top, or the scene is in a plane.
+        hook is above the top of the wall, or the scene is in a plane.
         """
 
     @property

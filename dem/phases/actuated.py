@@ -61,7 +61,7 @@ class ActuatedPhase(Phase):
         raise NotImplementedError
 
     def source_of(self, key: str) -> tuple[str, float | None]:
-        """Return the key of this phase that decides a key of the gait's motions, and the value of the former.
+        """Return the key of this phase that decides a key of a motion, and the value of the phase's key.
 
         Args:
             key: key of a motion with dots for nesting, such as `barbs.steps.0.duration_s`.

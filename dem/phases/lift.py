@@ -15,7 +15,7 @@ from dem.setting.part import Duration, Length, Part, Speed
 class Lift(Part, Phase):
     """Grip parts of filaments, raise them at constant speed, and hold them until a `release`.
 
-    Filaments go on to bend actively. No body is added for the end piece that grips, so that no contact with it exists.
+    Active bending goes on. The gripping end piece is not simulated as a body, so that nothing touches it.
     """
 
     of_filaments: ClassVar[bool] = True

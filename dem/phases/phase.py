@@ -50,7 +50,7 @@ class Phase:
     """Base of all kinds of phases, with defaults that kinds override."""
 
     actuates: ClassVar[bool] = False  #: Whether motors move or hold the barbs
-    begins: ClassVar[bool] = False  #: Whether the phase adds the bodies; the first phase of a run must, and no other
+    begins: ClassVar[bool] = False  #: Whether the phase adds the bodies, which only the first phase of a run does
     of_smarticles: ClassVar[bool] = False  #: Whether the phase needs smarticles
     of_filaments: ClassVar[bool] = False  #: Whether the phase needs filaments
     sources: ClassVar[frozenset[str]] = frozenset()

@@ -27,7 +27,7 @@ def typical_effective_mass(body: Body) -> float:
     """Return the effective mass [kg] of a body at a contact, averaged over spheres and directions.
 
     The average is a harmonic mean. The inverse of the effective mass at a point r from the centre of mass in the
-    direction n is the mobility 1/m + (r × n)·I⁻¹(r × n), with the mean over n of a third of its tensor's trace.
+    direction n is the mobility 1/m + (r × n)·I⁻¹(r × n). The mean of the mobility over n is a third of its trace.
     """
     if body.filament is not None:  # only what is near the contact gives way
         return body.filament.effective_mass

@@ -1,7 +1,7 @@
 """Choose engine and fidelity for a scene, from a table of measured errors and costs.
 
-`smarticles accuracy` measures a table on one scene. The shipped table joins the tables of three scenes; an activity,
-which is a list of phases that drive the pile, names each of them. A row has the errors of one named fidelity, and the
+`smarticles accuracy` measures a table on one scene. The shipped table joins the tables of three scenes, each
+named by its activity: the types of phases that drive the pile. A row has the errors of one named fidelity, and the
 ratio of the measured processor time to the planned wall time. This ratio corrects the wall times planned for other
 scenes. The column `knob` states what a row compares: `engine` all engines with one reference, `fidelity` the fidelities
 of one engine.
@@ -26,7 +26,7 @@ SHIPPED = Path(__file__).with_name("work_precision.csv")  #: Default table of me
 QUANTITIES = {"phi_0": "φ_0", "phi_f": "φ_f", "crossings": "⟨N⟩"}
 """Quantities with measured errors: symbols by the names in columns and in `--of`."""
 
-PACKING = ("phi_0", "phi_f")  #: Quantities whose errors decide a choice by default, the option `--of`
+PACKING = ("phi_0", "phi_f")  #: Default of the option `--of`: quantities whose errors decide a choice
 
 _HOW = "make one: smarticles accuracy SCENE.yaml --out DIR, then --table DIR/results/work_precision.csv"
 _FINEST = (list(FIDELITIES)[-1], "converged")

@@ -56,9 +56,9 @@ def time_steps(scene: Scene) -> tuple[float, ...]:
     """Return the time step [s] of each phase.
 
     Until motors act for the first time, smarticles are rigid in their initial shape. Phases until then have the time
-    step of a scene without motors, and therefore the same bits as in such a scene. Later a welded smarticle keeps the
-    barb angles of that moment, for which only the time step of a scene with motors is known to be stable. In a plane,
-    or if `fidelity.time_step_s` is given, all phases have one step.
+    step of a scene without motors, and results that are bitwise equal to those of such a scene. Later a welded
+    smarticle keeps the barb angles that its motors reached, for which only the time step of a scene with motors is
+    known to be stable. In a plane, or if `fidelity.time_step_s` is given, all phases have one step.
 
     Raises:
         InputError: as in `time_step`, or a wall, hook, string or shaking moves too fast for the step of its phase.

@@ -21,7 +21,7 @@ def _columns(*, whole_names: bool = False, **described: str | tuple[str, str]) -
     """Return columns by name.
 
     Args:
-        whole_names: whether a label that is not given is the whole name, and not the name without its unit.
+        whole_names: whether missing labels are whole names; otherwise they are names without units.
         described: description, or pair of label and description, by name. Units follow from the ends of the names.
     """
     found = {}

@@ -184,8 +184,9 @@ class Frame:
     #: (N, 3, 3) or (M, 3) float64 [rad/s], angular velocities of barb 1, middle link and barb 2, or of bars
     link_angular_velocity: Array = field(repr=False)
     contacts: Numbers = field(repr=False)  #: (N,) int64, number of other bodies that each body touches
-    #: Further data of the file, (N, 3, …) or (M, …) one value per link, by name. Frames of scenes that actuate have
-    #: `angle_rad`, `motor_torque_N_m` and `motor_work_J`, NaN on the middle link and on welded smarticles, and `halted`
+    #: Further values of links in the file, by name: (N, 3, …) for smarticles, (M, …) for other bodies. Frames of scenes
+    #: that actuate have `angle_rad`, `motor_torque_N_m` and `motor_work_J`, NaN on the middle link and on welded
+    #: smarticles, and `halted`
     cell_data: Mapping[str, NDArray[Any]] = field(repr=False)
     bars: RecordedBars | None = field(repr=False, default=None)  #: Bars of other bodies; None for smarticles
 

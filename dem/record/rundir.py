@@ -22,7 +22,7 @@ class Claim:
 
     @property
     def held(self) -> bool:
-        """Whether the path still leads to the locked directory, which could have been deleted or moved."""
+        """Whether the path still leads to the locked directory: false if it was deleted, moved or replaced."""
         try:
             present = (self.out / LOCK).stat()
         except OSError:

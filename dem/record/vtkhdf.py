@@ -138,7 +138,15 @@ def _append(root: Any, mesh: meshio.Mesh, time: float) -> None:
 
 
 def _lines(root: Any, lines: NDArray[np.int64], points: int) -> dict[str, Any]:
-    """Add a step's lines (n, 2) unless the previous step has equal ones; return the step's offsets."""
+    """Add the lines of a step, unless they are equal to the lines of the previous step.
+
+    Args:
+        lines: (n, 2) numbers of the points that lines join.
+        points: number of points of the step.
+
+    Returns:
+        Entries of the step in the lists of offsets of parts and lines, by name of the list.
+    """
     parts, number, stored = len(root["NumberOfPoints"]), len(lines), root["Lines"]
     part, cell, end = parts - 1, len(stored["Offsets"]) - (number + 1), len(stored["Connectivity"]) - 2 * number
     counts = (root["NumberOfPoints"][part], stored["NumberOfCells"][part]) if parts else (0, 0)

@@ -180,5 +180,5 @@ def _ledger_row(engine: Engine, row: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _mean(angles: Array) -> Array:
-    """Return the (2,) mean over smarticles of (N, 2); NaN without smarticles."""
+    """Return the mean (2,) over smarticles of angles (N, 2); NaN without smarticles."""
     return np.asarray(angles.mean(axis=0)) if len(angles) else np.full(2, math.nan)

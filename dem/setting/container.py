@@ -88,7 +88,7 @@ class Cylinder:
 
     @property
     def corner_radius(self) -> float:
-        """Distance of the wall's vertical edges from the axis [m]; polygon and circle have equal areas."""
+        """Distance of the wall's vertical edges from the axis [m]; facets enclose the area π `radius`²."""
         return self.corner_radius_of(self.radius)
 
     def corner_radius_of(self, radius: float) -> float:

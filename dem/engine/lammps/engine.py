@@ -152,7 +152,7 @@ class LammpsEngine:
             self._fresh = True
 
     def _scene(self, box: str) -> Iterator[str]:
-        """Yield all commands for a new LAMMPS except those for rigid bodies; `box` is the command for spheres."""
+        """Yield all commands for a new LAMMPS except those for rigid bodies; `box` makes the simulation box."""
         between, at_wall = text.contact_terms(self._law, self._reference.mass)
         yield from text.before_box(self.particle)
         # Vertical cuts divide the pile among ranks: above a horizontal cut there would be little work.
@@ -283,7 +283,7 @@ class LammpsEngine:
         return bodies_of(self.particle)[0]
 
     def _body(self, number: int) -> Particle | Kind:
-        """Return the smarticle, or the kind of a body in a mixture, for the number of the body."""
+        """Return the smarticle or, in a mixture, the kind of the body with this number."""
         return body_of(self.particle, self._kinds, number)
 
     @property

@@ -20,7 +20,7 @@ NEVER_PULLS = "limit_damping"
 """Keyword of a contact law: the normal force is zero where spring and dashpot together would pull."""
 SKIN = 0.2  # distance between spheres up to which they are listed as neighbours, in sphere diameters
 WRITTEN = "mol x y z vx vy vz quatw quati quatj quatk omegax omegay omegaz angmomx angmomy angmomz fx fy fz"
-"""Quantities of a body in a dump."""
+"""Quantities that LAMMPS writes to a dump file for each body."""
 
 
 @dataclass(frozen=True)

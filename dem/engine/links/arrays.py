@@ -37,7 +37,7 @@ class Bodies(NamedTuple):
     velocity: Array  #: (N, 3) velocities of the centres of mass [m/s]
     momentum: Array  #: (N, 3) angular momenta about the centres of mass, in the laboratory frame [kg m²/s]
     alpha: Array  #: (N, 2) angles of a smarticle's barbs [rad]; of no meaning for other bodies
-    rate: Array  #: (N, 2) rates of these angles [rad/s]; 0 while welded
+    rate: Array  #: (N, 2) rates of the barbs' angles [rad/s]; 0 while welded
     shape: Indices  #: (N,) number of each body's shape in `Shapes`
     #: (N, PLANE) plane geometry of smarticles, see `dem.engine.links.motion.planar.lay_out`; of rigid bodies only the
     #: inertia, in columns 14 to 17; of no meaning for filaments
@@ -71,7 +71,7 @@ class Segments(NamedTuple):
     begin: Indices  #: (N + 1,) number of the first segment of each body, then Q
     body: Indices  #: (Q,) number of the body to which each segment belongs
     part: Indices  #: (Q,) number of the part with which each segment moves
-    shared: NDArray[np.uint8]  #: (Q,) ends that count with another segment, bits of `shapes.AT_START`, `AT_END`
+    shared: NDArray[np.uint8]  #: (Q,) ends that another segment owns, as bits `shapes.AT_START` and `AT_END`
     first: Indices  #: (L + 1,) number of the first segment of each link, then Q
     bends: Any  #: `Bends`; None where no body is flexible
 
@@ -109,7 +109,7 @@ class Cells(NamedTuple):
 
     keys: Indices  #: (L,) bin of each link
     order: Indices  #: (L,) numbers of the links sorted by bin, and within a bin by number
-    starts: Indices  #: (bins + 2,) index in `order` of the first link of bin k, at k + 1
+    starts: Indices  #: (bins + 2,) entry k + 1 is the index in `order` of the first link of bin k
     marks: Array  #: (Q, 7) starts and ends of all segments at the search, and their skins [m]
     centres: Array  #: (N, 3) centres of mass at the search [m]
     own: Array  #: (L, 6) lower and upper corner of the box about each link [m]

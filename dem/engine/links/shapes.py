@@ -2,7 +2,7 @@
 
 A flat link consists of several parallel swept segments, its strands. Strands are the limit of the sphere chains of
 `dem.body.particle` at a pitch of zero, with equal sections and tips. A smarticle is the shape whose barbs turn about
-two hinges; all other shapes are rigid.
+two hinges; other shapes are rigid bodies, or filaments, which `dem.engine.links.motion.bending` moves.
 """
 
 from __future__ import annotations
@@ -59,7 +59,7 @@ class Shape:
     inertia: Array
     lines: Array  #: (M, LINE) segments, link by link; for the columns see `START`
     link: NDArray[np.int64]  #: (M,) link of each segment; for a smarticle 0 barb 1, 1 middle link, 2 barb 2
-    shared: NDArray[np.uint8]  #: (M,) ends that count with another segment, bits of `AT_START`, `AT_END`
+    shared: NDArray[np.uint8]  #: (M,) ends that another segment owns, as bits `AT_START` and `AT_END`
     effective_mass: float  #: Harmonic mean of the effective mass over points and directions [kg]; damping depends on it
     planar: Planar | None = None  #: Geometry of a smarticle; None for other bodies
     filament: Filament | None = None  #: Kind of filament of a flexible body; None for rigid bodies and smarticles
@@ -82,7 +82,7 @@ class Shapes(NamedTuple):
     first: NDArray[np.int64]  #: (K + 1,) index in `lines` of the first segment of each shape, then M
     lines: Array  #: (M, LINE) segments in the frame of the body; for the columns see `START`
     link: NDArray[np.int64]  #: (M,) link of each segment
-    flexible: Any  #: (K,) whether the body is a filament, which `motion.bending` moves; None if no shape is
+    flexible: Any  #: (K,) whether the body is a filament, which `motion.bending` moves; None if no shape is flexible
 
 
 @inlined

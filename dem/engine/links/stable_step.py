@@ -184,7 +184,7 @@ def _modes_of_pile(law: ContactLaw, heave: Array, rub: Array) -> list[Mode]:
 
 
 def _motion(place: Array) -> Array:
-    """Return the matrix (3, 6) from a body's velocity and spin to the velocity of a point; place in m."""
+    """Return the matrix (3, 6) that maps a body's velocity and spin to a point's velocity; place in m."""
     x, y, z = place
     return np.column_stack([np.eye(3), [[0, z, -y], [-z, 0, x], [y, -x, 0]]])
 
@@ -229,7 +229,9 @@ def _tip_of(ends: list[tuple[int, tuple[float, float, float]]]) -> tuple[int, fl
 
 
 def _motion_of(shape: Shape, row: Array, link: int, place: tuple[float, float, float], free: bool) -> Array:
-    """Return the matrix (3, 6), with free angles (3, 8), from the rates of `_mass` to a point's velocity.
+    """Return the matrix (3, 6) that maps a smarticle's velocity and angular velocity to a point's velocity.
+
+    If `free`, the matrix is (3, 8): two more columns are for the rates of both angles.
 
     Args:
         row: plane geometry of the smarticle.

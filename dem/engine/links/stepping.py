@@ -59,7 +59,7 @@ def settle(
 ) -> float:  # fmt: skip
     """Return the energy that the forces in the ledger dissipated in a kick [J]; called after the kick.
 
-    The work of a force in a kick is that along the mean of the velocities before and after the kick.
+    The work of a force in a kick follows from the mean of the velocities before and after the kick.
 
     Args:
         bodies: `spin` is written.

@@ -65,7 +65,7 @@ class Assembly:
         return self._model
 
     def _body(self, number: int) -> Particle | Kind:
-        """Return the smarticle, or the kind of a body in a mixture, for the number of the body."""
+        """Return the smarticle or, in a mixture, the kind of the body with this number."""
         return body_of(self._model, self._kinds, number)
 
     @property

@@ -128,7 +128,7 @@ def contacts_of_segment(
 
 @inlined
 def _contacts_with_wall(radius: float, ground: Ground, slot: int, point: Vector, rows: Array, count: int) -> int:
-    """Append a link end's contacts with the wall and its tiers to `rows`; return their new number."""
+    """Append a link end's contacts with the wall and its tiers to `rows`; return the number of rows."""
     x, y, z = point
     height, r, tiers = z - ground.place[WALL], math.sqrt(x * x + y * y), ground.radii.shape[0]
     lifted = ground.flags[1] != 0
@@ -162,7 +162,7 @@ def _contacts_with_wall(radius: float, ground: Ground, slot: int, point: Vector,
 
 @inlined
 def _contacts_with_rims(link: Array, ground: Ground, rims: Rims, first: int, rows: Array, count: int) -> int:
-    """Append contacts of a link's inner points with the wall's edges to `rows`; return their new number."""
+    """Append contacts of a link's inner points with edges of the wall to `rows`; return the number of rows."""
     if ground.flags[0] == 0:
         return count
     z, uz, radius = link[2], link[5], link[RADIUS]
@@ -183,7 +183,7 @@ def _contacts_with_rims(link: Array, ground: Ground, rims: Rims, first: int, row
 
 @inlined
 def _contacts_with_hooks(link: Array, ground: Ground, hooks: Hooks, rows: Array, count: int, met: Array) -> int:
-    """Append a segment's contacts with the bars of both hooks to `rows`; return their new number."""
+    """Append a segment's contacts with the bars of both hooks to `rows`; return the number of rows."""
     reach = link[RADIUS] + hooks.radius
     for hook in range(2):
         height = ground.place[LOWER + hook]

@@ -257,9 +257,9 @@ def _push_node(
 def _push_segment(
     filaments: Filaments, i: int, rod: Array, own: Piece, stretch: float, load: Array, out: Array
 ) -> None:
-    """Add the forces and torques on segment `i`: of contacts, stretching, drag, and the turn of its spin.
+    """Add the forces and torques on segment `i`: of contacts, stretching, drag, and gyroscopic forces.
 
-    Rolling has angular momentum along the axis; forces on both nodes turn it with the axis.
+    Gyroscopic forces turn the angular momentum of rolling with the axis.
 
     Args:
         stretch: sum over contacts of axial force times axial distance from the centre [N m].

@@ -21,8 +21,8 @@ def update_lists(bodies: Bodies, segments: Segments, pairs: Pairs, cells: Cells,
     """Rebuild the lists that are no longer valid because links have moved too far.
 
     Args:
-        skins: (7,) 0 to 2: thinnest skin [m], thickest skin [m] and time that a skin should last [s] of the tight
-            list; 3 to 5: these of the wide list; 6: width of a strip of the search [m].
+        skins: (7,) thinnest skin [m], thickest skin [m] and time that a skin should last [s]: 0 to 2 for the tight
+            list, 3 to 5 for the wide list; 6: width of a strip of the search [m].
 
     Returns:
         GOOD, or FULL if there is no room for all pairs.
