@@ -54,7 +54,7 @@ class LinksLedger:
         self.added += self.elastic()[0]
 
     def removed(self, remove: Callable[[], None]) -> None:
-        """Call `remove`, which removes contacts; if dissipation is recorded, their energy counts as dissipated."""
+        """Call `remove`, which removes contacts; if dissipation is recorded, it includes their elastic energy."""
         counted = self._world.ledger is not None
         stored = self.elastic()[0] if counted else 0.0
         remove()

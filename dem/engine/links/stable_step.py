@@ -229,7 +229,7 @@ def _tip_of(ends: list[tuple[int, tuple[float, float, float]]]) -> tuple[int, fl
 
 
 def _motion_of(shape: Shape, row: Array, link: int, place: tuple[float, float, float], free: bool) -> Array:
-    """Return the matrix (3, 6) that maps a smarticle's velocity and angular velocity to a point's velocity.
+    """Return the matrix (3, 6) that maps a smarticle's velocity and spin to a point's velocity.
 
     If `free`, the matrix is (3, 8): two more columns are for the rates of both angles.
 

@@ -162,7 +162,7 @@ def _contacts_with_wall(radius: float, ground: Ground, slot: int, point: Vector,
 
 @inlined
 def _contacts_with_rims(link: Array, ground: Ground, rims: Rims, first: int, rows: Array, count: int) -> int:
-    """Append contacts of a link's inner points with edges of the wall to `rows`; return the number of rows."""
+    """Append contacts of a link's inner points with the wall's edges to `rows`; return the number of rows."""
     if ground.flags[0] == 0:
         return count
     z, uz, radius = link[2], link[5], link[RADIUS]
