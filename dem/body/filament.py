@@ -1,4 +1,4 @@
-"""A flexible body: a round rod that stretches, bends and twists, and may bend by itself in a liquid."""
+"""A flexible body: a round rod that stretches, bends and twists, and may bend actively, in a liquid."""
 
 import math
 from dataclasses import dataclass

@@ -103,7 +103,9 @@ class ActuatedPhase(Phase):
         """Articulate smarticles, and make the control updates that are due.
 
         Args:
-            check_every: largest number of updates in a call, since the caller checks the pile between calls; None: any.
+            check_every: a call ends after each multiple of this number of updates, so that the caller can check the
+                pile;
+                None: no such end.
 
         Returns:
             The simulated time until the next call [s]; 0 at the end of the phase.

@@ -40,7 +40,7 @@ T = TypeVar("T")
 
 
 def create(path: Path, mesh: meshio.Mesh, time: float) -> None:
-    """Write a new file with one step at a time [s]; raise RunError if it cannot be written."""
+    """Write a new file with one step, of the time `time` [s]; raise RunError if it cannot be written."""
     content = io.BytesIO()
     with h5py.File(content, "w", libver=_FORMAT) as file:
         root = file.create_group("VTKHDF")
@@ -69,7 +69,7 @@ def create(path: Path, mesh: meshio.Mesh, time: float) -> None:
 
 
 def append(path: Path, mesh: meshio.Mesh, time: float) -> None:
-    """Add a step at a time [s] to a file; raise RunError if it cannot be written."""
+    """Append a step, of the time `time` [s], to a file; raise RunError if it cannot be written."""
     _change(path, lambda root: _append(root, mesh, time))
 
 

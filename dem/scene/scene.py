@@ -302,7 +302,7 @@ class Scene(Part):
 
     @property
     def wave_seed(self) -> int:
-        """Seed of the waves of filaments that bend by themselves."""
+        """Seed of the waves of actively bending filaments."""
         return self.seed_for("waves") % 2**32  # exact in an array of floats
 
     @property

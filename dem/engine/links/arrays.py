@@ -244,7 +244,7 @@ class Filaments(NamedTuple):
     begin: Indices  #: (F + 1,) number of the first node of each filament, then n
     rod: Array  #: (F, ROD) constants of each filament, columns from `bending.LENGTH` on
     gait: Array  #: (F, GAIT) state of the wave of preferred curvature, columns from `bending.PSI` on
-    wave: Array  #: (n, 3) amplitude of the preferred κ at each node, cosine and sine of its phase [1]
+    wave: Array  #: (n, 3) of the preferred κ at each node: amplitude, cosine and sine of the phase [1]
     preferred: Array  #: (n, 2) present preferred κ1 and κ2 at each node [1]
     mass: Array  #: (n,) masses of the nodes [kg]
     position: Array  #: (n, 3) positions of the nodes [m]

@@ -107,11 +107,11 @@ def _title(kernel: str, without: frozenset[str]) -> str:
 
 
 def _lacking(kind: Any, name: str) -> Iterator[str]:
-    """Yield the names of all fields that are None in an argument of a kernel, at any depth.
+    """Yield the names of the fields that are None in an argument of a kernel, and in its fields in turn.
 
     Args:
-        kind: Numba's type of the argument, or of a field.
-        name: name of the argument, or of the field, yielded if it is None itself.
+        kind: Numba's type of the argument.
+        name: name of the argument, which is yielded if the argument itself is None.
     """
     if isinstance(kind, types.NoneType):
         yield name

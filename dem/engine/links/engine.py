@@ -62,7 +62,7 @@ class LinksEngine:
         hooks: the lower and the upper hook; None: no hooks.
         channel: table and walls instead of the container; all motion is then confined to a plane.
         strengths: (N, 2) factors on torque limit and stiffness of the motors [1]; None: 1 for all motors.
-        wave_seed: seed of the waves of filaments that bend by themselves.
+        wave_seed: seed of the waves of actively bending filaments.
     """
 
     def __init__(

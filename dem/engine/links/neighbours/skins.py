@@ -47,7 +47,7 @@ def _at_end(bends: Any, p: int, end: int, mean: Vector, rigid: Vector) -> Vector
 
     Args:
         end: 0 for the start, 1 for the end.
-        rigid: this velocity in a rigid body, returned unless the body is flexible [m/s].
+        rigid: the result if the body is rigid [m/s].
     """
     if bends is None or bends.apart[p] == 0:
         return rigid
