@@ -31,7 +31,7 @@ _TURN = Rotation.from_quat([2**0.5 - 1, 3**0.5 - 1, 5**0.5 - 2, 1.0]).as_matrix(
 class Region:
     """An upright cylinder around x = y = 0."""
 
-    radius: float  #: [m]
+    radius: float  #: Radius [m]
     bottom: float  #: Height of the lower end [m]
     top: float  #: Height of the upper end [m]
 
@@ -111,7 +111,9 @@ def solid_points(
 def _grid_points(
     vertices: Floats, normal: float, in_plane: float, pitch: float, region: Region | None
 ) -> Iterator[Whole]:
-    """Yield indices (n, 3) of points of the rotated grid inside the boxes; an index may be repeated.
+    """Yield indices (n, 3) of grid points inside the boxes of the links; an index may be repeated.
+
+    The grid is rotated by `_TURN`. Arguments are those of `solid_points`.
 
     Each box is cut into pieces about as long as thick, so that few grid points must be tested for each piece.
     """
