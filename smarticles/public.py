@@ -246,7 +246,10 @@ def sweep(
 
 @contextmanager
 def _in_words_of_python(scratch: str) -> Iterator[None]:
-    """Let messages name arguments of Python instead of options and of files in a temporary folder."""
+    """Reword error messages for callers from Python: arguments for options, no paths in `scratch`.
+
+    `scratch` is the temporary folder with the files of a sweep.
+    """
     try:
         yield
     except (InputError, RunError) as error:

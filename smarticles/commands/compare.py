@@ -1,4 +1,7 @@
-"""Command `compare`: compare two runs or two sweeps: scenes, versions, measures, and frames and series bit by bit."""
+"""Command `compare`: compare two runs or two sweeps, A and B.
+
+Scenes, versions and measures are compared, and frames and series bit by bit.
+"""
 
 from __future__ import annotations
 
@@ -92,7 +95,7 @@ def _bits(bits: Mapping[str, Any]) -> str:
 
 
 def _measures(found: Sequence[Mapping[str, Any]]) -> str:
-    """Return a table of the main quantities, with one block of rows per phase."""
+    """Format the rows `measures` of a comparison as a table of the main quantities, phase by phase."""
     from postprocess.measures.registry import shown_quantities  # noqa: PLC0415
 
     formats = {quantity.header: shown for quantity, shown in shown_quantities()}
@@ -212,7 +215,7 @@ def compare_bits(one: Run, other: Run) -> dict[str, Any]:
     Returns:
         series: whether all common columns are equal; None if a run has no series.
         differs_at: simulated time of the first different sample [s]; None if all samples are equal.
-        frames: number of equal frames, also of those in files of another format.
+        frames: number of equal frames; the files of A and B may have different formats.
         compared: number of frames that both runs have.
         same_count: whether the runs have equal numbers of frames, samples and columns.
         identical: whether nothing differs.
@@ -248,7 +251,10 @@ def compare_bits(one: Run, other: Run) -> dict[str, Any]:
 
 
 def _equal_frames(one: tuple[Path, int], other: tuple[Path, int]) -> bool:
-    """Return whether two frames, each a number in a file, are equal bit by bit; a radius that one lacks is left out."""
+    """Return whether two frames, given by file and number in the file, are equal bit by bit.
+
+    The array `radius_m` is ignored if one of the frames lacks it.
+    """
     from dem.record.frame import read_mesh  # noqa: PLC0415
 
     if {one[0].suffix, other[0].suffix} == {".vtu"}:
@@ -264,7 +270,10 @@ def _equal_frames(one: tuple[Path, int], other: tuple[Path, int]) -> bool:
 
 
 def _pair_up(one: pd.DataFrame | None, other: pd.DataFrame | None, *, keys: Sequence[str]) -> list[dict[str, Any]]:
-    """Return rows with a quantity in tables A and B, one per combination of `keys` and quantity."""
+    """Return a row with A, B, B - A and its standard error for each quantity that tables A and B have.
+
+    Rows of the tables belong together if their values in the columns `keys` are equal.
+    """
     from postprocess.statistics.points import marked  # noqa: PLC0415
 
     def records(table: pd.DataFrame | None) -> dict[str, dict[Any, Any]]:
