@@ -102,7 +102,7 @@ def _lowest_tenth(heights: NDArray[np.float64]) -> float:
 def points(runs: pd.DataFrame) -> pd.DataFrame:
     """Average over seeds, and compute the deviation of φ_f from Gravish's φ_f [%].
 
-    The error of the deviation combines that of our mean and that of reading Gravish's point.
+    The error of the deviation combines the errors of our mean and of reading Gravish's point.
     """
     means = STUDY.points(runs)
     values = means[ASPECT].map(lambda aspect: gravish_at(aspect, "phi_f"))
@@ -112,7 +112,10 @@ def points(runs: pd.DataFrame) -> pd.DataFrame:
 
 
 def by_seed(runs: pd.DataFrame, quantity: str, *changed: str) -> pd.DataFrame:
-    """Return the change of a quantity with one factor, or the interaction of two factors, by l/w and seed."""
+    """Return the effect of the factors `changed` on a quantity: a row per l/w and seed.
+
+    One factor gives its effect, two factors give their interaction.
+    """
     table, left = runs, [*FACTORS, ASPECT, SEED]
     for factor in changed:
         left = [name for name in left if name != factor]
@@ -136,10 +139,10 @@ def effects(runs: pd.DataFrame) -> pd.DataFrame:
 
 
 def lowers(name: str, says: str, quantity: str, *changed: str, sign: int = -1, less: str = "") -> Finding:
-    """Make the finding that a change of a factor, or the interaction of two, lowers a quantity.
+    """Make the finding that the factor `changed`, or the interaction of two factors, lowers a quantity.
 
-    `sign` is −1 if the statement says that it lowers, +1 if it says that it raises the quantity. `less` is a factor
-    whose effect is subtracted, for a statement that the change lowers more than this factor does.
+    The sign is −1 for a statement that the quantity is lowered, +1 that it is raised. For a statement that a factor
+    lowers the quantity more than another factor does, `less` is the other factor; its effect is subtracted.
     """
 
     def outcome(runs: pd.DataFrame) -> Outcome:

@@ -58,7 +58,7 @@ QUANTITIES = declare(
         TAU: ("τ [s]", "", "time in which a free column on a shaking floor collapses; empty where it stood"),
         FORCE: ("chain [N]", "", "largest force of the string that pulls the chain"),
     }
-)  #: Measured quantities; those that a case does not have are NaN
+)  #: Measured quantities; quantities that a case does not have are NaN
 
 
 class Compared(NamedTuple):
@@ -142,7 +142,10 @@ def _measured(run: Run, case: str) -> dict[str, float]:
 
 
 def by_seed(runs: pd.DataFrame, one: Compared, variant: str) -> pd.Series:
-    """Return the mean of a quantity over its cases by seed; seeds without a value are left out."""
+    """Return a quantity's mean over its cases, by seed, for the runs of one variant (engine or pitch).
+
+    Seeds without a value are left out.
+    """
     chosen = runs[(runs[VARIANT] == variant) & runs[CASE].isin(one.cases)]
     means: pd.Series = chosen.groupby(SEED)[one.column].mean().dropna()
     return means
@@ -189,7 +192,8 @@ def pitch_of(variant: str) -> float:
 def refinement(runs: pd.DataFrame) -> pd.DataFrame:
     """Compare the shaken piles at each pitch of YADE's spheres with links: a row per quantity and variant.
 
-    Differences to links, which stand as pitch 0, are paired by seed. Other cases were not run at every pitch.
+    Differences are paired by seed; the engine `links` is listed with the pitch 0. Other cases were not run at every
+    pitch.
     """
     shaken = runs[runs[CASE] == EXTERNAL]
     rows: list[dict[str, object]] = []

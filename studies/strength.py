@@ -232,7 +232,7 @@ def with_crossings(
 
 
 def several_amplitudes(runs: pd.DataFrame) -> pd.DataFrame:
-    """Return the runs of internal oscillation at those l/w and heights of the hook that have several θ."""
+    """Return the runs of internal oscillation, at those l/w and hook heights for which several θ were run."""
     internal = runs[runs[PROCEDURE] == INTERNAL]
     return internal[internal.groupby([ASPECT, UPPER])[THETA].transform("nunique") > 1]
 

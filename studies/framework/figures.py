@@ -146,7 +146,7 @@ class Means:
     bars: str = BARS  #: Explains the error bars in the footer
 
     def draw(self, path: Path, analysis: Analysis) -> list[Path]:
-        """Draw the means of the judging engine with filled markers, those of other engines open beside them."""
+        """Draw means with filled markers, and means of engines that do not judge with open markers beside them."""
         every = analysis.tables.get(self.table, pd.DataFrame())
         every = self.rows(every) if len(every) else every
         columns = [quantity.column for quantity in self.quantities]
@@ -502,7 +502,8 @@ def panels(
 ) -> tuple[Canvas, list[Axes]]:
     """Make a figure and its panels, which fill line by line.
 
-    `columns` is the largest number of panels in a line, `width` that of the figure, `height` that of a line [inch].
+    `columns` is the largest number of panels in a line, `width` the width of the figure and `height` the height of a
+    line [inch]. `shared` are arguments of Matplotlib's `subplots`, such as `sharey`.
     """
     columns = min(count, columns)
     lines = -(-count // columns)
@@ -562,7 +563,10 @@ def draw_fits(
     *,
     lines: Sequence[Any] = ("solid",),
 ) -> None:
-    """Draw fitted curves at places x (n,), each with its own kind of line, and their 95 % bands."""
+    """Draw fitted curves at places x (n,) with their 95 % bands.
+
+    `fits` has values (n,) and half-widths (n,) by label, `lines` the line style of each curve.
+    """
     for (label, (values, half_widths)), line in zip(fits.items(), lines, strict=False):
         axes.plot(x, values, color=colour, linewidth=0.9, linestyle=line, label=label)
         low, high = np.asarray(values) - half_widths, np.asarray(values) + half_widths
@@ -581,8 +585,8 @@ def draw_means(
 ) -> None:
     """Draw means y (n,) at places x (n,) with their error bars.
 
-    `half_widths` (n,) are those of the 95 % intervals of y. `across` are those of x: (n,), or (2, n) for the lower and
-    the upper side. They are NaN where unknown; None draws no error bars.
+    `half_widths` (n,) are half the 95 % intervals of y, `across` half the 95 % intervals of x: (n,), or (2, n) for the
+    lower and the upper side. NaN stands for an unknown interval; None draws no error bars.
     """
     bars = axes.errorbar(
         x, y, yerr=half_widths, xerr=across, **{"markersize": 3.4, "linewidth": 0.7, **properties}, label=label
@@ -595,9 +599,9 @@ def draw_means(
 def draw_bounds(
     axes: Axes, x: ArrayLike, least: ArrayLike, lengths: ArrayLike, *, properties: Mapping[str, Any]
 ) -> None:
-    """Draw lower bounds (n,) as markers with arrows upwards; NaN are left out.
+    """Draw the lower bounds `least` (n,) at places x (n,) as markers with arrows upwards; NaN are left out.
 
-    The lengths of the arrows (n,), in the unit of y, have no physical meaning.
+    The lengths of the arrows, in the unit of y, have no physical meaning.
     """
     at, from_, long = np.broadcast_arrays(*(np.asarray(part, dtype=np.float64) for part in (x, least, lengths)))
     known = np.isfinite(from_)

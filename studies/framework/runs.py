@@ -52,7 +52,10 @@ class Quantity:
     bar: str = "SE"  #: Error that is shown in the short table: `SE` (standard error) or `95 %` (half-width)
 
     def cell(self, point: Mapping[str, float]) -> str:
-        """Format the mean over seeds of a point for the short table, with its error if the error is known."""
+        """Format the quantity's mean at a point for the short table, with its error if known.
+
+        `point` is a row of the table of points.
+        """
         error = point.get(marked(self.column, self.bar), math.nan)
         return format_with_error(self.scale * point[self.column], self.form, self.scale * error)
 
@@ -183,7 +186,7 @@ class MissingRun:
 
     @property
     def common_cause(self) -> str:
-        """Cause in which RUN stands for the path of the directory, so that equal causes can be counted."""
+        """Cause with RUN in place of the path of the directory, so that equal causes can be counted."""
         return self.cause.removeprefix(f"{self.directory}: ").replace(self.directory, "RUN")
 
 
@@ -204,7 +207,7 @@ class MeasuredRun:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Collected:
-    """Runs of a study: those that were measured, in the order given, and those that are missing."""
+    """Runs of a study: measured runs, in the order of the given directories, and missing runs."""
 
     study: str  #: Name of the study, for messages
     runs: Sequence[MeasuredRun]
@@ -231,7 +234,11 @@ class Collected:
         *,
         within: Callable[[MeasuredRun], Hashable] = lambda _: None,
     ) -> None:
-        """Raise InputError if runs of one group, by default all runs, differ in a quantity."""
+        """Raise InputError if runs of a group differ in a value.
+
+        `value` returns the value of a run, which messages call `quantity`; `within` returns its group. By default all
+        runs are one group.
+        """
         firsts: dict[Hashable, MeasuredRun] = {}
         for run in self.runs:
             first = firsts.setdefault(within(run), run)

@@ -126,7 +126,8 @@ def _runs_per_task(count: int, partition: Partition, wanted: int | None, memory:
 def _time(longest: float, cluster: Cluster, partition: Partition, wanted: str | None, where: str) -> int:
     """Return the wall time to request [s], a whole number of minutes, because Slurm counts minutes.
 
-    `longest` is the expected time of a task [s], `wanted` the time that the user gave in Slurm's notation.
+    `longest` is the expected time of the longest run [s], `wanted` the time that the user gave in Slurm's notation,
+    `where` the name of the partition for messages.
     """
     if wanted is None:
         needed = max(LEAST_TIME_S, longest) + cluster.signal_lead_s
