@@ -28,7 +28,7 @@ class Answer:
     measured: float  #: Value in the simulation [unit]
     tolerance: float  #: Largest allowed error, relative to the scale [1]
     reason: str = ""  #: Reason for the tolerance
-    scale: float = 0.0  #: Unit of the relative error [unit]; 0: the value by theory
+    scale: float = 0.0  #: Value that the error is divided by [unit]; 0: the value by theory
 
     @property
     def error(self) -> float:
@@ -115,7 +115,7 @@ def ladder(  # noqa: PLR0917 # a row of a table
     phases: int | None = None,
     **options: Any,
 ) -> Callable[[Function], Function]:
-    """Register a function `(access, steps, **options) -> list[float]` that returns an error for each time step.
+    """Register a function `(access, steps, **options) -> list[float]`: an error for each time step.
 
     A test runs it and compares the order at which errors fall with the time step with the expected order.
 

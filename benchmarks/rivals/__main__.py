@@ -50,7 +50,7 @@ SAME, TENTH = "links at this overlap are cheaper by [1]", "links at a tenth of i
 
 
 def data_of(count: int, seed: int, *phases: dict[str, Any], **keys: Any) -> dict[str, Any]:
-    """Return a scene as a dictionary, with a container wide enough for a straight smarticle."""
+    """Return a scene of `count` smarticles as a dictionary, in a container wider than a straight smarticle."""
     data = pile(count, *phases, seed=seed, per_layer=PAPER_PER_LAYER, **keys)
     data["container"]["radius_m"] = max(data["container"]["radius_m"], 0.012)
     return data
@@ -61,6 +61,7 @@ def scene_of(
 ) -> dict[str, Any]:
     """Return the scene of a setting as a dictionary: take-over of a poured pile, rest and activity.
 
+    `poured` is the run directory of the pour.
     The activity takes `seconds` [s]; `sample` is the time between two frames [s].
     """
     recording = {"frame_interval_s": sample, "series_interval_s": sample, "checkpoint_interval_s": None}
@@ -149,8 +150,8 @@ def planned(engines: Sequence[str], given: argparse.Namespace) -> Iterator[tuple
 def medians(rows: pd.DataFrame) -> pd.DataFrame:
     """Return medians over seeds per activity, engine and setting, and the cost relative to links.
 
-    The last two columns divide the cost by the lowest cost of links whose overlap is at most that of the row, and at
-    most a tenth of that of the row.
+    The last two columns divide the row's cost by a cost of the engine `links`: the lowest cost of a setting whose
+    overlap is at most the row's overlap, and the lowest cost of a setting whose overlap is at most a tenth of it.
     """
     columns = [COST, STEP, DEPTH, MEAN_DEPTH, BOX_DEPTH, PHI_REST, PHI_END, SINKING, MEMORY]
     groups = rows.groupby(KEYS, sort=False)

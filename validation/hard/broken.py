@@ -75,7 +75,7 @@ for _what in SPOILT:
 
 
 def _resting(access: EngineAccess, out: Path, count: int) -> tuple[Engine, Recorder]:
-    """Let a stack of smarticles come to rest; return the engine, and the recorder that checked it."""
+    """Let a stack of smarticles come to rest; return the engine, and the recorder with its watchdog."""
     scene, engine, recorder = watched(scene_data(access, count=count), out)
     for k in range(count):
         add(engine, (0, 0, lying(scene) * (2 * k + 1) + 1e-5))
@@ -124,7 +124,7 @@ def soft(access: EngineAccess, out: Path, *, stiffness: float) -> list[Check]:
 
 
 def _too_long(scene: Scene, factor: float) -> float:
-    """Return a time step [s] of about `factor` times the stable step that divides the control period."""
+    """Return a divisor of the control period [s] that is about `factor` times the stable time step."""
     control = scene.fidelity.control_interval_s
     step: float = control / max(1, math.floor(control / (factor * stable_step(scene))))
     return step

@@ -32,7 +32,7 @@ def hinged(
 ) -> Scene:
     """Return a scene of one articulated smarticle with springs as shafts.
 
-    Angles are those of the barbs [deg]; `motor` has keys of `motor` in a scene.
+    `angles` are the angles of the barbs [deg]; `motor` has keys of the scene's mapping `motor`.
     """
     smarticle = {"aspect_ratio": aspect_ratio, "angles_deg": list(angles)}
     return scene(access, shape_change(), fidelity=fidelity, smarticle=smarticle, motor=motor)
@@ -261,7 +261,7 @@ def shaft_vibration(access: EngineAccess, *, held: bool) -> list[Answer]:
     },
 )
 def vibration_errors(access: EngineAccess, steps: Sequence[float]) -> list[float]:
-    """Return the root-mean-square errors of the angle of a vibrating barb over 10 ms [rad]."""
+    """Return the root-mean-square error [rad] of a vibrating barb's angle over 10 ms for each time step."""
     one = hinged(access, torque_limit_N_m=STRONG)
 
     def path(dt: float) -> Array:
