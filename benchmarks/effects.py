@@ -25,7 +25,7 @@ MEASURED = 1  # index of the compared phase; phase 0 is the pour
 def pairs(seconds: float, hinged_step: float) -> list[tuple[str, str, Changes, Changes]]:
     """Return name, cause of the cost, and two sets of changed keys of a scene for each physical effect.
 
-    The first set is that of the scene without the effect, the second that of the scene with it. The compared phase
+    The first set gives the scene without the effect, the second set the scene with the effect. The compared phase
     takes `seconds` [s]; `hinged_step` is the time step of a scene with hinges [s].
     """
     rest = {"type": "relax", "duration_s": seconds}

@@ -80,7 +80,7 @@ class Rung:
 
     @property
     def sensitivity(self) -> bool:
-        """Whether the knob belongs to the model, so that other values are no errors."""
+        """Whether the knob is a parameter of the model, whose values differ but are not more or less accurate."""
         return self.knob == "restitution"
 
 

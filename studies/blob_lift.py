@@ -24,7 +24,7 @@ from studies.framework.findings import Effect, Finding, mean, slope, unit_of
 from studies.framework.runs import Key, Row, declare, last_columns, phase_of, run_columns
 from studies.framework.study import Study
 
-ACTIVE = "active [Hz]"  #: Frequency of the worms' turns from the end of tangling on; 0: they hold their bends
+ACTIVE = "active [Hz]"  #: Column: frequency of the worms' turns after tangling; 0 if they hold their bends
 RISE, SHARE, OTHERS = "rise of the centre of mass [m]", "lifted [-]", "lifted of those not gripped [-]"
 GRIPPED, HELD, CROSSINGS = "gripped [-]", "load over weight [-]", "crossing number before [-]"
 HEIGHT = "height of the centre of mass [m]"

@@ -43,9 +43,9 @@ DELAYED = "ln residual with an onset over that of an exponential [-]"
 
 EARLY = 0.1  # s, time at which fits begin: three periods of vibration
 MOMENTS = 24  #: Number of times, equally apart on a logarithmic axis, at which links are counted
-GIANT = 0.5  #: Share of the bodies in one cluster that makes it giant
-ORDERS = 60  #: Random orders of removal that are averaged
-NEAR = math.log(1.25)  #: Largest |ln| of a ratio of critical numbers that counts as agreement
+GIANT = 0.5  #: A cluster with at least this share of the bodies is giant
+ORDERS = 60  #: Number of random orders of removal over which results are averaged
+NEAR = math.log(1.25)  #: Critical numbers agree if ln of their ratio is at most this in size
 
 QUANTITIES = declare(
     {

@@ -38,7 +38,7 @@ KEPT, HEIGHT = "com height kept [-]", "height over length [-]"
 ACN, LEVEL, DENSITY = "crossing number per rod [-]", "spanning level [-]", "rods per cube of the length [-]"
 CONTACTS = "contacts per rod [-]"
 
-STANDS = 0.5  #: Share of the height of the centre of mass that a standing pile keeps
+STANDS = 0.5  #: A pile stands if its centre of mass keeps more than this share of its height
 LIKE = math.log(1.25)  #: Two levels count as equal if ln of their ratio is at most this in size
 REJECTED = 0.05  #: Greatest p-value at which the hypothesis of equal levels is rejected
 INNER = 0.7  #: Half the side of the square in which the field is computed, over the container's radius
@@ -165,7 +165,7 @@ def crossing_number_rises(table: pd.DataFrame) -> Outcome:
 
 
 def stands_from(table: pd.DataFrame) -> Outcome:
-    """Judge whether the thickest shaken rods fall and the thinnest stand."""
+    """Judge whether shaken piles of the thickest rods fall, and of the thinnest rods stand."""
     own = table[table[SERIES] == SHAKEN]
     effects = [
         Effect(

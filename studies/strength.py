@@ -144,7 +144,10 @@ def over_heights(runs: pd.DataFrame) -> pd.DataFrame:
 
 
 def order_findings(rows: Rows) -> tuple[Finding, Finding]:
-    """Make the findings that peak force and ⟨N⟩ rank procedures differently, and shape change is brittle."""
+    """Make two findings on procedures: peak force and ⟨N⟩ rank them differently; shape change is brittle.
+
+    Brittle: a greater peak force at a smaller displacement than after internal oscillation. `rows` selects the samples.
+    """
     return (
         Finding(
             id="other-order-than-crossings",

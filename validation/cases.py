@@ -52,27 +52,27 @@ class Check:
 
 
 def below(what: str, measured: float, limit: float) -> Check:
-    """Check that a value is below a limit; NaN fails."""
+    """Check that a measured value is below a limit; NaN fails. `what` names quantity and unit."""
     return Check(what, f"{measured:.4g}", f"< {limit:.4g}", bool(measured < limit))
 
 
 def above(what: str, measured: float, limit: float) -> Check:
-    """Check that a value is above a limit; NaN fails."""
+    """Check that a measured value is above a limit; NaN fails. `what` names quantity and unit."""
     return Check(what, f"{measured:.4g}", f"> {limit:.4g}", bool(measured > limit))
 
 
 def near(what: str, measured: float, expected: float, error: float) -> Check:
-    """Check that a value differs from the expected value by at most `error`; NaN fails."""
+    """Check that a measured value is within ±`error` of the expected value; NaN fails."""
     return Check(what, f"{measured:.5g}", f"{expected:.5g} ± {error:.2g}", bool(abs(measured - expected) <= error))
 
 
 def nothing(what: str, text: str | None) -> Check:
-    """Check that there is no error message."""
+    """Check that `text`, the message of an error, is None."""
     return Check(what, text or "nothing", "nothing", text is None)
 
 
 def says(text: str | None, *parts: str) -> Check:
-    """Check that an error message exists and contains all `parts`."""
+    """Check that `text`, the message of an error, is not None and contains all `parts`."""
     good = text is not None and all(part in text for part in parts)
     return Check("the error", text or "nothing", " … ".join(parts), good)
 

@@ -284,7 +284,7 @@ class Bodies:
         return self.wall_at((0.0 if frame.phase in self.boundaries.floor_alone else floor) + raised)
 
     def wall_at(self, base: float) -> pv.PolyData:
-        """Return the wall of a container whose floor is at a height [m]."""
+        """Return the mesh [m] of the wall of a container whose floor is at the height `base` [m]."""
         corners = self.boundaries.corners
         if not corners:
             height, radius = self.boundaries.height, self.run.manifest.container_radius_m

@@ -42,7 +42,7 @@ class Region:
 
     @property
     def inner(self) -> Region:
-        """The inner cylinder of 0.75 r, from 20 % to 80 % of the height, away from wall, floor and surface."""
+        """Inner cylinder away from wall, floor and surface: 0.75 of the radius, 20 % to 80 % of the height."""
         height = self.top - self.bottom
         return Region(radius=0.75 * self.radius, bottom=self.bottom + 0.2 * height, top=self.bottom + 0.8 * height)
 

@@ -49,8 +49,8 @@ class LinkLifetimes:
     second: Whole = field(repr=False)  #: (L,) int64, number of the second body
     begin: Floats = field(repr=False)  #: (L,) float64 [s], time of the first graph with the link
     end: Floats = field(repr=False)  #: (L,) float64 [s], time of the next graph without it, or the last time
-    formed: Flags = field(repr=False)  #: (L,) bool, False for links of the first graph
-    broken: Flags = field(repr=False)  #: (L,) bool, False for links of the last graph
+    formed: Flags = field(repr=False)  #: (L,) bool, whether the link formed after the first graph
+    broken: Flags = field(repr=False)  #: (L,) bool, whether the link broke, so that the last graph lacks it
     observed: float  #: Time from the first to the last graph [s]
 
     @property

@@ -29,7 +29,7 @@ class NematicOrder:
     #: Nematic order parameter S, the largest eigenvalue of Q [-]: 1 if all u are parallel, 1/4 if they are random in a
     #: plane, and on average about 0.8 / N^½ for N random u in space
     order: float
-    director: Floats  #: (3,) eigenvector of S, a unit vector that points upwards
+    director: Floats  #: (3,) eigenvector of Q with the eigenvalue S, a unit vector that points upwards
 
     @property
     def polar_angle(self) -> float:
@@ -47,7 +47,7 @@ class PolarOrder:
     """Polar order of unit vectors u, which depends on their signs."""
 
     vector: Floats  #: (3,) mean of u [-]; its z-component is the mean cosine of the angle from the vertical
-    order: float  #: Length of the mean [-]: 1 if all u are equal, on average 0.92 / N^½ for N random u
+    order: float  #: Length of `vector` [-]: 1 if all u are equal, on average 0.92 / N^½ for N random u
 
 
 def nematic_order(directions: ArrayLike, weights: ArrayLike | None = None) -> NematicOrder:

@@ -187,7 +187,7 @@ def slope_within(x: Sequence[float], y: Sequence[float], blocks: Sequence[Hashab
 class Parabola:
     """A parabola fitted to points."""
 
-    slope: Slope  #: Slope at the given x; NaN if x has fewer than three distinct values
+    slope: Slope  #: Slope at x = `at`, see `parabola`; NaN if x has fewer than three distinct values
     bend: Slope  #: Half the second derivative; below 0 if the parabola has a maximum
     top: float  #: x at which the slope is 0; NaN if the bend is 0
     #: p-value of the F test for lack of fit, by the scatter of points at equal x; NaN if x has at most three distinct

@@ -43,7 +43,7 @@ class Emulator:
     noise: float  #: Standard deviation from seed to seed
     lengths: Array  #: (d,) length scales over the ranges of the priors
     loo: Array  #: (n,) leave-one-out errors: prediction of each run from all others; over their standard deviation
-    explained: float  #: Fraction of the variance of the runs that predictions from all others explain [-]
+    explained: float  #: Fraction of the runs' variance that leave-one-out predictions explain [-]
 
     def predict(self, inputs: Array) -> tuple[Array, Array]:
         """Return mean and variance (m,) of the measure without noise at scaled parameters (m, d)."""

@@ -25,7 +25,7 @@ from studies.calibration.problem import CONDITION, Problem
 from templates.sweep.render import Value
 
 CUTOFF = 3.0  #: Largest implausibility that keeps a point [-]: three standard deviations, after Pukelsheim (1994)
-CANDIDATES = 13  #: Power of 2 of the number of points at which a region is examined
+CANDIDATES = 13  #: Base-2 logarithm of the number of points at which a region is examined
 WALKERS_PER_DIMENSION, CHUNK, MOST_STEPS = 8, 500, 8000
 ENOUGH_TIMES = 50  #: emcee's autocorrelation time is reliable if steps exceed it by this factor [-]
 DRAWS = 4000  #: Approximate number of draws of the posterior that are kept
@@ -56,11 +56,11 @@ class Result:
 
     problem: Problem
     runs: pd.DataFrame  #: All runs: wave, variables, measures (NaN: failed)
-    waves: pd.DataFrame  #: Points, runs, failures and remaining fraction of the prior of each wave
-    emulators: Sequence[Emulator | None]  #: One for each datum; None if too few runs have its condition
+    waves: pd.DataFrame  #: A row per wave: numbers of points, runs and failures; part of the prior not ruled out [%]
+    emulators: Sequence[Emulator | None]  #: Emulator of each datum; None if the datum's condition was not run
     draws: Array  #: (m, d + 1) draws of the posterior: parameters, and σ of the discrepancy
     best: Array  #: (d + 1,) draw with the largest posterior density
-    diagnostics: Mapping[str, float]  #: Autocorrelation time, steps over it, acceptance, effective draws
+    diagnostics: Mapping[str, float]  #: Of emcee: autocorrelation time, steps over it, acceptance, effective draws
     warnings: Sequence[str]  #: What a reader must know before using the posterior
 
     @property

@@ -100,7 +100,7 @@ class Datum:
     condition: int  #: Index of its condition in `Problem.conditions`
     measure: str  #: Name of the measure
     value: float  #: Measured value
-    error: float  #: Standard deviation of the measured value, with that from repetition to repetition
+    error: float  #: Standard deviation of the measured value, including the scatter of repetitions
     fitted: bool  #: Whether the calibration uses the point; otherwise the point is predicted only
 
     def label(self, conditions: Sequence[Mapping[str, Value]]) -> str:
@@ -111,7 +111,7 @@ class Datum:
 
 @dataclass(frozen=True, kw_only=True)
 class Problem:
-    """What is to be calibrated; a condition is one combination of the variables of the data."""
+    """Parameters, data and runs of a calibration; a condition is a combination of the data's variables."""
 
     path: Path
     text: str

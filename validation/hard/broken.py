@@ -87,7 +87,7 @@ def _resting(access: EngineAccess, out: Path, count: int) -> tuple[Engine, Recor
 
 @hard("spoilt: pile that is heated", {"count": 4, "share": 0.3})
 def heated(access: EngineAccess, out: Path, *, count: int, share: float) -> list[Check]:
-    """Reverse the damping of all contacts of a pile at rest, so that its energy grows."""
+    """Reverse the damping of all contacts of a pile at rest; the watchdog must report the growing energy."""
     engine, recorder = _resting(access, out, count)
     access.heat(engine, share)
     access.push(engine, count - 1, velocity=(0, 0, 1e-3))
@@ -104,7 +104,10 @@ def heated(access: EngineAccess, out: Path, *, count: int, share: float) -> list
 
 @hard("spoilt: pile that is kicked", {"count": 4, "speed": 0.3})
 def kicked(access: EngineAccess, out: Path, *, count: int, speed: float) -> list[Check]:
-    """Give a pile at rest an upward velocity far below the largest allowed speed."""
+    """Give a pile at rest a small upward velocity; the watchdog must report the sudden energy.
+
+    The speed is far below the largest allowed speed, so that only the check of the energy can notice it.
+    """
     engine, recorder = _resting(access, out, count)
     for k in range(count):
         access.push(engine, k, velocity=(0, 0, speed))
