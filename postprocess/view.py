@@ -174,10 +174,7 @@ class RunView:
         return sorted({round(place) for place in np.linspace(0, len(self.frames) - 1, number)})
 
     def _widened(self, values: Floats) -> tuple[float, float]:
-        """Return the extremes of the coloured field in the shown frame, all frames shown before, and a sample.
-
-        `values` are those of the shown frame. The sample has frames at equal intervals of the run.
-        """
+        """Return the extremes of the coloured field in `values`, all frames shown before, and sampled frames."""
         name = self.field.name
         samples = [np.array(self._bounds.get(name, ())), values]
         if name not in self._bounds:

@@ -149,7 +149,7 @@ def scene_settings(arguments: argparse.Namespace) -> list[str]:
 
 
 def reject_existing(option: str, path: Path | None, *, overwrite: bool) -> None:
-    """Raise InputError if an output file exists and may not be replaced; call it before the computation."""
+    """Raise InputError, before a computation, if the file of an output option exists and must be kept."""
     if path is not None and path.exists() and not overwrite:
         raise InputError(f"{option} {path}: exists; choose another name or give --overwrite")
 

@@ -48,10 +48,7 @@ def read_kept(directory: Path, kind: str, key: str) -> pd.DataFrame | None:
 
 
 def keep(table: pd.DataFrame, directory: Path, kind: str, key: str) -> None:
-    """Store a table in a run directory with the current `key_of`; do nothing if that is impossible.
-
-    `kind` is the name under which `read_kept` finds the table.
-    """
+    """Store a table, named by its `kind`, with a key in a run directory; do nothing if that is impossible."""
     rows = table.astype(object).to_numpy().tolist()
     text = json.dumps({"columns": list(table.columns), "rows": rows}, default=_plain)
     content = f"{key}\n{hashlib.sha256(text.encode()).hexdigest()}\n{text}"

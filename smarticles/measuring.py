@@ -142,7 +142,7 @@ def _measure_and_keep(
 
 
 def _with_variables(table: pd.DataFrame, values: Mapping[str, Any]) -> pd.DataFrame:
-    """Return the measures of one run with the variables of its sweep after the first column."""
+    """Insert the variables of a run's sweep, `values` by name, after the first column of the run's table."""
     for place, (name, value) in enumerate(values.items(), start=1):
         column = name
         cell = value if isinstance(value, str | int | float | bool) else json.dumps(value, ensure_ascii=False)

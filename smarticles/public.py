@@ -246,10 +246,7 @@ def sweep(
 
 @contextmanager
 def _in_words_of_python(scratch: str) -> Iterator[None]:
-    """Reword error messages for callers from Python: arguments for options, no paths in `scratch`.
-
-    `scratch` is the temporary folder with the files of a sweep.
-    """
+    """Reword error messages for Python: arguments in place of options, no paths of the folder `scratch`."""
     try:
         yield
     except (InputError, RunError) as error:

@@ -176,10 +176,7 @@ def is_for_cluster(arguments: argparse.Namespace, *, allow_ranks: bool = False) 
 
 
 def draft_of(path: Path, name: str, entries: Sequence[Entry], arguments: argparse.Namespace) -> Draft:
-    """Plan and render a job for runs, with the cluster options among the parsed arguments of a command.
-
-    `path` is the directory and `name` the name of the sweep.
-    """
+    """Plan and render a job for runs of the sweep `name` in `path`, by a command's cluster options."""
     from templates.slurm.cluster import shipped_clusters  # noqa: PLC0415
     from templates.slurm.job import Wishes  # noqa: PLC0415
     from templates.slurm.submission import draft, submissions  # noqa: PLC0415

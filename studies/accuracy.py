@@ -80,7 +80,7 @@ class Rung:
 
     @property
     def sensitivity(self) -> bool:
-        """Whether the knob is a parameter of the model, whose values differ but are not more or less accurate."""
+        """Whether the knob is a parameter of the model, so that other values have no errors."""
         return self.knob == "restitution"
 
 
@@ -293,10 +293,7 @@ _Point = tuple[str, str, str, dict[str, Value]]
 
 
 def _rungs(knob: str, base: Mapping[str, Value], *, smooth: bool) -> list[_Point]:
-    """Return all rungs of a knob, from coarse to fine, with the variables `base` of the scene.
-
-    `smooth`: the engine has links swept by spheres, not chains of spheres.
-    """
+    """Return all rungs of a knob, from coarse to fine; `smooth`: links are swept by spheres, not chains."""
     if knob == "section":
         return _strands(base) if smooth else _sections(base)
     if knob == "fidelity":
@@ -351,10 +348,7 @@ def _sections(base: Mapping[str, Value]) -> list[_Point]:
 
 
 def _strands(base: Mapping[str, Value]) -> list[_Point]:
-    """Return the rungs of the knob "section" for smooth links: 1 to 3 strands.
-
-    The diameter of the strands follows from their number, as in a scene that does not set it.
-    """
+    """Return the rungs of "section" for smooth links: 1 to 3 strands, whose number gives their diameter."""
     shapes: list[dict[str, Value]] = [{"rows": rows, "diameter_m": None} for rows in (1, 2, 3)]
     own = {key: base[key] for key in shapes[0]}
     if not any(_same(own, shape) for shape in shapes):

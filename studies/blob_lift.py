@@ -114,10 +114,7 @@ def _above(table: pd.DataFrame) -> list[Effect]:
 
 
 def height_around(run: Run, begin: float) -> History:
-    """Read the height of the centre of mass [mm] against time, from 1 s before the time `begin` [s] on.
-
-    Time 0 of the history is `begin`.
-    """
+    """Read the height of the centre of mass [mm] from 1 s before `begin` [s] on; time 0 is `begin`."""
     own = run.series.time >= begin - 1.0
     return History(times=run.series.time[own] - begin, values=1e3 * run.series["com_height_m"][own])
 

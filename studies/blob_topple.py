@@ -75,16 +75,13 @@ def centre(frame: Frame) -> NDArray[np.float64]:
 
 
 def slenderness(frame: Frame) -> float:
-    """Return the vertical over the horizontal standard deviation of the segments' middles [-].
-
-    The horizontal value is the root mean square over x and y.
-    """
+    """Return the vertical over the rms horizontal standard deviation of the segments' middles [-]."""
     x, y, z = np.var(frame.segments.mean(axis=1), axis=0)
     return float(np.sqrt(2 * z / (x + y)))
 
 
 def largest_cluster(frame: Frame, diameter: float) -> float:
-    """Return the share of bodies in the largest cluster of bodies that touch."""
+    """Return the fraction of bodies in the largest cluster of touching bodies of a diameter [m]."""
     segments, reach = frame.segments, TOUCHING * diameter
     i, j = close_segments(segments[:, 0], segments[:, 1], frame.body, reach)
     touch = segment_distances(segments[i], segments[j]) <= reach

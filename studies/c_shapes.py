@@ -230,10 +230,7 @@ def grows(table: pd.DataFrame) -> Outcome:
 
 
 def logarithm_best(table: pd.DataFrame) -> list[Effect]:
-    """Judge whether logarithms fit better than a line and an exponential, by the residuals of the fits.
-
-    The laws of a pair have equal numbers of parameters.
-    """
+    """Judge whether logarithms fit better than a line and an exponential with as many parameters."""
     laws = {
         "a + b ln t over that of a line": (AGAINST_LINE, -1),
         "a + b ln(1 + t/τ) over that of a + b exp(-t/τ)": (DELAYED, -1),

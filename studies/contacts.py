@@ -112,10 +112,7 @@ def points(runs: pd.DataFrame) -> pd.DataFrame:
 
 
 def by_seed(runs: pd.DataFrame, quantity: str, *changed: str) -> pd.DataFrame:
-    """Return the effect of the factors `changed` on a quantity: a row per l/w and seed.
-
-    One factor gives its effect, two factors give their interaction.
-    """
+    """Return the effect of one factor, or the interaction of two (`changed`), by l/w and seed."""
     table, left = runs, [*FACTORS, ASPECT, SEED]
     for factor in changed:
         left = [name for name in left if name != factor]
@@ -161,7 +158,7 @@ def lowers(name: str, says: str, quantity: str, *changed: str, sign: int = -1, l
 
 
 def _near_gravish(means: pd.DataFrame) -> Outcome:
-    """Judge whether a combination is surely within the margin of Gravish's points at every l/w."""
+    """Judge whether, for some combination of factors, φ_f is within `MARGIN` of Gravish's at every l/w."""
     known = means[means[DEVIATION].notna()]
     if known.empty:
         return Outcome(note="no points of Gravish's at these l/w", verdict=Verdict.NOT_RESOLVED)

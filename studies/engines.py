@@ -142,10 +142,7 @@ def _measured(run: Run, case: str) -> dict[str, float]:
 
 
 def by_seed(runs: pd.DataFrame, one: Compared, variant: str) -> pd.Series:
-    """Return a quantity's mean over its cases, by seed, for the runs of one variant (engine or pitch).
-
-    Seeds without a value are left out.
-    """
+    """Return a variant's mean of a quantity over its cases, by seed, for seeds that have a value."""
     chosen = runs[(runs[VARIANT] == variant) & runs[CASE].isin(one.cases)]
     means: pd.Series = chosen.groupby(SEED)[one.column].mean().dropna()
     return means

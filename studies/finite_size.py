@@ -71,7 +71,7 @@ def share(stage: str) -> str:
 
 
 def spans(stage: str, what: str = "pile") -> str:
-    """Return the name of the column that is 1 if clusters span the height, the width, or both ("pile")."""
+    """Return the name of the column that is 1 if clusters span `what`: "height", "width", or both: "pile"."""
     return f"spans {what} {stage} [-]"
 
 
@@ -185,7 +185,7 @@ def laws(runs: pd.DataFrame) -> pd.DataFrame:
 
 
 def _column(stage: str, axis: str) -> str:
-    """Return the column of the table of runs with the values of a threshold's axis, "l/w" or "⟨N⟩"."""
+    """Return the name of the column of l/w or of ⟨N⟩ at a stage, in the table of runs; `axis` says which."""
     return ASPECT if axis == "l/w" else crossings(stage)
 
 

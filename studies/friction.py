@@ -188,7 +188,8 @@ def tabulate(runs: pd.DataFrame) -> dict[str, pd.DataFrame]:
 def points(runs: pd.DataFrame, scatters: Mapping[str, Scatter]) -> pd.DataFrame:
     """Average φ and compute its deviation from Gravish's φ [%]: a row per stage, l/w and friction.
 
-    The error of the deviation includes the error of reading Gravish's points.
+    The error of the deviation includes the error of reading Gravish's points. `scatters` has the relative scatter over
+    seeds of each stage.
     """
     rows = []
     for stage, scatter in scatters.items():

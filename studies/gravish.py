@@ -203,7 +203,7 @@ def _fully_shaken(points: pd.DataFrame) -> pd.DataFrame:
 
 
 def _states(points: pd.DataFrame) -> pd.DataFrame:
-    """Return each point twice, with φ after rest and while shaken, in the columns of φ_0 and φ_f."""
+    """Return two rows per point: one with φ_f while shaken, one with φ_0 and, as φ_f, φ at rest after it."""
     points = _fully_shaken(points)
     shaken = points.assign(**{phi("phi_0"): math.nan, _STATE: "while shaken"})
     rest = points.assign(**{_STATE: "after rest"})

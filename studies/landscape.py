@@ -220,10 +220,7 @@ def predicted(runs: pd.DataFrame) -> tuple[pd.DataFrame, pd.DataFrame]:
 def _correlated(
     table: pd.DataFrame, strength: str, *, within: bool
 ) -> tuple[list[dict[str, object]], list[dict[str, object]]]:
-    """Return the rows of the tables `predictors` and `comparisons`, see `predicted`.
-
-    `table` has the runs of one part and scope; `within` states whether ranks are taken within each l/w.
-    """
+    """Return rows of both tables of `predicted` for runs of one part; `within`: ranks are within each l/w."""
     names = list(PREDICTORS)
     x, y = table[names].to_numpy(dtype=np.float64), table[strength].to_numpy(dtype=np.float64)
     strata = pd.factorize(table[ASPECT])[0].astype(np.int64)
@@ -351,7 +348,7 @@ def best_points(table: pd.DataFrame) -> pd.DataFrame:
 
 
 def _at_point(gained: pd.DataFrame, point: pd.Series) -> pd.DataFrame:
-    """Return the runs of one procedure, θ and planned time, indexed by l/w and seed."""
+    """Return the runs of a point (procedure, θ, planned time) as a table indexed by l/w and seed."""
     same = (gained[PROCEDURE] == point[PROCEDURE]) & np.isclose(gained[PLANNED], point[PLANNED])
     same &= np.isclose(gained[THETA], point[THETA], equal_nan=True)
     return gained[same].set_index([ASPECT, SEED])

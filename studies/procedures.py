@@ -463,14 +463,14 @@ def heights(run: Run) -> History:
 
 
 def _energy_series(points: pd.DataFrame) -> list[Series]:
-    """Return a series of each procedure, and of the internal oscillation at each other amplitude."""
+    """Return a series per procedure, and one per further amplitude of the internal oscillation."""
     internal = amplitudes(points)
     others = one_by_one(THETA, lambda theta: rf"internal, $\theta$ = {theta:g}°")
     return by_procedure(apart=0.004)(points) + others(internal[internal[THETA] != AMPLITUDE])
 
 
 def _aspect_series(points: pd.DataFrame) -> list[Series]:
-    """Return a series of the internal oscillation at each aspect ratio with several amplitudes."""
+    """Return a series of the internal oscillation per aspect ratio, if it was run at several amplitudes."""
     internal = amplitudes(points).sort_values(THETA)
     several = internal[internal.groupby(ASPECT)[THETA].transform("nunique") > 1]
     return one_by_one(ASPECT, lambda aspect: rf"$l/w$ = {aspect:g}")(several)

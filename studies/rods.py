@@ -120,19 +120,13 @@ def local_crossings(frame: Frame, *, length: float, radius: float, top: float) -
 
 
 def spanning_level(field: NDArray[np.float64]) -> float:
-    """Return the largest level of a field (X, Y, Z) at which the region with at least this level spans it.
-
-    The region must join bottom and top; the result is 0 if there is no such level.
-    """
+    """Return the highest level at which the region of a field above it joins bottom and top; 0 if none."""
     falling = np.unique(field)[::-1]
     return next((float(value) for value in falling if region_spans(field >= value, 2)), 0.0)
 
 
 def thresholds(runs: pd.DataFrame, column: str) -> dict[str, Profile]:
-    """Fit the value of a column above which piles stand, for each series, by profile likelihood.
-
-    The thresholds x_c of the profiles are natural logarithms of the value.
-    """
+    """Fit, for each series, the threshold of the logarithm of a column above which piles stand."""
     own = runs[(runs[column] > 0) & np.isfinite(runs[column])]
     if own.empty:
         return {}
@@ -193,7 +187,7 @@ def ratio_of(runs: pd.DataFrame, column: str, one: str, other: str) -> tuple[flo
 
 
 def one_level(runs: pd.DataFrame, *, other: str) -> Outcome:
-    """Judge whether piles of another series begin to stand at the spanning level of shaken piles."""
+    """Judge whether piles of the series `other` begin to stand at the spanning level of shaken piles."""
     ratios = {column: ratio_of(runs, column, other, SHAKEN) for column in (LEVEL, SLENDER, DENSITY)}
     cells = []
     for column, (value, half, chance) in ratios.items():

@@ -132,10 +132,7 @@ def angle_of(run: Run) -> float:
 
 
 def links_per_body(frame: Frame) -> float:
-    """Return the number of linked pairs over the number of bodies [-].
-
-    Two bodies are linked if one passes through the polygon of the other.
-    """
+    """Return linked pairs per body [-]: pairs of which one body passes through the other's polygon."""
     graph = entanglement_graph(polygon_crossings(frame.segments, frame.body), least=1)
     return len(graph.i) / frame.count
 
@@ -143,7 +140,7 @@ def links_per_body(frame: Frame) -> float:
 def chains_between(frame: Frame, low: float, high: float, forces: RecordedForces | None = None) -> float:
     """Return the mean number of chains of tension [-] through the levels `CUTS` between two heights [m].
 
-    NaN if no level has a tension. The recorded forces of the frame are read from its run directory if not given.
+    NaN if no level carries tension. The recorded forces of the frame are read from its run directory if not given.
     """
     forces = read_forces(frame) if forces is None else forces
     found = [chains_through(frame, forces, low + part * (high - low)) for part in CUTS]
@@ -217,10 +214,7 @@ def stronger(table: pd.DataFrame, *, times: float) -> Outcome:
 
 
 def narrow_less_square(table: pd.DataFrame, column: str) -> SeedMean:
-    """Return the mean over seeds of a column's value at 20° less its value at 90°.
-
-    The table must have runs with one vibration only.
-    """
+    """Return the mean over seeds of a column at 20° less at 90°, from a table with one vibration."""
     return mean_over_seeds(paired_differences(table, column, ANGLE, (SQUARE, NARROW), [SEED])[column])
 
 

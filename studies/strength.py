@@ -144,10 +144,7 @@ def over_heights(runs: pd.DataFrame) -> pd.DataFrame:
 
 
 def order_findings(rows: Rows) -> tuple[Finding, Finding]:
-    """Make two findings on procedures: peak force and ⟨N⟩ rank them differently; shape change is brittle.
-
-    Brittle: a greater peak force at a smaller displacement than after internal oscillation. `rows` selects the samples.
-    """
+    """Make two findings: peak force and ⟨N⟩ rank procedures differently; shape change makes brittle piles."""
     return (
         Finding(
             id="other-order-than-crossings",

@@ -77,10 +77,7 @@ class _Access:
 
 
 def _bar(length: float, thickness: float, radius: float, kind: type[Particle] = Particle) -> Particle:
-    """Return a smarticle without barbs and with the mass BALL_MASS; lengths are in [m].
-
-    `thickness` is the side of its square cross-section, `radius` the radius of its spheres.
-    """
+    """Return a barbless smarticle of mass BALL_MASS and square section, for spheres of a radius [m]."""
     boxes = Boxes(
         middle_length=length,
         barb_length=0.0,
@@ -283,10 +280,7 @@ class LinksAccess(_Access):
             bodies.position[1] = _spoilt_place(engine, what, bodies.position[1])
 
     def heat(self, engine: Engine, share: float) -> None:
-        """Multiply all normal damping coefficients by −`share`, so that dashpots supply energy.
-
-        Tangential damping coefficients are set to 0.
-        """
+        """Multiply normal damping by −`share`, so that dashpots supply energy; set tangential damping to 0."""
         world = _links(engine)._world
         world.laws = tuple(law._replace(damping=-share * law.damping, shear_damping=0.0) for law in world.laws)
 

@@ -281,7 +281,7 @@ RIGHT, REJECTED, STOPPED, WRONG, LATE = "right", "rejected by plan", "stopped wi
 
 
 def run_one(number: int, out: Path, tree: Path, limit: float) -> dict[str, Any]:
-    """Plan, run and check one scene; return its row of the table.
+    """Plan, run and check the scene with a number; return its row of the table.
 
     `tree` is the source tree whose `smarticles` is used, `limit` the largest wall time of `plan` and of `run` [s].
     """

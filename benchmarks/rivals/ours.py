@@ -9,7 +9,7 @@ from dem.plan.steps import time_steps
 
 
 def simulate(task: Task, knobs: Knobs) -> Outcome:
-    """Simulate a task; there are no knobs besides the scene."""
+    """Simulate a task; `knobs` are empty, since the scene has all parameters."""
     return simulated(task, OnEngine(task))
 
 

@@ -454,10 +454,7 @@ def _prism(sides: int) -> tuple[Floats, Whole]:
 
 
 def at_points(mesh: pv.PolyData, values: NDArray[Any]) -> NDArray[Any]:
-    """Convert values of the C cells of a mesh, (C, …), to values of its P points, (P, …).
-
-    Cells that share a point must have equal values, as the cells of one bar have.
-    """
+    """Convert values of mesh cells (C, …), equal for all cells at a point, to values of points (P, …)."""
     cells = mesh.GetPolys()
     ends, corners = (np.asarray(array) for array in (cells.GetOffsetsArray(), cells.GetConnectivityArray()))
     found = np.empty((mesh.n_points, *values.shape[1:]), dtype=values.dtype)

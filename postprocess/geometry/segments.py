@@ -185,10 +185,7 @@ def nearest_points(first: Floats, second: Floats) -> tuple[Floats, Floats]:
 
 
 def _corner_numbers(segments: Floats) -> Whole:
-    """Number the points at which ends of segments meet: (M, 2), the number of each end's point.
-
-    Ends of different bodies that meet have one number, too.
-    """
+    """Number the points at which ends of segments of any bodies meet: (M, 2), the number of each end."""
     points = segments.reshape(-1, 3)
     if len(points) == 0:
         return np.empty((0, 2), dtype=np.int64)

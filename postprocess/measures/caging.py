@@ -143,10 +143,7 @@ def caging_number(segments: ArrayLike, *, trials: int = 400, seed: int = 0) -> S
 
 
 def contact_normals(segments: Floats, number: Whole, *, diameter: ArrayLike, gap: float = 0.0) -> ContactNormals:
-    """Find the contacts of round segments (M, 2, 3) [m] of bodies with the indices `number` (M,).
-
-    `diameter` and `gap` are described by `cages`.
-    """
+    """Find contacts of segments whose bodies have the indices `number` (M,); other arguments: see `cages`."""
     sizes = np.asarray(diameter, dtype=np.float64)
     if sizes.shape not in {(), (len(segments),)} or not np.all(np.isfinite(sizes) & (sizes > 0)) or not gap >= 0:
         raise InputError(

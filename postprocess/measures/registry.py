@@ -72,10 +72,7 @@ class FrameMeasure:
 
 
 def measure_of(function: Callable[[Frame, Run], float] | FrameMeasure) -> FrameMeasure:
-    """Make a measure from a function of a frame and its run, or return a given measure.
-
-    The function's name gives column and unit: `speed_m_per_s` fills the column `speed [m/s]`.
-    """
+    """Make a measure from a function whose name has quantity and unit, such as `speed_m_per_s`."""
     if isinstance(function, FrameMeasure):
         return function
     label, unit = unit_of(function.__name__)

@@ -122,7 +122,7 @@ def read_strain_test(run: Run) -> StrainTest:
 
 
 def measured(pull: StrainTest) -> dict[str, float]:
-    """Compute the quantities of a strain test; the keys of the result are those of `QUANTITIES`."""
+    """Compute the quantities of a strain test, by their columns; `QUANTITIES` has the meanings."""
     end = pull.fracture + 1
     strains, forces = pull.strains[:end], pull.forces[:end]
     peak = int(np.argmax(forces))

@@ -103,10 +103,7 @@ class Subject:
         self.frames = read_frames(directory)
 
     def extent(self, indices: Iterable[int], axes: Floats) -> Floats:
-        """Return the extent of all bodies in some frames: lower left and upper right, (2, 2) [mm].
-
-        `axes` are those of the camera, see `Style.axes`; the extent is in the plane of the picture.
-        """
+        """Return lower left and upper right (2, 2) [mm] of the bodies in some frames, in the picture's plane."""
         return union([extent(visible_meshes(self.bodies, self.frames[i], axes[2]).values(), axes) for i in indices])
 
     def values(self, indices: Iterable[int], style: Style) -> list[Floats]:

@@ -87,7 +87,7 @@ def common_slopes(x: Floats, y: Floats, strata: Whole) -> Floats:
 
 
 def interval(value: float, drawn: Sequence[float]) -> Interval:
-    """Return a value with its 95 % interval, by percentiles of resampled values.
+    """Return a value with its 95 % interval, by percentiles of the resampled values `drawn`.
 
     If more than a tenth of the resampled values are not finite, the interval is NaN.
     """

@@ -92,7 +92,7 @@ def mean_with_error(samples: ArrayLike) -> Mean:
 
 
 def _correlation_time(deviations: Floats) -> float:
-    """Return the integrated correlation time in samples; 1 if the samples are independent."""
+    """Return the integrated correlation time of deviations from the mean, in samples; 1 if independent."""
     count = len(deviations)
     covariance = np.correlate(deviations, deviations, mode="full")[count - 1 :]
     if covariance[0] <= 0:
@@ -153,7 +153,7 @@ def difference(mean: SeedMean, baseline: SeedMean, *, scatter: Scatter | None = 
 
 
 def relative_difference(mean: SeedMean, baseline: SeedMean, *, scatter: Scatter | None = None) -> Difference:
-    """Return the `difference` in per cent of the baseline, taken as exact; NaN if the baseline is 0."""
+    """Return the `difference` in per cent of the baseline's mean, whose error is neglected; NaN if it is 0."""
     change = difference(mean, baseline, scatter=scatter)
     scale = 100 / baseline.value if baseline.value else math.nan
     return Difference(value=scale * change.value, half_width=abs(scale) * change.half_width)
@@ -230,5 +230,5 @@ def _lack_of_fit(x: Floats, residuals: Floats) -> float:
 
 
 def _quantile(freedom: float) -> float:
-    """Return the ratio of the 95 % half-width to the standard error, by Student's t."""
+    """Return the 95 % half-width over the standard error, by Student's t of `freedom` degrees of freedom."""
     return float(stdtrit(freedom, (1 + CONFIDENCE) / 2))

@@ -103,10 +103,7 @@ def run_accuracy(arguments: argparse.Namespace) -> int:
 
 
 def _listing(ladder: Ladder, expected_s: Mapping[str, float], seeds: int, jobs: int | None) -> str:
-    """Return a table of the variants, with the expected wall time [s] of a run and [h] of all runs.
-
-    `seeds` is the number of runs of each variant, `jobs` the number of simultaneous runs; None: one per core.
-    """
+    """Return a table of the variants, with the expected wall time [s] of a run and [h] of all runs."""
     from dem.engine.cores import usable_cores  # noqa: PLC0415
     from dem.plan.outlook import plan  # noqa: PLC0415
 

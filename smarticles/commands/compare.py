@@ -1,7 +1,4 @@
-"""Command `compare`: compare two runs or two sweeps, A and B.
-
-Scenes, versions and measures are compared, and frames and series bit by bit.
-"""
+"""Command `compare`: compare two runs or two sweeps, A and B, down to the bits of series and frames."""
 
 from __future__ import annotations
 
@@ -166,7 +163,7 @@ def _made_by(run: Run) -> dict[str, Any]:
 
 
 def _compare_sweeps(one: Folder, other: Folder) -> dict[str, Any]:
-    """Return scene, versions, only, bits and measures of the result of `compare` for two sweeps."""
+    """Return the entries scene, versions, only, bits and measures of `compare`'s result for two sweeps."""
     from templates.sweep.sweep_file import SEED  # noqa: PLC0415
 
     first, second = ({entry.name: run for entry, run in zip(f.entries, f.runs(), strict=True)} for f in (one, other))
@@ -251,10 +248,7 @@ def compare_bits(one: Run, other: Run) -> dict[str, Any]:
 
 
 def _equal_frames(one: tuple[Path, int], other: tuple[Path, int]) -> bool:
-    """Return whether two frames, given by file and number in the file, are equal bit by bit.
-
-    The array `radius_m` is ignored if one of the frames lacks it.
-    """
+    """Return whether two frames (file, number in it) are equal bit by bit; one may lack `radius_m`."""
     from dem.record.frame import read_mesh  # noqa: PLC0415
 
     if {one[0].suffix, other[0].suffix} == {".vtu"}:
@@ -270,10 +264,7 @@ def _equal_frames(one: tuple[Path, int], other: tuple[Path, int]) -> bool:
 
 
 def _pair_up(one: pd.DataFrame | None, other: pd.DataFrame | None, *, keys: Sequence[str]) -> list[dict[str, Any]]:
-    """Return a row with A, B, B - A and its standard error for each quantity that tables A and B have.
-
-    Rows of the tables belong together if their values in the columns `keys` are equal.
-    """
+    """Return A, B, B - A and its error of each quantity, for rows of tables A and B with equal `keys`."""
     from postprocess.statistics.points import marked  # noqa: PLC0415
 
     def records(table: pd.DataFrame | None) -> dict[str, dict[Any, Any]]:

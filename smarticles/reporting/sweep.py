@@ -147,7 +147,8 @@ def _measured(folder: Folder, varied: Mapping[str, Sequence[Any]], *, jobs: int)
 def _figures(final: pd.DataFrame, by: Sequence[str], varied: Mapping[str, Sequence[Any]], kind: str) -> list[Markup]:
     """Return charts against the variable with most values, with one curve per value of a second variable.
 
-    There are separate charts for each combination of the other variables.
+    There are separate charts for each combination of the other variables. `final` has means after the last phase, of
+    the type `kind`, by the variables `by`; `varied` has the values of each variable.
     """
     if not by:
         return []

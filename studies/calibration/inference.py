@@ -93,10 +93,7 @@ class Result:
         return pd.DataFrame(rows)
 
     def predictive(self) -> pd.DataFrame:
-        """Tabulate each datum with the 95 % band in which the posterior predicts a measurement.
-
-        The band includes discrepancy and error of the measurement.
-        """
+        """Tabulate each datum with the 95 % band of predicted measurements, discrepancy and error included."""
         random = np.random.default_rng(self.problem.content.first_seed)
         inputs, sizes = self.problem.scaled(self.theta), self.problem.sizes
         rows = []
@@ -142,7 +139,8 @@ def calibrate(problem: Problem, simulator: Simulator, say: Callable[[str], None]
     """Run all waves and sample the posterior; return None if runs of a wave are still in a queue.
 
     The first wave is a Sobol sequence in the priors. Each further wave takes those points of a finer sequence that the
-    runs so far do not rule out. Conditions that are predicted only are run in the last wave.
+    runs so far do not rule out. Conditions that are predicted only are run in the last wave. `say` gets a line about
+    each wave.
 
     Raises:
         InputError: The budget is too small, or too few runs finished for an emulator.
@@ -240,11 +238,7 @@ def emulate(problem: Problem, runs: pd.DataFrame) -> list[Emulator | None]:
 
 
 def _residuals(problem: Problem, emulators: Sequence[Emulator | None], theta: Array) -> tuple[Array, Array, Array]:
-    """Return residuals (n, J), their variances (n, J) and sizes (J,) of J fitted data at parameters (n, d).
-
-    A residual is measured value less emulator's mean; its variance is that of error and emulator together. Sizes are
-    those of `Problem.sizes`.
-    """
+    """Return data less emulator means (n, J), variances of both together (n, J), and `sizes` (J,)."""
     inputs, sizes = problem.scaled(theta), problem.sizes
     used = [(d, e, s) for d, e, s in zip(problem.data, emulators, sizes, strict=True) if d.fitted and e is not None]
     predicted = [emulator.predict(inputs) for _, emulator, _ in used]

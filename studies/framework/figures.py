@@ -133,7 +133,7 @@ class Means:
     share_y: bool = False  #: Whether all panels of one quantity, or of one line of panels, have one y axis
     #: Computes the horizontal lines of a panel from its rows: y by label; a line at NaN is left out
     levels: Callable[[pd.DataFrame], Mapping[str, float]] = lambda _: {}
-    #: By column of a quantity: column with its lower bound, which is drawn where the quantity has no mean
+    #: Columns with lower bounds, by column of the quantity; a bound is drawn where the mean is unknown
     bounds: Mapping[str, str] = field(default_factory=dict)
     #: Published values: places along x and values, by the column of the quantity
     reference: Mapping[str, tuple[pd.Series, pd.Series]] = field(default_factory=dict)
@@ -222,7 +222,7 @@ class Rows:
 
     name: str  #: Name of the files without suffix
     quantities: Sequence[Quantity]  #: Drawn along x, in a panel each
-    row: str | Callable[[pd.Series], str]  #: Column with the name of the line, or a function of a row of the table
+    row: str | Callable[[pd.Series], str]  #: Column with the names of lines, or function of a table's row
     table: str = "points"  #: Name of the study's table that is drawn
     split: Split = lambda table: [
         Series(rows=table, label="mean over seeds", properties=marker("o", style.BLUE, style.BLUE))
@@ -322,7 +322,7 @@ class Histories:
     #: Label of the y axis by column of the table `times`; the key is "" if `history` reads the values
     quantities: Mapping[str, str]
     x_label: str
-    split: Split  #: Makes the series of the runs; their properties have a colour
+    split: Split  #: Makes the series of the runs, each with a colour in its properties
     #: Reads the history of a run; if it raises InputError, the run is left out. None: the table `times` is drawn
     history: Callable[[Run], History] | None = None
     x: str = ""  #: Column of the table `times` that is drawn along x
@@ -330,7 +330,7 @@ class Histories:
     panels: str = ""  #: Column whose values have a panel each; empty: one panel
     panel: str = "l/w = {:g}"  #: Title of a panel, with `{}` for its value times `panel_scale`
     panel_scale: float = 1.0
-    width: float = 0.0  #: Width of the averaged intervals of x; 0: a hundredth of the longest activity or range of x
+    width: float = 0.0  #: Width of averaged intervals of x; 0: 1 % of the longest activity, or of the range of x
     unit: str = "s"  #: Unit of `width`
     log: bool = False  #: Whether x and the intervals are logarithmic
     level: float | None = None  #: Place of a horizontal line
@@ -563,10 +563,7 @@ def draw_fits(
     *,
     lines: Sequence[Any] = ("solid",),
 ) -> None:
-    """Draw fitted curves at places x (n,) with their 95 % bands.
-
-    `fits` has values (n,) and half-widths (n,) by label, `lines` the line style of each curve.
-    """
+    """Draw curves at places x (n,): `fits` has values and 95 % half-widths (n,) of each curve by label."""
     for (label, (values, half_widths)), line in zip(fits.items(), lines, strict=False):
         axes.plot(x, values, color=colour, linewidth=0.9, linestyle=line, label=label)
         low, high = np.asarray(values) - half_widths, np.asarray(values) + half_widths

@@ -178,20 +178,14 @@ class Judged:
 
 
 def _verdict(effects: Sequence[Effect]) -> tuple[Verdict, float]:
-    """Return the combined verdict of all effects, and the factor by which the number of runs must grow.
-
-    The factor is the largest `Effect.more` of the effects that are not resolved; NaN if the verdict is another one.
-    """
+    """Return the combined verdict of all effects, and the largest `Effect.more` if it is not resolved."""
     verdict = all_of(effect.verdict for effect in effects)
     needed = [effect.more for effect in effects if effect.verdict == verdict == Verdict.NOT_RESOLVED]
     return verdict, float(np.max(needed)) if needed else math.nan
 
 
 def all_of(verdicts: Iterable[Verdict]) -> Verdict:
-    """Combine verdicts on the parts of a statement: the first of not found, no data, not resolved, found.
-
-    The statement is thus found only if all its parts are found.
-    """
+    """Return the first of not found, no data, not resolved and found that a part of a statement has."""
     found = list(verdicts)
     order = (Verdict.NOT_FOUND, Verdict.NO_DATA, Verdict.NOT_RESOLVED, Verdict.FOUND)
     return next((verdict for verdict in order if verdict in found), Verdict.NO_DATA)

@@ -52,10 +52,7 @@ class Quantity:
     bar: str = "SE"  #: Error that is shown in the short table: `SE` (standard error) or `95 %` (half-width)
 
     def cell(self, point: Mapping[str, float]) -> str:
-        """Format the quantity's mean at a point for the short table, with its error if known.
-
-        `point` is a row of the table of points.
-        """
+        """Format the quantity's mean in a row of the table of points, with its error if known."""
         error = point.get(marked(self.column, self.bar), math.nan)
         return format_with_error(self.scale * point[self.column], self.form, self.scale * error)
 
@@ -136,7 +133,7 @@ def judging(table: pd.DataFrame) -> pd.DataFrame:
 
 
 def by_engine(table: pd.DataFrame, made: Callable[[pd.DataFrame], pd.DataFrame]) -> pd.DataFrame:
-    """Apply a function to the rows of each engine and concatenate the tables that it returns.
+    """Apply the function `made` to the rows of each engine, and concatenate the tables that it returns.
 
     The result has the column `engine` first if the given table has several engines.
     """
@@ -234,11 +231,7 @@ class Collected:
         *,
         within: Callable[[MeasuredRun], Hashable] = lambda _: None,
     ) -> None:
-        """Raise InputError if runs of a group differ in a value.
-
-        `value` returns the value of a run, which messages call `quantity`; `within` returns its group. By default all
-        runs are one group.
-        """
+        """Raise InputError if `value` differs between runs of a group (`within`), by default all runs."""
         firsts: dict[Hashable, MeasuredRun] = {}
         for run in self.runs:
             first = firsts.setdefault(within(run), run)

@@ -113,10 +113,7 @@ def plan_request(expected_s: Sequence[float], cluster: Cluster, wishes: Wishes) 
 
 
 def _runs_per_task(count: int, partition: Partition, wanted: int | None, memory: int) -> int:
-    """Return the number of runs of a task; by default tasks are equal and fill a node.
-
-    `count` is the number of all runs, `wanted` the number that the user gave, `memory` that of a run [MiB].
-    """
+    """Return the number of runs per task: `wanted`, or by default for equal tasks that fill a node."""
     if wanted is not None:
         return wanted if wanted > partition.cores else min(wanted, count)
     most = max(1, min(partition.cores, partition.memory_mib // memory))
@@ -124,11 +121,7 @@ def _runs_per_task(count: int, partition: Partition, wanted: int | None, memory:
 
 
 def _time(longest: float, cluster: Cluster, partition: Partition, wanted: str | None, where: str) -> int:
-    """Return the wall time to request [s], a whole number of minutes, because Slurm counts minutes.
-
-    `longest` is the expected time of the longest run [s], `wanted` the time that the user gave in Slurm's notation,
-    `where` the name of the partition for messages.
-    """
+    """Return the wall time to request [s], in whole minutes: `wanted`, or by the longest run's time [s]."""
     if wanted is None:
         needed = max(LEAST_TIME_S, longest) + cluster.signal_lead_s
         time_s = min(60 * math.ceil(needed / 60), partition.max_time_s)

@@ -84,10 +84,7 @@ def _plain(value: Value) -> bool:
 
 
 def _check(value: Value, rule: str) -> None:
-    """Raise an error of Jinja2 if a template's value is undefined, not plain data, or too long.
-
-    The message ends with `rule`, which states the allowed values.
-    """
+    """Raise Jinja2's error, with the text `rule`, if a value is undefined, no plain data, or too long."""
     if isinstance(value, jinja2.Undefined):
         str(value)  # StrictUndefined raises, with the name
     if not _plain(value):

@@ -34,7 +34,7 @@ PLACES = ("over the wall", "through the wall", "under the floor")
 
 
 def spoil(access: EngineAccess, out: Path, *, what: str, articulated: bool, steps: int) -> list[Check]:
-    """Set an invalid state for the second of three smarticles on the floor; the watchdog must report it."""
+    """Set the invalid state `what` of the second of three smarticles; the watchdog must report it."""
     scene, engine, recorder = watched(scene_data(access, shape_change(), count=3), out)
     # A few diameters apart, so that no smarticle falls on another.
     for k in range(3):
@@ -104,10 +104,7 @@ def heated(access: EngineAccess, out: Path, *, count: int, share: float) -> list
 
 @hard("spoilt: pile that is kicked", {"count": 4, "speed": 0.3})
 def kicked(access: EngineAccess, out: Path, *, count: int, speed: float) -> list[Check]:
-    """Give a pile at rest a small upward velocity; the watchdog must report the sudden energy.
-
-    The speed is far below the largest allowed speed, so that only the check of the energy can notice it.
-    """
+    """Give a pile at rest an upward velocity below the limit; the watchdog must report the sudden energy."""
     engine, recorder = _resting(access, out, count)
     for k in range(count):
         access.push(engine, k, velocity=(0, 0, speed))

@@ -84,7 +84,7 @@ SETTINGS: Mapping[str, Setting] = {
 
 
 def poses(setting: Setting, scene: Scene, seed: int) -> Poses:
-    """Return the initial poses of all smarticles."""
+    """Return the initial poses of all smarticles of a setting; the seed varies them."""
     rng, particle = np.random.default_rng(seed), scene.particle
     if setting.placed == "pile":
         narrow, reach = setting.keys == "at the wall", particle.reach

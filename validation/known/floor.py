@@ -184,10 +184,7 @@ def stack_at_rest(access: EngineAccess) -> list[Answer]:
     (2, LEAPFROG),
 )
 def stack_errors(access: EngineAccess, steps: Sequence[float]) -> list[float]:
-    """Return the error [m] of the heights of two vibrating stacked balls for each time step.
-
-    The theory is that of a chain of two masses and springs.
-    """
+    """Return the error [m] of the heights of two vibrating stacked balls for each time step."""
     shape = STIFFNESS * np.array([[2.0, -1.0], [-1.0, 1.0]])
     squares, modes = eigh(shape, BALL_MASS * np.eye(2))
     thrown, time = np.array([2e-3, -1e-3]), 0.02048  # m/s, s; overlaps stay above zero
@@ -209,10 +206,7 @@ REASON = "residual vibration after 0.4 s"
 
 
 def _level(found: ContactForces, level: int, each: int) -> Array:
-    """Return the forces (contacts, 3) [N] that act from below on a level of a stack.
-
-    `level` counts from the floor, 0 for the lowest bodies; a level has `each` bodies.
-    """
+    """Return the forces (contacts, 3) [N] from below on a level (0: lowest) that has `each` bodies."""
     bodies = found.smarticles // each
     if level:
         upwards: Array = -found.forces[(bodies == (level - 1, level)).all(axis=1)]

@@ -335,10 +335,7 @@ def _spread(law: ContactLaw, number: int) -> tuple[ContactLaw, float]:
     restitution=1.0,
 )
 def bounce_errors(access: EngineAccess, steps: Sequence[float], *, restitution: float, phases: int = 24) -> list[float]:
-    """Return the root-mean-square error [m] of a ball's height after a bounce for each time step.
-
-    The mean is over `phases` samples, see `_spread`.
-    """
+    """Return the rms error [m] of a ball's height after a bounce for each step, over `phases` samples."""
     speed, time, squares = 0.2, 5.12e-3, np.zeros(len(steps))
     for number in range(phases):
         law, gap = _spread(ball_law(restitution=restitution), number)
@@ -354,7 +351,7 @@ def bounce_errors(access: EngineAccess, steps: Sequence[float], *, restitution: 
 
 
 def _collided(access: EngineAccess, law: ContactLaw, dt: float, gap: float, *, tilted: bool) -> Array:
-    """Simulate a collision of two smarticles with a `gap` [m]; return all sphere centres, (S, 3) [m]."""
+    """Simulate a collision of two smarticles from a `gap` [m]; return all sphere centres, (S, 3) [m]."""
     one = scene(access)
     engine = access.build(one.particle, law, dt=dt)
     add(engine, (0, 0, 0.1))
@@ -394,10 +391,7 @@ def _collided(access: EngineAccess, law: ContactLaw, dt: float, gap: float, *, t
 def collision_errors(
     access: EngineAccess, steps: Sequence[float], *, smooth: bool, phases: int = PHASES
 ) -> list[float]:
-    """Return the root-mean-square error [m] of all spheres' positions after a collision for each time step.
-
-    The mean is over all spheres and `phases` samples, see `_spread`.
-    """
+    """Return the rms error [m] of all spheres after a collision for each step, over `phases` samples."""
     law = law_of(scene(access))
     if access.name == "links":
         # The tangential dashpot is not limited until the spring reaches Coulomb's limit. Only the smaller of these time
