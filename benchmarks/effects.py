@@ -74,7 +74,7 @@ def pairs(seconds: float, hinged_step: float) -> list[tuple[str, str, Changes, C
 
 
 def scene_data(changes: Changes, *, count: int, seed: int) -> Changes:
-    """Return a scene as a dictionary: a pile of the paper's smarticles at draft fidelity, with changed keys."""
+    """Return a scene as a dictionary: the paper's smarticles at draft fidelity, with changed keys."""
     data: Changes = {"schema_version": 1, "seed": seed, "count": count, "fidelity": "draft", **changes}
     recording = {"checkpoint_interval_s": None, **changes.get("recording", {})}
     phases = [{"type": "deposit"}, *changes["phases"]]

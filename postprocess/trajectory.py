@@ -57,7 +57,7 @@ def orientations(directions: Floats) -> Floats:
 
 
 def shapes_of(capsules: Capsules) -> list[dict[str, Any]]:
-    """Return the shape of each type as GSD describes it: along x, the mean of its capsules."""
+    """Return the shape of each type as GSD describes it: along x, with the mean length of its capsules."""
     lengths = np.linalg.norm(capsules.ends[:, 1] - capsules.ends[:, 0], axis=1)
     shapes = []
     for number, radius in enumerate(capsules.radii):

@@ -138,7 +138,7 @@ class RunView:
         self.plotter.reset_camera(render=False)
 
     def legend(self) -> list[dict[str, str]]:
-        """Return the colours and labels of the legend, from the greatest value; empty for a field of kind "name"."""
+        """Return colours and labels of the legend, from the greatest value; empty for a field of kind "name"."""
         scale = ColourScale.of(self.field, self._bounds.get(self.field.name, (0.0, 1.0)))
         colours = scale.painted(np.array(list(scale.labels))).tolist()
         pairs = reversed(list(zip(colours, scale.labels.values(), strict=True)))

@@ -33,7 +33,7 @@ def key_of(directory: Path) -> str:
 
 
 def read_kept(directory: Path, kind: str, key: str) -> pd.DataFrame | None:
-    """Read a table that `keep` stored; None if it does not exist, is damaged, or was stored with another key."""
+    """Read a table that `keep` stored; None if it is absent, damaged, or stored with another key."""
     import pandas as pd  # noqa: PLC0415
 
     try:
@@ -48,7 +48,7 @@ def read_kept(directory: Path, kind: str, key: str) -> pd.DataFrame | None:
 
 
 def keep(table: pd.DataFrame, directory: Path, kind: str, key: str) -> None:
-    """Store a table, named by its `kind`, with a key in a run directory; do nothing if that is impossible."""
+    """Store a table of a kind in a run directory, with the key of `key_of`; do nothing if that fails."""
     rows = table.astype(object).to_numpy().tolist()
     text = json.dumps({"columns": list(table.columns), "rows": rows}, default=_plain)
     content = f"{key}\n{hashlib.sha256(text.encode()).hexdigest()}\n{text}"

@@ -142,7 +142,7 @@ def _measure_and_keep(
 
 
 def _with_variables(table: pd.DataFrame, values: Mapping[str, Any]) -> pd.DataFrame:
-    """Insert the variables of a run's sweep, `values` by name, after the first column of the run's table."""
+    """Insert the variables of a run's sweep (`values` by name) after the first column of its table."""
     for place, (name, value) in enumerate(values.items(), start=1):
         column = name
         cell = value if isinstance(value, str | int | float | bool) else json.dumps(value, ensure_ascii=False)
@@ -155,7 +155,7 @@ def _with_variables(table: pd.DataFrame, values: Mapping[str, Any]) -> pd.DataFr
 
 
 def of_phase(table: pd.DataFrame, phase: str) -> pd.DataFrame:
-    """Select the rows of a table of `measured` by type of phase; "last" selects the last phase of each run.
+    """Select rows of a table of `measured` by type of phase; "last" selects the last phase of each run.
 
     Raises:
         InputError: no run has a phase of this type.

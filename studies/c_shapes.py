@@ -125,7 +125,7 @@ def opening_of(run: Run) -> float:
 
 
 def linked(segments: Floats, body: NDArray[np.int64]) -> EntanglementGraph:
-    """Join bodies whose linking number, closed straight, is not 0; segments (M, 2, 3) [m], body (M,)."""
+    """Join bodies whose linking number (open curves closed by a line) is not 0; segments (M, 2, 3) [m]."""
     return entanglement_graph(closed_linking(segments, body), least=1)
 
 

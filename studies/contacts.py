@@ -138,8 +138,8 @@ def effects(runs: pd.DataFrame) -> pd.DataFrame:
 def lowers(name: str, says: str, quantity: str, *changed: str, sign: int = -1, less: str = "") -> Finding:
     """Make the finding that the factor `changed`, or the interaction of two factors, lowers a quantity.
 
-    The sign is −1 for a statement that the quantity is lowered, +1 that it is raised. For a statement that a factor
-    lowers the quantity more than another factor does, `less` is the other factor; its effect is subtracted.
+    `sign`: −1 if the statement says that the quantity is lowered, +1 if raised. `less`: a factor whose effect is
+    subtracted, for a statement that the effect of `changed` is larger than the effect of this factor.
     """
 
     def outcome(runs: pd.DataFrame) -> Outcome:

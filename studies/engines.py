@@ -149,7 +149,7 @@ def by_seed(runs: pd.DataFrame, one: Compared, variant: str) -> pd.Series:
 
 
 def equivalence(runs: pd.DataFrame) -> pd.DataFrame:
-    """Compare the engines, paired by seed: a row for each quantity that at least one of them measured."""
+    """Compare the engines, paired by seed: a row for each quantity that one or both have measured."""
     rows = []
     for one in COMPARED:
         links, yade = (by_seed(runs, one, variant) for variant in (LINKS, YADE))
@@ -180,7 +180,7 @@ def equivalence(runs: pd.DataFrame) -> pd.DataFrame:
 
 
 def pitch_of(variant: str) -> float:
-    """Return the pitch of a variant [-]: 0 for links, the limit, 1 for `yade`; NaN if it is unknown."""
+    """Return the pitch of a variant [-]: 0 for links, 1 for `yade`; NaN if it is unknown."""
     if variant in (LINKS, YADE):
         return 0.0 if variant == LINKS else 1.0
     return float(variant.removeprefix("pitch-")) if variant.startswith("pitch-") else math.nan

@@ -90,7 +90,7 @@ def phi_by_aspect(runs: pd.DataFrame, stage: str) -> Mapping[float, SeedMean]:
 
 
 def compared(runs: pd.DataFrame, end: str) -> str:
-    """Return the stage that is compared with Gravish's φ_0 or φ_f (`end`): φ_f at rest if the runs have it."""
+    """Return the stage to compare with Gravish's φ_0 or φ_f (`end`): φ_f at rest if the runs have it."""
     return AT_REST if end == "phi_f" and phi_by_aspect(runs, AT_REST) else end
 
 
@@ -203,7 +203,7 @@ def _fully_shaken(points: pd.DataFrame) -> pd.DataFrame:
 
 
 def _states(points: pd.DataFrame) -> pd.DataFrame:
-    """Return two rows per point: one with φ_f while shaken, one with φ_0 and, as φ_f, φ at rest after it."""
+    """Return two rows per point: φ_f is measured while shaken in one, at rest afterwards in the other."""
     points = _fully_shaken(points)
     shaken = points.assign(**{phi("phi_0"): math.nan, _STATE: "while shaken"})
     rest = points.assign(**{_STATE: "after rest"})

@@ -220,7 +220,7 @@ def predicted(runs: pd.DataFrame) -> tuple[pd.DataFrame, pd.DataFrame]:
 def _correlated(
     table: pd.DataFrame, strength: str, *, within: bool
 ) -> tuple[list[dict[str, object]], list[dict[str, object]]]:
-    """Return rows of both tables of `predicted` for runs of one part; `within`: ranks are within each l/w."""
+    """Return rows of the tables `predictors` and `comparisons`, see `predicted`, from runs of one part."""
     names = list(PREDICTORS)
     x, y = table[names].to_numpy(dtype=np.float64), table[strength].to_numpy(dtype=np.float64)
     strata = pd.factorize(table[ASPECT])[0].astype(np.int64)

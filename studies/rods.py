@@ -120,13 +120,13 @@ def local_crossings(frame: Frame, *, length: float, radius: float, top: float) -
 
 
 def spanning_level(field: NDArray[np.float64]) -> float:
-    """Return the highest level at which the region of a field above it joins bottom and top; 0 if none."""
+    """Return the highest level above which the region of a field joins bottom and top; 0 if there is none."""
     falling = np.unique(field)[::-1]
     return next((float(value) for value in falling if region_spans(field >= value, 2)), 0.0)
 
 
 def thresholds(runs: pd.DataFrame, column: str) -> dict[str, Profile]:
-    """Fit, for each series, the threshold of the logarithm of a column above which piles stand."""
+    """Fit the threshold of ln(column) above which piles stand, for each series, by profile likelihood."""
     own = runs[(runs[column] > 0) & np.isfinite(runs[column])]
     if own.empty:
         return {}
@@ -137,7 +137,7 @@ def thresholds(runs: pd.DataFrame, column: str) -> dict[str, Profile]:
 
 
 def onsets(runs: pd.DataFrame) -> pd.DataFrame:
-    """Tabulate the values at which half of the piles stand, with 95 % intervals: a row per series and column."""
+    """Tabulate the values at which half of the piles stand: a row per series and column."""
     rows = []
     for column in (SLENDER, LEVEL, DENSITY):
         for series, one in thresholds(runs, column).items():

@@ -177,7 +177,7 @@ def force_history(run: Run) -> History:
 
 
 def ratio(table: pd.DataFrame, gamma: float, *, times: float) -> Effect:
-    """Return the effect that peak force is `times` as large at 20° as at 90°, after vibration at Γ = `gamma`.
+    """Return the effect that peak force at 20° is over `times` that at 90°, after vibration at Γ = `gamma`.
 
     Its value is the mean over seeds of ln(peak force at 20° / at 90°), its threshold ln `times`.
     """
@@ -214,7 +214,7 @@ def stronger(table: pd.DataFrame, *, times: float) -> Outcome:
 
 
 def narrow_less_square(table: pd.DataFrame, column: str) -> SeedMean:
-    """Return the mean over seeds of a column at 20° less at 90°, from a table with one vibration."""
+    """Return the mean over seeds of a column's value at 20° less its value at 90°, for one vibration."""
     return mean_over_seeds(paired_differences(table, column, ANGLE, (SQUARE, NARROW), [SEED])[column])
 
 

@@ -1,4 +1,4 @@
-"""Test access to the internals of the engines YADE and links, for example to set velocities or to hold a body.
+"""Test access to the internals of the engines YADE and links, for example to set velocities.
 
 Both engines use the leapfrog scheme, whose velocities belong to the half step before the positions. For a velocity v at
 t = 0 under an acceleration a, set the velocity v − a dt/2.

@@ -128,7 +128,7 @@ def segments(vertices: Array) -> Array:
 
 
 def surface(vertices: Array, thickness: float) -> tuple[Array, Array]:
-    """Return M points (M, 3) [m] on the axes of all links, and radii (M,) [m] of spheres that links contain.
+    """Return points (M, 3) [m] on the axes of all links, and radii (M,) [m] of spheres that links contain.
 
     Points are the ends of each axis, with radius 0, and the points thickness/2 from the ends, with radius thickness/2.
     The spheres lie inside the link, whether its ends are square or round. Vertices (N, 4, 3) and thickness are in [m].

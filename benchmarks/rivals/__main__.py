@@ -50,7 +50,7 @@ SAME, TENTH = "links at this overlap are cheaper by [1]", "links at a tenth of i
 
 
 def data_of(count: int, seed: int, *phases: dict[str, Any], **keys: Any) -> dict[str, Any]:
-    """Return a scene of `count` smarticles as a dictionary, in a container wider than a straight smarticle."""
+    """Return a scene of `count` smarticles as a dictionary; they can straighten within the container."""
     data = pile(count, *phases, seed=seed, per_layer=PAPER_PER_LAYER, **keys)
     data["container"]["radius_m"] = max(data["container"]["radius_m"], 0.012)
     return data

@@ -1,7 +1,8 @@
 """Overlaps between smarticles, computed from poses for the shapes of each engine.
 
 The overlap of two boxes is the shortest displacement that separates them. The overlap of two swept segments, or of
-spheres as segments of length zero, is the diameter less the distance of the axes. Links of one smarticle are ignored.
+spheres as segments of length zero, is the diameter less the distance of the axes. Links
+of one smarticle are not compared.
 """
 
 import itertools

@@ -117,7 +117,10 @@ def colour_field(name: str | None, run: Run) -> Field:
 
 
 def scalars(field: Field, frame: Frame, run: Run) -> Floats:
-    """Return a field as one number per link, (N, L): a vector's length; NaN if the frame lacks the field."""
+    """Return a field as one number per link, (N, L), see `link_values`.
+
+    A vector is replaced by its length. All numbers are NaN if the frame lacks the field.
+    """
     values = link_values(field, frame, run)
     if values is None:
         return np.full((frame.count, 1 + int(frame.link.max(initial=2))), np.nan)

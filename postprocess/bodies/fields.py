@@ -126,7 +126,7 @@ def _pressed(frame: Frame, _: Run) -> Floats:
 
 
 def _chain(frame: Frame, _: Run) -> NDArray[Any]:
-    """Return the number of each smarticle's force chain, (N,); without contacts each one is a chain of its own."""
+    """Return the number of each smarticle's force chain, (N,); without contacts, each has its own number."""
     try:
         return force_chains(frame).labels
     except UndefinedMeasureError:

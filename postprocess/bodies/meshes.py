@@ -112,7 +112,7 @@ def _lift(phase: SceneData, start: float | None) -> tuple[float, float, float] |
 
 
 def _cross(length: float, side: float, count: int, height: float) -> pv.PolyData:
-    """Return the mesh of a hook: `count` bars along x and `count` along y, see `dem.setting.hooks.Cross`.
+    """Return the mesh of a hook: `count` bars along x, and along y, as in `dem.setting.hooks.Cross`.
 
     Bars end on a circle with the diameter `length`; their cross-section is a square with the side `side`. Their axes
     are at `height`. All are in [m].
@@ -454,7 +454,10 @@ def _prism(sides: int) -> tuple[Floats, Whole]:
 
 
 def at_points(mesh: pv.PolyData, values: NDArray[Any]) -> NDArray[Any]:
-    """Convert values of mesh cells (C, …), equal for all cells at a point, to values of points (P, …)."""
+    """Convert values of the cells of a mesh, (C, …), to values of its points, (P, …).
+
+    All cells at a point must have equal values.
+    """
     cells = mesh.GetPolys()
     ends, corners = (np.asarray(array) for array in (cells.GetOffsetsArray(), cells.GetConnectivityArray()))
     found = np.empty((mesh.n_points, *values.shape[1:]), dtype=values.dtype)

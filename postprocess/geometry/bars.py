@@ -23,7 +23,7 @@ def centres_of_bodies(segments: Floats, body: Whole) -> Floats:
 
 
 def body_centres(frame: Frame) -> Floats:
-    """Return the centres of mass (N, 3) [m] of all bodies of a frame, assuming links of equal cross-section."""
+    """Return the centres of mass (N, 3) [m] of all bodies of a frame; links have equal cross-sections."""
     return centres_of_mass(frame.vertices) if frame.bars is None else centres_of_bodies(frame.segments, frame.body)
 
 

@@ -114,7 +114,7 @@ def swept_axes(vertices: Floats, diameter: float) -> Floats:
 
 
 def plane_frames(vertices: Floats) -> Floats:
-    """Return right-handed axes, as rows (N, 3, 3), of each smarticle's best-fitting plane; the normal is last.
+    """Return right-handed axes, the rows (N, 3, 3), of each smarticle's best-fitting plane, normal last.
 
     The normal is the direction in which the four vertices spread least, by singular value decomposition. It averages
     over vertices that are not quite in one plane. The normal of a straight smarticle is an arbitrary vector across it.

@@ -185,7 +185,10 @@ def nearest_points(first: Floats, second: Floats) -> tuple[Floats, Floats]:
 
 
 def _corner_numbers(segments: Floats) -> Whole:
-    """Number the points at which ends of segments of any bodies meet: (M, 2), the number of each end."""
+    """Number the points at which ends of segments meet: (M, 2), one number per end.
+
+    Ends of different bodies that meet have equal numbers, too.
+    """
     points = segments.reshape(-1, 3)
     if len(points) == 0:
         return np.empty((0, 2), dtype=np.int64)

@@ -90,7 +90,7 @@ def _sample(vertices: Floats, spacing: float) -> tuple[Floats, Whole]:
 
 
 def _mirrored(points: Floats, container: Region, lid: float, band: float) -> Floats:
-    """Return the mirror images of points nearer than `band` [m] to floor, wall, or lid at the height `lid`."""
+    """Return mirror images of points nearer than `band` [m] to floor, wall, or lid at the height `lid`."""
     floor = points[points[:, 2] < container.bottom + band] * [1, 1, -1]
     floor[:, 2] += 2 * container.bottom
     top = points[points[:, 2] > lid - band] * [1, 1, -1]

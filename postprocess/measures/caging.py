@@ -166,7 +166,7 @@ def contact_normals(segments: Floats, number: Whole, *, diameter: ArrayLike, gap
 
 
 def positively_spans(vectors: Floats) -> bool:
-    """Return whether sums of vectors (P, d) with coefficients of 0 or more give every d-dimensional vector.
+    """Return whether every d-dimensional vector is a sum of vectors (P, d) with coefficients of 0 or more.
 
     If n are the normals of contacts, this means that v = 0 is the only motion v with v · n ≥ 0 for all n.
     """
@@ -179,7 +179,7 @@ def positively_spans(vectors: Floats) -> bool:
 
 
 def _wrenches(points: Floats, normals: Floats) -> Floats:
-    """Return forces and moments (P, 6) of forces along normals (P, 3) of unit length at points (P, 3)."""
+    """Return the wrenches (P, 6), force and moment, of unit forces along normals (P, 3) at points (P, 3)."""
     return np.concatenate([normals, np.cross(points, normals)], axis=1)
 
 

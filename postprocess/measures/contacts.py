@@ -158,7 +158,7 @@ def pairs_of_spheres(centres: Floats, diameter: float) -> ContactPairs:
 
 
 def _merged(a: Whole, b: Whole, gaps: Floats, count: int) -> ContactPairs:
-    """Merge all contacts between smarticles a[k] and b[k] into one pair with the least gap; drop a[k] == b[k].
+    """Merge all contacts of smarticles a[k] and b[k] into one pair with the least gap; drop a[k] == b[k].
 
     `a`, `b` and `gaps` [m] have the shape (n,); `count` is the number of smarticles.
     """

@@ -144,7 +144,7 @@ def grid_points(segments: ArrayLike, pitch: float) -> Floats:
 
 
 def region_spans(inside: Flags, axis: int) -> bool:
-    """Return whether a connected region of a grid (X, Y, Z) joins the first and the last layer along an axis.
+    """Return whether a connected region of a grid (X, Y, Z) joins first and last layer along an axis.
 
     Regions of true values are connected through faces of cells. `crossing_field(…) > threshold` is such a grid.
 
@@ -156,7 +156,7 @@ def region_spans(inside: Flags, axis: int) -> bool:
 
 
 def _clipped(segments: Floats, radius: float) -> tuple[Floats, Flags]:
-    """Return the parts (m, 2, 3) of segments in a ball around the origin, and which segments reach it (M,)."""
+    """Return parts (m, 2, 3) of segments in a ball around the origin, and which segments reach it, (M,)."""
     start, along = segments[:, 0], segments[:, 1] - segments[:, 0]
     square, mixed = (along**2).sum(axis=1), (start * along).sum(axis=1)
     root = mixed**2 - square * ((start**2).sum(axis=1) - radius**2)

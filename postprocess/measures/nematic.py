@@ -167,7 +167,7 @@ def _opening(curve: Curve) -> tuple[Floats, str]:
 
 
 def _centres(middles: Floats, lengths: Floats, number: Whole) -> Floats:
-    """Return centres of mass (B, 3) [m] of bodies from middles (M, 3), lengths (M,) and bodies (M,) of segments."""
+    """Return centres of mass (B, 3) [m] by middles (M, 3), lengths (M,) and body numbers (M,) of segments."""
     sums, total = np.zeros((int(number.max(initial=-1)) + 1, 3)), np.bincount(number, lengths)
     np.add.at(sums, number, lengths[:, None] * middles)
     return sums / total[:, None]

@@ -168,7 +168,7 @@ def has_pull(series: Series, phase: int) -> bool:
 
 
 def _samples(edges: Floats, window: float) -> int:
-    """Return the number of samples in a window [s], by the times `edges` of a pull: at least one, at most all."""
+    """Return the number of samples in a window [s], at least 1 and at most all, by the times `edges`."""
     return min(max(round(window / float(np.median(np.diff(edges)))), 1), len(edges) - 1)
 
 

@@ -153,7 +153,7 @@ def difference(mean: SeedMean, baseline: SeedMean, *, scatter: Scatter | None = 
 
 
 def relative_difference(mean: SeedMean, baseline: SeedMean, *, scatter: Scatter | None = None) -> Difference:
-    """Return the `difference` in per cent of the baseline's mean, whose error is neglected; NaN if it is 0."""
+    """Return the `difference` in per cent of the baseline, whose error is neglected; NaN if it is 0."""
     change = difference(mean, baseline, scatter=scatter)
     scale = 100 / baseline.value if baseline.value else math.nan
     return Difference(value=scale * change.value, half_width=abs(scale) * change.half_width)

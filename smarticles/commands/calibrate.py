@@ -152,7 +152,10 @@ class SweepSimulator:
         return np.array([points[point] for point in sorted(points)])
 
     def run(self, wave: int, theta: Array) -> Sequence[tuple[Mapping[str, Value], Measured | None]] | None:
-        """Compute or submit missing runs of a wave; return variables and measures of all, None if any waits."""
+        """Compute or submit the missing runs of a wave; return variables and measures of all its runs.
+
+        Returns None as long as runs are missing. The measures of a failed run are None.
+        """
         sweep, points = self.problem.sweep(wave, theta)
         folder = sweeps.folder_of(sweep, points, self._path(wave), self.arguments.command_line)
         states = {status.name: status.state for status in folder.status()}

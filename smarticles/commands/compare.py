@@ -185,7 +185,7 @@ def _compare_sweeps(one: Folder, other: Folder) -> dict[str, Any]:
 
 
 def _listed(values: Mapping[str, Sequence[Any]]) -> dict[str, Any]:
-    """Return for each name its value, or several values joined in one text."""
+    """Return the value of each name; several values of a name are joined to one text."""
     return {name: some[0] if len(some) == 1 else ", ".join(map(str, some)) for name, some in values.items()}
 
 
@@ -248,7 +248,10 @@ def compare_bits(one: Run, other: Run) -> dict[str, Any]:
 
 
 def _equal_frames(one: tuple[Path, int], other: tuple[Path, int]) -> bool:
-    """Return whether two frames (file, number in it) are equal bit by bit; one may lack `radius_m`."""
+    """Return whether two frames, given by file and number in the file, are equal bit by bit.
+
+    An array `radius_m` that only one of the frames has is ignored.
+    """
     from dem.record.frame import read_mesh  # noqa: PLC0415
 
     if {one[0].suffix, other[0].suffix} == {".vtu"}:
@@ -264,7 +267,10 @@ def _equal_frames(one: tuple[Path, int], other: tuple[Path, int]) -> bool:
 
 
 def _pair_up(one: pd.DataFrame | None, other: pd.DataFrame | None, *, keys: Sequence[str]) -> list[dict[str, Any]]:
-    """Return A, B, B - A and its error of each quantity, for rows of tables A and B with equal `keys`."""
+    """Pair the rows of tables A and B that have equal values in the columns `keys`.
+
+    Returns a row for each pair and quantity: A, B, B - A, and the standard error of B - A.
+    """
     from postprocess.statistics.points import marked  # noqa: PLC0415
 
     def records(table: pd.DataFrame | None) -> dict[str, dict[Any, Any]]:

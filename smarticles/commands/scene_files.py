@@ -115,7 +115,7 @@ def _parts(schema: Mapping[str, Any]) -> Iterator[tuple[str, Mapping[str, Any]]]
 
 
 def _kinds(entry: Mapping[str, Any]) -> list[str]:
-    """Return the tags of the mappings that an entry of the schema, or an item of its list, may be."""
+    """Return the tags, such as types of phases, of the mappings that an entry of the schema allows."""
     if "discriminator" in entry:
         return list(entry["discriminator"]["mapping"])
     options = [*entry.get("anyOf", ()), *([entry["items"]] if "items" in entry else [])]

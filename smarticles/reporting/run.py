@@ -198,7 +198,7 @@ def _curves(run: Run) -> list[Markup]:
 
 
 def scene_blocks(directory: Path, scene: Scene | None, scene_error: str) -> list[Markup]:
-    """Return blocks with phases and warnings, or `scene_error` if there is no scene, and the scene file."""
+    """Return blocks: planned phases and warnings, or `scene_error` without a scene, and the scene file."""
     blocks = [words(scene_error, tone="warning")] if scene is None else []
     if scene is not None:
         planned = plan(scene)

@@ -93,7 +93,7 @@ class Result:
         return pd.DataFrame(rows)
 
     def predictive(self) -> pd.DataFrame:
-        """Tabulate each datum with the 95 % band of predicted measurements, discrepancy and error included."""
+        """Tabulate each datum with the 95 % band of predicted measurements, with discrepancy and error."""
         random = np.random.default_rng(self.problem.content.first_seed)
         inputs, sizes = self.problem.scaled(self.theta), self.problem.sizes
         rows = []
@@ -112,7 +112,7 @@ class Result:
         return pd.DataFrame(rows)
 
     def sensitivity(self) -> pd.DataFrame:
-        """Tabulate Sobol indices of each emulator's mean for parameters that vary by their priors (SALib)."""
+        """Tabulate Sobol indices of each emulator's mean for parameters drawn from their priors (SALib)."""
         from SALib.analyze import sobol as analysis  # noqa: PLC0415  (an extra)
         from SALib.sample import sobol as sampling  # noqa: PLC0415
 

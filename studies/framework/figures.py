@@ -146,7 +146,7 @@ class Means:
     bars: str = BARS  #: Explains the error bars in the footer
 
     def draw(self, path: Path, analysis: Analysis) -> list[Path]:
-        """Draw means with filled markers, and means of engines that do not judge with open markers beside them."""
+        """Draw means with filled markers, and beside them, with open ones, means of engines that do not judge."""
         every = analysis.tables.get(self.table, pd.DataFrame())
         every = self.rows(every) if len(every) else every
         columns = [quantity.column for quantity in self.quantities]
@@ -596,7 +596,7 @@ def draw_means(
 def draw_bounds(
     axes: Axes, x: ArrayLike, least: ArrayLike, lengths: ArrayLike, *, properties: Mapping[str, Any]
 ) -> None:
-    """Draw the lower bounds `least` (n,) at places x (n,) as markers with arrows upwards; NaN are left out.
+    """Draw lower bounds `least` (n,) at places x (n,) as markers with arrows upwards; NaN are left out.
 
     The lengths of the arrows, in the unit of y, have no physical meaning.
     """

@@ -185,14 +185,17 @@ def _verdict(effects: Sequence[Effect]) -> tuple[Verdict, float]:
 
 
 def all_of(verdicts: Iterable[Verdict]) -> Verdict:
-    """Return the first of not found, no data, not resolved and found that a part of a statement has."""
+    """Combine verdicts on the parts of a statement.
+
+    The result is the first of not found, no data, not resolved and found that a part has.
+    """
     found = list(verdicts)
     order = (Verdict.NOT_FOUND, Verdict.NO_DATA, Verdict.NOT_RESOLVED, Verdict.FOUND)
     return next((verdict for verdict in order if verdict in found), Verdict.NO_DATA)
 
 
 def decide(found: bool, wrong: bool = False, *, data: bool = True) -> Verdict:
-    """Return a verdict: "no data" unless `data`; "found" if `found`; "not found" if `wrong`; else "not resolved"."""
+    """Return "no data" unless `data`; "found" if `found`; "not found" if `wrong`; else "not resolved"."""
     if not data:
         return Verdict.NO_DATA
     return Verdict.FOUND if found else Verdict.NOT_FOUND if wrong else Verdict.NOT_RESOLVED

@@ -121,7 +121,10 @@ def _runs_per_task(count: int, partition: Partition, wanted: int | None, memory:
 
 
 def _time(longest: float, cluster: Cluster, partition: Partition, wanted: str | None, where: str) -> int:
-    """Return the wall time to request [s], in whole minutes: `wanted`, or by the longest run's time [s]."""
+    """Return the wall time of a task to request [s], a whole number of minutes, as Slurm counts.
+
+    It is the time `wanted`, or follows from the expected time of the longest run, `longest` [s].
+    """
     if wanted is None:
         needed = max(LEAST_TIME_S, longest) + cluster.signal_lead_s
         time_s = min(60 * math.ceil(needed / 60), partition.max_time_s)

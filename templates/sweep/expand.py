@@ -30,7 +30,7 @@ class Point:
 
 
 def expand(sweep: Sweep, *, max_points: int = MAX_POINTS) -> list[Point]:
-    """Make all points of a sweep, in the order of its file; InputError for an invalid scene or too many points."""
+    """Make all points of a sweep in the order of its file; InputError for too many or an invalid scene."""
     # Counted before they are made, which could exhaust the memory.
     sources = _sources(sweep)
     repeats, again = sweep.content.repeats, sweep.content.again

@@ -116,7 +116,7 @@ def kicked(access: EngineAccess, out: Path, *, count: int, speed: float) -> list
 
 @hard("spoilt: contacts too soft", {"stiffness": 0.5})
 def soft(access: EngineAccess, out: Path, *, stiffness: float) -> list[Check]:
-    """Run with contacts too soft to stop falling smarticles: links rejects the scene, YADE stops the run."""
+    """Run with contacts too soft to stop a fall: the engine `links` rejects the scene, YADE stops the run."""
     run = whole(scene_data(access, RELAX, fidelity={"base": "draft", "stiffness_N_per_m": stiffness}), out)
     if access.name == "links":
         return [says(run.text, "fidelity.stiffness_N_per_m: at 0.5 N/m", "use about", "N/m")]
@@ -124,7 +124,7 @@ def soft(access: EngineAccess, out: Path, *, stiffness: float) -> list[Check]:
 
 
 def _too_long(scene: Scene, factor: float) -> float:
-    """Return a divisor of the control period [s] that is about `factor` times the stable time step."""
+    """Return a time step [s] that divides the control period and is about `factor` times the stable step."""
     control = scene.fidelity.control_interval_s
     step: float = control / max(1, math.floor(control / (factor * stable_step(scene))))
     return step

@@ -118,7 +118,7 @@ def slide(access: EngineAccess, *, aspect_ratio: float = 0.7, friction: float = 
     phases=2,
 )
 def roll_errors(access: EngineAccess, steps: Sequence[float], *, phases: int = 5) -> list[float]:
-    """Return the error [m] of the displacement after 0.1 s of a ball that slides, then rolls, for each step.
+    """Return the error [m] of the way in 0.1 s of a ball that slides, then rolls, for each time step.
 
     The reference is a simulation with a quarter of the smallest time step. The tangential dashpot is off. On YADE its
     force is not limited by friction for the first few µs of a contact, so that results would depend on whether a time

@@ -391,7 +391,7 @@ def _collided(access: EngineAccess, law: ContactLaw, dt: float, gap: float, *, t
 def collision_errors(
     access: EngineAccess, steps: Sequence[float], *, smooth: bool, phases: int = PHASES
 ) -> list[float]:
-    """Return the rms error [m] of all spheres after a collision for each step, over `phases` samples."""
+    """Return the rms error [m] of sphere positions after a collision for each step, over `phases` samples."""
     law = law_of(scene(access))
     if access.name == "links":
         # The tangential dashpot is not limited until the spring reaches Coulomb's limit. Only the smaller of these time
