@@ -177,7 +177,7 @@ def force_history(run: Run) -> History:
 
 
 def ratio(table: pd.DataFrame, gamma: float, *, times: float) -> Effect:
-    """Return the effect that peak force at 20° is over `times` that at 90°, after vibration at Γ = `gamma`.
+    """Return the effect that peak force at 20° is over `times` that at 90° after vibration at Γ = `gamma`.
 
     Its value is the mean over seeds of ln(peak force at 20° / at 90°), its threshold ln `times`.
     """

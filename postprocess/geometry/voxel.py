@@ -85,8 +85,8 @@ def solid_points(
 ) -> tuple[Floats, float]:
     """Find the points of a cubic grid that lie inside the boxes of the links; return also their pitch [m].
 
-    Points (n, 3) [m] are returned once each. The cross-section of a straight smarticle may be turned around its length
-    by any angle, which its vertices do not determine; an arbitrary angle is used. InputError for bad sizes.
+    Each of the points (n, 3) [m] is returned once. The cross-section of a straight smarticle may be turned around its
+    length by any angle, which its vertices do not determine; an arbitrary angle is used. InputError for bad sizes.
 
     Args:
         thickness_normal: t1, along the normal of the smarticle's plane [m].

@@ -131,7 +131,7 @@ def _fit(counts: Floats, values: Floats, scatter: Scatter, power: float) -> tupl
 
 
 def _powers(counts: Floats, values: Floats, scatter: Scatter) -> tuple[float, float, float]:
-    """Return the best power of N and its 95 % interval; a fit worse than the scatter enlarges the interval."""
+    """Return the best power of N and its 95 % interval; a fit worse than the scatter widens the interval."""
     left = np.array([_fit(counts, values, scatter, float(power))[2] for power in POWERS]) / scatter.variance
     free = len(np.unique(counts)) - 3
     larger = max(left.min() / free, 1.0) if free > 0 else 1.0
