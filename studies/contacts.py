@@ -138,8 +138,8 @@ def effects(runs: pd.DataFrame) -> pd.DataFrame:
 def lowers(name: str, says: str, quantity: str, *changed: str, sign: int = -1, less: str = "") -> Finding:
     """Make the finding that the factor `changed`, or the interaction of two factors, lowers a quantity.
 
-    `sign`: −1 if the statement says that the quantity is lowered, +1 if raised. `less`: a factor whose effect is
-    subtracted, for a statement that the effect of `changed` is larger than the effect of this factor.
+    `sign` is −1 for "lowers" and +1 for "raises". With `less`, the name of another factor, the statement is that
+    `changed` lowers the quantity by more than `less` does.
     """
 
     def outcome(runs: pd.DataFrame) -> Outcome:

@@ -138,7 +138,7 @@ def links_per_body(frame: Frame) -> float:
 
 
 def chains_between(frame: Frame, low: float, high: float, forces: RecordedForces | None = None) -> float:
-    """Return the mean number of chains of tension [-] through the levels `CUTS` between two heights [m].
+    """Return the mean number of tensile force chains [-] through levels `CUTS` between two heights [m].
 
     NaN if no level carries tension. The recorded forces of the frame are read from its run directory if not given.
     """

@@ -47,9 +47,10 @@ class Cages:
 
     bodies: Whole = field(repr=False)  #: (B,) int64, numbers of the bodies
     contacts: Whole = field(repr=False)  #: (B,) int64, contacts of each body's segments with those of other bodies
-    #: (B,) bool, whether contacts block all translations that contacts can block
+    #: (B,) bool, whether its contacts block all translations of the body, except those that no contact can block
     translation: Flags = field(repr=False)
-    motion: Flags = field(repr=False)  #: (B,) bool, whether contacts block all motions that contacts can block
+    #: (B,) bool, whether its contacts block all rigid motions of the body, except those that no contact can block
+    motion: Flags = field(repr=False)
     #: (B,) float64 [-], fraction of all directions in which contacts let the body move, 1 without contact; found on a
     #: set of 2000 directions, so that less than 0.001 may be 0
     free: Floats = field(repr=False)

@@ -185,7 +185,7 @@ def _compare_sweeps(one: Folder, other: Folder) -> dict[str, Any]:
 
 
 def _listed(values: Mapping[str, Sequence[Any]]) -> dict[str, Any]:
-    """Return the value of each name; several values of a name are joined to one text."""
+    """Return one value per name: the only value, or all values of the name joined to a text."""
     return {name: some[0] if len(some) == 1 else ", ".join(map(str, some)) for name, some in values.items()}
 
 
