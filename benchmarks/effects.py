@@ -1,4 +1,4 @@
-"""Measure the cost of each effect: `python -m benchmarks.effects`.
+"""Measure the cost of each physical effect of a scene: `python -m benchmarks.effects`.
 
 Each effect is measured by pairs of runs, without and with the effect, in alternating order, so that other load on the
 machine affects both. The processor times of one phase are compared, without loading, pouring and waiting. The table
@@ -23,9 +23,9 @@ MEASURED = 1  # index of the compared phase; phase 0 is the pour
 
 
 def pairs(seconds: float, hinged_step: float) -> list[tuple[str, str, Changes, Changes]]:
-    """Return name, cause of the cost, and two sets of changed keys of a scene, for each effect.
+    """Return name, cause of the cost, and two sets of changed keys of a scene for each physical effect.
 
-    The first set is that of the scene without the effect, the second that of the scene with it. The compared phase
+    The first set gives the scene without the effect, the second set the scene with the effect. The compared phase
     takes `seconds` [s]; `hinged_step` is the time step of a scene with hinges [s].
     """
     rest = {"type": "relax", "duration_s": seconds}
@@ -74,7 +74,7 @@ def pairs(seconds: float, hinged_step: float) -> list[tuple[str, str, Changes, C
 
 
 def scene_data(changes: Changes, *, count: int, seed: int) -> Changes:
-    """Return a scene as a dictionary: a pile of the paper's smarticles at draft, with changed keys."""
+    """Return a scene as a dictionary: the paper's smarticles at draft fidelity, with changed keys."""
     data: Changes = {"schema_version": 1, "seed": seed, "count": count, "fidelity": "draft", **changes}
     recording = {"checkpoint_interval_s": None, **changes.get("recording", {})}
     phases = [{"type": "deposit"}, *changes["phases"]]

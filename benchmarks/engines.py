@@ -27,7 +27,7 @@ MEMORY, WHOLE = "peak memory [MiB]", "whole run [s]"
 
 
 def measured(folder: Path, run: dict[str, Any]) -> dict[str, Any]:
-    """Run a scene; return a row of the table, which begins with the columns `run`, from engine to seed."""
+    """Compute a run, given by its columns `engine` to `seed`; return its row of the table, with costs."""
     engine, activity, fidelity, count, seed = run.values()
     name = f"{engine}-{activity}-{fidelity}-{count}-{seed}"
     acting = {"type": activity, "duration_s": SECONDS, **ACTIVITIES[activity]}

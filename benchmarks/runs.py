@@ -20,7 +20,8 @@ def pile(
 ) -> dict[str, Any]:
     """Return a scene as a dictionary, with a pile as high as the paper's pile of 270.
 
-    The phases follow the pour. It pours `per_layer` smarticles at a time, by default in proportion to the floor's area.
+    The given phases follow the pour, which drops `per_layer` smarticles at a time, by default in proportion to the
+    floor's area.
     """
     widening = (count / PAPER_COUNT) ** 0.5
     per_layer = per_layer or max(PAPER_PER_LAYER, round(PAPER_PER_LAYER * widening**2))

@@ -65,7 +65,7 @@ def time_intervals(run: Path) -> dict[str, Any]:
 
 
 def row_of(run: Path, count: int, repeats: int) -> dict[str, Any]:
-    """Repeat the timing of a pile in separate processes; return a row with the smallest times."""
+    """Time the shaking of a pile in `repeats` separate processes; return a row with the least times."""
     command = [sys.executable, "-m", "benchmarks.scaling", "--time-pile", str(run)]
     found = [
         json.loads(subprocess.run(command, stdout=subprocess.PIPE, text=True, check=True).stdout)

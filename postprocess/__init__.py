@@ -6,7 +6,7 @@ barb tip of each smarticle; measures reject other shapes with `InputError`. The 
 `linking` are imported from their modules `postprocess.measures.heights`, `.entanglement` and `.linking`.
 
 Measures of bodies of any shape take `segments` (M, 2, 3) [m], the ends of all straight parts, and `body` (M,), the
-number of the body of each; `segments_of` has those of a frame, `read_centrelines` those of a file.
+number of the body of each; `segments_of` returns both for a frame, `read_centrelines` for a file.
 """
 
 from dem.record.forces import RecordedForces, read_forces

@@ -1,4 +1,4 @@
-"""Export a run for other programs: VTP files for ParaView, GSD for OVITO, or triangles as STL, OBJ or glTF."""
+"""Export a run for other programs: VTP for ParaView, GSD for OVITO, triangles as STL, OBJ or glTF."""
 
 import os
 import shutil
@@ -49,8 +49,10 @@ def export_run(
     The run may be unfinished. The written file or folder exists only if the export is complete.
 
     Args:
-        output: Path that must not exist: a folder for vtp and for all frames, else a file with this suffix, for gsd
-            always; `export-TO` or `export.TO` in the run directory if not given.
+        to: One of `FORMATS`.
+        output: Path to write, which must not exist: always a folder for vtp, always a file for gsd, otherwise a folder
+            for all frames and a file for one. A file ends in `.TO`. By default `export-TO` (folder) or `export.TO`
+            (file) in the run directory.
         time: Simulated time [s]; the frame nearest to it is exported. If not given, the last frame is exported.
         wanted: Kinds of bodies besides `postprocess.bodies.meshes.USUAL`.
         unwanted: Kinds of bodies and fields to leave out.

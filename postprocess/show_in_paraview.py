@@ -114,7 +114,7 @@ def largest_at(source: Any, time: float, name: str) -> float:
 
 
 def boxes(_kind: str, source: Any, view: Any) -> None:
-    """Show smarticles in colours that mean the same at all times: crossings, or numbers if the run is planar."""
+    """Colour smarticles by crossings, or by number if the run is planar, on one scale for all times."""
     shown = simple.Show(source, view)
     name = colouring(source)
     simple.ColorBy(shown, ("CELLS", name))

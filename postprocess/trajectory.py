@@ -1,4 +1,4 @@
-"""Write a run as one GSD file for OVITO and HOOMD-blue: a particle for each strand of each link, a rounded polyhedron.
+"""Write a run as one GSD file for OVITO and HOOMD-blue: each strand of a link is a rounded polyhedron.
 
 Strands are the capsules by which the engine represents links in contacts; of a sphere chain they are its envelope.
 
@@ -24,14 +24,14 @@ _NAMES: tuple[str, ...] = ("barb 1", "middle link", "barb 2")
 
 @dataclass(frozen=True, kw_only=True)
 class Capsules:
-    """Capsules of a frame, P of them; those of one type have equal sizes."""
+    """P capsules (cylinders with round ends) of a frame; capsules of one type have equal sizes."""
 
     ends: Floats  #: (P, 2, 3) ends of the axes [m]
     body: Whole  #: (P,) index of the body in the frame
     link: Whole  #: (P,) number of the link in the body
     types: Sequence[str]  #: Names of all types
     type_of: Whole  #: (P,) type of each capsule, a place in `types`
-    radii: Floats  #: (types,) [m]
+    radii: Floats  #: (types,) radius of the capsules of each type [m]
 
 
 def capsules_of(frame: Frame, run: Run) -> Capsules:
@@ -48,7 +48,7 @@ def capsules_of(frame: Frame, run: Run) -> Capsules:
 
 
 def orientations(directions: Floats) -> Floats:
-    """Return unit quaternions (P, 4), the real part first, that turn the x axis along the directions (P, 3)."""
+    """Return unit quaternions (P, 4), real part first, that turn the x axis along directions (P, 3)."""
     unit = directions / np.maximum(np.linalg.norm(directions, axis=1, keepdims=True), 1e-300)
     unit = np.where(unit[:, :1] < 0, -unit, unit)  # a capsule has no head
     x, y, z = unit.T
@@ -57,7 +57,7 @@ def orientations(directions: Floats) -> Floats:
 
 
 def shapes_of(capsules: Capsules) -> list[dict[str, Any]]:
-    """Return the shape of each type as GSD describes it: along x, the mean of its capsules."""
+    """Return the shape of each type as GSD describes it: along x, with the mean length of its capsules."""
     lengths = np.linalg.norm(capsules.ends[:, 1] - capsules.ends[:, 0], axis=1)
     shapes = []
     for number, radius in enumerate(capsules.radii):

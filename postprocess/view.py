@@ -138,7 +138,7 @@ class RunView:
         self.plotter.reset_camera(render=False)
 
     def legend(self) -> list[dict[str, str]]:
-        """Return the colours and labels of the legend, from the greatest value; empty for identity fields."""
+        """Return colours and labels of the legend, from the greatest value; empty for a field of kind "name"."""
         scale = ColourScale.of(self.field, self._bounds.get(self.field.name, (0.0, 1.0)))
         colours = scale.painted(np.array(list(scale.labels))).tolist()
         pairs = reversed(list(zip(colours, scale.labels.values(), strict=True)))
@@ -174,7 +174,7 @@ class RunView:
         return sorted({round(place) for place in np.linspace(0, len(self.frames) - 1, number)})
 
     def _widened(self, values: Floats) -> tuple[float, float]:
-        """Return the extremes of a field in all frames shown so far and in some frames of the run."""
+        """Return the extremes of the coloured field in `values`, all frames shown before, and sampled frames."""
         name = self.field.name
         samples = [np.array(self._bounds.get(name, ())), values]
         if name not in self._bounds:
@@ -374,7 +374,7 @@ def view_run(directory: Path | str, *, port: int = 0, opened: Callable[[str], No
 
 
 def _port(request: web.Request) -> int:
-    """Return the port of the connection; the one in `request.url` is from the browser's header Host."""
+    """Return the port of a request's connection; the port in `request.url` is what the browser claims."""
     assert request.transport is not None
     return int(request.transport.get_extra_info("sockname")[1])
 

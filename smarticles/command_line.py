@@ -23,7 +23,7 @@ class Parser(argparse.ArgumentParser):
         super().__init__(allow_abbrev=False, **options)
 
     def error(self, message: str) -> NoReturn:
-        """Raise InputError with a message of argparse in this project's wording."""
+        """Reword an error message of argparse, and raise it as InputError."""
         invalid = re.search(r"invalid choice: '(.*?)' \(choose from (.*)\)", message)
         if invalid:
             known = re.findall(r"[\w-]+", invalid[2])
@@ -131,7 +131,7 @@ _OPTIONS: Mapping[str, Mapping[str, Any]] = {
 
 
 def add_options(parser: argparse._ActionsContainer, *options: str, **settings: Any) -> None:
-    """Add arguments of `_OPTIONS` by name; `settings` of argparse replace those of the table."""
+    """Add arguments of `_OPTIONS` by name; `settings` replace the settings for argparse in the table."""
     for option in options:
         parser.add_argument(option, **{**_OPTIONS[option], **settings})
 
@@ -149,7 +149,7 @@ def scene_settings(arguments: argparse.Namespace) -> list[str]:
 
 
 def reject_existing(option: str, path: Path | None, *, overwrite: bool) -> None:
-    """Raise InputError if an output file exists and may not be replaced; call it before the computation."""
+    """Raise InputError, before a computation, if the file of an output option exists and must be kept."""
     if path is not None and path.exists() and not overwrite:
         raise InputError(f"{option} {path}: exists; choose another name or give --overwrite")
 
@@ -158,7 +158,7 @@ def reject_existing(option: str, path: Path | None, *, overwrite: bool) -> None:
 
 
 class Cell(str):
-    """Formatted number; `columns` aligns it to the right."""
+    """Formatted number in a table: a text that `columns` aligns to the right."""
 
     __slots__ = ()
 

@@ -33,7 +33,7 @@ def key_of(directory: Path) -> str:
 
 
 def read_kept(directory: Path, kind: str, key: str) -> pd.DataFrame | None:
-    """Return the kept table of a kind; None if there is none, or it is damaged or of another key."""
+    """Read a table that `keep` stored; None if it is absent, damaged, or stored with another key."""
     import pandas as pd  # noqa: PLC0415
 
     try:
@@ -48,7 +48,7 @@ def read_kept(directory: Path, kind: str, key: str) -> pd.DataFrame | None:
 
 
 def keep(table: pd.DataFrame, directory: Path, kind: str, key: str) -> None:
-    """Write a table into a run directory, unless the directory cannot be written."""
+    """Store a table of a kind in a run directory, with the key of `key_of`; do nothing if that fails."""
     rows = table.astype(object).to_numpy().tolist()
     text = json.dumps({"columns": list(table.columns), "rows": rows}, default=_plain)
     content = f"{key}\n{hashlib.sha256(text.encode()).hexdigest()}\n{text}"
@@ -67,7 +67,7 @@ def _plain(value: Any) -> Any:
 
 @cache
 def _program() -> str:
-    """Return a hash of the sources of all measures and readers, and the versions of the libraries."""
+    """Return a hash of the source code of all measures and readers, and of the versions of the libraries."""
     import numpy as np  # noqa: PLC0415
     import pandas as pd  # noqa: PLC0415
     import scipy  # noqa: PLC0415

@@ -142,7 +142,7 @@ def _measure_and_keep(
 
 
 def _with_variables(table: pd.DataFrame, values: Mapping[str, Any]) -> pd.DataFrame:
-    """Return the measures of one run with the variables of its sweep after the first column."""
+    """Insert the variables of a run's sweep (`values` by name) after the first column of its table."""
     for place, (name, value) in enumerate(values.items(), start=1):
         column = name
         cell = value if isinstance(value, str | int | float | bool) else json.dumps(value, ensure_ascii=False)
@@ -155,7 +155,7 @@ def _with_variables(table: pd.DataFrame, values: Mapping[str, Any]) -> pd.DataFr
 
 
 def of_phase(table: pd.DataFrame, phase: str) -> pd.DataFrame:
-    """Return the rows of a table of `measured` of one type of phase, or of the last phase of each run ("last").
+    """Select rows of a table of `measured` by type of phase; "last" selects the last phase of each run.
 
     Raises:
         InputError: no run has a phase of this type.
@@ -168,9 +168,9 @@ def of_phase(table: pd.DataFrame, phase: str) -> pd.DataFrame:
 
 
 def grouped(table: pd.DataFrame, by: Sequence[str], *, intervals: bool = False) -> pd.DataFrame:
-    """Average a table of `measured` over runs with equal values in `by`, with standard errors, by phase.
+    """Average a table of `measured`, phase by phase, over runs with equal values in the columns `by`.
 
-    With `intervals` it has the half-widths "… 95 % […]" of confidence intervals, too.
+    The result has standard errors "… SE […]" and, with `intervals`, half-widths "… 95 % […]" of confidence intervals.
     """
     from postprocess.statistics.points import means_by  # noqa: PLC0415
 

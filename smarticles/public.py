@@ -246,7 +246,7 @@ def sweep(
 
 @contextmanager
 def _in_words_of_python(scratch: str) -> Iterator[None]:
-    """Let messages name arguments of Python instead of options and of files in a temporary folder."""
+    """Reword error messages for Python: arguments in place of options, no paths of the folder `scratch`."""
     try:
         yield
     except (InputError, RunError) as error:

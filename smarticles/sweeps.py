@@ -61,7 +61,7 @@ def folder_of(
 ) -> Folder:
     """Create or open the directory of an expanded sweep, see `templates.sweep.folder.create_folder`.
 
-    `expected_s` has the expected wall time of each point [s]; None: the points are planned.
+    `expected_s` has the expected wall time of each point [s]; None: it is estimated here.
     """
     from templates.sweep.folder import create_folder  # noqa: PLC0415
 
@@ -176,7 +176,7 @@ def is_for_cluster(arguments: argparse.Namespace, *, allow_ranks: bool = False) 
 
 
 def draft_of(path: Path, name: str, entries: Sequence[Entry], arguments: argparse.Namespace) -> Draft:
-    """Render a job for runs by the cluster options of a command; see `templates.slurm.submission.draft`."""
+    """Plan and render a job for runs of the sweep `name` in `path`, by a command's cluster options."""
     from templates.slurm.cluster import shipped_clusters  # noqa: PLC0415
     from templates.slurm.job import Wishes  # noqa: PLC0415
     from templates.slurm.submission import draft, submissions  # noqa: PLC0415

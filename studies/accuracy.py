@@ -80,7 +80,7 @@ class Rung:
 
     @property
     def sensitivity(self) -> bool:
-        """Whether the knob belongs to the model, so that other values are no errors."""
+        """Whether the knob is a parameter of the model, so that other values have no errors."""
         return self.knob == "restitution"
 
 
@@ -138,7 +138,7 @@ _NAMED = re.compile(r"(?P<variant>.+)_seed(?P<seed>\d+)")
 
 
 def default_seeds(scene: Scene) -> tuple[int, ...]:
-    """Return the default seeds: 1 to 20 on links, where runs are cheap, otherwise 1 to 3."""
+    """Return the default seeds: 1 to 20 on the engine `links`, where runs are cheap, otherwise 1 to 3."""
     return tuple(range(1, 21 if scene.smooth else 4))
 
 
@@ -293,7 +293,7 @@ _Point = tuple[str, str, str, dict[str, Value]]
 
 
 def _rungs(knob: str, base: Mapping[str, Value], *, smooth: bool) -> list[_Point]:
-    """Return all rungs of a knob, from coarse to fine; `smooth`: links are swept bars, not sphere chains."""
+    """Return all rungs of a knob, from coarse to fine; `smooth`: links are swept by spheres, not chains."""
     if knob == "section":
         return _strands(base) if smooth else _sections(base)
     if knob == "fidelity":
@@ -325,9 +325,10 @@ def _names(engine: str) -> dict[str, dict[str, Value]]:
 
 
 def _sections(base: Mapping[str, Value]) -> list[_Point]:
-    """Return the rungs of the section of chains of spheres, with diameters by the scene's rule.
+    """Return the rungs of the knob "section" for chains of spheres: rows and pitch.
 
-    If the scene has several rows, there are two finer rungs: half of its pitch, and twice its rows.
+    The diameter of the spheres follows from rows and sizes, as in a scene that does not set it. If the scene has
+    several rows, there are two finer rungs: half of its pitch, and twice its rows.
     """
     shapes: list[dict[str, Value]] = [{"rows": 1, "pitch": pitch, "diameter_m": None} for pitch in (1.3, 1.0, 0.5)]
     shapes.append({"rows": 2, "pitch": 1.0, "diameter_m": None})
@@ -347,7 +348,7 @@ def _sections(base: Mapping[str, Value]) -> list[_Point]:
 
 
 def _strands(base: Mapping[str, Value]) -> list[_Point]:
-    """Return the rungs of the section of smooth links: 1 to 3 strands, with diameters by the scene's rule."""
+    """Return the rungs of "section" for smooth links: 1 to 3 strands, whose number gives their diameter."""
     shapes: list[dict[str, Value]] = [{"rows": rows, "diameter_m": None} for rows in (1, 2, 3)]
     own = {key: base[key] for key in shapes[0]}
     if not any(_same(own, shape) for shape in shapes):
@@ -357,7 +358,7 @@ def _strands(base: Mapping[str, Value]) -> list[_Point]:
 
 
 def _shaped(name: str, shape: dict[str, Value]) -> _Point:
-    """Return a rung of the section; its name has the diameter if the scene sets it."""
+    """Return a rung of the knob "section"; its name states the diameter if `shape` sets it."""
     name += "" if shape["diameter_m"] is None else f" d {1e3 * shape['diameter_m']:g} mm"
     return name, "", re.sub(r"[^A-Za-z0-9.]+", "-", name), shape
 
@@ -502,7 +503,7 @@ def _label(row: pd.Series) -> str:
 
 
 def _errors(row: pd.Series) -> str:
-    """Format all errors of a rung with their bands."""
+    """Format the errors of a rung with their 95 % bands [%], from its row of `work_precision`."""
     errors = {
         name: format_with_error(row[f"{name} error [%]"], "+.1f", row[f"{name} error 95 % [%]"]) for name in SYMBOLS
     }
@@ -545,11 +546,12 @@ def advise(table: pd.DataFrame, knob: str) -> Outcome:
 
 
 def worst_errors(table: pd.DataFrame) -> pd.DataFrame:
-    """Return the largest error of each named fidelity: of packing, heights and ⟨N⟩, and in a row of its own of energy.
+    """Return the largest error of each named fidelity.
 
-    The largest error is that with the largest bound: its absolute value plus its 95 % band. Quantities whose error or
-    band is unknown are left out. Columns: `engine`,
-    `fidelity`, `COST`, `quantity` (its symbol), `error [%]` (absolute value), `bound [%]`, and the number of seeds.
+    There is a row for packing, heights and ⟨N⟩ together, and a row for energy. The largest error is the error with the
+    largest bound: its absolute value plus its 95 % band. Quantities whose error or band is unknown are left out.
+    Columns: `engine`, `fidelity`, `COST`, `quantity` (its symbol), `error [%]` (absolute value), `bound [%]`, and the
+    number of seeds.
     """
     knob = "engine" if (table[KNOB] == "engine").any() else "fidelity"
     rows = []

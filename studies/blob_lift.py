@@ -24,14 +24,14 @@ from studies.framework.findings import Effect, Finding, mean, slope, unit_of
 from studies.framework.runs import Key, Row, declare, last_columns, phase_of, run_columns
 from studies.framework.study import Study
 
-ACTIVE = "active [Hz]"  #: Frequency of the worms' turns from the end of tangling on; 0: they hold their bends
+ACTIVE = "active [Hz]"  #: Column: frequency of the worms' turns after tangling; 0 if they hold their bends
 RISE, SHARE, OTHERS = "rise of the centre of mass [m]", "lifted [-]", "lifted of those not gripped [-]"
 GRIPPED, HELD, CROSSINGS = "gripped [-]", "load over weight [-]", "crossing number before [-]"
 HEIGHT = "height of the centre of mass [m]"
-LIFTED = 0.5  #: Part of the lift by which the centre of mass of a lifted worm has risen at least
+LIFTED = 0.5  #: Least rise of a lifted worm's centre of mass, over the distance of the lift [-]
 EXACT = 1e-7  #: Largest deviation of a gripped node from the path of the end piece [m]
-WHOLE = 0.9  #: Least share of worms of a blob that comes along as a whole
-LEFT = 0.5  #: Greatest share of the worms that are not gripped of a blob that is left behind
+WHOLE = 0.9  #: Least fraction of worms lifted if the blob is lifted as a whole [-]
+LEFT = 0.5  #: Greatest fraction lifted of the worms that are not gripped, if the blob is left behind [-]
 
 QUANTITIES = declare(
     {
@@ -52,7 +52,7 @@ QUANTITIES = declare(
 
 
 def _lift(run: Run) -> tuple[int, float, float]:
-    """Return the index of the phase that lifts, its first recorded time [s], and the distance [m]."""
+    """Return index, first recorded time [s] and distance [m] of the phase that lifts the end piece."""
     place = phase_of(run, "lift")
     times = run.series.time[run.series["phase"] == place]
     return place, float(times[0]), float(run.scene["phases"][place]["distance_m"])
@@ -85,7 +85,7 @@ def measure(run: Run) -> Row:
 
 
 def gripped(run: Run) -> np.ndarray:
-    """Return which worms (N,) the end piece holds: those with a node that moves with it exactly."""
+    """Return which worms the end piece holds, (N,) bool: worms with a node that follows the end piece."""
     place, begin, distance = _lift(run)
     speed = run.scene["phases"][place]["speed_m_per_s"]
     moving = [frame for frame in run.frames if begin < frame.time < begin + distance / speed]
@@ -114,7 +114,7 @@ def _above(table: pd.DataFrame) -> list[Effect]:
 
 
 def height_around(run: Run, begin: float) -> History:
-    """Read the height of the centre of mass [mm] from 1 s before a time [s] on, which is time 0 of the history."""
+    """Read the height of the centre of mass [mm] from 1 s before `begin` [s] on; time 0 is `begin`."""
     own = run.series.time >= begin - 1.0
     return History(times=run.series.time[own] - begin, values=1e3 * run.series["com_height_m"][own])
 

@@ -31,8 +31,8 @@ from studies.framework.study import COUNT, Study
 FALL, AWAY, CLUSTER = "fall of the centre of mass [m]", "way sideways [m]", "largest cluster [-]"
 BEFORE, SLENDER, AFTER = "height before [m]", "slenderness before [-]", "slenderness after [-]"
 TOUCHING = 1.05  #: Largest distance of the axes of worms that touch, in diameters
-SIDE = 0.5  #: Least way sideways over the fall of a blob that falls onto its side
-WHOLE = 0.9  #: Least share of the worms in the largest cluster of a blob in one piece
+SIDE = 0.5  #: Least horizontal way of the centre of mass, over its fall, if a blob falls onto its side [-]
+WHOLE = 0.9  #: Least fraction of the worms in the largest cluster if a blob is in one piece [-]
 
 QUANTITIES = declare(
     {
@@ -70,18 +70,18 @@ def measure(run: Run) -> Row:
 
 
 def centre(frame: Frame) -> NDArray[np.float64]:
-    """Return the centre of mass (3,) [m] of equal bodies."""
+    """Return the common centre of mass (3,) [m] of all bodies of a frame, which have equal masses."""
     return np.asarray(body_centres(frame).mean(axis=0))
 
 
 def slenderness(frame: Frame) -> float:
-    """Return the standard deviation of the segments' middles along z over that along one horizontal direction."""
+    """Return the vertical over the rms horizontal standard deviation of the segments' middles [-]."""
     x, y, z = np.var(frame.segments.mean(axis=1), axis=0)
     return float(np.sqrt(2 * z / (x + y)))
 
 
 def largest_cluster(frame: Frame, diameter: float) -> float:
-    """Return the share of bodies in the largest cluster of bodies that touch."""
+    """Return the fraction of bodies in the largest cluster of touching bodies of a diameter [m]."""
     segments, reach = frame.segments, TOUCHING * diameter
     i, j = close_segments(segments[:, 0], segments[:, 1], frame.body, reach)
     touch = segment_distances(segments[i], segments[j]) <= reach

@@ -43,9 +43,9 @@ DELAYED = "ln residual with an onset over that of an exponential [-]"
 
 EARLY = 0.1  # s, time at which fits begin: three periods of vibration
 MOMENTS = 24  #: Number of times, equally apart on a logarithmic axis, at which links are counted
-GIANT = 0.5  #: Share of the bodies in one cluster that makes it giant
-ORDERS = 60  #: Random orders of removal that are averaged
-NEAR = math.log(1.25)  #: Largest |ln| of a ratio of critical numbers that counts as agreement
+GIANT = 0.5  #: A cluster with at least this share of the bodies is giant
+ORDERS = 60  #: Number of random orders of removal over which results are averaged
+NEAR = math.log(1.25)  #: Critical numbers agree if ln of their ratio is at most this in size
 
 QUANTITIES = declare(
     {
@@ -125,12 +125,12 @@ def opening_of(run: Run) -> float:
 
 
 def linked(segments: Floats, body: NDArray[np.int64]) -> EntanglementGraph:
-    """Join bodies whose linking number, closed straight, is not 0; segments (M, 2, 3) [m], body (M,)."""
+    """Join bodies whose linking number (open curves closed by a line) is not 0; segments (M, 2, 3) [m]."""
     return entanglement_graph(closed_linking(segments, body), least=1)
 
 
 def links_per_body(graph: EntanglementGraph) -> float:
-    """Return the number of links over that of bodies; the mean degree is twice as large."""
+    """Return the number of links over the number of bodies [-]; the mean degree is twice as large."""
     return len(graph.i) / len(graph.bodies)
 
 
@@ -152,8 +152,8 @@ def critical_links(graph: EntanglementGraph, generator: np.random.Generator) -> 
     """Return the links per body [-] at which the largest cluster has the share `GIANT` of the bodies.
 
     Bodies are added in random order, with their links to those that are there already; links per body and the share of
-    the largest cluster are averaged over `ORDERS` orders. NaN if the share of all bodies is smaller, or is larger at
-    every number of bodies.
+    the largest cluster are averaged over `ORDERS` orders. NaN if the share does not reach `GIANT` with all bodies, or
+    exceeds it at every number of bodies.
 
     Source:
         Newman and Ziff, Phys. Rev. E 64, 016706 (2001).
@@ -200,11 +200,11 @@ LAWS: dict[str, Callable[[Floats, float], Floats]] = {
     "line": lambda t, _: t,
     "delayed logarithm": lambda t, tau: np.log1p(t / tau),
     "exponential": lambda t, tau: np.exp(-t / tau),
-}  #: What multiplies b in a + b f(t, τ), by the name of the law; τ is fitted to the last two
+}  #: Function f(t, τ) of each law a + b f(t, τ), by name; the first two do not depend on τ
 
 
 def residual(law: str, times: Floats, values: Floats) -> float:
-    """Return the root mean square that a + b f(t) leaves of values (n,) at times (n,) [s], with the best a, b and τ."""
+    """Fit a law a + b f(t, τ), see `LAWS`, to values (n,) at times (n,) [s]; return the rms residual."""
 
     def left(parameters: Floats) -> Floats:
         shape = LAWS[law](times, float(np.exp(parameters[0])))
@@ -230,7 +230,7 @@ def grows(table: pd.DataFrame) -> Outcome:
 
 
 def logarithm_best(table: pd.DataFrame) -> list[Effect]:
-    """Judge whether logarithms leave less than a line and than an exponential, of equal numbers of parameters."""
+    """Judge whether logarithms fit better than a line and an exponential with as many parameters."""
     laws = {
         "a + b ln t over that of a line": (AGAINST_LINE, -1),
         "a + b ln(1 + t/τ) over that of a + b exp(-t/τ)": (DELAYED, -1),
@@ -256,7 +256,7 @@ def percolates(table: pd.DataFrame) -> Outcome:
 
 
 def as_at_random(table: pd.DataFrame) -> Outcome:
-    """Judge whether piles percolate at the critical number of C shapes placed at random, within `NEAR`."""
+    """Judge whether the critical numbers of piles and of C shapes placed at random agree within `NEAR`."""
     ratio = (np.log(table[CRITICAL]) - np.log(table[RANDOM])).dropna()
     mean = mean_over_seeds(ratio.tolist())
     both = f"in piles by angle: {means_by(table, CRITICAL, OPENING, '.2f')}; at random: "
@@ -266,7 +266,7 @@ def as_at_random(table: pd.DataFrame) -> Outcome:
 
 
 def depends_on_opening(table: pd.DataFrame, *, quantity: str, label: str) -> Outcome:
-    """Show the slope of a quantity against the opening angle; found if it is not 0 at 95 %, with either sign."""
+    """Judge whether a quantity depends on the opening angle: its slope differs from 0 at 95 %."""
     slope = slope_within(table[OPENING].tolist(), table[quantity].tolist(), ["all"] * len(table))
     effect = Effect(label=f"{label} against the opening angle", value=slope, sign=0, unit=" per degree")
     note = f"by angle: {means_by(table, quantity, OPENING, '.3g')}"

@@ -154,13 +154,13 @@ def activations(runs: pd.DataFrame) -> pd.DataFrame:
 
 
 def _used(runs: pd.DataFrame) -> pd.DataFrame:
-    """Return the rows of the definition `REMAINING` at those l/w and Γ at which all runs collapsed."""
+    """Return the rows of the definition `REMAINING`, at each l/w for those Γ at which all runs collapsed."""
     own = runs[runs[DEFINITION] == REMAINING]
     return own[own[TIME].notna().groupby([own[ASPECT], own[GAMMA]]).transform("all")]
 
 
 def rise(used: pd.DataFrame) -> Slope:
-    """Fit the slope of ln(fτ) against 1/Γ [-], with an intercept of its own for each l/w and seed."""
+    """Fit one slope of ln(fτ) against 1/Γ [-] to all runs, with an intercept for each l/w and seed."""
     return slope_within(list(1 / used[GAMMA]), list(used[LOG]), list(zip(used[ASPECT], used[SEED], strict=True)))
 
 

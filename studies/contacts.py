@@ -102,7 +102,7 @@ def _lowest_tenth(heights: NDArray[np.float64]) -> float:
 def points(runs: pd.DataFrame) -> pd.DataFrame:
     """Average over seeds, and compute the deviation of φ_f from Gravish's φ_f [%].
 
-    The error of the deviation combines that of our mean and that of reading Gravish's point.
+    The error of the deviation combines the errors of our mean and of reading Gravish's point.
     """
     means = STUDY.points(runs)
     values = means[ASPECT].map(lambda aspect: gravish_at(aspect, "phi_f"))
@@ -112,7 +112,7 @@ def points(runs: pd.DataFrame) -> pd.DataFrame:
 
 
 def by_seed(runs: pd.DataFrame, quantity: str, *changed: str) -> pd.DataFrame:
-    """Return the change of a quantity with one factor, or the interaction of two factors, by l/w and seed."""
+    """Return the effect of one factor, or the interaction of two (`changed`), by l/w and seed."""
     table, left = runs, [*FACTORS, ASPECT, SEED]
     for factor in changed:
         left = [name for name in left if name != factor]
@@ -136,10 +136,10 @@ def effects(runs: pd.DataFrame) -> pd.DataFrame:
 
 
 def lowers(name: str, says: str, quantity: str, *changed: str, sign: int = -1, less: str = "") -> Finding:
-    """Make the finding that a change of a factor, or the interaction of two, lowers a quantity.
+    """Make the finding that the factor `changed`, or the interaction of two factors, lowers a quantity.
 
-    `sign` is −1 if the statement says that it lowers, +1 if it says that it raises the quantity. `less` is a factor
-    whose effect is subtracted, for a statement that the change lowers more than this factor does.
+    `sign` is −1 for "lowers" and +1 for "raises". With `less`, the name of another factor, the statement is that
+    `changed` lowers the quantity by more than `less` does.
     """
 
     def outcome(runs: pd.DataFrame) -> Outcome:
@@ -158,7 +158,7 @@ def lowers(name: str, says: str, quantity: str, *changed: str, sign: int = -1, l
 
 
 def _near_gravish(means: pd.DataFrame) -> Outcome:
-    """Judge whether a combination is surely within the margin of Gravish's points at every l/w."""
+    """Judge whether, for some combination of factors, φ_f is within `MARGIN` of Gravish's at every l/w."""
     known = means[means[DEVIATION].notna()]
     if known.empty:
         return Outcome(note="no points of Gravish's at these l/w", verdict=Verdict.NOT_RESOLVED)

@@ -58,7 +58,7 @@ QUANTITIES = declare(
         TAU: ("τ [s]", "", "time in which a free column on a shaking floor collapses; empty where it stood"),
         FORCE: ("chain [N]", "", "largest force of the string that pulls the chain"),
     }
-)  #: Measured quantities; those that a case does not have are NaN
+)  #: Measured quantities; quantities that a case does not have are NaN
 
 
 class Compared(NamedTuple):
@@ -142,14 +142,14 @@ def _measured(run: Run, case: str) -> dict[str, float]:
 
 
 def by_seed(runs: pd.DataFrame, one: Compared, variant: str) -> pd.Series:
-    """Return the mean of a quantity over its cases by seed; seeds without a value are left out."""
+    """Return a variant's mean of a quantity over its cases, by seed, for seeds that have a value."""
     chosen = runs[(runs[VARIANT] == variant) & runs[CASE].isin(one.cases)]
     means: pd.Series = chosen.groupby(SEED)[one.column].mean().dropna()
     return means
 
 
 def equivalence(runs: pd.DataFrame) -> pd.DataFrame:
-    """Compare the engines, paired by seed: a row for each quantity that at least one of them measured."""
+    """Compare the engines, paired by seed: a row for each quantity that one or both have measured."""
     rows = []
     for one in COMPARED:
         links, yade = (by_seed(runs, one, variant) for variant in (LINKS, YADE))
@@ -180,7 +180,7 @@ def equivalence(runs: pd.DataFrame) -> pd.DataFrame:
 
 
 def pitch_of(variant: str) -> float:
-    """Return the pitch of a variant [-]: 0 for links, the limit, 1 for `yade`; NaN if it is unknown."""
+    """Return the pitch of a variant [-]: 0 for links, 1 for `yade`; NaN if it is unknown."""
     if variant in (LINKS, YADE):
         return 0.0 if variant == LINKS else 1.0
     return float(variant.removeprefix("pitch-")) if variant.startswith("pitch-") else math.nan
@@ -189,7 +189,8 @@ def pitch_of(variant: str) -> float:
 def refinement(runs: pd.DataFrame) -> pd.DataFrame:
     """Compare the shaken piles at each pitch of YADE's spheres with links: a row per quantity and variant.
 
-    Differences to links, which stand as pitch 0, are paired by seed. Other cases were not run at every pitch.
+    Differences are paired by seed; the engine `links` is listed with the pitch 0. Other cases were not run at every
+    pitch.
     """
     shaken = runs[runs[CASE] == EXTERNAL]
     rows: list[dict[str, object]] = []

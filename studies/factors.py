@@ -56,7 +56,7 @@ def measure(run: Run) -> Row:
 
 
 def effect(quantity: str, factor: str) -> Finding:
-    """Make the finding that a factor changes a quantity with the sign that the paper's findings ask for."""
+    """Make the finding that a factor changes a quantity with the sign in `SIGNS`, of the paper's findings."""
     (symbol, sign), (name, text) = SIGNS[quantity], NAMES[factor]
 
     def outcome(runs: pd.DataFrame) -> Outcome:

@@ -36,7 +36,7 @@ BEFORE, AFTER = "before", "after"
 STAGES = {BEFORE: "phi_0", AFTER: "phi_f"}  #: Symbol of φ of the pile at rest, by stage: before and after the shake
 
 DEFINITIONS = (DEFINITION, "top-percentile", "voxel")
-"""Definitions of φ: that of the paper, one whose height does not depend on single smarticles, and one of the inside."""
+"""Definitions of φ: the paper's; one whose height does not depend on single smarticles; one of the pile's inside."""
 
 MOVING = f"phi_f shaken {DEFINITION} [-]"
 WINDOW = 1.0  #: Time at the end of the shake over which φ is averaged [s]: 30 periods
@@ -71,7 +71,7 @@ def share(stage: str) -> str:
 
 
 def spans(stage: str, what: str = "pile") -> str:
-    """Return the name of the column that is 1 if clusters span the height, the width, or both ("pile")."""
+    """Return the name of the column that is 1 if clusters span `what`: "height", "width", or both: "pile"."""
     return f"spans {what} {stage} [-]"
 
 
@@ -105,7 +105,7 @@ ASKED = {
     phi(AFTER, "voxel"): ("φ_f by voxels of the inside", ".4f", "phi-f-inside"),
     crossings(BEFORE): ("⟨N⟩_0", ".3f", "crossings-0"),
     crossings(AFTER): ("⟨N⟩_f", ".3f", "crossings-f"),
-}  #: Symbol, format and name in ids of findings of the quantities that are judged, by column
+}  #: Judged quantities by column: symbol, format, and name in the ids of findings
 
 
 def measure(run: Run) -> Row:
@@ -185,12 +185,12 @@ def laws(runs: pd.DataFrame) -> pd.DataFrame:
 
 
 def _column(stage: str, axis: str) -> str:
-    """Return the column of the runs that belongs to an axis of the table of thresholds, "l/w" or "⟨N⟩"."""
+    """Return the name of the column of l/w or of ⟨N⟩ at a stage, in the table of runs; `axis` says which."""
     return ASPECT if axis == "l/w" else crossings(stage)
 
 
 def _profiles(runs: pd.DataFrame, stage: str, axis: str) -> dict[int, Profile]:
-    """Fit, by size, the threshold in l/w or ⟨N⟩ (`axis`) above which piles are spanned."""
+    """Fit the threshold in l/w or ⟨N⟩ (`axis`) above which piles are spanned, for each size of pile."""
     column = _column(stage, axis)
     part = runs[(runs[ASPECT] <= LARGEST) & np.isfinite(runs[column])]
     if part.empty:

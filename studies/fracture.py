@@ -137,7 +137,7 @@ def measure(run: Run) -> Row:
 
 
 def force_history(run: Run, *, net: bool = False) -> History:
-    """Read the force on the upper hook over n W_s [-] against time; `net`: less that on the lower hook."""
+    """Read the force on the upper hook over n W_s [-] against time; `net`: less the lower hook's force."""
     pull = read_pull(run, run.series, run.phases[-1].index)
     force = (pull.net if net else pull).force / run.manifest.count / weight_of_one(run)
     return History(times=pull.times, values=force)
@@ -176,7 +176,7 @@ _BY_ASPECT = one_by_one(ASPECT, lambda aspect: rf"$l/w$ = {aspect:g}")
 
 
 def _line(rows: Rows) -> Split:
-    """Return a split with one series, the points of the internal oscillation that `rows` selects."""
+    """Return a split into one series: the points of the internal oscillation that `rows` selects."""
     properties = {**procedure_marker(INTERNAL), "linestyle": (0, (2, 1.5))}
     return lambda points: [Series(rows=rows(points), label="internal oscillation", properties=properties)]
 

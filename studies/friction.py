@@ -63,7 +63,7 @@ COMPARED = {
     "phi 10 s": "phi_f",
     "phi_f": "phi_f",
     "phi_f relaxed": "phi_f relaxed",
-}  #: Stage of Gravish that each of our stages is compared with; φ after 5 s and after 10 s is compared with φ_f
+}  #: Gravish's stage that each of our stages is compared with; φ after 5 s and after 10 s is compared with φ_f
 
 # Sets of stages that a finding asks to be near Gravish's at one friction, by their name.
 JUDGED: dict[str, Sequence[str]] = {
@@ -188,7 +188,8 @@ def tabulate(runs: pd.DataFrame) -> dict[str, pd.DataFrame]:
 def points(runs: pd.DataFrame, scatters: Mapping[str, Scatter]) -> pd.DataFrame:
     """Average φ and compute its deviation from Gravish's φ [%]: a row per stage, l/w and friction.
 
-    The error of the deviation includes that of reading Gravish's points.
+    The error of the deviation includes the error of reading Gravish's points. `scatters` has the relative scatter over
+    seeds of each stage.
     """
     rows = []
     for stage, scatter in scatters.items():
@@ -231,7 +232,7 @@ def crossings(found: Curves) -> pd.DataFrame:
 
 
 def nearness(found: Curves, friction: float) -> dict[str, float | int | str]:
-    """Compute deviations of all curves from Gravish's φ at a friction, and the confidence of being near.
+    """Compute deviations of all curves from Gravish's φ at a friction, and the confidence that φ is near.
 
     Returns by column: mean and largest deviation, the confidence that all points are within `MARGIN`, and the
     confidence of the worst point.
@@ -258,8 +259,9 @@ def nearness(found: Curves, friction: float) -> dict[str, float | int | str]:
 def verdict(near: Mapping[str, float | int | str], *, whole: bool) -> str:
     """Judge whether all points are within `MARGIN` of Gravish's: "yes", "no" or "undetermined".
 
-    Yes: the confidence for all points together, with independent errors, is at least `SURE`, and no point is missing
-    (`whole`). No: one point is surely farther off, by Bonferroni's rule for the number of points.
+    `near` is a result of `nearness`. Yes: the confidence for all points together, with independent errors, is at least
+    `SURE`, and no point is missing (`whole`). No: at least one point is farther off with the confidence `SURE`, by
+    Bonferroni's correction for the number of points.
     """
     confidence, least, count = (float(near[name]) for name in (CONFIDENCE, LEAST, COUNTED))
     if confidence >= 100 * SURE and whole:
@@ -281,7 +283,7 @@ def verdicts(found: Curves) -> pd.DataFrame:
 
 
 def nearest(found: Curves) -> pd.DataFrame:
-    """Tabulate for each set of stages in `JUDGED` the friction with the smallest maximum deviation."""
+    """Tabulate the friction with the smallest maximum deviation: a row per set of stages in `JUDGED`."""
     rows = []
     for what, stages in JUDGED.items():
         wanted = {key: curve for key, curve in found.items() if key[0] in stages}
@@ -373,7 +375,7 @@ def _common(found: pd.DataFrame) -> Outcome:
 
 
 def of_steel(surface: str) -> Finding:
-    """Make the finding that the friction at which φ_f is Gravish's is that of steel.
+    """Make the finding that φ_f equals Gravish's φ_f at the coefficient of friction of steel.
 
     `surface`, a key of `STEEL`, is the condition of the steel that the coefficients were published for.
     """

@@ -90,7 +90,7 @@ def phi_by_aspect(runs: pd.DataFrame, stage: str) -> Mapping[float, SeedMean]:
 
 
 def compared(runs: pd.DataFrame, end: str) -> str:
-    """Return the stage of φ_0 or φ_f that is compared with Gravish: φ_f at rest, where the runs have it."""
+    """Return the stage to compare with Gravish's φ_0 or φ_f (`end`): φ_f at rest if the runs have it."""
     return AT_REST if end == "phi_f" and phi_by_aspect(runs, AT_REST) else end
 
 
@@ -197,13 +197,13 @@ def _complete(runs: pd.DataFrame) -> pd.DataFrame:
 
 
 def _fully_shaken(points: pd.DataFrame) -> pd.DataFrame:
-    """Return the points without φ_f and ⟨N⟩ of those that were shaken for less time than others."""
+    """Return the points, with NaN for φ_f and ⟨N⟩ of points that were shaken for less time than others."""
     ends = [name for name in points if str(name).startswith(("phi_f", "crossings after", "crossings relaxed"))]
     return points.assign(**points[ends].where(points[SHAKEN] == points[SHAKEN].max()))
 
 
 def _states(points: pd.DataFrame) -> pd.DataFrame:
-    """Return each point twice, with φ after rest and while shaken, in the columns of φ_0 and φ_f."""
+    """Return two rows per point: φ_f is measured while shaken in one, at rest afterwards in the other."""
     points = _fully_shaken(points)
     shaken = points.assign(**{phi("phi_0"): math.nan, _STATE: "while shaken"})
     rest = points.assign(**{_STATE: "after rest"})

@@ -160,7 +160,7 @@ def measure(run: Run) -> Row:
 
 
 def _spent(run: Run, procedure: str, rest: int) -> float:
-    """Return the work that an activity did on all smarticles up to the end of the rest after it [J]."""
+    """Return the work of an activity on all smarticles [J], up to the end of the phase with index `rest`."""
     if procedure == STATIC:
         return 0.0
     series = run.series
@@ -189,7 +189,7 @@ def trajectories(runs: pd.DataFrame) -> pd.Series:
 
 
 def predicted(runs: pd.DataFrame) -> tuple[pd.DataFrame, pd.DataFrame]:
-    """Correlate both strengths with all measures.
+    """Correlate both strengths (`STRENGTHS`) with all measures (`PREDICTORS`).
 
     Returns two tables. The table `predictors` has rank correlation and slope with 95 % intervals: a row per strength,
     part of the runs, scope (over all l/w, within l/w, or one l/w) and measure; the best measure comes first. The table
@@ -220,7 +220,7 @@ def predicted(runs: pd.DataFrame) -> tuple[pd.DataFrame, pd.DataFrame]:
 def _correlated(
     table: pd.DataFrame, strength: str, *, within: bool
 ) -> tuple[list[dict[str, object]], list[dict[str, object]]]:
-    """Return the rows of both tables of `predicted` for one part, scope and strength."""
+    """Return rows of the tables `predictors` and `comparisons`, see `predicted`, from runs of one part."""
     names = list(PREDICTORS)
     x, y = table[names].to_numpy(dtype=np.float64), table[strength].to_numpy(dtype=np.float64)
     strata = pd.factorize(table[ASPECT])[0].astype(np.int64)
@@ -277,7 +277,7 @@ _POINT = [PROCEDURE, THETA, PLANNED]
 
 
 def gains(runs: pd.DataFrame) -> pd.DataFrame:
-    """Return the runs with an activity, with the column `GAIN`: strength less that of the poured pile."""
+    """Return the runs with an activity, with the column `GAIN`: strength less the poured pile's strength."""
     poured = runs[runs[PROCEDURE] == STATIC].groupby([ASPECT, SEED])[PEAK].mean().rename("poured")
     active = runs[runs[PROCEDURE] != STATIC].join(poured, on=[ASPECT, SEED], how="inner").reset_index(drop=True)
     return active.assign(**{GAIN: active[PEAK] - active["poured"]}).drop(columns="poured")
@@ -319,8 +319,8 @@ def costs(runs: pd.DataFrame) -> pd.DataFrame:
 def _drawn_ratio(values: Floats) -> Interval:
     """Return the mean gain over the mean energy with its 95 % interval, whose ends are NaN below 3 rows.
 
-    `values` (n, 2) are gains and energies. For two procedures they are (n, 4), and the result is the ratio of the two
-    gains per energy.
+    `values` (n, 2) are gains and energies. For two procedures they are (n, 4), and the result is the first procedure's
+    gain per energy over the second's.
     """
 
     def ratio(rows: Whole) -> Floats:
@@ -348,7 +348,7 @@ def best_points(table: pd.DataFrame) -> pd.DataFrame:
 
 
 def _at_point(gained: pd.DataFrame, point: pd.Series) -> pd.DataFrame:
-    """Return the runs of one procedure, θ and planned time, indexed by l/w and seed."""
+    """Return the runs of a point (procedure, θ, planned time) as a table indexed by l/w and seed."""
     same = (gained[PROCEDURE] == point[PROCEDURE]) & np.isclose(gained[PLANNED], point[PLANNED])
     same &= np.isclose(gained[THETA], point[THETA], equal_nan=True)
     return gained[same].set_index([ASPECT, SEED])

@@ -106,7 +106,7 @@ def pairs_of(table: pd.DataFrame, quantity: str, one: str, other: str) -> pd.Dat
 
 
 def gains(procedure: str) -> Rows:
-    """Return a function that computes φ_f of a procedure less φ_f of the static state, per l/w and seed."""
+    """Return a function that computes a procedure's gain of φ_f over the static state, per l/w and seed."""
 
     def rows(table: pd.DataFrame) -> pd.DataFrame:
         both = pairs_of(table, PHI_ACTIVE, procedure, STATIC)
@@ -149,9 +149,9 @@ def _largest_gains_little(table: pd.DataFrame) -> list[Effect]:
 
 
 def _logarithms(table: pd.DataFrame, one: str, other: str) -> pd.Series:
-    """Return log10 of the energy of `one` over that of `other`, for pairs with both above 0.
+    """Return log10(energy of procedure `one` / energy of `other`) of each pair of runs, indexed by l/w.
 
-    The index is l/w.
+    Pairs with an energy of 0 or less are left out.
     """
     both = pairs_of(table, ENERGY, one, other)
     both = both[(both["one"] > 0) & (both["other"] > 0)].set_index(ASPECT)
@@ -463,14 +463,14 @@ def heights(run: Run) -> History:
 
 
 def _energy_series(points: pd.DataFrame) -> list[Series]:
-    """Return a series of each procedure, and of the internal oscillation at each other amplitude."""
+    """Return a series per procedure, and one per further amplitude of the internal oscillation."""
     internal = amplitudes(points)
     others = one_by_one(THETA, lambda theta: rf"internal, $\theta$ = {theta:g}°")
     return by_procedure(apart=0.004)(points) + others(internal[internal[THETA] != AMPLITUDE])
 
 
 def _aspect_series(points: pd.DataFrame) -> list[Series]:
-    """Return a series of the internal oscillation at each aspect ratio with several amplitudes."""
+    """Return a series of the internal oscillation per aspect ratio, if it was run at several amplitudes."""
     internal = amplitudes(points).sort_values(THETA)
     several = internal[internal.groupby(ASPECT)[THETA].transform("nunique") > 1]
     return one_by_one(ASPECT, lambda aspect: rf"$l/w$ = {aspect:g}")(several)

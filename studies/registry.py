@@ -85,7 +85,7 @@ def _scripts() -> list[Script]:
     return found
 
 
-STUDIES: Mapping[str, Script] = MappingProxyType({study.name: study for study in _scripts()})  #: By name of the study
+STUDIES: Mapping[str, Script] = MappingProxyType({study.name: study for study in _scripts()})  #: All studies by name
 
 
 def shipped(name: str) -> Script:

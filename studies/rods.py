@@ -1,4 +1,4 @@
-"""Rods of several aspect ratios without a wall: does a pile hold its height where strong entanglement spans it?
+"""Does a pile of rods without a wall keep its height where strong entanglement spans the pile?
 
 Jung, Plumb-Reyes, Lin and Mahadevan (PNAS 2025, arXiv 2310.04903) find that longer rods entangle more, by the local
 average crossing number, that regions of strong entanglement percolate as the aspect ratio grows, and that piles become
@@ -38,10 +38,10 @@ KEPT, HEIGHT = "com height kept [-]", "height over length [-]"
 ACN, LEVEL, DENSITY = "crossing number per rod [-]", "spanning level [-]", "rods per cube of the length [-]"
 CONTACTS = "contacts per rod [-]"
 
-STANDS = 0.5  #: Share of the height of the centre of mass that a standing pile keeps
-LIKE = math.log(1.25)  #: Largest |ln| of a ratio of levels that counts as coincidence
-REJECTED = 0.05  #: Greatest p-value at which one level for two series is rejected
-INNER = 0.7  #: Half side of the square, over the container's radius, in which the field is taken
+STANDS = 0.5  #: A pile stands if its centre of mass keeps more than this share of its height
+LIKE = math.log(1.25)  #: Two levels count as equal if ln of their ratio is at most this in size
+REJECTED = 0.05  #: Greatest p-value at which the hypothesis of equal levels is rejected
+INNER = 0.7  #: Half the side of the square in which the field is computed, over the container's radius
 PITCH = 0.25  #: Distance of the points of the field, over the length of a rod
 BALL = 0.5  #: Radius of the balls of the field, over the length of a rod
 STEEL = 0.3  #: Coefficient of friction above which a shaken pile belongs to the series `SHAKEN`
@@ -98,7 +98,7 @@ def measure(run: Run) -> Row:
 
 
 def length_of(run: Run) -> float:
-    """Return the length of a run's rods [m]; InputError if its bodies are of another shape or of several kinds."""
+    """Return the length of a run's rods [m]; InputError unless all bodies are rods of one kind."""
     shapes = run.scene.get("particle") or []
     if [shape.get("shape") for shape in shapes] != ["rod"]:
         raise InputError(f"{run.path}: its bodies are not rods of one kind; leave it out")
@@ -120,13 +120,13 @@ def local_crossings(frame: Frame, *, length: float, radius: float, top: float) -
 
 
 def spanning_level(field: NDArray[np.float64]) -> float:
-    """Return the largest value of a field (X, Y, Z) whose region, at or above it, joins bottom and top; 0 if none."""
+    """Return the highest level above which the region of a field joins bottom and top; 0 if there is none."""
     falling = np.unique(field)[::-1]
     return next((float(value) for value in falling if region_spans(field >= value, 2)), 0.0)
 
 
 def thresholds(runs: pd.DataFrame, column: str) -> dict[str, Profile]:
-    """Fit, by series, the value of a column above which piles stand, in its logarithm, by profile likelihood."""
+    """Fit the threshold of ln(column) above which piles stand, for each series, by profile likelihood."""
     own = runs[(runs[column] > 0) & np.isfinite(runs[column])]
     if own.empty:
         return {}
@@ -137,7 +137,7 @@ def thresholds(runs: pd.DataFrame, column: str) -> dict[str, Profile]:
 
 
 def onsets(runs: pd.DataFrame) -> pd.DataFrame:
-    """Tabulate the values above which half of the piles stand: a row per series and column, with 95 % intervals."""
+    """Tabulate the values at which half of the piles stand: a row per series and column."""
     rows = []
     for column in (SLENDER, LEVEL, DENSITY):
         for series, one in thresholds(runs, column).items():
@@ -159,7 +159,7 @@ def crossing_number_rises(table: pd.DataFrame) -> Outcome:
 
 
 def stands_from(table: pd.DataFrame) -> Outcome:
-    """Judge whether the thickest shaken rods fall and the thinnest stand."""
+    """Judge whether shaken piles of the thickest rods fall, and of the thinnest rods stand."""
     own = table[table[SERIES] == SHAKEN]
     effects = [
         Effect(
@@ -174,9 +174,10 @@ def stands_from(table: pd.DataFrame) -> Outcome:
 
 
 def ratio_of(runs: pd.DataFrame, column: str, one: str, other: str) -> tuple[float, float, float]:
-    """Return ln of the ratio of two series' thresholds in a column, its 95 % half-width, and p of equal thresholds.
+    """Compare the thresholds of two series in a column.
 
-    The half-width is that of both intervals, added in squares; all are NaN where a series has no threshold.
+    Returns the logarithm of their ratio, its 95 % half-width, and the p-value of equal thresholds. Half-widths of both
+    thresholds are added in squares. All results are NaN if a series has no threshold.
     """
     found = thresholds(runs, column)
     if not {one, other} <= set(found) or not (found[one].known and found[other].known):
@@ -186,7 +187,7 @@ def ratio_of(runs: pd.DataFrame, column: str, one: str, other: str) -> tuple[flo
 
 
 def one_level(runs: pd.DataFrame, *, other: str) -> Outcome:
-    """Judge whether piles of another series begin to stand at the spanning level of shaken piles."""
+    """Judge whether piles of the series `other` begin to stand at the spanning level of shaken piles."""
     ratios = {column: ratio_of(runs, column, other, SHAKEN) for column in (LEVEL, SLENDER, DENSITY)}
     cells = []
     for column, (value, half, chance) in ratios.items():

@@ -41,9 +41,9 @@ LOG_PEAK = "log10 of the peak force over W [-]"
 BEFORE, HELD_FAST, CHAINS = "load before the pull over W [-]", "held fast [-]", "chains at the peak [-]"
 POURED, LINKS, HEIGHT = "links per staple poured [-]", "links per staple [-]", "com height [m]"
 
-TIMES = 5.0  #: Ratio of strengths above which "almost ten times" counts as found: half of it
+TIMES = 5.0  #: Ratio of strengths above which "almost ten times" counts as found: half of ten
 MOST_CHAINS = 3.0  #: Largest number of chains that the paper states
-CUTS = (0.25, 0.5, 0.75)  #: Heights of the cuts through which chains are counted, of the distance from grid to hook
+CUTS = (0.25, 0.5, 0.75)  #: Heights above the grid at which chains are counted, over the distance from grid to hook
 
 QUANTITIES = declare(
     {
@@ -81,7 +81,7 @@ QUANTITIES = declare(
 
 
 def measure(run: Run) -> Row:
-    """Measure links before and after vibration, the force on the hook, and the chains at the peak; return the row."""
+    """Measure links before and after vibration, hook force, and chains at its peak; return the run's row."""
     phases, hooks = run.phases, run.scene.get("hooks")
     types = tuple(phase.type for phase in phases)
     shaken = types == ("deposit", "relax", "shake", "relax", "remove-container", PULL)
@@ -132,15 +132,15 @@ def angle_of(run: Run) -> float:
 
 
 def links_per_body(frame: Frame) -> float:
-    """Return the number of pairs of bodies with one through the polygon of the other, over the number of bodies."""
+    """Return linked pairs per body [-]: pairs of which one body passes through the other's polygon."""
     graph = entanglement_graph(polygon_crossings(frame.segments, frame.body), least=1)
     return len(graph.i) / frame.count
 
 
 def chains_between(frame: Frame, low: float, high: float, forces: RecordedForces | None = None) -> float:
-    """Return the mean number of chains [-] that carry tension through the levels `CUTS` between two heights [m].
+    """Return the mean number of tensile force chains [-] through levels `CUTS` between two heights [m].
 
-    NaN if no level has a tension. The recorded forces of the frame are read from its run directory if not given.
+    NaN if no level carries tension. The recorded forces of the frame are read from its run directory if not given.
     """
     forces = read_forces(frame) if forces is None else forces
     found = [chains_through(frame, forces, low + part * (high - low)) for part in CUTS]
@@ -177,7 +177,10 @@ def force_history(run: Run) -> History:
 
 
 def ratio(table: pd.DataFrame, gamma: float, *, times: float) -> Effect:
-    """Return the mean over seeds of ln(peak force at 20° / at 90°) after one vibration, against the ln of a factor."""
+    """Return the effect that peak force at 20° is over `times` that at 90° after vibration at Γ = `gamma`.
+
+    Its value is the mean over seeds of ln(peak force at 20° / at 90°), its threshold ln `times`.
+    """
     own = table[table[GAMMA] == gamma]
     mean = narrow_less_square(own.assign(log=np.log(own[PEAK])), "log")
     low, middle, high = (math.exp(mean.value + half) for half in (-mean.half_width, 0.0, mean.half_width))
@@ -197,7 +200,7 @@ def vibrated(table: pd.DataFrame) -> list[float]:
 
 
 def stronger(table: pd.DataFrame, *, times: float) -> Outcome:
-    """Judge whether bundles of 20° are stronger than a multiple of those of 90° after each vibration."""
+    """Judge whether bundles of 20° are more than `times` as strong as bundles of 90° after each vibration."""
     held = table.groupby([ANGLE, GAMMA])[HELD_FAST].agg(["sum", "size"])
     cells = ", ".join(
         f"{angle:g}° Γ = {gamma:g}: {int(row['sum'])} of {int(row['size'])}"
@@ -211,12 +214,12 @@ def stronger(table: pd.DataFrame, *, times: float) -> Outcome:
 
 
 def narrow_less_square(table: pd.DataFrame, column: str) -> SeedMean:
-    """Return the mean over seeds of a column at 20° less that at 90°; the table has one vibration."""
+    """Return the mean over seeds of a column's value at 20° less its value at 90°, for one vibration."""
     return mean_over_seeds(paired_differences(table, column, ANGLE, (SQUARE, NARROW), [SEED])[column])
 
 
 def poured_more(table: pd.DataFrame) -> Outcome:
-    """Judge whether poured staples of 90° have more links than those of 20°."""
+    """Judge whether poured staples of 90° have more links than poured staples of 20°."""
     note = f"by angle: {means_by(table, POURED, ANGLE, '.2f')}"
     gamma = 0.0 if (table[GAMMA] == 0).any() else float(table[GAMMA].min())
     value = narrow_less_square(table[table[GAMMA] == gamma], POURED)
@@ -224,7 +227,10 @@ def poured_more(table: pd.DataFrame) -> Outcome:
 
 
 def entangles_faster(table: pd.DataFrame, *, relative: bool) -> Outcome:
-    """Judge whether vibration adds more links per staple at 20° than at 90°, absolutely or over those poured."""
+    """Judge whether vibration adds more links per staple at 20° than at 90°.
+
+    `relative`: the links added are divided by the links after pouring.
+    """
     gain = table[LINKS] / table[POURED] - 1 if relative else table[LINKS] - table[POURED]
     what = "links gained over those poured" if relative else "links gained per staple"
     effects, parts = [], []

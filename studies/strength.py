@@ -144,7 +144,7 @@ def over_heights(runs: pd.DataFrame) -> pd.DataFrame:
 
 
 def order_findings(rows: Rows) -> tuple[Finding, Finding]:
-    """Make the findings that peak force and ⟨N⟩ rank procedures differently, and shape change is brittle."""
+    """Make two findings: peak force and ⟨N⟩ rank procedures differently; shape change makes brittle piles."""
     return (
         Finding(
             id="other-order-than-crossings",
@@ -232,7 +232,7 @@ def with_crossings(
 
 
 def several_amplitudes(runs: pd.DataFrame) -> pd.DataFrame:
-    """Return the runs of internal oscillation at those l/w and heights of the hook that have several θ."""
+    """Return the runs of internal oscillation, at those l/w and hook heights for which several θ were run."""
     internal = runs[runs[PROCEDURE] == INTERNAL]
     return internal[internal.groupby([ASPECT, UPPER])[THETA].transform("nunique") > 1]
 

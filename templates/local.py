@@ -300,7 +300,7 @@ class _Runner:
         )
 
     def _left(self, running: dict[str, float]) -> float:
-        """Return the expected wall time left [s], scaled by true over expected time of the finished runs."""
+        """Return the expected wall time left [s], corrected by true over expected time of finished runs."""
         expected = {entry.name: entry.expected_s for entry in self.folder.entries}
         done = [outcome for outcome in self.outcomes.values() if outcome.status == "done"]
         planned = sum(expected[outcome.name] for outcome in done)

@@ -1,4 +1,4 @@
-"""Write the workflow of a sweep for another batch tool, beside its scenes: Snakemake, or row of the signac framework.
+"""Write the workflow of a sweep for another batch tool: Snakemake, or row of the signac framework.
 
 Sources: https://snakemake.readthedocs.io/en/stable/snakefiles/rules.html, https://row.readthedocs.io
 """
@@ -40,7 +40,7 @@ def workflow(tool: str, name: str, entries: Sequence[Entry]) -> str:
 
 
 def _walltime(seconds: int) -> str:
-    """Return a time as row reads it, such as `2 days, 03:00:00`."""
+    """Return a time [s] in the notation of the tool row, such as `2 days, 03:00:00`."""
     return format_time(seconds).replace("-", " days, ")
 
 

@@ -1,4 +1,4 @@
-"""Test access to the internals of the engines YADE and links, for example to set velocities or to hold a body.
+"""Test access to the internals of the engines YADE and links, for example to set velocities.
 
 Both engines use the leapfrog scheme, whose velocities belong to the half step before the positions. For a velocity v at
 t = 0 under an acceleration a, set the velocity v − a dt/2.
@@ -41,7 +41,7 @@ STIFFNESS = 500.0  # N/m
 
 
 class _Access:
-    """Test access that both engines share; it has no state, so that it can be sent to another process."""
+    """Test access that both engines share; it has no state, so that it can be sent to other processes."""
 
     engine: ClassVar[type[Any]]
 
@@ -66,18 +66,18 @@ class _Access:
         return engine
 
     def motors_of(self, scene: Scene) -> dict[str, Any]:
-        """Return the keyword arguments with which the engine's constructor gets the motors of a scene."""
+        """Return the keyword arguments for the engine's constructor that describe the motors of a scene."""
         raise NotImplementedError
 
     def build_hinged(self, scene: Scene, *, gravity: float, dt: float | None = None) -> Engine:
-        """Build an engine for articulated smarticles of a scene; None for `dt` [s]: the scene's time step."""
+        """Build an engine for articulated smarticles of a scene, with a time step `dt` [s] or the scene's own."""
         law, dt = contact_law_of(scene), dt or time_step(scene)
         height, motors = scene.cylinder.height, self.motors_of(scene)
         return self.build(scene.particle, law, dt=dt, gravity=gravity, height=height, **motors)
 
 
 def _bar(length: float, thickness: float, radius: float, kind: type[Particle] = Particle) -> Particle:
-    """Return a smarticle without barbs, with the mass of the ball; all lengths in [m]."""
+    """Return a barbless smarticle of mass BALL_MASS and square section, for spheres of a radius [m]."""
     boxes = Boxes(
         middle_length=length,
         barb_length=0.0,
@@ -111,7 +111,7 @@ POINTS = 400  # spheres that represent a link in `swept`
 
 
 class Pushed(LinksEngine):
-    """Links engine with additional external forces on links."""
+    """Engine `links` with additional external forces on single links of smarticles."""
 
     def __init__(self, **keys: Any) -> None:
         super().__init__(**keys)
@@ -176,14 +176,14 @@ class LinksAccess(_Access):
         return _bar(5 * BALL_RADIUS, BALL_RADIUS * math.sqrt(12 / 5), BALL_RADIUS)
 
     def ends(self, particle: Particle) -> Array:
-        """Return the centres of the spheres that can touch the floor, (n, 3) [m], body frame."""
+        """Return the centres (n, 3) [m], in the body frame, of all spheres that can touch the floor."""
         shape = smarticle_shape(particle)
         starts, ends = shape.lines[:, :3], shape.lines[:, :3] + shape.lines[:, 3:6]
         # Ends of links; each hinge once.
         return applied(particle.boxes.link_rotations[1], np.concatenate([starts[shape.shared == 0], ends]))
 
     def swept(self, particle: Particle) -> Array:
-        """Return the centres of spheres that cover the smarticle, (n, 3) [m], body frame."""
+        """Return the centres (n, 3) [m], in the body frame, of spheres that cover the smarticle."""
         lines, way = smarticle_shape(particle).lines, np.linspace(0, 1, POINTS)[:, None]
         points = [line[:3] + way * line[3:6] for line in lines]
         return applied(particle.boxes.link_rotations[1], np.concatenate(points))
@@ -193,7 +193,7 @@ class LinksAccess(_Access):
         return math.inf
 
     def push(self, engine: Engine, k: int, velocity: ArrayLike = (0, 0, 0), spin: ArrayLike = (0, 0, 0)) -> None:
-        """Set the velocity [m/s] and the angular velocity [rad/s] of a welded smarticle, (3,) each."""
+        """Set the velocity (3,) [m/s] and the angular velocity `spin` (3,) [rad/s] of welded smarticle `k`."""
         bodies = _links(engine)._world.posed()
         row, axes = bodies.plane[k], bodies.axes[k]
         inertia = np.array([[row[14], row[17], 0.0], [row[17], row[15], 0.0], [0.0, 0.0, row[16]]])
@@ -201,7 +201,7 @@ class LinksAccess(_Access):
         bodies.momentum[k] = axes @ inertia @ axes.T @ np.asarray(spin, float)
 
     def force(self, engine: Engine, k: int, link: int, force: ArrayLike) -> None:
-        """Apply a constant force (3,) [N] to the centre of a link from the next step on."""
+        """Apply a constant force (3,) [N] to the centre of a link of smarticle `k` from the next step on."""
         assert isinstance(engine, Pushed)
         engine.forces[k, link] = np.asarray(force, float)
 
@@ -242,7 +242,7 @@ class LinksAccess(_Access):
         motors.momentum[0] = row[18:20] * middle[2] + np.array([[row[20], row[21]], [row[21], row[20]]]) @ rates
 
     def burden(self, engine: Engine, k: int, ratio: float, *, rise: float) -> None:
-        """Multiply the weight of smarticle `k` by `ratio`; on links it grows during the time `rise` [s]."""
+        """Multiply the weight of smarticle `k` by `ratio`; on the engine `links` within the time `rise` [s]."""
         # All smarticles on links have one mass, so that an external force is added.
         own = _links(engine)
         if not isinstance(own, Pushed):
@@ -280,7 +280,7 @@ class LinksAccess(_Access):
             bodies.position[1] = _spoilt_place(engine, what, bodies.position[1])
 
     def heat(self, engine: Engine, share: float) -> None:
-        """Multiply all normal damping coefficients by −`share`, so that dashpots supply energy; tangential: 0."""
+        """Multiply normal damping by −`share`, so that dashpots supply energy; set tangential damping to 0."""
         world = _links(engine)._world
         world.laws = tuple(law._replace(damping=-share * law.damping, shear_damping=0.0) for law in world.laws)
 

@@ -44,7 +44,7 @@ def scene_of(data: Mapping[str, Any]) -> Scene:
     return parse_scene(data, source="case")
 
 
-ONE_STRAND = {"base": "standard", "rows": 1, "stiffness_N_per_m": 500.0}  #: Links are round on both engines
+ONE_STRAND = {"base": "standard", "rows": 1, "stiffness_N_per_m": 500.0}  #: Fidelity with round links on both engines
 
 
 def scene_data(access: EngineAccess, *phases: Mapping[str, Any], per_layer: int = 6, **keys: Any) -> dict[str, Any]:
@@ -86,7 +86,7 @@ def law_of(scene: Scene) -> ContactLaw:
 def ball_law(
     *, restitution: float = 1.0, friction: float = 0.0, tangential: float = 0.82, dashpot: float = 0.9
 ) -> ContactLaw:
-    """Return a contact law for the ball, with dashpots that give the restitution [1] at its mass.
+    """Return a contact law for the ball, with dashpots that give the restitution [1] for the ball's mass.
 
     `tangential` is the tangential over the normal stiffness, `dashpot` the tangential over the normal damping [1].
     """
@@ -106,7 +106,7 @@ def ball_law(
 
 
 def add(engine: Engine, position: ArrayLike, rotation: Rotation = FLAT) -> None:
-    """Add one body at rest at a position (3,) [m]."""
+    """Add a body at rest at a position (3,) [m], with a rotation from body frame to laboratory frame."""
     engine.add(Poses(np.array([position], dtype=float), (rotation,)))
 
 
@@ -151,7 +151,7 @@ def drive(
 def watched(data: dict[str, Any], out: Path | str, *, dt: float | None = None) -> tuple[Scene, Engine, Recorder]:
     """Build scene, engine and recorder with watchdog as a run does, from a scene as a dictionary.
 
-    The time step `dt` [s] may exceed the stable step; it is that of the scene if not given.
+    The time step `dt` [s] may exceed the stable step; by default it is the scene's time step.
     """
     scene = scene_of(data)
     Path(out).mkdir(parents=True, exist_ok=True)

@@ -28,7 +28,7 @@ class Answer:
     measured: float  #: Value in the simulation [unit]
     tolerance: float  #: Largest allowed error, relative to the scale [1]
     reason: str = ""  #: Reason for the tolerance
-    scale: float = 0.0  #: Unit of the relative error [unit]; 0: the value by theory
+    scale: float = 0.0  #: Value that the error is divided by [unit]; 0: the value by theory
 
     @property
     def error(self) -> float:
@@ -52,27 +52,27 @@ class Check:
 
 
 def below(what: str, measured: float, limit: float) -> Check:
-    """Check that a value is below a limit; NaN fails."""
+    """Check that a measured value is below a limit; NaN fails. `what` names quantity and unit."""
     return Check(what, f"{measured:.4g}", f"< {limit:.4g}", bool(measured < limit))
 
 
 def above(what: str, measured: float, limit: float) -> Check:
-    """Check that a value is above a limit; NaN fails."""
+    """Check that a measured value is above a limit; NaN fails. `what` names quantity and unit."""
     return Check(what, f"{measured:.4g}", f"> {limit:.4g}", bool(measured > limit))
 
 
 def near(what: str, measured: float, expected: float, error: float) -> Check:
-    """Check that a value differs from the expected value by at most `error`; NaN fails."""
+    """Check that a measured value is within ±`error` of the expected value; NaN fails."""
     return Check(what, f"{measured:.5g}", f"{expected:.5g} ± {error:.2g}", bool(abs(measured - expected) <= error))
 
 
 def nothing(what: str, text: str | None) -> Check:
-    """Check that there is no error message."""
+    """Check that `text`, the message of an error, is None."""
     return Check(what, text or "nothing", "nothing", text is None)
 
 
 def says(text: str | None, *parts: str) -> Check:
-    """Check that an error message exists and contains all `parts`."""
+    """Check that `text`, the message of an error, is not None and contains all `parts`."""
     good = text is not None and all(part in text for part in parts)
     return Check("the error", text or "nothing", " … ".join(parts), good)
 
@@ -115,7 +115,7 @@ def ladder(  # noqa: PLR0917 # a row of a table
     phases: int | None = None,
     **options: Any,
 ) -> Callable[[Function], Function]:
-    """Register a function `(access, steps, **options) -> list[float]` that returns an error for each time step.
+    """Register a function `(access, steps, **options) -> list[float]`: an error for each time step.
 
     A test runs it and compares the order at which errors fall with the time step with the expected order.
 

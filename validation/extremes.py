@@ -128,7 +128,7 @@ def segments(vertices: Array) -> Array:
 
 
 def surface(vertices: Array, thickness: float) -> tuple[Array, Array]:
-    """Return points (M, 3) [m] on the axes of all links, and the radii of material around them (M,) [m].
+    """Return points (M, 3) [m] on the axes of all links, and radii (M,) [m] of spheres that links contain.
 
     Points are the ends of each axis, with radius 0, and the points thickness/2 from the ends, with radius thickness/2.
     The spheres lie inside the link, whether its ends are square or round. Vertices (N, 4, 3) and thickness are in [m].
@@ -281,7 +281,7 @@ RIGHT, REJECTED, STOPPED, WRONG, LATE = "right", "rejected by plan", "stopped wi
 
 
 def run_one(number: int, out: Path, tree: Path, limit: float) -> dict[str, Any]:
-    """Plan, run and check one scene; return its row of the table.
+    """Plan, run and check the scene with a number; return its row of the table.
 
     `tree` is the source tree whose `smarticles` is used, `limit` the largest wall time of `plan` and of `run` [s].
     """

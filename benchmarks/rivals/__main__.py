@@ -50,7 +50,7 @@ SAME, TENTH = "links at this overlap are cheaper by [1]", "links at a tenth of i
 
 
 def data_of(count: int, seed: int, *phases: dict[str, Any], **keys: Any) -> dict[str, Any]:
-    """Return a scene as a dictionary, with a container wide enough for a straight smarticle."""
+    """Return a scene of `count` smarticles as a dictionary; they can straighten within the container."""
     data = pile(count, *phases, seed=seed, per_layer=PAPER_PER_LAYER, **keys)
     data["container"]["radius_m"] = max(data["container"]["radius_m"], 0.012)
     return data
@@ -61,6 +61,7 @@ def scene_of(
 ) -> dict[str, Any]:
     """Return the scene of a setting as a dictionary: take-over of a poured pile, rest and activity.
 
+    `poured` is the run directory of the pour.
     The activity takes `seconds` [s]; `sample` is the time between two frames [s].
     """
     recording = {"frame_interval_s": sample, "series_interval_s": sample, "checkpoint_interval_s": None}
@@ -91,7 +92,7 @@ def perform(task: Path) -> None:
 
 
 def run(folder: Path, setting: Setting, activity: str, seed: int, given: argparse.Namespace) -> Any:
-    """Simulate a setting in a separate process and measure the result; return a row of the table."""
+    """Simulate a setting in a separate process, with parsed options `given`; return a row of the table."""
     count, seconds, poured = given.count, given.seconds, folder / f"pile-{given.count}-{seed}"
     if not (poured / "done.json").exists():
         run_child(folder, poured.name, data_of(count, seed, {"type": "relax", "duration_s": 0.3}, **POUR))
@@ -138,7 +139,7 @@ def measured(scene: Scene, shape: str, positions: Array, frames: Array) -> dict[
 
 
 def planned(engines: Sequence[str], given: argparse.Namespace) -> Iterator[tuple[Setting, dict[str, Any]]]:
-    """Yield each simulation: its setting, and the columns that identify its row."""
+    """Yield setting and identifying columns of each simulation that the parsed options `given` ask for."""
     for seed, setting in product(given.seeds, SETTINGS):
         if setting.engine in engines and not (setting.costly and seed != given.seeds[0]):
             for activity in filter(given.activities.__contains__, setting.activities):
@@ -149,8 +150,8 @@ def planned(engines: Sequence[str], given: argparse.Namespace) -> Iterator[tuple
 def medians(rows: pd.DataFrame) -> pd.DataFrame:
     """Return medians over seeds per activity, engine and setting, and the cost relative to links.
 
-    The last two columns divide the cost by the lowest cost of links whose overlap is at most that of the row, and at
-    most a tenth of that of the row.
+    The last two columns divide the row's cost by a cost of the engine `links`: the lowest cost of a setting whose
+    overlap is at most the row's overlap, and the lowest cost of a setting whose overlap is at most a tenth of it.
     """
     columns = [COST, STEP, DEPTH, MEAN_DEPTH, BOX_DEPTH, PHI_REST, PHI_END, SINKING, MEMORY]
     groups = rows.groupby(KEYS, sort=False)

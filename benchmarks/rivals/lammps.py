@@ -18,7 +18,7 @@ SHARE = re.compile(r"^(\S+)% CPU use", re.MULTILINE)
 
 
 def simulate(task: Task, knobs: Knobs) -> Outcome:
-    """Simulate a task; there are no knobs besides the scene. The last run of the deck is the activity."""
+    """Simulate a task; `knobs` are empty. The last `run` command of the deck is the activity."""
     folder, scene = Path(task.folder) / "deck", task.scene
     write_deck(scene, folder)
     subprocess.run([shutil.which("lmp") or "lmp", "-in", DECK], cwd=folder, check=True, stdout=subprocess.DEVNULL)

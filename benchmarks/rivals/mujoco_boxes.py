@@ -46,7 +46,7 @@ class InMujoco(World):
         mujoco.mj_forward(self._model, self._data)
 
     def _add_container(self, spec: Any) -> None:
-        """Add floor and walls as planes."""
+        """Add floor and walls as planes to MuJoCo's model `spec`."""
         plane = self._mujoco.mjtGeom.mjGEOM_PLANE
         spec.worldbody.add_geom(type=plane, size=[1, 1, 1], **self._surface)
         for point, inward in zip(*self.task.walls(), strict=True):
@@ -55,7 +55,7 @@ class InMujoco(World):
             spec.worldbody.add_geom(type=plane, size=[1, 1, 1], pos=point, quat=_quaternion(frame), **self._surface)
 
     def _add_smarticle(self, spec: Any, k: int) -> None:
-        """Add smarticle `k` with its links and, if it actuates, hinges and servos."""
+        """Add smarticle `k` to MuJoCo's model `spec`: links and, if it actuates, hinges and servos."""
         task, boxes, joint = self.task, self.task.boxes, self._mujoco.mjtJoint
         if not self._hinged:
             body = spec.worldbody.add_body(
@@ -97,7 +97,7 @@ class InMujoco(World):
         body.add_geom(type=geom, size=sides, pos=centre, quat=_quaternion(frame), mass=0.0, **self._surface)
 
     def _servo(self, spec: Any, hinge: str, barb: int) -> None:
-        """Add a position servo that is critically damped for the barb alone."""
+        """Add a position servo at a hinge to MuJoCo's model `spec`, critically damped for the barb alone."""
         limit, boxes = float(self.task.scene.torque_limit), self.task.boxes
         inertia = boxes.link_inertias[barb][2] + boxes.link_masses[barb] * (boxes.barb_length / 2) ** 2
         gain = limit / SERVO

@@ -9,7 +9,7 @@ from dem.plan.steps import time_steps
 
 
 def simulate(task: Task, knobs: Knobs) -> Outcome:
-    """Simulate a task; there are no knobs besides the scene."""
+    """Simulate a task; `knobs` are empty, since the scene has all parameters."""
     return simulated(task, OnEngine(task))
 
 
@@ -32,7 +32,7 @@ class OnEngine(World):
         self._enter(ACTIVITY)
 
     def _enter(self, index: int) -> None:
-        """Begin a phase of the scene with its time step."""
+        """Begin the phase of the scene with an index, with the phase's time step."""
         self._stage = self.task.scene.phases[index].begin(self.task.scene, index)
         self.engine.set_time_step(self._steps[index])
         self.time_step = self.engine.time_step

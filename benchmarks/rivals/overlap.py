@@ -1,7 +1,8 @@
 """Overlaps between smarticles, computed from poses for the shapes of each engine.
 
 The overlap of two boxes is the shortest displacement that separates them. The overlap of two swept segments, or of
-spheres as segments of length zero, is the diameter less the distance of the axes. Links of one smarticle are ignored.
+spheres as segments of length zero, is the diameter less the distance of the axes. Links
+of one smarticle are not compared.
 """
 
 import itertools
@@ -23,9 +24,9 @@ PARALLEL = 1e-9  # squared sine below which two edges count as parallel
 
 @dataclass(frozen=True, eq=False)
 class Bars:
-    """Boxes, B in number."""
+    """B boxes, each a link of a smarticle."""
 
-    centres: Array  #: (B, 3) [m]
+    centres: Array  #: Centres, (B, 3) [m]
     frames: Array  #: Axes as columns, (B, 3, 3)
     halves: Array  #: Half lengths of the sides, (B, 3) [m]
     owners: Indices  #: Indices of smarticles, (B,)
@@ -36,7 +37,7 @@ class Bars:
         return self.centres, np.linalg.norm(self.halves, axis=1)
 
     def depths(self, pairs: Indices) -> Array:
-        """Compute the overlaps of pairs (P, 2) of boxes, (P,) [m], by the separating-axis theorem for 15 axes."""
+        """Compute the overlaps (P,) [m] of pairs of boxes with indices (P, 2), by the separating-axis theorem."""
         one, other = pairs.T
         between = self.centres[other] - self.centres[one]
         frames = np.concatenate([self.frames[one], self.frames[other]], axis=2)
@@ -55,11 +56,11 @@ class Bars:
 
 @dataclass(frozen=True, eq=False)
 class Swept:
-    """Segments swept by a sphere, S in number; spheres are segments of length zero."""
+    """S segments that are swept by a sphere; a sphere is a segment of length zero."""
 
-    starts: Array  #: (S, 3) [m]
-    ends: Array  #: (S, 3) [m]
-    radius: float  #: [m]
+    starts: Array  #: First ends of the segments, (S, 3) [m]
+    ends: Array  #: Second ends of the segments, (S, 3) [m]
+    radius: float  #: Radius of the sphere [m]
     owners: Indices  #: Indices of smarticles, (S,)
 
     @property
@@ -69,7 +70,7 @@ class Swept:
         return (self.starts + self.ends) / 2, reaches
 
     def depths(self, pairs: Indices) -> Array:
-        """Compute the overlaps of pairs (P, 2) of segments, (P,) [m]; negative for separate segments."""
+        """Compute the overlaps (P,) [m] of pairs of segments with indices (P, 2); negative for gaps."""
         one, other = pairs.T
         ends = self.starts[one], self.ends[one], self.starts[other], self.ends[other]
         return 2 * self.radius - segment_distances(*ends)

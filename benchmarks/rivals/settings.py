@@ -24,7 +24,7 @@ class Setting:
     activities: Sequence[str] = (SHAKE,)  #: Activities that the engine supports
     scene: Mapping[str, Any] = field(default_factory=dict)  #: Changed keys of the scene
     knobs: Mapping[str, Any] = field(default_factory=dict)  #: Parameters of the engine that a scene does not have
-    costly: bool = False  #: Simulate the first seed only
+    costly: bool = False  #: Whether only the first seed is simulated
 
     @property
     def key(self) -> str:
@@ -68,9 +68,9 @@ def _links(name: str, fidelity: Any, *, costly: bool = False) -> Setting:
 
 
 def _mujoco(name: str, time_step: float, contact: float) -> Setting:
-    """Return a setting of MuJoCo with a time step [s]; `contact` is the time constant of contacts [s].
+    """Return a setting of MuJoCo with a time step [s] and a time constant `contact` of contacts [s].
 
-    MuJoCo's default is 0.02 s; the least value is twice the time step.
+    MuJoCo's default of the time constant is 0.02 s; its least value is twice the time step.
     """
     solver = {"time_step": time_step, "solver": "CG", "iterations": 50, "cone": "pyramidal"}
     return Setting("mujoco", name, activities=BOTH, knobs={**solver, "solref": [contact, 1.0]}, costly=True)

@@ -54,7 +54,7 @@ def _part(name: str, definition: Schema) -> str:
 
 
 def anchor(name: str) -> str:
-    """Return the anchor of a definition of the schema on its page."""
+    """Return the anchor, on the page of scene keys, of a definition of the schema."""
     return f"scene-{name.lower()}"
 
 
@@ -73,7 +73,7 @@ def _table(definition: Schema) -> str:
 
 
 def _options(entry: Schema) -> Iterator[Schema]:
-    """Yield the alternatives of an entry, without null."""
+    """Yield the alternative types of an entry of the schema, without null."""
     for option in entry.get("anyOf", [entry]):
         if option.get("type") != "null":
             yield option

@@ -33,7 +33,7 @@ def cell(text: str) -> str:
 
 
 def code(text: str) -> str:
-    """Return a name as inline code; empty for an empty name."""
+    """Return a name as Markdown's inline code; an empty name gives an empty text."""
     return f"`{text}`" if text else ""
 
 

@@ -58,15 +58,15 @@ PAINTS: Mapping[str, Paint] = MappingProxyType(
 class ColourScale:
     """Mapping from the values of a field to colours, with its colour bar."""
 
-    kind: Literal["count", "value", "name"]  #: Kind of the field
-    colours: Colormap | None = None  #: Colour map of the bar; None if colours only show identity
+    kind: Literal["count", "value", "name"]  #: Kind of the field's values, see `Field.kind`
+    colours: Colormap | None = None  #: Colour map of the bar; None for a field of kind "name", without bar
     low: float = 0.0  #: Value at the lower end of the bar
     high: float = 1.0  #: Value at the upper end of the bar
     labels: Mapping[float, str] = dataclasses.field(default_factory=dict)  #: Labels of the bar, by value
 
     @classmethod
     def of(cls, field: Field, bounds: Span) -> Self:
-        """Return the colour scale of a field for values from the first to the second bound."""
+        """Return the colour scale of a field whose values lie between two bounds."""
         low, high = bounds
         if field.kind == "name":
             return cls(kind="name")
@@ -102,8 +102,9 @@ class ColourScale:
 def colour_field(name: str | None, run: Run) -> Field:
     """Return the field of a run by name or short name.
 
-    None stands for crossings, for smarticle_id if the run is planar, and for contacts, or kind, if bodies are no
-    smarticles. InputError if the name is unknown, or the run lacks the field.
+    The name None stands for "crossings", or for "smarticle_id" if the run is planar. If bodies are no smarticles, it
+    stands for "contacts", or for "kind" if there are several kinds of bodies. InputError if the name is unknown, or the
+    run lacks the field.
     """
     usual = "smarticle_id" if run.manifest.planar else "crossings"
     if run.manifest.kinds is not None:
@@ -116,7 +117,10 @@ def colour_field(name: str | None, run: Run) -> Field:
 
 
 def scalars(field: Field, frame: Frame, run: Run) -> Floats:
-    """Return one value of a field per link, (N, L) as of `link_values`: of vectors the length; NaN if there is none."""
+    """Return a field as one number per link, (N, L), see `link_values`.
+
+    A vector is replaced by its length. All numbers are NaN if the frame lacks the field.
+    """
     values = link_values(field, frame, run)
     if values is None:
         return np.full((frame.count, 1 + int(frame.link.max(initial=2))), np.nan)

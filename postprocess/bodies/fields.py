@@ -48,7 +48,7 @@ class Field:
     available_for: Callable[[Run], bool] = lambda _: True  #: Returns whether a run has the field
     costly: bool = False  #: Whether the field takes tenths of a second per frame or more
     label: str = ""  #: Text of the colour bar; the name if empty
-    shown: tuple[float, str] | None = None  #: Factor and unit of the numbers at the colour bar; None: SI
+    shown: tuple[float, str] | None = None  #: Factor from SI and unit of the numbers at the colour bar; None: SI
 
     @property
     def title(self) -> str:
@@ -126,7 +126,7 @@ def _pressed(frame: Frame, _: Run) -> Floats:
 
 
 def _chain(frame: Frame, _: Run) -> NDArray[Any]:
-    """Return the number of each smarticle's force chain, (N,); all numbers differ if there is no contact."""
+    """Return the number of each smarticle's force chain, (N,); without contacts, each has its own number."""
     try:
         return force_chains(frame).labels
     except UndefinedMeasureError:
@@ -248,7 +248,7 @@ BY_NAME: Mapping[str, Field] = MappingProxyType({field.name: field for field in 
 
 
 def fields_of(run: Run) -> tuple[Field, ...]:
-    """Return the fields that the frames of a run may have."""
+    """Return the fields that are available for a run, see `Field.available_for`."""
     return tuple(field for field in FIELDS if field.available_for(run))
 
 
@@ -263,7 +263,8 @@ def checked_field(name: str, aliases: Mapping[str, str] = MappingProxyType({})) 
 def link_values(field: Field, frame: Frame, run: Run) -> NDArray[Any] | None:
     """Return the values (N, L) or vectors (N, L, 3) of a field, one per link; None if the frame lacks it.
 
-    L is 3 for smarticles. Other bodies have up to L bars; places without a bar are filled with NaN, or 0.
+    N is the number of bodies. L is 3 for smarticles; other bodies have up to L bars, and the values of missing bars are
+    NaN, or 0 for a field of whole numbers.
     """
     values = field.take(frame, run)
     if values is None or (field.of == "link" and frame.bars is None):

@@ -1,6 +1,6 @@
 """Make meshes [m] of the bodies of a run in a frame: links, walls, floor, hooks, strings, forces.
 
-Meshes have the coordinates of the frames, z upwards, so that a shaken container moves, and the sizes of the simulation.
+Meshes have the coordinates of the frames, z upwards: a shaken container moves. They have the sizes of the simulation.
 A wall without a height in the scene ends above the highest smarticle; walls and strings have no thickness.
 """
 
@@ -48,7 +48,7 @@ class ChainStrings:
     anchors: Floats = field(repr=False)
 
     def lines(self, frame: Frame) -> Floats:
-        """Return the ends of both strings, (2, 2, 3) [m]: knot and anchor of each; (0, 2, 3) if untied."""
+        """Return the ends of both strings, (2, 2, 3) [m]: knot and anchor of each; (0, 2, 3) in other phases."""
         if frame.phase != self.phase:
             return np.empty((0, 2, 3))
         ends = self.anchors.copy()
@@ -112,7 +112,11 @@ def _lift(phase: SceneData, start: float | None) -> tuple[float, float, float] |
 
 
 def _cross(length: float, side: float, count: int, height: float) -> pv.PolyData:
-    """Return a hook: `count` bars along x and along y, cut to a disc, as in `dem.setting.hooks.Cross`."""
+    """Return the mesh of a hook: `count` bars along x, and along y, as in `dem.setting.hooks.Cross`.
+
+    Bars end on a circle with the diameter `length`; their cross-section is a square with the side `side`. Their axes
+    are at `height`. All are in [m].
+    """
     half, bars = side / 2, []
     for k in range(count):
         place = length * ((k + 1) / (count + 1) - 0.5)
@@ -280,7 +284,7 @@ class Bodies:
         return self.wall_at((0.0 if frame.phase in self.boundaries.floor_alone else floor) + raised)
 
     def wall_at(self, base: float) -> pv.PolyData:
-        """Return the wall of a container whose floor is at a height [m]."""
+        """Return the mesh [m] of the wall of a container whose floor is at the height `base` [m]."""
         corners = self.boundaries.corners
         if not corners:
             height, radius = self.boundaries.height, self.run.manifest.container_radius_m
@@ -438,7 +442,7 @@ def bar_meshes(bars: RecordedBars, kinds: Sequence[Kind]) -> pv.PolyData:
 
 
 def _prism(sides: int) -> tuple[Floats, Whole]:
-    """Return corners (along, in plane, normal) and triangles of a cylinder of unit length and diameter."""
+    """Return corners (2 sides, 3) and triangles (n, 3) of a cylinder along x, of unit length and diameter."""
     angles = 2 * math.pi * np.arange(sides) / sides
     disc = np.column_stack([np.cos(angles), np.sin(angles)]) / 2
     corners = np.concatenate([np.column_stack([np.full(sides, x), disc]) for x in (-0.5, 0.5)])
@@ -450,7 +454,10 @@ def _prism(sides: int) -> tuple[Floats, Whole]:
 
 
 def at_points(mesh: pv.PolyData, values: NDArray[Any]) -> NDArray[Any]:
-    """Return values (C, …) of the cells of a mesh at its points (P, …), which belong to one bar each."""
+    """Convert values of the cells of a mesh, (C, …), to values of its points, (P, …).
+
+    All cells at a point must have equal values.
+    """
     cells = mesh.GetPolys()
     ends, corners = (np.asarray(array) for array in (cells.GetOffsetsArray(), cells.GetConnectivityArray()))
     found = np.empty((mesh.n_points, *values.shape[1:]), dtype=values.dtype)

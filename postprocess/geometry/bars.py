@@ -10,11 +10,11 @@ from postprocess.geometry.links import Floats, Whole, centres_of_mass
 
 
 def centres_of_bodies(segments: Floats, body: Whole) -> Floats:
-    """Return the centres of mass (N, 3) [m] of bodies whose segments have one cross-section each.
+    """Return the centres of mass (N, 3) [m] of bodies; all segments of a body have equal cross-sections.
 
     Args:
         segments: (M, 2, 3) both ends of all segments [m].
-        body: (M,) index of the body that each belongs to, in ascending order and without gaps.
+        body: (M,) index of each segment's body: ascending, from 0, and without gaps.
     """
     lengths = np.linalg.norm(segments[:, 1] - segments[:, 0], axis=1)
     total = np.bincount(body, lengths)
@@ -23,7 +23,7 @@ def centres_of_bodies(segments: Floats, body: Whole) -> Floats:
 
 
 def body_centres(frame: Frame) -> Floats:
-    """Return the centres of mass (N, 3) [m] of all bodies of a frame; links are taken to have equal sections."""
+    """Return the centres of mass (N, 3) [m] of all bodies of a frame; links have equal cross-sections."""
     return centres_of_mass(frame.vertices) if frame.bars is None else centres_of_bodies(frame.segments, frame.body)
 
 
@@ -35,7 +35,7 @@ def body_volumes(frame: Frame, run: Run) -> Floats:
 
 
 def segment_volumes(frame: Frame, run: Run) -> Floats:
-    """Return the solid volumes (M,) [m³] of all segments of a frame of bodies that are no smarticles."""
+    """Return the solid volumes (M,) [m³] of all segments of a frame whose bodies are no smarticles."""
     areas = [
         kind.thickness_normal_m * kind.thickness_in_plane_m * (math.pi / 4 if kind.round else 1.0)
         for kind in run.manifest.kinds or ()

@@ -19,7 +19,7 @@ from postprocess.geometry.links import Floats, Whole
 from postprocess.geometry.segments import checked_segments
 
 UNITS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "µm": 1e-6, "μm": 1e-6}  #: Units of length, in metres
-BODY_FIELDS = ("body", "smarticle_id")  #: Cell data of VTK files that number the bodies, the first one found counts
+BODY_FIELDS = ("body", "smarticle_id")  #: Cell data with body numbers in VTK files; the first one found is used
 
 _REMEDY = "a CSV file needs columns body, x, y, z with one point per row, a VTK file needs lines"
 
@@ -165,7 +165,7 @@ def _numbered(points: Floats, lines: Whole, data: dict[str, NDArray[Any]]) -> _L
 
 
 def _factor(path: Path, unit: str) -> float:
-    """Return a unit of length in metres; InputError if it is unknown."""
+    """Return a unit of length in metres; InputError, which names the file `path`, if it is unknown."""
     if unit not in UNITS:
         raise InputError(f"{path}: unit {unit!r} is unknown; {nearest(unit, UNITS)}")
     return UNITS[unit]

@@ -2,7 +2,8 @@
 
 Frames hold the vertices of the centrelines alone. The spheres of a smarticle follow from its vertices and from the rows
 and the pitch of its chain. Several rows lie side by side along the normal of the smarticle's plane; a straight
-smarticle has no such plane, and an arbitrary plane through it is used.
+smarticle has no such plane, and an arbitrary plane through it is used. The engine `links` has strands in place of rows:
+the volumes that a sphere sweeps along the links.
 """
 
 from __future__ import annotations
@@ -113,7 +114,7 @@ def swept_axes(vertices: Floats, diameter: float) -> Floats:
 
 
 def plane_frames(vertices: Floats) -> Floats:
-    """Return right-handed axes (N, 3, 3) of each smarticle's best-fitting plane, the normal last.
+    """Return right-handed axes, the rows (N, 3, 3), of each smarticle's best-fitting plane, normal last.
 
     The normal is the direction in which the four vertices spread least, by singular value decomposition. It averages
     over vertices that are not quite in one plane. The normal of a straight smarticle is an arbitrary vector across it.
@@ -131,7 +132,7 @@ class Chain:
     diameter: float  #: Diameter of the spheres [m]
     rows: int  #: Number of rows or strands side by side along the smarticle's normal
     width: float  #: Total width of all rows, along the normal [m]
-    pitch: float  #: Largest distance of neighbouring centres along a link [m]; 0: strands, swept by a sphere
+    pitch: float  #: Largest distance of neighbouring spheres along a link [m]; 0 for strands
     bulge: float = 0.0  #: Extra thickness of the middle link on either side in the plane [m]; 0 for strands
 
 

@@ -20,7 +20,7 @@ from dem.errors import InputError
 from dem.record.frame import Frame
 from postprocess.geometry.links import Floats, Whole
 
-JOINED = 1e-6  #: Largest distance of two ends that are one corner, over the mean length of a segment [-]
+JOINED = 1e-6  #: Ends at most this far apart are one corner; over the mean length of a segment [-]
 
 
 class Segments(NamedTuple):
@@ -102,7 +102,7 @@ def curves(segments: ArrayLike, body: ArrayLike) -> tuple[Curve, ...]:
 
 
 def checked_curves(segments: ArrayLike, body: ArrayLike, what: str) -> tuple[Curve, ...]:
-    """Return `curves`; raise InputError that a body has no such quantity (`what`) if it is not one curve."""
+    """Return `curves`; raise InputError, which names the wanted quantity `what`, if a body is no curve."""
     found = curves(segments, body)
     for curve in found:
         if curve.flaw:
@@ -124,7 +124,7 @@ def padded(found: tuple[Curve, ...]) -> Floats:
 
 
 def extents(segments: ArrayLike, body: ArrayLike) -> Extents:
-    """Return the boxes around all bodies; InputError, see `checked_segments`."""
+    """Return the boxes around all bodies; `checked_segments` states the errors."""
     segments, body = checked_segments(segments, body)
     bodies, number = np.unique(body, return_inverse=True)
     low, high = np.full((len(bodies), 3), np.inf), np.full((len(bodies), 3), -np.inf)
@@ -151,7 +151,8 @@ def inner_axes(segments: Floats, radius: Floats) -> Floats:
 def close_segments(starts: Floats, ends: Floats, body: Whole, distance: float) -> tuple[Whole, Whole]:
     """Find pairs of segments of different bodies whose bounding spheres are at most a distance [m] apart.
 
-    Segments are given by starts and ends (M, 3) [m] and their bodies (M,). All nearer pairs are found.
+    Segments are given by starts and ends (M, 3) [m] and their bodies (M,). Returns the indices of the first and of the
+    second segment of each of the P pairs, (P,) each.
     """
     if len(starts) == 0:
         return np.empty(0, dtype=np.int64), np.empty(0, dtype=np.int64)
@@ -184,7 +185,10 @@ def nearest_points(first: Floats, second: Floats) -> tuple[Floats, Floats]:
 
 
 def _corner_numbers(segments: Floats) -> Whole:
-    """Number the corners at which segments meet, also those of different bodies: (M, 2), one number per end."""
+    """Number the points at which ends of segments meet: (M, 2), one number per end.
+
+    Ends of different bodies that meet have equal numbers, too.
+    """
     points = segments.reshape(-1, 3)
     if len(points) == 0:
         return np.empty((0, 2), dtype=np.int64)
@@ -196,7 +200,11 @@ def _corner_numbers(segments: Floats) -> Whole:
 
 
 def _walk(ends: Whole) -> tuple[list[int], bool, str]:
-    """Follow m segments from corner to corner: numbers 2 s + e of the ends passed, whether closed, the flaw."""
+    """Follow the segments of a body from corner to corner, by the corner numbers (m, 2) of their ends.
+
+    Returns the corners in order, each as the number 2 s + e of end e (0 or 1) of segment s; whether the curve is
+    closed; and the flaw, see `Curve.flaw`, with which there are no corners.
+    """
     at: dict[int, list[int]] = {}
     for number, corner in enumerate(ends.ravel().tolist()):
         at.setdefault(corner, []).append(number)

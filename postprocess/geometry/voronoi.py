@@ -78,7 +78,7 @@ def local_packing(
 
 
 def _sample(vertices: Floats, spacing: float) -> tuple[Floats, Whole]:
-    """Return points (n, 3) [m] at equal distances along links, not at hinges, and their smarticles (n,)."""
+    """Return points (n, 3) [m] at equal distances along links, not at hinges, and smarticle indices (n,)."""
     # Rounding of lengths must not give one of several equal links an extra point.
     cuts = np.ceil(link_lengths(vertices) / spacing - 1e-6).astype(int).ravel()
     link = np.repeat(np.arange(len(cuts)), cuts)
@@ -90,7 +90,7 @@ def _sample(vertices: Floats, spacing: float) -> tuple[Floats, Whole]:
 
 
 def _mirrored(points: Floats, container: Region, lid: float, band: float) -> Floats:
-    """Return the mirror images of points that are nearer to floor, lid or wall than `band` [m]."""
+    """Return mirror images of points nearer than `band` [m] to floor, wall, or lid at the height `lid`."""
     floor = points[points[:, 2] < container.bottom + band] * [1, 1, -1]
     floor[:, 2] += 2 * container.bottom
     top = points[points[:, 2] > lid - band] * [1, 1, -1]

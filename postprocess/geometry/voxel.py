@@ -31,7 +31,7 @@ _TURN = Rotation.from_quat([2**0.5 - 1, 3**0.5 - 1, 5**0.5 - 2, 1.0]).as_matrix(
 class Region:
     """An upright cylinder around x = y = 0."""
 
-    radius: float  #: [m]
+    radius: float  #: Radius [m]
     bottom: float  #: Height of the lower end [m]
     top: float  #: Height of the upper end [m]
 
@@ -42,7 +42,7 @@ class Region:
 
     @property
     def inner(self) -> Region:
-        """The inner cylinder of 0.75 r, from 20 % to 80 % of the height, away from wall, floor and surface."""
+        """Inner cylinder away from wall, floor and surface: 0.75 of the radius, 20 % to 80 % of the height."""
         height = self.top - self.bottom
         return Region(radius=0.75 * self.radius, bottom=self.bottom + 0.2 * height, top=self.bottom + 0.8 * height)
 
@@ -85,8 +85,8 @@ def solid_points(
 ) -> tuple[Floats, float]:
     """Find the points of a cubic grid that lie inside the boxes of the links; return also their pitch [m].
 
-    Points (n, 3) [m] are returned once each. The cross-section of a straight smarticle may be turned around its length
-    by any angle, which its vertices do not determine; an arbitrary angle is used. InputError for bad sizes.
+    Each of the points (n, 3) [m] is returned once. The cross-section of a straight smarticle may be turned around its
+    length by any angle, which its vertices do not determine; an arbitrary angle is used. InputError for bad sizes.
 
     Args:
         thickness_normal: t1, along the normal of the smarticle's plane [m].
@@ -111,7 +111,9 @@ def solid_points(
 def _grid_points(
     vertices: Floats, normal: float, in_plane: float, pitch: float, region: Region | None
 ) -> Iterator[Whole]:
-    """Yield indices (n, 3) of points of the rotated grid inside the boxes; an index may be repeated.
+    """Yield indices (n, 3) of grid points inside the boxes of the links; an index may be repeated.
+
+    The grid is rotated by `_TURN`. Arguments are those of `solid_points`.
 
     Each box is cut into pieces about as long as thick, so that few grid points must be tested for each piece.
     """

@@ -36,7 +36,7 @@ _BALANCE = 1e-9
 class ContactNormals(NamedTuple):
     """P contacts between segments of different bodies; both bodies of a contact have a row."""
 
-    body: Whole  #: (P,) int64, index of the body, by ascending number
+    body: Whole  #: (P,) int64, index of the body in the ascending order of body numbers
     point: Floats  #: (P, 3) [m], point of contact
     normal: Floats  #: (P, 3) unit vector [-], into the body
 
@@ -47,8 +47,10 @@ class Cages:
 
     bodies: Whole = field(repr=False)  #: (B,) int64, numbers of the bodies
     contacts: Whole = field(repr=False)  #: (B,) int64, contacts of each body's segments with those of other bodies
-    translation: Flags = field(repr=False)  #: (B,) bool, whether contacts block all translations that they can block
-    motion: Flags = field(repr=False)  #: (B,) bool, whether contacts block all motions that they can block
+    #: (B,) bool, whether its contacts block all translations of the body, except those that no contact can block
+    translation: Flags = field(repr=False)
+    #: (B,) bool, whether its contacts block all rigid motions of the body, except those that no contact can block
+    motion: Flags = field(repr=False)
     #: (B,) float64 [-], fraction of all directions in which contacts let the body move, 1 without contact; found on a
     #: set of 2000 directions, so that less than 0.001 may be 0
     free: Floats = field(repr=False)
@@ -96,8 +98,8 @@ def caging_number(segments: ArrayLike, *, trials: int = 400, seed: int = 0) -> S
 
     Contacts are independent, and equally likely everywhere on the sides of the round segments. Motions that no such
     contact can block do not count: a rod has 4 motions, every other shape 6. The number of a rod is 9, twice its
-    motions plus one; that of a U with equal links is 14.6. A pile in which bodies have fewer contacts than this number
-    cages them by order, or not at all.
+    motions plus one; that of a U with equal links is 14.6. In a pile with fewer contacts per body, bodies are caged
+    only if contacts are not random.
 
     Args:
         segments: (M, 2, 3) segments of one body [m].
@@ -143,7 +145,7 @@ def caging_number(segments: ArrayLike, *, trials: int = 400, seed: int = 0) -> S
 
 
 def contact_normals(segments: Floats, number: Whole, *, diameter: ArrayLike, gap: float = 0.0) -> ContactNormals:
-    """Find the contacts of round segments; arguments as of `cages`, with indices (M,) of bodies."""
+    """Find contacts of segments whose bodies have the indices `number` (M,); other arguments: see `cages`."""
     sizes = np.asarray(diameter, dtype=np.float64)
     if sizes.shape not in {(), (len(segments),)} or not np.all(np.isfinite(sizes) & (sizes > 0)) or not gap >= 0:
         raise InputError(
@@ -166,9 +168,9 @@ def contact_normals(segments: Floats, number: Whole, *, diameter: ArrayLike, gap
 
 
 def positively_spans(vectors: Floats) -> bool:
-    """Return whether each vector of a space is a sum of vectors (P, d) with coefficients of 0 or more.
+    """Return whether every d-dimensional vector is a sum of vectors (P, d) with coefficients of 0 or more.
 
-    Then, and only then, v · n ≥ 0 for all vectors n has no solution but v = 0.
+    If n are the normals of contacts, this means that v = 0 is the only motion v with v · n ≥ 0 for all n.
     """
     count, rank = vectors.shape
     if count <= rank or np.linalg.matrix_rank(vectors, tol=_RANK * count) < rank:
@@ -179,14 +181,15 @@ def positively_spans(vectors: Floats) -> bool:
 
 
 def _wrenches(points: Floats, normals: Floats) -> Floats:
-    """Return forces and moments (P, 6) of unit forces at points (P, 3)."""
+    """Return the wrenches (P, 6), force and moment, of unit forces along normals (P, 3) at points (P, 3)."""
     return np.concatenate([normals, np.cross(points, normals)], axis=1)
 
 
 def _sides(axes: Floats) -> Floats:
-    """Return wrenches (4 m, 6) that span those of all contacts on the sides of segments (m, 2, 3).
+    """Return wrenches (4 m, 6) whose linear span has the wrenches of all contacts on a body's sides.
 
-    Moments are about the middle, over the size, so that all components are comparable.
+    A wrench is a unit force and its moment. Moments are about the middle of the segments (m, 2, 3) and divided by their
+    size, see `_size`, so that all components are comparable.
     """
     middle, size = _size(axes)
     ends = (axes - middle) / size
@@ -202,7 +205,7 @@ def _basis(vectors: Floats) -> Floats:
 
 
 def _size(axes: Floats) -> tuple[Floats, float]:
-    """Return the middle (3,) and the size [m] of a body's segments: mean corner, and largest distance from it."""
+    """Return the mean of the ends of a body's segments, (3,) [m], and the largest distance from it [m]."""
     middle = axes.mean(axis=(0, 1))
     return middle, float(np.linalg.norm(axes - middle, axis=2).max())
 

@@ -1,9 +1,9 @@
-"""Compute linking numbers of closed curves, and of open curves closed straight; and the writhe of curves.
+"""Compute writhes of curves, and linking numbers of curves that are closed or are closed by a line.
 
-The linking number of two closed curves is a whole number, which no motion changes in which the curves do not pass
-through each other. An open curve is closed by the straight line between its free ends, as across the mouth of a U. The
-number is then whole too, but it changes where a body passes through that line. `postprocess.measures.linking` has the
-integral of open curves.
+The linking number of two closed curves is a whole number. It does not change unless the curves pass through each other.
+An open curve is closed by the straight line between its free ends, as across the mouth of a U. The number is then whole
+too, but it changes where a body passes through that line. `postprocess.measures.linking` has the integral of open
+curves.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ class ClosedLinking:
     """Linking numbers of the P linked pairs of B bodies; all other pairs have 0."""
 
     bodies: Whole = field(repr=False)  #: (B,) int64, numbers of the bodies
-    closed: Flags = field(repr=False)  #: (B,) bool, False for bodies that were closed straight
+    closed: Flags = field(repr=False)  #: (B,) bool, False for bodies that a straight line had to close
     i: Whole = field(repr=False)  #: (P,) int64, index in `bodies` of the first body of each pair
     j: Whole = field(repr=False)  #: (P,) int64, index in `bodies` of the second body, above i
     #: (P,) float64 [-], whole numbers; the sign depends on the directions of the curves; NaN if the integral is not
@@ -100,10 +100,11 @@ def closed_linking(segments: ArrayLike, body: ArrayLike) -> ClosedLinking:
 
 
 def writhe(corners: ArrayLike, *, closed: bool) -> float:
-    """Compute the writhe of a polygonal curve: the signed number of its own crossings, over all directions of view.
+    """Compute the writhe of a polygonal curve: the mean signed number of crossings with itself [-].
 
-    The value is exact for the polygon; it is 0 for a plane curve, changes its sign in a mirror, and does not depend on
-    the direction along the curve. For an open curve it is the integral over the curve as it is, without a closure.
+    The mean is over all directions of view. The value is exact for the polygon; it is 0 for a plane curve, changes its
+    sign in a mirror, and does not depend on the direction along the curve. For an open curve it is the integral over
+    the curve as it is, without a closure.
 
     Args:
         corners: (n, 3) corners in order [m]; a closed curve does not repeat its first corner.

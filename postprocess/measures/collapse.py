@@ -63,7 +63,7 @@ class ColumnHistory:
     """Heights of one column against time."""
 
     times: Floats  #: (n,) times since the vibration began [s]; negative before
-    heights: Floats  #: (n,) heights over `before` [-]
+    heights: Floats  #: (n,) heights divided by `before` [-]
     before: float  #: Mean height in the last `REST` seconds before the vibration [m]; a fraction [-] for `REMAINING`
 
 

@@ -71,10 +71,10 @@ def pairs_in_contact(frame: Frame, run: Run) -> ContactPairs:
 
     Two smarticles touch if a sphere or strand of one touches a sphere or strand of the other.
 
-    On links the number of pairs is exactly that of the engine, in all phases. On YADE it is exact at rest after
-    pouring; it deviates by at most 1.4 % while pouring and 0.7 % at rest after shaking. While a pile is shaken it is
-    6 to 11 % too high, because contacts that open carry no force. These numbers are from runs of 40 smarticles at
-    draft, 60 at standard and 30 at reference fidelity.
+    On the engine `links` the number of pairs is exact in all phases. On YADE it is exact at rest after pouring; it
+    deviates by at most 1.4 % while pouring and 0.7 % at rest after shaking. While a pile is shaken it is 6 to 11 % too
+    high, because contacts that open carry no force. These numbers are from runs of 40 smarticles at draft, 60 at
+    standard and 30 at reference fidelity.
 
     Returns:
         The pairs, with the least distance of two sphere centres or of two strands' axes.
@@ -103,18 +103,19 @@ def chain_of(run: Run) -> Chain:
 
 
 class Strands(NamedTuple):
-    """K axes of the swept spheres that represent the bodies of a frame in an engine."""
+    """K strands: spheres that are swept along straight axes, and represent the bodies of a frame."""
 
     axes: Floats  #: (K, 2, 3) float64 [m], both ends of each axis; they coincide for links of length 0
     body: Whole  #: (K,) int64, index of the body
     link: Whole  #: (K,) int64, number of the link, or bar, in its body
-    diameter: Floats  #: (K,) float64 [m], of the sphere
+    diameter: Floats  #: (K,) float64 [m], diameter of the swept sphere
 
 
 def strands_of(frame: Frame, run: Run) -> Strands:
-    """Return the strands of all bodies of a frame on links; on other engines the hulls of the chains of spheres.
+    """Return the strands that represent all bodies of a frame in the run's engine.
 
-    Strands that touch agree with the engine links exactly, for smarticles and for other bodies.
+    Those of the engine `links` are exact: strands touch where they touch in the run. For an engine with chains of
+    spheres they are the envelopes of the chains.
     """
     chain = chain_of(run)
     if frame.bars is None:
@@ -135,7 +136,9 @@ def strands_of(frame: Frame, run: Run) -> Strands:
 
 
 def _offsets(kind: Kind, rows: int) -> Floats:
-    """Return the offsets of a bar's strands along its normal [m]: rows have a meaning only across a wide flat side.
+    """Return the offsets (n,) [m] of a bar's strands from its axis, along its normal.
+
+    A bar with a flat side wider than a strand has n = `rows` strands; every other bar has one strand on its axis.
 
     Source:
         `dem.scene.scene.Scene.mixture`, `dem.engine.links.shapes.rigid_shape`.
@@ -155,7 +158,7 @@ def pairs_of_spheres(centres: Floats, diameter: float) -> ContactPairs:
 
 
 def _merged(a: Whole, b: Whole, gaps: Floats, count: int) -> ContactPairs:
-    """Merge all contacts a[k], b[k] of two smarticles into one pair with the least gap; drop a[k] == b[k].
+    """Merge all contacts of smarticles a[k] and b[k] into one pair with the least gap; drop a[k] == b[k].
 
     `a`, `b` and `gaps` [m] have the shape (n,); `count` is the number of smarticles.
     """

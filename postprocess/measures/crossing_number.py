@@ -89,7 +89,7 @@ def average_crossing_numbers(segments: ArrayLike, body: ArrayLike) -> CrossingNu
 
 
 def crossing_field(segments: ArrayLike, body: ArrayLike, points: ArrayLike, *, radius: float) -> Floats:
-    """Compute the local average crossing number, of the parts of all bodies within a ball around each point.
+    """Compute the average crossing number of the parts of all bodies within a ball around each point.
 
     Segments are cut where they leave the ball, so that the field does not depend on how bodies are divided into
     segments. The cost is 0.3 µs per point and pair of segments in its ball.
@@ -144,7 +144,7 @@ def grid_points(segments: ArrayLike, pitch: float) -> Floats:
 
 
 def region_spans(inside: Flags, axis: int) -> bool:
-    """Return whether one connected region of a grid (X, Y, Z) joins its first to its last layer along an axis.
+    """Return whether a connected region of a grid (X, Y, Z) joins first and last layer along an axis.
 
     Regions of true values are connected through faces of cells. `crossing_field(…) > threshold` is such a grid.
 
@@ -156,7 +156,7 @@ def region_spans(inside: Flags, axis: int) -> bool:
 
 
 def _clipped(segments: Floats, radius: float) -> tuple[Floats, Flags]:
-    """Return the parts of segments inside a ball at the origin, and which segments have one: (m, 2, 3), (M,)."""
+    """Return parts (m, 2, 3) of segments in a ball around the origin, and which segments reach it, (M,)."""
     start, along = segments[:, 0], segments[:, 1] - segments[:, 0]
     square, mixed = (along**2).sum(axis=1), (start * along).sum(axis=1)
     root = mixed**2 - square * ((start**2).sum(axis=1) - radius**2)

@@ -79,7 +79,8 @@ class PolygonCrossings:
     """Crossings of B bodies, and the P ordered pairs (i, j) where j passes through the polygon of i."""
 
     bodies: Whole = field(repr=False)  #: (B,) int64, numbers of the bodies
-    crossings: Whole = field(repr=False)  #: (B,) int64, segments of others through the polygon; 0 without a polygon
+    #: (B,) int64, number of segments of other bodies through the body's polygon; 0 without a polygon
+    crossings: Whole = field(repr=False)
     flaws: tuple[str, ...] = field(repr=False)  #: (B,) reason why a body spans no polygon; empty if it spans one
     i: Whole = field(repr=False)  #: (P,) int64, index in `bodies` of the body that is crossed
     j: Whole = field(repr=False)  #: (P,) int64, index in `bodies` of the body that passes through
@@ -92,7 +93,7 @@ class PolygonCrossings:
 
     @property
     def mean(self) -> float:
-        """Mean crossings of the bodies that span a polygon [-]."""
+        """Mean number of crossings of the bodies that span a polygon [-]."""
         return float(self.crossings[self.has_polygon].mean())
 
 

@@ -40,7 +40,7 @@ def checked_forces(normal: ArrayLike) -> Floats:
 
 
 def strong_contacts(normal: ArrayLike) -> Flags:
-    """Return which contacts are strong, with a normal force above the mean: (M,) bool for (M,) [N].
+    """Return which of M contacts are strong, (M,) bool: those with a normal force (M,) [N] above the mean.
 
     Raises:
         InputError: Not (M,) finite numbers above 0.

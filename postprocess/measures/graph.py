@@ -24,7 +24,7 @@ from postprocess.measures.entanglement import PolygonCrossings
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class EntanglementGraph:
-    """P links between B bodies."""
+    """Graph of B bodies, with a link for each of the P pairs that are entangled."""
 
     bodies: Whole = field(repr=False)  #: (B,) int64, numbers of the bodies
     i: Whole = field(repr=False)  #: (P,) int64, index in `bodies` of the first body of each link
@@ -43,21 +43,21 @@ class EntanglementGraph:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class LinkLifetimes:
-    """Times of L links; a link that breaks and forms again counts twice."""
+    """Times at which L links form and break; a link that breaks and forms again counts twice."""
 
     first: Whole = field(repr=False)  #: (L,) int64, number of the first body
     second: Whole = field(repr=False)  #: (L,) int64, number of the second body
     begin: Floats = field(repr=False)  #: (L,) float64 [s], time of the first graph with the link
     end: Floats = field(repr=False)  #: (L,) float64 [s], time of the next graph without it, or the last time
-    formed: Flags = field(repr=False)  #: (L,) bool, False for links of the first graph
-    broken: Flags = field(repr=False)  #: (L,) bool, False for links of the last graph
+    formed: Flags = field(repr=False)  #: (L,) bool, whether the link formed after the first graph
+    broken: Flags = field(repr=False)  #: (L,) bool, whether the link broke, so that the last graph lacks it
     observed: float  #: Time from the first to the last graph [s]
 
     @property
     def mean(self) -> float:
-        """Mean lifetime [s]: time of all links over the number that broke; NaN if none broke.
+        """Mean lifetime [s]: total time of all links over the number of links that broke; NaN if none broke.
 
-        The maximum-likelihood mean of exponential lifetimes, some of which last beyond the observation.
+        It is the maximum-likelihood estimate for exponential lifetimes of which some last beyond the observation.
         """
         broken = int(self.broken.sum())
         return float((self.end - self.begin).sum() / broken) if broken else math.nan

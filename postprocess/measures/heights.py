@@ -102,7 +102,7 @@ def _filled_height(ends: Floats, weights: Floats, percentile: float) -> float:
 
 
 def frame_heights(frame: Frame, run: Run) -> Heights:
-    """Compute the heights of the pile of a frame, with bodies of any shape; UndefinedMeasureError without bodies."""
+    """Compute the heights of a frame's pile of bodies of any shape; UndefinedMeasureError without bodies."""
     if frame.bars is None:
         return heights(frame.vertices, floor_z=frame.floor_z)
     com = body_centres(frame)[:, 2] - frame.floor_z

@@ -40,8 +40,9 @@ class Linking:
 def linking(vertices: Vertices) -> Linking:
     """Compute the linking numbers of all pairs of smarticles whose bounding spheres overlap.
 
-    A smarticle is the open chain tip, hinge, hinge, tip. Pairs whose bounding spheres do not overlap cannot hook. Their
-    linking numbers fall only with the square of the distance, so that a sum over all pairs would grow with the pile.
+    A smarticle is the open chain tip, hinge, hinge, tip. Pairs whose bounding spheres do not overlap cannot hook
+    into each other, but their linking numbers fall only with the square of the distance: a sum over all pairs would
+    grow with the pile.
 
     Source:
         See `gauss_integral`. The integral of open chains as a measure of entanglement: Panagiotou, Kröger & Millett,
@@ -112,7 +113,7 @@ def gauss_integral(first: ArrayLike, second: ArrayLike) -> Floats:
 def segment_integrals(first: Floats, second: Floats) -> Floats:
     """Compute Gauss's integrals of all pairs of straight segments (R, 2, 3) and (C, 2, 3) [m]: (R, C).
 
-    Formulas and convention are those of `gauss_integral`; six times as fast for many segments.
+    The result is that of `gauss_integral`, but for many segments six times as fast.
     """
     # Components come first, so that every operation runs over contiguous arrays.
     p, q = np.moveaxis(first, 0, 2)[..., None], np.moveaxis(second, 0, 2)[:, :, None]

@@ -29,7 +29,7 @@ class NematicOrder:
     #: Nematic order parameter S, the largest eigenvalue of Q [-]: 1 if all u are parallel, 1/4 if they are random in a
     #: plane, and on average about 0.8 / N^½ for N random u in space
     order: float
-    director: Floats  #: (3,) eigenvector of S, a unit vector that points upwards
+    director: Floats  #: (3,) eigenvector of Q with the eigenvalue S, a unit vector that points upwards
 
     @property
     def polar_angle(self) -> float:
@@ -47,11 +47,11 @@ class PolarOrder:
     """Polar order of unit vectors u, which depends on their signs."""
 
     vector: Floats  #: (3,) mean of u [-]; its z-component is the mean cosine of the angle from the vertical
-    order: float  #: Length of the mean [-]: 1 if all u are equal, on average 0.92 / N^½ for N random u
+    order: float  #: Length of `vector` [-]: 1 if all u are equal, on average 0.92 / N^½ for N random u
 
 
 def nematic_order(directions: ArrayLike, weights: ArrayLike | None = None) -> NematicOrder:
-    """Compute the nematic order of vectors (N, 3) of any length above 0, with weights (N,) if they are given.
+    """Compute the nematic order of vectors (N, 3) of any length above 0, with optional weights (N,).
 
     Raises:
         InputError: Not (N, 3) finite vectors of a length above 0, or not N weights above 0.
@@ -96,7 +96,7 @@ def polar_order(directions: ArrayLike) -> PolarOrder:
 
 
 def segment_order(segments: ArrayLike, body: ArrayLike) -> NematicOrder:
-    """Compute the nematic order of all segments, weighted by their lengths; it needs no axis of the bodies.
+    """Compute the nematic order of the directions of all segments, weighted by their lengths.
 
     Raises:
         InputError: See `checked_segments`.
@@ -167,7 +167,7 @@ def _opening(curve: Curve) -> tuple[Floats, str]:
 
 
 def _centres(middles: Floats, lengths: Floats, number: Whole) -> Floats:
-    """Return centres of mass (B, 3) of bodies by middles (M, 3), lengths (M,) and bodies (M,) of segments."""
+    """Return centres of mass (B, 3) [m] by middles (M, 3), lengths (M,) and body numbers (M,) of segments."""
     sums, total = np.zeros((int(number.max(initial=-1)) + 1, 3)), np.bincount(number, lengths)
     np.add.at(sums, number, lengths[:, None] * middles)
     return sums / total[:, None]

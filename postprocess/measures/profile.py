@@ -25,7 +25,7 @@ class PackingProfile:
 
     @property
     def volumes(self) -> Floats:
-        """(R, Z) volumes of the cells [m³]."""
+        """Volumes of the cells: (R, Z) [m³]."""
         volumes: Floats = math.pi * np.outer(np.diff(self.radii**2), np.diff(self.heights))
         return volumes
 

@@ -32,16 +32,16 @@ class HookPull:
     """Forces and heights of the two hooks during a pull of the upper hook, at n samples."""
 
     edges: Floats = field(repr=False)  #: (n + 1,) times [s]: 0 at the last sample before the pull, then the n samples
-    raised: Floats = field(repr=False)  #: (n + 1,) distance by which the hook has been raised at these times [m]
-    force: Floats = field(repr=False)  #: (n,) force that raises the hook, mean between two times [N]
-    #: (n,) upward force of the smarticles on the lower hook, mean between two times [N]: the load that it bears
+    raised: Floats = field(repr=False)  #: (n + 1,) distance by which the upper hook has been raised at `edges` [m]
+    force: Floats = field(repr=False)  #: (n,) force that raises the upper hook, mean between two `edges` [N]
+    #: (n,) upward force of the smarticles on the lower hook, mean between two `edges` [N]
     held: Floats = field(repr=False)
-    before: float  #: Mean force on the hook before the pull [N]: weight resting on it; negative if it is pushed up
+    before: float  #: Mean force on the upper hook before the pull [N]: weight on it; negative if pushed up
     engine_work: float  #: Work of the hook on the smarticles by the engine's energy ledger [J]; NaN if not recorded
 
     @property
     def times(self) -> Floats:
-        """(n,) middles of the intervals over which forces are averaged, since the pull began [s]."""
+        """Middles of the intervals over which forces are averaged: (n,) times since the pull began [s]."""
         middles: Floats = (self.edges[:-1] + self.edges[1:]) / 2
         return middles
 
@@ -136,7 +136,7 @@ def freed(pull: HookPull) -> float:
 def held_fast(pull: HookPull, asked: SceneData) -> bool:
     """Return whether the force limit stopped the hook of a finished pull.
 
-    The peak force is then a lower bound. `asked` is the data of the phase in the scene.
+    The peak force is then a lower bound. `asked` is the scene's entry for this phase.
     """
     if asked.get("force_limit_N") is None:
         return False  # nothing else stops a hook
@@ -168,7 +168,7 @@ def has_pull(series: Series, phase: int) -> bool:
 
 
 def _samples(edges: Floats, window: float) -> int:
-    """Return the number of samples in a window [s]: at least one, at most all."""
+    """Return the number of samples in a window [s], at least 1 and at most all, by the times `edges`."""
     return min(max(round(window / float(np.median(np.diff(edges)))), 1), len(edges) - 1)
 
 

@@ -25,18 +25,18 @@ _PACKAGE = __name__.rpartition(".")[0]
 
 @dataclass(frozen=True, kw_only=True)
 class Shown:
-    """Format of a quantity in the short tables that commands print, which have some of the columns."""
+    """Format of a quantity in the short tables that commands print; short tables omit many quantities."""
 
     heading: str  #: Heading of the column, with the unit of its numbers
     place: int  #: Order of the columns: lower numbers come first
-    form: str  #: Format of the number
+    form: str  #: Format specification of the number, such as `.3f`
     factor: float = 1.0  #: Factor from the SI unit to the unit of the heading [-]
     with_error: bool = False  #: Whether a column with the standard error follows
 
 
 @dataclass(frozen=True)
 class Quantity:
-    """One column of a table; its header is `com height [m]`."""
+    """One column of a table; its header has label and unit, such as `com height [m]`."""
 
     label: str  #: Name of the quantity
     unit: str  #: SI unit, or "-" for a pure number, "degree", "smarticles"
@@ -72,7 +72,7 @@ class FrameMeasure:
 
 
 def measure_of(function: Callable[[Frame, Run], float] | FrameMeasure) -> FrameMeasure:
-    """Return a function of a frame and its run as a measure; its name ends with the unit: `top_m`, `speed_m_per_s`."""
+    """Make a measure from a function whose name has quantity and unit, such as `speed_m_per_s`."""
     if isinstance(function, FrameMeasure):
         return function
     label, unit = unit_of(function.__name__)
@@ -109,7 +109,7 @@ def any_in_space(run: Run) -> bool:
 
 
 def rigid_in_space(run: Run) -> bool:
-    """Return whether the bodies of a run keep their shape, so that it may span a plane, and move in space."""
+    """Return whether the bodies of a run are rigid and move in three dimensions, not in a plane."""
     return any_in_space(run) and not is_flexible(run)
 
 
@@ -130,7 +130,7 @@ def in_one_cylinder(run: Run) -> bool:
 
 @cache
 def registered() -> tuple[FrameMeasure | PhaseMeasure, ...]:
-    """Return all measures of this package, in alphabetical order of their modules, and of installed packages.
+    """Return the measures of this package, by module in alphabetical order, and of installed packages.
 
     ValueError if two measures have one name, or two quantities one header.
     """
@@ -174,7 +174,7 @@ def frame_measures(definitions: Sequence[str], also: Collection[str] = ()) -> tu
     So are measures `on_request`, unless their names are among `also`.
 
     Raises:
-        InputError: There is no measure on request of a name.
+        InputError: A name in `also` is not that of a measure `on_request`.
     """
     asked = {m.name: m for m in registered() if isinstance(m, FrameMeasure) and m.on_request}
     for name in also:

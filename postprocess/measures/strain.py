@@ -76,7 +76,7 @@ class StrainTest:
     forces: Floats  #: (n,) forces of the pulled string along +x [N]
     held: Floats  #: (n,) forces of the fixed string along -x [N]
     widths: Floats  #: (n,) widths of the chain [m]
-    walls: Floats  #: (n,) outward force on a wall of the channel, the larger of the two [N]
+    walls: Floats  #: (n,) outward force on the more loaded wall of the channel [N]
 
     @property
     def fracture(self) -> int:
@@ -122,7 +122,7 @@ def read_strain_test(run: Run) -> StrainTest:
 
 
 def measured(pull: StrainTest) -> dict[str, float]:
-    """Compute the quantities of a strain test; the keys of the result are those of `QUANTITIES`."""
+    """Compute the quantities of a strain test, by their columns; `QUANTITIES` has the meanings."""
     end = pull.fracture + 1
     strains, forces = pull.strains[:end], pull.forces[:end]
     peak = int(np.argmax(forces))
@@ -174,8 +174,8 @@ def first_drop(forces: Floats) -> tuple[int, float]:
 def _slopes(strains: Floats, forces: Floats) -> tuple[float, float]:
     """Return the slope of force (n,) [N] against strain (n,) [-] at the start of a pull, and its change.
 
-    The slope [N] is from 20 % to 80 % of the last force. The change [-] is the slope from 50 % to 80 % over the slope
-    from 20 % to 50 %. Both are NaN if a range has fewer than three samples.
+    The slope [N] is fitted where the force is 20 % to 80 % of the last force. The change [-] is the slope at 50 % to
+    80 % over the slope at 20 % to 50 %. Both are NaN if a range has fewer than three samples.
     """
     top = forces[-1]
     ranges = ((0.2, 0.8), (0.2, 0.5), (0.5, 0.8))

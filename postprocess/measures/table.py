@@ -194,7 +194,7 @@ def _rows(
     *,
     offset: int = 0,
 ) -> list[dict[str, object]]:
-    """Return one row per frame of a part of one phase; `offset` is the number of the first frame."""
+    """Return a row of the table for each frame of a part of a phase; `offset` is the first frame's number."""
     rows: list[dict[str, object]] = []
     measures = [measure for measure in known if measure.available_for(run)]
     made = run.manifest

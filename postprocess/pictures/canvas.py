@@ -89,7 +89,7 @@ class Style:
         return float(max(width / (_FILL * self.size[0]), height / (_FILL * free))) or 1.0
 
     def panel(self, image: Image.Image) -> Image.Image:
-        """Return a picture without the space of captions and bars."""
+        """Cut the strips with captions and bars, at the top and the bottom, off a picture."""
         return image.crop((0, round(_HEAD * self.unit), image.width, image.height - round(_FOOT * self.unit)))
 
 
@@ -103,7 +103,7 @@ class Subject:
         self.frames = read_frames(directory)
 
     def extent(self, indices: Iterable[int], axes: Floats) -> Floats:
-        """Return the lower left and upper right (2, 2) [mm] of some frames in the plane of the picture."""
+        """Return lower left and upper right (2, 2) [mm] of the bodies in some frames, in the picture's plane."""
         return union([extent(visible_meshes(self.bodies, self.frames[i], axes[2]).values(), axes) for i in indices])
 
     def values(self, indices: Iterable[int], style: Style) -> list[Floats]:
@@ -190,7 +190,7 @@ class Canvas:
 
     Args:
         extent: (2, 2) extent in the camera's view [mm].
-        run: Run whose smarticles set the range of the shading of corners.
+        run: Run whose link size sets the range of the shading of corners (ambient occlusion).
         columns: Number of panels.
         scale: Colour scale; None: no colour bar.
         quick: Whether to leave out the shading of corners, which takes most of the time of a picture.

@@ -58,8 +58,8 @@ def ranks_within(values: Floats, strata: Whole) -> Floats:
 def correlation_within(x: Sequence[float], y: Sequence[float], blocks: Sequence[Hashable]) -> SeedMean:
     """Average Spearman's rank correlation of y (n,) with x (n,) over blocks (n,) in which both vary.
 
-    Give a y of which only a lower bound is known as `inf`, which has the highest rank. Points with NaN are left out.
-    The standard error follows from the scatter over blocks. It is NaN for fewer than six blocks, because five
+    A y that is only known to exceed a bound must be given as `inf`, which has the highest rank. Points with NaN are
+    left out. The standard error follows from the scatter over blocks. It is NaN for fewer than six blocks, because five
     correlations all have the same sign by chance in more than 5 % of all cases.
     """
     parts: dict[Hashable, list[tuple[float, float]]] = {}
@@ -87,7 +87,7 @@ def common_slopes(x: Floats, y: Floats, strata: Whole) -> Floats:
 
 
 def interval(value: float, drawn: Sequence[float]) -> Interval:
-    """Return a value with its 95 % interval, by percentiles of resampled values.
+    """Return a value with its 95 % interval, by percentiles of the resampled values `drawn`.
 
     If more than a tenth of the resampled values are not finite, the interval is NaN.
     """

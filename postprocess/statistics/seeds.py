@@ -92,7 +92,7 @@ def mean_with_error(samples: ArrayLike) -> Mean:
 
 
 def _correlation_time(deviations: Floats) -> float:
-    """Return the integrated correlation time in samples; 1 if the samples are independent."""
+    """Return the integrated correlation time of deviations from the mean, in samples; 1 if independent."""
     count = len(deviations)
     covariance = np.correlate(deviations, deviations, mode="full")[count - 1 :]
     if covariance[0] <= 0:
@@ -153,7 +153,7 @@ def difference(mean: SeedMean, baseline: SeedMean, *, scatter: Scatter | None = 
 
 
 def relative_difference(mean: SeedMean, baseline: SeedMean, *, scatter: Scatter | None = None) -> Difference:
-    """Return the `difference` in per cent of the baseline, taken as exact; NaN if the baseline is 0."""
+    """Return the `difference` in per cent of the baseline, whose error is neglected; NaN if it is 0."""
     change = difference(mean, baseline, scatter=scatter)
     scale = 100 / baseline.value if baseline.value else math.nan
     return Difference(value=scale * change.value, half_width=abs(scale) * change.half_width)
@@ -187,7 +187,7 @@ def slope_within(x: Sequence[float], y: Sequence[float], blocks: Sequence[Hashab
 class Parabola:
     """A parabola fitted to points."""
 
-    slope: Slope  #: Slope at the given x; NaN if x has fewer than three distinct values
+    slope: Slope  #: Slope at x = `at`, see `parabola`; NaN if x has fewer than three distinct values
     bend: Slope  #: Half the second derivative; below 0 if the parabola has a maximum
     top: float  #: x at which the slope is 0; NaN if the bend is 0
     #: p-value of the F test for lack of fit, by the scatter of points at equal x; NaN if x has at most three distinct
@@ -230,5 +230,5 @@ def _lack_of_fit(x: Floats, residuals: Floats) -> float:
 
 
 def _quantile(freedom: float) -> float:
-    """Return the ratio of the 95 % half-width to the standard error, by Student's t."""
+    """Return the 95 % half-width over the standard error, by Student's t of `freedom` degrees of freedom."""
     return float(stdtrit(freedom, (1 + CONFIDENCE) / 2))

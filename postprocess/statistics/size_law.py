@@ -119,7 +119,7 @@ def size_law(counts: Floats, values: Floats) -> SizeLaw:
 
 
 def _fit(counts: Floats, values: Floats, scatter: Scatter, power: float) -> tuple[float, float, float]:
-    """Return q_∞, a, and the weighted sum of squared residuals of the means at each N."""
+    """Fit q = q_∞ + a N^-power to the means at each N; return q_∞, a and weighted squared residuals."""
     sizes, place = np.unique(counts, return_inverse=True)
     members = np.bincount(place)
     means = np.bincount(place, values) / members
@@ -131,7 +131,7 @@ def _fit(counts: Floats, values: Floats, scatter: Scatter, power: float) -> tupl
 
 
 def _powers(counts: Floats, values: Floats, scatter: Scatter) -> tuple[float, float, float]:
-    """Return the best power of N and its 95 % interval, with errors enlarged if the residuals exceed them."""
+    """Return the best power of N and its 95 % interval; a fit worse than the scatter widens the interval."""
     left = np.array([_fit(counts, values, scatter, float(power))[2] for power in POWERS]) / scatter.variance
     free = len(np.unique(counts)) - 3
     larger = max(left.min() / free, 1.0) if free > 0 else 1.0

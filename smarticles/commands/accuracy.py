@@ -69,7 +69,7 @@ prints the progress.""",
 
 
 def run_accuracy(arguments: argparse.Namespace) -> int:
-    """Print a ladder, compute its missing runs, and analyse the finished runs; return the exit status."""
+    """Print the variants of a scene, compute missing runs, analyse all runs; return the exit status."""
     from dem.scene.reading import load_scene  # noqa: PLC0415
     from studies import accuracy  # noqa: PLC0415
     from templates.sweep.expand import expand  # noqa: PLC0415
@@ -103,7 +103,7 @@ def run_accuracy(arguments: argparse.Namespace) -> int:
 
 
 def _listing(ladder: Ladder, expected_s: Mapping[str, float], seeds: int, jobs: int | None) -> str:
-    """Return the ladder as a table, with its expected wall time [s per run, h in total]."""
+    """Return a table of the variants, with the expected wall time [s] of a run and [h] of all runs."""
     from dem.engine.cores import usable_cores  # noqa: PLC0415
     from dem.plan.outlook import plan  # noqa: PLC0415
 

@@ -118,7 +118,7 @@ def _say(text: str) -> None:
 
 @dataclass(frozen=True)
 class SweepSimulator:
-    """Computes each wave of a calibration as a sweep, here or on a cluster."""
+    """Computes each wave (batch of runs) of a calibration as a sweep, on this machine or on a cluster."""
 
     problem: Problem
     arguments: argparse.Namespace
@@ -131,7 +131,7 @@ class SweepSimulator:
         """Return the parameters (n, d) of a wave whose sweep exists; None if it does not.
 
         Raises:
-            InputError: the sweep has other free parameters.
+            InputError: the sweep lacks a free parameter of the calibration.
         """
         import numpy as np  # noqa: PLC0415
 
@@ -152,7 +152,10 @@ class SweepSimulator:
         return np.array([points[point] for point in sorted(points)])
 
     def run(self, wave: int, theta: Array) -> Sequence[tuple[Mapping[str, Value], Measured | None]] | None:
-        """Compute or submit the missing runs of a wave, and measure it; None if it is not finished."""
+        """Compute or submit the missing runs of a wave; return variables and measures of all its runs.
+
+        Returns None as long as runs are missing. The measures of a failed run are None.
+        """
         sweep, points = self.problem.sweep(wave, theta)
         folder = sweeps.folder_of(sweep, points, self._path(wave), self.arguments.command_line)
         states = {status.name: status.state for status in folder.status()}
@@ -165,7 +168,7 @@ class SweepSimulator:
         return self._measured(folder)
 
     def _complete(self, waiting: Folder) -> bool:
-        """Compute runs here and return True, or submit or list them and return False."""
+        """Compute the waiting runs on this machine and return True; or submit or count them and return False."""
         if self.for_cluster:
             sweeps.enqueue(waiting, self.arguments)
             return False
@@ -189,7 +192,7 @@ class SweepSimulator:
 
 
 def _listing(problem: Problem) -> str:
-    """Return the waves as a table, with the expected wall time of each [h of one core]."""
+    """Return a table of the waves: numbers of points and runs, and expected wall time on one core [h]."""
     from studies.calibration.inference import first_points  # noqa: PLC0415
 
     size, rows, total = problem.points_per_wave, [], 0.0

@@ -1,4 +1,4 @@
-"""Command `compare`: compare two runs or two sweeps: scenes, versions, measures, and frames and series bit by bit."""
+"""Command `compare`: compare two runs or two sweeps, A and B, down to the bits of series and frames."""
 
 from __future__ import annotations
 
@@ -92,7 +92,7 @@ def _bits(bits: Mapping[str, Any]) -> str:
 
 
 def _measures(found: Sequence[Mapping[str, Any]]) -> str:
-    """Return a table of the main quantities, with one block of rows per phase."""
+    """Format the rows `measures` of a comparison as a table of the main quantities, phase by phase."""
     from postprocess.measures.registry import shown_quantities  # noqa: PLC0415
 
     formats = {quantity.header: shown for quantity, shown in shown_quantities()}
@@ -163,7 +163,7 @@ def _made_by(run: Run) -> dict[str, Any]:
 
 
 def _compare_sweeps(one: Folder, other: Folder) -> dict[str, Any]:
-    """Return scene, versions, only, bits and measures of the result of `compare` for two sweeps."""
+    """Return the entries scene, versions, only, bits and measures of `compare`'s result for two sweeps."""
     from templates.sweep.sweep_file import SEED  # noqa: PLC0415
 
     first, second = ({entry.name: run for entry, run in zip(f.entries, f.runs(), strict=True)} for f in (one, other))
@@ -185,7 +185,7 @@ def _compare_sweeps(one: Folder, other: Folder) -> dict[str, Any]:
 
 
 def _listed(values: Mapping[str, Sequence[Any]]) -> dict[str, Any]:
-    """Return for each name its value, or several values joined in one text."""
+    """Return one value per name: the only value, or all values of the name joined to a text."""
     return {name: some[0] if len(some) == 1 else ", ".join(map(str, some)) for name, some in values.items()}
 
 
@@ -212,7 +212,7 @@ def compare_bits(one: Run, other: Run) -> dict[str, Any]:
     Returns:
         series: whether all common columns are equal; None if a run has no series.
         differs_at: simulated time of the first different sample [s]; None if all samples are equal.
-        frames: number of equal frames, also of those in files of another format.
+        frames: number of equal frames; the files of A and B may have different formats.
         compared: number of frames that both runs have.
         same_count: whether the runs have equal numbers of frames, samples and columns.
         identical: whether nothing differs.
@@ -248,7 +248,10 @@ def compare_bits(one: Run, other: Run) -> dict[str, Any]:
 
 
 def _equal_frames(one: tuple[Path, int], other: tuple[Path, int]) -> bool:
-    """Return whether two frames, each a number in a file, are equal bit by bit; a radius that one lacks is left out."""
+    """Return whether two frames, given by file and number in the file, are equal bit by bit.
+
+    An array `radius_m` that only one of the frames has is ignored.
+    """
     from dem.record.frame import read_mesh  # noqa: PLC0415
 
     if {one[0].suffix, other[0].suffix} == {".vtu"}:
@@ -264,7 +267,10 @@ def _equal_frames(one: tuple[Path, int], other: tuple[Path, int]) -> bool:
 
 
 def _pair_up(one: pd.DataFrame | None, other: pd.DataFrame | None, *, keys: Sequence[str]) -> list[dict[str, Any]]:
-    """Return rows with a quantity in tables A and B, one per combination of `keys` and quantity."""
+    """Pair the rows of tables A and B that have equal values in the columns `keys`.
+
+    Returns a row for each pair and quantity: A, B, B - A, and the standard error of B - A.
+    """
     from postprocess.statistics.points import marked  # noqa: PLC0415
 
     def records(table: pd.DataFrame | None) -> dict[str, dict[Any, Any]]:

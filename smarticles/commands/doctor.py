@@ -172,7 +172,7 @@ def examine(arguments: argparse.Namespace) -> int:
 
 
 def compile_links() -> int:
-    """Compile the engine links for all kinds of phases; return 0 if the code is stored, otherwise 1."""
+    """Compile the engine links for all kinds of phases; return 0 if the code is cached on disk, else 1."""
     try:
         from dem.engine.links.cache import folder  # noqa: PLC0415
     except ImportError as error:

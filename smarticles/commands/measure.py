@@ -200,7 +200,7 @@ def _text(table: pd.DataFrame, by: Sequence[str], shown: Sequence[_Column]) -> s
 
 
 def _notes(table: pd.DataFrame) -> list[str]:
-    """Return notes on hook forces that are no results: an untouched hook, or one stopped by its limit."""
+    """Return notes on hooks that nothing touched or that their force limit stopped, a line for each."""
     notes = []
     for row in table.to_dict("records") if "hook work [J]" in table.columns else ():
         where = f"{row['run']}: phase {row['phase']} ({row['phase type']})"

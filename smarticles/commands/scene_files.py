@@ -1,4 +1,4 @@
-"""Commands `init`, `keys` and `schema`: write an example scene; print the keys of scenes as text and as JSON schema."""
+"""Commands `init`, `keys` and `schema`: write an example scene; print the keys of scenes."""
 
 import argparse
 import json
@@ -94,7 +94,11 @@ def print_keys(arguments: argparse.Namespace) -> int:
 
 
 def _parts(schema: Mapping[str, Any]) -> Iterator[tuple[str, Mapping[str, Any]]]:
-    """Yield the definitions of a schema by the key that has them, or by their tag, such as the type of a phase."""
+    """Yield the parts of a scene by name, each with its definition in the JSON schema.
+
+    The name is the key of the scene that holds the part, such as `container`, or the part's tag, such as `deposit` for
+    a phase of this type.
+    """
     definitions = schema["$defs"]
     for definition in (schema, *definitions.values()):
         for key, entry in definition["properties"].items():
@@ -111,7 +115,7 @@ def _parts(schema: Mapping[str, Any]) -> Iterator[tuple[str, Mapping[str, Any]]]
 
 
 def _kinds(entry: Mapping[str, Any]) -> list[str]:
-    """Return the tags of the mappings of which an entry, or each item of a list, is one."""
+    """Return the tags, such as types of phases, of the mappings that an entry of the schema allows."""
     if "discriminator" in entry:
         return list(entry["discriminator"]["mapping"])
     options = [*entry.get("anyOf", ()), *([entry["items"]] if "items" in entry else [])]
@@ -119,7 +123,7 @@ def _kinds(entry: Mapping[str, Any]) -> list[str]:
 
 
 def _described(definition: Mapping[str, Any]) -> Iterator[str]:
-    """Yield two lines or more for each key: its default, choices and range, and its meaning."""
+    """Yield lines of text about a part: its description; default, choices, range and meaning of its keys."""
     yield from wrap(definition.get("description", ""), 100)
     signs = {"minimum": "≥", "exclusiveMinimum": ">", "maximum": "≤", "exclusiveMaximum": "<"}
     for key, entry in definition["properties"].items():

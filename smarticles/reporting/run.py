@@ -198,7 +198,7 @@ def _curves(run: Run) -> list[Markup]:
 
 
 def scene_blocks(directory: Path, scene: Scene | None, scene_error: str) -> list[Markup]:
-    """Return planned phases, warnings and scene file; if there is no scene, `scene_error` and scene file."""
+    """Return blocks: planned phases and warnings, or `scene_error` without a scene, and the scene file."""
     blocks = [words(scene_error, tone="warning")] if scene is None else []
     if scene is not None:
         planned = plan(scene)
@@ -220,7 +220,7 @@ def scene_blocks(directory: Path, scene: Scene | None, scene_error: str) -> list
 
 
 def effect_blocks(scenes: Sequence[Scene]) -> list[Markup]:
-    """Return a table of effects: the number of scenes that need each, and why they do."""
+    """Return a table of physical effects: whether or in how many scenes each is computed, and why."""
     rows = []
     for decisions in zip(*map(decide, scenes), strict=True):
         on = [effect for effect in decisions if effect.on]
@@ -234,7 +234,7 @@ def effect_blocks(scenes: Sequence[Scene]) -> list[Markup]:
 
 
 def accuracy_blocks(scene: Scene | None, path: Path | None) -> list[Markup]:
-    """Return the knobs of a scene's fidelity, and the measured errors of the named fidelities.
+    """Return tables of a scene's numerical parameters, and of the measured errors of the named fidelities.
 
     Args:
         path: table of measured errors by `smarticles accuracy`; None: the table that ships.

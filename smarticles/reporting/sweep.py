@@ -145,9 +145,10 @@ def _measured(folder: Folder, varied: Mapping[str, Sequence[Any]], *, jobs: int)
 
 
 def _figures(final: pd.DataFrame, by: Sequence[str], varied: Mapping[str, Sequence[Any]], kind: str) -> list[Markup]:
-    """Return charts against the variable with most values, with one curve per value of a second one.
+    """Return charts against the variable with most values, with one curve per value of a second variable.
 
-    Each combination of further variables has charts of its own.
+    There are separate charts for each combination of the other variables. `final` has means after the last phase, of
+    the type `kind`, by the variables `by`; `varied` has the values of each variable.
     """
     if not by:
         return []
@@ -201,7 +202,7 @@ def _pictures(folder: Folder) -> list[Markup]:
 
 
 def _common_limits(runs: Sequence[Run]) -> tuple[float, float] | None:
-    """Return the ends of a colour scale of crossings for the last frames of runs; None if a run has no crossings."""
+    """Return the extremes of crossings in the last frames of runs; None if a run has no crossings."""
     try:
         if not all(has_frames(run.path) and in_space(run) for run in runs):
             return None

@@ -1,4 +1,4 @@
-"""Commented example scenes, which `smarticles init` writes: one file per kind, and one for all shapes of bodies."""
+"""Commented example scenes for `smarticles init`: a file per kind, and one for all shapes of bodies."""
 
 from collections.abc import Mapping
 from pathlib import Path

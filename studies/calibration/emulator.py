@@ -22,10 +22,11 @@ from dem.errors import InputError
 
 Array = NDArray[np.float64]
 
-LENGTHS = (0.3, 30.0)  #: Limits of length scales, over the ranges of the priors; the upper one means no effect
+LENGTHS = (0.3, 30.0)  #: Limits of length scales, over the ranges of the priors; no effect at the upper limit
 NOISE = (1e-6, 10.0)  #: Limits of the variance from seed to seed, over the variance of the runs
-NOISE_PRIOR = (math.log(0.1), 1.5)  #: Mean and standard deviation of the logarithm of that variance
-AMPLITUDE_PRIOR = (0.0, 3.0)  #: The two for the variance of the process over that of the runs
+#: Prior of ln(variance from seed to seed / variance of the runs): mean, standard deviation
+NOISE_PRIOR = (math.log(0.1), 1.5)
+AMPLITUDE_PRIOR = (0.0, 3.0)  #: Prior of ln(variance of the process / variance of the runs): mean, standard deviation
 LEAST_RUNS = 6  #: Fewest runs of an emulator
 
 
@@ -34,15 +35,15 @@ class Emulator:
     """Gaussian process of one measure at one condition, fitted to n runs of d parameters."""
 
     inputs: Array  #: (n, d) parameters of the runs over the ranges of their priors
-    amplitude: float  #: Variance of the process over that of the values
+    amplitude: float  #: Variance of the process over the variance of the values [-]
     weights: Array  #: (n,) inverse of the covariance matrix times the values
     inverse: Array  #: (n, n) inverse of the covariance matrix with the noise
     mean: float  #: Mean of the values, which the process departs from
     scale: float  #: Standard deviation of the values
     noise: float  #: Standard deviation from seed to seed
     lengths: Array  #: (d,) length scales over the ranges of the priors
-    loo: Array  #: (n,) errors of the prediction of each run from all others, over their standard deviation
-    explained: float  #: Fraction of the variance of the runs that predictions from all others explain [-]
+    loo: Array  #: (n,) leave-one-out errors: prediction of each run from all others; over their standard deviation
+    explained: float  #: Fraction of the runs' variance that leave-one-out predictions explain [-]
 
     def predict(self, inputs: Array) -> tuple[Array, Array]:
         """Return mean and variance (m,) of the measure without noise at scaled parameters (m, d)."""

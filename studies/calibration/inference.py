@@ -1,4 +1,4 @@
-"""Run waves of designed points, narrow the region of each, and sample the posterior of the free parameters.
+"""Run waves of designed points, each in a smaller region, and sample the parameters' posterior.
 
 The measured value of datum j is z_j = f_j(θ) + δ_j + ε_j: f_j is what the simulation gives on average over seeds; ε_j
 is normal with the standard deviation that the data state; δ_j, the discrepancy of the model, is normal with standard
@@ -25,19 +25,20 @@ from studies.calibration.problem import CONDITION, Problem
 from templates.sweep.render import Value
 
 CUTOFF = 3.0  #: Largest implausibility that keeps a point [-]: three standard deviations, after Pukelsheim (1994)
-CANDIDATES = 13  #: Power of 2 of the number of points at which a region is examined
+CANDIDATES = 13  #: Base-2 logarithm of the number of points at which a region is examined
 WALKERS_PER_DIMENSION, CHUNK, MOST_STEPS = 8, 500, 8000
-ENOUGH_TIMES = 50  #: Steps over the autocorrelation time from which emcee's estimate of the latter is reliable
-DRAWS = 4000  #: Draws of the posterior that are kept, about
-NOT_IDENTIFIED, WEAKLY = 0.75, 0.5  #: Widths of the posterior over that of the prior above which verdicts hold [-]
-EDGE, EDGE_SHARE = 0.05, 0.15  #: Outer fraction of a prior's range, and share of the posterior in it, that is an edge
+ENOUGH_TIMES = 50  #: emcee's autocorrelation time is reliable if steps exceed it by this factor [-]
+DRAWS = 4000  #: Approximate number of draws of the posterior that are kept
+NOT_IDENTIFIED, WEAKLY = 0.75, 0.5  #: Posterior width over prior width above which these verdicts hold [-]
+#: A posterior is at an edge if one end of its prior's range, a fraction `EDGE`, has more than `EDGE_SHARE` of the draws
+EDGE, EDGE_SHARE = 0.05, 0.15
 _BANDS = (2.5, 50.0, 97.5)
 
 Measured = Mapping[str, float]  #: Values of the measures of a run; an absent measure was not found
 
 
 class Simulator(Protocol):
-    """What makes runs: a sweep of scenes, a Python function, or a table of runs made elsewhere."""
+    """Source of runs: a sweep of scenes, a Python function, or a table of runs made elsewhere."""
 
     def planned(self, wave: int) -> Array | None:
         """Return the parameters (n, d) of a wave that was begun earlier; None if it was not."""
@@ -55,11 +56,11 @@ class Result:
 
     problem: Problem
     runs: pd.DataFrame  #: All runs: wave, variables, measures (NaN: failed)
-    waves: pd.DataFrame  #: Points, runs, failures and remaining fraction of the prior of each wave
-    emulators: Sequence[Emulator | None]  #: One for each datum; None if too few runs have its condition
+    waves: pd.DataFrame  #: A row per wave: numbers of points, runs and failures; part of the prior not ruled out [%]
+    emulators: Sequence[Emulator | None]  #: Emulator of each datum; None if the datum's condition was not run
     draws: Array  #: (m, d + 1) draws of the posterior: parameters, and σ of the discrepancy
     best: Array  #: (d + 1,) draw with the largest posterior density
-    diagnostics: Mapping[str, float]  #: Autocorrelation time, steps over it, acceptance, effective draws
+    diagnostics: Mapping[str, float]  #: Of emcee: autocorrelation time, steps over it, acceptance, effective draws
     warnings: Sequence[str]  #: What a reader must know before using the posterior
 
     @property
@@ -70,7 +71,7 @@ class Result:
     def posterior(self) -> pd.DataFrame:
         """Tabulate the posterior: a row for each parameter, and one for the discrepancy.
 
-        `width` is that of the 95 % interval over that of the prior.
+        The column `width` is the width of the posterior's 95 % interval over that of the prior's [-].
         """
         names = [*self.problem.names, "discrepancy"]
         low, median, high = np.percentile(self.draws, _BANDS, axis=0)
@@ -92,7 +93,7 @@ class Result:
         return pd.DataFrame(rows)
 
     def predictive(self) -> pd.DataFrame:
-        """Tabulate each datum with the 95 % band of what a measurement would give, discrepancy and error included."""
+        """Tabulate each datum with the 95 % band of predicted measurements, with discrepancy and error."""
         random = np.random.default_rng(self.problem.content.first_seed)
         inputs, sizes = self.problem.scaled(self.theta), self.problem.sizes
         rows = []
@@ -111,7 +112,7 @@ class Result:
         return pd.DataFrame(rows)
 
     def sensitivity(self) -> pd.DataFrame:
-        """Tabulate Sobol indices of each emulator's mean for parameters that vary by their priors (SALib)."""
+        """Tabulate Sobol indices of each emulator's mean for parameters drawn from their priors (SALib)."""
         from SALib.analyze import sobol as analysis  # noqa: PLC0415  (an extra)
         from SALib.sample import sobol as sampling  # noqa: PLC0415
 
@@ -138,7 +139,8 @@ def calibrate(problem: Problem, simulator: Simulator, say: Callable[[str], None]
     """Run all waves and sample the posterior; return None if runs of a wave are still in a queue.
 
     The first wave is a Sobol sequence in the priors. Each further wave takes those points of a finer sequence that the
-    runs so far do not rule out. Conditions that are predicted only are run in the last wave.
+    runs so far do not rule out. Conditions that are predicted only are run in the last wave. `say` gets a line about
+    each wave.
 
     Raises:
         InputError: The budget is too small, or too few runs finished for an emulator.
@@ -205,10 +207,11 @@ def first_points(problem: Problem, size: int) -> Array:
 
 
 def _next(candidates: Array, distances: Array, size: int) -> Array:
-    """Return the first `size` candidates that are not ruled out, (size, d); if there are fewer, the least implausible.
+    """Return the first `size` candidates that are not ruled out, (size, d), or the least implausible.
 
-    `distances` are the implausibilities of the candidates.
-    A part of a Sobol sequence within a region is spread as evenly in it as the whole is in its cube.
+    The least implausible candidates are returned if fewer than `size` are not ruled out. `distances` (n,) are the
+    implausibilities of the candidates (n, d). A part of a Sobol sequence within a region is spread as evenly in it as
+    the whole is in its cube.
     """
     limit = max(CUTOFF, float(np.partition(distances, size - 1)[size - 1]))
     return _rounded(candidates[distances <= limit][:size])
@@ -235,7 +238,7 @@ def emulate(problem: Problem, runs: pd.DataFrame) -> list[Emulator | None]:
 
 
 def _residuals(problem: Problem, emulators: Sequence[Emulator | None], theta: Array) -> tuple[Array, Array, Array]:
-    """Return value minus emulator (n, J), variance of error and emulator (n, J), and sizes (J,) of fitted data."""
+    """Return data less emulator means (n, J), variances of both together (n, J), and `sizes` (J,)."""
     inputs, sizes = problem.scaled(theta), problem.sizes
     used = [(d, e, s) for d, e, s in zip(problem.data, emulators, sizes, strict=True) if d.fitted and e is not None]
     predicted = [emulator.predict(inputs) for _, emulator, _ in used]
@@ -247,8 +250,9 @@ def _residuals(problem: Problem, emulators: Sequence[Emulator | None], theta: Ar
 def implausibility(problem: Problem, emulators: Sequence[Emulator | None], theta: Array) -> Array:
     """Return the implausibility (n,) of parameters (n, d).
 
-    The largest distance of a fitted datum from its emulator, over the standard deviation of error, emulator and
-    discrepancy together; the latter at the scale of its prior.
+    It is the largest distance of a fitted datum from its emulator's mean, over the standard deviation of error,
+    emulator and discrepancy together. The standard deviation of the discrepancy is σ s_j, where σ is the scale of its
+    prior.
     """
     errors, variances, sizes = _residuals(problem, emulators, theta)
     found: Array = np.max(np.abs(errors) / np.sqrt(variances + (problem.content.discrepancy * sizes) ** 2), axis=1)
@@ -256,7 +260,7 @@ def implausibility(problem: Problem, emulators: Sequence[Emulator | None], theta
 
 
 def log_posterior(problem: Problem, emulators: Sequence[Emulator | None], draws: Array) -> Array:
-    """Return the logarithm of the posterior density (n,), without its constant, at parameters and σ (n, d + 1)."""
+    """Return ln of the posterior density (n,), up to a constant, at parameters and σ (n, d + 1)."""
     theta, sigma = draws[:, :-1], draws[:, -1]
     found = problem.log_prior(theta) - 0.5 * (sigma / problem.content.discrepancy) ** 2
     inside = np.isfinite(found) & (sigma >= 0)
@@ -305,7 +309,7 @@ def sample(problem: Problem, emulators: Sequence[Emulator | None]) -> tuple[Arra
 
 
 def _log_prior(problem: Problem, draws: Array) -> Array:
-    """Return the logarithm of the prior density (n,), without its constant, of parameters and σ (n, d + 1)."""
+    """Return ln of the prior density (n,), up to a constant, of parameters and σ (n, d + 1)."""
     found: Array = problem.log_prior(draws[:, :-1]) - 0.5 * (draws[:, -1] / problem.content.discrepancy) ** 2
     return found
 

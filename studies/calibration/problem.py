@@ -26,8 +26,8 @@ from templates.sweep.sweep_file import SEED, Sweep, SweepFile, parse_table, read
 
 Array = NDArray[np.float64]
 
-POINT, CONDITION, REPEAT = "point", "condition", "repeat"  #: Variables of every run beside those of the file
-MEASURE, VALUE, ERROR, PREDICT = "measure", "value", "error", "predict"  #: Columns of the data that are no variables
+POINT, CONDITION, REPEAT = "point", "condition", "repeat"  #: Variables that every run has beside those in the file
+MEASURE, VALUE, ERROR, PREDICT = "measure", "value", "error", "predict"  #: Columns of the data that are not variables
 _SEEDS_PER_WAVE = 1_000_000  # so that no two runs of a calibration have one seed
 _RUN_NAME = f"p{{{{ {POINT} }}}}_c{{{{ {CONDITION} }}}}_r{{{{ {REPEAT} }}}}"
 
@@ -100,7 +100,7 @@ class Datum:
     condition: int  #: Index of its condition in `Problem.conditions`
     measure: str  #: Name of the measure
     value: float  #: Measured value
-    error: float  #: Standard deviation of the measured value, with that from repetition to repetition
+    error: float  #: Standard deviation of the measured value, including the scatter of repetitions
     fitted: bool  #: Whether the calibration uses the point; otherwise the point is predicted only
 
     def label(self, conditions: Sequence[Mapping[str, Value]]) -> str:
@@ -111,7 +111,7 @@ class Datum:
 
 @dataclass(frozen=True, kw_only=True)
 class Problem:
-    """What is to be calibrated; a condition is one combination of the variables of the data."""
+    """Parameters, data and runs of a calibration; a condition is a combination of the data's variables."""
 
     path: Path
     text: str
@@ -132,7 +132,10 @@ class Problem:
 
     @cached_property
     def sizes(self) -> Array:
-        """Mean absolute value of each datum's measure over all fitted data of this measure (or all its data), (J,)."""
+        """Mean size of the measure of each of the J data, (J,): the s_j of the discrepancy.
+
+        It is the mean absolute value over all fitted data of this measure, or over all its data if none is fitted.
+        """
         found = []
         for datum in self.data:
             alike = [one for one in self.data if one.measure == datum.measure]
@@ -141,7 +144,7 @@ class Problem:
         return np.array(found)
 
     def conditions_of(self, wave: int) -> list[int]:
-        """Return the indices of conditions that a wave computes: those of fitted data, in the last wave all."""
+        """Return the indices of the conditions in a wave: conditions with fitted data; in the last wave all."""
         last = wave == self.content.waves
         return [k for k in range(len(self.conditions)) if last or any(one.condition == k for one in self.fitted)]
 
@@ -177,7 +180,7 @@ class Problem:
         return found
 
     def log_prior(self, theta: Array) -> Array:
-        """Return the logarithm of the prior density (n,), without its constant, of parameters (n, d).
+        """Return ln of the prior density (n,), up to a constant, of parameters (n, d).
 
         It is -inf outside the ranges.
         """

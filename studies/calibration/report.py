@@ -114,7 +114,11 @@ def _footer(problem: Problem, command: str) -> list[str]:
 
 
 def _contacts(problem: Problem, theta: Array) -> list[dict[str, float]]:
-    """Return the contact parameters at parameters (d,): of the scenes at all conditions, or free ones of that name."""
+    """Return the contact parameters by name, for free parameters `theta` (d,).
+
+    The list has one entry per condition, from its scene. Without scenes it has one entry: the free parameters that are
+    contact parameters.
+    """
     if problem.content.template or problem.content.scene:
         _, points = problem.sweep(problem.content.waves, theta[None, :])
         return [point.scene.contact.model_dump() for point in points]

@@ -1,6 +1,6 @@
-"""Compute runs of a calibration by a Python function, or read them from a table; measure run directories.
+"""Compute runs of a calibration by a Python function or read them from a table; measure runs.
 
-`smarticles.commands.calibrate` computes them as sweeps of scenes.
+`smarticles.commands.calibrate` computes runs as sweeps of scenes.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from templates.sweep.render import Value
 
 @dataclass(frozen=True)
 class FunctionSimulator:
-    """A Python function as the simulation: it gets a run's variables, with its seed, and returns its measures.
+    """A Python function as the simulation: it takes a run's variables and seed, and returns its measures.
 
     A RunError of the function is a failed run.
     """
@@ -34,7 +34,7 @@ class FunctionSimulator:
     function: Callable[[Mapping[str, Value]], Measured]
 
     def planned(self, wave: int) -> None:
-        """Return None, since nothing is kept."""
+        """Return None: a function's runs are not stored, so that no wave was begun earlier."""
 
     def run(self, wave: int, theta: Array) -> list[tuple[Mapping[str, Value], Measured | None]]:
         """Call the function for all runs of a wave."""
@@ -75,7 +75,7 @@ class TableSimulator:
         return found
 
     def run(self, wave: int, theta: Array) -> list[tuple[Mapping[str, Value], Measured | None]]:
-        """Return the rows whose variables are those of a condition."""
+        """Return variables and measures of the rows whose variables agree with a condition of the data."""
         found: list[tuple[Mapping[str, Value], Measured | None]] = []
         measures = list(dict.fromkeys(datum.measure for datum in self.problem.data))
         for row in self.table.to_dict("records"):

@@ -91,7 +91,7 @@ class Claim:
 
 
 def claims(results: Path, listed: Path = CLAIMS) -> tuple[Claim, ...]:
-    """Read the verdicts on all claims of a YAML list from the published tables of the studies.
+    """Read the verdicts on the claims in the YAML file `listed` from the published tables of the studies.
 
     `results` has a folder for each study. InputError if a study or a finding that the list names does not exist.
     """

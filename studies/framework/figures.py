@@ -133,7 +133,7 @@ class Means:
     share_y: bool = False  #: Whether all panels of one quantity, or of one line of panels, have one y axis
     #: Computes the horizontal lines of a panel from its rows: y by label; a line at NaN is left out
     levels: Callable[[pd.DataFrame], Mapping[str, float]] = lambda _: {}
-    #: By column of a quantity: column with its lower bound, which is drawn where the quantity has no mean
+    #: Columns with lower bounds, by column of the quantity; a bound is drawn where the mean is unknown
     bounds: Mapping[str, str] = field(default_factory=dict)
     #: Published values: places along x and values, by the column of the quantity
     reference: Mapping[str, tuple[pd.Series, pd.Series]] = field(default_factory=dict)
@@ -146,7 +146,7 @@ class Means:
     bars: str = BARS  #: Explains the error bars in the footer
 
     def draw(self, path: Path, analysis: Analysis) -> list[Path]:
-        """Draw the means of the judging engine with filled markers, those of other engines open beside them."""
+        """Draw means with filled markers, and beside them, with open ones, means of engines that do not judge."""
         every = analysis.tables.get(self.table, pd.DataFrame())
         every = self.rows(every) if len(every) else every
         columns = [quantity.column for quantity in self.quantities]
@@ -222,7 +222,7 @@ class Rows:
 
     name: str  #: Name of the files without suffix
     quantities: Sequence[Quantity]  #: Drawn along x, in a panel each
-    row: str | Callable[[pd.Series], str]  #: Column with the name of the line, or a function of a row of the table
+    row: str | Callable[[pd.Series], str]  #: Column with the names of lines, or function of a table's row
     table: str = "points"  #: Name of the study's table that is drawn
     split: Split = lambda table: [
         Series(rows=table, label="mean over seeds", properties=marker("o", style.BLUE, style.BLUE))
@@ -322,7 +322,7 @@ class Histories:
     #: Label of the y axis by column of the table `times`; the key is "" if `history` reads the values
     quantities: Mapping[str, str]
     x_label: str
-    split: Split  #: Makes the series of the runs; their properties have a colour
+    split: Split  #: Makes the series of the runs, each with a colour in its properties
     #: Reads the history of a run; if it raises InputError, the run is left out. None: the table `times` is drawn
     history: Callable[[Run], History] | None = None
     x: str = ""  #: Column of the table `times` that is drawn along x
@@ -330,7 +330,7 @@ class Histories:
     panels: str = ""  #: Column whose values have a panel each; empty: one panel
     panel: str = "l/w = {:g}"  #: Title of a panel, with `{}` for its value times `panel_scale`
     panel_scale: float = 1.0
-    width: float = 0.0  #: Width of the averaged intervals of x; 0: a hundredth of the longest activity or range of x
+    width: float = 0.0  #: Width of averaged intervals of x; 0: 1 % of the longest activity, or of the range of x
     unit: str = "s"  #: Unit of `width`
     log: bool = False  #: Whether x and the intervals are logarithmic
     level: float | None = None  #: Place of a horizontal line
@@ -502,7 +502,8 @@ def panels(
 ) -> tuple[Canvas, list[Axes]]:
     """Make a figure and its panels, which fill line by line.
 
-    `columns` is the largest number of panels in a line, `width` that of the figure, `height` that of a line [inch].
+    `columns` is the largest number of panels in a line, `width` the width of the figure and `height` the height of a
+    line [inch]. `shared` are arguments of Matplotlib's `subplots`, such as `sharey`.
     """
     columns = min(count, columns)
     lines = -(-count // columns)
@@ -562,7 +563,7 @@ def draw_fits(
     *,
     lines: Sequence[Any] = ("solid",),
 ) -> None:
-    """Draw fitted curves at places x (n,), each with its own kind of line, and their 95 % bands."""
+    """Draw curves at places x (n,): `fits` has values and 95 % half-widths (n,) of each curve by label."""
     for (label, (values, half_widths)), line in zip(fits.items(), lines, strict=False):
         axes.plot(x, values, color=colour, linewidth=0.9, linestyle=line, label=label)
         low, high = np.asarray(values) - half_widths, np.asarray(values) + half_widths
@@ -581,8 +582,8 @@ def draw_means(
 ) -> None:
     """Draw means y (n,) at places x (n,) with their error bars.
 
-    `half_widths` (n,) are those of the 95 % intervals of y. `across` are those of x: (n,), or (2, n) for the lower and
-    the upper side. They are NaN where unknown; None draws no error bars.
+    `half_widths` (n,) are half the 95 % intervals of y, `across` half the 95 % intervals of x: (n,), or (2, n) for the
+    lower and the upper side. NaN stands for an unknown interval; None draws no error bars.
     """
     bars = axes.errorbar(
         x, y, yerr=half_widths, xerr=across, **{"markersize": 3.4, "linewidth": 0.7, **properties}, label=label
@@ -595,9 +596,9 @@ def draw_means(
 def draw_bounds(
     axes: Axes, x: ArrayLike, least: ArrayLike, lengths: ArrayLike, *, properties: Mapping[str, Any]
 ) -> None:
-    """Draw lower bounds (n,) as markers with arrows upwards; NaN are left out.
+    """Draw lower bounds `least` (n,) at places x (n,) as markers with arrows upwards; NaN are left out.
 
-    The lengths of the arrows (n,), in the unit of y, have no physical meaning.
+    The lengths of the arrows, in the unit of y, have no physical meaning.
     """
     at, from_, long = np.broadcast_arrays(*(np.asarray(part, dtype=np.float64) for part in (x, least, lengths)))
     known = np.isfinite(from_)

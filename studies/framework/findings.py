@@ -46,7 +46,7 @@ class Verdict(StrEnum):
 
 
 def judge(effect: SeedMean, *, threshold: float = 0.0) -> Verdict:
-    """Decide whether an effect is above a threshold, by its 95 % interval; see `CRITERION`."""
+    """Decide whether an effect is above a threshold, by its 95 % interval, as `CRITERION` defines."""
     low, high = effect.value - effect.half_width, effect.value + effect.half_width
     return decide(low > threshold, high < threshold, data=not math.isnan(effect.value))
 
@@ -144,7 +144,7 @@ class Finding:
     found_if: str = ""  #: Criterion in words; empty: all effects with a sign beyond their thresholds
 
     def judge(self, samples: pd.DataFrame, tables: Mapping[str, pd.DataFrame] | None = None) -> Judged:
-        """Judge the finding by the samples, or by those tables of the study that the finding names."""
+        """Judge the finding by the samples, or by the study's tables that the finding names."""
         given = [(tables or {})[name] for name in self.tables] if self.tables else [self.rows(samples)]
         outcome = self.outcome(*given)
         outcome = outcome if isinstance(outcome, Outcome) else Outcome(effects=outcome)
@@ -178,28 +178,31 @@ class Judged:
 
 
 def _verdict(effects: Sequence[Effect]) -> tuple[Verdict, float]:
-    """Return the combined verdict of all effects, and the largest `Effect.more` of effects not resolved."""
+    """Return the combined verdict of all effects, and the largest `Effect.more` if it is not resolved."""
     verdict = all_of(effect.verdict for effect in effects)
     needed = [effect.more for effect in effects if effect.verdict == verdict == Verdict.NOT_RESOLVED]
     return verdict, float(np.max(needed)) if needed else math.nan
 
 
 def all_of(verdicts: Iterable[Verdict]) -> Verdict:
-    """Combine verdicts on the parts of a statement; if one part is not found, the statement is not found."""
+    """Combine verdicts on the parts of a statement.
+
+    The result is the first of not found, no data, not resolved and found that a part has.
+    """
     found = list(verdicts)
     order = (Verdict.NOT_FOUND, Verdict.NO_DATA, Verdict.NOT_RESOLVED, Verdict.FOUND)
     return next((verdict for verdict in order if verdict in found), Verdict.NO_DATA)
 
 
 def decide(found: bool, wrong: bool = False, *, data: bool = True) -> Verdict:
-    """Return no data without `data`, else found if `found`, else not found if `wrong`, else not resolved."""
+    """Return "no data" unless `data`; "found" if `found`; "not found" if `wrong`; else "not resolved"."""
     if not data:
         return Verdict.NO_DATA
     return Verdict.FOUND if found else Verdict.NOT_FOUND if wrong else Verdict.NOT_RESOLVED
 
 
 def within(value: float, half_width: float, margin: float) -> Verdict:
-    """Return found if value ± half_width lies within ±margin, not found if outside, else not resolved."""
+    """Decide whether a value lies within ±margin, by its 95 % interval value ± half_width."""
     size = abs(value)
     return decide(size + half_width <= margin, size - half_width > margin, data=not math.isnan(value))
 
@@ -310,12 +313,13 @@ def mean(
     shown: Sequence[str] = (),
     by: str = PROCEDURE,
 ) -> Finding:
-    """Make the finding that the mean of a value over all rows is above a threshold (sign +1) or below it (−1).
+    """Make the finding that the mean of a value is above a threshold (sign +1) or below it (−1).
 
     Args:
+        values: computes the value of each row.
         threshold: in the unit of the value.
         shown: columns whose means are shown but not judged.
-        by: column; the means of the columns `shown` are taken at each of its values.
+        by: column at whose values the means of the columns `shown` are taken.
     """
 
     def outcome(table: pd.DataFrame) -> Outcome:

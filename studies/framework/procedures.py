@@ -173,7 +173,7 @@ def _of_series(run: Run, active: Phase, straight_until: float | None) -> dict[st
 
 
 def _smooth(values: NDArray[np.float64], time: NDArray[np.float64], chosen: NDArray[np.bool_]) -> NDArray[np.float64]:
-    """Return the moving mean over `_WINDOW` of the chosen values; empty if they cover less time."""
+    """Return the moving mean over `_WINDOW` [s] of the chosen values; empty if they span a shorter time."""
     if chosen.sum() < 2:
         return np.empty(0)
     samples = max(round(_WINDOW / float(np.median(np.diff(time[chosen])))), 1)
@@ -182,7 +182,7 @@ def _smooth(values: NDArray[np.float64], time: NDArray[np.float64], chosen: NDAr
 
 
 def gained(work: NDArray[np.float64], before: NDArray[np.bool_]) -> float:
-    """Return the increase [J] of a cumulative work (n,) [J] since the last sample in `before` (n,).
+    """Return the increase [J] of a cumulative work (n,) [J] since the last sample marked in `before` (n,).
 
     NaN if the work was not recorded.
     """
@@ -196,9 +196,9 @@ def gained(work: NDArray[np.float64], before: NDArray[np.bool_]) -> float:
 def half_compaction(time: NDArray[np.float64], height: NDArray[np.float64], duration: float) -> float:
     """Return the time at which half of the compaction is reached, over the duration of the activity [-].
 
-    Times (n,) count from the start of the activity [s]; heights (n,) are over the height in the rest before [-]. Both
-    include the rests before and after the activity. The result is 1 if half is not reached during the activity, NaN if
-    the centre of mass is not lower in the rest after the activity.
+    Times (n,) count from the start of the activity [s]; heights (n,) are divided by the height in the rest before [-].
+    Both include the rests before and after the activity. The result is 1 if half is not reached during the activity,
+    NaN if the centre of mass is not lower in the rest after the activity.
     """
     final = height[time > duration]
     moving = (time >= 0) & (time <= duration)
@@ -224,9 +224,9 @@ def half_compaction(time: NDArray[np.float64], height: NDArray[np.float64], dura
 def samples(runs: pd.DataFrame) -> pd.DataFrame:
     """Make the table of samples: a row per procedure (static included), aspect ratio, θ and seed.
 
-    The static state has one row per aspect ratio and seed (θ is NaN): the mean over the runs that share both, since
-    these are poured from equal poses. "runs [-]" is the number of runs of a row. Quantities that a procedure lacks are
-    NaN.
+    The static state has one row per aspect ratio and seed (θ is NaN): the mean over all runs with this aspect ratio and
+    seed, since they are poured from equal poses. "runs [-]" is the number of runs of a row. Quantities that a procedure
+    lacks are NaN.
     """
     columns = {f"{STATIC} {quantity}": quantity for quantity in (PHI_ACTIVE, PHI, CROSSINGS)}
     static = runs.groupby([ASPECT, SEED], as_index=False)[list(columns)].mean().rename(columns=columns)

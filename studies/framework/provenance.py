@@ -71,7 +71,7 @@ class Origin:
         return f"Study {self.found.study}, fidelity {fidelities}{engines}: {used} of {used + missing} runs{lacking}"
 
     def figure_footer(self, points: str, text_name: str) -> list[str]:
-        """Return the footer of a figure, which names the file with the full footer."""
+        """Return the footer of a figure: the text `points`, and the file `text_name` with the full footer."""
         first, *more = (f"planned: {self.note}" if self.found.missing else self.note).split("; ")
         differs = f"{first[0].upper()}{first[1:]}{' and more' if more else ''}."
         if self.full:
@@ -84,7 +84,7 @@ class Origin:
         ]
 
     def footer(self, points: str, *statements: str) -> list[str]:
-        """Return the footer of tables and texts, a line for each statement."""
+        """Return the footer of tables and texts: a line for `points`, each of the statements, and the origin."""
         named = [("smarticles", ""), ("git", ""), *((engine, engine) for engine in self._engines)]
         versions = "; ".join(f"{name} {', '.join(self._versions(name, engine))}" for name, engine in named)
         return [

@@ -52,7 +52,7 @@ class Quantity:
     bar: str = "SE"  #: Error that is shown in the short table: `SE` (standard error) or `95 %` (half-width)
 
     def cell(self, point: Mapping[str, float]) -> str:
-        """Format the mean over seeds of a point for the short table, with its error if the error is known."""
+        """Format the quantity's mean in a row of the table of points, with its error if known."""
         error = point.get(marked(self.column, self.bar), math.nan)
         return format_with_error(self.scale * point[self.column], self.form, self.scale * error)
 
@@ -133,7 +133,7 @@ def judging(table: pd.DataFrame) -> pd.DataFrame:
 
 
 def by_engine(table: pd.DataFrame, made: Callable[[pd.DataFrame], pd.DataFrame]) -> pd.DataFrame:
-    """Apply a function to the rows of each engine and concatenate the tables that it returns.
+    """Apply the function `made` to the rows of each engine, and concatenate the tables that it returns.
 
     The result has the column `engine` first if the given table has several engines.
     """
@@ -183,7 +183,7 @@ class MissingRun:
 
     @property
     def common_cause(self) -> str:
-        """Cause in which RUN stands for the path of the directory, so that equal causes can be counted."""
+        """Cause with RUN in place of the path of the directory, so that equal causes can be counted."""
         return self.cause.removeprefix(f"{self.directory}: ").replace(self.directory, "RUN")
 
 
@@ -204,7 +204,7 @@ class MeasuredRun:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Collected:
-    """Runs of a study: those that were measured, in the order given, and those that are missing."""
+    """Runs of a study: measured runs, in the order of the given directories, and missing runs."""
 
     study: str  #: Name of the study, for messages
     runs: Sequence[MeasuredRun]
@@ -231,7 +231,7 @@ class Collected:
         *,
         within: Callable[[MeasuredRun], Hashable] = lambda _: None,
     ) -> None:
-        """Raise InputError if runs of one group, by default all runs, differ in a quantity."""
+        """Raise InputError if `value` differs between runs of a group (`within`), by default all runs."""
         firsts: dict[Hashable, MeasuredRun] = {}
         for run in self.runs:
             first = firsts.setdefault(within(run), run)

@@ -69,7 +69,7 @@ _SHAKE, _SERIES = "shake", "packing_fraction"
 def read_gravish() -> pd.DataFrame:
     """Read Gravish's digitised points: columns `l_over_w`, `phi_initial`, `phi_final` [-].
 
-    NaN where their figure has no point.
+    A value is NaN if Gravish's figure has no point.
     """
     with _FILE.open(encoding="utf-8") as file:
         return pd.read_csv(file)
@@ -142,8 +142,8 @@ def while_shaken(run: Run) -> History:
 def measured_row(run: Run, definitions: Sequence[str]) -> dict[str, object]:
     """Measure φ and crossings before and after shaking; return the run's row.
 
-    φ is measured by `DEFINITION` and the given definitions; costly ones are measured in the last frame only. InputError
-    if the run has no shaking after another phase, or a frame is missing.
+    φ is measured by `DEFINITION` and the given definitions; costly definitions are measured in the last frame only.
+    InputError if the run has no shaking after another phase, or a frame is missing.
     """
     shakes = [phase for phase in run.phases if phase.type == _SHAKE]
     if not shakes or shakes[0].index == 0:

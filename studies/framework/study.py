@@ -53,7 +53,7 @@ class Report:
 
 @dataclass(frozen=True, kw_only=True)
 class Study:
-    """A study: how runs are measured, which columns are averaged, what is judged, and what is drawn."""
+    """A study: its measures of a run, averaged columns, findings and figures."""
 
     name: str  #: Name of the study on the command line and in the provenance
     title: str  #: Heading of the text
@@ -72,7 +72,7 @@ class Study:
     same_count: Sequence[str] = (ASPECT,)  #: Runs that agree in these columns must have equal numbers of smarticles
     same_fidelity: Sequence[str] = ()  #: Runs that agree in these columns must have one fidelity
     order: Sequence[str]  #: Columns that the table of runs is sorted by; empty: in the order of the runs given
-    #: Other columns by column: runs that agree in the other columns must agree in the column, too
+    #: Columns (keys) that must be equal in all runs that agree in the columns of the value
     constant: Mapping[str, Sequence[str]] = field(default_factory=dict)
     #: Column that is above 0 for a run whose quantities are lower bounds, and the word for such runs in texts
     bounds: tuple[str, str] | None = None
@@ -279,7 +279,7 @@ class Study:
 
 
 def format_numbers(numbers: Iterable[int]) -> str:
-    """Format numbers in ascending order; five or more consecutive ones as `1 to 5`.
+    """Format numbers in ascending order; five or more consecutive numbers as `1 to 5`.
 
     Example:
         >>> format_numbers([1, 2, 3, 4, 5, 9])

@@ -113,7 +113,7 @@ def plan_request(expected_s: Sequence[float], cluster: Cluster, wishes: Wishes) 
 
 
 def _runs_per_task(count: int, partition: Partition, wanted: int | None, memory: int) -> int:
-    """Return the number of runs per task, at most all; by default equal tasks that fill a node."""
+    """Return the number of runs per task: `wanted`, or by default for equal tasks that fill a node."""
     if wanted is not None:
         return wanted if wanted > partition.cores else min(wanted, count)
     most = max(1, min(partition.cores, partition.memory_mib // memory))
@@ -121,7 +121,10 @@ def _runs_per_task(count: int, partition: Partition, wanted: int | None, memory:
 
 
 def _time(longest: float, cluster: Cluster, partition: Partition, wanted: str | None, where: str) -> int:
-    """Return the wall time to request [s], a whole number of minutes, because Slurm counts minutes."""
+    """Return the wall time of a task to request [s], a whole number of minutes, as Slurm counts.
+
+    It is the time `wanted`, or follows from the expected time of the longest run, `longest` [s].
+    """
     if wanted is None:
         needed = max(LEAST_TIME_S, longest) + cluster.signal_lead_s
         time_s = min(60 * math.ceil(needed / 60), partition.max_time_s)

@@ -46,7 +46,7 @@ class Submission(Document):
         "the runs in the queue are unknown; list them with `squeue --me`, cancel them, and remove the file's folder"
     )
     format: Literal[1] = 1
-    job_name: str  #: Unique name of the job, which finds the job if its number was lost
+    job_name: str  #: Unique name of the job, by which the job is found if its number was lost
     job_id: int | None = None  #: Number of the job; None if the script was only written
     cluster: str  #: Value of --cluster
     runs_per_task: int

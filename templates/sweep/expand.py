@@ -30,7 +30,7 @@ class Point:
 
 
 def expand(sweep: Sweep, *, max_points: int = MAX_POINTS) -> list[Point]:
-    """Make all points of a sweep, in the order of its file; raise InputError for invalid ones or too many."""
+    """Make all points of a sweep in the order of its file; InputError for too many or an invalid scene."""
     # Counted before they are made, which could exhaust the memory.
     sources = _sources(sweep)
     repeats, again = sweep.content.repeats, sweep.content.again
@@ -76,7 +76,7 @@ def _check_count(sweep: Sweep, count: int, most: int) -> None:
 
 
 def _sources(sweep: Sweep) -> list[Sequence[Mapping[str, Value]]]:
-    """Return lists of values, whose combinations are the points; values of later lists vary faster."""
+    """Return the lists of values of which all combinations are the points; later lists vary faster."""
     points = sweep.content.points
     zipped = points.zip_ or {}
     sources: dict[str, Sequence[Sequence[Mapping[str, Value]]]] = {

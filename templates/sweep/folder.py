@@ -41,7 +41,7 @@ class RunStatus(Status):
 
 
 def run_status(directory: Path) -> RunStatus:
-    """Return the status of a run by the files in its directory, which may be absent."""
+    """Return the status of a run from the files in its directory, which may not exist."""
     return RunStatus(name=directory.name, directory=directory, **vars(Run(directory).status))
 
 

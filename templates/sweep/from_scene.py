@@ -10,10 +10,12 @@ from dem.scene.reading import apply_override
 
 
 def as_template(data: Any, names: Mapping[str, str], source: str) -> str:
-    """Return the data of a scene as a template with variables; InputError for text that a template would run.
+    """Return the data of a scene as the text of a template with variables.
+
+    InputError if the scene has text that a template would execute.
 
     Args:
-        data: data of the scene; the keys of `names` are changed in place.
+        data: data of the scene; the values of the keys in `names` are replaced in place.
         names: name of the variable of each key of the scene, with dots for nested keys.
         source: scene or its file, for messages.
     """

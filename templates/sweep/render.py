@@ -32,12 +32,12 @@ MOST_MEMORY, MOST_SECONDS = 2**28, 1.0
 
 
 class _TooLongError(BaseException):
-    """The time of a rendering is over; a BaseException, since Jinja2 catches errors in constants."""
+    """Raised when a rendering takes too long; a BaseException, since Jinja2 catches errors in constants."""
 
 
 @contextmanager
 def _limited() -> Iterator[None]:
-    """Raise MemoryError or `_TooLongError` where a rendering takes more than `MOST_MEMORY` or `MOST_SECONDS`.
+    """Raise MemoryError or `_TooLongError` if a rendering exceeds `MOST_MEMORY` or `MOST_SECONDS`.
 
     Without `/proc` the memory is not limited, and in threads other than the main one the time is not.
     """
@@ -84,7 +84,7 @@ def _plain(value: Value) -> bool:
 
 
 def _check(value: Value, rule: str) -> None:
-    """Raise an error of Jinja2 if a template gives an unknown name, no plain data, or a very long text or list."""
+    """Raise Jinja2's error, with the text `rule`, if a value is undefined, no plain data, or too long."""
     if isinstance(value, jinja2.Undefined):
         str(value)  # StrictUndefined raises, with the name
     if not _plain(value):

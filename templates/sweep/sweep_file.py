@@ -271,7 +271,7 @@ def on_engine(sweep: Sweep, engine: str) -> Sweep:
 
 
 def read_text(path: Path, what: str) -> str:
-    """Return the text of a file of the kind `what`; raise InputError if it is no readable UTF-8 text."""
+    """Return the text of a file; InputError, which calls the file `what`, if it is no readable UTF-8 text."""
     try:
         with path.open(encoding="utf-8") as file:
             text = file.read(LONGEST_TABLE + 1)

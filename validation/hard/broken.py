@@ -34,7 +34,7 @@ PLACES = ("over the wall", "through the wall", "under the floor")
 
 
 def spoil(access: EngineAccess, out: Path, *, what: str, articulated: bool, steps: int) -> list[Check]:
-    """Set an invalid state for the second of three smarticles on the floor; the watchdog must report it."""
+    """Set the invalid state `what` of the second of three smarticles; the watchdog must report it."""
     scene, engine, recorder = watched(scene_data(access, shape_change(), count=3), out)
     # A few diameters apart, so that no smarticle falls on another.
     for k in range(3):
@@ -75,7 +75,7 @@ for _what in SPOILT:
 
 
 def _resting(access: EngineAccess, out: Path, count: int) -> tuple[Engine, Recorder]:
-    """Let a stack of smarticles come to rest; return the engine, and the recorder that checked it."""
+    """Let a stack of smarticles come to rest; return the engine, and the recorder with its watchdog."""
     scene, engine, recorder = watched(scene_data(access, count=count), out)
     for k in range(count):
         add(engine, (0, 0, lying(scene) * (2 * k + 1) + 1e-5))
@@ -87,7 +87,7 @@ def _resting(access: EngineAccess, out: Path, count: int) -> tuple[Engine, Recor
 
 @hard("spoilt: pile that is heated", {"count": 4, "share": 0.3})
 def heated(access: EngineAccess, out: Path, *, count: int, share: float) -> list[Check]:
-    """Reverse the damping of all contacts of a pile at rest, so that its energy grows."""
+    """Reverse the damping of all contacts of a pile at rest; the watchdog must report the growing energy."""
     engine, recorder = _resting(access, out, count)
     access.heat(engine, share)
     access.push(engine, count - 1, velocity=(0, 0, 1e-3))
@@ -104,7 +104,7 @@ def heated(access: EngineAccess, out: Path, *, count: int, share: float) -> list
 
 @hard("spoilt: pile that is kicked", {"count": 4, "speed": 0.3})
 def kicked(access: EngineAccess, out: Path, *, count: int, speed: float) -> list[Check]:
-    """Give a pile at rest an upward velocity far below the largest allowed speed."""
+    """Give a pile at rest an upward velocity below the limit; the watchdog must report the sudden energy."""
     engine, recorder = _resting(access, out, count)
     for k in range(count):
         access.push(engine, k, velocity=(0, 0, speed))
@@ -116,7 +116,7 @@ def kicked(access: EngineAccess, out: Path, *, count: int, speed: float) -> list
 
 @hard("spoilt: contacts too soft", {"stiffness": 0.5})
 def soft(access: EngineAccess, out: Path, *, stiffness: float) -> list[Check]:
-    """Run with contacts too soft to stop falling smarticles: links rejects the scene, YADE stops the run."""
+    """Run with contacts too soft to stop a fall: the engine `links` rejects the scene, YADE stops the run."""
     run = whole(scene_data(access, RELAX, fidelity={"base": "draft", "stiffness_N_per_m": stiffness}), out)
     if access.name == "links":
         return [says(run.text, "fidelity.stiffness_N_per_m: at 0.5 N/m", "use about", "N/m")]
@@ -124,7 +124,7 @@ def soft(access: EngineAccess, out: Path, *, stiffness: float) -> list[Check]:
 
 
 def _too_long(scene: Scene, factor: float) -> float:
-    """Return a time step [s] of about `factor` times the stable step that divides the control period."""
+    """Return a time step [s] that divides the control period and is about `factor` times the stable step."""
     control = scene.fidelity.control_interval_s
     step: float = control / max(1, math.floor(control / (factor * stable_step(scene))))
     return step

@@ -69,7 +69,7 @@ def one(access: EngineAccess, out: Path) -> list[Check]:
 
 @hard("checkpoint at the last step", {})
 def checkpoint_last(access: EngineAccess, out: Path) -> list[Check]:
-    """End a run at a checkpoint, whose reloaded engine has no contacts yet when the last check reads them."""
+    """End a run at a checkpoint; the last check must work on the reloaded engine, without contacts yet."""
     recording = {"series_interval_s": 0.01, "frame_interval_s": 0.04, "checkpoint_interval_s": 0.01}
     run = whole(scene_data(access, RELAX, count=2, recording=recording), out)
     return run.sound() + run.weight_on_floor(0.02)

@@ -112,7 +112,7 @@ def _phase_of(out: Path) -> str:
 
 
 def kills(engine: str, number: int, folder: Path, *, seed: int) -> list[dict[str, Any]]:
-    """Kill runs of one scene at random times, and compare each with the uninterrupted run.
+    """Kill `number` runs of one scene at random times; compare each with the uninterrupted run.
 
     Returns one row of the table per kill. `seed` is that of the scene and of the random times. Run directories of equal
     runs are removed. RunError if a run failed, or two uninterrupted runs differ.

@@ -84,7 +84,7 @@ SETTINGS: Mapping[str, Setting] = {
 
 
 def poses(setting: Setting, scene: Scene, seed: int) -> Poses:
-    """Return the initial poses of all smarticles."""
+    """Return the initial poses of all smarticles of a setting; the seed varies them."""
     rng, particle = np.random.default_rng(seed), scene.particle
     if setting.placed == "pile":
         narrow, reach = setting.keys == "at the wall", particle.reach
@@ -114,7 +114,7 @@ def poses(setting: Setting, scene: Scene, seed: int) -> Poses:
 
 
 def let_go(access: EngineAccess, setting: Setting, seed: int, factor: float) -> dict[str, Any]:
-    """Release smarticles at `factor` times the stable step; return a row of the table."""
+    """Release smarticles with a time step of `factor` times the stable step; return a row of the table."""
     data = setting.data(access)
     stable = stable_step(scene_of(data))
     with tempfile.TemporaryDirectory() as scratch:

@@ -37,18 +37,18 @@ class Noting(Watchdog):
         return False
 
     def check(self, state: PileState, **options: Any) -> None:
-        """Record the largest gap of a hinge, then check."""
+        """Record the largest gap of a hinge, then check the state as `Watchdog` does."""
         if (gaps := options.get("gaps")) is not None:
             self._note("gap", gaps.max(initial=0.0) / self.gap)
         super().check(state, **options)
 
     def check_depths(self, overlaps: Overlaps, **options: Any) -> None:
-        """Record the deepest contact, then check."""
+        """Record the deepest contact, then check the overlaps as `Watchdog` does."""
         self._note("depth", overlaps.deepest / self.depth)
         super().check_depths(overlaps, **options)
 
     def check_energy(self, state: PileState, *, energy: float, **options: Any) -> None:
-        """Record the excess of energy, then check."""
+        """Record the excess of energy, then check the energy as `Watchdog` does."""
         if np.isfinite(energy - self._ceiling):
             self._note("energy", (energy - self._ceiling) / self.energy)
         super().check_energy(state, energy=energy, **options)

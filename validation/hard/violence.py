@@ -81,7 +81,8 @@ def landing(access: EngineAccess, out: Path, *, time: float) -> list[Check]:
 def tip(access: EngineAccess, out: Path, *, speed: float) -> list[Check]:
     """Throw the tip of a barb at the floor, so fast that on YADE a sphere's centre goes through the floor.
 
-    From that depth on YADE's contact force decreases. On links the barrier stops the tip above the floor.
+    From that depth on YADE's contact force decreases. On the engine `links` the repulsive barrier stops the tip above
+    the floor.
     """
     scene, engine, recorder = watched(scene_data(access, count=1), out)
     add(engine, (0, 0, 0.02), Rotation.random(random_state=1))

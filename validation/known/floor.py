@@ -22,7 +22,7 @@ FRICTION = 0.4
 
 
 def lowest(access: EngineAccess, particle: Particle) -> Array:
-    """Return the contact points of a body lying flat, relative to its centre of mass, (n, 2) [m]."""
+    """Return x and y of a flat body's contact points with the floor, from its centre of mass: (n, 2) [m]."""
     ends = access.ends(particle)
     found: Array = ends[ends[:, 2] < ends[:, 2].min() + 1e-9, :2]
     return found
@@ -118,7 +118,7 @@ def slide(access: EngineAccess, *, aspect_ratio: float = 0.7, friction: float = 
     phases=2,
 )
 def roll_errors(access: EngineAccess, steps: Sequence[float], *, phases: int = 5) -> list[float]:
-    """Return the errors of the displacement of a ball that slides and then rolls, after 0.1 s [m].
+    """Return the error [m] of the way in 0.1 s of a ball that slides, then rolls, for each time step.
 
     The reference is a simulation with a quarter of the smallest time step. The tangential dashpot is off. On YADE its
     force is not limited by friction for the first few µs of a contact, so that results would depend on whether a time
@@ -150,7 +150,7 @@ def two_high(
 ) -> Engine:
     """Stack two balls on the floor, at their static overlaps if `sunk`, otherwise just touching.
 
-    Velocities are those of lower and upper ball, upwards [m/s].
+    `velocities` are the upward velocities of the lower and the upper ball [m/s].
     """
     press = BALL_MASS * G / STIFFNESS * sunk
     engine = access.build(access.ball(), law, dt=dt, gravity=G)
@@ -184,7 +184,7 @@ def stack_at_rest(access: EngineAccess) -> list[Answer]:
     (2, LEAPFROG),
 )
 def stack_errors(access: EngineAccess, steps: Sequence[float]) -> list[float]:
-    """Return the errors of both heights relative to rest, against theory for a chain of two masses [m]."""
+    """Return the error [m] of the heights of two vibrating stacked balls for each time step."""
     shape = STIFFNESS * np.array([[2.0, -1.0], [-1.0, 1.0]])
     squares, modes = eigh(shape, BALL_MASS * np.eye(2))
     thrown, time = np.array([2e-3, -1e-3]), 0.02048  # m/s, s; overlaps stay above zero
@@ -206,7 +206,7 @@ REASON = "residual vibration after 0.4 s"
 
 
 def _level(found: ContactForces, level: int, each: int) -> Array:
-    """Return the forces (contacts, 3) [N] from below on a level of a stack with `each` bodies per level."""
+    """Return the forces (contacts, 3) [N] from below on a level (0: lowest) that has `each` bodies."""
     bodies = found.smarticles // each
     if level:
         upwards: Array = -found.forces[(bodies == (level - 1, level)).all(axis=1)]

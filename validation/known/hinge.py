@@ -32,14 +32,14 @@ def hinged(
 ) -> Scene:
     """Return a scene of one articulated smarticle with springs as shafts.
 
-    Angles are those of the barbs [deg]; `motor` has keys of `motor` in a scene.
+    `angles` are the angles of the barbs [deg]; `motor` has keys of the scene's mapping `motor`.
     """
     smarticle = {"aspect_ratio": aspect_ratio, "angles_deg": list(angles)}
     return scene(access, shape_change(), fidelity=fidelity, smarticle=smarticle, motor=motor)
 
 
 def upright(access: EngineAccess, one: Scene, *, gravity: float, dt: float | None = None) -> Engine:
-    """Build an engine with one articulated smarticle in the xz plane, open side down, middle link fixed."""
+    """Build an engine with the smarticle of a scene in the xz plane, open side down, middle link fixed."""
     engine = access.build_hinged(one, gravity=gravity, dt=dt)
     boxes = one.smarticle.boxes
     turned = Rotation.from_euler("x", -90, degrees=True) * Rotation.from_matrix(boxes.link_rotations[1].T)
@@ -64,7 +64,7 @@ def _barb(one: Scene) -> tuple[float, float, float]:
 def pull(
     access: EngineAccess, *, aspect_ratio: float = 0.7, fidelity: str = "standard", largest: float = 0.01
 ) -> list[Answer]:
-    """Pull a straight smarticle at both ends, with a force that rises to a hundred times its weight."""
+    """Pull a straight smarticle at both ends; `largest`: allowed gap of a hinge over sphere diameter [1]."""
     one, duration = hinged(access, aspect_ratio=aspect_ratio, fidelity=fidelity, angles=(0, 0)), 0.02
     engine = access.build_hinged(one, gravity=0.0)
     add(engine, (0, 0, 0.05), Rotation.from_rotvec([0.4, 0.2, -0.7]))
@@ -214,7 +214,7 @@ def shaft_mode(one: Scene, pin: float, *, held: bool) -> tuple[float, Array]:
 
 
 def floating(access: EngineAccess, one: Scene, *, held: bool, dt: float | None = None) -> Engine:
-    """Build an engine without gravity and with a U whose barbs vibrate on their shafts by 0.01 rad."""
+    """Build an engine with a U, without gravity, whose barbs vibrate by 0.01 rad; `held`: middle fixed."""
     engine = access.build_hinged(one, gravity=0.0, dt=dt)
     add(engine, (0, 0, 0.05))
     engine.motors.articulate()
@@ -261,7 +261,7 @@ def shaft_vibration(access: EngineAccess, *, held: bool) -> list[Answer]:
     },
 )
 def vibration_errors(access: EngineAccess, steps: Sequence[float]) -> list[float]:
-    """Return the root-mean-square errors of the angle of a vibrating barb over 10 ms [rad]."""
+    """Return the root-mean-square error [rad] of a vibrating barb's angle over 10 ms for each time step."""
     one = hinged(access, torque_limit_N_m=STRONG)
 
     def path(dt: float) -> Array:

@@ -308,7 +308,7 @@ SPREAD = 8e-5  # m
 
 
 def _spread(law: ContactLaw, number: int) -> tuple[ContactLaw, float]:
-    """Return for sample `number` a law with stiffnesses up to 10 % higher, and an initial gap [m]."""
+    """Return a contact law with stiffnesses up to 10 % higher and an initial gap [m], for sample `number`."""
     factor = 1 + 0.1 * (0.569840 * number % 1)
     springs = {key: factor * getattr(law, key) for key in ("normal_stiffness", "tangential_stiffness")}
     return dataclasses.replace(law, **springs), 1e-4 + SPREAD * (0.754878 * number % 1)
@@ -335,7 +335,7 @@ def _spread(law: ContactLaw, number: int) -> tuple[ContactLaw, float]:
     restitution=1.0,
 )
 def bounce_errors(access: EngineAccess, steps: Sequence[float], *, restitution: float, phases: int = 24) -> list[float]:
-    """Return the root-mean-square errors [m] of a ball's height after one bounce, over `phases` samples."""
+    """Return the rms error [m] of a ball's height after a bounce for each step, over `phases` samples."""
     speed, time, squares = 0.2, 5.12e-3, np.zeros(len(steps))
     for number in range(phases):
         law, gap = _spread(ball_law(restitution=restitution), number)
@@ -351,7 +351,7 @@ def bounce_errors(access: EngineAccess, steps: Sequence[float], *, restitution: 
 
 
 def _collided(access: EngineAccess, law: ContactLaw, dt: float, gap: float, *, tilted: bool) -> Array:
-    """Simulate a collision of two smarticles with a `gap` [m]; return all sphere centres, (S, 3) [m]."""
+    """Simulate a collision of two smarticles from a `gap` [m]; return all sphere centres, (S, 3) [m]."""
     one = scene(access)
     engine = access.build(one.particle, law, dt=dt)
     add(engine, (0, 0, 0.1))
@@ -391,7 +391,7 @@ def _collided(access: EngineAccess, law: ContactLaw, dt: float, gap: float, *, t
 def collision_errors(
     access: EngineAccess, steps: Sequence[float], *, smooth: bool, phases: int = PHASES
 ) -> list[float]:
-    """Return the root-mean-square errors of the positions of all spheres after a collision [m]."""
+    """Return the rms error [m] of sphere positions after a collision for each step, over `phases` samples."""
     law = law_of(scene(access))
     if access.name == "links":
         # The tangential dashpot is not limited until the spring reaches Coulomb's limit. Only the smaller of these time

@@ -33,9 +33,10 @@ VELOCITIES = np.array([[0.1, -0.2, 0.3], [0.0, 0.1, 0.0]])  # m/s
 
 
 def free_pair(access: EngineAccess, law: str, damping: float) -> tuple[Engine, Iterator[float]]:
-    """Build two distant smarticles that spin and drift; return engine, and iterator that swings barbs.
+    """Build an engine with two distant smarticles that spin and drift; return engine and iterator.
 
-    The motors have the law `law` and the damping `damping` [N m s/rad]; 0 stands for the default damping.
+    The iterator advances the engine and swings the barbs, see `bench.drive`. The motors have the law `law` and the
+    damping `damping` [N m s/rad]; 0 stands for the default damping.
     """
     motor = {"law": law, "torque_limit_N_m": 1e-4} | ({"damping_N_m_s_per_rad": damping} if damping else {})
     one = scene(access, shape_change(), motor=motor)
