@@ -24,7 +24,7 @@ class MotorLaw:
     speed_limit: float  #: Greatest speed of a command, ω [rad/s]
     stiffness: float  #: Twist stiffness of the shaft between motor and barb [N m/rad]
     law: Law  #: What a motor does when its torque reaches τ_max, as `dem.setting.motor.Motor.law` describes it
-    damping: float = 0.0  #: A servo's derivative gain [N m s/rad]
+    damping: float = 0.0  #: A servo's derivative gain; on links also the damping of a shaft's twist [N m s/rad]
 
 
 # `speed_factor` and `halts` take scalars or arrays: compiled code calls them for one barb, `Motors` for barb 1, then

@@ -27,6 +27,11 @@ def problems(scene: SceneView, engine: str) -> Iterator[str]:
         yield from _of_section(scene)
         yield from _of_body(scene)
     yield from _of_recording(scene)
+    if scene.motor.damping_N_m_s_per_rad and scene.motor.law != "servo" and engine != "links":
+        yield (
+            f"motor.damping_N_m_s_per_rad: {scene.motor.damping_N_m_s_per_rad:g} N m s/rad with law "
+            f"{scene.motor.law} on engine: {engine}; use engine: links or law: servo, or leave it out"
+        )
     for index, phase in enumerate(scene.phases):
         yield from phase.check(scene, index)
     if scene.hooks is not None:

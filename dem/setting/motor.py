@@ -32,7 +32,13 @@ class Motor(Part):
         le=1e6,
         description="twist stiffness of the shaft between motor and barb, a servo's gain [N m/rad]",
     )
-    damping_N_m_s_per_rad: float = Field(0.0, ge=0, le=1e6, description="a servo's derivative gain [N m s/rad]")
+    damping_N_m_s_per_rad: float = Field(
+        0.0,
+        ge=0,
+        le=1e6,
+        description="a servo's derivative gain; halt, stall and ease, on links: damping of the shaft's twist, for "
+        "shafts so stiff that barbs would ring on them [N m s/rad]",
+    )
     strength_spread: float = Field(
         0.0,
         ge=0,
@@ -42,10 +48,10 @@ class Motor(Part):
     )
 
     @model_validator(mode="after")
-    def _damps_as_a_servo(self) -> Self:
-        if self.damping_N_m_s_per_rad and self.law != "servo":
+    def _slips_without_damping(self) -> Self:
+        if self.damping_N_m_s_per_rad and self.law == "slip":
             raise ValueError(
-                f"damping_N_m_s_per_rad: {self.damping_N_m_s_per_rad:g} N m s/rad, but law is {self.law}, which has "
-                "no damping; use law: servo"
+                f"damping_N_m_s_per_rad: {self.damping_N_m_s_per_rad:g} N m s/rad, but law is slip, which has no "
+                "damping; use law: servo"
             )
         return self

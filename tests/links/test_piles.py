@@ -226,6 +226,35 @@ def test_the_speed_of_a_command_is_limited() -> None:
     assert np.abs(np.diff(commands)).max() == pytest.approx(6.0 * 2e-4)
 
 
+def opening(stiffness: float, damping: float = 0.0) -> Array:
+    """Rates of a barb that opens at 3 rad/s from rest in free space, after each step of 0.02 s [rad/s]."""
+    motor = builds.motor_law("halt", torque_limit=1.0, speed_limit=3.0, stiffness=stiffness, damping=damping)
+    made = builds.engine(motor_law=motor, dt=5e-6)
+    made.add(builds.at([0, 0, 5.0]))
+    made.motors.articulate()
+    rates = []
+    for update in range(1, 101):
+        made.motors.actuate(np.full((1, 1, 2), math.pi / 2 - 6e-4 * update), 2e-4)
+        for _ in range(40):
+            made.advance(1)
+            rates.append(-made._world.bodies.rate[0, 0])
+    return np.array(rates)
+
+
+@pytest.mark.parametrize("stiffness", [3e-3, 0.03, 0.3])
+def test_a_shaft_vibrates_as_if_its_motor_started_once(stiffness: float) -> None:
+    # The rate is ω (1 - cos Ωt). Commands that jumped at each control update would drive it to -7 rad/s at 0.3 N m/rad.
+    rates = opening(stiffness)
+    assert rates.min() > -0.05 * 3.0
+    assert rates.max() == pytest.approx(6.0, rel=0.05)
+
+
+def test_a_damped_stiff_shaft_prescribes_the_speed() -> None:
+    # Damped as much as an inertia of 2e-9 kg m² can be without overshooting; 3 rad/s after two control periods.
+    rates = opening(3.0, damping=2 * math.sqrt(3.0 * 2e-9))
+    np.testing.assert_allclose(rates[80:], 3.0, rtol=0.02)
+
+
 def test_a_fast_spin_is_taken_in_short_steps() -> None:
     made = builds.engine(dt=1e-4)
     made.add(builds.at([0, 0, 1.0]))

@@ -44,7 +44,7 @@ PASSES = 0.9
 # Of a diameter; a body between two boundaries that move apart is held where a contact is deeper, far beyond the
 # linear range: nothing but the contacts can give way.
 HOLDS = 0.5
-FORMAT = "links-5"
+FORMAT = "links-6"
 
 
 class LinksEngine:

@@ -113,6 +113,7 @@ class LinksMotors:
             stiffness=law.stiffness * factors,
             damping=float(law.damping),
             command=np.zeros((n, 2)),
+            pace=np.zeros((n, 2)),
             schedule=np.zeros((n, 2)),
             torque=np.zeros((n, 2)),
             work=np.zeros((n, 2)),

@@ -1,11 +1,12 @@
 """Kernels of the motors: control updates, and the torques of shafts on the angles.
 
-A motor turns one end of its shaft to the command, and the barb is at the other end. So barbs turn freely against a
-spring, and the momentum p conjugate to an angle (see `planar`) is part of the state. The torque τ is that of a spring
-between angle and command, for a servo also of a damper. The laws slip and servo cap τ at τ_max. Under halt, stall and
-ease the command stops while τ is at τ_max or above; τ can exceed τ_max by stiffness × speed × control period, however
-stiff contacts are. The spring takes the mean of the angles half a step before and half a step after, the damper takes
-the rate after the step, so that both are stable at any stiffness and damping.
+A motor turns one end of its shaft to the command at constant speed in each control period, and the barb is at the other
+end. So barbs turn freely against a spring, and the momentum p conjugate to an angle (see `planar`) is part of the state.
+The torque τ is that of a spring, and of a damper if there is one, between angle and command. The laws slip and servo cap
+τ at τ_max. Under halt, stall and ease the command stops while τ is at τ_max or above; τ can exceed τ_max by stiffness ×
+speed × control period, however stiff contacts are. A command that jumped at each control update would set stiff shafts
+ringing. The spring takes the mean of the angles half a step before and half a step after, the damper takes the rate
+after the step, so that both are stable at any stiffness and damping.
 
 The work of the motors and the change of kinetic energy agree to second order in the time step, and exactly in kicks.
 """
@@ -50,7 +51,7 @@ def engage(shapes: Shapes, bodies: Bodies, motors: Motoring) -> None:
             alpha = bodies.alpha[i, k]
             bodies.rate[i, k] = 0.0
             motors.command[i, k] = motors.schedule[i, k] = alpha
-            motors.torque[i, k] = motors.impulse[i, k] = 0.0
+            motors.pace[i, k] = motors.torque[i, k] = motors.impulse[i, k] = 0.0
             motors.halted[i, k] = False
     motors.elapsed[0] = 0.0
 
@@ -109,8 +110,10 @@ def update(shapes: Shapes, bodies: Bodies, motors: Motoring) -> None:
             most = motors.speed * interval * _speed_factor(motors.law, over)
             advance = min(most, max(-most, target - motors.command[i, k]))
             motors.halted[i, k] = _halts(motors.law, over, advance, torque, motors.over[i])
-            if motors.law >= SLIP or not motors.halted[i, k]:
-                motors.command[i, k] += advance
+            if motors.law < SLIP and motors.halted[i, k]:
+                advance = 0.0
+            motors.command[i, k] += advance
+            motors.pace[i, k] = advance / interval
             motors.schedule[i, k] = target
     motors.elapsed[0] = 0.0
 
@@ -157,12 +160,18 @@ def free_torques(bodies: Bodies, motors: Motoring, i: int, r1: float, r2: float,
     """
     row = bodies.plane[i]
     m1, m2, m12 = row[24], row[25], row[26]
+    left = max(0.0, motors.interval - motors.elapsed[0])
+    command1 = motors.command[i, 0] - left * motors.pace[i, 0]
+    command2 = motors.command[i, 1] - left * motors.pace[i, 1]
     # The spring at the mean of the angles half a step before and after, which keeps its energy; the damper after.
     gain1, gain2 = 0.25 * dt * motors.stiffness[i, 0], 0.25 * dt * motors.stiffness[i, 1]
-    free1 = motors.stiffness[i, 0] * (motors.command[i, 0] - bodies.alpha[i, 0]) + gain1 * bodies.rate[i, 0]
-    free2 = motors.stiffness[i, 1] * (motors.command[i, 1] - bodies.alpha[i, 1]) + gain2 * bodies.rate[i, 1]
+    free1 = motors.stiffness[i, 0] * (command1 - bodies.alpha[i, 0]) + gain1 * bodies.rate[i, 0]
+    free2 = motors.stiffness[i, 1] * (command2 - bodies.alpha[i, 1]) + gain2 * bodies.rate[i, 1]
     gain1, gain2 = gain1 + motors.damping, gain2 + motors.damping
     free1, free2 = free1 - gain1 * r1, free2 - gain2 * r2
+    if motors.law < SLIP:  # the damper of a shaft sits between motor and barb, that of a servo brakes the barb
+        free1 += motors.damping * motors.pace[i, 0]
+        free2 += motors.damping * motors.pace[i, 1]
     # τ = free - gain dt M τ: 2 × 2, then one at its cap, then both.
     a, b, c, d = 1 + gain1 * dt * m1, gain1 * dt * m12, gain2 * dt * m12, 1 + gain2 * dt * m2
     determinant = a * d - b * c
