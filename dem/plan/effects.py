@@ -149,11 +149,13 @@ def _motors(scene: Scene, numbers: list[str]) -> dict[EffectName, tuple[bool, st
         EffectName.ARTICULATION: (
             True,
             f"phase{'s' if len(numbers) > 1 else ''} {', '.join(numbers)}: three links and two hinges per smarticle, "
-            f"pins of {fidelity.hinge_stiffness_N_per_m:g} N/m; welded in the others",
+            f"{'without play' if scene.smooth else f'pins of {fidelity.hinge_stiffness_N_per_m:g} N/m'}; welded in the "
+            "others",
         ),
         EffectName.MOTORS: (
             True,
-            f"ω = {motor.speed_limit_rad_per_s:g} rad/s, a control update every {fidelity.control_interval_s:g} s",
+            f"ω = {motor.speed_limit_rad_per_s:g} rad/s, shafts of {motor.stiffness_N_m_per_rad:g} N m/rad, a control "
+            f"update every {fidelity.control_interval_s:g} s",
         ),
         EffectName.TORQUE_CAP: (True, f"τ_max = {scene.torque_limit:.3g} N m, law {motor.law}{beyond}"),
     }
