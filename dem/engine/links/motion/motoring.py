@@ -1,12 +1,12 @@
 """Kernels of the motors: control updates, and the torques of shafts on the angles.
 
-A motor turns one end of its shaft to the command at constant speed in each control period, and the barb is at the other
-end. So barbs turn freely against a spring, and the momentum p conjugate to an angle (see `planar`) is part of the state.
-The torque τ is that of a spring, and of a damper if there is one, between angle and command. The laws slip and servo cap
-τ at τ_max. Under halt, stall and ease the command stops while τ is at τ_max or above; τ can exceed τ_max by stiffness ×
-speed × control period, however stiff contacts are. A command that jumped at each control update would set stiff shafts
-ringing. The spring takes the mean of the angles half a step before and half a step after, the damper takes the rate
-after the step, so that both are stable at any stiffness and damping.
+A motor turns one end of its shaft to the command at constant speed in each control period, and the barb is at the
+other end. So barbs turn freely against a spring, and the momentum p conjugate to an angle (see `planar`) is part of
+the state. The torque τ is that of a spring, and of a damper if there is one, between angle and command. The laws slip
+and servo cap τ at τ_max. Under halt, stall and ease the command stops while τ is at τ_max or above; τ can exceed τ_max
+by stiffness × speed × control period, however stiff contacts are. A command that jumped at each control update would
+set stiff shafts ringing. The spring takes the mean of the angles half a step before and half a step after, the damper
+takes the rate after the step, so that both are stable at any stiffness and damping.
 
 The work of the motors and the change of kinetic energy agree to second order in the time step, and exactly in kicks.
 """
