@@ -190,6 +190,7 @@ def test_a_killed_process_loses_no_frame_that_it_has_written(tmp_path: Path) -> 
     path, acknowledged, counts = tmp_path / VTKHDF, tmp_path / "written", (5,) * 10_000
     random = np.random.default_rng(3)
     first = 0
+    acknowledged.write_text("0", encoding="ascii")
     for _ in range(8):
         child = os.fork()
         if not child:
@@ -198,7 +199,11 @@ def test_a_killed_process_loses_no_frame_that_it_has_written(tmp_path: Path) -> 
                 writer.write(mesh(5, number), time_of(number))
                 acknowledged.write_text(f"{number + 1}", encoding="ascii")
             os._exit(0)
-        time.sleep(0.2 + random.uniform(0.0, 0.1))
+        until = time.monotonic() + 60
+        while int(acknowledged.read_text(encoding="ascii") or 0) <= first:  # a busy machine starts late
+            assert time.monotonic() < until
+            time.sleep(0.01)
+        time.sleep(random.uniform(0.0, 0.1))
         os.kill(child, signal.SIGKILL)
         os.waitpid(child, 0)
         written = int(acknowledged.read_text(encoding="ascii") or first)  # the kill may have come within this file
