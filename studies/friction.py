@@ -101,7 +101,7 @@ class Curve:
         return np.asarray(np.interp(friction, self.friction, self.packing) - self.reference, dtype=np.float64)
 
     def error(self, friction: Array) -> Array:
-        """Return the 95 % half-width (m,) [-] of `deviation`, from errors of the means and of Gravish's point."""
+        """Return the 95 % half-width (m,) [-] of `deviation` at coefficients of friction (m,), with Gravish's error."""
         if len(self.friction) == 1:
             return np.asarray(np.hypot(np.full(friction.shape, self.half_widths[0]), DIGITISING_ERROR))
         right = np.clip(np.searchsorted(self.friction, friction), 1, len(self.friction) - 1)
@@ -144,7 +144,7 @@ class Curve:
         return value, low, high, place
 
     def within(self, margin: float, friction: float) -> float:
-        """Return the confidence that φ is within a margin [-] of Gravish's φ; NaN without errors."""
+        """Return the confidence that φ is within a margin [-] of Gravish's φ; NaN if the errors are unknown."""
         at = np.array([friction])
         deviation, error = float(self.deviation(at)[0]), float(self.error(at)[0]) / _per_error(self.scatter)
         if not math.isfinite(error):

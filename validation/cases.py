@@ -62,12 +62,15 @@ def above(what: str, measured: float, limit: float) -> Check:
 
 
 def near(what: str, measured: float, expected: float, error: float) -> Check:
-    """Check that a measured value is within ±`error` of the expected value; NaN fails."""
+    """Check that a measured value is within ±`error` of the expected value; NaN fails.
+
+    `what` names quantity and unit.
+    """
     return Check(what, f"{measured:.5g}", f"{expected:.5g} ± {error:.2g}", bool(abs(measured - expected) <= error))
 
 
 def nothing(what: str, text: str | None) -> Check:
-    """Check that `text`, the message of an error, is None."""
+    """Check that nothing is reported: `text`, the message of an error, must be None; `what` names the check."""
     return Check(what, text or "nothing", "nothing", text is None)
 
 

@@ -98,7 +98,10 @@ class RunBoundaries:
 
 
 def _start(run: Run, index: int, series: Series | None) -> float | None:
-    """Return the start of a phase [s]; if not recorded, the time of the last sample before the phase."""
+    """Return the start of the phase `index` [s]; if not recorded, the time of the last sample before the phase.
+
+    None if there is no series either.
+    """
     start = run.phases[index].start_s
     if start is None and series is not None:
         start = float(series.time[series["phase"] < index].max(initial=0.0))

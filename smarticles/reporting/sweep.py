@@ -147,8 +147,13 @@ def _measured(folder: Folder, varied: Mapping[str, Sequence[Any]], *, jobs: int)
 def _figures(final: pd.DataFrame, by: Sequence[str], varied: Mapping[str, Sequence[Any]], kind: str) -> list[Markup]:
     """Return charts against the variable with most values, with one curve per value of a second variable.
 
-    There are separate charts for each combination of the other variables. `final` has means after the last phase, of
-    the type `kind`, by the variables `by`; `varied` has the values of each variable.
+    There are separate charts for each combination of the other variables.
+
+    Args:
+        final: table of means after the last phase; a row for each combination of values of the variables.
+        by: names of the variables, which are columns of `final`.
+        varied: values of each variable.
+        kind: type of the last phase, such as "relax", for captions.
     """
     if not by:
         return []

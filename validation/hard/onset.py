@@ -114,7 +114,7 @@ def poses(setting: Setting, scene: Scene, seed: int) -> Poses:
 
 
 def let_go(access: EngineAccess, setting: Setting, seed: int, factor: float) -> dict[str, Any]:
-    """Release smarticles with a time step of `factor` times the stable step; return a row of the table."""
+    """Simulate placed smarticles at `factor` times the stable time step; return a row of the table."""
     data = setting.data(access)
     stable = stable_step(scene_of(data))
     with tempfile.TemporaryDirectory() as scratch:

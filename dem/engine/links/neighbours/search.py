@@ -185,12 +185,16 @@ def _boxed(
 ) -> int:  # fmt: skip
     """Append to `close` those indices from `start` to `stop` - 1 whose boxes may overlap a given box.
 
-    The first loop is vectorised by the compiler. In the second loop every index is written, and overwritten by the next
-    one if its box does not overlap, so that no branch is needed.
+    The given box's lower x is not compared: the boxes begin in its bin or in later bins. The first loop is vectorised
+    by the compiler. In the second loop every index is written, and overwritten by the next one if its box does not
+    overlap, so that no branch is needed.
 
     Args:
         boxes: (6, L) lower x, y, z and upper x, y, z of all boxes [m].
+        close: indices in the first half; the second half is scratch.
         count: number of indices in `close` before.
+        start: first index to try.
+        stop: last index to try, plus one.
         ly: lower y of the given box [m].
         lz: lower z of the given box [m].
         hx: upper x of the given box [m].
