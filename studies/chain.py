@@ -180,7 +180,7 @@ def _widens(base: pd.DataFrame) -> list[Effect]:
 
 
 def rises(name: str, says: str, quantity: str, rows: Rows) -> Finding:
-    """Make the finding that a quantity rises with confinement."""
+    """Make the finding that a quantity rises with confinement h/H; `says` is its statement."""
 
     def outcome(part: pd.DataFrame) -> Outcome:
         effects, untouched = [], False

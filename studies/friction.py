@@ -207,7 +207,10 @@ def points(runs: pd.DataFrame, scatters: Mapping[str, Scatter]) -> pd.DataFrame:
 
 
 def curves(table: pd.DataFrame, scatters: Mapping[str, Scatter]) -> Curves:
-    """Make a curve of φ against friction for each stage and l/w at which Gravish has a point."""
+    """Make a curve of φ against friction for each stage and l/w at which Gravish has a point.
+
+    `scatters` has the relative scatter over seeds, by stage.
+    """
     found = {}
     for (stage, aspect), group in table[table[REFERENCE].notna()].groupby([STAGE, ASPECT], sort=False):
         rows = group.sort_values(FRICTION)

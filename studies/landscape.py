@@ -160,7 +160,10 @@ def measure(run: Run) -> Row:
 
 
 def _spent(run: Run, procedure: str, rest: int) -> float:
-    """Return the work of an activity on all smarticles [J], up to the end of the phase with index `rest`."""
+    """Return the work of an activity on all smarticles [J], up to the end of the phase with index `rest`.
+
+    `procedure` is the kind of activity; "static" spends nothing.
+    """
     if procedure == STATIC:
         return 0.0
     series = run.series
@@ -220,7 +223,10 @@ def predicted(runs: pd.DataFrame) -> tuple[pd.DataFrame, pd.DataFrame]:
 def _correlated(
     table: pd.DataFrame, strength: str, *, within: bool
 ) -> tuple[list[dict[str, object]], list[dict[str, object]]]:
-    """Return rows of the tables `predictors` and `comparisons`, see `predicted`, from runs of one part."""
+    """Correlate one strength, a column, with all measures; return rows of `predicted`'s two tables.
+
+    With `within`, the correlation is within each l/w, otherwise over all.
+    """
     names = list(PREDICTORS)
     x, y = table[names].to_numpy(dtype=np.float64), table[strength].to_numpy(dtype=np.float64)
     strata = pd.factorize(table[ASPECT])[0].astype(np.int64)

@@ -77,7 +77,10 @@ class _Access:
 
 
 def _bar(length: float, thickness: float, radius: float, kind: type[Particle] = Particle) -> Particle:
-    """Return a barbless smarticle of mass BALL_MASS and square section, for spheres of a radius [m]."""
+    """Return a barbless smarticle of mass BALL_MASS and square section, for spheres of a radius [m].
+
+    It has the given length and side of the section [m], and is of the class `kind`.
+    """
     boxes = Boxes(
         middle_length=length,
         barb_length=0.0,
@@ -89,7 +92,10 @@ def _bar(length: float, thickness: float, radius: float, kind: type[Particle] = 
 
 
 def _spoilt_place(engine: Engine, what: str, place: Iterable[float]) -> tuple[float, float, float]:
-    """Return the position [m] to which `LinksAccess.spoil` moves a body at `place` (3,) [m]."""
+    """Return the position [m] to which `LinksAccess.spoil` moves a body at `place` (3,) [m].
+
+    `what` names the invalid state, such as "over the wall".
+    """
     (x, y, z), reach, radius = place, engine.particle.reach, engine.particle.radius
     return {
         "position": (x, y, math.nan),

@@ -1,4 +1,7 @@
-"""Scenes, contact laws, engines and watchdogs for validation cases. All quantities are in SI units."""
+"""Scenes, contact laws, engines and watchdogs for validation cases. All quantities are in SI units.
+
+`access` is the engine, with access to its internals.
+"""
 
 import math
 from collections.abc import Callable, Iterator, Mapping

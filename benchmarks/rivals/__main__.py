@@ -92,7 +92,15 @@ def perform(task: Path) -> None:
 
 
 def run(folder: Path, setting: Setting, activity: str, seed: int, given: argparse.Namespace) -> Any:
-    """Simulate a setting in a separate process, with parsed options `given`; return a row of the table."""
+    """Simulate a setting in a separate process; return a row of the table.
+
+    Args:
+        folder: folder of the poured piles, in which the run gets a directory.
+        setting: engine and its parameters, a row of the table.
+        activity: what the smarticles do, one of `setting.activities`.
+        seed: seed of the pile.
+        given: parsed options.
+    """
     count, seconds, poured = given.count, given.seconds, folder / f"pile-{given.count}-{seed}"
     if not (poured / "done.json").exists():
         run_child(folder, poured.name, data_of(count, seed, {"type": "relax", "duration_s": 0.3}, **POUR))
@@ -139,7 +147,10 @@ def measured(scene: Scene, shape: str, positions: Array, frames: Array) -> dict[
 
 
 def planned(engines: Sequence[str], given: argparse.Namespace) -> Iterator[tuple[Setting, dict[str, Any]]]:
-    """Yield setting and identifying columns of each simulation that the parsed options `given` ask for."""
+    """Yield setting and identifying columns of each simulation that the parsed options `given` ask for.
+
+    Settings of engines that `engines` does not name are left out.
+    """
     for seed, setting in product(given.seeds, SETTINGS):
         if setting.engine in engines and not (setting.costly and seed != given.seeds[0]):
             for activity in filter(given.activities.__contains__, setting.activities):

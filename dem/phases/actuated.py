@@ -280,7 +280,7 @@ def _of_control(scene: SceneView) -> Iterator[str]:
 
 
 def _whole_fraction(whole: float, parts: int) -> str:
-    """Return, as text, a time [s] divided by `parts` or more, so that the result has few digits."""
+    """Return the time `whole` [s], divided by `parts` or a little more so that it has few digits, as text."""
     for more in range(parts, min(10 * parts, parts + MOST_PARTS) + 1):
         text = f"{whole / more:.3g}"
         if math.isclose(float(text) * more, whole, rel_tol=TOLERANCE):

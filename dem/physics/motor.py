@@ -32,7 +32,10 @@ class MotorLaw:
 
 
 def speed_factor(law: int, over: Any) -> Any:
-    """Return the factor on a motor's speed limit [1]; arguments as in `halts`."""
+    """Return the factor on a motor's speed limit [1], which is below 1 only under the law "ease".
+
+    `law` is its number in `LAWS`, `over` whether the torque has reached its limit.
+    """
     return 1.0 - (1.0 - EASED) * over if law == EASE else 1.0
 
 

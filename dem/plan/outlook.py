@@ -260,7 +260,10 @@ def protocol_lines(scene: Scene) -> tuple[str, ...]:
 
 
 def _protocol_keys(scene: Scene, rules: Mapping[str, Mapping[str, Any]]) -> Iterator[tuple[str, Any, Any]]:
-    """Yield the protocol's keys that apply to a scene, each with the scene's and the protocol's value."""
+    """Yield the protocol's keys that apply to a scene, each with the scene's and the protocol's value.
+
+    `rules` are the protocol's values, by part of the scene or type of phase, then by key.
+    """
     for part in PARTS:
         if applies(part, plane=scene.plane is not None, tiers=scene.container.tiers is not None):
             for key, value in rules[part].items():

@@ -61,7 +61,11 @@ def write_whole(path: Path, write: Callable[[Path], object], *, make_folder: boo
 
 
 def write_text(path: Path, text: str, *, make_folder: bool = True) -> None:
-    """Write a text file in UTF-8; arguments and errors as in `write_whole`."""
+    """Write or replace a text file in UTF-8, completely or not at all.
+
+    `make_folder`: whether to make the file's folder if it is missing. RunError if the disk is full or the folder cannot
+    be written; an existing file is then unchanged.
+    """
     write_whole(path, lambda temporary: temporary.write_bytes(text.encode()), make_folder=make_folder)
 
 

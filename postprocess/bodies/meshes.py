@@ -130,7 +130,7 @@ def _cross(length: float, side: float, count: int, height: float) -> pv.PolyData
 
 
 def knots(vertices: Floats, from_hinge: float) -> Floats:
-    """Return the points (2, 3) [m] at which strings are tied to the outer barbs of a chain.
+    """Return the points (2, 3) [m] at which strings are tied to the outer barbs of a chain of `vertices` [m].
 
     A knot lies on a barb at the distance `from_hinge` [m] from its hinge. Every second smarticle of a chain is rotated
     by 180°.
@@ -414,7 +414,7 @@ def link_boxes(
 
 
 def bar_meshes(bars: RecordedBars, kinds: Sequence[Kind]) -> pv.PolyData:
-    """Return boxes and cylinders of all bars as one mesh [m].
+    """Return boxes and cylinders of all bars as one mesh [m]; `kinds` has their cross-sections.
 
     The mesh has two arrays of cell data: `smarticle`, the index of the body, and `link`, the number of the bar in it.
     """

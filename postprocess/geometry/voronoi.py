@@ -108,10 +108,10 @@ def _cell_volumes(points: Floats, count: int, *, reach: float, together: int = T
     """Compute the Voronoi volumes (count,) [m³] of the first `count` points among points (n, 3) [m].
 
     The points are divided into slabs along x, with at most `together` points; the cells of a slab are computed among
-    all points within a reach [m] of the slab. The sphere around a corner of a cell through the point of the cell contains no other point. A cell is
-    therefore final if the spheres of all its corners lie inside the searched region. The remaining cells are computed
-    again with twice the reach, until the reach exceeds twice the distance from the point to its farthest corner. The
-    volume of an open cell is infinite.
+    all points within a reach [m] of the slab. The sphere around a corner of a cell through the point of the cell
+    contains no other point. A cell is therefore final if the spheres of all its corners lie inside the searched region.
+    The remaining cells are computed again with twice the reach, until the reach exceeds twice the distance from the
+    point to its farthest corner. The volume of an open cell is infinite.
     """
     if count <= together:
         return _cells(points)[0][:count]

@@ -241,16 +241,20 @@ def without_support(
 
 
 def on_floor(vertices: Vertices, *, diameter: float, floor_z: float) -> Flags:
-    """Return which of N smarticles touch the floor: (N,) bool; `without_support` describes the arguments."""
+    """Return which of N smarticles touch the floor: (N,) bool.
+
+    `diameter` is that of the spheres along the links, `floor_z` the height of the floor [m].
+    """
     axes = swept_axes(checked_vertices(vertices), diameter)
     touching: Flags = axes[..., 2].min(axis=1) - floor_z <= _REACH * diameter / 2
     return touching
 
 
 def at_wall(vertices: Vertices, *, diameter: float, wall_radius: float) -> Flags:
-    """Return which vertices touch the wall: (N, 4) bool; `without_support` describes the arguments.
+    """Return which vertices touch the wall: (N, 4) bool.
 
-    A straight link touches a round wall with its ends first.
+    A straight link touches a round wall with its ends first. `diameter` is that of the spheres along the links,
+    `wall_radius` that of the wall around the axis x = y = 0 [m].
     """
     axes = swept_axes(checked_vertices(vertices), diameter)
     touching: Flags = wall_radius - np.hypot(axes[..., 0], axes[..., 1]) <= _REACH * diameter / 2

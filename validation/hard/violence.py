@@ -1,4 +1,8 @@
-"""Fast impacts, deep overlaps, strong shaking, large mass ratios."""
+"""Fast impacts, deep overlaps, strong shaking, large mass ratios.
+
+In all cases `access` is the engine, with access to its internals, `out` the run directory, and times are simulated
+times [s]. A case returns its checks.
+"""
 
 import math
 from pathlib import Path
@@ -101,7 +105,10 @@ def tip(access: EngineAccess, out: Path, *, speed: float) -> list[Check]:
 
 @hard("deep overlap", {"time": 0.1}, {"time": 0.5})
 def overlap(access: EngineAccess, out: Path, *, time: float) -> list[Check]:
-    """Start with two parallel smarticles 0.4 diameters apart, which overlap over their whole length."""
+    """Start with two parallel smarticles 0.4 diameters apart, which overlap over their whole length.
+
+    They are simulated for a `time` [s].
+    """
     scene, engine, recorder = watched(scene_data(access, count=2, container={"height_m": 1.0}), out)
     d, start = scene.sphere_diameter, 0.03
     add(engine, (0, 0, start), TILTED)

@@ -1,4 +1,7 @@
-"""Known answers for single impacts (balls, bars, tips of smarticles), and errors over the time step."""
+"""Known answers for single impacts (balls, bars, tips of smarticles), and errors over the time step.
+
+`access` is the engine, with access to its internals; `dt` is a time step, a sequence `steps` has several [s].
+"""
 
 import dataclasses
 import math

@@ -383,7 +383,10 @@ class LammpsEngine:
         return saved
 
     def load(self, saved: Saved, scratch: Path) -> None:
-        """Replace the state; raise InputError if `saved` is of another engine or version, or damaged."""
+        """Replace the state; raise InputError if `saved` is of another engine or version, or damaged.
+
+        `scratch` is a folder for temporary files.
+        """
         memory = saved.memory
         if memory.get("format") != FORMAT:
             raise InputError(

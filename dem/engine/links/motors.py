@@ -69,7 +69,12 @@ class LinksMotors:
             world.set_articulated(False)
 
     def actuate(self, targets: Array, interval: float) -> None:
-        """Set the schedule; the first control update is made in the next step, between forces and kick."""
+        """Set the schedule; the first control update is made in the next step, between forces and kick.
+
+        Args:
+            targets: (U, N, 2) angles of the schedule at the ends of U control periods [rad].
+            interval: length of a control period [s].
+        """
         world = self._world
         assert world.motors is not None  # only articulated smarticles are actuated
         world.motors = world.motors._replace(

@@ -37,7 +37,10 @@ def rod_of(filament: Filament) -> Array:
 
 
 def wave_of(filament: Filament, curvature: PreferredCurvature | None) -> Array:
-    """Return `Filaments.wave` of one filament, (nodes, 3): amplitude, cosine and sine of the phase [1]."""
+    """Return `Filaments.wave` of one filament, (nodes, 3): amplitude, cosine and sine of the phase [1].
+
+    Amplitudes are 0 without a preferred `curvature`.
+    """
     wave = np.zeros((filament.nodes, 3))
     if curvature is not None:
         # A curvature 1/R turns a segment by the angle ℓ/R, and κ is twice the tangent of half of it.
@@ -65,10 +68,16 @@ def filaments_at(
     starts: Array | None,
     seed: int,
 ) -> Filaments:
-    """Return arrays of the filaments of `old` and of F new ones; see also `World.add_filaments`.
+    """Return arrays of the filaments of `old` and of F new ones.
 
     Args:
+        old: arrays of the filaments so far.
+        filament: shape of the new filaments.
         bodies: (F,) numbers of the new filaments among all bodies.
+        points: (F, nodes, 3) positions of the nodes [m].
+        velocities: (F, nodes, 3) velocities of the nodes [m/s]; None: at rest.
+        starts: (F,) initial angle ψ of each preferred curvature [rad]; None: 0.
+        seed: seed of the times at which preferred curvatures reverse.
     """
     count, nodes, _ = points.shape
     edges = np.diff(points, axis=1)

@@ -175,7 +175,7 @@ class World:
         self.skins[[2, 5]] = NEAR_STEPS * time_step, WIDE_STEPS * time_step
 
     def add(self, poses: Poses, *, speed: float = 0.0) -> None:
-        """Add bodies that fall at a speed [m/s] without rotation; smarticles are welded."""
+        """Add bodies at poses, smarticles welded; they fall at a speed [m/s] without rotation."""
         turns = np.array([rotation.as_matrix() for rotation in poses.rotations]).reshape(-1, 3, 3)
         if self.filaments is not None:
             self._add_posed_filaments(poses, turns, speed)

@@ -284,8 +284,8 @@ def push_boundaries(
         channel: (1,) half the distance of a channel's walls [m]; None in a container.
         hooks: the hooks; None: no hooks.
         rims: edges of the wall that links can reach; None: no such edges.
-        ledger: list of forces and their power, see `pairs.enter`; None: work is not summed.
-        step: time since the last forces; the length that the present step needs is written.
+        ledger: list of forces and their power, see `pairs.enter`; None: it is not needed.
+        step: time since the last forces; its number of sub-steps is increased if needed.
         rows: scratch of `contacts_of_segment`.
         met: scratch of `meeting.meet`.
 

@@ -105,7 +105,7 @@ def search(segments: Segments, cells: Cells, bare: float, piece: float) -> int:
 
 @inlined
 def _bin(offset: float, size: float, last: int) -> int:
-    """Return the number of the bin of an offset [m], at least 0 and at most `last`; NaN gives 0."""
+    """Return the number of the bin of a size [m] for an offset [m], from 0 to `last`; NaN gives 0."""
     return int(min(offset / size, float(last))) if offset > 0.0 else 0
 
 
@@ -125,7 +125,10 @@ def find_boxes(segments: Segments, cells: Cells, bare: float) -> None:
 
 @inlined
 def grid_over(cells: Cells, bare: float, piece: float) -> Grid:
-    """Return strips and bins for the boxes of all links; `piece` is the width of a strip [m]."""
+    """Return strips and bins for the boxes of all links; `piece` is the width of a strip [m].
+
+    `bare` is the distance that is added to radii and skins [m].
+    """
     x0, y0, x1, y1, tallest = math.inf, math.inf, -math.inf, -math.inf, 0.0
     for link in range(cells.keys.shape[0]):
         box = cells.own[link]
