@@ -250,10 +250,7 @@ class _Painter:
         return shape
 
     def _finish(self, tree: dict[str, Any], frame: Frame) -> None:
-        """Add dull materials, because glTF's default is a metallic mirror, and the provenance of the file.
-
-        `tree` is the JSON part of the file.
-        """
+        """Add dull materials, as glTF's default is a metallic mirror, and provenance to the JSON `tree`."""
         tree["materials"] = []
         for mesh in tree["meshes"]:
             opacity = PAINTS[mesh["name"]].opacity

@@ -62,8 +62,6 @@ def folder_of(
     """Create the directory of an expanded sweep, or open a directory that already holds this sweep.
 
     Args:
-        sweep: the sweep.
-        points: its points.
         out: the directory, which is absent, empty, or holds this sweep.
         command: command that makes it, for the record.
         expected_s: expected wall time of each point [s]; None: it is estimated here.

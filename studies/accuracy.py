@@ -86,7 +86,7 @@ class Rung:
 
 @dataclass(frozen=True, kw_only=True)
 class Ladder:
-    """Rungs of all knobs, and the variants of the scene that they need."""
+    """Rungs (values) of all knobs (parameters), and the variants of the scene that they need."""
 
     rungs: tuple[Rung, ...]  #: Rungs by knob, from coarse to fine
     settings: Mapping[str, Mapping[str, Value]] = field(repr=False)  #: Variables of the template by variant
@@ -293,9 +293,9 @@ _Point = tuple[str, str, str, dict[str, Value]]
 
 
 def _rungs(knob: str, base: Mapping[str, Value], *, smooth: bool) -> list[_Point]:
-    """Return all rungs (values) of a knob, from coarse to fine.
+    """Return all rungs of a knob, from coarse to fine, with the value that the scene itself has in `base`.
 
-    `base` has the values of the scene itself; `smooth`: links are swept by spheres, and are not chains of spheres.
+    `smooth`: links are swept by spheres, and are not chains of spheres.
     """
     if knob == "section":
         return _strands(base) if smooth else _sections(base)
@@ -351,10 +351,7 @@ def _sections(base: Mapping[str, Value]) -> list[_Point]:
 
 
 def _strands(base: Mapping[str, Value]) -> list[_Point]:
-    """Return the rungs of the knob "section" for smooth links: 1 to 3 strands side by side, which sweep a link.
-
-    Their number gives their diameter. `base` has the values of the scene itself, which is a rung too.
-    """
+    """Return the rungs of the knob "section" for swept links: `base`, and 1 to 3 strands side by side."""
     shapes: list[dict[str, Value]] = [{"rows": rows, "diameter_m": None} for rows in (1, 2, 3)]
     own = {key: base[key] for key in shapes[0]}
     if not any(_same(own, shape) for shape in shapes):
@@ -424,7 +421,7 @@ def _or_nan(number: float | None) -> float:
 
 
 def _of_series(run: Run, active: Sequence[int]) -> dict[str, float]:
-    """Return peak hook force, energies and joint gap of a run, by column; NaN if not recorded.
+    """Return peak hook force, energies and largest gap of a hinge of a run, by column; NaN if not recorded.
 
     `active` are the indices of the phases whose work is added up.
     """

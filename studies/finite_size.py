@@ -71,10 +71,7 @@ def share(stage: str) -> str:
 
 
 def spans(stage: str, what: str = "pile") -> str:
-    """Return the name of the column that is 1 if clusters span `what` at a stage.
-
-    `what` is "height", "width", or "pile" for both.
-    """
+    """Return the name of the column that is 1 if clusters span `what` ("height", "width", both: "pile")."""
     return f"spans {what} {stage} [-]"
 
 

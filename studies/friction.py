@@ -207,10 +207,7 @@ def points(runs: pd.DataFrame, scatters: Mapping[str, Scatter]) -> pd.DataFrame:
 
 
 def curves(table: pd.DataFrame, scatters: Mapping[str, Scatter]) -> Curves:
-    """Make a curve of φ against friction for each stage and l/w at which Gravish has a point.
-
-    `scatters` has the relative scatter over seeds, by stage.
-    """
+    """Make a curve of φ against friction for each stage, with its scatter, and l/w of a point of Gravish."""
     found = {}
     for (stage, aspect), group in table[table[REFERENCE].notna()].groupby([STAGE, ASPECT], sort=False):
         rows = group.sort_values(FRICTION)

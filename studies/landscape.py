@@ -160,10 +160,7 @@ def measure(run: Run) -> Row:
 
 
 def _spent(run: Run, procedure: str, rest: int) -> float:
-    """Return the work of an activity on all smarticles [J], up to the end of the phase with index `rest`.
-
-    `procedure` is the kind of activity; "static" spends nothing.
-    """
+    """Return the work of a procedure on all smarticles [J], up to the end of the phase with index `rest`."""
     if procedure == STATIC:
         return 0.0
     series = run.series

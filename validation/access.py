@@ -79,7 +79,7 @@ class _Access:
 def _bar(length: float, thickness: float, radius: float, kind: type[Particle] = Particle) -> Particle:
     """Return a barbless smarticle of mass BALL_MASS and square section, for spheres of a radius [m].
 
-    It has the given length and side of the section [m], and is of the class `kind`.
+    `thickness` is the side of the section [m], `kind` the class.
     """
     boxes = Boxes(
         middle_length=length,
@@ -92,10 +92,7 @@ def _bar(length: float, thickness: float, radius: float, kind: type[Particle] = 
 
 
 def _spoilt_place(engine: Engine, what: str, place: Iterable[float]) -> tuple[float, float, float]:
-    """Return the position [m] to which `LinksAccess.spoil` moves a body at `place` (3,) [m].
-
-    `what` names the invalid state, such as "over the wall".
-    """
+    """Return the position (3,) [m] out of bounds, as `what` says, to which a body at `place` is moved."""
     (x, y, z), reach, radius = place, engine.particle.reach, engine.particle.radius
     return {
         "position": (x, y, math.nan),

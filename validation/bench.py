@@ -1,7 +1,4 @@
-"""Scenes, contact laws, engines and watchdogs for validation cases. All quantities are in SI units.
-
-`access` is the engine, with access to its internals.
-"""
+"""Scenes, contact laws, engines and watchdogs for validation cases. All quantities are in SI units."""
 
 import math
 from collections.abc import Callable, Iterator, Mapping

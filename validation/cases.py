@@ -62,10 +62,7 @@ def above(what: str, measured: float, limit: float) -> Check:
 
 
 def near(what: str, measured: float, expected: float, error: float) -> Check:
-    """Check that a measured value is within ±`error` of the expected value; NaN fails.
-
-    `what` names quantity and unit.
-    """
+    """Check that a value (`what`: quantity, unit) is within ±`error` of the expected value; NaN fails."""
     return Check(what, f"{measured:.5g}", f"{expected:.5g} ± {error:.2g}", bool(abs(measured - expected) <= error))
 
 

@@ -147,10 +147,7 @@ def measured(scene: Scene, shape: str, positions: Array, frames: Array) -> dict[
 
 
 def planned(engines: Sequence[str], given: argparse.Namespace) -> Iterator[tuple[Setting, dict[str, Any]]]:
-    """Yield setting and identifying columns of each simulation that the parsed options `given` ask for.
-
-    Settings of engines that `engines` does not name are left out.
-    """
+    """Yield setting and identifying columns of each simulation with `engines` that the options select."""
     for seed, setting in product(given.seeds, SETTINGS):
         if setting.engine in engines and not (setting.costly and seed != given.seeds[0]):
             for activity in filter(given.activities.__contains__, setting.activities):

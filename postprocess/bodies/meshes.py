@@ -98,10 +98,7 @@ class RunBoundaries:
 
 
 def _start(run: Run, index: int, series: Series | None) -> float | None:
-    """Return the start of the phase `index` [s]; if not recorded, the time of the last sample before the phase.
-
-    None if there is no series either.
-    """
+    """Return the start of a phase, or the time of the last sample before it [s]; None if not recorded."""
     start = run.phases[index].start_s
     if start is None and series is not None:
         start = float(series.time[series["phase"] < index].max(initial=0.0))

@@ -69,7 +69,8 @@ def contact_pairs(vertices: Vertices, distance: float) -> ContactPairs:
 def pairs_in_contact(frame: Frame, run: Run) -> ContactPairs:
     """Find the pairs of smarticles that touch in the run's engine, sorted by i, then j.
 
-    Two smarticles touch if a sphere or strand of one touches a sphere or strand of the other.
+    Two smarticles touch if a sphere or strand (the volume that a sphere sweeps along a link) of one touches one of the
+    other.
 
     On the engine `links` the number of pairs is exact in all phases. On YADE it is exact at rest after pouring; it
     deviates by at most 1.4 % while pouring and 0.7 % at rest after shaking. While a pile is shaken it is 6 to 11 % too

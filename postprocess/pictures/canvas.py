@@ -103,10 +103,7 @@ class Subject:
         self.frames = read_frames(directory)
 
     def extent(self, indices: Iterable[int], axes: Floats) -> Floats:
-        """Return lower left and upper right (2, 2) [mm] of the bodies in some frames, in the picture's plane.
-
-        `axes` (3, 3) are the camera's: right, up and forward.
-        """
+        """Return lower left and upper right (2, 2) [mm] of the bodies in some frames along the camera's axes."""
         return union([extent(visible_meshes(self.bodies, self.frames[i], axes[2]).values(), axes) for i in indices])
 
     def values(self, indices: Iterable[int], style: Style) -> list[Floats]:

@@ -146,10 +146,7 @@ def _draw(folder: Folder, finished: Sequence[Entry], values: Mapping[str, object
 
 
 def _earlier(results: Path, folder: Folder, study: Study) -> Mapping[str, MeasuredRun]:
-    """Read those runs of a sweep, by name, that are in the tables of an earlier analysis.
-
-    `results` is the folder of the tables. InputError if the study needs more than tables.
-    """
+    """Read those runs of a sweep, by name, that are in the tables of an earlier analysis, in `results`."""
     from studies.framework.runs import Wanted, earlier_runs  # noqa: PLC0415
 
     if not study.from_tables:

@@ -147,13 +147,8 @@ def _measured(folder: Folder, varied: Mapping[str, Sequence[Any]], *, jobs: int)
 def _figures(final: pd.DataFrame, by: Sequence[str], varied: Mapping[str, Sequence[Any]], kind: str) -> list[Markup]:
     """Return charts against the variable with most values, with one curve per value of a second variable.
 
-    There are separate charts for each combination of the other variables.
-
-    Args:
-        final: table of means after the last phase; a row for each combination of values of the variables.
-        by: names of the variables, which are columns of `final`.
-        varied: values of each variable.
-        kind: type of the last phase, such as "relax", for captions.
+    There are separate charts for each combination of the other variables. The table `final` has means after the last
+    phase, whose type is `kind`, such as "relax". Its columns `by` are the variables; `varied` has the values of each.
     """
     if not by:
         return []

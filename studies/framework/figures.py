@@ -486,10 +486,7 @@ def by_procedure(labels: Mapping[str, str] = PROCEDURE_LABELS, *, apart: float =
 
 
 def marker(shape: str, colour: str, face: str) -> dict[str, Any]:
-    """Return properties, by Matplotlib's names, of a marker with a line and error bars of the same colour.
-
-    `shape` is Matplotlib's name of the marker, `face` the colour inside it.
-    """
+    """Return Matplotlib's properties of a marker, line and error bars in `colour`; `face`: its inside."""
     edges = {"markeredgewidth": 0.9, "elinewidth": 0.8, "capthick": 0.8}
     return {"marker": shape, "color": colour, "markerfacecolor": face, **edges}
 

@@ -70,10 +70,7 @@ def more_runs(effect: SeedMean, *, threshold: float = 0.0) -> float:
 
 
 def effect_text(effect: SeedMean, digits: int = 3, unit: str = "") -> str:
-    """Return `+0.0123 ± 0.0011 (n = 15)`: effect, standard error and number of runs, or `no data`.
-
-    `digits` are significant; `unit`, with a space before it, follows the error.
-    """
+    """Return `+0.0123 ± 0.0011 N (n = 15)`: effect, standard error, `unit`, number of runs; or `no data`."""
     if math.isnan(effect.value):
         return "no data"
     error = f" ± {effect.standard_error:.{digits}g}" if math.isfinite(effect.standard_error) else " without an error"
@@ -357,8 +354,7 @@ def ranks(
 
     Args:
         says: the statement.
-        x: column of x.
-        y: column of y.
+        x: column of x; `y`: column of y.
         within: columns whose values make blocks; ranks are taken within each block.
         bounds: column that is above 0 if y is a lower bound.
         found_if: the criterion in words.

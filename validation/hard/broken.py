@@ -94,10 +94,7 @@ def _resting(access: EngineAccess, out: Path, count: int) -> tuple[Engine, Recor
 
 @hard("spoilt: pile that is heated", {"count": 4, "share": 0.3})
 def heated(access: EngineAccess, out: Path, *, count: int, share: float) -> list[Check]:
-    """Reverse the damping of all contacts of a pile at rest; the watchdog must report the growing energy.
-
-    Normal damping is multiplied by −`share`, tangential damping is 0.
-    """
+    """Multiply the normal damping of a pile at rest by −`share`; the watchdog must report growing energy."""
     engine, recorder = _resting(access, out, count)
     access.heat(engine, share)
     access.push(engine, count - 1, velocity=(0, 0, 1e-3))

@@ -105,10 +105,7 @@ def tip(access: EngineAccess, out: Path, *, speed: float) -> list[Check]:
 
 @hard("deep overlap", {"time": 0.1}, {"time": 0.5})
 def overlap(access: EngineAccess, out: Path, *, time: float) -> list[Check]:
-    """Start with two parallel smarticles 0.4 diameters apart, which overlap over their whole length.
-
-    They are simulated for a `time` [s].
-    """
+    """Start with two parallel smarticles 0.4 diameters apart, which overlap over their whole length."""
     scene, engine, recorder = watched(scene_data(access, count=2, container={"height_m": 1.0}), out)
     d, start = scene.sphere_diameter, 0.03
     add(engine, (0, 0, start), TILTED)

@@ -383,10 +383,7 @@ class LammpsEngine:
         return saved
 
     def load(self, saved: Saved, scratch: Path) -> None:
-        """Replace the state; raise InputError if `saved` is of another engine or version, or damaged.
-
-        `scratch` is a folder for temporary files.
-        """
+        """Replace the state; raise InputError if `saved` is of another engine or version, or damaged."""
         memory = saved.memory
         if memory.get("format") != FORMAT:
             raise InputError(

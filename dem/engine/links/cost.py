@@ -48,10 +48,7 @@ COMPILE_FIRST, COMPILE_MORE = 13.0, 7.0
 
 
 def seconds_per_second(scene: Demand, time_step: float, activity: Activity) -> float:
-    """Return the estimated wall time per simulated time [1] on one core, for a time step [s].
-
-    `activity` is the kind of the phase, on which the cost of a step depends.
-    """
+    """Return the estimated wall time per simulated time [1] on one core, by time step [s] and phase kind."""
     count, recording, mixture = scene.count, scene.recording, scene.mixture
     rates = RATES[activity]
     if mixture is None:

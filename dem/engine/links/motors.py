@@ -69,11 +69,9 @@ class LinksMotors:
             world.set_articulated(False)
 
     def actuate(self, targets: Array, interval: float) -> None:
-        """Set the schedule; the first control update is made in the next step, between forces and kick.
+        """Set the schedule: angles (U, N, 2) [rad] at the ends of U control periods, and their length [s].
 
-        Args:
-            targets: (U, N, 2) angles of the schedule at the ends of U control periods [rad].
-            interval: length of a control period [s].
+        The first control update is made in the next step, between forces and kick.
         """
         world = self._world
         assert world.motors is not None  # only articulated smarticles are actuated

@@ -37,10 +37,7 @@ def rod_of(filament: Filament) -> Array:
 
 
 def wave_of(filament: Filament, curvature: PreferredCurvature | None) -> Array:
-    """Return `Filaments.wave` of one filament, (nodes, 3): amplitude, cosine and sine of the phase [1].
-
-    Amplitudes are 0 without a preferred `curvature`.
-    """
+    """Return `Filaments.wave` of one filament, (nodes, 3): amplitude, cosine and sine of the phase [1]."""
     wave = np.zeros((filament.nodes, 3))
     if curvature is not None:
         # A curvature 1/R turns a segment by the angle ℓ/R, and κ is twice the tangent of half of it.

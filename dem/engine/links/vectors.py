@@ -126,7 +126,7 @@ class Lines(NamedTuple):
 
 @inlined
 def lines(p: Array, q: Array) -> Lines:
-    """Return two segments, rows (LINE,) as in `shapes`, as `Lines`."""
+    """Return two segments as `Lines`, from rows (LINE,) with the columns of `shapes.START`."""
     start, other, u, v = vector(p, START), vector(q, START), vector(p, VECTOR), vector(q, VECTOR)
     w = sub(start, other)
     return Lines(

@@ -240,7 +240,7 @@ class World:
         """Add F filaments of one shape.
 
         Args:
-            shape: number of the shape, as in `add_bodies`.
+            shape: number of the shape in `kinds`.
             points: (F, nodes, 3) positions of the nodes [m].
             velocities: (F, nodes, 3) velocities of the nodes [m/s]; None: at rest.
             starts: (F,) initial angle ψ of each filament's preferred curvature [rad]; None: 0.

@@ -198,10 +198,7 @@ def _contacts_with_rims(link: Array, ground: Ground, rims: Rims, first: int, row
 
 @inlined
 def _contacts_with_hooks(link: Array, ground: Ground, hooks: Hooks, rows: Array, count: int, met: Array) -> int:
-    """Append a segment's contacts with the bars of both hooks to `rows`; return the number of rows.
-
-    `met` is scratch of `meeting.meet`. `rows` has `count` rows before.
-    """
+    """Append a segment's contacts with both hooks to `rows` from row `count` on; return the new count."""
     reach = link[RADIUS] + hooks.radius
     for hook in range(2):
         height = ground.place[LOWER + hook]
@@ -317,13 +314,10 @@ def _rub(
     law: Law, bodies: Bodies, parts: Parts, segments: Segments, p: int, ground: Ground, ledger: Any, step: Step,
     contact: Array, slip: Array,
 ) -> None:  # fmt: skip
-    """Add the force of a boundary on segment `p` at a contact to the load of the segment's part.
+    """Add the force of a boundary on segment `p` at a contact to `parts.load`, and its opposite to `ground.force`.
 
-    The opposite force is added to that on the boundary, `ground.force`, and the work to the ledger, if there is one.
-
-    Args:
-        contact: (COLUMNS,) the contact; for the columns see `SLOT`.
-        slip: (4,) stretch [m] and energy [J] of the tangential spring; updated.
+    `contact` (COLUMNS,) has the columns `SLOT` and following. `slip` (4,), stretch [m] and energy [J] of the tangential
+    spring, is updated.
     """
     i, row, damping = segments.body[p], segments.part[p], law.damping[bodies.shape[segments.body[p]], 0]
     depth, share, room, normal = contact[DEPTH], contact[SHARE], contact[ROOM], vector(contact, NORMAL)

@@ -57,11 +57,7 @@ class Found(NamedTuple):
 
 @part
 def _query_pairs(segments: Segments, pairs: Pairs, stiffness: float, found: Found) -> tuple[int, float]:
-    """Query all pairs of the wide list.
-
-    Args:
-        stiffness: kn [N/m].
-        found: results; updated.
+    """Query all pairs of the wide list, with the stiffness kn [N/m], and update the results `found`.
 
     Returns:
         Number of rows of `met` that were written, and energy of all normal springs [J].
@@ -90,10 +86,7 @@ def _query_pairs(segments: Segments, pairs: Pairs, stiffness: float, found: Foun
 def _query_boundaries(
     segments: Segments, ground: Ground, channel: Any, hooks: Any, rims: Any, stiffness: float, found: Found
 ) -> float:
-    """Query all contacts with boundaries; return the energy of their normal springs [J].
-
-    `stiffness` is kn [N/m]; `found` has the results, which are updated.
-    """
+    """Query all contacts with boundaries into `found`; return the energy of springs of `stiffness` kn [J]."""
     squares = 0.0
     for p in range(segments.line.shape[0]):
         i = segments.body[p]

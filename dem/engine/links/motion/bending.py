@@ -411,9 +411,7 @@ def kick_nodes(filaments: Any, dt: float) -> None:
 
 @inlined
 def _uniform(seed: int, number: int, event: int) -> float:
-    """Return a random number between 0 and 1, which depends on the three arguments alone.
-
-    `event` counts the numbers drawn for the filament `number`.
+    """Return a random number between 0 and 1, which depends on seed, filament and count of draws (`event`).
 
     Source: the finalizer of SplitMix64, Steele, Lea and Flood, OOPSLA 2014, applied once for each argument.
     """

@@ -132,7 +132,7 @@ def invert(row: Array) -> None:
 
 @inlined
 def invert_at(row: Array) -> None:
-    """Do what `invert` does, inlined into other kernels."""
+    """Compute columns 22 and 23 of a plane geometry (PLANE,) like `invert`, inlined into other kernels."""
     row[22], row[23] = 1 / row[16], 1 / (row[14] * row[15] - row[17] * row[17])
 
 

@@ -125,10 +125,7 @@ def find_boxes(segments: Segments, cells: Cells, bare: float) -> None:
 
 @inlined
 def grid_over(cells: Cells, bare: float, piece: float) -> Grid:
-    """Return strips and bins for the boxes of all links; `piece` is the width of a strip [m].
-
-    `bare` is the distance that is added to radii and skins [m].
-    """
+    """Return strips of the width `piece` [m], and bins, for the boxes of all links; `bare` is in `Grid`."""
     x0, y0, x1, y1, tallest = math.inf, math.inf, -math.inf, -math.inf, 0.0
     for link in range(cells.keys.shape[0]):
         box = cells.own[link]
