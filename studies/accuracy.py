@@ -293,9 +293,9 @@ _Point = tuple[str, str, str, dict[str, Value]]
 
 
 def _rungs(knob: str, base: Mapping[str, Value], *, smooth: bool) -> list[_Point]:
-    """Return all rungs of a knob, from coarse to fine, with the value that the scene itself has in `base`.
+    """Return all rungs (values) of a knob, from coarse to fine.
 
-    `smooth`: links are swept by spheres, and are not chains of spheres.
+    `base` has the scene's own values; `smooth`: links are swept by spheres, and are not chains of spheres.
     """
     if knob == "section":
         return _strands(base) if smooth else _sections(base)
@@ -421,7 +421,7 @@ def _or_nan(number: float | None) -> float:
 
 
 def _of_series(run: Run, active: Sequence[int]) -> dict[str, float]:
-    """Return peak hook force, energies and largest gap of a hinge of a run, by column; NaN if not recorded.
+    """Return peak hook force, energies and largest hinge gap of a run, by column; NaN if not recorded.
 
     `active` are the indices of the phases whose work is added up.
     """

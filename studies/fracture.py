@@ -137,10 +137,7 @@ def measure(run: Run) -> Row:
 
 
 def force_history(run: Run, *, net: bool = False) -> History:
-    """Read the upper hook's force over the weight of all smarticles [-], against time since the pull began.
-
-    With `net` the force is less the lower hook's force.
-    """
+    """Read the upper hook's force, if `net` less the lower's, against time, over all smarticles' weight."""
     pull = read_pull(run, run.series, run.phases[-1].index)
     force = (pull.net if net else pull).force / run.manifest.count / weight_of_one(run)
     return History(times=pull.times, values=force)

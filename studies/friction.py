@@ -101,7 +101,7 @@ class Curve:
         return np.asarray(np.interp(friction, self.friction, self.packing) - self.reference, dtype=np.float64)
 
     def error(self, friction: Array) -> Array:
-        """Return the 95 % half-width (m,) [-] of `deviation` at coefficients of friction (m,), with Gravish's error."""
+        """Return the 95 % half-width (m,) [-] of `deviation`, from errors of the means and of Gravish's point."""
         if len(self.friction) == 1:
             return np.asarray(np.hypot(np.full(friction.shape, self.half_widths[0]), DIGITISING_ERROR))
         right = np.clip(np.searchsorted(self.friction, friction), 1, len(self.friction) - 1)
@@ -207,7 +207,10 @@ def points(runs: pd.DataFrame, scatters: Mapping[str, Scatter]) -> pd.DataFrame:
 
 
 def curves(table: pd.DataFrame, scatters: Mapping[str, Scatter]) -> Curves:
-    """Make a curve of φ against friction for each stage, with its scatter, and l/w of a point of Gravish."""
+    """Make a curve of φ against friction for each stage and l/w at which Gravish has a point.
+
+    `scatters` has the relative scatter over seeds, by stage.
+    """
     found = {}
     for (stage, aspect), group in table[table[REFERENCE].notna()].groupby([STAGE, ASPECT], sort=False):
         rows = group.sort_values(FRICTION)

@@ -67,7 +67,7 @@ def near(what: str, measured: float, expected: float, error: float) -> Check:
 
 
 def nothing(what: str, text: str | None) -> Check:
-    """Check that nothing is reported: `text`, the message of an error, must be None; `what` names the check."""
+    """Check that nothing is reported: the message `text` of an error is None; `what` names the check."""
     return Check(what, text or "nothing", "nothing", text is None)
 
 
@@ -96,7 +96,7 @@ def _register(
 def case(
     name: str, about: str, theory: str, *, absent: Mapping[str, str] | None = None, **options: Any
 ) -> Callable[[Function], Function]:
-    """Register a function `(access, **options) -> list[Answer]` as a case with a known answer.
+    """Register a function `(access, **options) -> list[Answer]` as case `name` with a known answer.
 
     `about` describes the simulation, `theory` is the formula or source of the answer. `absent` has, by engine, the
     reason why the case does not apply to it.
@@ -139,7 +139,7 @@ def hard(
     long: Mapping[str, Any] | None = None,
     absent: Mapping[str, str] | None = None,
 ) -> Callable[[Function], Function]:
-    """Register a function `(access, folder, **options) -> list[Check]` as a hard case.
+    """Register a function `(access, folder, **options) -> list[Check]` as the hard case `name`.
 
     `short` has the keyword arguments in continuous integration, or is None if the case has a long form only. `long` has
     the arguments that differ in the long form. `absent` has, by engine, the reason why the case does not apply to it.

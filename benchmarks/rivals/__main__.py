@@ -94,12 +94,8 @@ def perform(task: Path) -> None:
 def run(folder: Path, setting: Setting, activity: str, seed: int, given: argparse.Namespace) -> Any:
     """Simulate a setting in a separate process; return a row of the table.
 
-    Args:
-        folder: folder of the poured piles, in which the run gets a directory.
-        setting: engine and its parameters, a row of the table.
-        activity: what the smarticles do, one of `setting.activities`.
-        seed: seed of the pile.
-        given: parsed options.
+    `folder` has the poured piles and gets a directory of the run; `activity` is one of `setting.activities`. Parsed options
+    are `given`.
     """
     count, seconds, poured = given.count, given.seconds, folder / f"pile-{given.count}-{seed}"
     if not (poured / "done.json").exists():

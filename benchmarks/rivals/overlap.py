@@ -109,7 +109,7 @@ def _boxes(particle: Particle, positions: Array, frames: Array) -> Bars:
 
 
 def _strands(particle: Particle, positions: Array, frames: Array) -> Swept:
-    """Return the strands of all links: one or several equal segments, side by side along the link's normal.
+    """Return the strands of all links: one or several equal segments side by side along a link's normal.
 
     The engine `links` has the same strands. A barb's strand goes from the hinge to a radius before the tip.
 

@@ -158,7 +158,7 @@ class World:
 
 
 def simulated(task: Task, simulation: World) -> Outcome:
-    """Simulate rest and activity of a task in `simulation`; the processor time of the activity is measured."""
+    """Simulate rest and activity of a task in `simulation`; measure the processor time of the activity."""
     if task.rest_s > CREEP:
         simulation.advance(task.rest_s - CREEP)
     samples, spent = [simulation.links()], 0.0

@@ -27,7 +27,7 @@ def first_ends(points: Array) -> Numbers:
 
 
 def owners(first: Numbers, inner: Flags) -> Flags:
-    """Return (2 S,) whether each end of a segment owns the place at which it lies; each place has one owner.
+    """Return (2 S,) whether each end of a segment owns the place where it lies; a place has one owner.
 
     A place is a joint, where ends of several segments meet, or a free end. The owner is the first end whose segment is
     joined at both ends, or else the first end at the place.

@@ -102,7 +102,7 @@ def place_layer(
 
 
 def fitted_poses(boxes: Boxes, vertices: Array) -> tuple[Poses, Array]:
-    """Fit the pose of a rigid shape, the links `boxes`, to the given vertices of each smarticle, by least squares.
+    """Fit the pose of rigid links, `boxes`, to the vertices of each smarticle, by least squares.
 
     Vertices do not determine the rotation of a straight shape about its length. The angle of this rotation is then
     arbitrary, but equal vertices give equal angles.

@@ -49,7 +49,7 @@ _LEAST_GRAVITY = 1e-6  # m/s²; below it motors, whose torque limit is proportio
 
 
 def _named(base: str, given: Mapping[str, Any], diameter: Any = None) -> Mapping[str, Any]:
-    """Return the parameters of the named fidelity `base`, adapted to the validated parts `given` of a scene.
+    """Return the parameters of the named fidelity `base`, adapted to the valid parts `given` of a scene.
 
     On the engine links `rows` is 1 if the scene has a plane, if t1 is at most t2, or if `diameter`, its
     `fidelity.diameter_m`, is not None.

@@ -127,7 +127,7 @@ def _cross(length: float, side: float, count: int, height: float) -> pv.PolyData
 
 
 def knots(vertices: Floats, from_hinge: float) -> Floats:
-    """Return the points (2, 3) [m] at which strings are tied to the outer barbs of a chain of `vertices` [m].
+    """Return the points (2, 3) [m] at which strings are tied to a chain of `vertices`, at its outer barbs.
 
     A knot lies on a barb at the distance `from_hinge` [m] from its hinge. Every second smarticle of a chain is rotated
     by 180°.

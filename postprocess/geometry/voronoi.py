@@ -78,7 +78,7 @@ def local_packing(
 
 
 def _sample(vertices: Floats, spacing: float) -> tuple[Floats, Whole]:
-    """Return points (n, 3) [m] at equal distances along links, not at hinges, and smarticle indices (n,)."""
+    """Return points (n, 3) at most `spacing` apart along links [m], not at hinges; smarticle indices (n,)."""
     # Rounding of lengths must not give one of several equal links an extra point.
     cuts = np.ceil(link_lengths(vertices) / spacing - 1e-6).astype(int).ravel()
     link = np.repeat(np.arange(len(cuts)), cuts)

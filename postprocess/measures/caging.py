@@ -34,7 +34,7 @@ _BALANCE = 1e-9
 
 
 class ContactNormals(NamedTuple):
-    """Contacts between segments of different bodies in P rows: two rows per contact, one for each of its bodies."""
+    """Contacts between segments of different bodies: P rows, two per contact, one for each of its bodies."""
 
     body: Whole  #: (P,) int64, index of the body in the ascending order of body numbers
     point: Floats  #: (P, 3) [m], point of contact

@@ -231,6 +231,7 @@ def above(
     """Make the finding that a procedure is above others in a quantity, paired by aspect ratio and seed.
 
     Args:
+        says: the statement.
         quantities: column, or several columns with a sign each: +1 if the statement says above, −1 if below.
         one, others: the procedure, and the procedures that it is compared with.
         sign: sign of a single column.

@@ -231,7 +231,10 @@ class Collected:
         *,
         within: Callable[[MeasuredRun], Hashable] = lambda _: None,
     ) -> None:
-        """Raise InputError, naming `quantity`, if `value` differs between runs of a group, by default all."""
+        """Raise InputError if `value` differs between runs of a group (`within`), by default all runs.
+
+        `quantity` names the value in the message.
+        """
         firsts: dict[Hashable, MeasuredRun] = {}
         for run in self.runs:
             first = firsts.setdefault(within(run), run)

@@ -113,7 +113,10 @@ def plan_request(expected_s: Sequence[float], cluster: Cluster, wishes: Wishes) 
 
 
 def _runs_per_task(count: int, partition: Partition, wanted: int | None, memory: int) -> int:
-    """Return the runs per task: `wanted`, or as many as fill a node if a run takes a `memory` [MiB]."""
+    """Return the number of runs per task: `wanted`, or by default for equal tasks that fill a node.
+
+    `count` is the number of runs, `memory` that of one run [MiB].
+    """
     if wanted is not None:
         return wanted if wanted > partition.cores else min(wanted, count)
     most = max(1, min(partition.cores, partition.memory_mib // memory))

@@ -222,7 +222,7 @@ class World:
         self.make_room()
 
     def _add_posed_filaments(self, poses: Poses, turns: Array, speed: float) -> None:
-        """Add filaments of a mixture at poses, in the shape in which they are poured, one by one."""
+        """Add filaments at poses, with rotations `turns` (N, 3, 3), in the shape in which they are poured."""
         assert self.mixture is not None
         assert poses.kinds is not None
         rng = np.random.default_rng([self.wave_seed, self.count])

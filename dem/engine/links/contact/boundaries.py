@@ -54,7 +54,7 @@ MET_PLACE, MET_NORMAL, MET_SHARE, MET_DISTANCE = meeting.PLACE, meeting.NORMAL, 
 
 
 def slots_for(hooks: Hooks | None, rims: Rims | None) -> int:
-    """Return the largest number of contacts of a segment with boundaries; `hooks`, `rims`: None without any."""
+    """Return the largest number of contacts of a segment with boundaries; `hooks`, `rims`: None if absent."""
     bars = 0 if hooks is None else 2 * hooks.bars.shape[1]
     return END_SLOTS + POINTS * bars + (0 if rims is None else len(rims.radii))
 
@@ -237,7 +237,7 @@ def _contacts_with_hooks(link: Array, ground: Ground, hooks: Hooks, rows: Array,
 def contacts_with_boundaries(
     segments: Segments, ground: Ground, channel: Any, hooks: Any, rims: Any, p: int, rows: Array, met: Array
 ) -> int:
-    """Call `contacts_of_segment` with its arguments, not inlined, for queries, in which speed matters less."""
+    """Call `contacts_of_segment`, not inlined, for queries, in which speed matters less."""
     return contacts_of_segment(segments, ground, channel, hooks, rims, p, rows, met)
 
 
@@ -314,7 +314,7 @@ def _rub(
     law: Law, bodies: Bodies, parts: Parts, segments: Segments, p: int, ground: Ground, ledger: Any, step: Step,
     contact: Array, slip: Array,
 ) -> None:  # fmt: skip
-    """Add the force of a boundary on segment `p` at a contact to `parts.load`, and its opposite to `ground.force`.
+    """Add the force of a boundary on segment `p` to `parts.load`, and its opposite to `ground.force`.
 
     `contact` (COLUMNS,) has the columns `SLOT` and following. `slip` (4,), stretch [m] and energy [J] of the tangential
     spring, is updated.
@@ -345,7 +345,7 @@ def _rub(
 
 @part
 def _squared(link: Array, s: float, radius: float, height: float) -> float:
-    """Return the squared distance [m²] of the place `s`, 0 to 1, on a link's axis from the circle about the z-axis."""
+    """Return the squared distance [m²] of the point `s`, 0 to 1, of a link from a circle about the z-axis."""
     x, y, z = along(vector(link, 0), s, vector(link, 3))
     out, up = math.sqrt(x * x + y * y) - radius, z - height
     return float(out * out + up * up)

@@ -258,7 +258,7 @@ def _lie_along(
 def _joint(
     both: Lines, diameter: float, stiffness: float, s: float, t: float, sign: float, bare: int, out: Array
 ) -> int:
-    """Subtract or add the contact of a joint, the common end of two segments of a body, with another segment.
+    """Subtract or add the contact of a joint, a common end of two segments, with another segment.
 
     Energy and force change as stated at the top of this module. The force is written as a bare force, which has no
     friction and no dashpot.

@@ -59,7 +59,7 @@ ROWS, POINT, PUSH, POWER, GAIN = 0, 2, 5, 8, 9
 
 @inlined
 def _extended(stretch: Any, row: int, velocity: Vector, arm: Vector) -> Vector:
-    """Return `velocity` plus the velocity by the stretching of part `row`, `arm` [m] from its reference point."""
+    """Return `velocity` plus that by the stretching of part `row`, `arm` [m] from its reference point."""
     if stretch is None:
         return velocity
     axis = vector(stretch[row], AXIS)

@@ -185,8 +185,7 @@ def _push_bend(out: Array, i: int, moments: Vector, one: Piece, two: Piece, bend
     Args:
         out: (n, 4) force on each node [N], torque about each segment's axis [N m].
         moments: derivatives of the energy by κ1, κ2 and the twist [N m].
-        one: segment i - 1.
-        two: segment i.
+        one: segment i - 1; `two` is segment i.
         bend: angles between the two segments.
     """
     m1, m2, twist = moments
@@ -411,7 +410,7 @@ def kick_nodes(filaments: Any, dt: float) -> None:
 
 @inlined
 def _uniform(seed: int, number: int, event: int) -> float:
-    """Return a random number between 0 and 1, which depends on seed, filament and count of draws (`event`).
+    """Return a random number between 0 and 1, by the seed, the filament's number and that of the draw.
 
     Source: the finalizer of SplitMix64, Steele, Lea and Flood, OOPSLA 2014, applied once for each argument.
     """

@@ -38,7 +38,7 @@ class Grid(NamedTuple):
 
 @inlined
 def off_lines(line: Array, p: int, q: int, reach: float) -> bool:
-    """Return whether the infinite lines through two axes are farther apart than `reach` [m]."""
+    """Return whether the infinite lines through the axes p and q are farther apart than `reach` [m]."""
     one, other = line[p], line[q]
     normal = cross(vector(one, 3), vector(other, 3))
     across = dot(sub(vector(one, 0), vector(other, 0)), normal)
@@ -47,7 +47,7 @@ def off_lines(line: Array, p: int, q: int, reach: float) -> bool:
 
 @inlined
 def near_each_other(line: Array, p: int, q: int, reach: float) -> bool:
-    """Return whether two axes are nearer than `reach` [m]."""
+    """Return whether the axes p and q are nearer than `reach` [m]."""
     both = lines(line[p], line[q])
     s, t = nearest(both)
     gap = between(both, s, t)
@@ -56,7 +56,7 @@ def near_each_other(line: Array, p: int, q: int, reach: float) -> bool:
 
 @inlined
 def _cannot_touch(bends: Any, p: int, q: int) -> bool:
-    """Return whether two segments of one body can never touch.
+    """Return whether two segments p and q of one body can never touch.
 
     These are all segments of a rigid body, and segments of a filament with near numbers, see `Bends.apart`.
     """
