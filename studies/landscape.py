@@ -295,8 +295,9 @@ def common_aspects(runs: pd.DataFrame) -> list[float]:
 def costs(runs: pd.DataFrame) -> pd.DataFrame:
     """Average gain and energy over l/w and seeds: over all l/w in `common_aspects`, and at each l/w.
 
-    The table has a row per scope, procedure, θ and planned time: means with errors, and the gain per energy with its
-    95 % interval. `FRONTIER` is 1 if the gain is above 0 and no other row of the scope gains as much for less energy.
+    The table has a row per scope (all l/w, or one), procedure, θ and planned time: means with errors, and the gain per
+    energy with its 95 % interval. `FRONTIER` is 1 if the gain is above 0 and no other row of the scope gains as much
+    for less energy.
     """
     gained = gains(runs)
     scopes = {COMMON: gained[gained[ASPECT].isin(common_aspects(runs))]}

@@ -94,8 +94,8 @@ def perform(task: Path) -> None:
 def run(folder: Path, setting: Setting, activity: str, seed: int, given: argparse.Namespace) -> Any:
     """Simulate a setting in a separate process; return a row of the table.
 
-    `folder` has the poured piles and gets a directory of the run; `activity` is one of `setting.activities`. Parsed options
-    are `given`.
+    `folder` has the poured piles and gets a directory of the run; `activity` is one of `setting.activities`, and parsed
+    options are in `given`.
     """
     count, seconds, poured = given.count, given.seconds, folder / f"pile-{given.count}-{seed}"
     if not (poured / "done.json").exists():

@@ -355,7 +355,7 @@ def ranks(
 
     Args:
         says: the statement.
-        x: column of x; `y`: column of y.
+        x, y: columns of both quantities.
         within: columns whose values make blocks; ranks are taken within each block.
         bounds: column that is above 0 if y is a lower bound.
         found_if: the criterion in words.

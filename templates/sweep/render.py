@@ -125,7 +125,7 @@ _FAILURES = (
 
 
 def evaluate(expression: str, values: Mapping[str, Value], source: str) -> Value:
-    """Return the value of a Jinja2 expression such as `(n / 2) | round | int`; `source` names its place in errors."""
+    """Return the value of a Jinja2 expression such as `(n / 2) | round | int`; `source` is for errors."""
     try:
         with _limited():
             result = _environment().compile_expression(expression, undefined_to_none=False)(**values)
