@@ -111,7 +111,6 @@ def local_crossings(frame: Frame, *, length: float, radius: float, top: float) -
     Points fill a box around the container's axis, see `INNER` and `EDGE`.
 
     Args:
-        frame: the pile.
         length: length of a rod [m].
         radius: radius of the container [m].
         top: height of the pile's top above the floor [m].

@@ -61,8 +61,8 @@ def scene_of(
 ) -> dict[str, Any]:
     """Return the scene of a setting as a dictionary: take-over of a poured pile, rest and activity.
 
-    `poured` is the run directory of the pour.
-    The activity takes `seconds` [s]; `sample` is the time between two frames [s].
+    `poured` is the run directory of the pour. The activity takes `seconds` [s]; `sample` is the time between two
+    frames [s].
     """
     recording = {"frame_interval_s": sample, "series_interval_s": sample, "checkpoint_interval_s": None}
     data = {**data_of(count, seed, recording=recording), "engine": "links", **setting.scene}

@@ -104,8 +104,7 @@ class ActuatedPhase(Phase):
 
         Args:
             check_every: a call ends after each multiple of this number of updates, so that the caller can check the
-                pile;
-                None: no such end.
+                pile; None: no such end.
 
         Returns:
             The simulated time until the next call [s]; 0 at the end of the phase.

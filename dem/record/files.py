@@ -63,8 +63,7 @@ def write_whole(path: Path, write: Callable[[Path], object], *, make_folder: boo
 def write_text(path: Path, text: str, *, make_folder: bool = True) -> None:
     """Write or replace a text file in UTF-8, completely or not at all.
 
-    `make_folder`: whether to make the file's folder if it is missing. RunError if the disk is full or the folder cannot
-    be written; an existing file is then unchanged.
+    `make_folder`: make a missing folder. RunError if writing fails; an existing file is then unchanged.
     """
     write_whole(path, lambda temporary: temporary.write_bytes(text.encode()), make_folder=make_folder)
 

@@ -86,7 +86,8 @@ class RunBoundaries:
     def raised(self, time: float, phase: int, top: float) -> float | None:
         """Return the height by which the wall has been lifted [m]; None if there is no wall any more.
 
-        `top` is the height of the pile's top above the floor [m]; a wall that has been lifted higher counts as removed.
+        `phase` is the index of the phase, `top` the height of the pile's top above the floor [m]; a wall that has been
+        lifted higher counts as removed.
         """
         if self.removal is None or phase < self.removal:
             return 0.0

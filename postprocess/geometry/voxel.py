@@ -67,7 +67,6 @@ def solid_fraction(
     than t1 t2 (w + 2l), by about 1 % for usual sizes. UndefinedMeasureError if there is no material in the region.
 
     Args:
-        region: Region whose volume counts.
         thickness_normal: t1, along the normal of the smarticle's plane [m].
         thickness_in_plane: t2, in the smarticle's plane [m].
         pitch: Distance of neighbouring points of the grid [m]; half the smaller thickness if not given.

@@ -619,8 +619,8 @@ def draw_bounds(
 def finish(figure: Canvas, path: Path, notes: Sequence[str], footer: Sequence[str], *, bars: str = BARS) -> list[Path]:
     """Add legend and footer to a figure, write it to a path without suffix, and return its files.
 
-    Axes are widened until they show everything. The footer has the lines `notes`, then `bars` if the figure has error
-    bars, which `bars` explains, then the lines `footer`.
+    Axes are widened until they show everything. The footer has the lines `notes`, then, if the figure has error bars,
+    their explanation `bars`, then the lines `footer`.
     """
     legends = [
         {label: handle for handle, label in zip(*axes.get_legend_handles_labels(), strict=True)} for axes in figure.axes

@@ -358,7 +358,6 @@ def ranks(
         x, y: columns of both quantities.
         within: columns whose values make blocks; ranks are taken within each block.
         bounds: column that is above 0 if y is a lower bound.
-        found_if: the criterion in words.
         unit: unit of the slope of y against x, which is shown but not judged.
     """
 

@@ -399,8 +399,8 @@ def collision_errors(
 ) -> list[float]:
     """Return the rms error [m] of sphere positions after a collision for each step.
 
-    The mean is over `phases` collisions with slightly different stiffnesses and initial gaps. `smooth`: without friction
-    and dashpots, between smarticles in parallel planes.
+    The mean is over `phases` collisions with slightly different stiffnesses and initial gaps. `smooth`: without
+    friction and dashpots, between smarticles in parallel planes.
     """
     law = law_of(scene(access))
     if access.name == "links":

@@ -106,10 +106,9 @@ def query_all(
     segments: Segments, pairs: Pairs, kept: Kept, boundaries: Boundaries, stiffness: float, wall_stiffness: float,
     found: Found,
 ) -> tuple[int, float]:  # fmt: skip
-    """Query all contacts.
+    """Query all contacts, between bodies those of the wide list.
 
     Args:
-        pairs: near segments, of which all pairs of the wide list are queried.
         kept: memory of the contacts with boundaries; read for the energy of tangential springs.
         stiffness: kn of contacts between bodies [N/m].
         wall_stiffness: kn of contacts with boundaries [N/m].
