@@ -61,7 +61,7 @@ def solid_fraction(
     thickness_in_plane: float,
     pitch: float | None = None,
 ) -> float:
-    """Return the fraction [-] of a region's volume inside the boxes of the links, by a fine grid of points.
+    """Return the fraction [-] of a region's volume inside the boxes of the links, by a grid of points.
 
     A point in two boxes counts once. The boxes of a smarticle overlap at its hinges, so the volume of a U is smaller
     than t1 t2 (w + 2l), by about 1 % for usual sizes. UndefinedMeasureError if there is no material in the region.

@@ -161,7 +161,7 @@ def _energies(engine: Engine, scene: Scene) -> Iterator[tuple[float, float, floa
 
 
 def climb(engine: str, name: str, seed: int) -> list[dict[str, Any]]:
-    """Run the setting `name` with one seed at increasing time steps, up to the second blow-up; return the rows."""
+    """Run the setting `name` with a seed at increasing time steps to the second blow-up; return the rows."""
     rows: list[dict[str, Any]] = []
     for factor in FACTORS:
         rows.append(let_go(engine_access(engine), SETTINGS[name], seed, factor))
