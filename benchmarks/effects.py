@@ -74,7 +74,7 @@ def pairs(seconds: float, hinged_step: float) -> list[tuple[str, str, Changes, C
 
 
 def scene_data(changes: Changes, *, count: int, seed: int) -> Changes:
-    """Return a scene as a dictionary: the paper's smarticles at draft fidelity, with changed keys."""
+    """Return a scene as a dictionary: the paper's smarticles at draft fidelity, with the keys `changes`."""
     data: Changes = {"schema_version": 1, "seed": seed, "count": count, "fidelity": "draft", **changes}
     recording = {"checkpoint_interval_s": None, **changes.get("recording", {})}
     phases = [{"type": "deposit"}, *changes["phases"]]
@@ -84,7 +84,8 @@ def scene_data(changes: Changes, *, count: int, seed: int) -> Changes:
 def row(effect: str, cause: str, costs: list[tuple[float, float]]) -> dict[str, Any]:
     """Return a row of the table: median and quartiles over pairs of the relative cost of an effect [%].
 
-    `costs` has, for each pair, the cost without and with the effect [s/s].
+    `effect` is its name, `cause` says what takes the time. `costs` has, for each pair, the cost without and with the
+    effect [s/s].
     """
     shares = [100 * (after / before - 1) for before, after in costs]
     low, _, high = statistics.quantiles(shares, n=4, method="inclusive") if len(shares) > 1 else [shares[0]] * 3

@@ -204,7 +204,7 @@ class _Painter:
     def content(self, frame: Frame, suffix: str) -> bytes | None:
         """Return the content of the file of a frame, with one object per kind; None if there is no body.
 
-        STL has one object for all kinds.
+        `suffix` is the format: "stl", "obj", "gltf" or "glb". STL has one object for all kinds.
         """
         scene: Any = trimesh.Scene()
         web = suffix in {"gltf", "glb"}
@@ -250,7 +250,7 @@ class _Painter:
         return shape
 
     def _finish(self, tree: dict[str, Any], frame: Frame) -> None:
-        """Add dull materials, because glTF's default is a metallic mirror, and the provenance of the file."""
+        """Add dull materials, as glTF's default is a metallic mirror, and provenance to the JSON `tree`."""
         tree["materials"] = []
         for mesh in tree["meshes"]:
             opacity = PAINTS[mesh["name"]].opacity

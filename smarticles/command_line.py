@@ -49,7 +49,10 @@ class Commands:
         self.parsers: dict[str, Parser] = {}
 
     def add(self, name: str, handler: Handler, *, summary: str, text: str, examples: str) -> Parser:
-        """Add a subcommand and return its parser; `summary` is for the list of commands, `text` for `--help`."""
+        """Add a subcommand and return its parser.
+
+        `handler` runs the command. `summary` is for the list of commands, `text` and `examples` for `--help`.
+        """
         parser: Parser = self._subparsers.add_parser(
             name,
             help=summary,
@@ -164,7 +167,7 @@ class Cell(str):
 
     @classmethod
     def of(cls, value: float, form: str, factor: float = 1.0) -> Self:
-        """Format `factor * value`; return a dash if the value is not finite."""
+        """Format `factor * value` by the format `form`, such as ".3g"; return a dash if it is not finite."""
         return cls(f"{factor * value:{form}}" if math.isfinite(value) else "-")
 
 

@@ -33,7 +33,7 @@ def key_of(directory: Path) -> str:
 
 
 def read_kept(directory: Path, kind: str, key: str) -> pd.DataFrame | None:
-    """Read a table that `keep` stored; None if it is absent, damaged, or stored with another key."""
+    """Read a table of a kind that `keep` stored; None if absent, damaged, or stored with another `key`."""
     import pandas as pd  # noqa: PLC0415
 
     try:

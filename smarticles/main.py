@@ -120,7 +120,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def guarded(action: Callable[[], int], *, debug: bool = False) -> int:
-    """Run an action and return the exit status; print exceptions and signals as one line on stderr."""
+    """Run an action, return the exit status; print exceptions (tracebacks: `debug`) and signals on stderr."""
     try:
         with orderly_stop():
             status = action()

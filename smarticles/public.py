@@ -260,7 +260,7 @@ def _in_words_of_python(scratch: str) -> Iterator[None]:
 
 
 def write_sweep(scene: Scene | Path | str, vary: Mapping[str, Sequence[Any]], folder: Path) -> Path:
-    """Write `sweep.yaml` and its template `scene.yaml.j2` for all combinations of `vary`; return its path."""
+    """Write a sweep of all combinations of `vary` (`sweep.yaml`, `scene.yaml.j2`); return the first path."""
     if not vary:
         raise InputError("vary: is empty; give a key of the scene and its values, e.g. {'seed': [1, 2, 3]}")
     data = _explicit_keys(scene) if isinstance(scene, Scene) else _read_scene_file(Path(scene))

@@ -59,9 +59,13 @@ def folder_of(
     expected_s: Sequence[float] | None = None,
     extend: bool = False,
 ) -> Folder:
-    """Create or open the directory of an expanded sweep, see `templates.sweep.folder.create_folder`.
+    """Create the directory of an expanded sweep, or open a directory that already holds this sweep.
 
-    `expected_s` has the expected wall time of each point [s]; None: it is estimated here.
+    Args:
+        out: the directory, which is absent, empty, or holds this sweep.
+        command: command that makes it, for the record.
+        expected_s: expected wall time of each point [s]; None: it is estimated here.
+        extend: whether to add the missing runs to a directory that holds some of these runs and no others.
     """
     from templates.sweep.folder import create_folder  # noqa: PLC0415
 

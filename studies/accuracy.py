@@ -86,7 +86,7 @@ class Rung:
 
 @dataclass(frozen=True, kw_only=True)
 class Ladder:
-    """Rungs of all knobs, and the variants of the scene that they need."""
+    """Rungs (values) of all knobs (parameters), and the variants of the scene that they need."""
 
     rungs: tuple[Rung, ...]  #: Rungs by knob, from coarse to fine
     settings: Mapping[str, Mapping[str, Value]] = field(repr=False)  #: Variables of the template by variant
@@ -293,7 +293,10 @@ _Point = tuple[str, str, str, dict[str, Value]]
 
 
 def _rungs(knob: str, base: Mapping[str, Value], *, smooth: bool) -> list[_Point]:
-    """Return all rungs of a knob, from coarse to fine; `smooth`: links are swept by spheres, not chains."""
+    """Return all rungs (values) of a knob, from coarse to fine.
+
+    `base` has the scene's own values; `smooth`: links are swept by spheres, and are not chains of spheres.
+    """
     if knob == "section":
         return _strands(base) if smooth else _sections(base)
     if knob == "fidelity":
@@ -328,7 +331,7 @@ def _sections(base: Mapping[str, Value]) -> list[_Point]:
     """Return the rungs of the knob "section" for chains of spheres: rows and pitch.
 
     The diameter of the spheres follows from rows and sizes, as in a scene that does not set it. If the scene has
-    several rows, there are two finer rungs: half of its pitch, and twice its rows.
+    several rows, there are two finer rungs: half of its pitch, and twice its rows. `base` has the scene's values.
     """
     shapes: list[dict[str, Value]] = [{"rows": 1, "pitch": pitch, "diameter_m": None} for pitch in (1.3, 1.0, 0.5)]
     shapes.append({"rows": 2, "pitch": 1.0, "diameter_m": None})
@@ -348,7 +351,7 @@ def _sections(base: Mapping[str, Value]) -> list[_Point]:
 
 
 def _strands(base: Mapping[str, Value]) -> list[_Point]:
-    """Return the rungs of "section" for smooth links: 1 to 3 strands, whose number gives their diameter."""
+    """Return the rungs of the knob "section" for swept links: `base`, and 1 to 3 strands side by side."""
     shapes: list[dict[str, Value]] = [{"rows": rows, "diameter_m": None} for rows in (1, 2, 3)]
     own = {key: base[key] for key in shapes[0]}
     if not any(_same(own, shape) for shape in shapes):
@@ -418,7 +421,7 @@ def _or_nan(number: float | None) -> float:
 
 
 def _of_series(run: Run, active: Sequence[int]) -> dict[str, float]:
-    """Return peak hook force, energies and joint gap of a run, by column; NaN if not recorded.
+    """Return peak hook force, energies and largest hinge gap of a run, by column; NaN if not recorded.
 
     `active` are the indices of the phases whose work is added up.
     """
@@ -587,7 +590,8 @@ class Promises:
     def compare(self, path: Path, tables: Mapping[str, pd.DataFrame], footer: Sequence[str]) -> list[Path]:
         """Draw tables of work and precision by the name of their scene; return the files.
 
-        A fidelity whose cost is unknown or 0 has no place on the logarithmic axis and is left out.
+        A fidelity whose cost is unknown or 0 has no place on the logarithmic axis and is left out. The path has no
+        suffix; the lines of the footer are below the figure.
         """
         figure, axes = panels(len(tables), columns=3, height=3.0, sharey=True)
         for panel, (title, table) in zip(axes, tables.items(), strict=True):

@@ -266,7 +266,7 @@ def as_at_random(table: pd.DataFrame) -> Outcome:
 
 
 def depends_on_opening(table: pd.DataFrame, *, quantity: str, label: str) -> Outcome:
-    """Judge whether a quantity depends on the opening angle: its slope differs from 0 at 95 %."""
+    """Judge whether the slope of a column against the opening angle is not 0; `label`: its name in texts."""
     slope = slope_within(table[OPENING].tolist(), table[quantity].tolist(), ["all"] * len(table))
     effect = Effect(label=f"{label} against the opening angle", value=slope, sign=0, unit=" per degree")
     note = f"by angle: {means_by(table, quantity, OPENING, '.3g')}"

@@ -1,6 +1,7 @@
 """Strain test of a chain of two or six robots between two walls, at several distances of the walls.
 
-The study measures force, yield, width and fracture against confinement h/H. It compares them with Savoie, Tuazon,
+The study measures force, yield, width and fracture against confinement h/H, the width of the chain at the start over
+the distance of the walls. It compares them with Savoie, Tuazon,
 Bhamla and Goldman, "Amorphous Entangled Active Matter", Soft Matter 2023, section "Robophysical experiment". The paper
 omits friction, servos and strings; variants of the sweep show their influence. In `chain-bodies` robots have bodies 2.1
 cm thick. Runs of one seed have equal servos. --quick takes minutes.
@@ -179,7 +180,7 @@ def _widens(base: pd.DataFrame) -> list[Effect]:
 
 
 def rises(name: str, says: str, quantity: str, rows: Rows) -> Finding:
-    """Make the finding that a quantity rises with confinement."""
+    """Make the finding that a quantity rises with confinement h/H; `says` is its statement."""
 
     def outcome(part: pd.DataFrame) -> Outcome:
         effects, untouched = [], False

@@ -111,7 +111,7 @@ def measure(run: Run) -> Sequence[Row]:
 
 
 def times(runs: pd.DataFrame) -> pd.DataFrame:
-    """Average ln(fτ) over seeds by definition, l/w and Γ; a mean that includes a bound has no error."""
+    """Average ln(fτ) over seeds by definition of height, l/w and Γ; no error for means with a bound."""
     found = []
     for point, group in runs.groupby([DEFINITION, ASPECT, GAMMA], sort=False):
         bounds, mean = int(group[TIME].isna().sum()), mean_over_seeds(group[LOG])

@@ -143,7 +143,7 @@ def measure(run: Run) -> Row:
 def positive(name: str, says: str, values: Callable[[pd.DataFrame], pd.Series], form: str) -> Finding:
     """Make the finding that the mean of a value over all runs is above 0.
 
-    `form` is a text with `{}` for the mean and its 95 % half-width.
+    `says` is its statement, `form` a text with `{}` for the mean and its 95 % half-width.
     """
 
     def outcome(runs: pd.DataFrame) -> list[Effect]:

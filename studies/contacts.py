@@ -138,8 +138,8 @@ def effects(runs: pd.DataFrame) -> pd.DataFrame:
 def lowers(name: str, says: str, quantity: str, *changed: str, sign: int = -1, less: str = "") -> Finding:
     """Make the finding that the factor `changed`, or the interaction of two factors, lowers a quantity.
 
-    `sign` is −1 for "lowers" and +1 for "raises". With `less`, the name of another factor, the statement is that
-    `changed` lowers the quantity by more than `less` does.
+    `says` is its statement. `sign` is −1 for "lowers" and +1 for "raises". With `less`, the name of another
+    factor, the statement is that `changed` lowers the quantity by more than `less` does.
     """
 
     def outcome(runs: pd.DataFrame) -> Outcome:

@@ -56,22 +56,22 @@ _DISTINCT = (1 / 6, 2 / 3)  # half and twice the power 1/3; an interval within t
 
 
 def phi(stage: str, definition: str = DEFINITION) -> str:
-    """Return the name of the column of φ of a pile at rest."""
+    """Return the name of the column of φ at a stage, a key of `STAGES`, by a definition of φ."""
     return f"{STAGES[stage]} {definition} [-]"
 
 
 def crossings(stage: str) -> str:
-    """Return the name of the column of ⟨N⟩."""
+    """Return the name of the column of ⟨N⟩ at a stage."""
     return f"crossings {stage} [-]"
 
 
 def share(stage: str) -> str:
-    """Return the name of the column with the share of smarticles in the largest entangled cluster."""
+    """Return the name of the column: share of smarticles in the largest entangled cluster at a stage."""
     return f"largest cluster {stage} [-]"
 
 
 def spans(stage: str, what: str = "pile") -> str:
-    """Return the name of the column that is 1 if clusters span `what`: "height", "width", or both: "pile"."""
+    """Return the name of the column that is 1 if clusters span `what` ("height", "width", both: "pile")."""
     return f"spans {what} {stage} [-]"
 
 
@@ -134,7 +134,7 @@ def measure(run: Run) -> Row:
 
 
 def _at_rest(run: Run, frames: FrameSequence, stage: str, phase: int) -> dict[str, object]:
-    """Measure the last frame of a rest; return cells of the run's row."""
+    """Measure the last frame of a rest, the phase with the index `phase`; return cells of the run's row."""
     part = frames.in_phase(phase)
     if not part:
         raise InputError(f"{run.path}: no frame of phase {phase} (relax); run it again")

@@ -137,7 +137,7 @@ def measure(run: Run) -> Row:
 
 
 def force_history(run: Run, *, net: bool = False) -> History:
-    """Read the force on the upper hook over n W_s [-] against time; `net`: less the lower hook's force."""
+    """Read the upper hook's force, if `net` less the lower's, against time, over all smarticles' weight."""
     pull = read_pull(run, run.series, run.phases[-1].index)
     force = (pull.net if net else pull).force / run.manifest.count / weight_of_one(run)
     return History(times=pull.times, values=force)

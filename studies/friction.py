@@ -144,7 +144,7 @@ class Curve:
         return value, low, high, place
 
     def within(self, margin: float, friction: float) -> float:
-        """Return the confidence that φ is within a margin [-] of Gravish's φ; NaN without errors."""
+        """Return the confidence that φ is within a margin [-] of Gravish's φ; NaN if the errors are unknown."""
         at = np.array([friction])
         deviation, error = float(self.deviation(at)[0]), float(self.error(at)[0]) / _per_error(self.scatter)
         if not math.isfinite(error):
@@ -207,7 +207,10 @@ def points(runs: pd.DataFrame, scatters: Mapping[str, Scatter]) -> pd.DataFrame:
 
 
 def curves(table: pd.DataFrame, scatters: Mapping[str, Scatter]) -> Curves:
-    """Make a curve of φ against friction for each stage and l/w at which Gravish has a point."""
+    """Make a curve of φ against friction for each stage and l/w at which Gravish has a point.
+
+    `scatters` has the relative scatter over seeds, by stage.
+    """
     found = {}
     for (stage, aspect), group in table[table[REFERENCE].notna()].groupby([STAGE, ASPECT], sort=False):
         rows = group.sort_values(FRICTION)

@@ -128,7 +128,7 @@ def steps(runs: pd.DataFrame) -> pd.DataFrame:
 
 
 def falls(end: str) -> Finding:
-    """Make the finding that φ_0 or φ_f falls monotonically with l/w."""
+    """Make the finding that φ_0 or φ_f, which `end` names, falls monotonically with l/w."""
 
     def outcome(runs: pd.DataFrame) -> Outcome:
         stage = compared(runs, end)
@@ -155,7 +155,7 @@ def falls(end: str) -> Finding:
 
 
 def near(end: str) -> Finding:
-    """Make the finding that φ_0 or φ_f is near Gravish's points."""
+    """Make the finding that φ_0 or φ_f, which `end` names, is near Gravish's points."""
 
     def outcome(runs: pd.DataFrame) -> Outcome:
         found, stage = deviations(runs), compared(runs, end)

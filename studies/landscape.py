@@ -160,7 +160,7 @@ def measure(run: Run) -> Row:
 
 
 def _spent(run: Run, procedure: str, rest: int) -> float:
-    """Return the work of an activity on all smarticles [J], up to the end of the phase with index `rest`."""
+    """Return the work of a procedure on all smarticles [J], up to the end of the phase with index `rest`."""
     if procedure == STATIC:
         return 0.0
     series = run.series
@@ -220,7 +220,10 @@ def predicted(runs: pd.DataFrame) -> tuple[pd.DataFrame, pd.DataFrame]:
 def _correlated(
     table: pd.DataFrame, strength: str, *, within: bool
 ) -> tuple[list[dict[str, object]], list[dict[str, object]]]:
-    """Return rows of the tables `predictors` and `comparisons`, see `predicted`, from runs of one part."""
+    """Correlate one strength, a column, with all measures; return rows of `predicted`'s two tables.
+
+    With `within`, the correlation is within each l/w, otherwise over all.
+    """
     names = list(PREDICTORS)
     x, y = table[names].to_numpy(dtype=np.float64), table[strength].to_numpy(dtype=np.float64)
     strata = pd.factorize(table[ASPECT])[0].astype(np.int64)
@@ -292,8 +295,9 @@ def common_aspects(runs: pd.DataFrame) -> list[float]:
 def costs(runs: pd.DataFrame) -> pd.DataFrame:
     """Average gain and energy over l/w and seeds: over all l/w in `common_aspects`, and at each l/w.
 
-    The table has a row per scope, procedure, θ and planned time: means with errors, and the gain per energy with its
-    95 % interval. `FRONTIER` is 1 if the gain is above 0 and no other row of the scope gains as much for less energy.
+    The table has a row per scope (all l/w, or one), procedure, θ and planned time: means with errors, and the gain per
+    energy with its 95 % interval. `FRONTIER` is 1 if the gain is above 0 and no other row of the scope gains as much
+    for less energy.
     """
     gained = gains(runs)
     scopes = {COMMON: gained[gained[ASPECT].isin(common_aspects(runs))]}

@@ -108,8 +108,12 @@ def length_of(run: Run) -> float:
 def local_crossings(frame: Frame, *, length: float, radius: float, top: float) -> NDArray[np.float64]:
     """Return the local average crossing number (X, Y, Z) [-] in the inside of a pile.
 
-    Points fill a box around the axis, see `INNER` and `EDGE`; lengths, the container's radius and the pile's height
-    `top` are in [m].
+    Points fill a box around the container's axis, see `INNER` and `EDGE`.
+
+    Args:
+        length: length of a rod [m].
+        radius: radius of the container [m].
+        top: height of the pile's top above the floor [m].
     """
     side = 2 * INNER * radius
     across, up = (max(2, round(span / (PITCH * length)) + 1) for span in (side, (1 - 2 * EDGE) * top))

@@ -195,7 +195,7 @@ def ratio(table: pd.DataFrame, gamma: float, *, times: float) -> Effect:
 
 
 def vibrated(table: pd.DataFrame) -> list[float]:
-    """Return the accelerations [g] of the runs with vibration."""
+    """Return the distinct peak accelerations [g] of the runs with vibration, ascending."""
     return sorted(float(gamma) for gamma in table[GAMMA].unique() if gamma > 0)
 
 

@@ -186,7 +186,10 @@ def other_order(table: pd.DataFrame) -> Outcome:
 
 
 def strongest(rows: Rows, suffix: str = "") -> tuple[Finding, Finding]:
-    """Make the findings that peak force is greatest after shape change, least after internal oscillation."""
+    """Make the findings that peak force is greatest after shape change, least after internal oscillation.
+
+    `rows` selects the rows of the table, which `suffix` states at the end of the statements.
+    """
     keys: dict[str, Any] = {"beside": (STATIC,), "bounds": HELD_FAST, "rows": rows}
     most, least = (f"has the {one} peak force of the three procedures{suffix}" for one in ("highest", "least"))
     return (

@@ -77,7 +77,10 @@ class _Access:
 
 
 def _bar(length: float, thickness: float, radius: float, kind: type[Particle] = Particle) -> Particle:
-    """Return a barbless smarticle of mass BALL_MASS and square section, for spheres of a radius [m]."""
+    """Return a barbless smarticle of mass BALL_MASS and square section, for spheres of a radius [m].
+
+    `thickness` is the side of the section [m], `kind` the class.
+    """
     boxes = Boxes(
         middle_length=length,
         barb_length=0.0,
@@ -89,7 +92,7 @@ def _bar(length: float, thickness: float, radius: float, kind: type[Particle] = 
 
 
 def _spoilt_place(engine: Engine, what: str, place: Iterable[float]) -> tuple[float, float, float]:
-    """Return the position [m] to which `LinksAccess.spoil` moves a body at `place` (3,) [m]."""
+    """Return the position (3,) [m] out of bounds, as `what` says, to which a body at `place` is moved."""
     (x, y, z), reach, radius = place, engine.particle.reach, engine.particle.radius
     return {
         "position": (x, y, math.nan),

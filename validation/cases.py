@@ -62,12 +62,12 @@ def above(what: str, measured: float, limit: float) -> Check:
 
 
 def near(what: str, measured: float, expected: float, error: float) -> Check:
-    """Check that a measured value is within ±`error` of the expected value; NaN fails."""
+    """Check that a value (`what`: quantity, unit) is within ±`error` of the expected value; NaN fails."""
     return Check(what, f"{measured:.5g}", f"{expected:.5g} ± {error:.2g}", bool(abs(measured - expected) <= error))
 
 
 def nothing(what: str, text: str | None) -> Check:
-    """Check that `text`, the message of an error, is None."""
+    """Check that nothing is reported: the message `text` of an error is None; `what` names the check."""
     return Check(what, text or "nothing", "nothing", text is None)
 
 
@@ -96,7 +96,7 @@ def _register(
 def case(
     name: str, about: str, theory: str, *, absent: Mapping[str, str] | None = None, **options: Any
 ) -> Callable[[Function], Function]:
-    """Register a function `(access, **options) -> list[Answer]` as a case with a known answer.
+    """Register a function `(access, **options) -> list[Answer]` as case `name` with a known answer.
 
     `about` describes the simulation, `theory` is the formula or source of the answer. `absent` has, by engine, the
     reason why the case does not apply to it.
@@ -139,7 +139,7 @@ def hard(
     long: Mapping[str, Any] | None = None,
     absent: Mapping[str, str] | None = None,
 ) -> Callable[[Function], Function]:
-    """Register a function `(access, folder, **options) -> list[Check]` as a hard case.
+    """Register a function `(access, folder, **options) -> list[Check]` as the hard case `name`.
 
     `short` has the keyword arguments in continuous integration, or is None if the case has a long form only. `long` has
     the arguments that differ in the long form. `absent` has, by engine, the reason why the case does not apply to it.

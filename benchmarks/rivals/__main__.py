@@ -61,8 +61,8 @@ def scene_of(
 ) -> dict[str, Any]:
     """Return the scene of a setting as a dictionary: take-over of a poured pile, rest and activity.
 
-    `poured` is the run directory of the pour.
-    The activity takes `seconds` [s]; `sample` is the time between two frames [s].
+    `poured` is the run directory of the pour. The activity takes `seconds` [s]; `sample` is the time between two
+    frames [s].
     """
     recording = {"frame_interval_s": sample, "series_interval_s": sample, "checkpoint_interval_s": None}
     data = {**data_of(count, seed, recording=recording), "engine": "links", **setting.scene}
@@ -92,7 +92,11 @@ def perform(task: Path) -> None:
 
 
 def run(folder: Path, setting: Setting, activity: str, seed: int, given: argparse.Namespace) -> Any:
-    """Simulate a setting in a separate process, with parsed options `given`; return a row of the table."""
+    """Simulate a setting in a separate process; return a row of the table.
+
+    `folder` has the poured piles and gets a directory of the run; `activity` is one of `setting.activities`, and parsed
+    options are in `given`.
+    """
     count, seconds, poured = given.count, given.seconds, folder / f"pile-{given.count}-{seed}"
     if not (poured / "done.json").exists():
         run_child(folder, poured.name, data_of(count, seed, {"type": "relax", "duration_s": 0.3}, **POUR))
@@ -139,7 +143,7 @@ def measured(scene: Scene, shape: str, positions: Array, frames: Array) -> dict[
 
 
 def planned(engines: Sequence[str], given: argparse.Namespace) -> Iterator[tuple[Setting, dict[str, Any]]]:
-    """Yield setting and identifying columns of each simulation that the parsed options `given` ask for."""
+    """Yield setting and identifying columns of each simulation with `engines` that the options select."""
     for seed, setting in product(given.seeds, SETTINGS):
         if setting.engine in engines and not (setting.costly and seed != given.seeds[0]):
             for activity in filter(given.activities.__contains__, setting.activities):

@@ -18,7 +18,8 @@ SCALE = 100.0
 def simulate(task: Task, knobs: Knobs) -> Outcome:
     """Simulate a task.
 
-    Knobs: `time_step` [s], solver `iterations`, and `recovery`, the share of the overlap that a step undoes.
+    `knobs` are parameters of the engine: `time_step` [s], solver `iterations`, and `recovery`, the share of the overlap
+    that a step undoes.
     """
     return simulated(task, InBullet(task, **knobs))
 

@@ -43,7 +43,7 @@ def simulate(task: Task, knobs: Knobs) -> Outcome:
 
 
 def _dumped(path: Path, task: Task) -> tuple[Array, Array, Array]:
-    """Read times (F,) [s], centres of mass (F, N, 3) [m] and rotations (F, N, 3, 3) from a dump.
+    """Read times (F,) [s], centres of mass (F, N, 3) [m] and rotations (F, N, 3, 3) from a dump of a task.
 
     Rotations are from body frame to laboratory frame.
     """

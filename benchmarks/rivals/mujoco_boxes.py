@@ -15,7 +15,7 @@ SERVO = 0.02  # deviation from the target at which a servo reaches its torque li
 
 
 def simulate(task: Task, knobs: Knobs) -> Outcome:
-    """Simulate a task; knobs: `time_step` [s], `solver`, `iterations`, `cone`, `solref` (names of MuJoCo)."""
+    """Simulate a task; `knobs`: `time_step` [s], and MuJoCo's `solver`, `iterations`, `cone`, `solref`."""
     return simulated(task, InMujoco(task, **knobs))
 
 

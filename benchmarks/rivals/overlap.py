@@ -77,7 +77,7 @@ class Swept:
 
 
 def deepest(solid: Bars | Swept) -> float:
-    """Return the largest overlap between different smarticles [m], 0 without any overlap."""
+    """Return the largest overlap of two smarticles [m] whose links are `solid`; 0 without any overlap."""
     centres, reaches = solid.bounds
     pairs = cKDTree(centres).query_pairs(2 * float(reaches.max()), output_type="ndarray").astype(np.int64)
     one, other = pairs.T
@@ -97,7 +97,7 @@ def solid_of(shape: str, particle: Particle, positions: Array, frames: Array) ->
 
 
 def halves_of(boxes: Boxes) -> Array:
-    """Return half the side lengths of each link along the axes of its frame, (3, 3) [m]."""
+    """Return half the side lengths of each link of `boxes` along the axes of its frame, (3, 3) [m]."""
     sections = np.tile([boxes.thickness_in_plane, boxes.thickness_normal], (LINKS, 1))
     return np.column_stack([boxes.lengths, sections]) / 2
 
@@ -109,7 +109,14 @@ def _boxes(particle: Particle, positions: Array, frames: Array) -> Bars:
 
 
 def _strands(particle: Particle, positions: Array, frames: Array) -> Swept:
-    """Return strands as in `dem.engine.links.shapes`: barbs from the hinge to a radius before the tip."""
+    """Return the strands of all links: one or several equal segments side by side along a link's normal.
+
+    The engine `links` has the same strands. A barb's strand goes from the hinge to a radius before the tip.
+
+    Args:
+        positions: (N, 3, 3) centres of the links [m].
+        frames: (N, 3, 3, 3) axes of the links as columns.
+    """
     planar = planar_of(particle)
     barb = (-planar.arm, planar.tip - planar.arm)
     spans = {0: barb, 1: (-planar.end, planar.end), 2: barb}

@@ -17,7 +17,8 @@ SCALE = 100.0
 def simulate(task: Task, knobs: Knobs) -> Outcome:
     """Simulate a task.
 
-    Knobs: `time_step` [s], solver `iterations`, and `frequency` [Hz] and `damping` of contacts.
+    `knobs` are parameters of the engine: `time_step` [s], solver `iterations`, and `frequency` [Hz] and `damping` of
+    contacts.
     """
     return simulated(task, InRapier(task, **knobs))
 

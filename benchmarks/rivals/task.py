@@ -158,7 +158,7 @@ class World:
 
 
 def simulated(task: Task, simulation: World) -> Outcome:
-    """Simulate rest and activity of a task; the processor time of the activity is measured."""
+    """Simulate rest and activity of a task in `simulation`; measure the processor time of the activity."""
     if task.rest_s > CREEP:
         simulation.advance(task.rest_s - CREEP)
     samples, spent = [simulation.links()], 0.0
@@ -175,7 +175,7 @@ def simulated(task: Task, simulation: World) -> Outcome:
 
 
 def rigid_links(boxes: Boxes, positions: Array, turns: Array) -> tuple[Array, Array]:
-    """Return centres (N, 3, 3) [m] and axes (N, 3, 3, 3) of the links of rigid smarticles.
+    """Return centres (N, 3, 3) [m] and axes (N, 3, 3, 3) of the links `boxes` of rigid smarticles.
 
     Positions are the centres of mass, (N, 3) [m], turns the rotations from body frame to laboratory frame, (N, 3, 3).
     """

@@ -27,9 +27,10 @@ def first_ends(points: Array) -> Numbers:
 
 
 def owners(first: Numbers, inner: Flags) -> Flags:
-    """Return (2 S,) whether each end owns the joint, or free end, at its place; each has one owner.
+    """Return (2 S,) whether each end of a segment owns the place where it lies; a place has one owner.
 
-    The owner is the first end whose segment is joined at both ends, or else the first end at the place.
+    A place is a joint, where ends of several segments meet, or a free end. The owner is the first end whose segment is
+    joined at both ends, or else the first end at the place.
 
     Args:
         first: (2 S,) place of each end, from `first_ends`.
@@ -209,7 +210,8 @@ class Bars:
     def owned(self) -> Flags:
         """(S, 2) whether each bar owns the joint, or free end, at its start and at its end.
 
-        Each joint has one owner: the first of those bars that are joined at both ends, or else the first bar.
+        A joint is a common end of several bars. Each joint has one owner: the first of those bars that are joined at
+        both ends, or else the first bar.
         """
         return owners(self._joints, np.repeat((~self.free).all(axis=1), 2)).reshape(-1, 2)
 

@@ -104,9 +104,9 @@ class Kind:
     def _stations(self, bar: int) -> Array:
         """Return (n,) distances of a bar's spheres from its start [m].
 
-        At a joint only the owner has a sphere; other bars begin 1 + `HINGE_CLEARANCE` diameters away from it. At a free
-        end the last sphere reaches just to the tip; in a filament its centre is at the tip. See
-        `dem.body.particle.Particle`.
+        At a joint, a common end of bars, only the bar that owns it, see `Bars.owned`, has a sphere; other bars begin 1
+        + `HINGE_CLEARANCE` diameters away from it. At a free end the last sphere reaches just to the tip; in a filament
+        its centre is at the tip. See `dem.body.particle.Particle`.
         """
         length, d = float(self.bars.lengths[bar]), self.diameter
         free, owned = self.bars.free[bar], self.bars.owned[bar]
@@ -241,7 +241,7 @@ class Mixture:
 
     @property
     def diameter(self) -> float:
-        """Diameter of the smallest spheres, or strands, of all kinds; overlaps are compared with it [m]."""
+        """Least diameter of the spheres, or of the swept spheres on links, of all kinds, for overlaps [m]."""
         return min(kind.diameter for kind in self.kinds)
 
     @property

@@ -102,7 +102,7 @@ def place_layer(
 
 
 def fitted_poses(boxes: Boxes, vertices: Array) -> tuple[Poses, Array]:
-    """Fit the pose of a rigid shape to the given vertices of each smarticle, by least squares.
+    """Fit the pose of rigid links, `boxes`, to the vertices of each smarticle, by least squares.
 
     Vertices do not determine the rotation of a straight shape about its length. The angle of this rotation is then
     arbitrary, but equal vertices give equal angles.
@@ -124,7 +124,7 @@ def fitted_poses(boxes: Boxes, vertices: Array) -> tuple[Poses, Array]:
 
 
 def _turns(moments: Array) -> Array:
-    """Return (N, 3, 3) rotations R that make trace(Rᵀ M) largest, for M (N, 3, 3)."""
+    """Return (N, 3, 3) rotations R that make trace(Rᵀ M) largest, for `moments` M (N, 3, 3)."""
     m = moments / np.abs(moments).max(axis=(1, 2), keepdims=True)
     n = np.empty((len(m), 4, 4))
     for i in range(3):

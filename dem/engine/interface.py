@@ -324,7 +324,7 @@ class Engine(Protocol):
         """Number of bodies present, N."""
 
     def add(self, poses: Poses, *, speed: float = 0.0) -> None:
-        """Add bodies of `particle`, smarticles welded, that fall at a speed [m/s] without rotation."""
+        """Add bodies of `particle` at poses, smarticles welded; they fall at a speed [m/s] without rotation."""
 
     def still(self) -> None:
         """Set all velocities to zero; the kinetic energy counts as dissipated. Smarticles must be welded."""

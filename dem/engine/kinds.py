@@ -33,7 +33,7 @@ class EngineKind(Protocol):
         """Return the largest stable time step [s]; `articulated`: whether barbs can turn or have turned."""
 
     def seconds_per_second(self, scene: Demand, time_step: float, activity: Activity) -> float:
-        """Return the estimated wall time per simulated time [1] on one core, for a time step [s]."""
+        """Return the estimated wall time per simulated time [1] on one core, by time step [s] and phase kind."""
 
     def seconds_to_compile(self, scene: Demand) -> float:
         """Return the estimated processor time [s] to compile the code that a scene needs and the cache lacks."""

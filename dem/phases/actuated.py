@@ -104,8 +104,7 @@ class ActuatedPhase(Phase):
 
         Args:
             check_every: a call ends after each multiple of this number of updates, so that the caller can check the
-                pile;
-                None: no such end.
+                pile; None: no such end.
 
         Returns:
             The simulated time until the next call [s]; 0 at the end of the phase.
@@ -280,7 +279,7 @@ def _of_control(scene: SceneView) -> Iterator[str]:
 
 
 def _whole_fraction(whole: float, parts: int) -> str:
-    """Return, as text, a time [s] divided by `parts` or more, so that the result has few digits."""
+    """Return the time `whole` [s], divided by `parts` or a little more so that it has few digits, as text."""
     for more in range(parts, min(10 * parts, parts + MOST_PARTS) + 1):
         text = f"{whole / more:.3g}"
         if math.isclose(float(text) * more, whole, rel_tol=TOLERANCE):

@@ -127,7 +127,7 @@ def with_pull_defaults(phase: Any, sizes: tuple[float, float]) -> Any:
 
     Args:
         phase: data of a phase of any type.
-        sizes: as in `with_defaults`.
+        sizes: w and t2 of the smarticle, or the longest bar and smallest thickness of other bodies [m].
     """
     pulls = isinstance(phase, Mapping) and phase.get("type") == "pull-hook"
     return with_defaults(phase, _DEFAULTS, sizes) if pulls else phase

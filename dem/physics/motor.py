@@ -32,7 +32,7 @@ class MotorLaw:
 
 
 def speed_factor(law: int, over: Any) -> Any:
-    """Return the factor on a motor's speed limit [1]; arguments as in `halts`."""
+    """Return the factor on a motor's speed limit [1] under a law; `over`: the torque is at its limit."""
     return 1.0 - (1.0 - EASED) * over if law == EASE else 1.0
 
 

@@ -106,7 +106,7 @@ class Plan:
         return "\n".join(lines)
 
     def _engine_to_text(self) -> list[str]:
-        """Return lines about knobs that the engine ignores and, on links, about the fidelity; none on YADE."""
+        """Return lines on fidelity keys that the engine ignores and, on links, the fidelity; none on YADE."""
         idle = ", ".join(engine_kind(self.engine).idle_knobs)
         if not self.strands:
             return [f"engine {self.engine}: {idle} have no meaning here"] if idle else []
@@ -221,7 +221,7 @@ def _step_warnings(scene: Scene) -> tuple[str, ...]:
 
 
 def engine_warnings(scene: Scene) -> tuple[str, ...]:
-    """Return a warning, in one line, about knobs that the scene sets and its engine ignores; () for none."""
+    """Return a line of warning about fidelity keys that the scene sets and its engine ignores, or ()."""
     fidelity, named = scene.fidelity, scene.named_knobs
     usual = {key: named.get(key, Fidelity.model_fields[key].default) for key in engine_kind(scene.engine).idle_knobs}
     idle = [f"{key} ({getattr(fidelity, key):g})" for key, value in usual.items() if getattr(fidelity, key) != value]
@@ -260,7 +260,7 @@ def protocol_lines(scene: Scene) -> tuple[str, ...]:
 
 
 def _protocol_keys(scene: Scene, rules: Mapping[str, Mapping[str, Any]]) -> Iterator[tuple[str, Any, Any]]:
-    """Yield the protocol's keys that apply to a scene, each with the scene's and the protocol's value."""
+    """Yield the keys of a protocol's `rules` that apply to a scene, with the scene's and the rules' value."""
     for part in PARTS:
         if applies(part, plane=scene.plane is not None, tiers=scene.container.tiers is not None):
             for key, value in rules[part].items():

@@ -81,7 +81,7 @@ def _steps_in(interval: float, wanted: float) -> int:
 
 
 def _check_speeds(scene: Scene, steps: Sequence[float]) -> None:
-    """Reject walls, hooks, strings or shaking too fast for contacts to push smarticles away."""
+    """Reject boundaries or strings too fast for contacts; `steps` has the time step of each phase [s]."""
     diameter = scene.sphere_diameter
     for index, (phase, step) in enumerate(zip(scene.phases, steps, strict=True)):
         most = MOST_PER_STEP * diameter / step

@@ -61,7 +61,10 @@ def write_whole(path: Path, write: Callable[[Path], object], *, make_folder: boo
 
 
 def write_text(path: Path, text: str, *, make_folder: bool = True) -> None:
-    """Write a text file in UTF-8; arguments and errors as in `write_whole`."""
+    """Write or replace a text file in UTF-8, completely or not at all.
+
+    `make_folder`: make a missing folder. RunError if writing fails; an existing file is then unchanged.
+    """
     write_whole(path, lambda temporary: temporary.write_bytes(text.encode()), make_folder=make_folder)
 
 

@@ -246,7 +246,7 @@ def read_frame(path: Path | str, number: int | None = None) -> Frame:
     form = _form(points, lines, reject, general=general)
 
     def per_link(name: str, kind: Any, *shape: int) -> NDArray[Any]:
-        """Return cell data (N, 3, …) of smarticles, or (M, …) of other bodies."""
+        """Return cell data as the type `kind`, (N, 3, …) of smarticles, or (M, …) of other bodies."""
         values = data.pop(name, None)
         if values is None:
             reject(f"cell data '{name}' is missing")

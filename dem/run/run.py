@@ -183,7 +183,8 @@ def _restore(simulation: Simulation, saved: tuple[Checkpoint, str | None] | None
 def _mark_ended(simulation: Simulation | None, claim: Claim, log: logging.Logger, error: BaseException) -> str:
     """Write the series and `failed.json` after an error; return the cause in words.
 
-    If the run failed, the text also has the last checkpoint. Nothing is written if the run directory was moved.
+    If the run failed, the text also has the last checkpoint. Nothing is written if the run directory was moved, which
+    `claim` shows. `simulation` is None if it could not be built.
     """
     status: Ended = "interrupted" if isinstance(error, StopRequestedError | KeyboardInterrupt) else "failed"
     cause = "interrupted by the user" if isinstance(error, KeyboardInterrupt) else str(error)

@@ -36,8 +36,9 @@ class Watchdog:
     def within_limits(self, extremes: Extremes, *, floor: float, raised: float | None = 0.0) -> bool:
         """Return whether extremes over all bodies show that all limits hold, except the limit of the energy.
 
-        If the result is false, the limits may hold nevertheless: `check` and `check_depths` must decide. `floor` and
-        `raised` are as in `check`.
+        If the result is false, the limits may hold nevertheless: `check` and `check_depths` must decide. `floor` is
+        its height, `raised` the distance by which the upper hook may have lifted bodies [m]; None: the wall does not
+        enclose the pile.
         """
         inside = extremes.lowest >= floor
         if raised is not None:

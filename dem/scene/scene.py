@@ -49,7 +49,7 @@ _LEAST_GRAVITY = 1e-6  # m/s²; below it motors, whose torque limit is proportio
 
 
 def _named(base: str, given: Mapping[str, Any], diameter: Any = None) -> Mapping[str, Any]:
-    """Return the knobs of the named fidelity `base`, adapted to the validated parts `given` of a scene.
+    """Return the parameters of the named fidelity `base`, adapted to the valid parts `given` of a scene.
 
     On the engine links `rows` is 1 if the scene has a plane, if t1 is at most t2, or if `diameter`, its
     `fidelity.diameter_m`, is not None.
@@ -239,7 +239,7 @@ class Scene(Part):
 
     @property
     def named_knobs(self) -> Mapping[str, Any]:
-        """Knobs of the named fidelity for this scene, as they are before the scene or a rule changes them."""
+        """Parameters of the named fidelity for this scene, before the scene or a rule changes them."""
         return _named(self.fidelity.base, dict(self), self.fidelity.diameter_m)
 
     @property
@@ -259,7 +259,7 @@ class Scene(Part):
         return self._diameter_of(smarticle.thickness_normal_m, smarticle.thickness_in_plane_m, rows)
 
     def _diameter_of(self, normal: float, in_plane: float, rows: int, *, disc: bool = False) -> float:
-        """Return the diameter [m] of spheres, or strands, for a section of a bar.
+        """Return the diameter [m] of the spheres in a chain, or swept on links, for a section of a bar.
 
         Args:
             normal: thickness along the normal [m].

@@ -9,7 +9,7 @@ from dem.setting.part import Length, Part, Stiffness
 
 
 class Fidelity(Part):
-    """Knobs that trade accuracy for cost; none of them changes mass or inertia."""
+    """Numerical parameters (knobs) that trade accuracy for cost; none of them changes mass or inertia."""
 
     base: Literal["draft", "standard", "reference"] = Field(
         "standard", description="named fidelity that gives the default of all other knobs"

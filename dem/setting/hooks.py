@@ -54,7 +54,12 @@ _HOOK_DEFAULTS = {"side_m": (0, 1), "length_m": (1, 0), "lower_height_m": (0, 10
 
 
 def with_hook_defaults(hooks: Any, sizes: tuple[float, float]) -> Any:
-    """Return unvalidated data of `Hooks`, with missing lengths computed from `sizes`."""
+    """Return unvalidated data of `Hooks`, with missing lengths computed from `sizes`.
+
+    Args:
+        hooks: the data; data that are no mapping are returned unchanged.
+        sizes: w and t2 of the smarticle, or the longest bar and smallest thickness of other bodies [m].
+    """
     filled = with_defaults(hooks, _HOOK_DEFAULTS, sizes)
     return {"lower_length_m": filled["length_m"]} | filled if isinstance(filled, dict) else filled
 

@@ -69,11 +69,15 @@ class BaseMotion(Part):
         """Yield the simple motions of which the motion consists, in order, up to the time `until` [s].
 
         A repeated sequence yields its first two repetitions only, since all later ones are equal to the second.
+        `start` has the angles at the beginning of the motion, `home` those at the beginning of the phase [rad].
         """
         raise NotImplementedError
 
     def end(self, start: Array, home: Array) -> Array:
-        """Return the angles [rad] at the end of a motion of finite duration; arguments as in `course`."""
+        """Return the angles [rad] at the end of a motion of finite duration.
+
+        `start` has the angles at the beginning of the motion, `home` those at the beginning of the phase [rad].
+        """
         return self.course(start, home)(np.array(self.duration))
 
 
@@ -85,7 +89,8 @@ class SimpleMotion(BaseMotion):
     def extent(self, start: Array, home: Array, until: float) -> tuple[Angles, Angles, Angles]:
         """Return lowest and highest angle [rad] and greatest speed [rad/s] up to the time `until` [s].
 
-        Jumps of the angle do not count as speed, since motors follow them at their speed limit.
+        Jumps of the angle do not count as speed, since motors follow them at their speed limit. `start` has the angles
+        at the beginning of the motion, `home` those at the beginning of the phase [rad].
         """
         raise NotImplementedError
 
@@ -125,7 +130,7 @@ class _Straight(SimpleMotion):
         return self.duration_s
 
     def goal(self, home: Array) -> Array:
-        """Return the angles [rad] at the end of the turn."""
+        """Return the angles [rad] at the end of the turn; `home`: those at the beginning of the phase [rad]."""
         raise NotImplementedError
 
     def course(self, start: Array, home: Array) -> Course:

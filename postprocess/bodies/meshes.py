@@ -86,7 +86,8 @@ class RunBoundaries:
     def raised(self, time: float, phase: int, top: float) -> float | None:
         """Return the height by which the wall has been lifted [m]; None if there is no wall any more.
 
-        `top` is the height of the pile's top above the floor [m]; a wall that has been lifted higher counts as removed.
+        `phase` is the index of the phase, `top` the height of the pile's top above the floor [m]; a wall that has been
+        lifted higher counts as removed.
         """
         if self.removal is None or phase < self.removal:
             return 0.0
@@ -98,7 +99,7 @@ class RunBoundaries:
 
 
 def _start(run: Run, index: int, series: Series | None) -> float | None:
-    """Return the start of a phase [s]; if not recorded, the time of the last sample before the phase."""
+    """Return the start of a phase, or the time of the last sample before it [s]; None if not recorded."""
     start = run.phases[index].start_s
     if start is None and series is not None:
         start = float(series.time[series["phase"] < index].max(initial=0.0))
@@ -127,7 +128,7 @@ def _cross(length: float, side: float, count: int, height: float) -> pv.PolyData
 
 
 def knots(vertices: Floats, from_hinge: float) -> Floats:
-    """Return the points (2, 3) [m] at which strings are tied to the outer barbs of a chain.
+    """Return the points (2, 3) [m] at which strings are tied to a chain of `vertices`, at its outer barbs.
 
     A knot lies on a barb at the distance `from_hinge` [m] from its hinge. Every second smarticle of a chain is rotated
     by 180°.
@@ -411,7 +412,7 @@ def link_boxes(
 
 
 def bar_meshes(bars: RecordedBars, kinds: Sequence[Kind]) -> pv.PolyData:
-    """Return boxes and cylinders of all bars as one mesh [m].
+    """Return boxes and cylinders of all bars as one mesh [m]; `kinds` has their cross-sections.
 
     The mesh has two arrays of cell data: `smarticle`, the index of the body, and `link`, the number of the bar in it.
     """

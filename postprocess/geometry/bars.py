@@ -28,7 +28,7 @@ def body_centres(frame: Frame) -> Floats:
 
 
 def body_volumes(frame: Frame, run: Run) -> Floats:
-    """Return the solid volumes (N,) [m³] of all bodies of a frame; overlaps at joints count twice."""
+    """Return the solid volumes (N,) [m³] of all bodies; overlaps at common ends of bars count twice."""
     if run.manifest.kinds is None:
         return np.full(frame.count, run.manifest.solid_volume_m3)
     return np.array([kind.volume_m3 for kind in run.manifest.kinds])[frame.kind]

@@ -111,7 +111,7 @@ def checked_curves(segments: ArrayLike, body: ArrayLike, what: str) -> tuple[Cur
 
 
 def only_curves(segments: Floats, body: Whole) -> Segments:
-    """Return the segments of all bodies that are one curve."""
+    """Return the segments of all bodies that are one curve; `body` (M,) is the body of each segment."""
     joined = [one.body for one in curves(segments, body) if not one.flaw]
     return Segments(segments[np.isin(body, joined)], body[np.isin(body, joined)])
 
@@ -124,7 +124,10 @@ def padded(found: tuple[Curve, ...]) -> Floats:
 
 
 def extents(segments: ArrayLike, body: ArrayLike) -> Extents:
-    """Return the boxes around all bodies; `checked_segments` states the errors."""
+    """Return the boxes around all bodies, in the ascending order of their numbers.
+
+    Segments are (M, 2, 3) [m], `body` (M,) are the numbers of their bodies; `checked_segments` states the errors.
+    """
     segments, body = checked_segments(segments, body)
     bodies, number = np.unique(body, return_inverse=True)
     low, high = np.full((len(bodies), 3), np.inf), np.full((len(bodies), 3), -np.inf)

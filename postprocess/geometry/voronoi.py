@@ -78,7 +78,7 @@ def local_packing(
 
 
 def _sample(vertices: Floats, spacing: float) -> tuple[Floats, Whole]:
-    """Return points (n, 3) [m] at equal distances along links, not at hinges, and smarticle indices (n,)."""
+    """Return points (n, 3) at most `spacing` apart along links [m], not at hinges; smarticle indices (n,)."""
     # Rounding of lengths must not give one of several equal links an extra point.
     cuts = np.ceil(link_lengths(vertices) / spacing - 1e-6).astype(int).ravel()
     link = np.repeat(np.arange(len(cuts)), cuts)
@@ -107,11 +107,11 @@ def _mirrored(points: Floats, container: Region, lid: float, band: float) -> Flo
 def _cell_volumes(points: Floats, count: int, *, reach: float, together: int = TOGETHER) -> Floats:
     """Compute the Voronoi volumes (count,) [m³] of the first `count` points among points (n, 3) [m].
 
-    The points are divided into slabs along x; the cells of a slab are computed among all points within a reach [m] of
-    the slab. The sphere around a corner of a cell through the point of the cell contains no other point. A cell is
-    therefore final if the spheres of all its corners lie inside the searched region. The remaining cells are computed
-    again with twice the reach, until the reach exceeds twice the distance from the point to its farthest corner. The
-    volume of an open cell is infinite.
+    The points are divided into slabs along x, with at most `together` points; the cells of a slab are computed among
+    all points within a reach [m] of the slab. The sphere around a corner of a cell through the point of the cell
+    contains no other point. A cell is therefore final if the spheres of all its corners lie inside the searched region.
+    The remaining cells are computed again with twice the reach, until the reach exceeds twice the distance from the
+    point to its farthest corner. The volume of an open cell is infinite.
     """
     if count <= together:
         return _cells(points)[0][:count]

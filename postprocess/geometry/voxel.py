@@ -61,10 +61,15 @@ def solid_fraction(
     thickness_in_plane: float,
     pitch: float | None = None,
 ) -> float:
-    """Return the fraction of a region's volume inside the boxes of the links [-], see `solid_points`.
+    """Return the fraction [-] of a region's volume inside the boxes of the links, by a grid of points.
 
     A point in two boxes counts once. The boxes of a smarticle overlap at its hinges, so the volume of a U is smaller
     than t1 t2 (w + 2l), by about 1 % for usual sizes. UndefinedMeasureError if there is no material in the region.
+
+    Args:
+        thickness_normal: t1, along the normal of the smarticle's plane [m].
+        thickness_in_plane: t2, in the smarticle's plane [m].
+        pitch: Distance of neighbouring points of the grid [m]; half the smaller thickness if not given.
     """
     points, pitch = solid_points(
         vertices, thickness_normal=thickness_normal, thickness_in_plane=thickness_in_plane, pitch=pitch, region=region
@@ -113,9 +118,14 @@ def _grid_points(
 ) -> Iterator[Whole]:
     """Yield indices (n, 3) of grid points inside the boxes of the links; an index may be repeated.
 
-    The grid is rotated by `_TURN`. Arguments are those of `solid_points`.
+    The grid is rotated by `_TURN`. Each box is cut into pieces about as long as thick, so that few grid points must be
+    tested for each piece.
 
-    Each box is cut into pieces about as long as thick, so that few grid points must be tested for each piece.
+    Args:
+        normal: t1, the thickness along the normal of the smarticle's plane [m].
+        in_plane: t2, the thickness in the smarticle's plane [m].
+        pitch: Distance of neighbouring points [m].
+        region: Region to whose neighbourhood points are restricted; None: no restriction.
     """
     lengths = link_lengths(vertices)
     # A link without length (l = 0) has no direction, and yields no piece.

@@ -34,7 +34,7 @@ _BALANCE = 1e-9
 
 
 class ContactNormals(NamedTuple):
-    """P contacts between segments of different bodies; both bodies of a contact have a row."""
+    """Contacts between segments of different bodies: P rows, two per contact, one for each of its bodies."""
 
     body: Whole  #: (P,) int64, index of the body in the ascending order of body numbers
     point: Floats  #: (P, 3) [m], point of contact
@@ -145,7 +145,17 @@ def caging_number(segments: ArrayLike, *, trials: int = 400, seed: int = 0) -> S
 
 
 def contact_normals(segments: Floats, number: Whole, *, diameter: ArrayLike, gap: float = 0.0) -> ContactNormals:
-    """Find contacts of segments whose bodies have the indices `number` (M,); other arguments: see `cages`."""
+    """Find the contacts between segments of different bodies.
+
+    Args:
+        segments: (M, 2, 3) axes of round sections [m].
+        number: (M,) index of each segment's body, from 0.
+        diameter: Diameter of all sections, or (M,) of each segment [m].
+        gap: Largest distance of two surfaces that counts as contact [m].
+
+    Raises:
+        InputError: A diameter is not above 0, or the gap is below 0.
+    """
     sizes = np.asarray(diameter, dtype=np.float64)
     if sizes.shape not in {(), (len(segments),)} or not np.all(np.isfinite(sizes) & (sizes > 0)) or not gap >= 0:
         raise InputError(

@@ -265,7 +265,10 @@ def _curve(free: Floats, times: Floats, start: float | None, end: float | None) 
 
 
 def _fit(times: Floats, heights: Floats, start: float | None, end: float | None) -> Any:
-    """Return the best of several fits from different starting points, since there may be several minima."""
+    """Return the best of several fits from different starting points, since there may be several minima.
+
+    `start` and `end` are the heights before and long after the collapse, in the unit of `heights`; None: fitted too.
+    """
     low, high = [math.log(times[0] / 10), _EXPONENTS[0]], [math.log(_LONGEST), _EXPONENTS[1]]
     guess: list[float] = []
     if start is None:

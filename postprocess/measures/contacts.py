@@ -69,7 +69,8 @@ def contact_pairs(vertices: Vertices, distance: float) -> ContactPairs:
 def pairs_in_contact(frame: Frame, run: Run) -> ContactPairs:
     """Find the pairs of smarticles that touch in the run's engine, sorted by i, then j.
 
-    Two smarticles touch if a sphere or strand of one touches a sphere or strand of the other.
+    Two smarticles touch if a sphere or strand (the volume that a sphere sweeps along a link) of one touches one of the
+    other.
 
     On the engine `links` the number of pairs is exact in all phases. On YADE it is exact at rest after pouring; it
     deviates by at most 1.4 % while pouring and 0.7 % at rest after shaking. While a pile is shaken it is 6 to 11 % too
@@ -241,16 +242,20 @@ def without_support(
 
 
 def on_floor(vertices: Vertices, *, diameter: float, floor_z: float) -> Flags:
-    """Return which of N smarticles touch the floor: (N,) bool; `without_support` describes the arguments."""
+    """Return which of N smarticles touch the floor: (N,) bool.
+
+    `diameter` is that of the spheres along the links, `floor_z` the height of the floor [m].
+    """
     axes = swept_axes(checked_vertices(vertices), diameter)
     touching: Flags = axes[..., 2].min(axis=1) - floor_z <= _REACH * diameter / 2
     return touching
 
 
 def at_wall(vertices: Vertices, *, diameter: float, wall_radius: float) -> Flags:
-    """Return which vertices touch the wall: (N, 4) bool; `without_support` describes the arguments.
+    """Return which vertices touch the wall: (N, 4) bool.
 
-    A straight link touches a round wall with its ends first.
+    A straight link touches a round wall with its ends first. `diameter` is that of the spheres along the links,
+    `wall_radius` that of the wall around the axis x = y = 0 [m].
     """
     axes = swept_axes(checked_vertices(vertices), diameter)
     touching: Flags = wall_radius - np.hypot(axes[..., 0], axes[..., 1]) <= _REACH * diameter / 2

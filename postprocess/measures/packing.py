@@ -134,7 +134,10 @@ def packing_of(frame: Frame, run: Run, *, definition: str) -> float:
 
 
 def _packing_of_bars(frame: Frame, run: Run, *, definition: str, radius: float) -> float:
-    """Return the packing fraction [-] of bodies that are no smarticles; NaN if it is undefined."""
+    """Return the packing fraction [-] of bodies that are no smarticles; NaN if it is undefined.
+
+    `definition` is a key of `DEFINITIONS`; `radius` is that of the cylinder [m].
+    """
     if definition in COSTLY_DEFINITIONS or frame.count < 2:
         return math.nan
     levels = frame_heights(frame, run)

@@ -194,7 +194,13 @@ def _rows(
     *,
     offset: int = 0,
 ) -> list[dict[str, object]]:
-    """Return a row of the table for each frame of a part of a phase; `offset` is the first frame's number."""
+    """Return a row of the table for each frame of a part of a phase.
+
+    Args:
+        known: the measures of a frame.
+        costly: frames for which costly measures are computed, the others get NaN.
+        offset: number of the part's first frame.
+    """
     rows: list[dict[str, object]] = []
     measures = [measure for measure in known if measure.available_for(run)]
     made = run.manifest

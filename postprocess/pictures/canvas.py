@@ -103,7 +103,7 @@ class Subject:
         self.frames = read_frames(directory)
 
     def extent(self, indices: Iterable[int], axes: Floats) -> Floats:
-        """Return lower left and upper right (2, 2) [mm] of the bodies in some frames, in the picture's plane."""
+        """Return lower left and upper right (2, 2) [mm] of the bodies in some frames along the camera's axes."""
         return union([extent(visible_meshes(self.bodies, self.frames[i], axes[2]).values(), axes) for i in indices])
 
     def values(self, indices: Iterable[int], style: Style) -> list[Floats]:
@@ -303,7 +303,11 @@ class Canvas:
     def _write(
         self, column: int, name: str, text: str, at: tuple[float, float], size: float, *, bold: bool = False
     ) -> None:
-        """Write a line at a position from the lower left [pixel]; shrink or cut it if it is too long."""
+        """Write a line at a position from the lower left [pixel]; shrink or cut it if it is too long.
+
+        `column` is the number of the run, from the left; `size` is the font size, over `Style.unit`. A new line
+        replaces the line with its `name`.
+        """
         (x, y), width = at, self._style.size[0]
         text = "".join(letter if letter.isprintable() else "?" for letter in text)
         points, room = size * self._style.unit, (width - x) / _LETTER

@@ -51,8 +51,9 @@ class FilmTimes:
     ) -> Self:
         """Choose the times of a film's pictures from the ascending times (m,) [s] of the recorded frames.
 
-        `start`, `end` and `every` are in simulated time [s]; None: all frames, and at most `most` pictures. InputError
-        if there are fewer than two frames or pictures, or an argument is out of its range.
+        `start`, `end` and `every` are in simulated time [s]; None: all frames, and at most `most` pictures. The rate at
+        which the film shows them is in [pictures/s]. InputError if there are fewer than two frames or pictures, or an
+        argument is out of its range.
         """
         recorded = np.asarray(recorded, dtype=np.float64)
         if most < 2:

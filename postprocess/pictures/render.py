@@ -76,6 +76,7 @@ def render_run(
         view: Key of `VIEWS`; None: "front", or "top" if the run is planar.
         forces: Whether to draw contact forces as lines, with a thickness proportional to the normal force, in front of
             pale smarticles.
+        overwrite: Whether to replace an existing output.
 
     Raises:
         InputError: No frame, an unknown field or view, a time outside the recorded frames, a bad size, bad limits, an
@@ -121,19 +122,25 @@ def render_film(
     """Draw a film of a run with one camera and one colour scale, and return the path of the written file.
 
     The pictures are at equal intervals of simulated time; each shows the nearest recorded frame. The caption states the
-    speed. `render_run` describes the arguments that are not listed.
+    speed.
 
     Args:
         directory: A run directory with at least two frames; the run may be unfinished.
         output: File to write: `.gif` or `.webp`, or `.mp4`, which needs the package imageio-ffmpeg; `film.gif` in the
             run directory if not given.
         compare: Further runs, drawn side by side; the film ends at the last time common to all runs.
+        color_by: Name or short name of a field; None: crossings, or smarticle_id if the run is planar.
+        limits: Ends of the colour scale, see `Limits`; the extremes in this film if not given.
         size: Width and height of the picture of one run [pixel]; even numbers for `.mp4`.
+        view: Key of `VIEWS`; None: "front", or "top" if the run is planar.
+        frames_per_second: Rate at which the film shows pictures [1/s].
         start: Simulated time at which the film begins [s]; that of the first frame if not given.
         end: Simulated time at which the film ends [s]; that of the last frame if not given.
         every: Simulated time between two pictures [s]; if not given, a multiple of the recorded interval.
         most_frames: Largest number of pictures if `every` is not given.
+        forces: Whether to draw contact forces as lines, with a thickness proportional to the normal force.
         track: Shows the progress, see `Track`.
+        overwrite: Whether to replace an existing output.
 
     Raises:
         InputError: Fewer than two frames, an output that exists or cannot be written, or an argument out of its range.

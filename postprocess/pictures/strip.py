@@ -26,8 +26,8 @@ class Row:
 def draw_strip(rows: Sequence[Row], output: Path, *, columns: Sequence[str], footer: Sequence[str]) -> Path:
     """Draw a row of pictures for each run, and write them as one figure, a `.png`; return its path.
 
-    A row has one time per column. A smarticle has one colour in all pictures of a run. The footer is below the
-    pictures.
+    A row has one time per column. A smarticle has one colour in all pictures of a run. `columns` are the titles of the
+    columns; the lines of the footer are below the pictures.
     """
     subjects = [Subject(row.directory) for row in rows]
     style = Style.of([subject.run for subject in subjects[:1]], color_by="id", size=_SIZE, view="front")

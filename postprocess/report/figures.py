@@ -95,7 +95,7 @@ def blank_figure(width: float, height: float) -> Figure:
 
 
 def add_footer(figure: Figure, lines: Sequence[str]) -> None:
-    """Add a footer with the provenance to a finished figure, which grows by the height of the text.
+    """Add a footer of `lines`, the provenance, to a finished figure, which grows by its height.
 
     The footer takes at most `FOOTER_SHARE` of the figure. A longer text is cut with "…" before its last statement,
     which names the file with the full text.

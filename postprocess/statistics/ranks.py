@@ -100,7 +100,7 @@ def interval(value: float, drawn: Sequence[float]) -> Interval:
 
 
 def few_blocks(blocks: Whole, strata: Whole) -> bool:
-    """Return whether a stratum has fewer than three blocks, too few for an error by resampling."""
+    """Return whether a stratum (n,) has fewer than three blocks (n,), too few for an error by resampling."""
     return any(len(np.unique(blocks[strata == stratum])) < 3 for stratum in np.unique(strata))
 
 

@@ -153,7 +153,11 @@ def difference(mean: SeedMean, baseline: SeedMean, *, scatter: Scatter | None = 
 
 
 def relative_difference(mean: SeedMean, baseline: SeedMean, *, scatter: Scatter | None = None) -> Difference:
-    """Return the `difference` in per cent of the baseline, whose error is neglected; NaN if it is 0."""
+    """Return the difference `mean` less `baseline` in per cent of the baseline; NaN if the baseline is 0.
+
+    The baseline's error counts in the difference, but not in the division. `scatter` is common to both means; None: the
+    interval follows from the error of each mean.
+    """
     change = difference(mean, baseline, scatter=scatter)
     scale = 100 / baseline.value if baseline.value else math.nan
     return Difference(value=scale * change.value, half_width=abs(scale) * change.half_width)

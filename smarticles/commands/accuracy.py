@@ -103,7 +103,11 @@ def run_accuracy(arguments: argparse.Namespace) -> int:
 
 
 def _listing(ladder: Ladder, expected_s: Mapping[str, float], seeds: int, jobs: int | None) -> str:
-    """Return a table of the variants, with the expected wall time [s] of a run and [h] of all runs."""
+    """Return a table of the variants, with the expected wall time [s] of a run and [h] of all runs.
+
+    `expected_s` has the expected wall time by variant [s], `seeds` is the number of seeds, `jobs` that of runs at once;
+    None: one per core.
+    """
     from dem.engine.cores import usable_cores  # noqa: PLC0415
     from dem.plan.outlook import plan  # noqa: PLC0415
 

@@ -171,7 +171,10 @@ def _run_until(
 
 
 def _set_parallelism(scene: Scene, out: Path, *, resume: bool, threads: int | None, ranks: int | None) -> None:
-    """Set the environment variables from which the engine takes its number of threads or ranks."""
+    """Set the environment variables from which the engine takes its number of threads or ranks.
+
+    To `resume` without a given number, the number of the run's manifest is taken; by default it is 1.
+    """
     from dem.engine.cores import RANKS, check_ranks, threads_warning  # noqa: PLC0415
     from dem.record.run import Run  # noqa: PLC0415
 

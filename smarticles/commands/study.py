@@ -134,7 +134,7 @@ def compute_and_analyse(
 
 
 def _draw(folder: Folder, finished: Sequence[Entry], values: Mapping[str, object], output: Path) -> None:
-    """Draw the first finished run whose variables have these values."""
+    """Draw the first finished run whose variables have these values, into the file `output`."""
     from postprocess.pictures.render import render_run  # noqa: PLC0415  (imports PyVista)
 
     for entry in finished:
@@ -146,7 +146,7 @@ def _draw(folder: Folder, finished: Sequence[Entry], values: Mapping[str, object
 
 
 def _earlier(results: Path, folder: Folder, study: Study) -> Mapping[str, MeasuredRun]:
-    """Read those runs of a sweep, by name, that are in the tables of an earlier analysis."""
+    """Read those runs of a sweep, by name, that are in the tables of an earlier analysis, in `results`."""
     from studies.framework.runs import Wanted, earlier_runs  # noqa: PLC0415
 
     if not study.from_tables:

@@ -46,6 +46,8 @@ def against_variable(variable: str, label: str, groups: Groups) -> str:
     """Draw means with error bars against a variable; return the chart as a data URL.
 
     Args:
+        variable: title of the x-axis.
+        label: title of the y-axis.
         groups: x, means and standard errors of each curve; an error may be NaN.
     """
     values = [x for xs, _, _ in groups.values() for x in xs]

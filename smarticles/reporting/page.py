@@ -59,7 +59,7 @@ def words(*lines: str, tone: str = "plain") -> Markup:
 
 
 def table(caption: str, header: Sequence[Any], rows: Iterable[Sequence[Any]], *, folded: bool = False) -> Markup:
-    """Return a table of at most `MAX_ROWS` rows; `folded`: show only the caption until a click."""
+    """Return a table of at most `MAX_ROWS` rows; `folded`: show only its caption until a click."""
     cells = [[format_cell(value) for value in row] for row in rows]
     numeric = [all_numbers([row[k] for row in cells]) for k in range(len(header))]
     left_out = max(len(cells) - MAX_ROWS, 0)
@@ -76,6 +76,7 @@ def figure(caption: str, alt: str, picture: str, kind: str) -> Markup:
 
     Args:
         alt: description for readers who cannot see the picture.
+        picture: the picture as a data URL.
         kind: "chart" (colours are inverted on a dark page), "card" (light background) or "card wide".
     """
     return Markup(_blocks.figure(caption, alt, picture, kind))
@@ -87,6 +88,7 @@ def turntable(caption: str, alt: str, views: Sequence[str]) -> Markup:
     The HTML is a group of radio buttons, one per view, so that the page needs no script.
 
     Args:
+        alt: description for readers who cannot see the picture.
         views: data URLs of pictures from equally spaced angles.
     """
     angles = [round(360 * number / len(views)) for number in range(len(views))]
@@ -107,5 +109,5 @@ def embedded(path: Path) -> str:
 
 
 def data_url(content: bytes, mime: str) -> str:
-    """Return a data URL with the content of a file."""
+    """Return a data URL with the content of a file of the media type `mime`, such as `image/png`."""
     return f"data:{mime};base64,{base64.b64encode(content).decode()}"

@@ -47,7 +47,7 @@ _LEAST_RUNS = 3  # for an interval that is worth its name
 
 
 def sweep_page(folder: Folder, accuracy: Path | None, *, jobs: int) -> str:
-    """Return the HTML page of a sweep or a study.
+    """Return the HTML page of a sweep or a study; `jobs` processes measure its runs.
 
     `accuracy` is the path of a table of measured errors; None: the table that ships.
     """
@@ -119,7 +119,7 @@ def _scenes(folder: Folder) -> dict[str, Scene]:
 
 
 def _measured(folder: Folder, varied: Mapping[str, Sequence[Any]], *, jobs: int) -> list[Section]:
-    """Return the sections with tables and charts of means over runs with equal variables."""
+    """Return sections of means over runs with equal variables, whose values are `varied`; `jobs` measure."""
     if not any(has_frames(folder.run(entry)) for entry in folder.entries):
         return [("Result", [words("No run has frames yet.", tone="note")])]
     runs = measured([folder.path], costly="never", jobs=jobs)
@@ -147,8 +147,8 @@ def _measured(folder: Folder, varied: Mapping[str, Sequence[Any]], *, jobs: int)
 def _figures(final: pd.DataFrame, by: Sequence[str], varied: Mapping[str, Sequence[Any]], kind: str) -> list[Markup]:
     """Return charts against the variable with most values, with one curve per value of a second variable.
 
-    There are separate charts for each combination of the other variables. `final` has means after the last phase, of
-    the type `kind`, by the variables `by`; `varied` has the values of each variable.
+    There are separate charts for each combination of the other variables. The table `final` has means after the last
+    phase, whose type is `kind`, such as "relax". Its columns `by` are the variables; `varied` has the values of each.
     """
     if not by:
         return []

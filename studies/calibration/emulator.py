@@ -109,7 +109,7 @@ def fit(inputs: Array, values: Array, label: str) -> Emulator:
 
 
 def kernel(dimension: int) -> Any:
-    """Return the kernel of an emulator before its fit: squared exponential plus white noise."""
+    """Return the kernel of an emulator of `dimension` parameters: squared exponential plus white noise."""
     from sklearn.gaussian_process.kernels import RBF, ConstantKernel, WhiteKernel  # noqa: PLC0415  (an extra)
 
     signal = ConstantKernel(1.0, (1e-3, 1e3)) * RBF(np.ones(dimension), LENGTHS)

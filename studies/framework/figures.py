@@ -486,7 +486,7 @@ def by_procedure(labels: Mapping[str, str] = PROCEDURE_LABELS, *, apart: float =
 
 
 def marker(shape: str, colour: str, face: str) -> dict[str, Any]:
-    """Return properties, by Matplotlib's names, of a marker with a line and error bars of the same colour."""
+    """Return Matplotlib's properties of a marker, line and error bars in `colour`; `face`: its inside."""
     edges = {"markeredgewidth": 0.9, "elinewidth": 0.8, "capthick": 0.8}
     return {"marker": shape, "color": colour, "markerfacecolor": face, **edges}
 
@@ -518,7 +518,7 @@ def panels(
 def binned(
     histories: Sequence[History], width: float, *, log: bool = False
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Average each history over intervals of a width [s], or over 49 logarithmic intervals.
+    """Average each history over intervals of a width [s] or, with `log`, over 49 logarithmic intervals.
 
     Two intervals meet at time 0, when the activity begins. An interval is left out if a history has no sample in it.
     Returns the centres of the intervals (n,) [s] and the means of each history (histories, n).
@@ -546,7 +546,11 @@ def binned(
 def draw_history(
     axes: Axes, histories: Sequence[History], width: float, *, log: bool = False, **properties: Any
 ) -> NDArray[np.float64]:
-    """Draw mean (line) and range (band) of histories; return the times (n,) [s] of the drawn points."""
+    """Draw mean (line) and range (band) of histories; return the times (n,) [s] of the drawn points.
+
+    A point is an average over an interval of the width [s]; with `log`, over one of 49 logarithmic intervals, and the
+    width has no effect. `properties` are arguments of Matplotlib's `Axes.plot`; one of them must be `color`.
+    """
     centres, means = binned(histories, width, log=log)
     axes.plot(centres, means.mean(axis=0), **properties)
     if len(means) > 1:
@@ -563,7 +567,10 @@ def draw_fits(
     *,
     lines: Sequence[Any] = ("solid",),
 ) -> None:
-    """Draw curves at places x (n,): `fits` has values and 95 % half-widths (n,) of each curve by label."""
+    """Draw curves of one colour at places x (n,), with bands.
+
+    `fits` has values and 95 % half-widths (n,) of each curve by its label, `lines` the line style of each curve.
+    """
     for (label, (values, half_widths)), line in zip(fits.items(), lines, strict=False):
         axes.plot(x, values, color=colour, linewidth=0.9, linestyle=line, label=label)
         low, high = np.asarray(values) - half_widths, np.asarray(values) + half_widths
@@ -583,7 +590,8 @@ def draw_means(
     """Draw means y (n,) at places x (n,) with their error bars.
 
     `half_widths` (n,) are half the 95 % intervals of y, `across` half the 95 % intervals of x: (n,), or (2, n) for the
-    lower and the upper side. NaN stands for an unknown interval; None draws no error bars.
+    lower and the upper side. NaN stands for an unknown interval; None draws no error bars. `properties` are arguments
+    of Matplotlib's `Axes.errorbar`; `label` is for the legend.
     """
     bars = axes.errorbar(
         x, y, yerr=half_widths, xerr=across, **{"markersize": 3.4, "linewidth": 0.7, **properties}, label=label
@@ -598,7 +606,8 @@ def draw_bounds(
 ) -> None:
     """Draw lower bounds `least` (n,) at places x (n,) as markers with arrows upwards; NaN are left out.
 
-    The lengths of the arrows, in the unit of y, have no physical meaning.
+    The lengths of the arrows, in the unit of y, have no physical meaning. `properties` are arguments of Matplotlib's
+    `Axes.errorbar`.
     """
     at, from_, long = np.broadcast_arrays(*(np.asarray(part, dtype=np.float64) for part in (x, least, lengths)))
     known = np.isfinite(from_)
@@ -610,7 +619,8 @@ def draw_bounds(
 def finish(figure: Canvas, path: Path, notes: Sequence[str], footer: Sequence[str], *, bars: str = BARS) -> list[Path]:
     """Add legend and footer to a figure, write it to a path without suffix, and return its files.
 
-    Axes are widened until they show everything. The footer explains error bars by `bars` if the figure has any.
+    Axes are widened until they show everything. The footer has the lines `notes`, then, if the figure has error bars,
+    their explanation `bars`, then the lines `footer`.
     """
     legends = [
         {label: handle for handle, label in zip(*axes.get_legend_handles_labels(), strict=True)} for axes in figure.axes

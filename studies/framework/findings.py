@@ -54,8 +54,8 @@ def judge(effect: SeedMean, *, threshold: float = 0.0) -> Verdict:
 def more_runs(effect: SeedMean, *, threshold: float = 0.0) -> float:
     """Return the factor by which the number of runs must grow to resolve an effect of this size.
 
-    The scatter is assumed to stay. The factor is infinite if more than a million runs are needed, and NaN if the
-    scatter is unknown.
+    The effect is resolved if it differs from the threshold. The scatter is assumed to stay. The factor is infinite if
+    more than a million runs are needed, and NaN if the scatter is unknown.
     """
     size, scatter = abs(effect.value - threshold), effect.standard_error * math.sqrt(effect.count)
     if not math.isfinite(scatter):
@@ -70,7 +70,7 @@ def more_runs(effect: SeedMean, *, threshold: float = 0.0) -> float:
 
 
 def effect_text(effect: SeedMean, digits: int = 3, unit: str = "") -> str:
-    """Return `+0.0123 ± 0.0011 (n = 15)`: effect, standard error and number of runs, or `no data`."""
+    """Return `+0.0123 ± 0.0011 N (n = 15)`: effect, standard error, `unit`, number of runs; or `no data`."""
     if math.isnan(effect.value):
         return "no data"
     error = f" ± {effect.standard_error:.{digits}g}" if math.isfinite(effect.standard_error) else " without an error"
@@ -231,6 +231,7 @@ def above(
     """Make the finding that a procedure is above others in a quantity, paired by aspect ratio and seed.
 
     Args:
+        says: the statement.
         quantities: column, or several columns with a sign each: +1 if the statement says above, −1 if below.
         one, others: the procedure, and the procedures that it is compared with.
         sign: sign of a single column.
@@ -287,6 +288,9 @@ def slope(
     """Make the finding that a quantity rises (sign +1) or falls (−1) with a variable, on straight lines.
 
     Args:
+        says: the statement.
+        quantity: column of the quantity.
+        against: column of the variable.
         within: columns whose values make blocks; the lines of all blocks have one slope, each its own intercept.
         label: name of the quantity in texts; empty: its symbol.
     """
@@ -316,7 +320,9 @@ def mean(
     """Make the finding that the mean of a value is above a threshold (sign +1) or below it (−1).
 
     Args:
+        says: the statement.
         values: computes the value of each row.
+        label: name of the value in texts.
         threshold: in the unit of the value.
         shown: columns whose means are shown but not judged.
         by: column at whose values the means of the columns `shown` are taken.
@@ -348,6 +354,8 @@ def ranks(
     ranks above all other values, and a pile that a single smarticle braces has a peak many times those of other piles.
 
     Args:
+        says: the statement.
+        x, y: columns of both quantities.
         within: columns whose values make blocks; ranks are taken within each block.
         bounds: column that is above 0 if y is a lower bound.
         unit: unit of the slope of y against x, which is shown but not judged.
@@ -387,7 +395,7 @@ def blocks(table: pd.DataFrame, columns: Sequence[str]) -> Sequence[Hashable]:
 
 
 def means_by(table: pd.DataFrame, quantity: str, by: str, form: str) -> str:
-    """Format the means of a quantity at each value of the column `by`: `0.4: 1.02, 0.7: 1.05`."""
+    """Format means at each value of the column `by` in the format `form`: `0.4: 1.02, 0.7: 1.05`."""
     means = table.groupby(by)[quantity].mean().dropna()
     cells = {value if isinstance(value, str) else f"{value:g}": one for value, one in means.items()}
     return ", ".join(f"{value}: {one:{form}}" for value, one in cells.items()) or "none"

@@ -150,8 +150,8 @@ def height_history(run: Run) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
 def _of_series(run: Run, active: Phase, straight_until: float | None) -> dict[str, float]:
     """Measure heights [-] and energy per smarticle [J] from the series, by column; NaN if not recorded.
 
-    `straight_until` is the time since a shape change began at which barbs start to close again [s]; None for other
-    activities.
+    `active` is the phase of the activity, `straight_until` the time since a shape change began at which barbs start to
+    close again [s]; None for other activities.
     """
     found = {STRAIGHT: math.nan, LOWEST: math.nan, HALF: math.nan, ENERGY: math.nan}
     if not (run.path / "series.h5").exists():

@@ -150,7 +150,7 @@ def compared_engines(runs: pd.DataFrame, keys: Sequence[str], quantities: Iterab
     Runs with equal point and seed were poured from equal poses. Piles are chaotic and soon forget their poses, so
     pairing reduces the scatter only a little. The table has one row per point, other engine and quantity. A row has the
     mean of each engine over the pairs, and their difference with its 95 % half-width by Student's t, also in per cent
-    of the other engine's mean.
+    of the other engine's mean. `keys` are the columns that identify a point, `quantities` the compared columns.
     """
     first, *others = engines_of(runs)
     rows = []
@@ -231,7 +231,10 @@ class Collected:
         *,
         within: Callable[[MeasuredRun], Hashable] = lambda _: None,
     ) -> None:
-        """Raise InputError if `value` differs between runs of a group (`within`), by default all runs."""
+        """Raise InputError if `value` differs between runs of a group (`within`), by default all runs.
+
+        `quantity` names the value in the message.
+        """
         firsts: dict[Hashable, MeasuredRun] = {}
         for run in self.runs:
             first = firsts.setdefault(within(run), run)
@@ -263,7 +266,7 @@ def collect_runs(
     """Measure finished runs and list the others as missing; InputError if no run is done.
 
     A run for which `measure` raises InputError is missing, with the status "unusable". Runs of an earlier analysis, by
-    name, replace directories that do not exist.
+    name, replace directories that do not exist. `study` is the study's name, for messages.
     """
     runs: list[MeasuredRun] = []
     missing: list[MissingRun] = []

@@ -92,7 +92,7 @@ def gravish_note(aspects: Sequence[float]) -> str:
 
 
 def phi(stage: str, definition: str = DEFINITION) -> str:
-    """Return the name of the column of φ at a stage."""
+    """Return the name of the column of φ at a stage, by a definition of φ."""
     return f"{stage} {definition} [-]"
 
 

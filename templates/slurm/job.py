@@ -64,7 +64,7 @@ class Request:
 
 
 def plan_request(expected_s: Sequence[float], cluster: Cluster, wishes: Wishes) -> Request:
-    """Return the request for runs with expected wall times [s]; InputError if it exceeds a limit."""
+    """Return the request for runs with expected wall times [s] and `wishes`; InputError above a limit."""
     name, partition = cluster.partition(wishes.partition)
     where = f"partition {name} of {cluster.name}"
     memory, ranks = wishes.memory_mib or MEMORY_PER_RUN_MIB, wishes.ranks or 1
@@ -113,7 +113,10 @@ def plan_request(expected_s: Sequence[float], cluster: Cluster, wishes: Wishes) 
 
 
 def _runs_per_task(count: int, partition: Partition, wanted: int | None, memory: int) -> int:
-    """Return the number of runs per task: `wanted`, or by default for equal tasks that fill a node."""
+    """Return the number of runs per task: `wanted`, or by default for equal tasks that fill a node.
+
+    `count` is the number of runs, `memory` that of one run [MiB].
+    """
     if wanted is not None:
         return wanted if wanted > partition.cores else min(wanted, count)
     most = max(1, min(partition.cores, partition.memory_mib // memory))
@@ -123,7 +126,8 @@ def _runs_per_task(count: int, partition: Partition, wanted: int | None, memory:
 def _time(longest: float, cluster: Cluster, partition: Partition, wanted: str | None, where: str) -> int:
     """Return the wall time of a task to request [s], a whole number of minutes, as Slurm counts.
 
-    It is the time `wanted`, or follows from the expected time of the longest run, `longest` [s].
+    It is the time `wanted`, or follows from the expected time of the longest run, `longest` [s]. `where` names the
+    partition in messages.
     """
     if wanted is None:
         needed = max(LEAST_TIME_S, longest) + cluster.signal_lead_s
@@ -168,6 +172,7 @@ def render_script(
     """Return the text of the script of an array job; raise InputError if it cannot be rendered.
 
     Args:
+        sweep: Directory of the sweep.
         number: Name of the submission's folder in `jobs/`.
         command: Command that starts `smarticles`, as words.
     """

@@ -189,6 +189,8 @@ def create_folder(
 
     Args:
         path: The directory, which is absent, empty, or holds this sweep.
+        command: Command that makes it, for the record.
+        versions: Version of each package that expands a sweep, for the record.
         expected_s: Expected wall time of each point [s].
         extend: Whether to add the missing runs to a directory that holds some of these runs and no others.
 

@@ -125,7 +125,7 @@ _FAILURES = (
 
 
 def evaluate(expression: str, values: Mapping[str, Value], source: str) -> Value:
-    """Return the value of a Jinja2 expression such as `(n / 2) | round | int`, or raise InputError."""
+    """Return the value of a Jinja2 expression such as `(n / 2) | round | int`; `source` is for errors."""
     try:
         with _limited():
             result = _environment().compile_expression(expression, undefined_to_none=False)(**values)
@@ -136,7 +136,7 @@ def evaluate(expression: str, values: Mapping[str, Value], source: str) -> Value
 
 
 def render_text(template: str, values: Mapping[str, Value], source: str) -> str:
-    """Render a template as text, not as YAML; raise InputError if it fails or uses an unknown name."""
+    """Render a template as text; InputError, with `source` as its place, if it fails or lacks a name."""
     try:
         with _limited():
             return _environment().from_string(template).render(**values)
@@ -145,7 +145,7 @@ def render_text(template: str, values: Mapping[str, Value], source: str) -> str:
 
 
 def render_yaml(template: str, values: Mapping[str, Value], source: str) -> Any:
-    """Render a template of YAML and return its data; on an error raise InputError with its line."""
+    """Render a template of YAML and return its data; InputError with `source` and line on an error."""
     prefix = "value"
     while prefix in template or prefix in repr(values):
         prefix += "x"

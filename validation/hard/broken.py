@@ -1,4 +1,8 @@
-"""Corrupted simulations: the watchdog must report the error and the affected smarticles."""
+"""Corrupted simulations: the watchdog must report the error and the affected smarticles.
+
+In all cases `access` is the engine, with access to its internals, `out` the run directory, and times are simulated
+times [s]. A case returns its checks.
+"""
 
 import math
 from pathlib import Path
@@ -34,7 +38,10 @@ PLACES = ("over the wall", "through the wall", "under the floor")
 
 
 def spoil(access: EngineAccess, out: Path, *, what: str, articulated: bool, steps: int) -> list[Check]:
-    """Set the invalid state `what` of the second of three smarticles; the watchdog must report it."""
+    """Set the invalid state `what` of the second of three smarticles; the watchdog must report it.
+
+    `what` is a key of `SPOILT`; the watchdog checks after a number of time `steps`.
+    """
     scene, engine, recorder = watched(scene_data(access, shape_change(), count=3), out)
     # A few diameters apart, so that no smarticle falls on another.
     for k in range(3):
@@ -87,7 +94,7 @@ def _resting(access: EngineAccess, out: Path, count: int) -> tuple[Engine, Recor
 
 @hard("spoilt: pile that is heated", {"count": 4, "share": 0.3})
 def heated(access: EngineAccess, out: Path, *, count: int, share: float) -> list[Check]:
-    """Reverse the damping of all contacts of a pile at rest; the watchdog must report the growing energy."""
+    """Multiply the normal damping of a pile at rest by −`share`; the watchdog must report growing energy."""
     engine, recorder = _resting(access, out, count)
     access.heat(engine, share)
     access.push(engine, count - 1, velocity=(0, 0, 1e-3))
@@ -134,7 +141,7 @@ def _too_long(scene: Scene, factor: float) -> float:
 # A long case: welded smarticles chatter and never settle, so that the pour waits until its time limit.
 @hard("spoilt: time step 4 of the stable one", None, {"factor": 4.0, "count": 6, "seconds": 0.3})
 def wrong_step(access: EngineAccess, out: Path, *, factor: float, count: int, seconds: float) -> list[Check]:
-    """Run at a time step above the stable one; the error message must name the last checkpoint."""
+    """Run for some `seconds` at `factor` times the stable time step; the error must name a checkpoint."""
     fidelity = "draft" if access.name == "yade" else {"base": "draft", "control_interval_s": LONG_CONTROL}
     recording = {"checkpoint_interval_s": 0.02}
     data = scene_data(access, swing(seconds), count=count, fidelity=fidelity, recording=recording)

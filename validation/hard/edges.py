@@ -1,4 +1,8 @@
-"""Scenes with extreme shapes, counts, friction, time steps, motors, containers and hooks."""
+"""Scenes with extreme shapes, counts, friction, time steps, motors, containers and hooks.
+
+In all cases `access` is the engine, with access to its internals, `out` the run directory, and times are simulated
+times [s]. A case returns its checks.
+"""
 
 import math
 from pathlib import Path
@@ -33,7 +37,7 @@ TORQUE_LIMIT = 1.607e-5  # τ_max of the paper [N m]
 
 
 def barbs(access: EngineAccess, out: Path, *, ratio: float, count: int) -> list[Check]:
-    """Pour smarticles without barbs, with the shortest barbs, and with the longest barbs."""
+    """Pour smarticles of an unusual aspect ratio: without barbs, with the shortest or the longest barbs."""
     run = whole(scene_data(access, RELAX, count=count, smarticle={"aspect_ratio": ratio}), out)
     # A large final speed is allowed, since rods roll.
     return run.sound(rest=0.05) + run.weight_on_floor(0.02)
@@ -45,7 +49,7 @@ for _ratio in (0.0, 0.05, 2.0):
 
 @hard("rods that may roll", {"count": 40, "radius": 0.0117})
 def rods(access: EngineAccess, out: Path, *, count: int, radius: float) -> list[Check]:
-    """Pour rods, which have a small moment of inertia about their axis, into a narrow container."""
+    """Pour rods, whose moment of inertia about their axis is small, into a container of a `radius` [m]."""
     data = scene_data(access, RELAX, count=count, smarticle={"aspect_ratio": 0}, container={"radius_m": radius})
     data["phases"][0]["settle"] = {"timeout_s": 1}
     run = whole(data, out)
@@ -77,7 +81,7 @@ def checkpoint_last(access: EngineAccess, out: Path) -> list[Check]:
 
 @hard("N = 2000", None, {"count": 2000, "per_layer": 500, "radius": 0.15})
 def many(access: EngineAccess, out: Path, *, count: int, per_layer: int, radius: float) -> list[Check]:
-    """Pour 2000 smarticles into a wide container."""
+    """Pour many smarticles, `per_layer` at a time, into a wide container of a `radius` [m]."""
     data = scene_data(access, RELAX, count=count, per_layer=per_layer, container={"radius_m": radius})
     run = whole(data, out)
     return run.sound(rest=0.1) + run.weight_on_floor(0.02)
@@ -107,7 +111,7 @@ def _with_step(data: dict[str, Any], share: float) -> tuple[dict[str, Any], floa
 @hard("time step 0.5 of the stable one", {"share": 0.5, "count": 4}, {"count": 40})
 @hard("time step 0.9 of the stable one", {"share": 0.9, "count": 4}, {"count": 40})
 def step_below(access: EngineAccess, out: Path, *, share: float, count: int) -> list[Check]:
-    """Run with an explicit time step below the stable one."""
+    """Run with an explicit time step, the fraction `share` of the stable one."""
     data, requested, _ = _with_step(scene_data(access, swing(0.04), REST, count=count), share)
     run = whole(data, out)
     assert run.scene is not None  # the scene is valid
@@ -120,7 +124,7 @@ def step_below(access: EngineAccess, out: Path, *, share: float, count: int) -> 
 @hard("time step 1.1 of the stable one", {"share": 1.1})
 @hard("time step 2 of the stable one", {"share": 2.0})
 def step_above(access: EngineAccess, out: Path, *, share: float) -> list[Check]:
-    """Run with an explicit time step above the stable one, which must be rejected."""
+    """Run with an explicit time step of `share` > 1 times the stable one, which must be rejected."""
     data, requested, stable = _with_step(scene_data(access, shape_change()), share)
     run = whole(data, out)
     above_stable = f"fidelity.time_step_s: {requested:g} s is above the stable step {stable:.4g} s"
@@ -142,7 +146,7 @@ def no_torque(access: EngineAccess, out: Path) -> list[Check]:
 @hard("τ_max / 1000, stall", {"law": "stall", "count": 6}, {"count": 40})
 @hard("τ_max / 1000, slip", {"law": "slip", "count": 6}, {"count": 40})
 def weak_motors(access: EngineAccess, out: Path, *, law: str, count: int) -> list[Check]:
-    """Actuate with a torque limit too small to lift the barbs."""
+    """Actuate motors of a torque law with a torque limit too small to lift the barbs."""
     limit = TORQUE_LIMIT / 1000
     motor = {"law": law, "torque_limit_N_m": limit}
     run = whole(scene_data(access, turn(40, 0.3), RELAX, count=count, motor=motor), out)
@@ -219,7 +223,11 @@ def jammed(access: EngineAccess, out: Path, *, count: int, seconds: float) -> li
 def hook(
     access: EngineAccess, out: Path, *, count: int, distance: float, speed: float, change: float, rest: float
 ) -> list[Check]:
-    """Pull the upper hook out of a pile after a shape change around the hook."""
+    """Pull the upper hook out of a pile after a shape change around the hook.
+
+    The shape change takes the time `change`, the rest after the pull `rest` [s]; the hook is pulled over a distance [m]
+    at a speed [m/s].
+    """
     hooks = {"lower_height_m": 2e-3, "upper_height_m": 4e-3}
     # The phase is longer than the motion, so that hanging smarticles come to rest.
     pull = {"type": "pull-hook", "distance_m": distance, "speed_m_per_s": speed, "duration_s": distance / speed + rest}

@@ -56,7 +56,7 @@ def finish(process: subprocess.Popen[bytes], what: str) -> float:
 
 
 def kill_after(process: subprocess.Popen[bytes], seconds: float, what: str) -> bool:
-    """Kill a process after `seconds` [s] of processor time; return False if the process ended before."""
+    """Kill a process, named `what`, after processor time [s]; return False if the process ended before."""
     ticks = os.sysconf("SC_CLK_TCK")
     while True:
         try:

@@ -114,7 +114,7 @@ def poses(setting: Setting, scene: Scene, seed: int) -> Poses:
 
 
 def let_go(access: EngineAccess, setting: Setting, seed: int, factor: float) -> dict[str, Any]:
-    """Release smarticles with a time step of `factor` times the stable step; return a row of the table."""
+    """Simulate placed smarticles at `factor` times the stable time step; return a row of the table."""
     data = setting.data(access)
     stable = stable_step(scene_of(data))
     with tempfile.TemporaryDirectory() as scratch:
@@ -161,7 +161,7 @@ def _energies(engine: Engine, scene: Scene) -> Iterator[tuple[float, float, floa
 
 
 def climb(engine: str, name: str, seed: int) -> list[dict[str, Any]]:
-    """Run a setting with one seed at increasing time steps, up to the second blow-up; return the rows."""
+    """Run the setting `name` with a seed at increasing time steps to the second blow-up; return the rows."""
     rows: list[dict[str, Any]] = []
     for factor in FACTORS:
         rows.append(let_go(engine_access(engine), SETTINGS[name], seed, factor))

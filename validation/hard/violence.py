@@ -1,4 +1,8 @@
-"""Fast impacts, deep overlaps, strong shaking, large mass ratios."""
+"""Fast impacts, deep overlaps, strong shaking, large mass ratios.
+
+In all cases `access` is the engine, with access to its internals, `out` the run directory, and times are simulated
+times [s]. A case returns its checks.
+"""
 
 import math
 from pathlib import Path

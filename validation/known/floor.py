@@ -1,4 +1,7 @@
-"""Known answers on the floor: sliding, rolling, stacks, flat impacts."""
+"""Known answers on the floor: sliding, rolling, stacks, flat impacts.
+
+`access` is the engine, with access to its internals; `dt` is a time step, a sequence `steps` has several [s].
+"""
 
 import math
 from collections.abc import Sequence

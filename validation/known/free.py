@@ -1,4 +1,7 @@
-"""Known answers without contact: free fall and free rotation."""
+"""Known answers without contact: free fall and free rotation.
+
+`access` is the engine, with access to its internals; `dt` is a time step, a sequence `steps` has several [s].
+"""
 
 from collections.abc import Sequence
 

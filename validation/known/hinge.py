@@ -1,4 +1,7 @@
-"""Known answers for hinges: gaps under load, sag and tilt of barbs, vibrations of barbs."""
+"""Known answers for hinges: gaps under load, sag and tilt of barbs, vibrations of barbs.
+
+`access` is the engine, with access to its internals; `dt` is a time step, a sequence `steps` has several [s].
+"""
 
 import math
 from collections.abc import Sequence

@@ -1,4 +1,7 @@
-"""Conservation of momentum and energy, the energy ledger of a pile, and impenetrable links."""
+"""Conservation of momentum and energy, the energy ledger of a pile, and impenetrable links.
+
+`access` is the engine, with access to its internals; `dt` is a time step, a sequence `steps` has several [s].
+"""
 
 import math
 import tempfile

@@ -69,7 +69,9 @@ def sphere_lines(
 
     Args:
         bodies: the N bodies.
+        cylinder: the container, in which all spheres lie up to a margin.
         spheres: (S, 3) centres of the spheres of each body [m].
+        title: first line of the file.
         first: number of bodies that LAMMPS has already.
         first_sphere: number of spheres that LAMMPS has already.
     """
@@ -146,7 +148,10 @@ def neighbours(particle: Particle | Mixture) -> Iterator[str]:
 
 
 def container(cylinder: Cylinder, at_wall: str, *, walled: bool = True) -> Iterator[str]:
-    """Yield the commands of floor and wall, whose heights are the variables `floor_z` and `wall_z`."""
+    """Yield the commands of floor and wall, whose heights are the variables `floor_z` and `wall_z`.
+
+    `at_wall` are LAMMPS's words for the contact law at floor and wall. Unless `walled`, there is no wall.
+    """
     extent = f"{cylinder.radius:.9g} {cylinder.bottom:.9g} {cylinder.height:.9g}"
     yield "variable         wave equal sin(v_omega*(step-v_begun)*dt)"
     yield "variable         floor_z equal v_floor_base+v_floor_amplitude*v_wave"

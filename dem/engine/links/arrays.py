@@ -65,7 +65,7 @@ class Parts(NamedTuple):
 
 
 class Segments(NamedTuple):
-    """Q segments of all bodies: the strands of L links."""
+    """Q segments of all bodies: each of L links has one segment, or several side by side, its strands."""
 
     line: Array  #: (Q, LINE) segments in the laboratory frame; for the columns see `dem.engine.links.shapes.START`
     begin: Indices  #: (N + 1,) number of the first segment of each body, then Q

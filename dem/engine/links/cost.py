@@ -48,7 +48,7 @@ COMPILE_FIRST, COMPILE_MORE = 13.0, 7.0
 
 
 def seconds_per_second(scene: Demand, time_step: float, activity: Activity) -> float:
-    """Return the estimate of `dem.engine.kinds.EngineKind.seconds_per_second`."""
+    """Return the estimated wall time per simulated time [1] on one core, by time step [s] and phase kind."""
     count, recording, mixture = scene.count, scene.recording, scene.mixture
     rates = RATES[activity]
     if mixture is None:

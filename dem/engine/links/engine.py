@@ -292,7 +292,7 @@ class LinksEngine:
         return Saved(content=content.getvalue(), memory=json.loads(json.dumps(memory)))
 
     def load(self, saved: Saved, scratch: Path) -> None:
-        """Replace the state by a saved one.
+        """Replace the state by a saved one; this engine needs no files in `scratch`.
 
         Raises:
             InputError: another engine or version saved the state, or it is damaged.

@@ -21,7 +21,7 @@ OPTIONAL = OF_FILAMENTS | {"channel", "cords", "hooks", "ledger", "motors", "rim
 
 
 class LinksKind:
-    """`dem.engine.kinds.EngineKind` of links."""
+    """The engine `links`, with the members of `dem.engine.kinds.EngineKind`."""
 
     name = "links"
     workers = "threads"

@@ -69,7 +69,10 @@ class LinksMotors:
             world.set_articulated(False)
 
     def actuate(self, targets: Array, interval: float) -> None:
-        """Set the schedule; the first control update is made in the next step, between forces and kick."""
+        """Set the schedule: angles (U, N, 2) [rad] at the ends of U control periods, and their length [s].
+
+        The first control update is made in the next step, between forces and kick.
+        """
         world = self._world
         assert world.motors is not None  # only articulated smarticles are actuated
         world.motors = world.motors._replace(

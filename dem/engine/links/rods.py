@@ -65,10 +65,16 @@ def filaments_at(
     starts: Array | None,
     seed: int,
 ) -> Filaments:
-    """Return arrays of the filaments of `old` and of F new ones; see also `World.add_filaments`.
+    """Return arrays of the filaments of `old` and of F new ones.
 
     Args:
+        old: arrays of the filaments so far.
+        filament: shape of the new filaments.
         bodies: (F,) numbers of the new filaments among all bodies.
+        points: (F, nodes, 3) positions of the nodes [m].
+        velocities: (F, nodes, 3) velocities of the nodes [m/s]; None: at rest.
+        starts: (F,) initial angle ψ of each preferred curvature [rad]; None: 0.
+        seed: seed of the times at which preferred curvatures reverse.
     """
     count, nodes, _ = points.shape
     edges = np.diff(points, axis=1)

@@ -121,9 +121,9 @@ def _step_of(
 def rigid_stable_time_step(shapes: Sequence[Shape], law: ContactLaw) -> float:
     """Return the largest stable time step [s] over the stiffest modes of rigid bodies of several shapes.
 
-    The modes are: an end of a bar, with all its strands, against another such end or against a boundary; and a pile of
-    bodies that lie on their broad side, with a contact at every end, in which neighbours above and below move in
-    opposite directions, across or along the broad side.
+    The modes are: an end of a bar, with all its strands (segments side by side), against another such end or against a
+    boundary; and a pile of bodies that lie on their broad side, with a contact at every end, in which neighbours above
+    and below move in opposite directions, across or along the broad side.
     """
     return min(_rigid_step(shape, law) for shape in shapes)
 
@@ -169,7 +169,9 @@ def _modes_of_end(law: ContactLaw, tips: Array) -> list[Mode]:
 
 
 def _modes_of_pile(law: ContactLaw, heave: Array, rub: Array) -> list[Mode]:
-    """Return the modes of a pile of bodies that lie on their broad side, with J as in `_modes_of_end`.
+    """Return the modes of a pile of bodies that lie on their broad side.
+
+    J is the matrix from the k velocities of a body to the velocity of a point of contact.
 
     Args:
         heave: (k, k) sum of Jᵀ J over all contacts, with the rows of J across the broad side.

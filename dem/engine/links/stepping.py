@@ -66,6 +66,7 @@ def settle(
         parts: `motion` is written.
         ledger: forces, see `dem.engine.links.contact.pairs.enter`; emptied.
         motors: the motors; None while smarticles are welded.
+        filaments: the filaments; None without flexible bodies.
         dt: time over which the forces acted [s].
     """
     total = 0.0
@@ -92,6 +93,7 @@ def act(
 
     Args:
         system: all data of the simulation, after `pose`, with valid lists of near segments.
+        scratch: arrays whose content does not outlive the call.
         totals: (TOTALS,) sums and state of the sub-steps, which are updated; for the indices see `LOST`.
         tick: ticks of the time step that have passed.
         dt: length of an undivided time step [s].
@@ -154,7 +156,7 @@ def act(
 
 @part
 def count_down(motors: Any) -> None:
-    """Reduce the number of steps until the next control update by one."""
+    """Reduce the number of steps until the next control update of the motors by one."""
     if motors is not None:
         motors.due[1] -= 1
 
@@ -166,6 +168,7 @@ def advance(steps: int, clock: Clock, system: System, scratch: Scratch, totals: 
     Args:
         steps: number of steps.
         clock: time at the beginning of the first step, and length of the steps.
+        scratch: arrays whose content does not outlive a step.
         totals: (TOTALS,) sums and state of the sub-steps, which are updated; for the indices see `LOST`.
 
     Returns:

@@ -126,7 +126,7 @@ class Lines(NamedTuple):
 
 @inlined
 def lines(p: Array, q: Array) -> Lines:
-    """Return two segments, rows (LINE,) as in `shapes`, as `Lines`."""
+    """Return two segments as `Lines`, from rows (LINE,) with the columns of `shapes.START`."""
     start, other, u, v = vector(p, START), vector(q, START), vector(p, VECTOR), vector(q, VECTOR)
     w = sub(start, other)
     return Lines(
@@ -136,7 +136,7 @@ def lines(p: Array, q: Array) -> Lines:
 
 @inlined
 def between(both: Lines, s: float, t: float) -> Vector:
-    """Return the vector from q + t v to p + s u [m]."""
+    """Return the vector from the point q + t v of the second segment to p + s u of the first [m]."""
     return sub(along(both.w, s, both.u), scale(t, both.v))
 
 

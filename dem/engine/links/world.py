@@ -175,7 +175,7 @@ class World:
         self.skins[[2, 5]] = NEAR_STEPS * time_step, WIDE_STEPS * time_step
 
     def add(self, poses: Poses, *, speed: float = 0.0) -> None:
-        """Add bodies that fall at a speed [m/s] without rotation; smarticles are welded."""
+        """Add bodies at poses, smarticles welded; they fall at a speed [m/s] without rotation."""
         turns = np.array([rotation.as_matrix() for rotation in poses.rotations]).reshape(-1, 3, 3)
         if self.filaments is not None:
             self._add_posed_filaments(poses, turns, speed)
@@ -222,7 +222,7 @@ class World:
         self.make_room()
 
     def _add_posed_filaments(self, poses: Poses, turns: Array, speed: float) -> None:
-        """Add filaments of a mixture at poses, in the shape in which they are poured, one by one."""
+        """Add filaments at poses, with rotations `turns` (N, 3, 3), in the shape in which they are poured."""
         assert self.mixture is not None
         assert poses.kinds is not None
         rng = np.random.default_rng([self.wave_seed, self.count])
@@ -240,7 +240,7 @@ class World:
         """Add F filaments of one shape.
 
         Args:
-            shape: number of the shape, as in `add_bodies`.
+            shape: number of the shape in `kinds`.
             points: (F, nodes, 3) positions of the nodes [m].
             velocities: (F, nodes, 3) velocities of the nodes [m/s]; None: at rest.
             starts: (F,) initial angle ψ of each filament's preferred curvature [rad]; None: 0.

@@ -22,7 +22,11 @@ from dem.errors import reject
 
 
 class Assembly:
-    """All bodies of a pile as bodies of YADE; arguments as in `YadeEngine`."""
+    """All bodies of a pile as bodies of YADE.
+
+    `hinge_law` is None if smarticles stay welded. `strengths` (N, 2) are factors on the motors' torque limit and
+    stiffness, None: 1. `planar` bodies move only in the xy plane.
+    """
 
     def __init__(
         self,

@@ -54,7 +54,7 @@ MET_PLACE, MET_NORMAL, MET_SHARE, MET_DISTANCE = meeting.PLACE, meeting.NORMAL, 
 
 
 def slots_for(hooks: Hooks | None, rims: Rims | None) -> int:
-    """Return the largest number of contacts that a segment can have with boundaries."""
+    """Return the largest number of contacts of a segment with boundaries; `hooks`, `rims`: None if absent."""
     bars = 0 if hooks is None else 2 * hooks.bars.shape[1]
     return END_SLOTS + POINTS * bars + (0 if rims is None else len(rims.radii))
 
@@ -65,7 +65,15 @@ def _note(
 ) -> int:
     """Write a contact with SHARE 1 into row `count` of `rows`; return the new number of rows.
 
-    Other arguments are the columns of the row, see `SLOT`; `part_of` is the index of the boundary.
+    Args:
+        rows: (slots, COLUMNS) written; for the columns see `SLOT`.
+        count: number of rows so far.
+        slot: place of the contact in the memory of the segment's contacts.
+        part_of: index of the boundary.
+        depth: overlap [m].
+        room: overlap at which the link's axis would reach the surface, or the axis of the bar [m].
+        point: the point on the link's axis [m].
+        normal: unit vector from the boundary to the link [1].
     """
     row = rows[count]
     row[SLOT], row[PART], row[DEPTH], row[SHARE], row[FACTOR], row[ROOM] = slot, part_of, depth, 1.0, 1.0, room
@@ -128,7 +136,11 @@ def contacts_of_segment(
 
 @inlined
 def _contacts_with_wall(radius: float, ground: Ground, slot: int, point: Vector, rows: Array, count: int) -> int:
-    """Append a link end's contacts with the wall and its tiers to `rows`; return the number of rows."""
+    """Append a link end's contacts with the wall and its tiers to `rows`; return the number of rows.
+
+    `point` is the end of the axis [m], `radius` that of the link [m], `slot` the end's first place in the memory of
+    contacts; the wall uses the two places after it. `rows` has `count` rows before.
+    """
     x, y, z = point
     height, r, tiers = z - ground.place[WALL], math.sqrt(x * x + y * y), ground.radii.shape[0]
     lifted = ground.flags[1] != 0
@@ -162,7 +174,10 @@ def _contacts_with_wall(radius: float, ground: Ground, slot: int, point: Vector,
 
 @inlined
 def _contacts_with_rims(link: Array, ground: Ground, rims: Rims, first: int, rows: Array, count: int) -> int:
-    """Append contacts of a link's inner points with the wall's edges to `rows`; return the number of rows."""
+    """Append contacts of a link's inner points with the wall's edges to `rows`; return the number of rows.
+
+    `first` is the first edge's place in the memory of contacts. `rows` has `count` rows before.
+    """
     if ground.flags[0] == 0:
         return count
     z, uz, radius = link[2], link[5], link[RADIUS]
@@ -183,7 +198,7 @@ def _contacts_with_rims(link: Array, ground: Ground, rims: Rims, first: int, row
 
 @inlined
 def _contacts_with_hooks(link: Array, ground: Ground, hooks: Hooks, rows: Array, count: int, met: Array) -> int:
-    """Append a segment's contacts with the bars of both hooks to `rows`; return the number of rows."""
+    """Append a segment's contacts with both hooks to `rows` from row `count` on; return the new count."""
     reach = link[RADIUS] + hooks.radius
     for hook in range(2):
         height = ground.place[LOWER + hook]
@@ -222,7 +237,7 @@ def _contacts_with_hooks(link: Array, ground: Ground, hooks: Hooks, rows: Array,
 def contacts_with_boundaries(
     segments: Segments, ground: Ground, channel: Any, hooks: Any, rims: Any, p: int, rows: Array, met: Array
 ) -> int:
-    """Call `contacts_of_segment` without inlining it, for queries, in which speed matters less."""
+    """Call `contacts_of_segment`, not inlined, for queries, in which speed matters less."""
     return contacts_of_segment(segments, ground, channel, hooks, rims, p, rows, met)
 
 
@@ -263,6 +278,11 @@ def push_boundaries(
         parts: forces are added to `load`.
         kept: memory of the contacts; updated.
         ground: forces of the bodies on boundaries are added to `force`.
+        channel: (1,) half the distance of a channel's walls [m]; None in a container.
+        hooks: the hooks; None: no hooks.
+        rims: edges of the wall that links can reach; None: no such edges.
+        ledger: list of forces and their power, see `pairs.enter`; None: it is not needed.
+        step: time since the last forces; its number of sub-steps is increased if needed.
         rows: scratch of `contacts_of_segment`.
         met: scratch of `meeting.meet`.
 
@@ -294,7 +314,11 @@ def _rub(
     law: Law, bodies: Bodies, parts: Parts, segments: Segments, p: int, ground: Ground, ledger: Any, step: Step,
     contact: Array, slip: Array,
 ) -> None:  # fmt: skip
-    """Add the force of a boundary on segment `p` at a contact, and update the tangential spring `slip`."""
+    """Add the force of a boundary on segment `p` to `parts.load`, and its opposite to `ground.force`.
+
+    `contact` (COLUMNS,) has the columns `SLOT` and following. `slip` (4,), stretch [m] and energy [J] of the tangential
+    spring, is updated.
+    """
     i, row, damping = segments.body[p], segments.part[p], law.damping[bodies.shape[segments.body[p]], 0]
     depth, share, room, normal = contact[DEPTH], contact[SHARE], contact[ROOM], vector(contact, NORMAL)
     place, velocity, speed, turning = place_and_motion(segments.line[p, RADIUS], parts, ground, row, contact)
@@ -321,7 +345,7 @@ def _rub(
 
 @part
 def _squared(link: Array, s: float, radius: float, height: float) -> float:
-    """Return the squared distance [m²] of a point of an axis from a horizontal circle about the z-axis."""
+    """Return the squared distance [m²] of the point `s`, 0 to 1, of a link from a circle about the z-axis."""
     x, y, z = along(vector(link, 0), s, vector(link, 3))
     out, up = math.sqrt(x * x + y * y) - radius, z - height
     return float(out * out + up * up)

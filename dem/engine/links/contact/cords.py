@@ -41,6 +41,7 @@ def pull(bodies: Bodies, parts: Parts, cords: Cords, hinged: Any, step: Step) ->
         parts: forces are added to `load`.
         cords: the strings; `sums` and `knot` are written.
         hinged: the motors; None while smarticles are welded.
+        step: time since the last forces, over the length of the time step.
 
     Returns:
         Power of the strings on the links [W].

@@ -91,16 +91,19 @@ def meet_at(
 ) -> int:  # fmt: skip
     """Find points of contact and forces of segments that touch; return the number of bare forces.
 
+    A bare force has no friction and no dashpot.
+
     Args:
+        both: the two segments.
         s: place of the nearest point along the first segment, 0 to 1.
         t: place of the nearest point along the second segment, 0 to 1.
         gap: vector from the nearest point of the second segment to the nearest point of the first [m].
         distance: length of `gap` [m].
         diameter: sum of both radii [m].
         stiffness: kn [N/m].
-        shared_p: as in `meet`.
-        shared_q: as in `meet`.
-        out: (ROWS, COLUMNS) written.
+        shared_p: bits `AT_START` and `AT_END`: ends of the first segment that are ends of earlier segments of its body.
+        shared_q: the same bits for the second segment.
+        out: (ROWS, COLUMNS) written; for the columns see `PLACE`.
     """
     deepest = diameter - distance
     u, slope, hardening = stretch(deepest, diameter)
@@ -128,13 +131,14 @@ def meets_elsewhere(both: Lines, reach: float, shared_p: int, shared_q: int) -> 
     """Return the number of places, besides the nearest points, at which `meet_at` may find forces.
 
     For most segments it is 0. The code has no branches, since a mispredicted branch takes as long as
-    the whole function. Numbers are bitwise equal to those of `_lie_along` and `_joint`. A joint at the end of a
-    segment, which is rare, always counts.
+    the whole function. Numbers are bitwise equal to those of `_lie_along` and `_joint`. A joint is the common end of
+    two segments of a body. A joint at the end of a segment, which is rare, always counts.
 
     Args:
+        both: the two segments.
         reach: square of the sum of both radii [m²].
-        shared_p: joints of the first segment, as in `meet`.
-        shared_q: joints of the second segment, as in `meet`.
+        shared_p: bits `AT_START` and `AT_END`: ends of the first segment that are ends of earlier segments of its body.
+        shared_q: the same bits for the second segment.
     """
     b, d, e = both.b, both.d, both.e
     start, end = -d * both.inverse_a, (b - d) * both.inverse_a
@@ -172,7 +176,11 @@ def _note(
     out: Array, k: int, both: Lines, s: float, t: float, gap: Vector, distance: float, load: float, share: float,
     hardening: float,
 ) -> None:  # fmt: skip
-    """Write a point of contact, half way between the two axes, into row `k` of `out`."""
+    """Write a point of contact, half way between the two axes, into row `k` of `out`.
+
+    The points at `s` along the first and `t` along the second axis (0 to 1) differ by the vector `gap` of the length
+    `distance` [m]. `load` [N], `share` and `hardening` are columns of the row, see `PLACE`.
+    """
     row = out[k]
     put(row, PLACE, _halfway(both, s, t))
     put(row, NORMAL, scale(1 / distance, gap))
@@ -187,12 +195,16 @@ def _lie_along(
     """Write contacts at both ends of the stretch over which two segments lie along each other.
 
     Args:
+        both: the two segments.
         deepest: overlap δ0 [m].
         u: stretched overlap u0 [m].
         slope: u0' [1].
+        diameter: sum of both radii [m].
+        stiffness: kn [N/m].
+        out: (ROWS, COLUMNS) written; for the columns see `PLACE`.
 
     Returns:
-        Number of bare forces.
+        Number of bare forces (without friction and dashpot) that were written.
     """
     b, d, e = both.b, both.d, both.e
     # Where on the first link, in its lengths, are the second one's ends?
@@ -246,15 +258,23 @@ def _lie_along(
 def _joint(
     both: Lines, diameter: float, stiffness: float, s: float, t: float, sign: float, bare: int, out: Array
 ) -> int:
-    """Subtract (sign -1) or add (sign 1) the contact of a joint with a point of the other segment.
+    """Subtract or add the contact of a joint, a common end of two segments, with another segment.
+
+    Energy and force change as stated at the top of this module. The force is written as a bare force, which has no
+    friction and no dashpot.
 
     Args:
-        s: place of the joint or the point along the first segment, 0 to 1.
-        t: place of the joint or the point along the second segment, 0 to 1.
-        bare: number of bare forces so far.
+        both: the two segments, of which one ends at the joint.
+        diameter: sum of both radii [m].
+        stiffness: kn [N/m].
+        s: place of the joint, or of the point that it touches, along the first segment, 0 to 1.
+        t: place of that point, or of the joint, along the second segment, 0 to 1.
+        sign: -1 to subtract, 1 to add.
+        bare: number of bare forces that `out` has before the call.
+        out: (ROWS, COLUMNS) updated; for the columns see `PLACE`.
 
     Returns:
-        New number of bare forces.
+        Number of bare forces after the call.
     """
     gap = sub(sub(along(both.p, s, both.u), both.q), scale(t, both.v))
     squared = dot(gap, gap)

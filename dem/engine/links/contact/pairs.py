@@ -59,7 +59,7 @@ ROWS, POINT, PUSH, POWER, GAIN = 0, 2, 5, 8, 9
 
 @inlined
 def _extended(stretch: Any, row: int, velocity: Vector, arm: Vector) -> Vector:
-    """Return `velocity` plus the velocity by a part's stretching, `arm` [m] away from its reference point."""
+    """Return `velocity` plus that by the stretching of part `row`, `arm` [m] from its reference point."""
     if stretch is None:
         return velocity
     axis = vector(stretch[row], AXIS)
@@ -159,6 +159,8 @@ def _rub(
         damping: cn of a contact of these bodies [N s/m].
         parts: forces are added to `load`.
         rows: numbers of both parts.
+        ledger: list of forces and their power, see `enter`; None: it is not needed.
+        step: time since the last forces; its number of sub-steps is increased if needed.
         place: the point [m].
         normal: unit vector from the second segment to the first [1].
         depth: overlap [m].
@@ -195,6 +197,8 @@ def push_apart(
         bodies: `deepest` is increased where an overlap is larger.
         parts: forces are added to `load`.
         pairs: pairs that may touch; `slip` and `used` are updated.
+        ledger: list of forces and their power, see `enter`; None: it is not needed.
+        step: time since the last forces; its number of sub-steps is increased if needed.
         out: (ROWS, COLUMNS) scratch.
 
     Returns:

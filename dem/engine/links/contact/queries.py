@@ -57,7 +57,7 @@ class Found(NamedTuple):
 
 @part
 def _query_pairs(segments: Segments, pairs: Pairs, stiffness: float, found: Found) -> tuple[int, float]:
-    """Query all pairs of the wide list.
+    """Query all pairs of the wide list, with the stiffness kn [N/m], and update the results `found`.
 
     Returns:
         Number of rows of `met` that were written, and energy of all normal springs [J].
@@ -86,7 +86,7 @@ def _query_pairs(segments: Segments, pairs: Pairs, stiffness: float, found: Foun
 def _query_boundaries(
     segments: Segments, ground: Ground, channel: Any, hooks: Any, rims: Any, stiffness: float, found: Found
 ) -> float:
-    """Query all contacts with boundaries; return the energy of their normal springs [J]."""
+    """Query all contacts with boundaries into `found`; return the energy of springs of `stiffness` kn [J]."""
     squares = 0.0
     for p in range(segments.line.shape[0]):
         i = segments.body[p]
@@ -106,9 +106,10 @@ def query_all(
     segments: Segments, pairs: Pairs, kept: Kept, boundaries: Boundaries, stiffness: float, wall_stiffness: float,
     found: Found,
 ) -> tuple[int, float]:  # fmt: skip
-    """Query all contacts.
+    """Query all contacts, between bodies those of the wide list.
 
     Args:
+        kept: memory of the contacts with boundaries; read for the energy of tangential springs.
         stiffness: kn of contacts between bodies [N/m].
         wall_stiffness: kn of contacts with boundaries [N/m].
         found: results; `touches`, `held` and `depth` must be zero before the call.
@@ -219,6 +220,7 @@ def forces_of_pairs(
     """Write the forces of bodies on each other, one row per point of contact and per bare force.
 
     Args:
+        pairs: pairs that may touch, with their tangential springs.
         links: (Q,) code of each segment's link, see `dem.body.forces.at_links`.
         out: scratch of `meet`.
         slip: (4,) scratch.
@@ -264,6 +266,8 @@ def forces_of_boundaries(
     """Write the forces of boundaries on bodies, one row per contact.
 
     Args:
+        kept: memory of the contacts, with their tangential springs.
+        known: the boundaries.
         links: (Q,) code of each segment's link, see `dem.body.forces.at_links`.
         out: scratch of `meet`.
         contacts: scratch of `contacts_of_segment`.

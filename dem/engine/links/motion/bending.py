@@ -164,7 +164,7 @@ def _piece(filaments: Filaments, i: int) -> Piece:
 
 @inlined
 def _bend_of(one: Piece, two: Piece) -> Bend:
-    """Return the angles between two segments."""
+    """Return the angles between two successive segments."""
     inverse = 1 / (1 + dot(one.t, two.t))
     binormal, d, e = scale(2 * inverse, cross(one.t, two.t)), add(one.d, two.d), add(one.e, two.e)
     d1, e1, d2, e2 = dot(one.d, binormal), dot(one.e, binormal), dot(two.d, binormal), dot(two.e, binormal)
@@ -185,6 +185,8 @@ def _push_bend(out: Array, i: int, moments: Vector, one: Piece, two: Piece, bend
     Args:
         out: (n, 4) force on each node [N], torque about each segment's axis [N m].
         moments: derivatives of the energy by κ1, κ2 and the twist [N m].
+        one: segment i - 1; `two` is segment i.
+        bend: angles between the two segments.
     """
     m1, m2, twist = moments
     d1, e1, d2, e2 = bend.along
@@ -201,7 +203,10 @@ def _push_bend(out: Array, i: int, moments: Vector, one: Piece, two: Piece, bend
 
 @inlined
 def _rates(one: Piece, two: Piece, bend: Bend, slope: float) -> Vector:
-    """Return dκ1/dt, dκ2/dt, and dν/dt times `slope`, the derivative of ν by the twist [1/s]."""
+    """Return the rates of κ1, κ2 and ν between two segments, that of ν times `slope` [1/s].
+
+    `slope` is the derivative of ν by the twist, `bend` has the angles between the segments.
+    """
     d1, e1, d2, e2 = bend.along
     both = add(one.opening, two.opening)
     g, growth = sub(cross(one.opening, two.t), cross(two.opening, one.t)), dot(both, bend.tangent)
@@ -219,9 +224,12 @@ def _push_node(
     """Add the forces and torques of bending and twisting at inner node `i`, and update its preferred κ.
 
     Args:
+        rod: (ROD,) constants of the filament; for the columns see `LENGTH`.
         angle: cosine and sine of ψ, and the factor on the preferred κ [1].
         one: the segment before the node.
         two: the segment after the node.
+        ledger: None: internal damping is part of the forces; otherwise it is added to `filaments.damping`.
+        step: its number of sub-steps is increased if needed.
 
     Returns:
         Work of the change of the preferred κ [J].
@@ -262,6 +270,8 @@ def _push_segment(
     Gyroscopic forces turn the angular momentum of rolling with the axis.
 
     Args:
+        rod: (ROD,) constants of the filament; for the columns see `LENGTH`.
+        own: direction and motion of the segment.
         stretch: sum over contacts of axial force times axial distance from the centre [N m].
         load: (6,) force [N] and torque about the centre [N m] of contacts.
         out: (n, 4) array to which forces of internal damping are added [N].
@@ -400,7 +410,7 @@ def kick_nodes(filaments: Any, dt: float) -> None:
 
 @inlined
 def _uniform(seed: int, number: int, event: int) -> float:
-    """Return a random number between 0 and 1, which depends on the three arguments alone.
+    """Return a random number between 0 and 1, by the seed, the filament's number and that of the draw.
 
     Source: the finalizer of SplitMix64, Steele, Lea and Flood, OOPSLA 2014, applied once for each argument.
     """

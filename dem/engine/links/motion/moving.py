@@ -41,6 +41,8 @@ def kick(shapes: Shapes, bodies: Bodies, parts: Parts, motors: Any, gravity: flo
         bodies: `velocity` and `momentum` are written.
         parts: the parts, with loads; loads on barbs change their angles.
         motors: the motors, of which `impulse`, `momentum` and `work` are written; None while smarticles are welded.
+        gravity: g [m/s²].
+        planar: whether bodies move only in the xy plane and turn only about z, without weight.
         dt: time for which the forces act [s]: half of the last and half of the next sub-step.
     """
     velocity, momentum, load, across = bodies.velocity, bodies.momentum, bodies.load, 0.0 if planar else 1.0
@@ -78,6 +80,7 @@ def resolve_speeds(
 
     Args:
         bodies: the bodies, with the present forces in `load`.
+        gravity: g [m/s²].
         step: `need` is increased.
     """
     velocity, spin, load = bodies.velocity, bodies.spin, bodies.load

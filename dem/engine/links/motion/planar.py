@@ -63,7 +63,7 @@ def lay_out(planar: Planar, alpha1: float, alpha2: float, row: Array) -> None:
 
 @inlined
 def lay_out_at(planar: Planar, alpha1: float, alpha2: float, row: Array) -> None:
-    """Do what `lay_out` does, inlined into other kernels."""
+    """Compute the plane geometry like `lay_out`, from both angles [rad], inlined into other kernels."""
     c1, s1 = direction(alpha1)
     c2, s2 = direction(alpha2)
     lay_out_directions(planar, c1, s1, c2, s2, row)
@@ -132,7 +132,7 @@ def invert(row: Array) -> None:
 
 @inlined
 def invert_at(row: Array) -> None:
-    """Do what `invert` does, inlined into other kernels."""
+    """Compute columns 22 and 23 of a plane geometry (PLANE,) like `invert`, inlined into other kernels."""
     row[22], row[23] = 1 / row[16], 1 / (row[14] * row[15] - row[17] * row[17])
 
 
@@ -189,7 +189,10 @@ def momenta(row: Array, normal: float, rate1: float, rate2: float) -> tuple[floa
 
 @inlined
 def rates(row: Array, normal: float, p1: float, p2: float) -> tuple[float, float]:
-    """Return the rates α̇ [rad/s] for conjugate momenta p1 and p2 [kg m²/s]; inverse of `momenta`."""
+    """Return the rates α̇ [rad/s] for conjugate momenta p1 and p2 [kg m²/s]; inverse of `momenta`.
+
+    `row` is the plane geometry, `normal` the component of the angular momentum along the normal [kg m²/s].
+    """
     wz = normal * row[22]
     q1, q2 = p1 - row[18] * wz, p2 - row[19] * wz
     return row[24] * q1 + row[26] * q2, row[26] * q1 + row[25] * q2

@@ -57,7 +57,7 @@ def _move(parts: Parts, row: int, velocity: Vector, spin: Vector, origin: Vector
 
 @inlined
 def find_motion(shapes: Shapes, bodies: Bodies, parts: Parts, i: int, hinged: Any) -> None:
-    """Write the motion of body `i`'s parts into `parts.motion`; reference points are its centre of mass."""
+    """Write the motion of body `i`'s parts about its centre of mass; `hinged`: motors, None while welded."""
     row, position = parts.begin[i], vector(bodies.position[i], 0)
     velocity, spin = vector(bodies.velocity[i], 0), vector(bodies.spin[i], 0)
     if hinged is not None and shapes.hinged[bodies.shape[i]]:
@@ -79,7 +79,7 @@ def find_motion(shapes: Shapes, bodies: Bodies, parts: Parts, i: int, hinged: An
 
 @inlined
 def _planar_line(planar: Planar, plane: Array, link: int) -> tuple[float, float, float, float]:
-    """Return x, y of a link's start, from the centre of mass, and x, y of the vector to its end [m]."""
+    """Return x, y of a link's start from the centre of mass, and of its vector [m], by its plane geometry."""
     x, y, ux, uy = -planar.end - plane[0], -plane[1], 2 * planar.end, 0.0
     if link == 0:
         x, ux, uy = -planar.half - plane[0], planar.tip * plane[10], planar.tip * plane[11]
@@ -106,7 +106,7 @@ def place_segments(shapes: Shapes, bodies: Bodies, segments: Segments, i: int) -
 
 @inlined
 def find_motions(shapes: Shapes, bodies: Bodies, parts: Parts, hinged: Any) -> None:
-    """Write the angular velocities of all bodies and the motion of all parts."""
+    """Write the spins of all bodies and the motion of all parts; `hinged`: motors, None while welded."""
     for i in range(bodies.position.shape[0]):
         if is_flexible(shapes.flexible, bodies.shape[i]):
             continue

@@ -21,6 +21,7 @@ def update_lists(bodies: Bodies, segments: Segments, pairs: Pairs, cells: Cells,
     """Rebuild the lists that are no longer valid because links have moved too far.
 
     Args:
+        cells: scratch of the search; its length sets the largest number of pairs.
         skins: (7,) thinnest skin [m], thickest skin [m] and time that a skin should last [s]: 0 to 2 for the tight
             list, 3 to 5 for the wide list; 6: width of a strip of the search [m].
 
@@ -40,7 +41,7 @@ def update_lists(bodies: Bodies, segments: Segments, pairs: Pairs, cells: Cells,
 
 @part
 def _tighten(bodies: Bodies, segments: Segments, pairs: Pairs, skins: Array) -> None:
-    """Rebuild the tight list from the wide list."""
+    """Rebuild the tight list from the wide list; for `skins` see `update_lists`."""
     mark(bodies, segments, pairs.near_marks, pairs.near_centres, skins[NEAR_LEAST], skins[NEAR_MOST], skins[NEAR_TIME])
     marks, first, second, used, near = pairs.near_marks, pairs.first, pairs.second, pairs.used, pairs.near
     line, count = segments.line, 0
@@ -68,7 +69,8 @@ def build(bodies: Bodies, segments: Segments, pairs: Pairs, cells: Cells, skins:
 
     Args:
         pairs: the lists; fields of the tight list are not written.
-        skins: see `update_lists`.
+        cells: scratch of the search; its length sets the largest number of pairs.
+        skins: (7,) see `update_lists`.
 
     Returns:
         GOOD, or FULL if there is no room for all pairs; the wide list is then unchanged.

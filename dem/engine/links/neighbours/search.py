@@ -38,7 +38,7 @@ class Grid(NamedTuple):
 
 @inlined
 def off_lines(line: Array, p: int, q: int, reach: float) -> bool:
-    """Return whether the infinite lines through two axes are farther apart than `reach` [m]."""
+    """Return whether the infinite lines through the axes p and q are farther apart than `reach` [m]."""
     one, other = line[p], line[q]
     normal = cross(vector(one, 3), vector(other, 3))
     across = dot(sub(vector(one, 0), vector(other, 0)), normal)
@@ -47,7 +47,7 @@ def off_lines(line: Array, p: int, q: int, reach: float) -> bool:
 
 @inlined
 def near_each_other(line: Array, p: int, q: int, reach: float) -> bool:
-    """Return whether two axes are nearer than `reach` [m]."""
+    """Return whether the axes p and q are nearer than `reach` [m]."""
     both = lines(line[p], line[q])
     s, t = nearest(both)
     gap = between(both, s, t)
@@ -56,7 +56,7 @@ def near_each_other(line: Array, p: int, q: int, reach: float) -> bool:
 
 @inlined
 def _cannot_touch(bends: Any, p: int, q: int) -> bool:
-    """Return whether two segments of one body can never touch.
+    """Return whether two segments p and q of one body can never touch.
 
     These are all segments of a rigid body, and segments of a filament with near numbers, see `Bends.apart`.
     """
@@ -105,7 +105,7 @@ def search(segments: Segments, cells: Cells, bare: float, piece: float) -> int:
 
 @inlined
 def _bin(offset: float, size: float, last: int) -> int:
-    """Return the number of the bin of an offset [m], at least 0 and at most `last`; NaN gives 0."""
+    """Return the number of the bin of a size [m] for an offset [m], from 0 to `last`; NaN gives 0."""
     return int(min(offset / size, float(last))) if offset > 0.0 else 0
 
 
@@ -125,7 +125,7 @@ def find_boxes(segments: Segments, cells: Cells, bare: float) -> None:
 
 @inlined
 def grid_over(cells: Cells, bare: float, piece: float) -> Grid:
-    """Return strips and bins for the boxes of all links; `piece` is the width of a strip [m]."""
+    """Return strips of the width `piece` [m], and bins, for the boxes of all links; `bare` is in `Grid`."""
     x0, y0, x1, y1, tallest = math.inf, math.inf, -math.inf, -math.inf, 0.0
     for link in range(cells.keys.shape[0]):
         box = cells.own[link]
@@ -185,12 +185,16 @@ def _boxed(
 ) -> int:  # fmt: skip
     """Append to `close` those indices from `start` to `stop` - 1 whose boxes may overlap a given box.
 
-    The first loop is vectorised by the compiler. In the second loop every index is written, and overwritten by the next
-    one if its box does not overlap, so that no branch is needed.
+    The given box's lower x is not compared: the boxes begin in its bin or in later bins. The first loop is vectorised
+    by the compiler. In the second loop every index is written, and overwritten by the next one if its box does not
+    overlap, so that no branch is needed.
 
     Args:
         boxes: (6, L) lower x, y, z and upper x, y, z of all boxes [m].
+        close: indices in the first half; the second half is scratch.
         count: number of indices in `close` before.
+        start: first index to try.
+        stop: last index to try, plus one.
         ly: lower y of the given box [m].
         lz: lower z of the given box [m].
         hx: upper x of the given box [m].

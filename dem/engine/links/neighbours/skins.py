@@ -43,10 +43,12 @@ def _square(a: Vector) -> float:
 
 @inlined
 def _at_end(bends: Any, p: int, end: int, mean: Vector, rigid: Vector) -> Vector:
-    """Return the velocity of a segment's end less the mean velocity of all bodies [m/s].
+    """Return the velocity of an end of segment `p` less the mean velocity of all bodies [m/s].
 
     Args:
+        bends: data of flexible bodies; None where no body is flexible.
         end: 0 for the start, 1 for the end.
+        mean: mean velocity of all bodies [m/s].
         rigid: the result if the body is rigid [m/s].
     """
     if bends is None or bends.apart[p] == 0:
