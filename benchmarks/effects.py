@@ -23,10 +23,13 @@ MEASURED = 1  # index of the compared phase; phase 0 is the pour
 
 
 def pairs(seconds: float, hinged_step: float) -> list[tuple[str, str, Changes, Changes]]:
-    """Return name, cause of the cost, and two sets of changed keys of a scene for each physical effect.
+    """Return, for each effect, its name, what takes the time, and two dictionaries of scene keys.
 
-    The first set gives the scene without the effect, the second set the scene with the effect. The compared phase
-    takes `seconds` [s]; `hinged_step` is the time step of a scene with hinges [s].
+    `scene_data` makes a scene of each dictionary: the first one without the effect, the second one with the effect.
+
+    Args:
+        seconds: duration of the compared phase [s].
+        hinged_step: time step of the scenes with hinges [s].
     """
     rest = {"type": "relax", "duration_s": seconds}
     still = {"type": "shake", "duration_s": seconds, "peak_acceleration_g": 0}
@@ -74,7 +77,13 @@ def pairs(seconds: float, hinged_step: float) -> list[tuple[str, str, Changes, C
 
 
 def scene_data(changes: Changes, *, count: int, seed: int) -> Changes:
-    """Return a scene as a dictionary: the paper's smarticles at draft fidelity, with the keys `changes`."""
+    """Return a scene as a dictionary: a pour of the paper's smarticles, then the phases of `changes`.
+
+    Args:
+        changes: `phases` after the pour, and other changed keys; `fidelity` is "draft" unless it is changed.
+        count: number of smarticles.
+        seed: seed of the scene.
+    """
     data: Changes = {"schema_version": 1, "seed": seed, "count": count, "fidelity": "draft", **changes}
     recording = {"checkpoint_interval_s": None, **changes.get("recording", {})}
     phases = [{"type": "deposit"}, *changes["phases"]]
@@ -82,10 +91,12 @@ def scene_data(changes: Changes, *, count: int, seed: int) -> Changes:
 
 
 def row(effect: str, cause: str, costs: list[tuple[float, float]]) -> dict[str, Any]:
-    """Return a row of the table: median and quartiles over pairs of the relative cost of an effect [%].
+    """Return a row of the table, by column: the relative cost of an effect [%], as median and quartiles.
 
-    `effect` is its name, `cause` says what takes the time. `costs` has, for each pair, the cost without and with the
-    effect [s/s].
+    Args:
+        effect: name of the effect.
+        cause: what takes the time, in words.
+        costs: for each pair of runs, the processor time per simulated time without and with the effect [s/s].
     """
     shares = [100 * (after / before - 1) for before, after in costs]
     low, _, high = statistics.quantiles(shares, n=4, method="inclusive") if len(shares) > 1 else [shares[0]] * 3

@@ -27,7 +27,12 @@ MEMORY, WHOLE = "peak memory [MiB]", "whole run [s]"
 
 
 def measured(folder: Path, run: dict[str, Any]) -> dict[str, Any]:
-    """Compute a run, given by its columns `engine` to `seed`; return its row of the table, with costs."""
+    """Compute a run, and return its row of the table: the columns of `run`, then times and memory.
+
+    Args:
+        folder: folder of all runs.
+        run: engine, activity, fidelity, number of smarticles and seed, in this order, by column.
+    """
     engine, activity, fidelity, count, seed = run.values()
     name = f"{engine}-{activity}-{fidelity}-{count}-{seed}"
     acting = {"type": activity, "duration_s": SECONDS, **ACTIVITIES[activity]}

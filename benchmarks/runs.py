@@ -18,10 +18,13 @@ PAPER_COUNT, PAPER_RADIUS, PAPER_PER_LAYER = 270, 0.0234, 10
 def pile(
     count: int, *phases: dict[str, Any], seed: int = 1, per_layer: int | None = None, **keys: Any
 ) -> dict[str, Any]:
-    """Return a scene as a dictionary, with a pile as high as the paper's pile of 270.
+    """Return a scene as a dictionary: a pour of `count` smarticles, then the given phases.
 
-    The given phases follow the pour, which drops `per_layer` smarticles at a time, by default in proportion to the
-    floor's area.
+    The container's radius is such that the pile is as high as the paper's pile of 270 smarticles.
+
+    Args:
+        per_layer: number of smarticles dropped at a time; None: in proportion to the floor's area, but 10 or more.
+        keys: other keys of the scene.
     """
     widening = (count / PAPER_COUNT) ** 0.5
     per_layer = per_layer or max(PAPER_PER_LAYER, round(PAPER_PER_LAYER * widening**2))
@@ -36,9 +39,9 @@ def pile(
 
 
 def run_child(folder: Path, name: str, data: dict[str, Any]) -> resource.struct_rusage:
-    """Run a scene on one thread into `folder/name`; exit the benchmark if the run fails.
+    """Run the scene `data` on one thread; return processor time and memory of the process.
 
-    Returns processor time and memory of the process.
+    The run directory is `folder/name`. If the run fails, the benchmark exits.
     """
     path = folder / f"{name}.yaml"
     path.write_text(dump_scene(parse_scene(data, source="benchmarks")), encoding="utf-8")
@@ -51,14 +54,17 @@ def run_child(folder: Path, name: str, data: dict[str, Any]) -> resource.struct_
 
 
 def phase_cost(run: Path, phase: int = -1) -> float:
-    """Return the processor time per simulated time of a phase of a finished run [s/s]."""
+    """Return the processor time per simulated time of a phase of a finished run [s/s].
+
+    `phase` is the index of the phase; -1 is the last phase.
+    """
     timed = json.loads((run / "done.json").read_text())["phases"][phase]
     cost: float = timed["cpu_s"] / (timed["end_s"] - timed["start_s"])
     return cost
 
 
 def folder_of(name: str, out: Path | None) -> Path:
-    """Create and return the folder of a benchmark: `out`, or by default `out/NAME-DATE`."""
+    """Create and return the folder of a benchmark: `out`, or `out/NAME-DATE` if `out` is None."""
     folder = out or Path("out") / f"{name}-{datetime.now(UTC).strftime('%Y%m%d-%H%M%S')}"
     folder.mkdir(parents=True, exist_ok=True)
     return folder

@@ -42,7 +42,7 @@ def passive(scene: Scene) -> State:
 
     Raises:
         InputError: LAMMPS cannot compute parts of the scene, which the message lists; or spheres of different
-            smarticles overlap, since their poses are from another engine or fidelity.
+            smarticles overlap by more than `DEEPEST` diameters, as in piles of another engine or fidelity.
     """
     found = list(_foreign(scene))
     if found:
@@ -71,7 +71,7 @@ def passive(scene: Scene) -> State:
 
 
 def _foreign(scene: Scene) -> Iterator[str]:
-    """Yield the parts of a scene that LAMMPS cannot compute, each as its key and name."""
+    """Yield the parts of a scene that a deck cannot describe, as texts such as "plane: motion in a plane"."""
     if scene.smooth:
         yield f"engine: {scene.engine} takes links as they are, a deck has chains of spheres (use engine: yade)"
     if scene.mixture is not None:

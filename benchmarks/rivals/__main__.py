@@ -50,7 +50,10 @@ SAME, TENTH = "links at this overlap are cheaper by [1]", "links at a tenth of i
 
 
 def data_of(count: int, seed: int, *phases: dict[str, Any], **keys: Any) -> dict[str, Any]:
-    """Return a scene of `count` smarticles as a dictionary; they can straighten within the container."""
+    """Return a scene as a dictionary: a pour of `count` smarticles, then the given phases.
+
+    The container's radius is at least 12 mm, which leaves room for moving barbs. `keys` are other keys of the scene.
+    """
     data = pile(count, *phases, seed=seed, per_layer=PAPER_PER_LAYER, **keys)
     data["container"]["radius_m"] = max(data["container"]["radius_m"], 0.012)
     return data
@@ -61,8 +64,13 @@ def scene_of(
 ) -> dict[str, Any]:
     """Return the scene of a setting as a dictionary: take-over of a poured pile, rest and activity.
 
-    `poured` is the run directory of the pour. The activity takes `seconds` [s]; `sample` is the time between two
-    frames [s].
+    Args:
+        activity: a key of `ACTIVITIES`.
+        poured: run directory of the pour.
+        count: number of smarticles.
+        seed: seed of the scene.
+        seconds: duration of the activity [s].
+        sample: time between two recorded frames [s].
     """
     recording = {"frame_interval_s": sample, "series_interval_s": sample, "checkpoint_interval_s": None}
     data = {**data_of(count, seed, recording=recording), "engine": "links", **setting.scene}
@@ -75,9 +83,10 @@ def scene_of(
 
 
 def perform(task: Path) -> None:
-    """Simulate a task file in this process, and write poses and costs next to the file.
+    """Simulate the task in the file `task`, a JSON file that `run` wrote, in this process.
 
-    A separate process is needed because YADE and PyVista must not be loaded together, and to measure memory.
+    Poses are written next to the file, to `task.npz`; time step, costs and version to `task.row.json`. `run` calls
+    this in a process of its own because YADE and PyVista must not be loaded together, and to measure memory.
     """
     content = json.loads(task.read_text(encoding="utf-8"))
     module = importlib.import_module(f"benchmarks.rivals.{ENGINES[content['engine']].module}")
@@ -92,10 +101,12 @@ def perform(task: Path) -> None:
 
 
 def run(folder: Path, setting: Setting, activity: str, seed: int, given: argparse.Namespace) -> Any:
-    """Simulate a setting in a separate process; return a row of the table.
+    """Simulate a setting in a separate process; return its row of the table, without the columns of `planned`.
 
-    `folder` has the poured piles and gets a directory of the run; `activity` is one of `setting.activities`, and parsed
-    options are in `given`.
+    Args:
+        folder: folder of the poured piles and of all simulations; a missing pile is poured first.
+        activity: one of `setting.activities`.
+        given: options of the command line; `count` and `seconds` are used.
     """
     count, seconds, poured = given.count, given.seconds, folder / f"pile-{given.count}-{seed}"
     if not (poured / "done.json").exists():
@@ -117,9 +128,12 @@ def run(folder: Path, setting: Setting, activity: str, seed: int, given: argpars
 
 
 def measured(scene: Scene, shape: str, positions: Array, frames: Array) -> dict[str, float]:
-    """Measure overlaps and packing fractions of a simulation.
+    """Return overlaps [m], packing fractions and rate of sinking [m/s] of a simulation, by column.
 
-    `shape` is the shape that the engine uses for contacts, see `solid_of`; `Outcome` describes positions and frames.
+    Args:
+        shape: shape that the engine uses for contacts: "boxes", "strands" or "spheres".
+        positions: (2 + F, N, 3, 3) centres of the links at the times that `Outcome.positions` states [m].
+        frames: (2 + F, N, 3, 3, 3) axes of the links as columns, at the same times.
     """
     before, rested, *acting = zip(positions, frames, strict=True)
     depths = np.array(
@@ -143,7 +157,14 @@ def measured(scene: Scene, shape: str, positions: Array, frames: Array) -> dict[
 
 
 def planned(engines: Sequence[str], given: argparse.Namespace) -> Iterator[tuple[Setting, dict[str, Any]]]:
-    """Yield setting and identifying columns of each simulation with `engines` that the options select."""
+    """Yield the simulations that the options select: setting, and first columns of the row of the table.
+
+    The columns are `engine`, `setting`, `activity` and `seed`.
+
+    Args:
+        engines: keys of `ENGINES` to use.
+        given: options of the command line; `seeds` and `activities` are used.
+    """
     for seed, setting in product(given.seeds, SETTINGS):
         if setting.engine in engines and not (setting.costly and seed != given.seeds[0]):
             for activity in filter(given.activities.__contains__, setting.activities):
@@ -154,8 +175,9 @@ def planned(engines: Sequence[str], given: argparse.Namespace) -> Iterator[tuple
 def medians(rows: pd.DataFrame) -> pd.DataFrame:
     """Return medians over seeds per activity, engine and setting, and the cost relative to links.
 
-    The last two columns divide the row's cost by a cost of the engine `links`: the lowest cost of a setting whose
-    overlap is at most the row's overlap, and the lowest cost of a setting whose overlap is at most a tenth of it.
+    The last two columns compare each row with the engine `links` at the same activity. In the first, the row's cost is
+    divided by that of the cheapest setting of `links` whose overlap is not larger than the row's. In the second, this
+    overlap may be at most a tenth of the row's. NaN: `links` has no such setting.
     """
     columns = [COST, STEP, DEPTH, MEAN_DEPTH, BOX_DEPTH, PHI_REST, PHI_END, SINKING, MEMORY]
     groups = rows.groupby(KEYS, sort=False)

@@ -57,7 +57,11 @@ def _dumped(path: Path, task: Task) -> tuple[Array, Array, Array]:
 
 
 def _blocks(path: Path) -> Iterator[tuple[int, Array]]:
-    """Yield the step and the rows, sorted by number of the smarticle, of each frame in a dump."""
+    """Yield the step and the rows of each frame in a dump.
+
+    Rows are sorted by the number of the smarticle, which is their first column; the others are centre of mass, velocity
+    and quaternion (w, x, y, z).
+    """
     text = path.read_text(encoding="utf-8")
     for block in text.split("ITEM: TIMESTEP\n")[1:]:
         lines = block.splitlines()

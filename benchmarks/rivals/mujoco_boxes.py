@@ -55,7 +55,7 @@ class InMujoco(World):
             spec.worldbody.add_geom(type=plane, size=[1, 1, 1], pos=point, quat=_quaternion(frame), **self._surface)
 
     def _add_smarticle(self, spec: Any, k: int) -> None:
-        """Add smarticle `k` to MuJoCo's model `spec`: links and, if it actuates, hinges and servos."""
+        """Add the three links of smarticle `k` to MuJoCo's model `spec`; hinges and servos if barbs move."""
         task, boxes, joint = self.task, self.task.boxes, self._mujoco.mjtJoint
         if not self._hinged:
             body = spec.worldbody.add_body(
@@ -97,7 +97,14 @@ class InMujoco(World):
         body.add_geom(type=geom, size=sides, pos=centre, quat=_quaternion(frame), mass=0.0, **self._surface)
 
     def _servo(self, spec: Any, hinge: str, barb: int) -> None:
-        """Add a position servo at a hinge to MuJoCo's model `spec`, critically damped for the barb alone."""
+        """Add a position servo at a hinge to MuJoCo's model `spec`.
+
+        It is critically damped for the barb alone, with the middle link fixed.
+
+        Args:
+            hinge: name of the joint in the model.
+            barb: link that turns, 0 or 2.
+        """
         limit, boxes = float(self.task.scene.torque_limit), self.task.boxes
         inertia = boxes.link_inertias[barb][2] + boxes.link_masses[barb] * (boxes.barb_length / 2) ** 2
         gain = limit / SERVO
@@ -113,7 +120,11 @@ class InMujoco(World):
             self._data.qvel[free + 2] += speed
 
     def step(self, gravity: float, time_s: float) -> None:
-        """Take one step: welded bodies with `gravity` [m/s²], hinged bodies with targets at `time_s` [s]."""
+        """Take one step, to the time `time_s` [s] since the activity began; 0 during the rest.
+
+        `gravity` [m/s²] acts on welded smarticles; on hinged ones gravity is constant, and servos get the target angles
+        of that time.
+        """
         if not self._hinged:
             self._model.opt.gravity[2] = -gravity
         elif time_s:

@@ -32,7 +32,7 @@ class OnEngine(World):
         self._enter(ACTIVITY)
 
     def _enter(self, index: int) -> None:
-        """Begin the phase of the scene with an index, with the phase's time step."""
+        """Begin the phase of the scene that has the given index, and use the time step of this phase."""
         self._stage = self.task.scene.phases[index].begin(self.task.scene, index)
         self.engine.set_time_step(self._steps[index])
         self.time_step = self.engine.time_step

@@ -1,8 +1,8 @@
 """Overlaps between smarticles, computed from poses for the shapes of each engine.
 
-The overlap of two boxes is the shortest displacement that separates them. The overlap of two swept segments, or of
-spheres as segments of length zero, is the diameter less the distance of the axes. Links
-of one smarticle are not compared.
+The overlap of two boxes is the shortest displacement that separates them. The overlap of two swept segments is the
+diameter less the distance of the segments; a sphere is a segment of length zero. Links of one smarticle are not
+compared.
 """
 
 import itertools
@@ -24,7 +24,7 @@ PARALLEL = 1e-9  # squared sine below which two edges count as parallel
 
 @dataclass(frozen=True, eq=False)
 class Bars:
-    """B boxes, each a link of a smarticle."""
+    """B boxes, one for each link of all smarticles."""
 
     centres: Array  #: Centres, (B, 3) [m]
     frames: Array  #: Axes as columns, (B, 3, 3)
@@ -37,7 +37,13 @@ class Bars:
         return self.centres, np.linalg.norm(self.halves, axis=1)
 
     def depths(self, pairs: Indices) -> Array:
-        """Compute the overlaps (P,) [m] of pairs of boxes with indices (P, 2), by the separating-axis theorem."""
+        """Return the overlaps (P,) [m] of pairs of boxes, by the separating-axis theorem.
+
+        A negative value means that the boxes are apart.
+
+        Args:
+            pairs: (P, 2) indices of the boxes.
+        """
         one, other = pairs.T
         between = self.centres[other] - self.centres[one]
         frames = np.concatenate([self.frames[one], self.frames[other]], axis=2)
@@ -70,7 +76,11 @@ class Swept:
         return (self.starts + self.ends) / 2, reaches
 
     def depths(self, pairs: Indices) -> Array:
-        """Compute the overlaps (P,) [m] of pairs of segments with indices (P, 2); negative for gaps."""
+        """Return the overlaps (P,) [m] of pairs of swept segments; a negative value is a gap.
+
+        Args:
+            pairs: (P, 2) indices of the segments.
+        """
         one, other = pairs.T
         ends = self.starts[one], self.ends[one], self.starts[other], self.ends[other]
         return 2 * self.radius - segment_distances(*ends)
@@ -87,9 +97,13 @@ def deepest(solid: Bars | Swept) -> float:
 
 
 def solid_of(shape: str, particle: Particle, positions: Array, frames: Array) -> Bars | Swept:
-    """Return the shapes that an engine uses for contacts: "boxes", "strands" (links) or "spheres".
+    """Return all links of N smarticles in the shape that an engine uses for contacts.
 
-    Positions are the centres of the links, (N, 3, 3) [m], frames their axes as columns, (N, 3, 3, 3).
+    Args:
+        shape: "boxes"; "strands", the swept segments of the engine `links`; or "spheres", the chains of spheres of YADE
+            and LAMMPS.
+        positions: (N, 3, 3) centres of the links [m].
+        frames: (N, 3, 3, 3) axes of the links as columns.
     """
     if shape == "boxes":
         return _boxes(particle, positions, frames)

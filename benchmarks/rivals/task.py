@@ -91,11 +91,15 @@ class Task:
 
     @property
     def kick(self) -> float:
-        """Velocity of the container just after the start of the activity [m/s]."""
+        """Upward velocity of the container just after the start of the activity [m/s]."""
         return float(self.scene.phases[ACTIVITY].peak_speed(self.scene.gravity_m_per_s2))
 
     def walls(self) -> tuple[Array, Array]:
-        """Return the flat walls: points (FACETS, 3) [m], and unit normals into the container (FACETS, 3)."""
+        """Return the flat walls that replace the round wall, tangent to it, for engines without round walls.
+
+        Returns:
+            A point of each wall, (FACETS, 3) [m], and its unit normal into the container, (FACETS, 3).
+        """
         angles = 2 * math.pi * np.arange(FACETS) / FACETS
         outwards = np.column_stack([np.cos(angles), np.sin(angles), np.zeros(FACETS)])
         return self.scene.cylinder.radius * outwards, -outwards
@@ -139,7 +143,10 @@ class World:
         raise NotImplementedError
 
     def begin(self) -> None:
-        """Begin the activity: give all smarticles the opposite of the container's velocity."""
+        """Begin the activity, at which the container jumps to its first velocity.
+
+        In the container's frame all smarticles get the opposite velocity.
+        """
         self._since = 0.0
         self.kick(-self.task.kick)
 

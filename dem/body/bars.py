@@ -16,10 +16,12 @@ JOINED = 1e-9  # of the longest bar: ends that are nearer are one joint
 
 
 def first_ends(points: Array) -> Numbers:
-    """Return (2 S,) for each end of segments the lowest number of all ends at its place.
+    """Return (2 S,) a number for each end of segments that is the same for all ends at the same point.
+
+    End e (0 or 1) of segment s has the number 2 s + e. Of all ends at a point, the lowest number is returned.
 
     Args:
-        points: (S, 2, 3) ends of the segments [m]. End e of segment s has the number 2 s + e.
+        points: (S, 2, 3) ends of the segments [m].
     """
     places = points.reshape(-1, 3)
     longest = np.abs(points[:, 1] - points[:, 0]).max()
@@ -27,13 +29,13 @@ def first_ends(points: Array) -> Numbers:
 
 
 def owners(first: Numbers, inner: Flags) -> Flags:
-    """Return (2 S,) whether each end of a segment owns the place where it lies; a place has one owner.
+    """Return (2 S,) whether each end of a segment owns the point where it lies.
 
-    A place is a joint, where ends of several segments meet, or a free end. The owner is the first end whose segment is
-    joined at both ends, or else the first end at the place.
+    Every joint, where ends of several segments meet, has one owner: the first end there whose segment is joined at both
+    of its ends, or the first end if there is no such segment. A free end owns its point.
 
     Args:
-        first: (2 S,) place of each end, from `first_ends`.
+        first: (2 S,) number of the point of each end, from `first_ends`.
         inner: (2 S,) whether the segment of each end is joined to other segments at both of its ends.
     """
     order = np.lexsort((np.arange(len(first)), ~inner, first))
@@ -100,15 +102,15 @@ class Bars:
 
     @cached_property
     def _joints(self) -> Numbers:
-        """(2 S,) lowest number of all ends at the place of each end, see `first_ends`."""
+        """(2 S,) number of the joint, or free end, at each end of the bars, see `first_ends`."""
         return first_ends(self.points)
 
     @cached_property
     def gaps(self) -> tuple[Numbers, Numbers, Array]:
-        """Numbers of both bars of all P pairs, each (P,), and distances (P,) between their axes [m].
+        """Numbers of the first and of the second bar of all P pairs of bars, and distances of their axes [m].
 
-        Of two bars with a common joint, the distance is that between one bar and the far end of the other bar, the
-        smaller of the two values; it is 0 for bars that lie on each other.
+        Each array is (P,). The axes of two bars with a common joint meet there. Their distance is measured from the far
+        end of one bar to the axis of the other bar, and the smaller of the two values is given.
         """
         first, second = np.triu_indices(len(self.points), 1)
         joints = self._joints.reshape(-1, 2)

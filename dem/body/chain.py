@@ -95,7 +95,11 @@ def extent(state: State, diameter: float) -> float:
 
 
 def _corners(state: State) -> Array:
-    """Return (N, V, 3) tips, hinges, and corners of middle links thicker than barbs, on link axes [m]."""
+    """Return (N, V, 3) ends of the axes of each smarticle's links, or rows of spheres [m].
+
+    They are the barb tips and the hinges (V = 4). If the middle link is thicker than the barbs, the ends of its two
+    outermost rows of spheres are added (V = 8).
+    """
     bulge, vertices = state.boxes.bulge, state.vertices
     if not bulge:
         return vertices

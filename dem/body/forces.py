@@ -35,7 +35,13 @@ class ContactForces:
 
 
 def at_links(smarticle: Number, link: Number, each: int = LINKS) -> Number:
-    """Return codes `each` × `smarticle` + `link`, 0 or above; `each`: largest number of links of a body."""
+    """Return codes of links, 0 or above, for `contacts_of_points`.
+
+    Args:
+        smarticle: numbers of the bodies.
+        link: number of each link, or bar, within its body.
+        each: largest number of links, or bars, of a body; the code is `each` × `smarticle` + `link`.
+    """
     return each * smarticle + link
 
 

@@ -163,7 +163,10 @@ class Kind:
 
 @dataclass(frozen=True)
 class Mixture:
-    """K kinds of bodies of a pile without smarticles, and the kind of each of N bodies, as poured."""
+    """Kinds of bodies of a pile without smarticles, K in all, and the kind of each of its N bodies.
+
+    Bodies are numbered in the order in which they are poured.
+    """
 
     kinds: tuple[Kind, ...]
     of: Numbers = field(repr=False)  #: (N,) index in `kinds` for each body
@@ -205,7 +208,10 @@ class Mixture:
 
     @cached_property
     def ends(self) -> Array:
-        """(B, 2, 3) both ends of the bars of one body of each kind, in its body frame [m]."""
+        """(B, 2, 3) both ends of the bars of one body of each kind, in the body's frame [m].
+
+        B is the sum of `sizes`; the bars of the first kind come first.
+        """
         return np.concatenate([kind.bars.ends for kind in self.kinds])
 
     @cached_property
@@ -241,7 +247,7 @@ class Mixture:
 
     @property
     def diameter(self) -> float:
-        """Least diameter of the spheres, or of the swept spheres on links, of all kinds, for overlaps [m]."""
+        """Smallest diameter of the spheres, or strands, of all kinds [m]."""
         return min(kind.diameter for kind in self.kinds)
 
     @property
@@ -271,6 +277,9 @@ def body_of(model: Particle | Mixture, kinds: Sequence[int] | Numbers, number: i
 
 
 def padded(rows: Sequence[Array]) -> Array:
-    """Return k arrays (n, …) as one (k, largest n, …), in which shorter ones repeat their last item."""
+    """Return k arrays of different lengths as one array (k, n, …), where n is the largest length.
+
+    Shorter arrays are filled up with their last item. All arrays must have at least one item.
+    """
     longest = max(map(len, rows))
     return np.array([row[np.minimum(np.arange(longest), len(row) - 1)] for row in rows])

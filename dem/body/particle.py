@@ -100,7 +100,10 @@ class Boxes:
 
     @property
     def _weights(self) -> Array:
-        """(3,) [m]: length of a link with the barbs' thickness that has the mass of each link."""
+        """(3,) [m]: lengths of the links, each times its thickness in the plane over that of the barbs.
+
+        Volumes and masses of the links are in proportion to these lengths.
+        """
         return self.lengths * (np.array(self.thicknesses_in_plane) / self.thickness_in_plane)
 
     @property
@@ -274,9 +277,9 @@ class Particle:
     def barb_start(self) -> float:
         """Distance from the hinge to the centre of a barb's first sphere [m].
 
-        At this distance the first sphere is at least `HINGE_CLEARANCE` diameters away from the surface of the sphere at
-        the hinge. If the middle link is thicker than the barbs, the first sphere is as far away from the middle link's
-        outermost row of spheres, for barb angles of 90° to 90° + `INWARDS`.
+        It leaves a gap of at least `HINGE_CLEARANCE` diameters between the surfaces of this sphere and of the sphere at
+        the hinge. If the middle link is thicker than the barbs, the gap is that to the outermost row of spheres of the
+        middle link, at barb angles of 90° to 90° + `INWARDS`.
         """
         start = self.chain.diameter * (1 + HINGE_CLEARANCE)
         return (self.boxes.bulge + start) / math.cos(INWARDS) if self.boxes.bulge else start

@@ -1,4 +1,8 @@
-"""Names of the effects that a scene may need, and what an effect adds to a run."""
+"""Names of the effects that a scene may need, and what an effect adds to a run.
+
+An effect is a physical process that is simulated only where needed, such as friction or motors, or a kind of recorded
+data, such as frames or energies.
+"""
 
 from __future__ import annotations
 
@@ -58,7 +62,10 @@ class Adds:
         return Adds(**lists, python="; ".join(part.python for part in each if part.python))
 
     def to_text(self) -> str:
-        """Return one line that names engines, materials, bodies and files and counts the rest; "" for nothing."""
+        """Return a line that describes the additions; "" if there are none.
+
+        Engines, materials, shapes and files are named; functors, datasets and arrays are counted; `python` comes last.
+        """
         named = {"engines": self.engines, "materials": self.materials, "bodies": self.shapes, "files": self.files}
         counted = {"functors": self.functors, "datasets": self.series, "arrays per frame": self.arrays}
         parts = [f"{what} {', '.join(names)}" for what, names in named.items() if names]

@@ -144,11 +144,11 @@ class Motors(Protocol):
         """Largest number of control updates that one call of `actuate` takes."""
 
     def actuate(self, targets: Array, interval: float) -> None:
-        """Make a control update now, and schedule one more at the end of each following control period.
+        """Make U control updates, one at the beginning of each of U control periods; the first begins now.
 
         Args:
-            targets: (U, N, 2) angles of the schedule at the ends of U control periods [rad]; U is at most
-                `updates_at_once`.
+            targets: (U, N, 2) angles of barb 1 and barb 2 that the schedule has at the end of each period [rad]; U is
+                at most `updates_at_once`.
             interval: length of a control period [s].
         """
 
@@ -235,7 +235,11 @@ class Filaments(Protocol):
 
 
 class EnergyLedger(Protocol):
-    """Energy ledger: work and dissipation, summed step by step; only what the scene records is summed."""
+    """Energy ledger: work and dissipation, summed step by step.
+
+    Some sums cost time. Engines may leave out the work of moving boundaries if the scene records no energies, and leave
+    out the dissipation in contacts, hinges and filaments if it has no `recording.dissipation_interval_s`.
+    """
 
     @property
     def container_work(self) -> float:
@@ -324,7 +328,7 @@ class Engine(Protocol):
         """Number of bodies present, N."""
 
     def add(self, poses: Poses, *, speed: float = 0.0) -> None:
-        """Add bodies of `particle` at poses, smarticles welded; they fall at a speed [m/s] without rotation."""
+        """Add bodies at poses, with a downward speed [m/s] and without rotation; smarticles are welded."""
 
     def still(self) -> None:
         """Set all velocities to zero; the kinetic energy counts as dissipated. Smarticles must be welded."""
@@ -358,9 +362,13 @@ class Engine(Protocol):
         """
 
     def extremes(self, state: PileState) -> Extremes | None:
-        """Return extremes over all bodies in their present `state`, faster than a full check.
+        """Return the largest speed, largest overlap and other extremes of all bodies, to check limits fast.
 
-        None: the engine has no faster way, or extremes alone cannot show that all limits hold.
+        None: on this engine extremes are not faster than a check of each body, or each body must be checked since the
+        extremes alone do not show that all limits hold.
+
+        Args:
+            state: present state of the engine.
         """
 
     # -- checkpoints -------------------------------------------------------------------------------------------

@@ -21,7 +21,7 @@ class EngineKind(Protocol):
 
     @property
     def order(self) -> tuple[str, ...]:
-        """All names in `Adds.engines`, in the order in which a step runs them."""
+        """Names of all parts of the engine, see `Adds.engines`, in the order in which a step runs them."""
 
     def version(self) -> str:
         """Return the engine's version, on which results depend; raise RunError if it is not installed."""
@@ -33,7 +33,12 @@ class EngineKind(Protocol):
         """Return the largest stable time step [s]; `articulated`: whether barbs can turn or have turned."""
 
     def seconds_per_second(self, scene: Demand, time_step: float, activity: Activity) -> float:
-        """Return the estimated wall time per simulated time [1] on one core, by time step [s] and phase kind."""
+        """Return the estimated wall time per simulated time [1] of a phase on one core.
+
+        Args:
+            time_step: time step of the phase [s].
+            activity: kind of the phase.
+        """
 
     def seconds_to_compile(self, scene: Demand) -> float:
         """Return the estimated processor time [s] to compile the code that a scene needs and the cache lacks."""

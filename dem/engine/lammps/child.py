@@ -28,7 +28,11 @@ _OPTIONS = (*"--bind-to none --mca btl_vader_single_copy_mechanism none --mca mp
 
 
 def lammps_version() -> str:
-    """Return LAMMPS's version; raise RunError if it, mpirun or a style of `NEEDED` is missing or fails."""
+    """Return LAMMPS's version.
+
+    Raises:
+        RunError: LAMMPS or mpirun is not installed, LAMMPS does not start, or it was built without a style in `NEEDED`.
+    """
     for program, what in ((LMP, "LAMMPS"), (MPIRUN, "Open MPI")):
         if shutil.which(program) is None:
             raise RunError(
@@ -124,7 +128,10 @@ class Child:
         os.read(self._answers, 4096)
 
     def _why_it_ended(self) -> str:
-        """Return the cause of LAMMPS's end in one line, and save LAMMPS's log."""
+        """Return the cause of LAMMPS's end, advice, and the path of the saved log, as a message of one line.
+
+        The log is copied to a new temporary folder, and the folder of LAMMPS's files is removed.
+        """
         status = self._process.returncode
         log, output = (_text(self.scratch / name) for name in (LOG, OUTPUT))
         cause, way_out = explain(log, output, status)
@@ -140,7 +147,7 @@ def explain(log: str, output: str, status: int | None) -> tuple[str, str]:
     Args:
         log: content of LAMMPS's log file.
         output: output of mpirun.
-        status: exit status of mpirun.
+        status: exit status of mpirun; None if it is unknown.
     """
     errors = re.findall(r"^ERROR(?: on proc \d+)?: (.+)", f"{log}\n{output}", re.MULTILINE)
     if errors:

@@ -72,7 +72,11 @@ class Contacts:
         return Overlaps(float(depths.max(initial=0.0)), deep, self.elastic_energy(law))
 
     def elastic_energy(self, law: ContactLaw) -> float:
-        """Return an upper bound of the elastic energy of all contacts [J], from overlaps and friction."""
+        """Return an upper bound of the elastic energy of all contacts [J].
+
+        Normal springs are compressed by the overlaps. All tangential springs are assumed to be at the Coulomb limit,
+        with the larger one of the friction coefficients between bodies and at the wall.
+        """
         squares = float((self.depths**2).sum() + (self.fixed_depths**2).sum())
         friction = max(law.friction, law.wall_friction)
         return law.normal_stiffness / 2 * squares * (1 + friction**2 * law.normal_stiffness / law.tangential_stiffness)

@@ -142,9 +142,10 @@ class LammpsEngine:
         )
 
     def _send(self, commands: Iterator[str]) -> None:
-        """Send commands, and make LAMMPS set up forces anew in its next run.
+        """Send commands to LAMMPS, and make its next `run` compute all forces anew at the start.
 
-        Without a simulation box in LAMMPS nothing is sent: `_scene` yields these commands when the box is made.
+        Before the first bodies are added, LAMMPS has no simulation box and nothing is sent. What the commands set is
+        then part of the commands that `_scene` yields for the new box.
         """
         self._contacts = None
         if self._box:
@@ -152,7 +153,11 @@ class LammpsEngine:
             self._fresh = True
 
     def _scene(self, box: str) -> Iterator[str]:
-        """Yield all commands for a new LAMMPS except those for rigid bodies; `box` makes the simulation box."""
+        """Yield all commands that a new LAMMPS process needs before those of the rigid bodies.
+
+        Args:
+            box: command that makes the simulation box with its spheres, `read_data` or `read_restart` with a file.
+        """
         between, at_wall = text.contact_terms(self._law, self._reference.mass)
         yield from text.before_box(self.particle)
         # Vertical cuts divide the pile among ranks: above a horizontal cut there would be little work.
