@@ -1,4 +1,4 @@
-"""The phases that move barbs: by given motions, or by one of the paper's two gaits."""
+"""Phases that move barbs: by motions of the scene, a shape change, or an internal oscillation."""
 
 import math
 from typing import Annotated, Any, Literal, Self
@@ -24,7 +24,11 @@ Offsets = Annotated[
 
 
 def _length_of_motions(data: dict[str, Any]) -> float:
-    """Return the longest duration of the motions in `data` [s]; inf if one has no end."""
+    """Return the longest duration of the motions of an `actuate` phase [s]; inf if one has no end.
+
+    Args:
+        data: values of the phase's fields, by name; motions are under `barbs`, `barb_1` and `barb_2`.
+    """
     motions = [data[key] for key in ("barbs", "barb_1", "barb_2") if data.get(key) is not None]
     return max((motion.duration for motion in motions), default=math.inf)
 
@@ -134,7 +138,10 @@ class ShapeChange(Part, ActuatedPhase):
 
 
 class InternalOscillation(Part, ActuatedPhase):
-    """Swing both barbs at the motor's speed limit, θ/2 to either side of `smarticle.angles_deg`."""
+    """Swing both barbs about `smarticle.angles_deg` at the motor's speed limit.
+
+    A swing from one end to the other is θ, or if `scaled` θ · 0.7/(l/w).
+    """
 
     type: Literal["internal-oscillation"]
     theta_deg: float = Field(..., ge=1e-6, le=240, description="θ, full swing, peak to peak [deg]")

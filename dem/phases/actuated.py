@@ -61,10 +61,13 @@ class ActuatedPhase(Phase):
         raise NotImplementedError
 
     def source_of(self, key: str) -> tuple[str, float | None]:
-        """Return the key of this phase that decides a key of a motion, and the value of the phase's key.
+        """Return the key in the scene file that a user must change to change a parameter of a motion.
 
         Args:
-            key: key of a motion with dots for nesting, such as `barbs.steps.0.duration_s`.
+            key: parameter of a motion in the phase's `Gait`, with dots for nesting, such as `barbs.steps.0.duration_s`.
+
+        Returns:
+            The key, relative to this phase, and its value; None if it is not given.
         """
         raise NotImplementedError
 
@@ -279,7 +282,13 @@ def _of_control(scene: SceneView) -> Iterator[str]:
 
 
 def _whole_fraction(whole: float, parts: int) -> str:
-    """Return the time `whole` [s], divided by `parts` or a little more so that it has few digits, as text."""
+    """Return a time of few digits of which `whole` is a multiple, as text [s].
+
+    Args:
+        whole: the multiple [s].
+        parts: least number of times that the returned time fits into `whole`. The smallest number that gives few
+            digits is used, or `parts` if none is found.
+    """
     for more in range(parts, min(10 * parts, parts + MOST_PARTS) + 1):
         text = f"{whole / more:.3g}"
         if math.isclose(float(text) * more, whole, rel_tol=TOLERANCE):
@@ -320,8 +329,8 @@ def _of_range(place: str, present: float, swing: Sine | Triangle, reached: tuple
     """Yield an error if a swing leaves the range of the hinges.
 
     Args:
-        place: key that sets the amplitude of the swing.
-        present: value of the key `place` [deg].
+        place: key in the scene file that sets the amplitude of the swing.
+        present: value of this key [deg].
         reached: lowest and highest angle of the swing [deg].
     """
     lowest, highest = HINGE_RANGE

@@ -132,7 +132,7 @@ class Phase:
         return Stage(self, scene, index, self.first_memory(scene))
 
     def first_memory(self, scene: SceneView) -> Memory:
-        """Return the memory of the stage at its beginning."""
+        """Return `Stage.memory`, the data from which a run is resumed, at the beginning of the phase."""
         return {}
 
     def prepare(self, scene: SceneView, index: int) -> Any:

@@ -65,7 +65,10 @@ class Parts(NamedTuple):
 
 
 class Segments(NamedTuple):
-    """Q segments of all bodies: each of L links has one segment, or several side by side, its strands."""
+    """Q segments of all bodies, which have L links in all.
+
+    A link consists of one segment, or of several segments side by side, which are called its strands.
+    """
 
     line: Array  #: (Q, LINE) segments in the laboratory frame; for the columns see `dem.engine.links.shapes.START`
     begin: Indices  #: (N + 1,) number of the first segment of each body, then Q
@@ -179,7 +182,10 @@ class Hooks(NamedTuple):
 
 
 class Rims(NamedTuple):
-    """Round edges of the wall that links can touch, between tiers and below a lifted wall."""
+    """Circular edges of the wall that links can touch: where a tier begins, and below a lifted wall.
+
+    A tier is one of the wall's coaxial cylinders, which stand on each other and become narrower upwards.
+    """
 
     heights: Array  #: (rims,) heights above `place` of the wall [m]
     radii: Array  #: (rims,) radii [m]
@@ -309,7 +315,13 @@ def joined(one: Bodies, other: Bodies) -> Bodies:
 
 
 def pairs_for(bodies: int, segments: int, capacity: int) -> Pairs:
-    """Return empty lists of near segments; arguments are numbers of bodies, segments and, at most, pairs."""
+    """Return empty lists of near segments with room for `capacity` pairs.
+
+    Args:
+        bodies: number of bodies.
+        segments: number of segments of all bodies.
+        capacity: largest number of pairs.
+    """
     return Pairs(
         np.zeros(capacity, np.int32),
         np.zeros(capacity, np.int32),
@@ -327,7 +339,14 @@ def pairs_for(bodies: int, segments: int, capacity: int) -> Pairs:
 
 
 def cells_for(bodies: int, links: int, segments: int, capacity: int) -> Cells:
-    """Return arrays for the search; arguments are numbers of bodies, links, segments and, at most, pairs."""
+    """Return arrays for the search for neighbours, with room for `capacity` pairs.
+
+    Args:
+        bodies: number of bodies.
+        links: number of links of all bodies.
+        segments: number of segments of all bodies.
+        capacity: largest number of pairs.
+    """
     return Cells(
         np.zeros(links, np.int32),
         np.zeros(links, np.int32),

@@ -46,7 +46,8 @@ class LinksBoundaries:
     Args:
         cylinder: the container.
         shaken: whether the scene shakes the container.
-        removed: `LinksLedger.removed`, which calls a function that removes contacts, and counts their energy.
+        removed: `LinksLedger.removed`. It calls its argument, a function that removes contacts, and counts the energy
+            of these contacts as dissipated.
     """
 
     def __init__(
@@ -152,9 +153,11 @@ class LinksBoundaries:
         return force
 
     def parts(self) -> dict[str, tuple[int, float]]:
-        """Return the boundaries between which bodies can be held, by name; none without hooks.
+        """Return index and rise of the boundaries between which bodies can be squeezed.
 
-        A value has the boundary's index in `Ground.place`, and its rise above the floor since the start [m].
+        Returns:
+            Keys are "the lower hook", "the upper hook" and, if there is a wall, "the wall". A value is the boundary's
+            index in `Ground.place` and its rise relative to the floor since the start [m]. Empty without hooks.
         """
         if self._world.hooks is None:
             return {}

@@ -97,7 +97,12 @@ def folder() -> Path | None:
 
 
 def is_kept(without: frozenset[str]) -> bool:
-    """Return whether the cache has code for simulations in which the groups of arrays `without` are None."""
+    """Return whether the cache has the code for simulations that lack some groups of arrays.
+
+    Args:
+        without: names of the arguments of kernels, or of their fields, that are None in these simulations, such as
+            "hooks" or "motors".
+    """
     where = folder()
     return where is not None and any(where.glob(f"{_title(LONGEST, without)}.*.code"))
 
@@ -107,11 +112,11 @@ def _title(kernel: str, without: frozenset[str]) -> str:
 
 
 def _lacking(kind: Any, name: str) -> Iterator[str]:
-    """Yield the names of the fields that are None in an argument of a kernel, and in its fields in turn.
+    """Yield the names of all fields of a kernel's argument that are None, including fields of fields.
 
     Args:
         kind: Numba's type of the argument.
-        name: name of the argument, which is yielded if the argument itself is None.
+        name: name of the argument. If the argument itself is None, this name is yielded.
     """
     if isinstance(kind, types.NoneType):
         yield name
@@ -141,7 +146,11 @@ class KernelCache(NullCache):
 
     @contextmanager
     def turn(self, types_: Any) -> Iterator[None]:
-        """Let this process compile for some types of arguments while other processes that need the code wait."""
+        """Return a context manager in which this process compiles while others that need the code wait.
+
+        Args:
+            types_: types of the kernel's arguments for which the code is compiled.
+        """
         path = self.path(types_)
         if path is None or path.exists():
             yield
@@ -198,7 +207,10 @@ def _cause(error: Exception) -> str:
 
 @contextmanager
 def _locked(path: Path) -> Iterator[None]:
-    """Hold the lock of a file during a block, which runs without the lock after waiting for `PATIENCE`."""
+    """Return a context manager that waits for the lock of a file and holds it until the block ends.
+
+    If another process holds the lock for longer than `PATIENCE`, or locks do not work here, the block runs without it.
+    """
     file = None
     try:
         if fcntl is not None:
@@ -212,7 +224,11 @@ def _locked(path: Path) -> Iterator[None]:
 
 
 def _wait_for(file: int) -> None:
-    """Wait for the lock of an open file; raise OSError where its file system has no locks."""
+    """Wait for the lock of an open file, at most for `PATIENCE`; then go on without it.
+
+    Raises:
+        OSError: the file system has no locks.
+    """
     begun = time.monotonic()
     while True:
         try:
@@ -227,7 +243,11 @@ def _wait_for(file: int) -> None:
 
 
 def announce(seconds: float = math.nan) -> None:
-    """Report, once per process, that it compiles, and if known the expected processor time [s]."""
+    """Log that this process compiles the engine; only the first call in a process has an effect.
+
+    Args:
+        seconds: expected processor time [s], which the message states; NaN: unknown.
+    """
     if not _ANNOUNCED.is_set():
         _ANNOUNCED.set()
         about = "" if math.isnan(seconds) else f", about {seconds:.0f} s of processor time"

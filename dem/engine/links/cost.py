@@ -48,7 +48,13 @@ COMPILE_FIRST, COMPILE_MORE = 13.0, 7.0
 
 
 def seconds_per_second(scene: Demand, time_step: float, activity: Activity) -> float:
-    """Return the estimated wall time per simulated time [1] on one core, by time step [s] and phase kind."""
+    """Return the estimated wall time on one core per simulated time [1].
+
+    Args:
+        scene: sizes and settings of the simulation.
+        time_step: time step [s].
+        activity: what goes on: pouring, rest, shaking, or motors that move.
+    """
     count, recording, mixture = scene.count, scene.recording, scene.mixture
     rates = RATES[activity]
     if mixture is None:

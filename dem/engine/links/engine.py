@@ -215,8 +215,9 @@ class LinksEngine:
     def overlaps(self, limit: float) -> Overlaps:
         """Return the present overlaps; `Overlaps.deep` marks bodies with an overlap above `limit` [m].
 
-        An overlap since the last check counts as well if links may have passed through each other, which is possible
-        above `PASSES`. A body that is held between two boundaries is marked above an overlap of `HOLDS` diameters.
+        Overlaps in the steps since the last check count as well where they were above `PASSES` of the overlap at which
+        axes meet, since links may then have passed through each other. A body that is held between two boundaries is
+        marked above an overlap of `HOLDS` diameters, even if `limit` is larger.
         """
         found, world = self._world.contacts(), self._world
         between = world.bodies.deepest.copy()
@@ -245,7 +246,13 @@ class LinksEngine:
         )
 
     def extremes(self, state: PileState) -> Extremes | None:
-        """Return the extremes; None if an overlap needs a full check. `Extremes.gap` is 0: hinges are rigid."""
+        """Return extremes over all bodies; None if an overlap is so large that a full check is needed.
+
+        `Extremes.gap` is 0, since hinges are rigid.
+
+        Args:
+            state: present state of the bodies.
+        """
         if state.bodies is None:
             velocities = state.smarticles.link_velocities.reshape(-1, 3)
         else:

@@ -81,7 +81,11 @@ class LinksKind:
 
 
 def _present(scene: Demand) -> Iterator[frozenset[str]]:
-    """Yield the names of the groups of arrays that are not None, for each kind of phase of a scene."""
+    """Yield the names of those `OPTIONAL` groups of arrays that exist in phases of a scene.
+
+    The first set of names is for phases without motors, the second one for phases with motors. A set is left out if
+    the scene has no such phase.
+    """
     known = {
         "channel": scene.channel is not None,
         **dict.fromkeys(OF_FILAMENTS, scene.mixture is not None and scene.mixture.flexible),

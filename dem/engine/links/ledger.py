@@ -54,7 +54,10 @@ class LinksLedger:
         self.added += self.elastic()[0]
 
     def removed(self, remove: Callable[[], None]) -> None:
-        """Call `remove`, which removes contacts; if dissipation is recorded, it includes their elastic energy."""
+        """Call `remove`, a function that removes contacts, and count their elastic energy as dissipated.
+
+        The energy is not counted if dissipation is not recorded.
+        """
         counted = self._world.ledger is not None
         stored = self.elastic()[0] if counted else 0.0
         remove()

@@ -37,7 +37,14 @@ def rod_of(filament: Filament) -> Array:
 
 
 def wave_of(filament: Filament, curvature: PreferredCurvature | None) -> Array:
-    """Return `Filaments.wave` of one filament, (nodes, 3): amplitude, cosine and sine of the phase [1]."""
+    """Return the wave of preferred κ along one filament, as in `Filaments.wave`.
+
+    Args:
+        curvature: preferred curvature; None: the filament has none.
+
+    Returns:
+        (nodes, 3) amplitude, cosine and sine of the phase at each node [1].
+    """
     wave = np.zeros((filament.nodes, 3))
     if curvature is not None:
         # A curvature 1/R turns a segment by the angle ℓ/R, and κ is twice the tangent of half of it.
@@ -116,7 +123,14 @@ def filaments_at(
 
 
 def _untwisted(tangents: Array) -> Array:
-    """Return first directors (F, S, 3) [1] of filaments without twist, whose tangents are (F, S, 3)."""
+    """Return first directors of filaments without twist, unit vectors across each segment.
+
+    Args:
+        tangents: (F, S, 3) unit vectors along the S segments of each of F filaments [1].
+
+    Returns:
+        (F, S, 3) first directors [1].
+    """
     found = np.zeros_like(tangents)
     for f, own in enumerate(tangents):
         least = np.zeros(3)

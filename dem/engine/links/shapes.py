@@ -146,7 +146,10 @@ def smarticle_shape(particle: Particle) -> Shape:
 
 
 def offsets_of(particle: Particle) -> Array:
-    """Return the offsets (S,) of a link's strands along the normal [m]; several reach from face to face."""
+    """Return (S,) positions of a link's S strands along the normal, from the smarticle's mid-plane [m].
+
+    A single strand is in the mid-plane. Of several strands, the surfaces of the outer two reach the link's faces.
+    """
     reach = (particle.boxes.thickness_normal - particle.chain.diameter) / 2
     return np.zeros(1) if particle.chain.rows == 1 else np.linspace(-reach, reach, particle.chain.rows)
 

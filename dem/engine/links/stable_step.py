@@ -69,8 +69,9 @@ def filament_stable_time_step(filament: Filament, law: ContactLaw, effective_mas
     """Return the largest stable time step [s] over the stiffest modes of a filament among filaments.
 
     In these modes neighbouring nodes move in opposite directions: along the filament, across it, or about its axis. The
-    stiffness is that of stretching, bending or twisting plus that of contacts. Contacts are assumed at a tip, and on
-    both sides of the filament a diameter apart; they act on one node, and the bodies touched move against the node.
+    stiffness is that of stretching, bending or twisting plus that of contacts. Two cases of contacts are considered:
+    contacts at a tip, and contacts along both sides of the filament, one per diameter. The bodies that touch a node
+    are assumed to move opposite to it.
 
     Args:
         law: law of the contacts.

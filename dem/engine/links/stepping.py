@@ -28,7 +28,7 @@ from dem.engine.links.vectors import dot, vector
 
 
 class Clock(NamedTuple):
-    """Time after steps of equal length: begin + made dt."""
+    """Clock that counts steps of equal length; the time is `begin` + `made` · `dt`."""
 
     begin: float  #: Time at which steps of this length began [s]
     made: int  #: Number of steps of this length made before the call

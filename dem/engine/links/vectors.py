@@ -148,7 +148,7 @@ def clamp(value: float) -> float:
 
 @inlined
 def nearest(both: Lines) -> tuple[float, float]:
-    """Return the places s and t of the nearest points of two segments.
+    """Return s and t, from 0 to 1, of the nearest points p + s u and q + t v of two segments.
 
     Source: Ericson, Real-Time Collision Detection (2005), section 5.1.9.
     """

@@ -91,7 +91,8 @@ class Contacts:
 class World:
     """All data of a simulation, and methods that change it between calls of the kernels.
 
-    Kinds of bodies are smarticles, if there are any, then the kinds of `mixture`, then the shapes of `more`.
+    Kinds of bodies are numbered in this order: the smarticle, if `particle` is given; the kinds of `mixture`; the
+    shapes in `more`.
     """
 
     particle: Particle | None  #: Smarticle of which all smarticles are copies; None: a pile without smarticles
@@ -434,7 +435,8 @@ class World:
     def contacts(self) -> Contacts:
         """Return all present contacts; the simulation is not changed.
 
-        The wide list is still valid after the last step; contacts of bodies that were added since are missing.
+        Contacts between bodies are found in the wide list of `pairs`, which is still valid after the last step. It
+        lacks contacts of bodies that were added after this step.
         """
         self.posed()
         found, count, energy = self._query()

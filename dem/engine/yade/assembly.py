@@ -24,8 +24,11 @@ from dem.errors import reject
 class Assembly:
     """All bodies of a pile as bodies of YADE.
 
-    `hinge_law` is None if smarticles stay welded. `strengths` (N, 2) are factors on the motors' torque limit and
-    stiffness, None: 1. `planar` bodies move only in the xy plane.
+    Args:
+        particle: the smarticle of which the pile consists, or a mixture of other bodies.
+        hinge_law: law of the hinges; None if smarticles stay welded.
+        planar: whether bodies move only in the xy plane.
+        strengths: (N, 2) factors on torque limit and stiffness of the motors [1]; None: 1 for all motors.
     """
 
     def __init__(

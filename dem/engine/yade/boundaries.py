@@ -100,9 +100,11 @@ class YadeBoundaries:
         return float(self._upper.pos[2])
 
     def parts(self) -> Mapping[str, tuple[Sequence[int], float]]:
-        """Return the boundaries between which smarticles can be held, by name; none without hooks.
+        """Return ids and rise of the boundaries between which smarticles can be squeezed.
 
-        A value has the ids of a boundary's bodies, and the rise of the boundary above the floor since the start [m].
+        Returns:
+            Keys are "the lower hook", "the upper hook" and, if there is a wall, "the wall". A value has the ids of the
+            boundary's bodies in YADE, and its rise relative to the floor since the start [m]. Empty without hooks.
         """
         if not self.hooks:
             return {}

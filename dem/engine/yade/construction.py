@@ -1,4 +1,8 @@
-"""Construct the materials, engines and functors that each effect needs on YADE."""
+"""Construct the materials, engines and functors of YADE that a scene needs.
+
+A scene needs some of the effects in `dem.engine.effect.EffectName`, such as contacts or motors. `ADDS` lists what each
+effect needs.
+"""
 
 import math
 from collections.abc import Mapping
@@ -65,7 +69,12 @@ VERLET_DISTANCE = 0.15
 
 
 def add_materials(yade: Yade, adds: Adds, law: ContactLaw) -> None:
-    """Add the materials `adds.materials` to YADE's simulation, in that order."""
+    """Add the materials `adds.materials` to YADE's simulation, in that order.
+
+    Args:
+        adds: what all effects of the scene add.
+        law: law of the contacts, from which stiffness and damping follow.
+    """
     # YADE puts two materials in series, so that each has twice the contact's value. The wall's dashpot is chosen such
     # that in series with a smarticle's dashpot it gives `law.wall_damping`. `dem.engine.yade.assembly.clump` sets
     # masses, so that densities are zero.
@@ -95,6 +104,8 @@ def add_engines(
 
     Args:
         yade: YADE, with the materials already added.
+        adds: what all effects of the scene add.
+        law: law of the contacts.
         hinges: law of the hinges; None where smarticles stay welded.
         gravity: g, downwards [m/s²].
         radius: radius of the spheres [m].

@@ -124,7 +124,11 @@ class Hinges:
         self._pins, self._shafts, self._ends = [], [], []
 
     def _hinges(self) -> Iterator[tuple[int, int, int]]:
-        """Yield the ids of each hinge's nodes: of the barb at centre and at axis end, of the middle link."""
+        """Yield the ids of the three nodes of each hinge, smarticle by smarticle.
+
+        They are the barb's node at the centre of the hinge, its node at the end of the hinge's axis, and the middle
+        link's node at the centre.
+        """
         for links in self._nodes:
             for hinge, barb in enumerate(BARBS):
                 centre, end = links[barb]
@@ -153,7 +157,10 @@ class Hinges:
             phys.maxTwistPl = strength * law.torque_cap / SHAFT_FORCE
 
     def moved(self) -> None:
-        """Discard the twists and gaps that were loaded; YADE has computed them anew in a step."""
+        """Use the twists and gaps that YADE computes; call this after the first step after loading.
+
+        Until then, `angles` and `gaps` return the values that were saved.
+        """
         self._loaded = None
 
     def _twists(self) -> Array:
@@ -175,10 +182,15 @@ class Hinges:
         return np.asarray(-SENSE * np.array(turning).reshape(-1, 2))
 
     def set_torques(self, torques: Array, time_step: float) -> None:
-        """Set the torques (N, 2) of the shafts on the barbs [N m]; positive torques raise the angle.
+        """Set the torques of the shafts on the barbs; positive torques raise the barbs' angles.
 
-        YADE sums changes of twist and tilt over steps, which drift. This method sets the twist, and every
-        `UPDATES_PER_TILT` calls also the tilt, from the present angles; `time_step` is dt [s].
+        In every step YADE adds increments to these torques and to the moments against tilt, the rotation of a barb out
+        of the smarticle's plane, so that errors add up. Each call replaces the torques. Every `UPDATES_PER_TILT` calls
+        the moments against tilt are computed anew from the present orientations.
+
+        Args:
+            torques: (N, 2) torques about the hinges' axes [N m].
+            time_step: dt [s].
         """
         moments = (-SENSE * torques).ravel().tolist()
         for (geom, phys), moment in zip(self._shafts, moments, strict=True):

@@ -148,7 +148,12 @@ class YadeLedger:
         return found
 
     def _contacts(self, before: Velocities) -> Contacts:
-        """Return all contacts after a step; a contact absent in `before` gets its present velocity for it."""
+        """Return all contacts after a step.
+
+        Args:
+            before: relative velocities before the step, by the ids of the two bodies. For a contact that is absent,
+                the velocity after the step is used instead.
+        """
         rows = []
         for contact in contacts_of(self._yade, self._assembly):
             geom, phys = contact.geom, contact.phys

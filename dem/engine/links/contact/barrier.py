@@ -44,7 +44,9 @@ class Step(NamedTuple):
 
 @inlined
 def stretch(depth: float, room: float) -> tuple[float, float, float]:
-    """Return the stretched overlap u [m], its slope u' [1] and the hardening h [1].
+    """Return the stretched overlap u [m], its derivative u' = du/dδ [1] and the hardening h [1].
+
+    The energy of a contact is kn/2 u², the force of its spring kn u u'; its dashpots are multiplied by h.
 
     Args:
         depth: overlap δ [m].
@@ -70,6 +72,8 @@ def stretch(depth: float, room: float) -> tuple[float, float, float]:
 def _demand(depth: float, room: float, closing: float, whole: float) -> float:
     """Return the number of sub-steps per time step that a contact beyond the linear range needs.
 
+    The spring is linear up to an overlap of `LINEAR` times `room`.
+
     Args:
         depth: overlap [m].
         room: overlap at which axes meet [m].
@@ -86,6 +90,8 @@ def _demand(depth: float, room: float, closing: float, whole: float) -> float:
 @inlined
 def resolve(step: Step, depth: float, room: float, closing: float) -> None:
     """Increase `step.need` if a contact is beyond the linear range, or gets there within a time step.
+
+    The spring is linear up to an overlap of `LINEAR` times `room`.
 
     Args:
         step: `need` is increased.

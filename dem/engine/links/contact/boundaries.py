@@ -63,13 +63,15 @@ def slots_for(hooks: Hooks | None, rims: Rims | None) -> int:
 def _note(
     rows: Array, count: int, slot: int, part_of: int, depth: float, room: float, point: Vector, normal: Vector
 ) -> int:
-    """Write a contact with SHARE 1 into row `count` of `rows`; return the new number of rows.
+    """Write a full contact into row `count` of `rows`; return the new number of rows.
+
+    A full contact has the value 1 in the columns `SHARE` and `FACTOR`.
 
     Args:
         rows: (slots, COLUMNS) written; for the columns see `SLOT`.
         count: number of rows so far.
-        slot: place of the contact in the memory of the segment's contacts.
-        part_of: index of the boundary.
+        slot: column of the contact in the memory of contacts, `Kept`.
+        part_of: index of the boundary in `Ground.force`.
         depth: overlap [m].
         room: overlap at which the link's axis would reach the surface, or the axis of the bar [m].
         point: the point on the link's axis [m].
@@ -136,10 +138,19 @@ def contacts_of_segment(
 
 @inlined
 def _contacts_with_wall(radius: float, ground: Ground, slot: int, point: Vector, rows: Array, count: int) -> int:
-    """Append a link end's contacts with the wall and its tiers to `rows`; return the number of rows.
+    """Append the contacts of one end of a link with the wall, its edges and its ceilings to `rows`.
 
-    `point` is the end of the axis [m], `radius` that of the link [m], `slot` the end's first place in the memory of
-    contacts; the wall uses the two places after it. `rows` has `count` rows before.
+    Args:
+        radius: radius of the link [m].
+        ground: the wall.
+        slot: first column of this end in the memory of contacts, `Kept`. Contacts with the wall have the columns
+            `slot` + 1 and `slot` + 2.
+        point: the end of the link's axis [m].
+        rows: (slots, COLUMNS) written; for the columns see `SLOT`.
+        count: number of rows before the call.
+
+    Returns:
+        Number of rows after the call.
     """
     x, y, z = point
     height, r, tiers = z - ground.place[WALL], math.sqrt(x * x + y * y), ground.radii.shape[0]
@@ -174,9 +185,18 @@ def _contacts_with_wall(radius: float, ground: Ground, slot: int, point: Vector,
 
 @inlined
 def _contacts_with_rims(link: Array, ground: Ground, rims: Rims, first: int, rows: Array, count: int) -> int:
-    """Append contacts of a link's inner points with the wall's edges to `rows`; return the number of rows.
+    """Append the contacts of a link, between its two ends, with the circular edges of the wall to `rows`.
 
-    `first` is the first edge's place in the memory of contacts. `rows` has `count` rows before.
+    Args:
+        link: (LINE,) segment of the link.
+        ground: the wall.
+        rims: edges of the wall.
+        first: column of the first edge in the memory of contacts, `Kept`.
+        rows: (slots, COLUMNS) written; for the columns see `SLOT`.
+        count: number of rows before the call.
+
+    Returns:
+        Number of rows after the call.
     """
     if ground.flags[0] == 0:
         return count
@@ -198,7 +218,19 @@ def _contacts_with_rims(link: Array, ground: Ground, rims: Rims, first: int, row
 
 @inlined
 def _contacts_with_hooks(link: Array, ground: Ground, hooks: Hooks, rows: Array, count: int, met: Array) -> int:
-    """Append a segment's contacts with both hooks to `rows` from row `count` on; return the new count."""
+    """Append the contacts of a segment with both hooks to `rows`.
+
+    Args:
+        link: (LINE,) the segment.
+        ground: the heights of the hooks.
+        hooks: the hooks.
+        rows: (slots, COLUMNS) written; for the columns see `SLOT`.
+        count: number of rows before the call.
+        met: scratch of `meeting.meet`.
+
+    Returns:
+        Number of rows after the call.
+    """
     reach = link[RADIUS] + hooks.radius
     for hook in range(2):
         height = ground.place[LOWER + hook]
@@ -316,8 +348,11 @@ def _rub(
 ) -> None:  # fmt: skip
     """Add the force of a boundary on segment `p` to `parts.load`, and its opposite to `ground.force`.
 
-    `contact` (COLUMNS,) has the columns `SLOT` and following. `slip` (4,), stretch [m] and energy [J] of the tangential
-    spring, is updated.
+    Args:
+        ledger: list of forces and their power, see `pairs.enter`; None: it is not needed.
+        step: time since the last forces; its number of sub-steps is increased if needed.
+        contact: (COLUMNS,) the contact, a row of `contacts_of_segment`; for the columns see `SLOT`.
+        slip: (4,) stretch [m] and energy [J] of the tangential spring; updated.
     """
     i, row, damping = segments.body[p], segments.part[p], law.damping[bodies.shape[segments.body[p]], 0]
     depth, share, room, normal = contact[DEPTH], contact[SHARE], contact[ROOM], vector(contact, NORMAL)

@@ -39,9 +39,10 @@ def pull(bodies: Bodies, parts: Parts, cords: Cords, hinged: Any, step: Step) ->
 
     Args:
         parts: forces are added to `load`.
-        cords: the strings; `sums` and `knot` are written.
+        cords: the strings. `knot` is written. Forces times the fraction of a time step that has passed since the last
+            forces are added to `sums`.
         hinged: the motors; None while smarticles are welded.
-        step: time since the last forces, over the length of the time step.
+        step: time since the last forces, and length of a time step; read only.
 
     Returns:
         Power of the strings on the links [W].

@@ -11,11 +11,12 @@ from dem.engine.links.vectors import Vector, add, along, cross, dot, put, scale,
 
 @inlined
 def share_of_step(depth: float, closing: float, dt: float) -> float:
-    """Return a factor on the spring's force [1], below 1 in the first and the last step of a contact.
+    """Return a factor on the normal spring's force [1], below 1 in a contact's first and last step.
 
-    Then bodies are in contact for a part of the step only. The leapfrog scheme conserves kn/2 δ_n δ_n+1 of consecutive
-    overlaps. With this factor the spring does no work in total, whatever its first and last overlap are. With the
-    factor 1 in all steps it would dissipate (ω dt)²/12 of its energy, ω being its angular frequency.
+    In these two steps bodies touch for only a part of the step. With the factor, the spring does no net work over a
+    whole contact, since the leapfrog scheme conserves kn/2 δ_n δ_n+1 with the overlaps δ of successive steps. With a
+    factor of 1 in all steps, the spring would lose (ω dt)²/12 of its energy, where ω is the contact's angular
+    frequency.
 
     Args:
         depth: overlap [m].

@@ -68,12 +68,13 @@ def meet(p: Array, q: Array, stiffness: float, shared_p: int, shared_q: int, out
         p: (LINE,) the first segment.
         q: (LINE,) the second segment.
         stiffness: kn [N/m].
-        shared_p: ends of the first segment that are ends of earlier segments of its body, see `shapes.AT_START`.
-        shared_q: ends of the second segment that are ends of earlier segments of its body.
+        shared_p: bits `shapes.AT_START` and `shapes.AT_END`. A bit is set if this end of the first segment is a joint
+            with an earlier segment of its body.
+        shared_q: the same bits for the second segment.
         out: (ROWS, COLUMNS) written; for the columns see `PLACE`.
 
     Returns:
-        0 if the segments are apart, otherwise 1 + the number of rows with bare forces.
+        0 if the segments do not touch, otherwise 1 + the number of bare forces, which have no friction and no dashpot.
     """
     both, diameter = lines(p, q), p[RADIUS] + q[RADIUS]
     s, t = nearest(both)
@@ -89,9 +90,9 @@ def meet_at(
     both: Lines, s: float, t: float, gap: Vector, distance: float, diameter: float, stiffness: float,
     shared_p: int, shared_q: int, out: Array,
 ) -> int:  # fmt: skip
-    """Find points of contact and forces of segments that touch; return the number of bare forces.
+    """Find the points of contact of two segments that touch, and the forces there.
 
-    A bare force has no friction and no dashpot.
+    Returns the number of bare forces, which have no friction and no dashpot.
 
     Args:
         both: the two segments.
@@ -101,7 +102,8 @@ def meet_at(
         distance: length of `gap` [m].
         diameter: sum of both radii [m].
         stiffness: kn [N/m].
-        shared_p: bits `AT_START` and `AT_END`: ends of the first segment that are ends of earlier segments of its body.
+        shared_p: bits `shapes.AT_START` and `shapes.AT_END`. A bit is set if this end of the first segment is a joint
+            with an earlier segment of its body.
         shared_q: the same bits for the second segment.
         out: (ROWS, COLUMNS) written; for the columns see `PLACE`.
     """
@@ -128,16 +130,17 @@ def meet_at(
 
 @inlined
 def meets_elsewhere(both: Lines, reach: float, shared_p: int, shared_q: int) -> int:
-    """Return the number of places, besides the nearest points, at which `meet_at` may find forces.
+    """Return 0 if `meet_at` finds forces at the nearest points only, otherwise a positive number.
 
-    For most segments it is 0. The code has no branches, since a mispredicted branch takes as long as
-    the whole function. Numbers are bitwise equal to those of `_lie_along` and `_joint`. A joint is the common end of
-    two segments of a body. A joint at the end of a segment, which is rare, always counts.
+    Segments with a joint at their end, which are rare, always give a positive number. The points are computed exactly
+    as in `_lie_along` and `_joint`, so that rounding does not make the results differ. The code has no branches, since
+    a mispredicted branch takes as long as the whole function.
 
     Args:
         both: the two segments.
         reach: square of the sum of both radii [m²].
-        shared_p: bits `AT_START` and `AT_END`: ends of the first segment that are ends of earlier segments of its body.
+        shared_p: bits `shapes.AT_START` and `shapes.AT_END`. A bit is set if this end of the first segment is a joint
+            with an earlier segment of its body.
         shared_q: the same bits for the second segment.
     """
     b, d, e = both.b, both.d, both.e
@@ -192,13 +195,16 @@ def _note(
 def _lie_along(
     both: Lines, deepest: float, u: float, slope: float, diameter: float, stiffness: float, out: Array
 ) -> int:
-    """Write contacts at both ends of the stretch over which two segments lie along each other.
+    """Write the contacts at both ends of the length over which two segments lie along each other.
+
+    For δ0, u0 and u0' see the top of this module. Row 0 of `out` must have the contact at the nearest points, row
+    `ENERGY` its energy; both are updated.
 
     Args:
         both: the two segments.
-        deepest: overlap δ0 [m].
-        u: stretched overlap u0 [m].
-        slope: u0' [1].
+        deepest: overlap δ0 at the nearest points [m].
+        u: u0, the stretched overlap there [m].
+        slope: u0', the derivative of u0 by δ0 [1].
         diameter: sum of both radii [m].
         stiffness: kn [N/m].
         out: (ROWS, COLUMNS) written; for the columns see `PLACE`.
@@ -258,17 +264,18 @@ def _lie_along(
 def _joint(
     both: Lines, diameter: float, stiffness: float, s: float, t: float, sign: float, bare: int, out: Array
 ) -> int:
-    """Subtract or add the contact of a joint, a common end of two segments, with another segment.
+    """Subtract or add the contact between the joint of one segment and a point of the other segment.
 
-    Energy and force change as stated at the top of this module. The force is written as a bare force, which has no
-    friction and no dashpot.
+    A joint is a common end of two segments of a body; the top of this module states why its contact is subtracted or
+    added. Row `ENERGY` of `out` changes by its energy. Its force is written as a bare force, without friction and
+    dashpot.
 
     Args:
-        both: the two segments, of which one ends at the joint.
+        both: the two segments, at least one of which has a joint.
         diameter: sum of both radii [m].
         stiffness: kn [N/m].
-        s: place of the joint, or of the point that it touches, along the first segment, 0 to 1.
-        t: place of that point, or of the joint, along the second segment, 0 to 1.
+        s: place along the first segment, 0 to 1: 0 or 1 if the joint is that segment's.
+        t: place along the second segment, 0 to 1: 0 or 1 if the joint is that segment's.
         sign: -1 to subtract, 1 to add.
         bare: number of bare forces that `out` has before the call.
         out: (ROWS, COLUMNS) updated; for the columns see `PLACE`.

@@ -59,7 +59,14 @@ ROWS, POINT, PUSH, POWER, GAIN = 0, 2, 5, 8, 9
 
 @inlined
 def _extended(stretch: Any, row: int, velocity: Vector, arm: Vector) -> Vector:
-    """Return `velocity` plus that by the stretching of part `row`, `arm` [m] from its reference point."""
+    """Return `velocity` plus the velocity that the stretching of part `row` causes at a point [m/s].
+
+    Args:
+        stretch: `Parts.stretch`; None if no body is flexible.
+        row: number of the part.
+        velocity: velocity of the point if the part did not stretch [m/s].
+        arm: vector from the part's reference point to the point [m].
+    """
     if stretch is None:
         return velocity
     axis = vector(stretch[row], AXIS)
@@ -104,7 +111,8 @@ def enter(ledger: Array, rows: tuple[int, int], place: Vector, force: Vector, po
         rows: numbers of the two parts in contact; -1 for a boundary.
         place: point of contact [m].
         force: force on the first part [N].
-        power: half of the power of `force` with the velocities before the kick [W].
+        power: half of the power of `force` at the velocities before the kick [W]. The other half, at the velocities
+            after the kick, is added by `dem.engine.links.stepping.settle`.
         gain: energy that the tangential spring took up [J].
     """
     n = int(ledger[0, 0]) + 1

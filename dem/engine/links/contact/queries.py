@@ -57,10 +57,14 @@ class Found(NamedTuple):
 
 @part
 def _query_pairs(segments: Segments, pairs: Pairs, stiffness: float, found: Found) -> tuple[int, float]:
-    """Query all pairs of the wide list, with the stiffness kn [N/m], and update the results `found`.
+    """Find all contacts between bodies, among the pairs of segments in the wide list.
+
+    Args:
+        stiffness: kn [N/m].
+        found: results; `met`, `touches` and `depth` are updated.
 
     Returns:
-        Number of rows of `met` that were written, and energy of all normal springs [J].
+        Number of rows of `found.met` that were written, and energy of all normal springs between bodies [J].
     """
     line, count, energy, out = segments.line, 0, 0.0, found.out
     for k in range(pairs.counts[0]):
@@ -86,7 +90,15 @@ def _query_pairs(segments: Segments, pairs: Pairs, stiffness: float, found: Foun
 def _query_boundaries(
     segments: Segments, ground: Ground, channel: Any, hooks: Any, rims: Any, stiffness: float, found: Found
 ) -> float:
-    """Query all contacts with boundaries into `found`; return the energy of springs of `stiffness` kn [J]."""
+    """Find all contacts of bodies with boundaries; return the energy of their normal springs [J].
+
+    Args:
+        channel: (1,) half the distance of a channel's walls [m]; None in a container.
+        hooks: the hooks; None: no hooks.
+        rims: edges of the wall that links can reach; None: no such edges.
+        stiffness: kn of contacts with boundaries [N/m].
+        found: results; `touches`, `held` and `depth` are updated.
+    """
     squares = 0.0
     for p in range(segments.line.shape[0]):
         i = segments.body[p]
@@ -106,16 +118,17 @@ def query_all(
     segments: Segments, pairs: Pairs, kept: Kept, boundaries: Boundaries, stiffness: float, wall_stiffness: float,
     found: Found,
 ) -> tuple[int, float]:  # fmt: skip
-    """Query all contacts, between bodies those of the wide list.
+    """Find all contacts, of bodies with each other and with boundaries.
 
     Args:
+        pairs: lists of near segments; contacts between bodies are found in the wide list.
         kept: memory of the contacts with boundaries; read for the energy of tangential springs.
         stiffness: kn of contacts between bodies [N/m].
         wall_stiffness: kn of contacts with boundaries [N/m].
         found: results; `touches`, `held` and `depth` must be zero before the call.
 
     Returns:
-        Number of rows of `met` that were written, and energy of all springs [J].
+        Number of rows of `found.met` that were written, and energy of all springs [J].
     """
     count, energy = _query_pairs(segments, pairs, stiffness, found)
     energy += _query_boundaries(
@@ -128,7 +141,10 @@ def query_all(
 def find_extremes(
     bodies: Bodies, segments: Segments, depths: Array, velocities: Array, energy: float, extremes: Array
 ) -> None:
-    """Compute extremes over all bodies, which mostly suffice to show that the watchdog's limits hold.
+    """Compute extremes over all bodies.
+
+    A run is checked against limits of speed, position, overlap and energy. If the extremes are within these limits, a
+    full check of all bodies is not needed.
 
     Args:
         depths: (N,) see `Found.depth`.

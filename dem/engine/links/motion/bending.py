@@ -180,12 +180,14 @@ def _bend_of(one: Piece, two: Piece) -> Bend:
 
 @inlined
 def _push_bend(out: Array, i: int, moments: Vector, one: Piece, two: Piece, bend: Bend) -> None:
-    """Add the forces and torques of bending moments between the segments i - 1 and i to `out`.
+    """Add the forces and torques of bending and twisting between the segments i - 1 and i to `out`.
 
     Args:
         out: (n, 4) force on each node [N], torque about each segment's axis [N m].
-        moments: derivatives of the energy by κ1, κ2 and the twist [N m].
-        one: segment i - 1; `two` is segment i.
+        i: number of the node between the two segments.
+        moments: derivatives of the energy by κ1, κ2 and the twist m [N m].
+        one: segment i - 1.
+        two: segment i.
         bend: angles between the two segments.
     """
     m1, m2, twist = moments
@@ -203,9 +205,15 @@ def _push_bend(out: Array, i: int, moments: Vector, one: Piece, two: Piece, bend
 
 @inlined
 def _rates(one: Piece, two: Piece, bend: Bend, slope: float) -> Vector:
-    """Return the rates of κ1, κ2 and ν between two segments, that of ν times `slope` [1/s].
+    """Return the rates of change of κ1 and κ2, and that of ν times dν/dm [1/s].
 
-    `slope` is the derivative of ν by the twist, `bend` has the angles between the segments.
+    For κ1, κ2, ν and the twist m see the top of this module.
+
+    Args:
+        one: the first segment.
+        two: the next segment.
+        bend: angles between the two segments.
+        slope: dν/dm [1].
     """
     d1, e1, d2, e2 = bend.along
     both = add(one.opening, two.opening)
@@ -425,14 +433,22 @@ def _uniform(seed: int, number: int, event: int) -> float:
 
 @part
 def _wait(gait: Array) -> float:
-    """Return a random time to the next reversal of a wave [s]; `gait`: (GAIT,), its `DRAWN` is increased."""
+    """Return a random time from one reversal of a filament's wave to the next [s].
+
+    Args:
+        gait: (GAIT,) state of the wave; for the columns see `PSI`. The number of draws, `DRAWN`, is increased by 1.
+    """
     gait[DRAWN] += 1
     return float(-math.log(_uniform(int(gait[SEED]), int(gait[NUMBER]), int(gait[DRAWN]))) / gait[REVERSALS])
 
 
 @part
 def _turn_wave(gait: Array, dt: float) -> None:
-    """Advance a filament's wave (GAIT,) by `dt` [s]: its factor, its angle ψ, and due reversals."""
+    """Advance the wave of a filament's preferred curvature by a time `dt` [s].
+
+    Args:
+        gait: (GAIT,) state of the wave, for the columns see `PSI`; factor, angle ψ and sense are updated.
+    """
     change, rest = gait[CHANGE] * dt, gait[TARGET] - gait[FACTOR]
     gait[FACTOR] = gait[TARGET] if abs(rest) <= change else gait[FACTOR] + math.copysign(change, rest)
     gait[PSI] += gait[SENSE] * gait[RATE] * dt

@@ -47,7 +47,7 @@ def planar_at(shapes: Shapes, k: int) -> Planar:
 
 @kernel
 def lay_out(planar: Planar, alpha1: float, alpha2: float, row: Array) -> None:
-    """Compute the plane geometry of one smarticle.
+    """Compute the plane geometry of one smarticle; for u_k, b and A see the top of this module.
 
     Args:
         alpha1: angle of barb 1 [rad]; 0: straight, π/2: the U.
@@ -71,9 +71,10 @@ def lay_out_at(planar: Planar, alpha1: float, alpha2: float, row: Array) -> None
 
 @inlined
 def direction(angle: float) -> tuple[float, float]:
-    """Return the cosine and the sine of an angle [rad] of a few turns at most.
+    """Return the cosine and the sine of an angle [rad], exact to rounding up to a few turns.
 
-    Source: kernels of fdlibm (k_sin.c, k_cos.c), after a reduction of the angle to ±π/4 with π/2 in two parts.
+    A multiple of π/2 is subtracted so that the angle is within ±π/4; π/2 is stored as a sum of two numbers to lose no
+    digits. The series are those of fdlibm (k_sin.c, k_cos.c).
     """
     turns = math.floor(angle * QUARTERS + 0.5)
     x = (angle - turns * QUARTER) - turns * QUARTER_REST

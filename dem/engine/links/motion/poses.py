@@ -57,7 +57,10 @@ def _move(parts: Parts, row: int, velocity: Vector, spin: Vector, origin: Vector
 
 @inlined
 def find_motion(shapes: Shapes, bodies: Bodies, parts: Parts, i: int, hinged: Any) -> None:
-    """Write the motion of body `i`'s parts about its centre of mass; `hinged`: motors, None while welded."""
+    """Write velocity, angular velocity and reference point of each part of body `i` into `parts.motion`.
+
+    The reference point of all parts is the body's centre of mass. `hinged` is None while smarticles are welded.
+    """
     row, position = parts.begin[i], vector(bodies.position[i], 0)
     velocity, spin = vector(bodies.velocity[i], 0), vector(bodies.spin[i], 0)
     if hinged is not None and shapes.hinged[bodies.shape[i]]:
@@ -79,7 +82,15 @@ def find_motion(shapes: Shapes, bodies: Bodies, parts: Parts, i: int, hinged: An
 
 @inlined
 def _planar_line(planar: Planar, plane: Array, link: int) -> tuple[float, float, float, float]:
-    """Return x, y of a link's start from the centre of mass, and of its vector [m], by its plane geometry."""
+    """Return the axis of a smarticle's link, which lies in the xy plane of the body's frame.
+
+    Args:
+        plane: (PLANE,) plane geometry of the smarticle.
+        link: 0 barb 1, 1 middle link, 2 barb 2.
+
+    Returns:
+        x and y of the start of the axis from the centre of mass [m]; x and y of the vector from start to end [m].
+    """
     x, y, ux, uy = -planar.end - plane[0], -plane[1], 2 * planar.end, 0.0
     if link == 0:
         x, ux, uy = -planar.half - plane[0], planar.tip * plane[10], planar.tip * plane[11]

@@ -22,8 +22,9 @@ def update_lists(bodies: Bodies, segments: Segments, pairs: Pairs, cells: Cells,
 
     Args:
         cells: scratch of the search; its length sets the largest number of pairs.
-        skins: (7,) thinnest skin [m], thickest skin [m] and time that a skin should last [s]: 0 to 2 for the tight
-            list, 3 to 5 for the wide list; 6: width of a strip of the search [m].
+        skins: (7,) limits of skins, the distances by which segments may move before a list is rebuilt. 0 to 2, for the
+            tight list: thinnest skin [m], thickest skin [m], time that a skin should last [s]. 3 to 5: the same for the
+            wide list. 6: width of a strip of the search [m].
 
     Returns:
         GOOD, or FULL if there is no room for all pairs.

@@ -1,4 +1,7 @@
-"""Find all pairs of segments that are nearer than the sum of their radii, skins and a bare reach.
+"""Find all pairs of segments that are nearer to each other than a limit.
+
+The limit is the sum of both radii, both skins (distances by which segments may move until the next search) and a
+constant distance, the bare reach.
 
 Every link has a box about all its segments, enlarged by their radii, their skins and half the bare reach. Boxes are
 sorted by their lower corners into strips along y and, within a strip, into short bins along x. All boxes that can
@@ -38,7 +41,10 @@ class Grid(NamedTuple):
 
 @inlined
 def off_lines(line: Array, p: int, q: int, reach: float) -> bool:
-    """Return whether the infinite lines through the axes p and q are farther apart than `reach` [m]."""
+    """Return whether the infinite lines through two axes are farther apart than `reach` [m].
+
+    The axes are those of the segments in the rows p and q of `line` (…, LINE).
+    """
     one, other = line[p], line[q]
     normal = cross(vector(one, 3), vector(other, 3))
     across = dot(sub(vector(one, 0), vector(other, 0)), normal)
@@ -47,7 +53,7 @@ def off_lines(line: Array, p: int, q: int, reach: float) -> bool:
 
 @inlined
 def near_each_other(line: Array, p: int, q: int, reach: float) -> bool:
-    """Return whether the axes p and q are nearer than `reach` [m]."""
+    """Return whether the axes of the segments in the rows p and q of `line` are nearer than `reach` [m]."""
     both = lines(line[p], line[q])
     s, t = nearest(both)
     gap = between(both, s, t)
@@ -105,7 +111,13 @@ def search(segments: Segments, cells: Cells, bare: float, piece: float) -> int:
 
 @inlined
 def _bin(offset: float, size: float, last: int) -> int:
-    """Return the number of the bin of a size [m] for an offset [m], from 0 to `last`; NaN gives 0."""
+    """Return the number of the bin that contains a coordinate, from 0 to `last`; NaN gives 0.
+
+    Args:
+        offset: the coordinate, from the lower end of the first bin [m].
+        size: size of a bin [m].
+        last: number of the last bin, which contains all larger coordinates.
+    """
     return int(min(offset / size, float(last))) if offset > 0.0 else 0
 
 
@@ -125,7 +137,12 @@ def find_boxes(segments: Segments, cells: Cells, bare: float) -> None:
 
 @inlined
 def grid_over(cells: Cells, bare: float, piece: float) -> Grid:
-    """Return strips of the width `piece` [m], and bins, for the boxes of all links; `bare` is in `Grid`."""
+    """Return strips and bins for the boxes of all links, which must be in `cells.own`.
+
+    Args:
+        bare: bare reach, which the grid stores [m].
+        piece: width of a strip [m]; bins are a quarter of it long.
+    """
     x0, y0, x1, y1, tallest = math.inf, math.inf, -math.inf, -math.inf, 0.0
     for link in range(cells.keys.shape[0]):
         box = cells.own[link]
@@ -163,7 +180,11 @@ def sort_bins(cells: Cells, grid: Grid) -> None:
 
 @inlined
 def copy_by_bin(segments: Segments, cells: Cells) -> None:
-    """Copy boxes and segments of links in the order of the bins, and number the groups of pairs."""
+    """Copy boxes and segments of links in the order of the bins, and number the groups of pairs.
+
+    A group has all pairs with the same first segment. All fields of `cells` from `boxes` to `numbers`, and `places`,
+    are written.
+    """
     few, n = cells.marks.shape[0] <= FEW, 0
     for m in range(cells.keys.shape[0]):
         link = cells.order[m]
