@@ -59,7 +59,7 @@ def bare(stream: TextIO) -> TextIO:
 
 @contextmanager
 def printable() -> Iterator[None]:
-    """Make standard output and error write control characters as escapes, during a block."""
+    """Context manager in which standard output and error write control characters as escapes."""
     out, error = (cast(TextIO, Printable(stream)) for stream in (sys.stdout, sys.stderr))
     with redirect_stdout(out), redirect_stderr(error):
         yield

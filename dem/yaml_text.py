@@ -58,13 +58,15 @@ StrictLoader.add_implicit_resolver("tag:yaml.org,2002:int", _INT, list("-+012345
 
 
 def read_text(path: Path) -> str:
-    """Return the text of a UTF-8 file, cut off where it is longer than `load_yaml` accepts."""
+    """Return the text of a UTF-8 file, cut off one character beyond the length that `load_yaml` accepts."""
     with path.open(encoding="utf-8") as file:
         return file.read(LONGEST + 1)
 
 
 def load_yaml(text: str, loader: type[Any] = StrictLoader) -> Any:
-    """Return the data of a YAML text; raise yaml.YAMLError if it is not valid. For users see `parse_yaml`.
+    """Return the data of a YAML text; raise yaml.YAMLError if it is not valid.
+
+    `parse_yaml` does the same, and raises InputError with a message for users.
 
     Args:
         loader: `StrictLoader`, a subclass of it, or another loader that makes plain data only.

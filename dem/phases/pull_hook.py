@@ -123,17 +123,22 @@ _DEFAULTS = {"distance_m": (2, 0), "speed_m_per_s": (1, 0)}
 
 
 def with_pull_defaults(phase: Any, sizes: tuple[float, float]) -> Any:
-    """Return unvalidated data of a phase; missing keys of a pull-hook are computed from `sizes`.
+    """Return unvalidated data of a phase; in those of a pull-hook, missing keys are filled in.
 
     Args:
         phase: data of a phase of any type.
-        sizes: w and t2 of the smarticle, or the longest bar and smallest thickness of other bodies [m].
+        sizes: lengths from which the defaults follow [m]: (w, t2) of the smarticle, or (longest bar, smallest
+            thickness) of other bodies.
     """
     pulls = isinstance(phase, Mapping) and phase.get("type") == "pull-hook"
     return with_defaults(phase, _DEFAULTS, sizes) if pulls else phase
 
 
 def _force_sum(engine: Engine) -> list[float]:
-    """Return the force (x, y, z) on the upper hook, summed over all steps [N]; constant without contact."""
+    """Return the force (x, y, z) on the upper hook, summed over all time steps so far [N].
+
+    The mean force between two steps is the difference of their sums over the number of steps. The sum does not change
+    while nothing touches the hook.
+    """
     total: list[float] = engine.boundaries.hook_sums[1].tolist()
     return total

@@ -331,7 +331,11 @@ def _mismatches(scene: SceneView, taken: Taken) -> Iterator[str]:
 
 
 def _within_tips(vertices: Array, radius: float) -> Array:
-    """Return vertices (N, 4, 3) with both tips moved inwards by a radius [m], to centres of spheres."""
+    """Return smarticles' vertices (N, 4, 3) [m] with both tips moved inwards by a sphere's radius [m].
+
+    Moved tips are the centres of spheres that end at the original tips. A tip moves along its barb, or along the middle
+    link if barbs have no length, at most to the other end.
+    """
     moved = vertices.copy()
     for tip, hinge, far in ((0, 1, 2), (3, 2, 1)):
         # Without barbs the middle link ends at the tips.
@@ -359,7 +363,10 @@ def _in_cross(cross: Cross, vertices: Array) -> Flags:
 
 
 def _angles(taken: Taken) -> Array:
-    """Return (N, 2) angles of the barbs [deg]; absolute values if the frame holds vertices but no angles."""
+    """Return the barbs' angles (N, 2) in a frame [deg].
+
+    If the frame does not hold them they are computed from the vertices, which give absolute values only.
+    """
     recorded = taken.frame.cell_data.get("angle_rad")
     if recorded is not None:
         return np.asarray(np.degrees(recorded[:, [0, 2]]))

@@ -32,20 +32,29 @@ class MotorLaw:
 
 
 def speed_factor(law: int, over: Any) -> Any:
-    """Return the factor on a motor's speed limit [1] under a law; `over`: the torque is at its limit."""
+    """Return the factor on a motor's speed limit [1].
+
+    It is `EASED` under the law "ease" at the torque limit, and otherwise 1.
+
+    Args:
+        law: index of the law in `LAWS`.
+        over: whether the torque has reached its limit.
+    """
     return 1.0 - (1.0 - EASED) * over if law == EASE else 1.0
 
 
 def halts(law: int, over: Any, advance: Any, torque: Any, findings: Any) -> Any:
-    """Return whether a motor halts; under the laws "slip" and "servo", which never halt, return `over`.
+    """Return whether a motor halts, or for the laws "slip" and "servo" whether it is at its torque limit.
+
+    Motors never halt under "slip" and "servo".
 
     Args:
-        law: number of the law in `LAWS`.
+        law: index of the law in `LAWS`.
         over: whether the torque has reached its limit.
         advance: change of the command that the schedule requires [rad], or its rate [rad/s]; only the sign matters.
         torque: torque on the barb since the last control update [N m].
-        findings: number of consecutive updates, of barb 1 and barb 2 in turn, that found the torque at its limit; the
-            present update included.
+        findings: how many times in a row a barb of the smarticle was found at the torque limit, this time included. An
+            update looks at barb 1, then at barb 2, and both share one count.
     """
     if law == HALT:
         return over & (advance * torque > 0.0)
@@ -57,12 +66,13 @@ def halts(law: int, over: Any, advance: Any, torque: Any, findings: Any) -> Any:
 class Motors:
     """Two motors on each of N smarticles.
 
-    A motor turns one end of its shaft to the command. The barb is at the other end, at the actual angle, and receives
-    the torque k (command - actual). Under the law "stall" the load of an elastic contact stays, so that a motor starts
-    again only after neighbours have moved.
+    A motor turns one end of its shaft to an angle, the command. The barb is at the other end, at the actual angle, and
+    receives the torque k (command - actual). A motor halted under the law "stall" keeps its command, and with it the
+    load of its contacts, so that it starts again only after neighbouring bodies have moved.
 
     Args:
-        angles: (N, 2) angles at the start [rad].
+        law: parameters of the motors.
+        angles: (N, 2) angles of the barbs at the start [rad].
         strengths: (N, 2) factors on torque limit and stiffness [1]; None: 1 for all motors.
     """
 

@@ -1,10 +1,10 @@
 """Choose engine and fidelity for a scene, from a table of measured errors and costs.
 
-`smarticles accuracy` measures a table on one scene. The shipped table joins the tables of three scenes, each
-named by its activity: the types of phases that drive the pile. A row has the errors of one named fidelity, and the
-ratio of the measured processor time to the planned wall time. This ratio corrects the wall times planned for other
-scenes. The column `knob` states what a row compares: `engine` all engines with one reference, `fidelity` the fidelities
-of one engine.
+A fidelity is a named set of numerical parameters: `draft`, `standard` or `reference`. `smarticles accuracy` measures a
+table on one scene. The shipped table joins the tables of three scenes, each named by its activity: the types of phases
+that drive the pile. A row has the errors of one named fidelity, and the ratio of the measured processor time to the
+planned wall time. This ratio corrects the wall times planned for other scenes. The column `knob` states what a row
+compares: `engine` all engines with one reference, `fidelity` the fidelities of one engine.
 """
 
 import csv
@@ -58,7 +58,7 @@ class Error:
 
 @dataclass(frozen=True, kw_only=True)
 class Measured:
-    """Errors and cost of one named fidelity of an engine, from the table."""
+    """One fidelity (`draft`, `standard` or `reference`) of an engine, with its errors and cost from the table."""
 
     fidelity: str
     errors: tuple[Error, ...]  #: Errors of the quantities that decide a choice
@@ -158,10 +158,13 @@ def read_table(
 
 
 def _named_fidelities(rows: Sequence[dict[str, str]]) -> dict[tuple[str, str], dict[str, str]]:
-    """Return the rows of named fidelities by engine and fidelity, from coarse to fine.
+    """Return the rows of named fidelities by (engine, fidelity), engine by engine, from coarse to fine.
 
-    All rows have one value of the column `knob`, since their errors must have one reference: `engine` if there are such
-    rows, or else `fidelity`.
+    Only rows whose errors have the same reference are returned: those with `engine` in the column `knob` if there are
+    any, otherwise those with `fidelity`.
+
+    Args:
+        rows: all rows of the table: texts by name of the column.
     """
     named = {row[_VALUE]: row for row in rows if row[_KNOB] == "engine"} or {
         # Older tables lack the column.
@@ -229,7 +232,9 @@ class Choice:
 def choose(
     scene: Scene, table: AccuracyTable, *, max_error: float | None = None, max_hours: float | None = None
 ) -> Choice:
-    """Choose the cheapest fidelity within `max_error`, or without it the most exact within `max_hours`.
+    """Choose the cheapest fidelity within `max_error`; if that is None, the most exact within `max_hours`.
+
+    One of the two limits must be given.
 
     Args:
         scene: the scene; its own engine and fidelity are ignored.
@@ -237,7 +242,7 @@ def choose(
         max_hours: longest wall time on one core [h].
 
     Raises:
-        InputError: no fidelity is within the limit; the message gives a limit that can be kept.
+        InputError: no fidelity is within the limits; the message gives a limit that can be kept.
     """
     plans: dict[str, Plan] = {}
     expected: list[Measured] = []
@@ -259,17 +264,19 @@ def choose(
 
 
 def pick(expected: Sequence[Measured], *, max_error: float | None, max_hours: float | None) -> tuple[Measured, str]:
-    """Return the fidelity that `choose` takes, and in words the limit that decided.
+    """Return the fidelity that `choose` takes, and the limit that decided, in words.
 
-    If `max_error` is given, the cheapest fidelity within it is returned. Otherwise the reference is returned if it
-    takes at most `max_hours`. If it takes longer, each engine's finest fidelity within `max_hours` is a candidate, and
-    the candidate with the least known error is returned.
+    If `max_error` is given, this is the cheapest fidelity within it. Otherwise it is the reference, to which all errors
+    are relative, if the reference takes at most `max_hours`. If it takes longer, each engine's finest fidelity within
+    `max_hours` is a candidate, and the candidate with the least error is taken; unknown errors count as infinite.
 
     Args:
         expected: fidelities of all engines, those of one engine from coarse to fine.
+        max_error: largest relative error [1].
+        max_hours: longest wall time [h].
 
     Raises:
-        InputError: no fidelity is within the limit.
+        InputError: no fidelity is within the limits, or the cheapest one within `max_error` takes too long.
     """
     quick = [one for one in expected if max_hours is None or one.hours <= max_hours]
     if max_error is None:

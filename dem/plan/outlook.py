@@ -106,7 +106,11 @@ class Plan:
         return "\n".join(lines)
 
     def _engine_to_text(self) -> list[str]:
-        """Return lines on fidelity keys that the engine ignores and, on links, the fidelity; none on YADE."""
+        """Return lines about the engine, and about the fidelity if the engine is links; no lines for YADE.
+
+        The lines name the fidelity keys that have no effect on the engine. On links they also give rows, stiffness and
+        time step.
+        """
         idle = ", ".join(engine_kind(self.engine).idle_knobs)
         if not self.strands:
             return [f"engine {self.engine}: {idle} have no meaning here"] if idle else []
@@ -246,7 +250,10 @@ def recording_warnings(scene: Scene) -> tuple[str, ...]:
 
 
 def protocol_lines(scene: Scene) -> tuple[str, ...]:
-    """Return lines about keys that have, or have not, the protocol's values; () without a protocol."""
+    """Return lines that list which keys have the values of the scene's protocol, and which have others.
+
+    A protocol is a named set of values of scene keys. Without a protocol there are no lines: ().
+    """
     if scene.protocol is None:
         return ()
     kept, other = [], []
@@ -260,7 +267,13 @@ def protocol_lines(scene: Scene) -> tuple[str, ...]:
 
 
 def _protocol_keys(scene: Scene, rules: Mapping[str, Mapping[str, Any]]) -> Iterator[tuple[str, Any, Any]]:
-    """Yield the keys of a protocol's `rules` that apply to a scene, with the scene's and the rules' value."""
+    """Yield (key, value in the scene, value in the protocol) for each key of a scene that the protocol sets.
+
+    A key is dotted, such as `phases.0.moves`.
+
+    Args:
+        rules: the protocol: values by key, by part of the scene or type of phase.
+    """
     for part in PARTS:
         if applies(part, plane=scene.plane is not None, tiers=scene.container.tiers is not None):
             for key, value in rules[part].items():

@@ -17,7 +17,10 @@ MOST_PER_STEP = 0.05
 
 
 def stable_step(scene: Scene) -> float:
-    """Return the largest stable time step [s] of a scene, with hinges if any phase has motors."""
+    """Return the largest stable time step [s] of a scene.
+
+    If any phase has motors, it is the step for smarticles with hinges; otherwise for rigid smarticles.
+    """
     return engine_kind(scene.engine).stable_step(scene, articulated=scene.actuates)
 
 
@@ -55,10 +58,11 @@ def time_step(scene: Scene) -> float:
 def time_steps(scene: Scene) -> tuple[float, ...]:
     """Return the time step [s] of each phase.
 
-    Until motors act for the first time, smarticles are rigid in their initial shape. Phases until then have the time
-    step of a scene without motors, and results that are bitwise equal to those of such a scene. Later a welded
-    smarticle keeps the barb angles that its motors reached, for which only the time step of a scene with motors is
-    known to be stable. In a plane, or if `fidelity.time_step_s` is given, all phases have one step.
+    All phases have the step of `time_step`, with one exception. Phases before the first one with motors have the longer
+    step of a scene without motors, since their smarticles are still rigid in the initial shape. Their results are
+    bitwise equal to those of that scene. Smarticles that are welded later keep the barb angles that their motors
+    reached, for which the longer step is not known to be stable. In a plane, or if `fidelity.time_step_s` is given,
+    there is no exception.
 
     Raises:
         InputError: as in `time_step`, or a wall, hook, string or shaking moves too fast for the step of its phase.
@@ -81,7 +85,11 @@ def _steps_in(interval: float, wanted: float) -> int:
 
 
 def _check_speeds(scene: Scene, steps: Sequence[float]) -> None:
-    """Reject boundaries or strings too fast for contacts; `steps` has the time step of each phase [s]."""
+    """Raise InputError if boundaries or strings move so fast in a time step that contacts cannot follow.
+
+    Args:
+        steps: time step of each phase [s].
+    """
     diameter = scene.sphere_diameter
     for index, (phase, step) in enumerate(zip(scene.phases, steps, strict=True)):
         most = MOST_PER_STEP * diameter / step

@@ -18,11 +18,12 @@ Columns = Mapping[str, Column]  #: Datasets by name, in the order of the file
 
 
 def _columns(*, whole_names: bool = False, **described: str | tuple[str, str]) -> Columns:
-    """Return columns by name.
+    """Return columns by name, each with the unit that ends its name: `speed_m_per_s` has m/s.
 
     Args:
-        whole_names: whether missing labels are whole names; otherwise they are names without units.
-        described: description, or pair of label and description, by name. Units follow from the ends of the names.
+        whole_names: whether a column without a label of its own is labelled by its whole name; otherwise by its name
+            without the unit, with blanks for underscores.
+        described: by name of the column, its description, or a pair (label, description).
     """
     found = {}
     for name, text in described.items():

@@ -133,7 +133,7 @@ class Manifest(Document):
 
     @property
     def measured_radius_m(self) -> float:
-        """Radius for packing fractions [m]."""
+        """Radius r in packing fractions [m]: `packing_radius_m` if it is given, otherwise the container's radius."""
         return self.container_radius_m if self.packing_radius_m is None else self.packing_radius_m
 
     def walled(self, phase: int) -> bool:

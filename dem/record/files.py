@@ -13,11 +13,11 @@ from dem.record.names import partial
 
 @contextlib.contextmanager
 def whole(path: Path, *, before: Path | None = None, shared: bool = False) -> Iterator[Path]:
-    """Yield a temporary path, which is renamed to `path` if the block succeeds, and is removed otherwise.
+    """Context manager: yield a temporary path; rename it to `path` at the end, or remove it after an error.
 
     Args:
-        before: path to which an existing file is moved; None: it is overwritten.
-        shared: whether several processes may write the file at once.
+        before: path to which an existing file at `path` is moved first; None: that file is replaced.
+        shared: whether several processes may write the file at once; each then has its own temporary path.
     """
     name = f"{path.stem}.{os.getpid()}{path.suffix}" if shared else path.name
     temporary = path.with_name(partial(name))
@@ -69,7 +69,12 @@ def write_text(path: Path, text: str, *, make_folder: bool = True) -> None:
 
 
 def reject_inflated(archive: zipfile.ZipFile | None, most: int) -> None:
-    """Raise ValueError if an archive, which may be malicious, would unpack to more than `most` bytes."""
+    """Raise ValueError if a ZIP archive, which may be malicious, would unpack to too many bytes.
+
+    Args:
+        archive: the archive; None is accepted.
+        most: largest accepted number of unpacked bytes.
+    """
     total = sum(member.file_size for member in archive.infolist()) if archive else 0
     if total > most:
         raise ValueError(f"it would unpack to {total} bytes, at most {most} are possible")

@@ -26,7 +26,10 @@ VERTICES = 4
 
 
 def _remedy(path: Path) -> str:
-    """Return advice about an unreadable frame, which a resumed run would not write again."""
+    """Return advice to the user about a frame that cannot be read, for an error message.
+
+    To resume the run is no remedy, since it would not write the frame again.
+    """
     if path.suffix == ".vtkhdf":
         return REMEDY.format(path.with_name(SCENE))
     scene = path.parent.parent / SCENE
@@ -77,7 +80,10 @@ def motor_fields(
     work: Array | None = None,
     halted: Flags | None = None,
 ) -> dict[str, NDArray[Any]]:
-    """Return cell data (3N,) of scenes with motors, by name; NaN on middle links.
+    """Return the fields that frames of scenes with motors add: (3N,) cell data by name, one value per link.
+
+    The fields are `angle_rad`, `motor_torque_N_m`, `motor_work_J` and `halted`. Middle links, and all links where an
+    argument is None, have NaN; in `halted`, which holds 0 and 1, they have 0.
 
     Args:
         angles: (N, 2) angles of the barbs [rad].
@@ -246,7 +252,12 @@ def read_frame(path: Path | str, number: int | None = None) -> Frame:
     form = _form(points, lines, reject, general=general)
 
     def per_link(name: str, kind: Any, *shape: int) -> NDArray[Any]:
-        """Return cell data as the type `kind`, (N, 3, …) of smarticles, or (M, …) of other bodies."""
+        """Remove and return cell data by name: (N, 3, …) of smarticles, (M, …) of other bodies.
+
+        Args:
+            kind: type of the numbers that are returned.
+            shape: shape of the value of one link: none for a number, 3 for a vector.
+        """
         values = data.pop(name, None)
         if values is None:
             reject(f"cell data '{name}' is missing")

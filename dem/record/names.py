@@ -43,5 +43,5 @@ def partial(name: str) -> str:
 
 
 def is_partial(name: str) -> bool:
-    """Return whether a name is one that `partial` gives, as of a file that a killed process left."""
+    """Return whether a name is one that `partial` gives; killed processes leave such files behind."""
     return name.startswith(".") and ".partial." in name

@@ -193,7 +193,7 @@ def _foreign(file: h5py.File) -> str | None:
 
 
 def _wrong(attributes: dict[str, Any], data: dict[str, NDArray[Any]]) -> str | None:
-    """Return in words what is wrong with the content of a file; None for correct content."""
+    """Return in words what is wrong with the attributes or datasets of `series.h5`; None if nothing is."""
     for key in ("format", "scene_sha256", "seed"):
         if key not in attributes:
             return f"attribute '{key}' is missing"

@@ -96,7 +96,10 @@ def read_step(path: Path, number: int) -> meshio.Mesh:
 
 
 def check_times(path: Path, times: Sequence[float]) -> None:
-    """Raise InputError unless the first steps have these times [s] and a run can continue after them."""
+    """Raise InputError unless the first steps have these times [s] and any later steps can be removed.
+
+    This is checked in memory, before a run is resumed; the file does not change. Without times nothing is checked.
+    """
     if not times:
         return
     if not np.array_equal(read_times(path)[: len(times)], times):
@@ -113,8 +116,9 @@ def _make(root: Any, name: str, empty: NDArray[Any], rows: int) -> None:
     """Create a dataset without rows.
 
     Args:
-        empty: array with the type and the shape of rows, (0, …).
-        rows: rows of a chunk; only chunks of `_CHUNK` rows are compressed, since each step changes shorter ones.
+        empty: array without rows, (0, …), that has the type and the shape of the rows to come.
+        rows: number of rows in a chunk. Chunks of `_CHUNK` rows are compressed. Shorter ones are not, since they grow
+            with every step.
     """
     packed = {"compression": 4, "shuffle": True} if rows == _CHUNK else {}
     shape = empty.shape[1:]
@@ -141,14 +145,15 @@ def _append(root: Any, mesh: meshio.Mesh, time: float) -> None:
 
 
 def _lines(root: Any, lines: NDArray[np.int64], points: int) -> dict[str, Any]:
-    """Add the lines of a step, unless they are equal to the lines of the previous step.
+    """Add the lines of a step to the file, unless they are equal to the lines of the previous step.
 
     Args:
         lines: (n, 2) numbers of the points that lines join.
         points: number of points of the step.
 
     Returns:
-        Entries of the step in the lists of offsets of parts and lines, by name of the list.
+        Where the step's lines begin in the file: the values for the lists `PartOffsets`, `CellOffsets` and
+        `ConnectivityIdOffsets`, by these names.
     """
     parts, number, stored = len(root["NumberOfPoints"]), len(lines), root["Lines"]
     part, cell, end = parts - 1, len(stored["Offsets"]) - (number + 1), len(stored["Connectivity"]) - 2 * number
@@ -245,7 +250,7 @@ def _opened(path: Path) -> Iterator[Any]:
 
 
 def _stamp(path: Path) -> tuple[float, ...]:
-    """Return sizes and times of a file and its journal, which differ before and after any change."""
+    """Return sizes and modification times of a file and its journal; any change of the file changes them."""
     found: list[float] = []
     for each in (path, journal_of(path)):
         try:

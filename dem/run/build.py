@@ -44,7 +44,7 @@ KEPT_WITHIN = 0.01
 
 
 def build_engine(scene: Scene, dt: float) -> Engine:
-    """Return a simulation of a scene that has no smarticles yet.
+    """Return the engine for a scene: a simulation to which no smarticles have been added yet.
 
     Args:
         dt: shortest time step of all phases [s]; whether it is stable is not checked.
@@ -53,7 +53,12 @@ def build_engine(scene: Scene, dt: float) -> Engine:
 
 
 def build_recorder(scene: Scene, out: Path, progress: ProgressWriter) -> Recorder:
-    """Return the recorder of a scene, which writes into the run directory `out`, and its watchdog."""
+    """Return the recorder of a scene, with the watchdog that it calls.
+
+    Args:
+        out: run directory into which the recorder writes.
+        progress: writer that the recorder tells the progress of the run.
+    """
     recording = scene.recording
     # A mould of tiers has no single radius, and a plane has none.
     radius = math.nan if scene.cylinder.upper or scene.plane else scene.container.measured_radius

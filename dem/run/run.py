@@ -52,7 +52,8 @@ def run_scene(
         progress: whether to draw a progress line on the terminal.
         resume: whether to continue from the newest undamaged checkpoint, or from the start if none was written.
         builders: functions that make the parts of the run; None: default functions.
-        stop: request to stop by SIGUSR1, which may have come before this call; None: signals are noted from now on.
+        stop: `StopRequest` of a caller that has listened for SIGUSR1 already; if it has come, the run stops before
+            its first step. None: listening begins with the simulation.
 
     Raises:
         InputError: `out` holds other files, or another process writes into it.
@@ -148,7 +149,10 @@ def _saved(scene: Scene, out: Path, made_by: tuple[str, str]) -> tuple[Checkpoin
 
 @contextlib.contextmanager
 def _of_checkpoint(out: Path) -> Iterator[None]:
-    """Raise InputError in place of any other error of a block that reads a checkpoint, except RunError."""
+    """Context manager for code that uses a checkpoint: replace any unexpected error by an InputError.
+
+    An InputError or RunError is passed on.
+    """
     try:
         yield
     except (InputError, RunError):
@@ -181,10 +185,13 @@ def _restore(simulation: Simulation, saved: tuple[Checkpoint, str | None] | None
 
 
 def _mark_ended(simulation: Simulation | None, claim: Claim, log: logging.Logger, error: BaseException) -> str:
-    """Write the series and `failed.json` after an error; return the cause in words.
+    """Write the series and `failed.json` after an error has ended a run; return the cause in words.
 
-    If the run failed, the text also has the last checkpoint. Nothing is written if the run directory was moved, which
-    `claim` shows. `simulation` is None if it could not be built.
+    If the run failed, rather than being interrupted, the text ends with the time of the last checkpoint.
+
+    Args:
+        simulation: the run; None: the error came before it was built.
+        claim: lock of the run directory. If it shows that the directory was moved, nothing is written.
     """
     status: Ended = "interrupted" if isinstance(error, StopRequestedError | KeyboardInterrupt) else "failed"
     cause = "interrupted by the user" if isinstance(error, KeyboardInterrupt) else str(error)
@@ -305,7 +312,10 @@ def _processor() -> str:
 
 
 def _blas() -> str:
-    """Return name and kernels of NumPy's BLAS, for the manifest; results of links do not depend on BLAS."""
+    """Return name, version and kernels of NumPy's BLAS, for the manifest.
+
+    The results of the engine links do not depend on it.
+    """
     built = np.show_config(mode="dicts")["Build Dependencies"]["blas"]
     forced = os.environ.get("OPENBLAS_CORETYPE", "")
     return f"{built.get('name')} {built.get('version')}, kernels {forced or 'by the processor'}"

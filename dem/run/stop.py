@@ -12,13 +12,16 @@ class StopRequestedError(Exception):
 
 
 class StopRequest:
-    """A record of whether SIGUSR1 has come while `listening` was active."""
+    """A request to stop: `came` is true once SIGUSR1 has come while `listening` was active."""
 
     came: bool = False
 
     @contextmanager
     def listening(self) -> Iterator[None]:
-        """Note SIGUSR1 during a block, instead of being killed by it; without effect outside the main thread."""
+        """Context manager: note in `came` that SIGUSR1 has come, instead of being killed by it.
+
+        Outside the main thread it has no effect.
+        """
         if threading.current_thread() is not threading.main_thread():
             yield
             return

@@ -17,7 +17,11 @@ APART = 1.0  # m; distance of smarticles, which touch nothing: code is compiled 
 
 
 def compile_for(scene: Scene) -> None:
-    """Compile all code for a scene: make a step, query and record in each kind of its phases."""
+    """Compile all code for a scene, by making time steps and queries of the engine in a test set-up.
+
+    The scene's number of bodies are put far apart. Steps are made with rigid bodies, with motors and strings if the
+    scene has them, and with the wall lifted if a phase does so.
+    """
     engine = engine_kind(scene.engine).build(scene, min(time_steps(scene)))
     places = np.zeros((scene.count, 3))
     places[:, 0 if scene.plane is not None else 2] = APART * (1 + np.arange(scene.count))

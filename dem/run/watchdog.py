@@ -34,11 +34,14 @@ class Watchdog:
     _ceiling: float = math.inf  # limit of kinetic and potential energy less the work done [J]
 
     def within_limits(self, extremes: Extremes, *, floor: float, raised: float | None = 0.0) -> bool:
-        """Return whether extremes over all bodies show that all limits hold, except the limit of the energy.
+        """Return whether the extremes over all bodies prove that all limits hold, except the limit of the energy.
 
-        If the result is false, the limits may hold nevertheless: `check` and `check_depths` must decide. `floor` is
-        its height, `raised` the distance by which the upper hook may have lifted bodies [m]; None: the wall does not
-        enclose the pile.
+        This test is quick but too strict. If the result is false, `check` and `check_depths` must decide.
+
+        Args:
+            floor: height of the floor [m].
+            raised: None if the wall does not enclose the pile, so that it is not checked. A number, for `check` the
+                rise of the upper hook [m], has no effect here.
         """
         inside = extremes.lowest >= floor
         if raised is not None:
@@ -58,14 +61,15 @@ class Watchdog:
         raised: float | None = 0.0,
         gaps: Array | None = None,
     ) -> None:
-        """Check speeds, hinges and positions of all smarticles.
+        """Check speeds, hinges and positions of all smarticles; raise RunError beyond a limit.
 
         Args:
             floor: height of the floor [m].
-            points: (N, P, 3) centres of the spheres, or points of the links' axes [m]; None: centres of mass.
-                The check of overlaps does not replace them: YADE underestimates overlaps beyond wall or floor.
+            points: (N, P, 3) points that must be inside the container [m]: centres of the spheres, or points of the
+                links' axes; None: centres of mass. The check of overlaps cannot replace this one, since YADE
+                underestimates overlaps beyond wall or floor.
             raised: distance by which the upper hook may have lifted bodies since the start [m]; None: the wall does not
-                enclose the pile.
+                enclose the pile, and only the floor bounds it.
             gaps: (N, 2) distances between the links of each hinge [m]; None while welded.
         """
         positions = state.positions
@@ -131,14 +135,14 @@ class Watchdog:
     def check_energy(self, state: PileState, *, energy: float, elastic: float, time: float) -> None:
         """Check that the energy has not increased by more than work and springs can explain.
 
-        Contacts, hinges and welding dissipate energy, and their springs return at most what they store. Kinetic and
-        potential energy less the work done can therefore not exceed their value at any earlier time by more than the
-        elastic energy at that time. The lowest of these ceilings is the limit.
+        E is the kinetic and potential energy, less all energy added and all work done since the start. Contacts, hinges
+        and welding dissipate energy, and their springs return at most what they store. E can therefore exceed its value
+        at an earlier check by at most the elastic energy at that check. RunError is raised if E exceeds the least of
+        these sums by more than `self.energy`.
 
         Args:
             state: poses and velocities of the bodies, to name the fastest ones.
-            energy: kinetic and potential energy, less all energy added and all work done since the start [J]; NaN if
-                the work is unknown at present, which removes the ceiling.
+            energy: E [J]; NaN if the work is unknown at present, so that earlier checks no longer count.
             elastic: upper bound of the elastic energy of contacts and hinges [J].
         """
         if math.isnan(energy):

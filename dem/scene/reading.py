@@ -121,10 +121,11 @@ def apply_override(data: Any, override: str) -> None:
 
 
 def _plain(scene: Scene) -> dict[str, Any]:
-    """Return the resolved scene as plain data, without keys of `ADDED_KEYS` and others at their defaults.
+    """Return the resolved scene as plain data, without default values of keys added to the format later.
 
-    These keys were added to the format later; without them the hashes of older scenes stay. A scene with a protocol
-    keeps `packing_radius_m` and the keys of `ADDED_KEYS`, since a protocol may have filled them in.
+    Without such keys, among them `ADDED_KEYS`, the hashes of older scenes do not change. A scene with a protocol keeps
+    `packing_radius_m` and `ADDED_KEYS`, since the protocol may have filled them in. A scene of other bodies than
+    smarticles has no key `smarticle`.
     """
     data = scene.model_dump(mode="json")
     smarticle = data["smarticle"]

@@ -83,7 +83,7 @@ def _of_particle(scene: SceneView) -> Iterator[str]:
 
 
 def _of_filaments(scene: SceneView, engine: str) -> Iterator[str]:
-    """Yield an error for each key or phase that filaments exclude, and for each that needs filaments."""
+    """Yield an error for each key or phase that does not go with filaments, or that needs them and has none."""
     mixture = scene.mixture
     flexible = [kind.filament is not None for kind in mixture.kinds] if mixture is not None else [False]
     if not any(flexible):

@@ -49,10 +49,14 @@ _LEAST_GRAVITY = 1e-6  # m/s²; below it motors, whose torque limit is proportio
 
 
 def _named(base: str, given: Mapping[str, Any], diameter: Any = None) -> Mapping[str, Any]:
-    """Return the parameters of the named fidelity `base`, adapted to the valid parts `given` of a scene.
+    """Return the parameters of a named fidelity by key of `Fidelity`, adapted to a scene.
 
-    On the engine links `rows` is 1 if the scene has a plane, if t1 is at most t2, or if `diameter`, its
-    `fidelity.diameter_m`, is not None.
+    On the engine links `rows` is 1 in a plane, for t1 ≤ t2, and if a sphere diameter is given.
+
+    Args:
+        base: name of the fidelity.
+        given: parts of the scene that are validated already, by name.
+        diameter: `fidelity.diameter_m`; None: not given.
     """
     engine, smarticle = given.get("engine", ""), given.get("smarticle") or Smarticle()
     narrow = smarticle.thickness_normal_m <= smarticle.thickness_in_plane_m
@@ -169,7 +173,10 @@ class Scene(Part):
     @model_validator(mode="wrap")
     @classmethod
     def _stiff_enough(cls, data: Any, handler: ModelWrapValidatorHandler[Self]) -> Self:
-        """Return the validated scene; on links, increase the named stiffness if loads and speeds need more."""
+        """Return the validated scene; on the engine links, increase kn if loads and speeds need more.
+
+        Only a kn that comes from the named fidelity is increased; one that the scene gives is kept.
+        """
         scene = handler(data)
         given = data.get("fidelity") if isinstance(data, Mapping) else scene.fidelity
         chosen = given is not None and not isinstance(given, str | Mapping)
@@ -259,13 +266,16 @@ class Scene(Part):
         return self._diameter_of(smarticle.thickness_normal_m, smarticle.thickness_in_plane_m, rows)
 
     def _diameter_of(self, normal: float, in_plane: float, rows: int, *, disc: bool = False) -> float:
-        """Return the diameter [m] of the spheres in a chain, or swept on links, for a section of a bar.
+        """Return the diameter [m] of the spheres that stand for a bar with a given cross-section.
+
+        A bar is a chain of spheres, or on the engine links a sphere that is swept along the bar's axis. If
+        `fidelity.diameter_m` is given, it is the diameter of all bars.
 
         Args:
-            normal: thickness along the normal [m].
-            in_plane: thickness in the plane [m].
+            normal: thickness t1 of the bar, along the normal [m].
+            in_plane: thickness t2 of the bar, in its plane [m].
             rows: number of rows of spheres along the normal.
-            disc: whether the section is a disc.
+            disc: whether the cross-section is a disc.
         """
         if self.fidelity.diameter_m is not None:
             return self.fidelity.diameter_m
@@ -386,7 +396,7 @@ class Scene(Part):
 
     @property
     def bodies(self) -> tuple[Particle | Kind, ...]:
-        """One body of each kind; damping in the contact law is for the effective mass of the first."""
+        """One body of each kind. The damping in the contact law is computed from the effective mass of the first."""
         return bodies_of(self.model)
 
 

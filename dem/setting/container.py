@@ -72,7 +72,7 @@ class Container(Part):
 
     @property
     def measured_radius(self) -> float:
-        """Radius for packing fractions [m]."""
+        """Radius r in packing fractions [m]: `packing_radius_m` if it is given, otherwise `radius_m`."""
         return self.radius_m if self.packing_radius_m is None else self.packing_radius_m
 
 

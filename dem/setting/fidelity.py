@@ -81,7 +81,7 @@ _BY_ENGINE: Mapping[str, Mapping[str, Mapping[str, Any]]] = {
 
 
 def fidelities(engine: str) -> Mapping[str, Mapping[str, Any]]:
-    """Return an engine's named fidelities from coarse to fine: values of `Fidelity`'s keys by name.
+    """Return an engine's named fidelities from coarse to fine: by name, the values of `Fidelity`'s keys.
 
     An unknown engine gets the fidelities for YADE.
     """

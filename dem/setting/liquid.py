@@ -14,5 +14,5 @@ class Liquid(Part):
 
     @property
     def immersing(self) -> Immersing:
-        """This liquid, as a filament's data, `dem.body.filament.Liquid`."""
+        """The same liquid as an object that filaments use, `dem.body.filament.Liquid`."""
         return Immersing(viscosity=self.viscosity_Pa_s, density=self.density_kg_per_m3)
