@@ -114,9 +114,10 @@ def draw_scene(number: int, engine: str = "links") -> dict[str, Any]:
 
 # -- the checker -------------------------------------------------------------------------------------------------------
 
-DEPTH = {"draft": 0.3, "standard": 0.22, "reference": 0.15}
-"""Largest penetration of floor or wall by fidelity, over the thickness of a link: what each name promises."""
-SOFTEST = 0.65  # of scenes that give a stiffness of their own: half of the mean width of a square section, 4/π thick
+DEPTH = {"draft": 0.24, "standard": 0.17, "reference": 0.12}
+"""Largest penetration of floor or wall by fidelity, over the mean width of a link's section, 2 (t1 + t2)/π: what each
+name promises."""
+SOFTEST = 0.5  # the same for scenes that give a stiffness of their own
 ENERGY = 0.01  # largest excess of energy, over the supplied energy
 INSIDE = 1e-3  # least distance of a crossing from the ends of a segment, over the length of the segment
 
@@ -201,7 +202,8 @@ def check_run(path: Path, scene: Mapping[str, Any]) -> dict[str, Any]:
 
     The value "wrong" describes all failed checks; it is empty if all passed.
     """
-    thickness = min(scene["smarticle"]["thickness_normal_m"], scene["smarticle"]["thickness_in_plane_m"])
+    section = scene["smarticle"]["thickness_normal_m"], scene["smarticle"]["thickness_in_plane_m"]
+    thickness = min(section)
     radius, wall = scene["container"]["radius_m"], scene["container"]["height_m"]
     wrong: list[str] = []
     floor_depth = wall_depth = moved = -np.inf
@@ -228,6 +230,7 @@ def check_run(path: Path, scene: Mapping[str, Any]) -> dict[str, Any]:
     fidelity = scene["fidelity"]
     own = isinstance(fidelity, dict) and "stiffness_N_per_m" in fidelity
     most = SOFTEST if own else DEPTH[fidelity["base"] if isinstance(fidelity, dict) else fidelity]
+    most *= 2 * sum(section) / np.pi / thickness
     if floor_depth > most:
         wrong.append(f"{floor_depth:.2f} thicknesses below the floor")
     if wall_depth > most:

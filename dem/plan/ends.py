@@ -1,0 +1,76 @@
+"""Reject scenes that cannot end well: without any loss of energy, or with a wall that bodies are thrown over.
+
+A body that is thrown down at v rebounds with e v. A body at rest that the floor hits at v leaves with (1 + e) v. Both
+rise by the square of their speed over 2g. Other bodies and the height of the pile are not considered. Impacts without
+loss take energy by friction alone, which neither smooth contacts nor contacts that stick have.
+"""
+
+import math
+from collections.abc import Iterator
+
+from dem.errors import InputError
+from dem.phases.deposit import Deposit
+from dem.phases.shake import Shake
+from dem.scene.scene import Scene
+from dem.setting.part import LONGEST_LENGTH
+
+# Least height of the wall over the estimated rise of bodies. Of random extreme scenes on links, all stayed inside that
+# had estimates up to 0.9 of the wall, and none from 1.0 on.
+MARGIN = 1.1
+STICKS = 5.0  # friction from which on less than 1/(1 + μ²) = 4 % of impacts slide, in random directions
+
+
+def check_ends(scene: Scene) -> None:
+    """Raise InputError if nothing in a scene loses energy, or if its wall is too low."""
+    if scene.plane is not None or scene.liquid is not None or not scene.gravity_m_per_s2:
+        return
+    for index, phase in enumerate(scene.phases):
+        if phase.frees:
+            return
+        problems: Iterator[str] = iter(())
+        if isinstance(phase, Deposit):
+            problems = _of_pour(scene, phase)
+        elif isinstance(phase, Shake):
+            problems = _of_shaking(scene, phase, index)
+        for problem in problems:
+            raise InputError(problem)
+
+
+def _of_pour(scene: Scene, pour: Deposit) -> Iterator[str]:
+    contact, gravity, speed = scene.contact, scene.gravity_m_per_s2, pour.thrown_at_m_per_s
+    frictions = contact.friction_smarticle, contact.friction_wall
+    if contact.restitution == 1 and not any(0 < friction < STICKS for friction in frictions):
+        yield (
+            f"contact.restitution: 1 at friction {frictions[0]:g} and {frictions[1]:g} (smarticles, wall) loses next "
+            "to no energy, since nothing rubs: what phases.0 (deposit) pours does not come to rest; use at most 0.95, "
+            "or friction from 0.1 to 1"
+        )
+    rise = (contact.restitution * speed) ** 2 / (2 * gravity)
+    least = MARGIN * rise
+    if least > scene.cylinder.height:
+        yield (
+            f"phases.0.thrown_at_m_per_s: what is thrown at {speed:g} m/s rebounds by {rise:.3g} m at "
+            f"contact.restitution = {contact.restitution:g}, out of the wall of {scene.cylinder.height:.3g} m; use at "
+            f"most {0.995 * speed * math.sqrt(scene.cylinder.height / least):.3g} m/s{_higher(least)}"
+        )
+
+
+def _of_shaking(scene: Scene, shake: Shake, index: int) -> Iterator[str]:
+    gravity, peak = scene.gravity_m_per_s2, shake.peak_acceleration_g
+    if peak <= 1:  # nothing leaves the floor
+        return
+    # The wall is at its lowest when the body is at its highest.
+    speed = (1 + scene.contact.restitution) * shake.pushing_speed(gravity)
+    rise = shake.amplitude(gravity) + speed**2 / (2 * gravity)
+    least = MARGIN * rise
+    if least > scene.cylinder.height:
+        yield (
+            f"phases.{index}.frequency_hz: {shake.frequency_hz:g} Hz at Γ = {peak:g} throws smarticles up by "
+            f"{rise:.3g} m, out of the wall of {scene.cylinder.height:.3g} m; use at least "
+            f"{1.005 * shake.frequency_hz * math.sqrt(least / scene.cylinder.height):.3g} Hz{_higher(least)}"
+        )
+
+
+def _higher(least: float) -> str:
+    """Return a way out by the height of the wall [m], if any wall may be so high."""
+    return f" or container.height_m: {1.005 * least:.3g}" if 1.005 * least < LONGEST_LENGTH else ""
