@@ -87,3 +87,10 @@ def test_a_wall_that_is_taken_away_is_not_in_the_way() -> None:
     check_ends(small(low | {"phases": [{"type": "deposit"}, {"type": "remove-container"}, shake]}))
     with pytest.raises(InputError, match="throws smarticles up"):
         check_ends(small(low | {"phases": [{"type": "deposit"}, shake]}))
+
+
+def test_a_few_smarticles_thrown_as_by_the_code_of_the_paper_are_accepted() -> None:
+    for count, ratio in ((1, 0.0), (10, 0.4), (50, 0.0)):
+        check_ends(small({"count": count, "smarticle.aspect_ratio": ratio, "phases.0.thrown_at_m_per_s": 2.0}))
+    with pytest.raises(InputError, match="rebounds by"):
+        check_ends(small({"phases.0.thrown_at_m_per_s": 3.0}))
