@@ -111,3 +111,16 @@ def test_a_servo_needs_a_control_update_in_every_step() -> None:
     assert time_step(chain()) == pytest.approx(1e-4)
     with pytest.raises(InputError, match=r"fidelity.control_interval_s: 0.0005 s is 5 time steps, but a servo"):
         time_step(chain({"fidelity.control_interval_s": 5e-4}))
+
+
+@pytest.mark.parametrize(("engine", "shorter"), [("links", 2.0), ("yade", 1.0)])
+def test_steps_on_links_are_half_as_long_where_impacts_lose_nothing(engine: str, shorter: float) -> None:
+    def relative_step(restitution: float) -> float:
+        # A long interval, so that a whole number of steps fits into it.
+        recording = {"series_interval_s": 0.1, "frame_interval_s": 0.1, "checkpoint_interval_s": None}
+        scene = small({"engine": engine, "contact.restitution": restitution, "recording": recording})
+        return time_step(scene) / stable_step(scene)
+
+    assert relative_step(0.95) / relative_step(0.96) == pytest.approx(shorter, rel=0.01)
+    given = {"engine": engine, "contact.restitution": 1, "fidelity": {"base": "draft", "time_step_s": 2e-5}}
+    assert time_step(small(given)) == pytest.approx(2e-5)
