@@ -197,13 +197,20 @@ def crossings(before: Array, after: Array) -> list[tuple[int, int]]:
     return list(zip(i[found].tolist(), j[found].tolist(), strict=True))
 
 
+def accepted_depth(scene: Mapping[str, Any]) -> float:
+    """Return the largest accepted penetration of floor or wall [m]."""
+    fidelity, smarticle = scene["fidelity"], scene["smarticle"]
+    own = isinstance(fidelity, dict) and "stiffness_N_per_m" in fidelity
+    most = SOFTEST if own else DEPTH[fidelity["base"] if isinstance(fidelity, dict) else fidelity]
+    return float(most * 2 * (smarticle["thickness_normal_m"] + smarticle["thickness_in_plane_m"]) / np.pi)
+
+
 def check_run(path: Path, scene: Mapping[str, Any]) -> dict[str, Any]:
     """Check the finished run of a scene of `draw_scene`; return measured values by quantity.
 
     The value "wrong" describes all failed checks; it is empty if all passed.
     """
-    section = scene["smarticle"]["thickness_normal_m"], scene["smarticle"]["thickness_in_plane_m"]
-    thickness = min(section)
+    thickness = min(scene["smarticle"]["thickness_normal_m"], scene["smarticle"]["thickness_in_plane_m"])
     radius, wall = scene["container"]["radius_m"], scene["container"]["height_m"]
     wrong: list[str] = []
     floor_depth = wall_depth = moved = -np.inf
@@ -227,10 +234,7 @@ def check_run(path: Path, scene: Mapping[str, Any]) -> dict[str, Any]:
             crossed.update(pairs)
             first = first if first is not None or not pairs else frame.time
         last = vertices
-    fidelity = scene["fidelity"]
-    own = isinstance(fidelity, dict) and "stiffness_N_per_m" in fidelity
-    most = SOFTEST if own else DEPTH[fidelity["base"] if isinstance(fidelity, dict) else fidelity]
-    most *= 2 * sum(section) / np.pi / thickness
+    most = accepted_depth(scene) / thickness
     if floor_depth > most:
         wrong.append(f"{floor_depth:.2f} thicknesses below the floor")
     if wall_depth > most:
