@@ -24,7 +24,7 @@ from dem.setting.plane import Plane
 
 CHECK_INTERVAL = 0.01  # s between checks whether a layer has come down, a pile has settled, or a force is too large
 SETTLE_SECONDS = 0.35  # s, typical time in which a poured pile settles
-CALMER = 0.75  # a pile comes to rest while its kinetic energy falls below this part of itself in half a longest wait
+CALMER = 0.9  # a pile comes to rest while its kinetic energy falls below this part of itself in half a longest wait
 
 Memory = dict[str, Any]
 
