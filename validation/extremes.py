@@ -114,9 +114,10 @@ def draw_scene(number: int, engine: str = "links") -> dict[str, Any]:
 
 # -- the checker -------------------------------------------------------------------------------------------------------
 
-DEPTH = {"draft": 0.3, "standard": 0.22, "reference": 0.15}
-"""Largest penetration of floor or wall by fidelity, over the thickness of a link: what each name promises."""
-SOFTEST = 0.65  # of scenes that give a stiffness of their own: half of the mean width of a square section, 4/π thick
+DEPTH = {"draft": 0.24, "standard": 0.17, "reference": 0.12}
+"""Largest penetration of floor or wall by fidelity, over the mean width of a link's section, 2 (t1 + t2)/π: what each
+name promises."""
+SOFTEST = 0.5  # the same for scenes that give a stiffness of their own
 ENERGY = 0.01  # largest excess of energy, over the supplied energy
 INSIDE = 1e-3  # least distance of a crossing from the ends of a segment, over the length of the segment
 
@@ -196,6 +197,14 @@ def crossings(before: Array, after: Array) -> list[tuple[int, int]]:
     return list(zip(i[found].tolist(), j[found].tolist(), strict=True))
 
 
+def accepted_depth(scene: Mapping[str, Any]) -> float:
+    """Return the largest accepted penetration of floor or wall [m]."""
+    fidelity, smarticle = scene["fidelity"], scene["smarticle"]
+    own = isinstance(fidelity, dict) and "stiffness_N_per_m" in fidelity
+    most = SOFTEST if own else DEPTH[fidelity["base"] if isinstance(fidelity, dict) else fidelity]
+    return float(most * 2 * (smarticle["thickness_normal_m"] + smarticle["thickness_in_plane_m"]) / np.pi)
+
+
 def check_run(path: Path, scene: Mapping[str, Any]) -> dict[str, Any]:
     """Check the finished run of a scene of `draw_scene`; return measured values by quantity.
 
@@ -225,9 +234,7 @@ def check_run(path: Path, scene: Mapping[str, Any]) -> dict[str, Any]:
             crossed.update(pairs)
             first = first if first is not None or not pairs else frame.time
         last = vertices
-    fidelity = scene["fidelity"]
-    own = isinstance(fidelity, dict) and "stiffness_N_per_m" in fidelity
-    most = SOFTEST if own else DEPTH[fidelity["base"] if isinstance(fidelity, dict) else fidelity]
+    most = accepted_depth(scene) / thickness
     if floor_depth > most:
         wrong.append(f"{floor_depth:.2f} thicknesses below the floor")
     if wall_depth > most:

@@ -5,7 +5,7 @@ import pytest
 
 from dem.errors import InputError
 from dem.scene.reading import parse_scene
-from validation.extremes import crossings, draw_scene, surface
+from validation.extremes import accepted_depth, crossings, draw_scene, surface
 
 ALONG_X = np.array([[-3.0, 0, 0], [-1, 0, 0], [1, 0, 0], [3, 0, 0]])
 ALONG_Y = ALONG_X[:, [1, 0, 2]]
@@ -50,3 +50,12 @@ def test_a_link_that_stands_or_lies_on_the_floor_is_not_below_it() -> None:
     for vertices, depth in ((standing, 0.0), (lying, 0.0), (lying - [0, 0, 0.2], 0.2)):
         points, inset = surface(vertices[None], thickness)
         assert (inset - points[:, 2]).max() == pytest.approx(depth)
+
+
+@pytest.mark.parametrize(
+    ("fidelity", "depth"),
+    [("draft", 0.24), ({"base": "standard", "rows": 2}, 0.17), ({"base": "draft", "stiffness_N_per_m": 100.0}, 0.5)],
+)
+def test_the_accepted_depth_is_a_part_of_the_mean_width_of_the_section(fidelity: object, depth: float) -> None:
+    section = {"thickness_normal_m": 2e-3, "thickness_in_plane_m": 1e-3}
+    assert accepted_depth({"fidelity": fidelity, "smarticle": section}) == pytest.approx(depth * 6e-3 / np.pi)

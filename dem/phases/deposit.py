@@ -12,11 +12,22 @@ from dem.body.placement import place_layer
 from dem.body.state import spheres_of
 from dem.engine.interface import Engine
 from dem.errors import RunError
-from dem.phases.phase import CHECK_INTERVAL, SETTLE_SECONDS, Memory, Phase, SceneView, Settle, Stage, has_settled
+from dem.phases.phase import (
+    CHECK_INTERVAL,
+    SETTLE_SECONDS,
+    Memory,
+    Phase,
+    SceneView,
+    Settle,
+    Stage,
+    begin_wait,
+    has_settled,
+    waits_in_vain,
+)
 from dem.setting.part import Part, Speed
 
-# Time after which a layer must have landed: at least 2 s, and 10 times that of a fall √(2h/g) over the wall's height h,
-# the longest fall that there is; at 9.81 m/s² the fall of a layer takes less than 0.1 s.
+# Time after which a layer must have landed, or lose energy: at least 2 s, and 10 times that of a fall √(2h/g) over the
+# wall's height h, the longest fall that there is; at 9.81 m/s² the fall of a layer takes less than 0.1 s.
 LAYER_TIMEOUT = 2.0  # s
 LANDING_FALLS = 10
 LAYER_SECONDS = 0.125  # s, typical time between two layers of a pour; measured on YADE and links, N = 100 … 270
@@ -82,10 +93,11 @@ class Deposit(Part, Phase):
 
     def first_memory(self, scene: SceneView) -> Memory:
         rng = np.random.default_rng(scene.seed_for("deposit"))
-        # `left`: bodies to pour; `layer`: bodies of the layer that falls; `waited`: time since the pour of that
-        # layer, or since the last one landed [s]; `still`: time for which the pile has been still [s].
-        state = rng.bit_generator.state
-        return {"left": scene.count, "layer": 0, "waited": 0.0, "still": 0.0, "random": state}
+        # `left`: bodies to pour; `layer`: bodies of the layer that falls; `still`: time for which the pile has been
+        # still [s]. A wait begins with the pour of a layer, and when it has landed.
+        memory: Memory = {"left": scene.count, "layer": 0, "still": 0.0, "random": rng.bit_generator.state}
+        begin_wait(memory)
+        return memory
 
     def proceed(self, stage: Stage, engine: Engine) -> float:
         memory = stage.memory
@@ -103,21 +115,22 @@ class Deposit(Part, Phase):
         return CHECK_INTERVAL
 
     def _check_layer(self, memory: Memory, engine: Engine, gravity: float) -> None:
-        size, limit = memory["layer"], self.landed_speed_m_per_s
-        fastest = float(-engine.state().velocities[-size:, 2].min())
+        size, limit, state = memory["layer"], self.landed_speed_m_per_s, engine.state()
+        fastest = float(-state.velocities[-size:, 2].min())
         # Contacts are looked for only where the answer depends on them.
         aloft = int((engine.touches()[-size:] == 0).sum()) if fastest < limit else 0
         timeout = max(LAYER_TIMEOUT, LANDING_FALLS * math.sqrt(2 * engine.cylinder.height / gravity))
         if fastest < limit and not aloft:
-            memory.update(layer=0, waited=0.0)
-        elif memory["waited"] > timeout:
+            memory["layer"] = 0
+            begin_wait(memory)
+        elif waits_in_vain(memory, state.kinetic_energy, timeout):
             cause = f"the fastest falls at {fastest:.3g} m/s, limit {limit:g} m/s; raise phases.0.landed_speed_m_per_s"
             if fastest < limit:
                 cause = (
                     f"{aloft} of them touch nothing at {gravity:g} m/s² of gravity, so that they still fall or bounce; "
                     "lower contact.restitution or phases.0.layer_height_w, or raise gravity_m_per_s2"
                 )
-            raise RunError(f"a layer of {size} had not come down {timeout:.3g} s after it was poured: {cause}")
+            raise RunError(f"a layer of {size} had not come down {memory['judged']:.3g} s after it was poured: {cause}")
 
     def _pour(self, stage: Stage, engine: Engine) -> None:
         scene, memory = stage.scene, stage.memory
@@ -158,4 +171,5 @@ class Deposit(Part, Phase):
         if kinds is not None:
             poses = replace(poses, kinds=kinds)
         engine.add(poses, speed=self.thrown_at_m_per_s)
-        memory.update(left=memory["left"] - size, layer=size, waited=0.0, random=rng.bit_generator.state)
+        memory.update(left=memory["left"] - size, layer=size, random=rng.bit_generator.state)
+        begin_wait(memory)

@@ -24,6 +24,7 @@ from dem.setting.plane import Plane
 
 CHECK_INTERVAL = 0.01  # s between checks whether a layer has come down, a pile has settled, or a force is too large
 SETTLE_SECONDS = 0.35  # s, typical time in which a poured pile settles
+CALMER = 0.9  # a pile comes to rest while its kinetic energy falls below this part of itself in half a longest wait
 
 Memory = dict[str, Any]
 
@@ -182,28 +183,59 @@ class Settle(Part):
         0.05, ge=1e-9, le=1e6, description="mean net force on a smarticle over its weight [1]"
     )
     hold_s: float = Field(0.05, ge=0, le=1e6, description="time for which both limits must hold [s]")
-    timeout_s: Duration = Field(5.0, description="longest wait [s]; then the run fails with the residuals")
+    timeout_s: Duration = Field(
+        5.0,
+        description="longest wait [s] while the pile loses little energy; then the run fails with the residuals",
+    )
+
+
+def begin_wait(memory: Memory) -> None:
+    """Note in the memory of a stage that a wait begins, for `waits_in_vain`."""
+    # `waited`: time since the wait began [s], which the stage adds up; `judged`: length of the wait at the last verdict
+    # [s]; `energy` and `before`: largest kinetic energies since that verdict, and between it and the one before [J].
+    memory.update(waited=0.0, judged=0.0, energy=0.0, before=0.0)
+
+
+def waits_in_vain(memory: Memory, energy: float, longest: float) -> bool:
+    """Return whether a wait is at its end: `longest` [s] have passed, and the pile no longer loses energy.
+
+    Low gravity, bounces with little loss, or friction alone make long waits, but energy then decays all the time.
+
+    Args:
+        memory: memory of the stage, see `begin_wait`.
+        energy: kinetic energy of the pile [J].
+        longest: wait after which the pile must lose energy [s].
+    """
+    if "judged" not in memory:  # a run that an older version has begun
+        memory.update(judged=0.0, energy=0.0, before=0.0)
+    memory["energy"] = max(memory["energy"], energy)
+    if memory["waited"] <= memory["judged"] + longest / 2:
+        return False
+    calmer = memory["energy"] < CALMER * memory["before"]
+    memory.update(judged=memory["judged"] + longest / 2, before=memory["energy"], energy=0.0)
+    return bool(memory["judged"] >= longest and not calmer)
 
 
 def has_settled(settle: Settle, memory: Memory, engine: Engine) -> bool:
     """Return whether the pile has settled; to be called every `CHECK_INTERVAL`.
 
     Args:
-        memory: memory of the stage. Its `waited` is the time since the wait began [s], which the phase updates; `still`
-            is the time for which both limits have held [s], which this function updates.
+        memory: memory of the stage, see `begin_wait`. Its `waited` is the time since the wait began [s], which the phase
+            updates; `still` is the time for which both limits have held [s], which this function updates.
 
     Raises:
-        RunError: the pile has not settled within `settle.timeout_s`.
+        RunError: the pile has not settled within `settle.timeout_s`, and no longer comes nearer to rest.
     """
-    speed = float(np.linalg.norm(engine.state().velocities, axis=1).max())
+    state = engine.state()
+    speed = float(np.linalg.norm(state.velocities, axis=1).max())
     unbalanced = engine.unbalanced_force()
     still = speed < settle.speed_m_per_s and unbalanced < settle.unbalanced_force
     memory["still"] = memory["still"] + CHECK_INTERVAL if still else 0.0
     if memory["still"] > settle.hold_s:
         return True
-    if memory["waited"] > settle.timeout_s:
+    if waits_in_vain(memory, state.kinetic_energy, settle.timeout_s):
         raise RunError(
-            f"the pile has not settled after {settle.timeout_s:g} s: speed {speed:.3g} m/s (limit "
+            f"the pile has not settled after {memory['judged']:g} s: speed {speed:.3g} m/s (limit "
             f"{settle.speed_m_per_s:g} m/s), unbalanced force {unbalanced:.3g} (limit "
             f"{settle.unbalanced_force:g}); raise phases.0.settle.timeout_s or its limits"
         )

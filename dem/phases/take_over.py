@@ -21,7 +21,7 @@ from dem.arrays import Array, Flags
 from dem.body.placement import Poses, fitted_poses
 from dem.engine.interface import Engine
 from dem.errors import InputError, RunError, shown
-from dem.phases.phase import CHECK_INTERVAL, Memory, Phase, SceneView, Settle, Stage, has_settled
+from dem.phases.phase import CHECK_INTERVAL, Memory, Phase, SceneView, Settle, Stage, begin_wait, has_settled
 from dem.record.frame import Frame
 from dem.record.run import Run, open_run
 from dem.setting.hooks import Cross
@@ -210,8 +210,10 @@ class TakeOver(Part, Phase):
 
     def first_memory(self, scene: SceneView) -> Memory:
         # `task`: the next action; `stops`: how often velocities were set to zero; `height`: mean height of smarticles
-        # when they were added [m]; `waited`: time since then [s]; `still`: time for which the pile has been still [s].
-        return {"task": "put", "stops": 0, "height": 0.0, "waited": 0.0, "still": 0.0}
+        # when they were added [m], which begins the wait; `still`: time for which the pile has been still [s].
+        memory: Memory = {"task": "put", "stops": 0, "height": 0.0, "still": 0.0}
+        begin_wait(memory)
+        return memory
 
     def proceed(self, stage: Stage, engine: Engine) -> float:
         wait = self._do(stage, engine)

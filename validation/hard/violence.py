@@ -11,9 +11,22 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from dem.errors import RunError
+from dem.plan.steps import time_step
 from validation.access import EngineAccess
-from validation.bench import TILTED, add, energy, fastest, lying, scene_data, shape_change, watchdog_error, watched
+from validation.bench import (
+    TILTED,
+    add,
+    energy,
+    fastest,
+    lying,
+    scene_data,
+    scene_of,
+    shape_change,
+    watchdog_error,
+    watched,
+)
 from validation.cases import Check, above, below, hard, near, nothing, says
+from validation.extremes import crossings
 from validation.hard.runs import Noting, whole
 
 
@@ -185,8 +198,14 @@ def thrown_out(access: EngineAccess, out: Path, *, count: int, seconds: float) -
     # Shaking that moves the floor by more than a twentieth of a diameter in a step is rejected.
     stiff = {} if access.name == "yade" else {"stiffness_N_per_m": 5000}
     fidelity = {"base": "draft", "time_step_fraction": 0.25, **stiff}
-    run = whole(scene_data(access, shake, count=count, fidelity=fidelity, container={"height_m": 0.045}), out)
-    return [says(run.text, "at t = ", "thrown out over the wall of 0.045 m; raise container.height_m or shake less")]
+    data = scene_data(access, shake, count=count, fidelity=fidelity, container={"height_m": 0.045})
+    rejected = whole(data, out).text
+    # Without the checks of `time_steps`.
+    run = whole(data, out, steps=lambda scene: (time_step(scene),) * len(scene.phases))
+    return [
+        says(rejected, "phases.1.frequency_hz: 20 Hz at Γ = 30 throws smarticles up by", "out of the wall of 0.045 m"),
+        says(run.text, "at t = ", "thrown out over the wall of 0.045 m; raise container.height_m or shake less"),
+    ]
 
 
 def mass_ratio(
@@ -240,3 +259,56 @@ for _above in (False, True):
             {"heavy_above": _above, "stiffness": _stiffness, "time": 0.1},
             absent={} if _above or _stiffness < 1e6 else {"links": LIGHT_ON_HEAVY},
         )(mass_ratio)
+
+
+def lid(access: EngineAccess, out: Path, *, count: int, stiffness: float) -> list[Check]:
+    """Press on a column of smarticles of l/w = 1.8 with ten times its weight, let it rest, then shake at Γ = 10.
+
+    No phase has a lid: the weight of the highest smarticle is raised instead.
+    """
+    fidelity = {"base": "draft", "stiffness_N_per_m": stiffness}
+    shake = {"type": "shake", "duration_s": 0.2, "frequency_hz": 30, "peak_acceleration_g": 10}
+    data = scene_data(access, shake, count=count, per_layer=1, smarticle={"aspect_ratio": 1.8}, fidelity=fidelity)
+    data["container"] = {"radius_m": 1.05 * scene_of(data).model.reach, "height_m": 0.6}
+    scene, engine, recorder = watched(data, out)
+    stage = scene.phases[0].begin(scene, 0)
+    while wait := stage.proceed(engine):
+        engine.advance(max(1, round(wait / engine.time_step)))
+    ratio, rise = 10.0 * count, 0.1
+    recorder.watchdog.energy = math.inf  # the ledger does not include the work of the added load
+    top = int(engine.state().smarticles.positions[:, 2].argmax())
+    access.burden(engine, top, ratio, rise=rise)
+    crossed, last, interval = 0, engine.state().smarticles.vertices, round(1e-3 / engine.time_step)
+
+    def watch(seconds: float) -> str | None:
+        nonlocal crossed, last
+        message, end = None, engine.time + seconds
+        while not message and engine.time < end:
+            engine.advance(interval)
+            vertices = engine.state().smarticles.vertices
+            crossed, last = crossed + len(crossings(last, vertices)), vertices
+            message = watchdog_error(engine, recorder)
+        return message
+
+    resting = watch(rise + 0.4)
+    load = (count + ratio - 1) * scene.particle.boxes.mass * scene.gravity_m_per_s2
+    # Each step kicks the loaded smarticle itself by `ratio` g dt.
+    speeds = np.delete(np.linalg.norm(engine.state().smarticles.link_velocities, axis=-1), top, axis=0)
+    force = -access.floor_force(engine)[2]
+    shaking = watch(scene.phases[1].begin(scene, 1).proceed(engine))
+    return [
+        nothing("the watchdog reports at rest", resting),
+        near("force on floor and wall over the load [1]", force / load, 1.0, 0.05),
+        below("speed of the others at rest [m/s]", float(speeds.max()), 0.05),  # after a fall of 0.1 mm
+        nothing("the watchdog reports while it is shaken", shaking),
+        below("pairs of axes crossed [1]", crossed, 0.5),
+    ]
+
+
+for _stiffness in (250.0, 5000.0):
+    hard(
+        f"heavy lid on a column, contacts of {_stiffness:g} N/m",
+        {"count": 6, "stiffness": _stiffness},
+        {"count": 20},
+        absent={"yade": "chains of spheres are pushed through the wall by such a load; links have a barrier"},
+    )(lid)

@@ -11,7 +11,7 @@ from double import EngineDouble
 from scenes import chain, small
 
 from dem.errors import InputError, RunError
-from dem.phases.phase import CHECK_INTERVAL, Stage
+from dem.phases.phase import CHECK_INTERVAL, Stage, begin_wait, waits_in_vain
 from dem.scene.scene import Scene
 
 DT = 2e-4
@@ -155,6 +155,16 @@ def test_a_pile_that_does_not_settle_is_reported_with_its_residuals(
     with pytest.raises(RunError, match=r"not settled after 0\.1 s: .*; raise phases\.0\.settle\.timeout_s") as caught:
         run_phase(scene, engine, 0)
     assert said in str(caught.value)
+
+
+@pytest.mark.parametrize(("halved_every", "waited"), [(0.05, 0.25), (0.5, 0.1)])
+def test_a_wait_goes_on_while_the_pile_loses_energy(halved_every: float, waited: float) -> None:
+    memory: dict[str, Any] = {}
+    begin_wait(memory)
+    while not waits_in_vain(memory, max(0.5 ** (memory["waited"] / halved_every), 0.1), 0.1):
+        memory["waited"] += CHECK_INTERVAL
+    # One pile loses half its energy in half of the longest wait, until 0.17 s; the other loses 7 %.
+    assert memory["judged"] == pytest.approx(waited)
 
 
 # -- container ---------------------------------------------------------------------------------------------------------
