@@ -44,19 +44,22 @@ def export_run(
     color_by: str | None = None,
     progress: Callable[[int, int], None] = lambda _done, _all: None,
 ) -> Path:
-    """Export the bodies of a run to files for other programs, in one of `FORMATS`; return the path.
+    """Export the bodies of a run to files for other programs; return the path of the file or folder.
 
-    The run may be unfinished. The written file or folder exists only if the export is complete.
+    The file or folder exists only if the export is complete.
 
     Args:
-        to: One of `FORMATS`.
-        output: Path to write, which must not exist: always a folder for vtp, always a file for gsd, otherwise a folder
-            for all frames and a file for one. A file ends in `.TO`. By default `export-TO` (folder) or `export.TO`
-            (file) in the run directory.
-        time: Simulated time [s]; the frame nearest to it is exported. If not given, the last frame is exported.
+        directory: A run directory with at least one frame; the run may be unfinished.
+        to: Format of the export, one of `FORMATS`.
+        output: Path to write, which must not exist. It is a folder for vtp, and for all frames as stl, obj, gltf or
+            glb; otherwise it is a file, whose suffix must be that of the format. None: `export-TO` (folder) or
+            `export.TO` (file) in the run directory, where TO is the format.
+        time: Simulated time [s]; the frame nearest to it is exported. None: the last frame.
+        every_frame: Whether to export all frames; `time` must then be None.
         wanted: Kinds of bodies besides `postprocess.bodies.meshes.USUAL`.
         unwanted: Kinds of bodies and fields to leave out.
-        color_by: Name or short name of a field, for formats with colours, see `colour_field`.
+        color_by: Name or short name of the field that colours the smarticles, for formats with colours; None: the usual
+            field, see `colour_field`.
         progress: Called after each frame with the number of exported frames and the number of all.
 
     Raises:

@@ -55,7 +55,10 @@ def folder_of_export(given: str | None) -> Path:
 
 
 def show(folder: Path) -> tuple[Any, Any]:
-    """Read the collections in a folder and show them; return view and animation scene."""
+    """Show all kinds of bodies from their files `KIND.pvd` in a folder.
+
+    Returns ParaView's view and its animation scene.
+    """
     simple._DisableFirstRenderCameraReset()
     view = simple.GetActiveViewOrCreate("RenderView")
     view.UseColorPaletteForBackground = 0
@@ -89,14 +92,17 @@ def plain(kind: str, source: Any, view: Any) -> Any:
 
 
 def times(source: Any) -> list[float]:
-    """Return the times of a collection [s], the last one first."""
+    """Return the times [s] at which the bodies of a `.pvd` reader are recorded, the last one first."""
     # ParaView gives a single time as a number, not as a list.
     found = source.TimestepValues
     return [found] if isinstance(found, float) else list(found)[::-1]
 
 
 def data_at(source: Any, time: float) -> Any:
-    """Return the data of a collection at a time [s], since ParaView's summaries may be of another time."""
+    """Return the data of a `.pvd` reader at a time [s].
+
+    ParaView's own summaries of data may be those of another time.
+    """
     source.UpdatePipeline(time)
     found = simple.servermanager.Fetch(source)
     return found.GetBlock(0) if found.IsA("vtkMultiBlockDataSet") else found

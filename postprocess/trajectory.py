@@ -1,9 +1,12 @@
-"""Write a run as one GSD file for OVITO and HOOMD-blue: each strand of a link is a rounded polyhedron.
+"""Write a run as one GSD file for OVITO and HOOMD-blue, with its links as capsules.
 
-Strands are the capsules by which the engine represents links in contacts; of a sphere chain they are its envelope.
+The capsules, or strands, are those by which the engine represents links in contacts; a link may consist of several side
+by side. Of a sphere chain they are its envelope. GSD stores a capsule as a polyhedron of two vertices with a rounding
+radius.
 
-Sources: https://gsd.readthedocs.io/en/stable/schema-hoomd.html and shapes.html. OVITO draws polyhedra of two vertices
-with a rounding radius as capsules: https://www.ovito.org/manual/reference/file_formats/input/gsd.html
+Source:
+    https://gsd.readthedocs.io/en/stable/schema-hoomd.html and shapes.html. OVITO draws such polyhedra as capsules:
+    https://www.ovito.org/manual/reference/file_formats/input/gsd.html
 """
 
 from collections.abc import Iterable, Sequence
@@ -76,9 +79,9 @@ def write_trajectory(
     Positions are those of the run, in metres. The box is as large as the bodies need, and around the origin.
 
     Args:
-        frames: the frames with their numbers.
-        fields: fields to write as `log/particles/NAME`.
-        first: the frames once more, read before all others for shapes and the size of the box.
+        frames: The frames with their numbers.
+        fields: Fields to write as `log/particles/NAME`.
+        first: The same frames without numbers; they are read first, to find the shapes and the size of the box.
     """
     import gsd.hoomd  # noqa: PLC0415 - an extra
 

@@ -174,7 +174,10 @@ class RunView:
         return sorted({round(place) for place in np.linspace(0, len(self.frames) - 1, number)})
 
     def _widened(self, values: Floats) -> tuple[float, float]:
-        """Return the extremes of the coloured field in `values`, all frames shown before, and sampled frames."""
+        """Return the least and the greatest value of the coloured field, the ends of its colour scale.
+
+        They are the extremes of `values`, of all frames shown before, and of some frames evenly spaced over the run.
+        """
         name = self.field.name
         samples = [np.array(self._bounds.get(name, ())), values]
         if name not in self._bounds:

@@ -134,7 +134,10 @@ _OPTIONS: Mapping[str, Mapping[str, Any]] = {
 
 
 def add_options(parser: argparse._ActionsContainer, *options: str, **settings: Any) -> None:
-    """Add arguments of `_OPTIONS` by name; `settings` replace the settings for argparse in the table."""
+    """Add arguments and options to a parser, by their names in `_OPTIONS`.
+
+    `settings` are settings for argparse. They apply to all these options and take precedence over those in `_OPTIONS`.
+    """
     for option in options:
         parser.add_argument(option, **{**_OPTIONS[option], **settings})
 

@@ -100,11 +100,11 @@ class ColourScale:
 
 
 def colour_field(name: str | None, run: Run) -> Field:
-    """Return the field of a run by name or short name.
+    """Return the field of a run by its name, or by its short name in `ALIASES`.
 
-    The name None stands for "crossings", or for "smarticle_id" if the run is planar. If bodies are no smarticles, it
-    stands for "contacts", or for "kind" if there are several kinds of bodies. InputError if the name is unknown, or the
-    run lacks the field.
+    If the name is None, the field of smarticles is "crossings", or "smarticle_id" in a planar run. The field of other
+    bodies is then "contacts", or "kind" if the run has several kinds of bodies. InputError if the name is unknown, or
+    the run lacks the field.
     """
     usual = "smarticle_id" if run.manifest.planar else "crossings"
     if run.manifest.kinds is not None:

@@ -126,7 +126,10 @@ def _pressed(frame: Frame, _: Run) -> Floats:
 
 
 def _chain(frame: Frame, _: Run) -> NDArray[Any]:
-    """Return the number of each smarticle's force chain, (N,); without contacts, each has its own number."""
+    """Return which force chain each smarticle belongs to, (N,) int: equal numbers mark one chain.
+
+    A smarticle in no chain has a number of its own. If no smarticles touch, all numbers differ.
+    """
     try:
         return force_chains(frame).labels
     except UndefinedMeasureError:
@@ -253,7 +256,10 @@ def fields_of(run: Run) -> tuple[Field, ...]:
 
 
 def checked_field(name: str, aliases: Mapping[str, str] = MappingProxyType({})) -> Field:
-    """Return the field with a name, or with a short name among `aliases`; InputError if it is unknown."""
+    """Return the field with a name; InputError if the name is unknown.
+
+    `aliases` maps short names, which are accepted too, to the names of fields.
+    """
     field = BY_NAME.get(aliases.get(name, name))
     if field is None:
         raise InputError(f"{name!r} is no field; {nearest(name, [*aliases, *BY_NAME], cutoff=0.5)}")

@@ -48,7 +48,11 @@ class ChainStrings:
     anchors: Floats = field(repr=False)
 
     def lines(self, frame: Frame) -> Floats:
-        """Return the ends of both strings, (2, 2, 3) [m]: knot and anchor of each; (0, 2, 3) in other phases."""
+        """Return the ends of both strings in a frame, (2, 2, 3) [m]: knot and anchor of each string.
+
+        The string with the fixed anchor comes first. Frames of phases without tied strings give an empty array
+        (0, 2, 3).
+        """
         if frame.phase != self.phase:
             return np.empty((0, 2, 3))
         ends = self.anchors.copy()
@@ -77,17 +81,20 @@ class RunBoundaries:
 
     @property
     def corners(self) -> list[tuple[float, float]]:
-        """Radius and height of each corner in the profile of a mould's wall, from the floor up [m]."""
+        """Corners of the profile of a mould's wall from the floor up, each (radius, height) [m].
+
+        The list is empty if the container is no mould.
+        """
         found = [(self.tiers[0][0], 0.0), self.tiers[0]] if self.tiers else []
         for (_, top), (radius, higher) in pairwise(self.tiers):
             found += [(radius, top), (radius, higher)]
         return found
 
     def raised(self, time: float, phase: int, top: float) -> float | None:
-        """Return the height by which the wall has been lifted [m]; None if there is no wall any more.
+        """Return the height by which the wall has been lifted at `time` [m]; None if the wall is removed.
 
-        `phase` is the index of the phase, `top` the height of the pile's top above the floor [m]; a wall that has been
-        lifted higher counts as removed.
+        `time` is in [s], `phase` is the index of the phase at this time. The wall counts as removed once it has been
+        lifted by more than `top`, the height of the pile's top above the floor [m].
         """
         if self.removal is None or phase < self.removal:
             return 0.0
@@ -99,7 +106,11 @@ class RunBoundaries:
 
 
 def _start(run: Run, index: int, series: Series | None) -> float | None:
-    """Return the start of a phase, or the time of the last sample before it [s]; None if not recorded."""
+    """Return the time at which the phase `index` starts [s]; None if it is not known.
+
+    If the run does not record this time, it is taken from the last sample of the series before the phase. It is 0 if
+    there is no such sample, and not known if the run has no series.
+    """
     start = run.phases[index].start_s
     if start is None and series is not None:
         start = float(series.time[series["phase"] < index].max(initial=0.0))
@@ -128,10 +139,12 @@ def _cross(length: float, side: float, count: int, height: float) -> pv.PolyData
 
 
 def knots(vertices: Floats, from_hinge: float) -> Floats:
-    """Return the points (2, 3) [m] at which strings are tied to a chain of `vertices`, at its outer barbs.
+    """Return the points (2, 3) [m] at which strings are tied to both ends of a chain of smarticles.
 
-    A knot lies on a barb at the distance `from_hinge` [m] from its hinge. Every second smarticle of a chain is rotated
-    by 180°.
+    `vertices` (N, 4, 3) [m] are those of the smarticles in the order of the chain. One string is tied to the first
+    smarticle, the other one to the last, each at the outer barb, at the distance `from_hinge` [m] from the barb's
+    hinge. Every second smarticle of a chain is rotated by 180°, so that N decides which barb of the last one is the
+    outer one.
 
     Source:
         `dem.body.chain.Chain.ties`.
@@ -412,9 +425,10 @@ def link_boxes(
 
 
 def bar_meshes(bars: RecordedBars, kinds: Sequence[Kind]) -> pv.PolyData:
-    """Return boxes and cylinders of all bars as one mesh [m]; `kinds` has their cross-sections.
+    """Return boxes and cylinders of all bars as one mesh [m].
 
-    The mesh has two arrays of cell data: `smarticle`, the index of the body, and `link`, the number of the bar in it.
+    `kinds` are the kinds of bodies, with the cross-sections of their bars; `bars.kind` are indices into it. The mesh
+    has two arrays of cell data: `smarticle`, the index of the body, and `link`, the number of the bar in its body.
     """
     along = bars.segments[:, 1] - bars.segments[:, 0]
     lengths = np.linalg.norm(along, axis=1, keepdims=True)
@@ -467,9 +481,10 @@ def at_points(mesh: pv.PolyData, values: NDArray[Any]) -> NDArray[Any]:
 
 
 def owners(mesh: pv.PolyData, frame: Frame) -> tuple[Whole, Whole]:
-    """Return body and link of each of the C cells of a mesh, which must have the fields `IDENTITY`.
+    """Return the body and the link to which each of the C cells of a mesh belongs.
 
-    Bodies (C,) are indices into the arrays of the frame; links (C,) are numbers from 0.
+    Bodies (C,) are indices into the arrays of the frame; links (C,) are numbers from 0. The mesh must have the cell
+    data `smarticle_id` and `link`.
     """
     owner, link = (np.asarray(mesh.cell_data[name]) for name in ("smarticle_id", "link"))
     order = np.argsort(frame.smarticle_ids)

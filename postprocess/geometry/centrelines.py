@@ -47,7 +47,8 @@ def read_centrelines(path: Path | str, *, unit: str | None = None) -> Centreline
 
     Args:
         path: The file.
-        unit: Unit of its coordinates: m, cm, mm or um; None: the unit in the header of a CSV file.
+        unit: Unit of its coordinates: m, cm, mm or um. None: the unit in the header of a CSV file; a VTK file states no
+            unit, so that it must be given.
 
     Raises:
         InputError: The file is missing, damaged or without segments, or its unit is unknown.
@@ -154,7 +155,15 @@ def _read_polydata(path: Path) -> _Lines:
 
 
 def _numbered(points: Floats, lines: Whole, data: dict[str, NDArray[Any]]) -> _Lines:
-    """Number the bodies by cell data, or else by the points that their lines share."""
+    """Return the lines of a file with the numbers of the bodies to which they belong.
+
+    The numbers are those of the cell data `BODY_FIELDS`. Without such data all lines that share points are one body.
+
+    Args:
+        points: (P, 3) coordinates of all points.
+        lines: (M, 2) indices of the two end points of each line.
+        data: Cell data by name, each with one value per line.
+    """
     name = next((name for name in BODY_FIELDS if name in data), None)
     if name is None:
         graph = coo_array((np.ones(len(lines)), (lines[:, 0], lines[:, 1])), shape=(len(points), len(points)))

@@ -77,9 +77,9 @@ def bounding_spheres(vertices: Floats) -> tuple[Floats, Floats]:
 
 
 def close_pairs(vertices: Floats) -> tuple[Whole, Whole]:
-    """Find the pairs of smarticles whose bounding spheres overlap; others neither touch nor cross.
+    """Find the pairs of smarticles whose bounding spheres overlap, by their vertices (N, 4, 3) [m].
 
-    Returns the lower indices (P,) and the higher indices (P,).
+    All other pairs neither touch nor cross. Returns the lower indices (P,) and the higher indices (P,) of the P pairs.
     """
     if len(vertices) < 2:
         return np.empty(0, dtype=np.int64), np.empty(0, dtype=np.int64)
@@ -127,7 +127,10 @@ def plane_frames(vertices: Floats) -> Floats:
 
 @dataclass(frozen=True, kw_only=True)
 class Chain:
-    """Sizes of the sphere chain or the strands that represent a smarticle."""
+    """Sizes of the spheres or strands by which an engine represents a smarticle.
+
+    A strand is the volume that a sphere sweeps as it moves along the three links.
+    """
 
     diameter: float  #: Diameter of the spheres [m]
     rows: int  #: Number of rows or strands side by side along the smarticle's normal
@@ -137,7 +140,10 @@ class Chain:
 
 
 def strands(vertices: Floats, chain: Chain) -> Floats:
-    """Return the axes (N, R, 4, 3) [m] of the R strands of each smarticle, see `swept_axes`."""
+    """Return the axes (N, R, 4, 3) [m] of the R strands that represent each smarticle, side by side.
+
+    A strand is the volume that a sphere sweeps along its axis; `swept_axes` describes one axis (4, 3).
+    """
     return _side_by_side(swept_axes(vertices, chain.diameter), vertices, chain)
 
 

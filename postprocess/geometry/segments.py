@@ -117,7 +117,10 @@ def only_curves(segments: Floats, body: Whole) -> Segments:
 
 
 def padded(found: tuple[Curve, ...]) -> Floats:
-    """Return the corners of B curves as one array (B, n, 3) [m]; shorter curves repeat their last corner."""
+    """Return the corners of B curves as one array (B, n, 3) [m]; shorter curves repeat their last corner.
+
+    n is the largest number of corners. No curve may have a flaw, because it would have no corners.
+    """
     longest = max((len(curve.corners) for curve in found), default=1)
     rows = [np.pad(one.corners, ((0, longest - len(one.corners)), (0, 0)), mode="edge") for one in found]
     return np.array(rows, dtype=np.float64).reshape(len(rows), longest, 3)
@@ -139,8 +142,8 @@ def extents(segments: ArrayLike, body: ArrayLike) -> Extents:
 def inner_axes(segments: Floats, radius: Floats) -> Floats:
     """Return segments (M, 2, 3) [m] whose free ends are moved inwards by radii (M,) [m].
 
-    A sphere of that radius that moves along the result ends at the tips of the body, as in the engines. No end moves
-    beyond the middle of its segment.
+    An end is free if no other segment meets it. A sphere of that radius whose centre moves along the result ends at the
+    tips of the body; engines place their spheres in the same way. No end moves beyond the middle of its segment.
     """
     corners = _corner_numbers(segments)
     free = np.bincount(corners.ravel())[corners] == 1
@@ -205,8 +208,9 @@ def _corner_numbers(segments: Floats) -> Whole:
 def _walk(ends: Whole) -> tuple[list[int], bool, str]:
     """Follow the segments of a body from corner to corner, by the corner numbers (m, 2) of their ends.
 
-    Returns the corners in order, each as the number 2 s + e of end e (0 or 1) of segment s; whether the curve is
-    closed; and the flaw, see `Curve.flaw`, with which there are no corners.
+    Returns three values. The first is a list of the corners in order: the number 2 s + e is end e (0 or 1) of segment
+    s. The second is whether the curve is closed. The third is the flaw, see `Curve.flaw`; with a flaw the list is
+    empty.
     """
     at: dict[int, list[int]] = {}
     for number, corner in enumerate(ends.ravel().tolist()):

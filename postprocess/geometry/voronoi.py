@@ -78,7 +78,10 @@ def local_packing(
 
 
 def _sample(vertices: Floats, spacing: float) -> tuple[Floats, Whole]:
-    """Return points (n, 3) at most `spacing` apart along links [m], not at hinges; smarticle indices (n,)."""
+    """Return points along all links, (n, 3) [m], and the index of the smarticle of each point, (n,).
+
+    Successive points of a link are at most `spacing` [m] apart; none lies at a hinge.
+    """
     # Rounding of lengths must not give one of several equal links an extra point.
     cuts = np.ceil(link_lengths(vertices) / spacing - 1e-6).astype(int).ravel()
     link = np.repeat(np.arange(len(cuts)), cuts)
@@ -107,11 +110,14 @@ def _mirrored(points: Floats, container: Region, lid: float, band: float) -> Flo
 def _cell_volumes(points: Floats, count: int, *, reach: float, together: int = TOGETHER) -> Floats:
     """Compute the Voronoi volumes (count,) [m³] of the first `count` points among points (n, 3) [m].
 
-    The points are divided into slabs along x, with at most `together` points; the cells of a slab are computed among
-    all points within a reach [m] of the slab. The sphere around a corner of a cell through the point of the cell
-    contains no other point. A cell is therefore final if the spheres of all its corners lie inside the searched region.
-    The remaining cells are computed again with twice the reach, until the reach exceeds twice the distance from the
-    point to its farthest corner. The volume of an open cell is infinite.
+    The volume of an open cell is infinite. To limit memory the first `count` points are divided into slabs along x,
+    with at most `together` points each. The cells of a slab are computed from all points that are at most `reach` [m]
+    away from it along x.
+
+    A corner of a cell is the centre of a sphere through the cell's own point that contains no other point. A cell is
+    therefore final if the spheres of all its corners lie inside the searched region. All other cells are computed again
+    from the points within a radius of 2 `reach` around their own points. This radius is doubled until it exceeds the
+    diameters of these spheres, or all points are searched.
     """
     if count <= together:
         return _cells(points)[0][:count]
@@ -137,10 +143,15 @@ def _cell_volumes(points: Floats, count: int, *, reach: float, together: int = T
 def _cells(points: Floats) -> tuple[Floats, Floats, Floats, Floats]:
     """Compute the Voronoi cells of points (n, 3) [m].
 
-    A cell is the union of pyramids with their apex at its point and a face as base; the height of a pyramid is half the
-    distance to the neighbour behind the face. Returns volumes (n,) [m³], infinite for open cells, and distances (n,)
-    from the point to the farthest corner [m]. Also returns the least and the greatest x (n,) [m] that the spheres
-    around the corners of a cell through its point reach.
+    A cell is the union of pyramids with their apex at its point and a face as base. The height of a pyramid is half the
+    distance to the neighbour behind the face. Each corner of a cell is the centre of a sphere through the cell's point.
+
+    Returns:
+        Four arrays:
+        Volumes of the cells, (n,) [m³]; infinite for open cells.
+        Largest radius of the spheres of each cell: the distance from its point to its farthest corner, (n,) [m].
+        Least x of the spheres of each cell, (n,) [m].
+        Greatest x of the spheres of each cell, (n,) [m].
     """
     diagram = Voronoi(points)
     pairs = np.asarray(diagram.ridge_points)

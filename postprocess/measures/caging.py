@@ -196,10 +196,11 @@ def _wrenches(points: Floats, normals: Floats) -> Floats:
 
 
 def _sides(axes: Floats) -> Floats:
-    """Return wrenches (4 m, 6) whose linear span has the wrenches of all contacts on a body's sides.
+    """Return wrenches (4 m, 6) that span the wrenches of all contacts on a body's sides.
 
-    A wrench is a unit force and its moment. Moments are about the middle of the segments (m, 2, 3) and divided by their
-    size, see `_size`, so that all components are comparable.
+    A wrench is a unit force and its moment; that of every contact is a linear combination of the returned ones. `axes`
+    (m, 2, 3) [m] are the segments of the body. Moments are about the middle of the body and divided by its size, see
+    `_size`, so that all components are comparable.
     """
     middle, size = _size(axes)
     ends = (axes - middle) / size

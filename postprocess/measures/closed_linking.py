@@ -56,13 +56,14 @@ class ClosedLinking:
 
 
 def closed_linking(segments: ArrayLike, body: ArrayLike) -> ClosedLinking:
-    """Compute the linking numbers of all pairs of bodies, each a curve, closed straight if it is open.
+    """Compute the linking numbers of all pairs of bodies; open bodies are closed by a straight line.
 
-    Pairs whose bounding spheres are apart are not linked and cost nothing; others cost 0.6 µs per pair of segments. A
-    straight rod closed straight encloses nothing and has 0 with all others.
+    The line joins the two free ends of a body. A straight rod encloses nothing when it is closed in this way, so all
+    its linking numbers are 0. Pairs whose bounding spheres do not overlap are not linked and cost nothing. All other
+    pairs cost 0.6 µs per pair of their segments.
 
     Args:
-        segments: (M, 2, 3) [m].
+        segments: (M, 2, 3) both ends of all segments [m].
         body: (M,) number of the body of each segment.
 
     Raises:
@@ -138,7 +139,11 @@ def writhe(corners: ArrayLike, *, closed: bool) -> float:
 
 
 def writhes(segments: ArrayLike, body: ArrayLike) -> Floats:
-    """Compute the writhe of each body, open or closed: (B,) [-]; InputError if a body is no curve."""
+    """Compute the writhe of each body, open or closed: (B,) [-].
+
+    Bodies are in ascending order of their numbers. Segments are (M, 2, 3) [m]; `body` (M,) is the number of the body of
+    each segment. InputError if a body is no curve.
+    """
     found = checked_curves(segments, body, "writhe")
     return np.array([writhe(one.corners, closed=one.closed) for one in found], dtype=np.float64)
 

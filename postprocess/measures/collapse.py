@@ -118,9 +118,9 @@ def column_history(run: Run, definition: str, shaken: Vibration) -> ColumnHistor
 
 
 def height_with_the_wall(run: Run) -> float:
-    """Return the height of the centre of mass at the last sample before the wall was removed [m].
+    """Return the height of a column's centre of mass just before the wall is removed [m].
 
-    InputError if the run has no samples before the wall was removed.
+    It is the height in the last sample before the phase that removes the wall. InputError if there is no such sample.
     """
     series = run.series
     removal = [phase.type for phase in run.phases].index("remove-container")
@@ -265,9 +265,10 @@ def _curve(free: Floats, times: Floats, start: float | None, end: float | None) 
 
 
 def _fit(times: Floats, heights: Floats, start: float | None, end: float | None) -> Any:
-    """Return the best of several fits from different starting points, since there may be several minima.
+    """Fit a stretched exponential from several starting points; return the best result of `least_squares`.
 
-    `start` and `end` are the heights before and long after the collapse, in the unit of `heights`; None: fitted too.
+    There may be several minima. `start` and `end` are h_start and h_end in the unit of the heights, None if they are
+    free parameters; `_named` describes the parameters.
     """
     low, high = [math.log(times[0] / 10), _EXPONENTS[0]], [math.log(_LONGEST), _EXPONENTS[1]]
     guess: list[float] = []
@@ -289,7 +290,10 @@ def _fit(times: Floats, heights: Floats, start: float | None, end: float | None)
 
 
 def _error(fit: Any) -> float:
-    """Return the standard error of ln τ; infinite if the samples do not determine it."""
+    """Return the standard error of ln τ for a result of `_fit`.
+
+    It is infinite if the samples do not determine τ.
+    """
     residuals, jacobian = fit.fun, fit.jac
     freedom = len(residuals) - len(fit.x)
     # The column of a parameter at its bound could make the matrix singular.

@@ -111,7 +111,9 @@ def entanglement(vertices: Vertices) -> Entanglement:
 
 
 def link_crossings(vertices: Vertices) -> Whole:
-    """Count the links of others through each smarticle's plane: (N,) int64; 0 for straight smarticles.
+    """Count the links of other smarticles that pass through each smarticle's plane: (N,) int64.
+
+    Straight smarticles have no plane and the count 0.
 
     Source:
         Savoie et al., Soft Matter 2023, ⟨N⟩; the docstring of this module states which links pass.
@@ -154,10 +156,10 @@ def link_passages(vertices: Vertices) -> LinkPassages:
 
 
 def polygon_crossings(segments: ArrayLike, body: ArrayLike) -> PolygonCrossings:
-    """Count the segments of others that pass through the polygon of each body.
+    """Count the segments of other bodies that pass through the polygon of each body.
 
     Args:
-        segments: (M, 2, 3) [m].
+        segments: (M, 2, 3) both ends of all segments [m].
         body: (M,) number of the body of each segment.
 
     Raises:
@@ -235,7 +237,11 @@ def _flaw(curve: Curve) -> str:
 
 
 def _close_pairs(vertices: Floats, planes: Flags) -> tuple[Whole, Whole]:
-    """Find ordered pairs (i, j) of smarticles whose bounding spheres overlap and whose i has a plane."""
+    """Find the ordered pairs (i, j) where smarticle i has a plane through which j may pass.
+
+    The bounding spheres of i and j overlap. `planes` (N,) marks the smarticles that have a plane. Returns the indices i
+    (P,) and j (P,).
+    """
     low, high = close_pairs(vertices)
     i, j = np.concatenate([low, high]), np.concatenate([high, low])
     return i[planes[i]], j[planes[i]]

@@ -79,9 +79,10 @@ def force_participation(normal: ArrayLike) -> float:
 
 
 def force_chains(frame: Frame, forces: RecordedForces | None = None) -> Clusters:
-    """Find clusters of smarticles joined by strong contacts; a cluster of one smarticle is no force chain.
+    """Find clusters of smarticles joined by strong contacts, see `strong_contacts`.
 
-    The recorded forces of the frame are read from its run directory if not given.
+    Only contacts between smarticles count, also in the mean force. Every smarticle is in a cluster, but a cluster of
+    one is no force chain. If `forces` is None, the forces recorded with the frame are read from its run directory.
 
     Raises:
         InputError: The run recorded no forces, or their file is damaged.

@@ -1,9 +1,9 @@
-"""Measure the work of motors in a phase from samples every 0.1 s, as the code of the paper does.
+"""Measure the work of motors in a phase from samples every 0.1 s, as Savoie et al.'s code does.
 
-The paper defines the work as the integral of τ dα; `motor_work_J` of the series sums it over every step. The paper's
-code stores torque and angle every 0.1 s (CheckPointSmarticles.cpp of `wsavoie/SmarticleSim`). A sum over such samples
-underestimates the work of a barb that oscillates faster than that. Because the time of the first sample is arbitrary,
-tables also state the least and the greatest sum over all possible first frames.
+Savoie et al., Soft Matter 2023, define the work as the integral of τ dα; `motor_work_J` of the series sums it over
+every step. Their code stores torque and angle every 0.1 s (CheckPointSmarticles.cpp of `wsavoie/SmarticleSim`). A sum
+over such samples underestimates the work of a barb that oscillates faster than that. Because the time of the first
+sample is arbitrary, tables also state the least and the greatest sum over all possible first frames.
 """
 
 import math
@@ -60,7 +60,11 @@ def sampled(frames: FrameSequence) -> list[int]:
 
 
 def _sampled_work_of(run: Run, series: Series, phase: int) -> tuple[float, ...]:
-    """Return the sampled work [J] from the first frame on, its minimum and maximum over all first frames."""
+    """Return the sampled work of a phase [J], and the least and greatest value over all first samples.
+
+    The first value has the first frame of the phase as its first sample. For the other two the first sample is each
+    frame within the first 0.1 s of the phase. All three are NaN if the work is unknown for each first sample.
+    """
     frames = run.frames.in_phase(phase)
     firsts = int((frames.times - frames.times[:1] < APART * (1 - _NEAR)).sum())
     works = [_work_of([frames[first + k] for k in sampled(frames[first:])]) for first in range(firsts)]

@@ -98,6 +98,8 @@ def polar_order(directions: ArrayLike) -> PolarOrder:
 def segment_order(segments: ArrayLike, body: ArrayLike) -> NematicOrder:
     """Compute the nematic order of the directions of all segments, weighted by their lengths.
 
+    Segments are (M, 2, 3) [m]; `body` (M,) is the number of the body of each segment.
+
     Raises:
         InputError: See `checked_segments`.
         UndefinedMeasureError: There is no segment.
@@ -107,10 +109,16 @@ def segment_order(segments: ArrayLike, body: ArrayLike) -> NematicOrder:
 
 
 def body_axes(segments: ArrayLike, body: ArrayLike, *, longest: bool = True) -> Floats:
-    """Return the axis of each body: (B, 3) unit vectors of arbitrary sign, for `nematic_order`.
+    """Return the longest or the shortest axis of each body: (B, 3) unit vectors of arbitrary sign.
 
-    The longest axis is the direction in which the material, spread evenly along the segments, spreads most; the
-    shortest one is the normal of a flat body, as of a ring.
+    The longest axis is the direction in which the material, spread evenly along the segments, spreads most. The
+    shortest axis is that in which it spreads least: the normal of a flat body such as a ring. `nematic_order` takes
+    such axes.
+
+    Args:
+        segments: (M, 2, 3) both ends of all segments [m].
+        body: (M,) number of the body of each segment.
+        longest: Whether to return the longest axis, else the shortest.
 
     Raises:
         InputError: See `checked_segments`; or a body spreads as far in a second direction, within 1e-6.
@@ -140,7 +148,8 @@ def opening_directions(segments: ArrayLike, body: ArrayLike) -> Floats:
     """Return the direction in which each body is open: (B, 3) unit vectors, for `polar_order`.
 
     It points from the centre of mass to the middle between the two free ends, as out of the mouth of a U, and does not
-    depend on the order of the segments.
+    depend on the order of the segments. Segments are (M, 2, 3) [m]; `body` (M,) is the number of the body of each
+    segment.
 
     Raises:
         InputError: See `checked_segments`; or a body has no such direction: it is closed, branches, has several pieces,

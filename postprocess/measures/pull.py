@@ -168,7 +168,10 @@ def has_pull(series: Series, phase: int) -> bool:
 
 
 def _samples(edges: Floats, window: float) -> int:
-    """Return the number of samples in a window [s], at least 1 and at most all, by the times `edges`."""
+    """Return the number of samples that a window [s] holds: at least one, at most all n.
+
+    `edges` (n + 1,) are the times between which the n samples lie [s], see `HookPull.edges`.
+    """
     return min(max(round(window / float(np.median(np.diff(edges)))), 1), len(edges) - 1)
 
 

@@ -72,7 +72,10 @@ class FrameMeasure:
 
 
 def measure_of(function: Callable[[Frame, Run], float] | FrameMeasure) -> FrameMeasure:
-    """Make a measure from a function whose name has quantity and unit, such as `speed_m_per_s`."""
+    """Make a measure from a function of a frame and its run; a measure is returned unchanged.
+
+    The name of the function states quantity and unit, such as `speed_m_per_s`.
+    """
     if isinstance(function, FrameMeasure):
         return function
     label, unit = unit_of(function.__name__)
@@ -124,15 +127,18 @@ def in_space(run: Run) -> bool:
 
 
 def in_one_cylinder(run: Run) -> bool:
-    """Return whether the wall of a run has one radius, unlike the tiers of a mould or a channel."""
+    """Return whether the bodies of a run are smarticles in one cylinder.
+
+    It is false for a mould with several tiers, which have different radii, and for a planar run, as in a channel.
+    """
     return in_space(run) and run.manifest.container_tiers == 1
 
 
 @cache
 def registered() -> tuple[FrameMeasure | PhaseMeasure, ...]:
-    """Return the measures of this package, by module in alphabetical order, and of installed packages.
+    """Return the measures of the modules of this package, followed by those of installed packages.
 
-    ValueError if two measures have one name, or two quantities one header.
+    The modules are in alphabetical order. ValueError if two measures have one name, or two quantities one header.
     """
     package = import_module(_PACKAGE)
     modules = [import_module(f"{_PACKAGE}.{found.name}") for found in pkgutil.iter_modules(package.__path__)]
@@ -170,11 +176,16 @@ def shown_quantities() -> tuple[tuple[Quantity, Shown], ...]:
 def frame_measures(definitions: Sequence[str], also: Collection[str] = ()) -> tuple[FrameMeasure, ...]:
     """Return the measures of frames in the order of their columns.
 
-    Measures with a definition come last, in the order of `definitions`; measures with other definitions are left out.
-    So are measures `on_request`, unless their names are among `also`.
+    Quantities such as the packing fraction have several definitions, with one measure for each. These measures come
+    after all others.
+
+    Args:
+        definitions: Definitions whose measures are returned, in this order, see `FrameMeasure.definition`; measures
+            with other definitions are left out.
+        also: Names of measures with `FrameMeasure.on_request` to return; all other measures with it are left out.
 
     Raises:
-        InputError: A name in `also` is not that of a measure `on_request`.
+        InputError: A name in `also` is not that of a measure with `on_request`.
     """
     asked = {m.name: m for m in registered() if isinstance(m, FrameMeasure) and m.on_request}
     for name in also:

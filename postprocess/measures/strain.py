@@ -122,7 +122,11 @@ def read_strain_test(run: Run) -> StrainTest:
 
 
 def measured(pull: StrainTest) -> dict[str, float]:
-    """Compute the quantities of a strain test, by their columns; `QUANTITIES` has the meanings."""
+    """Compute the quantities of a strain test; return their values by the names of their columns.
+
+    The names are the keys of `QUANTITIES`, which also states their meanings. Yield quantities are NaN without a yield
+    drop.
+    """
     end = pull.fracture + 1
     strains, forces = pull.strains[:end], pull.forces[:end]
     peak = int(np.argmax(forces))

@@ -51,7 +51,8 @@ def measure_run(
 
     Args:
         definitions: Definitions of the packing fraction, keys of `packing.DEFINITIONS`.
-        costly: Frames for which costly measures are computed: none, the last recorded frame of each phase, or all.
+        costly: Frames for which costly measures are computed: "never" none, "phase-end" the last recorded frame of each
+            phase, "every-frame" all.
         measures: Further measures, whose columns follow those of the registered ones.
         also: Names of measures that tables have on request alone, such as "crossing-number".
 
@@ -194,12 +195,14 @@ def _rows(
     *,
     offset: int = 0,
 ) -> list[dict[str, object]]:
-    """Return a row of the table for each frame of a part of a phase.
+    """Return one row of a table for each of several successive frames of one phase.
 
     Args:
-        known: the measures of a frame.
-        costly: frames for which costly measures are computed, the others get NaN.
-        offset: number of the part's first frame.
+        part: The frames.
+        series: Series whose values at the time of a frame are added to its row; None: none are added.
+        known: Measures to compute, if they apply to the run.
+        costly: Frames for which costly measures are computed, see `measure_run`; rows of other frames have NaN.
+        offset: Number of the first frame, for the column "frame".
     """
     rows: list[dict[str, object]] = []
     measures = [measure for measure in known if measure.available_for(run)]

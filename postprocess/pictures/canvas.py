@@ -154,7 +154,11 @@ def union(extents: Sequence[Floats]) -> Floats:
 
 
 def add_bodies(plotter: Any, meshes: Mapping[str, pv.PolyData], frame: Frame, colours: NDArray[np.uint8]) -> None:
-    """Replace the meshes of a frame in a window; colours of the links are sRGB (N, 3, 3), uint8."""
+    """Draw the meshes of a frame in a window of PyVista, in place of all bodies drawn before.
+
+    `meshes` are the meshes by kind, as of `visible_meshes`. `colours` (N, 3, 3) uint8 are the sRGB colours of the
+    links.
+    """
     pale = "forces" in meshes
     for kind in (*PAINTS, "ghost"):
         for name in (kind, f"{kind} edges"):
@@ -189,6 +193,7 @@ class Canvas:
     RunError if this machine lacks the libraries to draw without a display.
 
     Args:
+        style: Coloured field, size of a panel and camera.
         extent: (2, 2) extent in the camera's view [mm].
         run: Run whose link size sets the range of the shading of corners (ambient occlusion).
         columns: Number of panels.

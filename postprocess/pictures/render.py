@@ -193,8 +193,13 @@ def pictures(
 ) -> Iterator[Image.Image]:
     """Yield pictures of runs side by side, with one camera and one colour scale.
 
-    Each run has the indices of its frames, one per picture. `quick` leaves out the shading of corners; `pace` is the
-    speed of a film, for the caption.
+    Args:
+        subjects: The runs, from left to right.
+        indices: For each run, the indices of its frames, one per picture.
+        style: Coloured field, size and camera.
+        limits: Ends of the colour scale, see `Limits`.
+        quick: Whether to leave out the shading of corners, which takes most of the time.
+        pace: Speed of a film as text for the caption; empty for a single picture.
     """
     titles = titles_of([subject.run for subject in subjects])
     pairs = list(zip(subjects, indices, strict=True))

@@ -82,7 +82,10 @@ def style() -> AbstractContextManager[None]:
 
 
 def new_figure(*, width: float = COLUMN_WIDTH, height: float = 2.6) -> tuple[Figure, Axes]:
-    """Make a figure with one pair of axes, of a width and a height without the footer [inch]."""
+    """Make a figure with one pair of axes, of a width and a height [inch].
+
+    The height is that before `add_footer`, which enlarges the figure.
+    """
     figure = blank_figure(width, height)
     return figure, figure.add_subplot()
 
@@ -142,9 +145,9 @@ def save(figure: Figure, path: Path, *, formats: Sequence[str] = ("png", "svg", 
 
 
 def sequence(colours: int, *, last: float = 1.0) -> list[str]:
-    """Return hexadecimal colours of viridis from dark to light, brightened so that shading is visible.
+    """Return `colours` hexadecimal colours of the map viridis, from dark to light.
 
-    `last` is the position of the last colour in the map, up to 1.
+    They are brightened so that shading is visible. `last` is the position of the last colour in the map; 1 is its end.
     """
     steps = [0.16 + (last - 0.16) * i / max(colours - 1, 1) for i in range(colours)]
     plain = np.array([matplotlib.colormaps["viridis"](step)[:3] for step in steps])
@@ -188,7 +191,7 @@ def _hold(axes: Axes, place: int, *, log: bool) -> None:
 
 
 def _drawn(axes: Axes) -> list[NDArray[np.float64]]:
-    """Return points (n, 2) of all lines, error bars and bands in data coordinates.
+    """Return the points of all lines, error bars and bands in data coordinates: one array (n, 2) for each.
 
     `Axes.dataLim` does not suffice: for error bars it lacks the least end that is above 0.
     """

@@ -58,5 +58,8 @@ def table_lines(header: Sequence[str], rows: Iterable[Sequence[str]]) -> list[st
 
 
 def meaning_lines(file: str, meanings: Mapping[str, str]) -> list[str]:
-    """Return lines of Markdown that describe the columns of a file."""
+    """Return lines of Markdown that list the columns of a file with their meanings.
+
+    `file` is the name of the file; `meanings` maps the names of its columns to their meanings.
+    """
     return ["", f"Columns of `{file}`:", "", *(f"- `{name}`: {text}" for name, text in meanings.items())]

@@ -77,7 +77,10 @@ def means_by(table: pd.DataFrame, by: Sequence[str], *, intervals: bool = False)
 
 
 def seeds_of(group: pd.DataFrame) -> dict[str, object]:
-    """Return two columns of a row per point: the number of seeds in the group, and the seeds as text."""
+    """Return two columns of a table that describe the seeds of a group of runs.
+
+    The column `SEEDS` has the number of seeds, the column "seeds" the seeds in ascending order as text.
+    """
     return {SEEDS: len(group), "seeds": " ".join(map(str, sorted(group[SEED])))}
 
 

@@ -119,7 +119,11 @@ def size_law(counts: Floats, values: Floats) -> SizeLaw:
 
 
 def _fit(counts: Floats, values: Floats, scatter: Scatter, power: float) -> tuple[float, float, float]:
-    """Fit q = q_∞ + a N^-power to the means at each N; return q_∞, a and weighted squared residuals."""
+    """Fit q = q_∞ + a N^-power to the means at each N, with weights.
+
+    Returns q_∞, a and the weighted sum of squared residuals. `counts` (n,) are the numbers of smarticles of each run,
+    `values` (n,) its values of q. The weight of a mean is the number of its runs times N^fall, see `Scatter`.
+    """
     sizes, place = np.unique(counts, return_inverse=True)
     members = np.bincount(place)
     means = np.bincount(place, values) / members
@@ -131,7 +135,11 @@ def _fit(counts: Floats, values: Floats, scatter: Scatter, power: float) -> tupl
 
 
 def _powers(counts: Floats, values: Floats, scatter: Scatter) -> tuple[float, float, float]:
-    """Return the best power of N and its 95 % interval; a fit worse than the scatter widens the interval."""
+    """Return the power of N that fits best, and the lower and upper end of its 95 % interval.
+
+    `counts` (n,) are the numbers of smarticles of each run, `values` (n,) its values of the quantity. If the means
+    deviate from the best fit by more than the scatter explains, the interval is wider.
+    """
     left = np.array([_fit(counts, values, scatter, float(power))[2] for power in POWERS]) / scatter.variance
     free = len(np.unique(counts)) - 3
     larger = max(left.min() / free, 1.0) if free > 0 else 1.0
@@ -178,10 +186,15 @@ class Profile:
 
 
 def profiles(x: Floats, having: Floats, groups: NDArray[np.int64]) -> dict[int, Profile]:
-    """Compute the profile likelihood of the threshold x_c for each group of runs, at common values of x_c.
+    """Compute the profile likelihood of the threshold x_c for each group of runs, by the group's number.
 
-    `x` (n,) is finite; `having` (n,) is 1 for a run with the property, else 0; `groups` (n,) is, for example, the size
-    of the pile.
+    Args:
+        x: (n,) finite values of x of all runs.
+        having: (n,) 1 for a run that has the property, else 0.
+        groups: (n,) number of the group of each run, for example the size of the pile.
+
+    Returns:
+        The profile of each group; its key is the number of the group. All profiles have the same tried values of x_c.
     """
     span = float(np.ptp(x)) or 1.0
     places = np.linspace(x.min() - span / 2, x.max() + span / 2, _PLACES)
