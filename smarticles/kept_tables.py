@@ -1,4 +1,4 @@
-"""Keep the table of a run's measures in its directory until its files or the program change."""
+"""Keep tables of measures in run directories, to be read again until files or program change."""
 
 from __future__ import annotations
 
@@ -33,7 +33,10 @@ def key_of(directory: Path) -> str:
 
 
 def read_kept(directory: Path, kind: str, key: str) -> pd.DataFrame | None:
-    """Read a table of a kind that `keep` stored; None if absent, damaged, or stored with another `key`."""
+    """Read the table that `keep` stored in a run directory with this kind and key; None if there is none.
+
+    None is also returned for a damaged file. Parameters are those of `keep`.
+    """
     import pandas as pd  # noqa: PLC0415
 
     try:
@@ -48,7 +51,12 @@ def read_kept(directory: Path, kind: str, key: str) -> pd.DataFrame | None:
 
 
 def keep(table: pd.DataFrame, directory: Path, kind: str, key: str) -> None:
-    """Store a table of a kind in a run directory, with the key of `key_of`; do nothing if that fails."""
+    """Store a table of measures in a run directory; do nothing if the file cannot be written.
+
+    Args:
+        kind: what the table contains, such as `phases-phase-end`; part of the name of the file.
+        key: hash of the run's files and the program, by `key_of`.
+    """
     rows = table.astype(object).to_numpy().tolist()
     text = json.dumps({"columns": list(table.columns), "rows": rows}, default=_plain)
     content = f"{key}\n{hashlib.sha256(text.encode()).hexdigest()}\n{text}"

@@ -120,7 +120,10 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def guarded(action: Callable[[], int], *, debug: bool = False) -> int:
-    """Run an action, return the exit status; print exceptions (tracebacks: `debug`) and signals on stderr."""
+    """Run an action and return the exit status; print the cause of a failure or an interruption on stderr.
+
+    `debug`: print tracebacks, too.
+    """
     try:
         with orderly_stop():
             status = action()

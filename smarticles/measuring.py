@@ -85,17 +85,20 @@ def measured(
     """Measure runs and sweeps; tables of runs that have not changed since are read from their directories.
 
     Args:
+        directories: directories of runs and sweeps.
         frames: return one row per frame instead of one row per run and phase.
-        costly: when to compute the costly packing fractions, see `postprocess.measure_run`.
-        also: names of measures that tables have on request alone, such as "crossing-number".
-        measures: further measures; tables with their columns are not kept.
+        costly: frames for which costly packing fractions are computed: "never", "phase-end" or "every-frame".
+        also: names of measures that are computed on request only, such as "crossing-number".
+        measures: measures that the caller defines; with them, tables are neither read from directories nor stored
+            there.
         jobs: number of processes. More than 1 needs `if __name__ == "__main__":` in the calling script, since the
             processes import it.
-        progress: is called with the number of measured runs and of all runs to measure, after each run.
+        progress: function that is called after each measured run, with the number of runs measured so far and the
+            number of runs to measure.
 
     Returns:
-        A table with units in the column names. Variables of a sweep are columns after the first one. A variable is
-        called "NAME (swept)" if there is a measured column NAME with other values.
+        One table of all runs, with units in the column names. The variables of a sweep follow the first column, `run`.
+        A variable is called "NAME (swept)" if there is a measured column NAME with other values.
 
     Raises:
         InputError: a sweep has no run with frames yet, or a file is missing or damaged.

@@ -260,7 +260,10 @@ def _in_words_of_python(scratch: str) -> Iterator[None]:
 
 
 def write_sweep(scene: Scene | Path | str, vary: Mapping[str, Sequence[Any]], folder: Path) -> Path:
-    """Write a sweep of all combinations of `vary` (`sweep.yaml`, `scene.yaml.j2`); return the first path."""
+    """Write `sweep.yaml` and its template `scene.yaml.j2` into a folder; return the path of `sweep.yaml`.
+
+    The sweep has all combinations of the values in `vary`, which has the form of the argument `vary` of `sweep`.
+    """
     if not vary:
         raise InputError("vary: is empty; give a key of the scene and its values, e.g. {'seed': [1, 2, 3]}")
     data = _explicit_keys(scene) if isinstance(scene, Scene) else _read_scene_file(Path(scene))
@@ -287,7 +290,11 @@ def write_sweep(scene: Scene | Path | str, vary: Mapping[str, Sequence[Any]], fo
 
 
 def _explicit_keys(scene: Scene) -> dict[str, Any]:
-    """Return the keys that were set explicitly, without derived keys, which may depend on varied keys."""
+    """Return the keys that were set explicitly in a scene, with their values, as nested mappings.
+
+    Keys of `fidelity` are left out if their values follow from the rest of the scene, since varied keys may change
+    these.
+    """
     data = scene.model_dump(mode="json", exclude_unset=True)
     if "fidelity" in data:
         derived = dict(scene.named_knobs)

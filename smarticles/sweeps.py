@@ -180,7 +180,18 @@ def is_for_cluster(arguments: argparse.Namespace, *, allow_ranks: bool = False) 
 
 
 def draft_of(path: Path, name: str, entries: Sequence[Entry], arguments: argparse.Namespace) -> Draft:
-    """Plan and render a job for runs of the sweep `name` in `path`, by a command's cluster options."""
+    """Plan and render a cluster job for runs of a sweep; write nothing.
+
+    Args:
+        path: directory of the sweep.
+        name: name of the sweep.
+        entries: runs of the job.
+        arguments: parsed command line with the options of `add_cluster_options`. Without --cluster, the cluster is that
+            of the latest job in the directory.
+
+    Raises:
+        InputError: there is neither --cluster nor an earlier job, or the request exceeds limits of the cluster.
+    """
     from templates.slurm.cluster import shipped_clusters  # noqa: PLC0415
     from templates.slurm.job import Wishes  # noqa: PLC0415
     from templates.slurm.submission import draft, submissions  # noqa: PLC0415

@@ -80,7 +80,7 @@ class Rung:
 
     @property
     def sensitivity(self) -> bool:
-        """Whether the knob is a parameter of the model, so that other values have no errors."""
+        """Whether the knob is a physical parameter of the model, whose values have effects instead of errors."""
         return self.knob == "restitution"
 
 
@@ -99,7 +99,10 @@ class Ladder:
         return tuple(dict.fromkeys(rung.knob for rung in self.rungs))
 
     def references(self) -> dict[str, Rung]:
-        """Return the reference of each knob: its finest rung, or the scene itself for a sensitivity."""
+        """Return the reference of each knob by its name: its finest rung.
+
+        The reference of a physical parameter of the model (see `Rung.sensitivity`) is the scene's own value instead.
+        """
         return {rung.knob: rung for rung in self.rungs if not rung.sensitivity or rung.setting == BASE}
 
 
@@ -174,11 +177,17 @@ def parse_knobs(text: str) -> tuple[str, ...]:
 
 
 def build_ladder(scene: Scene, *, source: str, knobs: Sequence[str] | None = None) -> Ladder:
-    """Make the ladder of a scene, for the given knobs or all that change anything in this scene.
+    """Make the ladder of a scene: the rungs of some knobs, and the variants of the scene that they need.
 
-    Rungs that the scene cannot have, such as two rows of spheres in a square section, are left out. `source` names the
-    file of the scene in messages. InputError if the scene has no activity, a time step of its own, or nothing that a
-    given knob changes.
+    Rungs that the scene cannot have, such as two rows of spheres in a square section, are left out of the ladder; it
+    lists them with the reason.
+
+    Args:
+        source: path of the scene file, for messages.
+        knobs: knobs to change; None: all that change anything in this scene, except `engine`.
+
+    Raises:
+        InputError: the scene has no activity or sets the time step in seconds, or a given knob changes nothing in it.
     """
     types = [phase.type for phase in scene.phases]
     driven = bool(ACTUATED & set(types))
@@ -328,10 +337,11 @@ def _names(engine: str) -> dict[str, dict[str, Value]]:
 
 
 def _sections(base: Mapping[str, Value]) -> list[_Point]:
-    """Return the rungs of the knob "section" for chains of spheres: rows and pitch.
+    """Return the rungs of the knob "section" for chains of spheres; a rung sets rows and pitch.
 
-    The diameter of the spheres follows from rows and sizes, as in a scene that does not set it. If the scene has
-    several rows, there are two finer rungs: half of its pitch, and twice its rows. `base` has the scene's values.
+    Rows of spheres lie side by side in a bar. The pitch is the distance of neighbouring spheres over their diameter,
+    and the diameter has its default for these rows. The scene's own rows and pitch, from `base`, are a rung as well. If
+    it has several rows, there are two finer rungs: half of its pitch, and twice its rows.
     """
     shapes: list[dict[str, Value]] = [{"rows": 1, "pitch": pitch, "diameter_m": None} for pitch in (1.3, 1.0, 0.5)]
     shapes.append({"rows": 2, "pitch": 1.0, "diameter_m": None})
@@ -351,7 +361,11 @@ def _sections(base: Mapping[str, Value]) -> list[_Point]:
 
 
 def _strands(base: Mapping[str, Value]) -> list[_Point]:
-    """Return the rungs of the knob "section" for swept links: `base`, and 1 to 3 strands side by side."""
+    """Return the rungs of the knob "section" for smooth bodies; a rung sets the number of strands.
+
+    Strands are swept spheres that lie side by side and represent a bar. The rungs are 1, 2 and 3 strands, and the
+    scene's own number and diameter, from `base`, if they differ from these.
+    """
     shapes: list[dict[str, Value]] = [{"rows": rows, "diameter_m": None} for rows in (1, 2, 3)]
     own = {key: base[key] for key in shapes[0]}
     if not any(_same(own, shape) for shape in shapes):
@@ -367,9 +381,10 @@ def _shaped(name: str, shape: dict[str, Value]) -> _Point:
 
 
 def measure(run: Run, expected_s: Mapping[str, float]) -> Row:
-    """Measure cost and compared quantities of a run, whose directory is SETTING_seedN; return its row.
+    """Measure the cost and the compared quantities of a run; return its row in the table of runs.
 
-    `expected_s` has the known expected wall times [s] by name of the run directory.
+    The name of the run directory must be VARIANT_seedN. `expected_s` has the known expected wall times [s] by name of
+    the run directory.
     """
     active = [phase for phase in run.phases if phase.type in ACTIVITIES]
     if not active or active[0].index == 0:
@@ -423,7 +438,7 @@ def _or_nan(number: float | None) -> float:
 def _of_series(run: Run, active: Sequence[int]) -> dict[str, float]:
     """Return peak hook force, energies and largest hinge gap of a run, by column; NaN if not recorded.
 
-    `active` are the indices of the phases whose work is added up.
+    The energy put in is added up over the phases whose indices are `active`.
     """
     names = (COMPARED["hook_force"], COMPARED["energy"], RESIDUAL, GAP)
     found = dict.fromkeys(names, math.nan)
@@ -516,8 +531,8 @@ def _errors(row: pd.Series) -> str:
 def advise(table: pd.DataFrame, knob: str) -> Outcome:
     """Judge which rung of a knob to use: the cheapest one whose errors are not resolved.
 
-    The text gives the largest error in φ that the seeds do not exclude. For a sensitivity it lists the rungs that
-    differ from the scene.
+    `table` is that of `work_precision`. The text of the outcome gives the errors of this rung and the largest error in
+    φ that is possible at 95 %. For a sensitivity the text lists the rungs whose results differ from those of the scene.
     """
     rows = table[table[KNOB] == knob]
     own, judged = rows[rows[VERDICT] == IS_REFERENCE], rows[rows[VERDICT].isin([RESOLVED, NOT_RESOLVED])]
@@ -549,12 +564,13 @@ def advise(table: pd.DataFrame, knob: str) -> Outcome:
 
 
 def worst_errors(table: pd.DataFrame) -> pd.DataFrame:
-    """Return the largest error of each named fidelity.
+    """Return the largest error of each named fidelity, from the table of `work_precision`.
 
-    There is a row for packing, heights and ⟨N⟩ together, and a row for energy. The largest error is the error with the
-    largest bound: its absolute value plus its 95 % band. Quantities whose error or band is unknown are left out.
-    Columns: `engine`, `fidelity`, `COST`, `quantity` (its symbol), `error [%]` (absolute value), `bound [%]`, and the
-    number of seeds.
+    A fidelity has two rows: one for the worst of packing, height and ⟨N⟩, and one for energy. The worst quantity is the
+    one with the largest bound, which is the absolute value of its error plus the 95 % band. Columns: engine, name of
+    the fidelity, cost (`COST`), number of seeds, symbol of the quantity, absolute value of the error [%], bound [%].
+
+    The reference, fidelities with a single seed, and quantities whose error or band is unknown are left out.
     """
     knob = "engine" if (table[KNOB] == "engine").any() else "fidelity"
     rows = []

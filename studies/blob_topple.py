@@ -75,13 +75,20 @@ def centre(frame: Frame) -> NDArray[np.float64]:
 
 
 def slenderness(frame: Frame) -> float:
-    """Return the vertical over the rms horizontal standard deviation of the segments' middles [-]."""
+    """Return how slender the bodies stand together: vertical over horizontal standard deviation [-].
+
+    The deviations are those of the midpoints of all segments; the horizontal one is the root mean square of those along
+    x and y.
+    """
     x, y, z = np.var(frame.segments.mean(axis=1), axis=0)
     return float(np.sqrt(2 * z / (x + y)))
 
 
 def largest_cluster(frame: Frame, diameter: float) -> float:
-    """Return the fraction of bodies in the largest cluster of touching bodies of a diameter [m]."""
+    """Return the share of all bodies that are in the largest cluster of touching bodies [-].
+
+    Two bodies touch if the distance of their axes is at most `TOUCHING` times their `diameter` [m].
+    """
     segments, reach = frame.segments, TOUCHING * diameter
     i, j = close_segments(segments[:, 0], segments[:, 1], frame.body, reach)
     touch = segment_distances(segments[i], segments[j]) <= reach

@@ -125,7 +125,14 @@ def opening_of(run: Run) -> float:
 
 
 def linked(segments: Floats, body: NDArray[np.int64]) -> EntanglementGraph:
-    """Join bodies whose linking number (open curves closed by a line) is not 0; segments (M, 2, 3) [m]."""
+    """Return the graph in which two bodies are joined if their linking number is not 0.
+
+    Open curves are closed by a straight line between their ends.
+
+    Args:
+        segments: (M, 2, 3) end points of all segments [m].
+        body: (M,) number of the body of each segment.
+    """
     return entanglement_graph(closed_linking(segments, body), least=1)
 
 
@@ -135,9 +142,16 @@ def links_per_body(graph: EntanglementGraph) -> float:
 
 
 def at_random(bodies: Floats, centres: Floats, radius: float, height: float, generator: np.random.Generator) -> Floats:
-    """Place bodies (N, S, 2, 3) with centres (N, 3) [m] anew in a cylinder: (N S, 2, 3) [m].
+    """Place copies of bodies at random in a cylinder; return their segments (N S, 2, 3) [m], body by body.
 
-    Centres are uniform in a cylinder of a radius and height [m], orientations are uniform; bodies may overlap.
+    Centres are uniform in the cylinder, orientations are uniform; bodies may overlap.
+
+    Args:
+        bodies: (N, S, 2, 3) end points of the S segments of each of N bodies [m].
+        centres: (N, 3) present centres of the bodies [m].
+        radius: radius of the cylinder [m].
+        height: height of the cylinder [m].
+        generator: source of random numbers.
     """
     count = len(bodies)
     away, angle = radius * np.sqrt(generator.random(count)), 2 * math.pi * generator.random(count)

@@ -111,12 +111,12 @@ def baseline(runs: pd.DataFrame) -> pd.DataFrame:
 
 
 def in_range(runs: pd.DataFrame) -> pd.DataFrame:
-    """Return the rows of the variant `baseline` with an h/H within the range of the paper."""
+    """Return the rows of the variant `baseline` whose confinement h/H is in the paper's range, `RANGE`."""
     return baseline(runs)[baseline(runs)[CONFINEMENT].between(*RANGE)]
 
 
 def by_trial(part: pd.DataFrame, quantity: str) -> SeedMean:
-    """Average a quantity over h/H, then over seeds.
+    """Average a quantity over the confinements h/H for each seed, then over seeds.
 
     Runs with equal servos are identical until the chain touches a wall, so values at several h/H are not independent.
     """

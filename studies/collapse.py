@@ -111,7 +111,10 @@ def measure(run: Run) -> Sequence[Row]:
 
 
 def times(runs: pd.DataFrame) -> pd.DataFrame:
-    """Average ln(fτ) over seeds by definition of height, l/w and Γ; no error for means with a bound."""
+    """Average ln(fτ) over seeds, for each definition of height, l/w and Γ.
+
+    A mean that contains a lower bound of τ, from a column that did not collapse, has no error.
+    """
     found = []
     for point, group in runs.groupby([DEFINITION, ASPECT, GAMMA], sort=False):
         bounds, mean = int(group[TIME].isna().sum()), mean_over_seeds(group[LOG])
@@ -263,7 +266,15 @@ def _with_bounds(table: pd.DataFrame) -> pd.DataFrame:
 def _law_curves(
     tables: Mapping[str, pd.DataFrame], rows: pd.DataFrame, _: str, places: NDArray[np.float64]
 ) -> dict[str, tuple[ArrayLike, ArrayLike]]:
-    """Compute ln(fτ) = Δ/Γ of one l/w at places 1/Γ (n,), with 95 % half-widths (n,)."""
+    """Compute the fitted law ln(fτ) = Δ/Γ at one l/w, as a curve of a figure.
+
+    Args:
+        rows: rows with this l/w.
+        places: values of 1/Γ (n,).
+
+    Returns:
+        Values (n,) of ln(fτ) and their 95 % half-widths (n,), by the label of the curve.
+    """
     points = judging(tables["points"])
     own = points[(points[DEFINITION] == REMAINING) & (points[ASPECT] == rows[ASPECT].iloc[0])].iloc[0]
     return {"_Δ": (own[ACTIVATION] * places, own[marked(ACTIVATION, "95 %")] * places)}

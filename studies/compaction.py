@@ -61,7 +61,7 @@ _MEANINGS = {
 
 
 class Fit(NamedTuple):
-    """A law fitted to φ against time; its end is uncertain if φ is still far from it."""
+    """A law fitted to φ against time. Its φ_∞ is uncertain if φ is still far from it at the last time."""
 
     law: str  #: Key of `LAWS`
     begin: float  #: φ_b, φ when shaking begins [-]
@@ -79,7 +79,7 @@ class Fit(NamedTuple):
 def fit(law: str, times: Array, packing: Array) -> Fit:
     """Fit a law to φ (n,) [-] at times (n,) [s] by least squares.
 
-    φ is linear in begin and end, so that both follow exactly from τ and power.
+    Only τ and the power are searched for. φ is linear in φ_b and φ_∞, so that linear least squares give these exactly.
     """
 
     def solved(parameters: Array) -> tuple[Array, Array]:
@@ -157,7 +157,15 @@ def positive(name: str, says: str, values: Callable[[pd.DataFrame], pd.Series], 
 def _law_curves(
     _: Mapping[str, pd.DataFrame], rows: pd.DataFrame, __: str, times: Array
 ) -> dict[str, tuple[ArrayLike, ArrayLike]]:
-    """Compute φ at times (n,) by both laws, averaged over the runs of one coefficient of friction."""
+    """Compute φ by both laws, averaged over runs of one coefficient of friction, as curves of a figure.
+
+    Args:
+        rows: rows of these runs in the table of runs.
+        times: (n,) [s].
+
+    Returns:
+        Values (n,) and their 95 % half-widths (n,), here NaN, by the name of the law.
+    """
     fits = {law: rows[[law_column(law, name) for name in _MEANINGS][:5]].itertuples(index=False) for law in LAWS}
     means = {law: np.mean([Fit(law, *run).at(times) for run in runs], axis=0) for law, runs in fits.items()}
     return {law: (mean, np.full(len(times), np.nan)) for law, mean in means.items()}

@@ -107,7 +107,10 @@ _WORDS = {Verdict.FOUND: "equivalent", Verdict.NOT_FOUND: "different"}
 
 
 def measure(run: Run) -> Row:
-    """Measure the quantities of the run's case; return the run's row, with NaN for all other quantities."""
+    """Measure a run of a case, such as `hook` or `shape-change`, and return its row.
+
+    The name of the scene is CASE/VARIANT. Quantities that belong to other cases are NaN.
+    """
     case, slash, variant = run.manifest.name.partition("/")
     if not slash or case not in (*ACTIVE, HOOK, COLLAPSE, CHAIN):
         msg = f"{run.path}: the scene's name is {run.manifest.name!r}, not CASE/VARIANT; give runs of the study engines"
@@ -142,7 +145,11 @@ def _measured(run: Run, case: str) -> dict[str, float]:
 
 
 def by_seed(runs: pd.DataFrame, one: Compared, variant: str) -> pd.Series:
-    """Return a variant's mean of a quantity over its cases, by seed, for seeds that have a value."""
+    """Return the values of a quantity in a variant by seed, each a mean over the cases of the quantity.
+
+    Seeds without a value are left out. The cases are listed in `one`; those that start with one pile count as one
+    value.
+    """
     chosen = runs[(runs[VARIANT] == variant) & runs[CASE].isin(one.cases)]
     means: pd.Series = chosen.groupby(SEED)[one.column].mean().dropna()
     return means
@@ -180,17 +187,20 @@ def equivalence(runs: pd.DataFrame) -> pd.DataFrame:
 
 
 def pitch_of(variant: str) -> float:
-    """Return the pitch of a variant [-]: 0 for links, 1 for `yade`; NaN if it is unknown."""
+    """Return the pitch of YADE's chains in a variant: distance of spheres over their diameter [-].
+
+    It is 0 for links, the limit of fine chains, 1 for `yade`, and NaN for other variants that do not name a pitch.
+    """
     if variant in (LINKS, YADE):
         return 0.0 if variant == LINKS else 1.0
     return float(variant.removeprefix("pitch-")) if variant.startswith("pitch-") else math.nan
 
 
 def refinement(runs: pd.DataFrame) -> pd.DataFrame:
-    """Compare the shaken piles at each pitch of YADE's spheres with links: a row per quantity and variant.
+    """Compare the shaken piles on YADE, at each pitch of its spheres, with those on links.
 
-    Differences are paired by seed; the engine `links` is listed with the pitch 0. Other cases were not run at every
-    pitch.
+    The table has a row per quantity and variant. Differences are paired by seed; links is listed with the pitch 0. Only
+    shaken piles were run at every pitch.
     """
     shaken = runs[runs[CASE] == EXTERNAL]
     rows: list[dict[str, object]] = []

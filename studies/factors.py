@@ -56,7 +56,11 @@ def measure(run: Run) -> Row:
 
 
 def effect(quantity: str, factor: str) -> Finding:
-    """Make the finding that a factor changes a quantity with the sign in `SIGNS`, of the paper's findings."""
+    """Make the finding that a factor raises (sign +1 in `SIGNS`) or lowers (−1) a quantity.
+
+    The effect is the mean difference between runs with the factor's value of the paper's code and those with that of
+    its text, see `FACTORS`.
+    """
     (symbol, sign), (name, text) = SIGNS[quantity], NAMES[factor]
 
     def outcome(runs: pd.DataFrame) -> Outcome:

@@ -71,7 +71,10 @@ def share(stage: str) -> str:
 
 
 def spans(stage: str, what: str = "pile") -> str:
-    """Return the name of the column that is 1 if clusters span `what` ("height", "width", both: "pile")."""
+    """Return the name of the column that is 1 if entangled clusters span a pile at a stage, else 0.
+
+    `what` is spanned: "height" (floor to top), "width" (wall to wall) or "pile" (both).
+    """
     return f"spans {what} {stage} [-]"
 
 
@@ -185,7 +188,7 @@ def laws(runs: pd.DataFrame) -> pd.DataFrame:
 
 
 def _column(stage: str, axis: str) -> str:
-    """Return the name of the column of l/w or of ⟨N⟩ at a stage, in the table of runs; `axis` says which."""
+    """Return the column of the table of runs for an axis: "l/w", or "⟨N⟩" at a stage of the run."""
     return ASPECT if axis == "l/w" else crossings(stage)
 
 
@@ -200,7 +203,10 @@ def _profiles(runs: pd.DataFrame, stage: str, axis: str) -> dict[int, Profile]:
 
 
 def thresholds(runs: pd.DataFrame) -> pd.DataFrame:
-    """Tabulate the thresholds at which half of the piles are spanned: a row per stage, axis and size."""
+    """Tabulate the l/w and the ⟨N⟩ at which half of the piles are spanned.
+
+    The table has one row per stage (`before` or `after` the shake), quantity (l/w or ⟨N⟩) and number of smarticles.
+    """
     return pd.DataFrame(
         {
             "stage": stage,
@@ -355,7 +361,16 @@ FINDINGS = (
 def _law_curves(
     tables: Mapping[str, pd.DataFrame], rows: pd.DataFrame, column: str, places: NDArray[np.float64]
 ) -> dict[str, tuple[ArrayLike, ArrayLike]]:
-    """Compute the law of a quantity at places N^(-1/3) (n,), with 95 % half-widths (n,)."""
+    """Compute the law q_∞ + a N^(-1/3) of a quantity, fitted at one l/w, as a curve of a figure.
+
+    Args:
+        rows: rows with this l/w.
+        column: column of the quantity.
+        places: values of N^(-1/3) (n,).
+
+    Returns:
+        Values (n,) and 95 % half-widths (n,) by the label of the curve; empty if there are too few sizes to fit.
+    """
     law = fitted(tables["runs"], float(rows[ASPECT].iloc[0]), column)
     if law is None:
         return {}

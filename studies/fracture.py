@@ -137,7 +137,10 @@ def measure(run: Run) -> Row:
 
 
 def force_history(run: Run, *, net: bool = False) -> History:
-    """Read the upper hook's force, if `net` less the lower's, against time, over all smarticles' weight."""
+    """Read the force on the upper hook against time, over the weight of all smarticles [-].
+
+    With `net`, the force on the lower hook is subtracted.
+    """
     pull = read_pull(run, run.series, run.phases[-1].index)
     force = (pull.net if net else pull).force / run.manifest.count / weight_of_one(run)
     return History(times=pull.times, values=force)
@@ -154,13 +157,13 @@ def at_one_theta(table: pd.DataFrame) -> pd.DataFrame:
 
 
 def amplitudes(table: pd.DataFrame) -> pd.DataFrame:
-    """Return the rows of the internal oscillation at `SHOWN_ASPECT`; none if they have one θ."""
+    """Return the rows of the internal oscillation at `SHOWN_ASPECT`, or none if all have the same θ."""
     part = at_shown_aspect(table[table[PROCEDURE] == INTERNAL])
     return part if part[THETA].nunique() > 1 else part.iloc[:0]
 
 
 def aspects(table: pd.DataFrame) -> pd.DataFrame:
-    """Return the rows of internal oscillation at θ = `AMPLITUDE`; none unless they have two l/w or more."""
+    """Return the rows of the internal oscillation at θ = `AMPLITUDE`, or none if all have the same l/w."""
     part = of_procedure(table, INTERNAL)
     return part if part[ASPECT].nunique() > 1 else part.iloc[:0]
 
@@ -176,7 +179,7 @@ _BY_ASPECT = one_by_one(ASPECT, lambda aspect: rf"$l/w$ = {aspect:g}")
 
 
 def _line(rows: Rows) -> Split:
-    """Return a split into one series: the points of the internal oscillation that `rows` selects."""
+    """Return a function that makes one series of the rows of the internal oscillation that `rows` selects."""
     properties = {**procedure_marker(INTERNAL), "linestyle": (0, (2, 1.5))}
     return lambda points: [Series(rows=rows(points), label="internal oscillation", properties=properties)]
 

@@ -103,10 +103,12 @@ def run_accuracy(arguments: argparse.Namespace) -> int:
 
 
 def _listing(ladder: Ladder, expected_s: Mapping[str, float], seeds: int, jobs: int | None) -> str:
-    """Return a table of the variants, with the expected wall time [s] of a run and [h] of all runs.
+    """Return a table of the variants, with the expected wall time of one run [s] and of all runs [h].
 
-    `expected_s` has the expected wall time by variant [s], `seeds` is the number of seeds, `jobs` that of runs at once;
-    None: one per core.
+    Args:
+        expected_s: expected wall time of one run [s] by variant.
+        seeds: number of seeds.
+        jobs: number of simultaneous runs; None: one per core.
     """
     from dem.engine.cores import usable_cores  # noqa: PLC0415
     from dem.plan.outlook import plan  # noqa: PLC0415

@@ -128,7 +128,9 @@ class SweepSimulator:
         return Path(self.arguments.out) / f"wave{wave}"
 
     def planned(self, wave: int) -> Array | None:
-        """Return the parameters (n, d) of a wave whose sweep exists; None if it does not.
+        """Return the parameters (n, d) of the points of a wave (counted from 1); None if it has no sweep yet.
+
+        The d columns are the free parameters, in the order of the calibration file.
 
         Raises:
             InputError: the sweep lacks a free parameter of the calibration.
@@ -154,7 +156,13 @@ class SweepSimulator:
     def run(self, wave: int, theta: Array) -> Sequence[tuple[Mapping[str, Value], Measured | None]] | None:
         """Compute or submit the missing runs of a wave; return variables and measures of all its runs.
 
-        Returns None as long as runs are missing. The measures of a failed run are None.
+        Args:
+            wave: number of the wave, from 1.
+            theta: parameters (n, d), a row for each point.
+
+        Returns:
+            For each run a pair, variables by name and measures by name; the measures of a failed run are None. The
+            whole result is None as long as some runs have neither finished nor failed.
         """
         sweep, points = self.problem.sweep(wave, theta)
         folder = sweeps.folder_of(sweep, points, self._path(wave), self.arguments.command_line)
@@ -168,7 +176,11 @@ class SweepSimulator:
         return self._measured(folder)
 
     def _complete(self, waiting: Folder) -> bool:
-        """Compute the waiting runs on this machine and return True; or submit or count them and return False."""
+        """Compute the waiting runs here, or leave them to others; return whether they were computed here.
+
+        For a cluster, a job is written or submitted. With --submit none and no --cluster, the command that starts the
+        runs is printed.
+        """
         if self.for_cluster:
             sweeps.enqueue(waiting, self.arguments)
             return False

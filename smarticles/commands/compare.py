@@ -115,12 +115,15 @@ def compare(one: Path, other: Path) -> dict[str, Any]:
 
     Returns:
         kind: "run" or "sweep".
-        identical: whether A and B have equal sets of runs, whose series and frames agree bit by bit.
-        scene: `Differences` of the scenes, with dots for nested keys; for sweeps, of constants and variables.
-        versions: `Differences` of engine, package versions and number of threads.
-        only: names of runs that only A or only B has; empty for runs.
-        bits: results of `compare_bits` by the runs' names; one entry for two runs.
-        measures: rows with phase, quantity, A, B, B - A, and the standard error of B - A; for sweeps also variables.
+        identical: whether series and frames agree bit by bit in all runs that both have begun; False if there are none,
+            or if one sweep has a run that the other lacks.
+        scene: values in A and in B of each key of the scene, or of each variable and constant of the sweeps, that
+            differs; see `differences`.
+        versions: the same for engine, package versions and number of threads; for runs also for their status.
+        only: for sweeps, names of runs that A alone has (key "A") and that B alone has (key "B"); empty for runs.
+        bits: result of `compare_bits` by the name of the run; one entry for two runs.
+        measures: one row per phase and quantity with the values in A and B, B - A, and the standard error of B - A; for
+            sweeps, one row per phase, quantity and combination of variables.
 
     Raises:
         InputError: A is a run and B a sweep or vice versa, or a directory is neither.
@@ -185,12 +188,15 @@ def _compare_sweeps(one: Folder, other: Folder) -> dict[str, Any]:
 
 
 def _listed(values: Mapping[str, Sequence[Any]]) -> dict[str, Any]:
-    """Return one value per name: the only value, or all values of the name joined to a text."""
+    """Return one value for each name: its only value, or a text with all its values, separated by commas."""
     return {name: some[0] if len(some) == 1 else ", ".join(map(str, some)) for name, some in values.items()}
 
 
 def _versions(runs: Iterable[Run]) -> dict[str, Any]:
-    """Return the engine and the package versions of the started runs of a sweep."""
+    """Return engine, package versions and number of threads of the started runs, by name.
+
+    If runs differ in one of them, it is a text with all values, separated by commas.
+    """
     found: dict[str, dict[Any, None]] = {}
     for run in runs:
         for name, value in _made_by(run).items() if (run.path / MANIFEST).is_file() else ():
@@ -199,7 +205,10 @@ def _versions(runs: Iterable[Run]) -> dict[str, Any]:
 
 
 def differences(one: Mapping[str, Any], other: Mapping[str, Any]) -> Differences:
-    """Return the values of A and B by key, for keys whose values differ; nested keys are joined by dots."""
+    """Return the values of A and B, as a pair, for each key whose values differ.
+
+    Keys of nested mappings are joined by dots, such as `contact.restitution`. None stands for a key that is missing.
+    """
     from dem.scene.reading import flattened  # noqa: PLC0415
 
     first, second = flattened(one), flattened(other)

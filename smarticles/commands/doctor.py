@@ -172,7 +172,10 @@ def examine(arguments: argparse.Namespace) -> int:
 
 
 def compile_links() -> int:
-    """Compile the engine links for all kinds of phases; return 0 if the code is cached on disk, else 1."""
+    """Compile the code of the engine `links` for all kinds of scenes, such as shaken piles and hooks.
+
+    Returns the exit status: 0 if compiled code is stored on disk, where later runs find it; otherwise 1.
+    """
     try:
         from dem.engine.links.cache import folder  # noqa: PLC0415
     except ImportError as error:

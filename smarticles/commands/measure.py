@@ -200,7 +200,7 @@ def _text(table: pd.DataFrame, by: Sequence[str], shown: Sequence[_Column]) -> s
 
 
 def _notes(table: pd.DataFrame) -> list[str]:
-    """Return notes on hooks that nothing touched or that their force limit stopped, a line for each."""
+    """Return a line of text for each hook that touched nothing, or that was stopped at its force limit."""
     notes = []
     for row in table.to_dict("records") if "hook work [J]" in table.columns else ():
         where = f"{row['run']}: phase {row['phase']} ({row['phase type']})"
@@ -218,7 +218,13 @@ def _notes(table: pd.DataFrame) -> list[str]:
 
 
 def _legend(shown: Container[str], *, per_frame: bool, by: Sequence[str]) -> str:
-    """Return the legend of the printed columns, and the frames or runs over which means are taken."""
+    """Return the legend below the printed table: what a row is, and what the columns mean.
+
+    Args:
+        shown: names of the printed columns.
+        per_frame: whether a row is a frame instead of a phase.
+        by: columns whose values make groups of runs; empty: runs are not averaged.
+    """
     from postprocess.measures.packing import COSTLY_DEFINITIONS, DEFINITIONS  # noqa: PLC0415
     from postprocess.measures.pull import WINDOW  # noqa: PLC0415
     from postprocess.measures.strain import FRACTURE, PEAK, QUANTITIES, WIDENING, YIELD  # noqa: PLC0415

@@ -173,7 +173,8 @@ def _run_until(
 def _set_parallelism(scene: Scene, out: Path, *, resume: bool, threads: int | None, ranks: int | None) -> None:
     """Set the environment variables from which the engine takes its number of threads or ranks.
 
-    To `resume` without a given number, the number of the run's manifest is taken; by default it is 1.
+    `threads` and `ranks` are the numbers that the user gave. Without a number it is 1; with `resume`, it is that in the
+    manifest of the run in `out`. InputError if the engine cannot use the given number.
     """
     from dem.engine.cores import RANKS, check_ranks, threads_warning  # noqa: PLC0415
     from dem.record.run import Run  # noqa: PLC0415

@@ -94,10 +94,10 @@ def print_keys(arguments: argparse.Namespace) -> int:
 
 
 def _parts(schema: Mapping[str, Any]) -> Iterator[tuple[str, Mapping[str, Any]]]:
-    """Yield the parts of a scene by name, each with its definition in the JSON schema.
+    """Yield the name and the JSON schema of each part of a scene, that is, of each mapping inside a scene.
 
-    The name is the key of the scene that holds the part, such as `container`, or the part's tag, such as `deposit` for
-    a phase of this type.
+    A part is named by its key, such as `container`. If a key allows several types of mappings, as `phases` does, the
+    part of this name only lists the types, and each type, such as `deposit`, is a part of its own.
     """
     definitions = schema["$defs"]
     for definition in (schema, *definitions.values()):
@@ -115,7 +115,10 @@ def _parts(schema: Mapping[str, Any]) -> Iterator[tuple[str, Mapping[str, Any]]]
 
 
 def _kinds(entry: Mapping[str, Any]) -> list[str]:
-    """Return the tags, such as types of phases, of the mappings that an entry of the schema allows."""
+    """Return the types of mappings, such as `deposit`, that a key of a scene allows; empty if none.
+
+    `entry` is the entry of the key in the JSON schema.
+    """
     if "discriminator" in entry:
         return list(entry["discriminator"]["mapping"])
     options = [*entry.get("anyOf", ()), *([entry["items"]] if "items" in entry else [])]

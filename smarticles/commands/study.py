@@ -104,15 +104,22 @@ def compute_and_analyse(
     pictured: Mapping[str, object],
     earlier: Mapping[str, MeasuredRun] = MappingProxyType({}),
 ) -> int:
-    """Compute the missing runs of a sweep, unless --analyse is given, and analyse the finished runs.
+    """Compute the missing runs of a sweep, analyse its finished runs, and print the results; return 0.
+
+    With --analyse no run is computed.
 
     Args:
+        folder: directory of the sweep; the results are written to its subfolder `results`.
         arguments: parsed command line with --analyse and --jobs.
-        load: returns the study that analyses the runs; called late, since it imports large libraries.
-        note: how the runs differ from the full study.
-        full: what the full study found; empty if these runs are the full study.
-        pictured: values of variables; the first finished run that has them is drawn.
-        earlier: measured runs of an earlier analysis by name; these runs are not computed.
+        load: returns the study that analyses the runs. It is called after the runs, since it imports large libraries.
+        note: how the runs differ from the full study, for the results.
+        full: what the full study found, for the results; empty if these runs are the full study.
+        pictured: values of variables by name; the first finished run with these values is drawn.
+        earlier: measured runs of an earlier analysis by name of the run; they are not computed again.
+
+    Raises:
+        InputError: --analyse is given, and no run is finished.
+        RunError: a run failed; the finished runs have been analysed.
     """
     missing = folder.only([entry for entry in folder.entries if entry.name not in earlier])
     outcomes = [] if arguments.analyse else compute(missing, jobs=arguments.jobs, command=arguments.command_line)
@@ -146,7 +153,11 @@ def _draw(folder: Folder, finished: Sequence[Entry], values: Mapping[str, object
 
 
 def _earlier(results: Path, folder: Folder, study: Study) -> Mapping[str, MeasuredRun]:
-    """Read those runs of a sweep, by name, that are in the tables of an earlier analysis, in `results`."""
+    """Read the measured runs of an earlier analysis from its folder `results`, by name of the run.
+
+    Only runs whose name and scene are those of a run in `folder` are read. InputError if the study cannot be analysed
+    from tables, since it needs the files of the runs.
+    """
     from studies.framework.runs import Wanted, earlier_runs  # noqa: PLC0415
 
     if not study.from_tables:

@@ -123,7 +123,11 @@ def _check_ranks(points: Sequence[Point], ranks: int | None) -> None:
 
 
 def _draft(name: str, entries: Sequence[Entry], arguments: argparse.Namespace) -> Draft:
-    """Render the submission of all runs of a new sweep, or of the missing runs of an existing sweep."""
+    """Render the cluster job for the runs of a sweep; write nothing.
+
+    The job has all runs, `entries`. If the directory --out has this sweep already, the job has only the runs that are
+    missing and not in the queue, or all runs if there are none of these.
+    """
     from templates.slurm.submission import submissions, tasks_of_runs, to_submit  # noqa: PLC0415
     from templates.sweep.folder import open_folder  # noqa: PLC0415
 

@@ -48,7 +48,8 @@ def against_variable(variable: str, label: str, groups: Groups) -> str:
     Args:
         variable: title of the x-axis.
         label: title of the y-axis.
-        groups: x, means and standard errors of each curve; an error may be NaN.
+        groups: a curve for each name in the legend: values of the variable (numbers or words), means, and half-lengths
+            of the error bars, of equal length; an error may be NaN.
     """
     values = [x for xs, _, _ in groups.values() for x in xs]
     numeric = all(isinstance(x, int | float) for x in values)
@@ -77,7 +78,11 @@ def against_variable(variable: str, label: str, groups: Groups) -> str:
 
 
 def thinned(times: Array, values: Array) -> tuple[Array, Array]:
-    """Reduce a curve (n,) to at most 400 points: the extremes of each interval, without NaN."""
+    """Reduce a curve to at most 400 points, without NaN; return its times and values.
+
+    A curve with more points, times (n,) and values (n,), is cut into 200 intervals with about equal numbers of points;
+    the points with the least and the greatest value of each interval are kept.
+    """
     finite = np.isfinite(values)
     times, values = times[finite], values[finite]
     if len(times) <= _MAX_POINTS:

@@ -36,9 +36,11 @@ def page(title: str, about: str, lead: Iterable[tuple[str, str]], sections: Iter
     """Return an HTML page.
 
     Args:
+        title: title of the page.
         about: kind of directory: "run", "sweep", "study" or "results of a study".
-        lead: label and value of the most important facts.
-        sections: titles and blocks; a section without blocks is left out.
+        lead: label and value of each of the most important facts, which come first.
+        sections: title and HTML blocks of each section; a section without blocks is left out.
+        source: directory that the page is about; its name is in the last line of the page.
     """
     try:
         made = f"smarticles {version('smarticles')}"

@@ -136,12 +136,14 @@ def frame_table(found: pd.DataFrame, caption: str) -> Markup:
 def picture_blocks(
     directory: Path, *, name: str = "", turn: bool = True, limits: tuple[float, float] | None = None
 ) -> list[Markup]:
-    """Return pictures of the last frame of a run, or a note with the reason why there are none.
+    """Return HTML blocks with pictures of the last frame of a run.
+
+    There is a note with the reason if pictures cannot be drawn, and no block if the run has no frames.
 
     Args:
         name: name of the run in captions; empty on the page of a single run.
         turn: add views from all sides.
-        limits: ends of the colour scale; None: the extremes in this picture.
+        limits: lower and upper end of the colour scale of the picture; None: the extremes in it.
     """
     from postprocess.pictures.render import render_run  # noqa: PLC0415  (imports PyVista)
     from postprocess.pictures.render import turntable as draw_views  # noqa: PLC0415
@@ -198,7 +200,13 @@ def _curves(run: Run) -> list[Markup]:
 
 
 def scene_blocks(directory: Path, scene: Scene | None, scene_error: str) -> list[Markup]:
-    """Return blocks: planned phases and warnings, or `scene_error` without a scene, and the scene file."""
+    """Return HTML blocks about a scene: table of phases, warnings of the plan, and text of the scene file.
+
+    Args:
+        directory: folder that has the scene file.
+        scene: the scene, or None if this version cannot read it.
+        scene_error: text that replaces phases and warnings if `scene` is None.
+    """
     blocks = [words(scene_error, tone="warning")] if scene is None else []
     if scene is not None:
         planned = plan(scene)
@@ -220,7 +228,10 @@ def scene_blocks(directory: Path, scene: Scene | None, scene_error: str) -> list
 
 
 def effect_blocks(scenes: Sequence[Scene]) -> list[Markup]:
-    """Return a table of physical effects: whether or in how many scenes each is computed, and why."""
+    """Return a table of physical effects: whether each is computed, and why; no block without scenes.
+
+    For several scenes, the table has the number of scenes in which an effect is computed.
+    """
     rows = []
     for decisions in zip(*map(decide, scenes), strict=True):
         on = [effect for effect in decisions if effect.on]
@@ -298,7 +309,12 @@ def warning_blocks(directories: Mapping[str, Path]) -> list[Markup]:
 
 
 def provenance_table(facts: Sequence[Sequence[Any]], versions: Mapping[str, str]) -> Markup:
-    """Return a table of facts about the origin of a run or sweep, followed by versions."""
+    """Return a table on the origin of a run or sweep.
+
+    Args:
+        facts: rows of two cells, the name of a fact and its value.
+        versions: versions by name of the package; they follow below the facts.
+    """
     rows = [*facts, *([f"version of {name}", version] for name, version in versions.items())]
     return table("Origin", ["fact", "value"], rows)
 

@@ -119,7 +119,10 @@ def _scenes(folder: Folder) -> dict[str, Scene]:
 
 
 def _measured(folder: Folder, varied: Mapping[str, Sequence[Any]], *, jobs: int) -> list[Section]:
-    """Return sections of means over runs with equal variables, whose values are `varied`; `jobs` measure."""
+    """Measure a sweep with `jobs` processes; return sections of tables and charts of means over runs.
+
+    Means are over runs with equal variables. `varied` has all values of each variable and constant.
+    """
     if not any(has_frames(folder.run(entry)) for entry in folder.entries):
         return [("Result", [words("No run has frames yet.", tone="note")])]
     runs = measured([folder.path], costly="never", jobs=jobs)
@@ -202,7 +205,12 @@ def _pictures(folder: Folder) -> list[Markup]:
 
 
 def _common_limits(runs: Sequence[Run]) -> tuple[float, float] | None:
-    """Return the extremes of crossings in the last frames of runs; None if a run has no crossings."""
+    """Return the ends of one colour scale for pictures of several runs; None if there is none.
+
+    The upper end is the largest number of links of other smarticles through one smarticle's plane, in the last frames
+    of the runs; the lower end is 0. There is no scale if the number is 0, or if it cannot be counted in one of the
+    runs.
+    """
     try:
         if not all(has_frames(run.path) and in_space(run) for run in runs):
             return None

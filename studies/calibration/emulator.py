@@ -54,20 +54,21 @@ class Emulator:
 
 
 def fit(inputs: Array, values: Array, label: str) -> Emulator:
-    """Fit an emulator to runs.
+    """Fit an emulator to the values of one measure in n runs.
 
-    The kernel is a squared exponential with a length scale for each parameter. White noise stands for the scatter from
-    seed to seed. All have their most probable values by likelihood and log-normal priors (scikit-learn). Without
-    priors, few runs in several dimensions are interpolated through their scatter. Repetitions at one point are rows of
-    their own.
+    The kernel is a squared exponential with a length scale for each parameter; white noise stands for the scatter from
+    seed to seed. Amplitude, length scales and noise have their most probable values: they maximise the likelihood times
+    log-normal priors. Without priors the emulator would pass exactly through few runs in several dimensions, scatter
+    included.
 
     Args:
-        inputs: Parameters (n, d) over the ranges of their priors.
-        values: Measured values (n,).
-        label: Name of the datum, for messages.
+        inputs: parameters (n, d) of the runs, scaled from 0 to 1 over the ranges of their priors. Runs with equal
+            parameters and different seeds have a row each.
+        values: measured values (n,).
+        label: name of the datum, for messages.
 
     Raises:
-        InputError: There are fewer than `LEAST_RUNS` runs, or all values are equal.
+        InputError: there are fewer than `LEAST_RUNS` runs, or all values are equal.
 
     Source:
         Rasmussen and Williams, Gaussian Processes for Machine Learning, 2006, chapters 2 and 5. Prior of the length

@@ -93,7 +93,12 @@ class Result:
         return pd.DataFrame(rows)
 
     def predictive(self) -> pd.DataFrame:
-        """Tabulate each datum with the 95 % band of predicted measurements, with discrepancy and error."""
+        """Tabulate each datum with median and 95 % band of the values that the model predicts for it.
+
+        The band contains the posterior of the parameters, the variance of the emulator, the discrepancy of the model
+        and the error of the measurement. `covered` says whether the datum lies within it. Data without an emulator have
+        no band.
+        """
         random = np.random.default_rng(self.problem.content.first_seed)
         inputs, sizes = self.problem.scaled(self.theta), self.problem.sizes
         rows = []
@@ -138,9 +143,12 @@ class Result:
 def calibrate(problem: Problem, simulator: Simulator, say: Callable[[str], None] = print) -> Result | None:
     """Run all waves and sample the posterior; return None if runs of a wave are still in a queue.
 
-    The first wave is a Sobol sequence in the priors. Each further wave takes those points of a finer sequence that the
-    runs so far do not rule out. Conditions that are predicted only are run in the last wave. `say` gets a line about
-    each wave.
+    The first wave has points of a Sobol sequence in the priors. Each further wave has those points of a finer sequence
+    that the runs so far do not rule out. A condition is a combination of the data's variables, such as l/w and count;
+    conditions without data to fit are run in the last wave only.
+
+    Args:
+        say: function that is called with a line of text about each wave.
 
     Raises:
         InputError: The budget is too small, or too few runs finished for an emulator.
@@ -207,11 +215,15 @@ def first_points(problem: Problem, size: int) -> Array:
 
 
 def _next(candidates: Array, distances: Array, size: int) -> Array:
-    """Return the first `size` candidates that are not ruled out, (size, d), or the least implausible.
+    """Return the points of the next wave: the first `size` candidates that are not ruled out, (size, d).
 
-    The least implausible candidates are returned if fewer than `size` are not ruled out. `distances` (n,) are the
-    implausibilities of the candidates (n, d). A part of a Sobol sequence within a region is spread as evenly in it as
-    the whole is in its cube.
+    If fewer than `size` are not ruled out, the `size` least implausible candidates are returned. A candidate is ruled
+    out if its implausibility is above `CUTOFF`.
+
+    Args:
+        candidates: parameters (n, d), a Sobol sequence. Its part within a region fills the region evenly.
+        distances: implausibilities (n,) of the candidates [-].
+        size: number of points.
     """
     limit = max(CUTOFF, float(np.partition(distances, size - 1)[size - 1]))
     return _rounded(candidates[distances <= limit][:size])
@@ -238,7 +250,12 @@ def emulate(problem: Problem, runs: pd.DataFrame) -> list[Emulator | None]:
 
 
 def _residuals(problem: Problem, emulators: Sequence[Emulator | None], theta: Array) -> tuple[Array, Array, Array]:
-    """Return data less emulator means (n, J), variances of both together (n, J), and `sizes` (J,)."""
+    """Return deviations of the J fitted data from the emulators at parameters (n, d), and variances.
+
+    Returns:
+        Data less emulator means, (n, J); variances of measurement and emulator together, (n, J); mean sizes s_j of the
+        measures, (J,).
+    """
     inputs, sizes = problem.scaled(theta), problem.sizes
     used = [(d, e, s) for d, e, s in zip(problem.data, emulators, sizes, strict=True) if d.fitted and e is not None]
     predicted = [emulator.predict(inputs) for _, emulator, _ in used]
@@ -248,11 +265,11 @@ def _residuals(problem: Problem, emulators: Sequence[Emulator | None], theta: Ar
 
 
 def implausibility(problem: Problem, emulators: Sequence[Emulator | None], theta: Array) -> Array:
-    """Return the implausibility (n,) of parameters (n, d).
+    """Return the implausibility (n,) [-] of parameters (n, d), given the fitted data.
 
-    It is the largest distance of a fitted datum from its emulator's mean, over the standard deviation of error,
-    emulator and discrepancy together. The standard deviation of the discrepancy is σ s_j, where σ is the scale of its
-    prior.
+    It is the largest ratio over the data: distance of the datum from the emulator's mean, over the standard deviation
+    of measurement, emulator and discrepancy together. The discrepancy has the standard deviation σ s_j, where s_j is
+    the mean size of the measure, and σ is the scale of its prior.
     """
     errors, variances, sizes = _residuals(problem, emulators, theta)
     found: Array = np.max(np.abs(errors) / np.sqrt(variances + (problem.content.discrepancy * sizes) ** 2), axis=1)
@@ -276,7 +293,8 @@ def sample(problem: Problem, emulators: Sequence[Emulator | None]) -> tuple[Arra
     """Sample the posterior by emcee.
 
     Returns:
-        Draws (m, d + 1) of the parameters and σ, thinned; the draw of the largest density (d + 1,); diagnostics.
+        Thinned draws (m, d + 1) of the parameters and σ; the draw with the largest posterior density, (d + 1,);
+        diagnostics by name: autocorrelation time in steps, steps over it, acceptance, and number of effective draws.
     """
     import emcee  # noqa: PLC0415  (an extra)
 

@@ -132,9 +132,10 @@ class Problem:
 
     @cached_property
     def sizes(self) -> Array:
-        """Mean size of the measure of each of the J data, (J,): the s_j of the discrepancy.
+        """Mean size of the measure of each of the J data, (J,), in the unit of the measure.
 
-        It is the mean absolute value over all fitted data of this measure, or over all its data if none is fitted.
+        It is the mean absolute value over all fitted data of this measure, or over all its data if none is fitted. The
+        standard deviation of the model's discrepancy is σ times this size.
         """
         found = []
         for datum in self.data:
@@ -237,7 +238,11 @@ class Problem:
         return sweep, points_of(sweep, runs)
 
     def _template(self, text: str, file: Path) -> str:
-        """Return the text of a scene as a template with a variable for each of `keys`, and one for the seed."""
+        """Turn the text of a scene into a template with a variable for each of `keys`, and one for the seed.
+
+        `keys` of the calibration file has the key of the scene that each variable changes. `file` is the path of the
+        scene, for messages. InputError if `keys` lacks a variable or has an unknown one.
+        """
         data = parse_yaml(text, str(file))
         if not isinstance(data, dict):
             raise InputError(f"{file}: a scene is a mapping of keys to values, got {shown(data)}")

@@ -75,7 +75,10 @@ class TableSimulator:
         return found
 
     def run(self, wave: int, theta: Array) -> list[tuple[Mapping[str, Value], Measured | None]]:
-        """Return variables and measures of the rows whose variables agree with a condition of the data."""
+        """Return variables and measures of the rows whose variables match a condition of the data.
+
+        `wave` and `theta` are not used: the table is the only wave.
+        """
         found: list[tuple[Mapping[str, Value], Measured | None]] = []
         measures = list(dict.fromkeys(datum.measure for datum in self.problem.data))
         for row in self.table.to_dict("records"):

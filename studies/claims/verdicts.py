@@ -62,11 +62,11 @@ class Claim:
 
     @property
     def verdict(self) -> str:
-        """Verdict under both protocols together.
+        """Verdict from both protocols together: the rules of the paper's text, and those of the paper's code.
 
-        A protocol without data does not count. If the protocols agree, it is their common verdict. Otherwise it is
-        `partly` if one reproduces the claim, else `not`. Without data it is `no data`, or `not testable` if no study
-        tested the claim.
+        A protocol without data does not count. If both agree, it is their common verdict: `reproduced`, `not`, or `not
+        resolved`. If they differ, it is `partly` if one reproduces the claim, else `not`. It is `no data` if there are
+        no data, and `not testable` if no study tested the claim.
         """
         settled = [one.settled for one in (self.tested["text"], self.tested["code"]) if one is not None]
         known = set(settled) - {"no data"}
@@ -128,9 +128,13 @@ def _tested(
     *,
     optional: bool = False,
 ) -> Tested | None:
-    """Read the verdict of a finding [STUDY, ID], and of the finding `instead`; None if `named` is None.
+    """Read the verdict of a finding from the tables of its study; None if `named` is None.
 
-    With `optional` a finding that the study lacks gives None, otherwise InputError.
+    Args:
+        read: returns the findings of a study.
+        named: name of the study and id of the finding.
+        instead: the same for a test of our own, whose verdict is used if `named` does not resolve the claim.
+        optional: return None if the study lacks the finding; otherwise raise InputError.
     """
     if named is None:
         return None
@@ -153,7 +157,10 @@ def _tested(
 
 
 def _findings(folder: Path) -> _Findings:
-    """Read the findings of a study by id (by statement if the table has no ids), and `Tested.basis`."""
+    """Read the findings of a study: rows of its table by id, and a text on the runs that they rest on.
+
+    Findings of a table without ids are listed by their statement. The text is the one of `_basis`.
+    """
     for name in ("findings.csv", "verdicts.csv"):
         path = folder / name
         if path.is_file():

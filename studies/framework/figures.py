@@ -55,7 +55,10 @@ class Analysis:
     footer: Sequence[str]  #: Statements about the origin of the results
 
     def table(self, name: str) -> pd.DataFrame:
-        """Return a table's rows of the judging engine; empty if the study has no table of this name."""
+        """Return the rows of a table that are from the judging engine, whose runs decide the findings.
+
+        The result is empty if the study has no table of this name.
+        """
         return judging(self.tables.get(name, pd.DataFrame()))
 
 
@@ -146,7 +149,11 @@ class Means:
     bars: str = BARS  #: Explains the error bars in the footer
 
     def draw(self, path: Path, analysis: Analysis) -> list[Path]:
-        """Draw means with filled markers, and beside them, with open ones, means of engines that do not judge."""
+        """Draw the means of the judging engine with filled markers, and those of other engines with open ones.
+
+        The judging engine is the one whose runs decide the findings. Open markers are beside the filled ones. Returns
+        the files; none if there is nothing to draw.
+        """
         every = analysis.tables.get(self.table, pd.DataFrame())
         every = self.rows(every) if len(every) else every
         columns = [quantity.column for quantity in self.quantities]
@@ -435,9 +442,11 @@ class Scatter:
 
 
 def one_by_one(column: str, label: Callable[[Any], str], *, last: float = 0.85) -> SplitBy:
-    """Return a split into one series per value of a column, in colours from dark to light.
+    """Return a split of tables into one series per value of a column, in colours from dark to light.
 
-    `label` makes the text in the legend from a value; `last` is the place of the lightest colour in the map, up to 1.
+    Args:
+        label: makes the text in the legend from a value.
+        last: position of the lightest colour in the colour map, from 0 to 1.
     """
 
     def split(table: pd.DataFrame) -> list[Series]:
@@ -567,9 +576,11 @@ def draw_fits(
     *,
     lines: Sequence[Any] = ("solid",),
 ) -> None:
-    """Draw curves of one colour at places x (n,), with bands.
+    """Draw curves of one colour over points x (n,), with bands.
 
-    `fits` has values and 95 % half-widths (n,) of each curve by its label, `lines` the line style of each curve.
+    Args:
+        fits: for each curve, by its label in the legend, values (n,) and 95 % half-widths (n,) of the band.
+        lines: line style of each curve.
     """
     for (label, (values, half_widths)), line in zip(fits.items(), lines, strict=False):
         axes.plot(x, values, color=colour, linewidth=0.9, linestyle=line, label=label)
@@ -587,11 +598,14 @@ def draw_means(
     label: str,
     across: ArrayLike | None = None,
 ) -> None:
-    """Draw means y (n,) at places x (n,) with their error bars.
+    """Draw means y (n,) at positions x (n,) with their error bars.
 
-    `half_widths` (n,) are half the 95 % intervals of y, `across` half the 95 % intervals of x: (n,), or (2, n) for the
-    lower and the upper side. NaN stands for an unknown interval; None draws no error bars. `properties` are arguments
-    of Matplotlib's `Axes.errorbar`; `label` is for the legend.
+    Args:
+        half_widths: half-widths (n,) of the 95 % intervals of y, NaN where unknown; None: no vertical bars.
+        properties: arguments of Matplotlib's `Axes.errorbar`.
+        label: text in the legend.
+        across: half-widths of the 95 % intervals of x: (n,), or (2, n) for the lower and the upper side; None: no
+            horizontal bars.
     """
     bars = axes.errorbar(
         x, y, yerr=half_widths, xerr=across, **{"markersize": 3.4, "linewidth": 0.7, **properties}, label=label
@@ -604,10 +618,10 @@ def draw_means(
 def draw_bounds(
     axes: Axes, x: ArrayLike, least: ArrayLike, lengths: ArrayLike, *, properties: Mapping[str, Any]
 ) -> None:
-    """Draw lower bounds `least` (n,) at places x (n,) as markers with arrows upwards; NaN are left out.
+    """Draw lower bounds `least` (n,) at positions x (n,) as markers with arrows upwards.
 
-    The lengths of the arrows, in the unit of y, have no physical meaning. `properties` are arguments of Matplotlib's
-    `Axes.errorbar`.
+    Bounds that are NaN are left out. The lengths of the arrows, in the unit of y, have no physical meaning.
+    `properties` are arguments of Matplotlib's `Axes.errorbar`.
     """
     at, from_, long = np.broadcast_arrays(*(np.asarray(part, dtype=np.float64) for part in (x, least, lengths)))
     known = np.isfinite(from_)
@@ -617,10 +631,15 @@ def draw_bounds(
 
 
 def finish(figure: Canvas, path: Path, notes: Sequence[str], footer: Sequence[str], *, bars: str = BARS) -> list[Path]:
-    """Add legend and footer to a figure, write it to a path without suffix, and return its files.
+    """Add legend and footer to a figure, write it to files, and return their paths.
 
-    Axes are widened until they show everything. The footer has the lines `notes`, then, if the figure has error bars,
-    their explanation `bars`, then the lines `footer`.
+    The limits of the axes are widened until they show everything.
+
+    Args:
+        path: path of the files without suffix.
+        notes: first lines of the footer, below the figure.
+        footer: last lines of the footer.
+        bars: explanation of the error bars, a line between `notes` and `footer` if there are error bars.
     """
     legends = [
         {label: handle for handle, label in zip(*axes.get_legend_handles_labels(), strict=True)} for axes in figure.axes

@@ -144,7 +144,10 @@ class Finding:
     found_if: str = ""  #: Criterion in words; empty: all effects with a sign beyond their thresholds
 
     def judge(self, samples: pd.DataFrame, tables: Mapping[str, pd.DataFrame] | None = None) -> Judged:
-        """Judge the finding by the samples, or by the study's tables that the finding names."""
+        """Judge the finding by the samples, or by the tables that `Finding.tables` names.
+
+        `samples` has a row per run or group of runs, see `Study.samples`; `tables` has all tables of the study by name.
+        """
         given = [(tables or {})[name] for name in self.tables] if self.tables else [self.rows(samples)]
         outcome = self.outcome(*given)
         outcome = outcome if isinstance(outcome, Outcome) else Outcome(effects=outcome)
@@ -185,9 +188,10 @@ def _verdict(effects: Sequence[Effect]) -> tuple[Verdict, float]:
 
 
 def all_of(verdicts: Iterable[Verdict]) -> Verdict:
-    """Combine verdicts on the parts of a statement.
+    """Combine the verdicts on the parts of a statement to a verdict on the whole.
 
-    The result is the first of not found, no data, not resolved and found that a part has.
+    It is the first of these that applies: `not found` if any part is not found; `no data` if any part has no data, or
+    if there are no parts; `not resolved` if any part is not resolved; `found`.
     """
     found = list(verdicts)
     order = (Verdict.NOT_FOUND, Verdict.NO_DATA, Verdict.NOT_RESOLVED, Verdict.FOUND)
@@ -231,14 +235,19 @@ def above(
     """Make the finding that a procedure is above others in a quantity, paired by aspect ratio and seed.
 
     Args:
+        name: id of the finding.
         says: the statement.
         quantities: column, or several columns with a sign each: +1 if the statement says above, −1 if below.
-        one, others: the procedure, and the procedures that it is compared with.
-        sign: sign of a single column.
+        one: procedure of the statement.
+        others: procedures that it is compared with.
+        sign: sign of `quantities` if it is one column.
         beside: procedures whose difference from `one` is shown but not judged.
-        beside_quantity: column of the difference that is shown; None: the column that is judged.
-        bounds: column that is above 0 if the first of the quantities is a lower bound and the others are unknown.
+        beside_quantity: column of the differences that are not judged; None: those of `quantities`.
+        bounds: column that is above 0 in runs whose first quantity is a lower bound, and whose other quantities are
+            unknown.
+        rows: selects the rows that the finding is judged by.
         shown: columns whose means are shown but not judged.
+        found_if: criterion in words; empty: all effects beyond their thresholds.
     """
     signs = {quantities: sign} if isinstance(quantities, str) else quantities
 
@@ -285,13 +294,15 @@ def slope(
     rows: Rows = lambda table: table,
     label: str = "",
 ) -> Finding:
-    """Make the finding that a quantity rises (sign +1) or falls (−1) with a variable, on straight lines.
+    """Make the finding that a quantity rises (sign +1) or falls (−1) with a variable, by straight lines.
 
     Args:
+        name: id of the finding.
         says: the statement.
         quantity: column of the quantity.
         against: column of the variable.
-        within: columns whose values make blocks; the lines of all blocks have one slope, each its own intercept.
+        within: columns whose values make blocks of rows; all blocks have one slope, and each has its own intercept.
+        rows: selects the rows that the finding is judged by.
         label: name of the quantity in texts; empty: its symbol.
     """
     label = f"{label or symbol(quantity)} against {symbol(against)}"
@@ -320,12 +331,14 @@ def mean(
     """Make the finding that the mean of a value is above a threshold (sign +1) or below it (−1).
 
     Args:
+        name: id of the finding.
         says: the statement.
-        values: computes the value of each row.
+        values: computes the value of each row of a table.
         label: name of the value in texts.
+        rows: selects the rows that the finding is judged by.
         threshold: in the unit of the value.
         shown: columns whose means are shown but not judged.
-        by: column at whose values the means of the columns `shown` are taken.
+        by: column; the means of the columns `shown` are taken at each of its values.
     """
 
     def outcome(table: pd.DataFrame) -> Outcome:
@@ -348,17 +361,21 @@ def ranks(
     unit: str,
     rows: Rows = lambda table: table,
 ) -> Finding:
-    """Make the finding that y rises with x, by their rank correlation within blocks.
+    """Make the finding that y rises with x, by their rank correlation within blocks of rows.
 
     Ranks are used since peak forces do not follow a straight line: a pile that held fast gives a lower bound, which
     ranks above all other values, and a pile that a single smarticle braces has a peak many times those of other piles.
 
     Args:
+        name: id of the finding.
         says: the statement.
-        x, y: columns of both quantities.
-        within: columns whose values make blocks; ranks are taken within each block.
+        x: column of the first quantity.
+        y: column of the second quantity.
+        within: columns whose values make blocks of rows; ranks are taken within each block.
         bounds: column that is above 0 if y is a lower bound.
+        found_if: criterion in words.
         unit: unit of the slope of y against x, which is shown but not judged.
+        rows: selects the rows that the finding is judged by.
     """
 
     def outcome(table: pd.DataFrame) -> Outcome:

@@ -48,10 +48,10 @@ _WINDOW = 0.1  # s, of moving means of heights: longer than a swing at θ = 10°
 
 
 def prepared_by(run: Run, *then: str) -> dict[str, object]:
-    """Return procedure, θ [deg], `run_columns`, and duration of the activity [s] of a run, by column.
+    """Return procedure, θ [deg], cells of `run_columns` and duration of the activity [s], by column.
 
-    InputError unless the phases are a pour, a rest, optionally one activity and another rest, and then phases of the
-    types `then`.
+    A run without an activity has the procedure `static`, θ NaN and the duration 0. The phases must be a pour and a
+    rest, then one activity and another rest or nothing, then phases of the types `then`; otherwise InputError.
     """
     types = [phase.type for phase in run.phases]
     active = [kind for kind in types if kind in PROCEDURES]
@@ -150,8 +150,10 @@ def height_history(run: Run) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
 def _of_series(run: Run, active: Phase, straight_until: float | None) -> dict[str, float]:
     """Measure heights [-] and energy per smarticle [J] from the series, by column; NaN if not recorded.
 
-    `active` is the phase of the activity, `straight_until` the time since a shape change began at which barbs start to
-    close again [s]; None for other activities.
+    Args:
+        active: phase of the activity.
+        straight_until: time [s] since the beginning of a shape change at which the barbs, straight until then, start to
+            close again; None for other activities.
     """
     found = {STRAIGHT: math.nan, LOWEST: math.nan, HALF: math.nan, ENERGY: math.nan}
     if not (run.path / "series.h5").exists():
@@ -173,7 +175,10 @@ def _of_series(run: Run, active: Phase, straight_until: float | None) -> dict[st
 
 
 def _smooth(values: NDArray[np.float64], time: NDArray[np.float64], chosen: NDArray[np.bool_]) -> NDArray[np.float64]:
-    """Return the moving mean over `_WINDOW` [s] of the chosen values; empty if they span a shorter time."""
+    """Return the moving mean over `_WINDOW` of the values (n,) that are chosen (n,); times (n,) in [s].
+
+    The result is empty if the chosen values span a time shorter than `_WINDOW`.
+    """
     if chosen.sum() < 2:
         return np.empty(0)
     samples = max(round(_WINDOW / float(np.median(np.diff(time[chosen])))), 1)

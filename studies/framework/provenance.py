@@ -45,7 +45,7 @@ class Origin:
 
     @property
     def whole_note(self) -> str:
-        """Text on how the measured runs differ from the full study, with the number of missing runs."""
+        """Text on how the measured runs differ from the full study; it has the number of missing runs, if any."""
         used, missing = len(self.found.runs), len(self.found.missing)
         return f"only {used} of {used + missing} runs of what is planned: {self.note}" if missing else self.note
 
@@ -71,7 +71,11 @@ class Origin:
         return f"Study {self.found.study}, fidelity {fidelities}{engines}: {used} of {used + missing} runs{lacking}"
 
     def figure_footer(self, points: str, text_name: str) -> list[str]:
-        """Return the footer of a figure: the text `points`, and the file `text_name` with the full footer."""
+        """Return the two lines of the footer of a figure: runs and points; note, commits and other files.
+
+        `points` is a statement on the points, such as the number of seeds at each. `text_name` is the name of the text
+        file with the full footer.
+        """
         first, *more = (f"planned: {self.note}" if self.found.missing else self.note).split("; ")
         differs = f"{first[0].upper()}{first[1:]}{' and more' if more else ''}."
         if self.full:
@@ -84,7 +88,11 @@ class Origin:
         ]
 
     def footer(self, points: str, *statements: str) -> list[str]:
-        """Return the footer of tables and texts: a line for `points`, each of the statements, and the origin."""
+        """Return the lines of the footer of tables and texts.
+
+        The first line has the runs and `points`, a statement on the measured points; then follow `statements`,
+        reference, note, versions and command.
+        """
         named = [("smarticles", ""), ("git", ""), *((engine, engine) for engine in self._engines)]
         versions = "; ".join(f"{name} {', '.join(self._versions(name, engine))}" for name, engine in named)
         return [
@@ -104,10 +112,14 @@ class Origin:
         tables: Mapping[str, pd.DataFrame],
         text: tuple[str, Sequence[str]],
     ) -> dict[str, Path]:
-        """Write tables, text and provenance; return the paths of the files by their names.
+        """Write tables, text and provenance into a folder; return the paths of the files by their names.
 
-        `text` is the name of a Markdown file and its lines; missing runs are listed below them. The footer goes below
-        the text, and into CSV files as comments, to be read with `comment="#"`.
+        Args:
+            output: folder.
+            footer: lines on the origin. They are written below the text, and below CSV tables as comments, so that
+                readers need `comment="#"`.
+            tables: tables by the name of the file without `.csv`.
+            text: name of a Markdown file and its lines; a list of the missing runs follows below them.
         """
         missing = pd.DataFrame([asdict(run) for run in self.found.missing], columns=["directory", "status", "cause"])
         below = "".join(f"# {line}\n" for line in footer)

@@ -63,10 +63,12 @@ def declare(
     axes: Mapping[str, str] = MappingProxyType({}),
     scales: Mapping[str, float] = MappingProxyType({}),
 ) -> dict[str, Quantity]:
-    """Make quantities by column.
+    """Make the quantities of a study, by the name of their column.
 
-    `rows` has label, format (empty: `.3g`) and meaning of each quantity, `axes` labels of axes, `scales` factors for
-    short tables and figures.
+    Args:
+        rows: label in the short table, format (empty: `.3g`) and meaning of each quantity, by column.
+        axes: labels of the axes in figures by column; default: the name of the column.
+        scales: factors in the short table and in figures by column, such as 1e3 for millimetres; default: 1.
     """
     return {
         column: Quantity(
@@ -115,7 +117,10 @@ def sort_rows(table: pd.DataFrame, columns: Sequence[str], keys: Sequence[Key]) 
 
 
 def engines_of(table: pd.DataFrame) -> tuple[str, ...]:
-    """Return the engines in a table, the judging one first; empty if the table has no column `engine`."""
+    """Return the engines in a table, first the one whose runs decide the findings.
+
+    The result is empty if the table has no column `engine`.
+    """
     if ENGINE not in table.columns:
         return ()
     return tuple(sorted(set(table[ENGINE]), key=lambda name: (name not in ENGINE_NAMES, name)))
@@ -127,7 +132,10 @@ def of_engine(table: pd.DataFrame, engine: str) -> pd.DataFrame:
 
 
 def judging(table: pd.DataFrame) -> pd.DataFrame:
-    """Return the rows of the judging engine without the column `engine`; all rows if it has none."""
+    """Return the rows of the engine whose runs decide the findings, without the column `engine`.
+
+    All rows are returned if the table has no such column.
+    """
     several = engines_of(table)
     return of_engine(table, several[0]) if several else table
 
@@ -145,12 +153,13 @@ def by_engine(table: pd.DataFrame, made: Callable[[pd.DataFrame], pd.DataFrame])
 
 
 def compared_engines(runs: pd.DataFrame, keys: Sequence[str], quantities: Iterable[str]) -> pd.DataFrame:
-    """Compare the judging engine with the other engines: differences at each point, paired by seed.
+    """Compare the judging engine with each other engine: differences at each point, paired by seed.
 
-    Runs with equal point and seed were poured from equal poses. Piles are chaotic and soon forget their poses, so
-    pairing reduces the scatter only a little. The table has one row per point, other engine and quantity. A row has the
-    mean of each engine over the pairs, and their difference with its 95 % half-width by Student's t, also in per cent
-    of the other engine's mean. `keys` are the columns that identify a point, `quantities` the compared columns.
+    The judging engine is the one whose runs decide the findings. Runs with equal point and seed were poured from equal
+    poses. Piles are chaotic and soon forget their poses, so pairing reduces the scatter only a little. The table has
+    one row per point, other engine and quantity. A row has the mean of each engine over the pairs, and their difference
+    with its 95 % half-width by Student's t, also in per cent of the other engine's mean. `keys` are the columns that
+    identify a point, `quantities` the compared columns.
     """
     first, *others = engines_of(runs)
     rows = []
@@ -231,9 +240,13 @@ class Collected:
         *,
         within: Callable[[MeasuredRun], Hashable] = lambda _: None,
     ) -> None:
-        """Raise InputError if `value` differs between runs of a group (`within`), by default all runs.
+        """Raise InputError if a value differs between runs that must be alike, such as runs averaged together.
 
-        `quantity` names the value in the message.
+        Args:
+            quantity: name of the value in the message.
+            value: returns the value of a run.
+            within: returns the group of a run; only runs of one group must have equal values. Default: all runs are one
+                group.
         """
         firsts: dict[Hashable, MeasuredRun] = {}
         for run in self.runs:
@@ -245,7 +258,10 @@ class Collected:
                 )
 
     def reject_repeats(self, point: Callable[[MeasuredRun], str]) -> None:
-        """Raise InputError if two runs have equal point, seed and engine; `point` names a run's point."""
+        """Raise InputError if two runs have equal point, seed and engine.
+
+        A point is a combination of the sweep's variables; `point` returns the name of a run's point.
+        """
         seen: dict[tuple[str, int, str], MeasuredRun] = {}
         for run in self.runs:
             key = (point(run), run.run.manifest.seed, run.run.manifest.engine)
@@ -263,10 +279,15 @@ def collect_runs(
     *,
     earlier: Mapping[str, MeasuredRun] | None = None,
 ) -> Collected:
-    """Measure finished runs and list the others as missing; InputError if no run is done.
+    """Measure the finished runs among given run directories, and list the others as missing.
 
-    A run for which `measure` raises InputError is missing, with the status "unusable". Runs of an earlier analysis, by
-    name, replace directories that do not exist. `study` is the study's name, for messages.
+    Args:
+        study: name of the study, for messages.
+        measure: measures a run. If it raises InputError, the run is missing, with the status "unusable".
+        earlier: measured runs of an earlier analysis by name; they replace directories that do not exist.
+
+    Raises:
+        InputError: no run is finished.
     """
     runs: list[MeasuredRun] = []
     missing: list[MissingRun] = []
