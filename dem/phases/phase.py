@@ -220,8 +220,8 @@ def has_settled(settle: Settle, memory: Memory, engine: Engine) -> bool:
     """Return whether the pile has settled; to be called every `CHECK_INTERVAL`.
 
     Args:
-        memory: memory of the stage, see `begin_wait`. Its `waited` is the time since the wait began [s], which the phase
-            updates; `still` is the time for which both limits have held [s], which this function updates.
+        memory: memory of the stage, see `begin_wait`. Its `waited` is the time since the wait began [s], which the
+            phase updates; `still` is the time for which both limits have held [s], which this function updates.
 
     Raises:
         RunError: the pile has not settled within `settle.timeout_s`, and no longer comes nearer to rest.
