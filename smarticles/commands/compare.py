@@ -116,11 +116,11 @@ def compare(one: Path, other: Path) -> dict[str, Any]:
     Returns:
         kind: "run" or "sweep".
         identical: whether series and frames agree bit by bit in all runs that both have begun; False if there are none,
-            or if one sweep has a run that the other lacks.
+            or if one sweep has begun a run that the other has not.
         scene: values in A and in B of each key of the scene, or of each variable and constant of the sweeps, that
             differs; see `differences`.
         versions: the same for engine, package versions and number of threads; for runs also for their status.
-        only: for sweeps, names of runs that A alone has (key "A") and that B alone has (key "B"); empty for runs.
+        only: for sweeps, names of the runs that A alone (key "A") and B alone (key "B") has begun; empty for runs.
         bits: result of `compare_bits` by the name of the run; one entry for two runs.
         measures: one row per phase and quantity with the values in A and B, B - A, and the standard error of B - A; for
             sweeps, one row per phase, quantity and combination of variables.
@@ -170,8 +170,8 @@ def _compare_sweeps(one: Folder, other: Folder) -> dict[str, Any]:
     from templates.sweep.sweep_file import SEED  # noqa: PLC0415
 
     first, second = ({entry.name: run for entry, run in zip(f.entries, f.runs(), strict=True)} for f in (one, other))
-    both = [name for name in first if name in second]
-    begun = [name for name in both if all((runs[name].path / MANIFEST).is_file() for runs in (first, second))]
+    begun = [[name for name, run in runs.items() if (run.path / MANIFEST).is_file()] for runs in (first, second)]
+    both = [name for name in begun[0] if name in begun[1]]
     varied = [values_in(folder) for folder in (one, other)]
     keys = [*(name for name in varied[0] if name != SEED and name in varied[1]), *PHASE]
     tables = [grouped(measured([folder.path]), keys) for folder in (one, other)]
@@ -179,10 +179,10 @@ def _compare_sweeps(one: Folder, other: Folder) -> dict[str, Any]:
         "scene": differences(*map(_listed, varied)),
         "versions": differences(*(_versions(runs.values()) for runs in (first, second))),
         "only": {
-            "A": [name for name in first if name not in second],
-            "B": [name for name in second if name not in first],
+            "A": [name for name in begun[0] if name not in both],
+            "B": [name for name in begun[1] if name not in both],
         },
-        "bits": {name: compare_bits(first[name], second[name]) for name in begun},
+        "bits": {name: compare_bits(first[name], second[name]) for name in both},
         "measures": _pair_up(*tables, keys=keys),
     }
 

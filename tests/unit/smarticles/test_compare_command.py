@@ -84,9 +84,24 @@ def test_sweeps_are_compared_run_by_run_and_group_by_group(
         write_run(tmp_path / name / "runs" / "n5", count=5)
         write_run(tmp_path / name / "runs" / "n6", count=6, packing=(0.1, 0.1, 0.12 + shift, 0.1))
         sweep_file.write_text(sweep_file.read_text().replace("[5, 6]", "[5, 6, 7]"))
+    write_run(tmp_path / "two" / "runs" / "n7", count=7)
     said = smarticles("compare", tmp_path / "one", tmp_path / "two")
     lines = words_of(said.out)
     assert "only in B: n7" in lines
     assert "identical bits: 1 of 2 runs that both sweeps have" in lines
     assert any(line.startswith("6 shake φ 0.1200 0.1400 0.0200") for line in lines)
     assert any(line.startswith("5 shake φ 0.1300 0.1300 0.0000") for line in lines)
+
+
+def test_a_sweep_with_a_run_that_has_not_begun_is_not_identical(
+    tmp_path: Path, sweep_file: Path, write_run: WriteRun, smarticles: Smarticles
+) -> None:
+    for name, counts in (("one", (5, 6)), ("two", (5,))):
+        smarticles("sweep", sweep_file, "--out", tmp_path / name)
+        for count in counts:
+            write_run(tmp_path / name / "runs" / f"n{count}", count=count)
+    found = json.loads(smarticles("compare", tmp_path / "one", tmp_path / "two", "--json").out)
+    assert (found["identical"], found["only"]) == (False, {"A": ["n6"], "B": []})
+    write_run(tmp_path / "two" / "runs" / "n6", count=6)
+    found = json.loads(smarticles("compare", tmp_path / "one", tmp_path / "two", "--json").out)
+    assert (found["identical"], found["only"]) == (True, {"A": [], "B": []})
