@@ -116,13 +116,15 @@ class Curve:
         return np.unique(np.concatenate([np.clip(steps, None, self.friction[-1]), self.friction]))
 
     def crossing(self) -> tuple[float, float, float, str]:
-        """Find the friction at which φ is Gravish's φ.
+        """Find the friction at which φ equals Gravish's φ.
 
-        Returns the friction [-], both ends of its 95 % interval [-], and its place: "within", "above" or "below the
-        range" of measured friction. If scatter makes φ cross Gravish's φ several times, the friction is the middle
-        between the first and the last crossing; outside the range it is ±inf. The interval covers all friction at
-        which φ does not clearly differ from Gravish's φ. Its ends are ±inf beyond the measured range, NaN without
-        errors.
+        Returns this friction [-], the lower and the upper end of its 95 % interval [-], and where it lies relative to
+        the measured friction: "within the range", "above the range" or "below the range". If φ crosses Gravish's φ
+        several times because of scatter, the friction is the middle between the first and the last crossing. If φ does
+        not cross it, the friction is +inf (above) or −inf (below).
+
+        The interval has all values of friction at which φ differs from Gravish's φ by no more than its error. An end is
+        ±inf if it may lie outside the measured range, and NaN if the errors are unknown.
         """
         off = self.packing - self.reference
         left = np.nonzero(off[:-1] * off[1:] < 0)[0]
@@ -167,7 +169,11 @@ def _per_error(scatter: Scatter) -> float:
 
 
 def tabulate(runs: pd.DataFrame) -> dict[str, pd.DataFrame]:
-    """Make the tables `points`, `crossings`, `verdicts`, `nearest`, `growth` and `scatter`."""
+    """Make the tables of the study, by name, from the table of runs.
+
+    `points`, `crossings`, `verdicts`, `nearest` and `growth` are made by the functions of these names. The table
+    `scatter` has the scatter of φ over seeds, relative to the mean, at each stage.
+    """
     scatters = {}
     for name in (stage for stage in COMPARED if phi(stage) in runs):
         groups = [group[phi(name)].dropna() for _, group in runs.groupby([ASPECT, FRICTION])]
@@ -235,10 +241,10 @@ def crossings(found: Curves) -> pd.DataFrame:
 
 
 def nearness(found: Curves, friction: float) -> dict[str, float | int | str]:
-    """Compute deviations of all curves from Gravish's φ at a friction, and the confidence that φ is near.
+    """Compare all curves with Gravish's φ at one coefficient of friction; return columns of a table.
 
-    Returns by column: mean and largest deviation, the confidence that all points are within `MARGIN`, and the
-    confidence of the worst point.
+    They are the number of curves, mean absolute, mean and largest deviation [%], the name of the curve with the largest
+    one, and two confidences [%]: that all curves are within `MARGIN` of Gravish's φ, and that the least certain one is.
     """
     at = np.array([friction])
     deviations = {
@@ -286,7 +292,10 @@ def verdicts(found: Curves) -> pd.DataFrame:
 
 
 def nearest(found: Curves) -> pd.DataFrame:
-    """Tabulate the friction with the smallest maximum deviation: a row per set of stages in `JUDGED`."""
+    """Tabulate the friction at which the largest deviation from Gravish's φ is smallest.
+
+    The table has a row per set of stages in `JUDGED`, with the columns of `nearness` and the verdict at this friction.
+    """
     rows = []
     for what, stages in JUDGED.items():
         wanted = {key: curve for key, curve in found.items() if key[0] in stages}
@@ -305,7 +314,10 @@ def nearest(found: Curves) -> pd.DataFrame:
 
 
 def growth(runs: pd.DataFrame) -> pd.DataFrame:
-    """Tabulate the mean growth of φ between `TIMES` [%] by l/w and friction, with pooled scatter."""
+    """Tabulate mean φ at `TIMES`, and its mean growth between them [%]: a row per l/w and friction.
+
+    The 95 % half-widths of the growth follow from the scatter over seeds, pooled over all rows.
+    """
     names = [phi(at_time(time)) for time in TIMES]
     grown = runs.reindex(columns=[*runs.columns, *(set(names) - set(runs.columns))])
     for name, (one, other) in zip(GROWTHS, itertools.pairwise(names), strict=True):
@@ -443,7 +455,11 @@ FINDINGS = (
 
 
 def _crosses(tables: Mapping[str, pd.DataFrame], aspect: float) -> pd.DataFrame:
-    """Return friction (`x`, `low`, `high`) and φ (`y`) [-] at which φ_0 and φ_f of one l/w are Gravish's."""
+    """Return the points of a figure at which φ_0 and φ_f equal Gravish's at one l/w.
+
+    The columns are the friction `x`, the ends `low` and `high` of its 95 % interval within the measured range, and φ
+    `y` [-].
+    """
     found = tables["crossings"]
     found = found[(found[ASPECT] == aspect) & found[STAGE].isin(["phi_0", "phi_f"]) & np.isfinite(found[FRICTION])]
     low, high = (found[name].clip(found[FIRST], found[LAST]) for name in (LOW, HIGH))

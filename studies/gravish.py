@@ -82,7 +82,7 @@ def measure(run: Run) -> Row:
 
 
 def phi_by_aspect(runs: pd.DataFrame, stage: str) -> Mapping[float, SeedMean]:
-    """Return the mean φ of a stage over seeds by l/w, in ascending order."""
+    """Return the mean φ over seeds at a stage by l/w, in ascending order; empty if it was not measured."""
     if phi(stage) not in runs:  # tables of earlier versions
         return {}
     found = {float(aspect): mean_over_seeds(part[phi(stage)]) for aspect, part in runs.groupby(ASPECT)}
@@ -90,7 +90,10 @@ def phi_by_aspect(runs: pd.DataFrame, stage: str) -> Mapping[float, SeedMean]:
 
 
 def compared(runs: pd.DataFrame, end: str) -> str:
-    """Return the stage to compare with Gravish's φ_0 or φ_f (`end`): φ_f at rest if the runs have it."""
+    """Return the stage whose φ is compared with Gravish's φ_0 or φ_f (`end` is "phi_0" or "phi_f").
+
+    It is `end`, but for φ_f `AT_REST` if the runs were measured at rest after shaking.
+    """
     return AT_REST if end == "phi_f" and phi_by_aspect(runs, AT_REST) else end
 
 
@@ -128,7 +131,7 @@ def steps(runs: pd.DataFrame) -> pd.DataFrame:
 
 
 def falls(end: str) -> Finding:
-    """Make the finding that φ_0 or φ_f, which `end` names, falls monotonically with l/w."""
+    """Make the finding that φ_0 (`end` is "phi_0") or φ_f ("phi_f") falls monotonically with l/w."""
 
     def outcome(runs: pd.DataFrame) -> Outcome:
         stage = compared(runs, end)
@@ -155,7 +158,7 @@ def falls(end: str) -> Finding:
 
 
 def near(end: str) -> Finding:
-    """Make the finding that φ_0 or φ_f, which `end` names, is near Gravish's points."""
+    """Make the finding that φ_0 (`end` is "phi_0") or φ_f ("phi_f") is near Gravish's points."""
 
     def outcome(runs: pd.DataFrame) -> Outcome:
         found, stage = deviations(runs), compared(runs, end)
@@ -192,18 +195,24 @@ def _compacts(runs: pd.DataFrame) -> Outcome:
 
 
 def _complete(runs: pd.DataFrame) -> pd.DataFrame:
-    """Return the runs with all columns of quantities; tables of earlier versions lack φ_f at rest."""
+    """Add a column of NaN to the table of runs for each of `QUANTITIES` that it lacks, and return it.
+
+    Tables of earlier versions of the study lack φ_f at rest.
+    """
     return runs.reindex(columns=[*runs.columns, *(name for name in QUANTITIES if name not in runs)])
 
 
 def _fully_shaken(points: pd.DataFrame) -> pd.DataFrame:
-    """Return the points, with NaN for φ_f and ⟨N⟩ of points that were shaken for less time than others."""
+    """Return the points, with NaN for φ_f and ⟨N⟩ after shaking unless the time of shaking is the longest."""
     ends = [name for name in points if str(name).startswith(("phi_f", "crossings after", "crossings relaxed"))]
     return points.assign(**points[ends].where(points[SHAKEN] == points[SHAKEN].max()))
 
 
 def _states(points: pd.DataFrame) -> pd.DataFrame:
-    """Return two rows per point: φ_f is measured while shaken in one, at rest afterwards in the other."""
+    """Return each point in two rows: φ_f is measured at rest in one, while shaken in the other.
+
+    The column `state` says which. φ_0 is NaN in the second, so that it is drawn once.
+    """
     points = _fully_shaken(points)
     shaken = points.assign(**{phi("phi_0"): math.nan, _STATE: "while shaken"})
     rest = points.assign(**{_STATE: "after rest"})

@@ -189,11 +189,12 @@ def trajectories(runs: pd.DataFrame) -> pd.Series:
 
 
 def predicted(runs: pd.DataFrame) -> tuple[pd.DataFrame, pd.DataFrame]:
-    """Correlate both strengths (`STRENGTHS`) with all measures (`PREDICTORS`).
+    """Correlate both strengths (`STRENGTHS`) with all measures of the pile (`PREDICTORS`).
 
-    Returns two tables. The table `predictors` has rank correlation and slope with 95 % intervals: a row per strength,
-    part of the runs, scope (over all l/w, within l/w, or one l/w) and measure; the best measure comes first. The table
-    `comparisons` has the best measure's rank correlation less that of each other measure.
+    Returns two tables. The first has rank correlation and slope with 95 % intervals: a row per strength, part of the
+    runs (`EVERY`, `FREE` or `SWUNG`), scope (over all l/w, within l/w, or one l/w) and measure; the measure with the
+    strongest correlation comes first. The second has the absolute rank correlation of this measure less that of each
+    other measure.
     """
     each: list[dict[str, object]] = []
     against: list[dict[str, object]] = []
@@ -220,9 +221,9 @@ def predicted(runs: pd.DataFrame) -> tuple[pd.DataFrame, pd.DataFrame]:
 def _correlated(
     table: pd.DataFrame, strength: str, *, within: bool
 ) -> tuple[list[dict[str, object]], list[dict[str, object]]]:
-    """Correlate one strength, a column, with all measures; return rows of `predicted`'s two tables.
+    """Correlate one strength with all measures of the pile; return rows of both tables of `predicted`.
 
-    With `within`, the correlation is within each l/w, otherwise over all.
+    `strength` is the column. With `within`, the correlation is within each l/w, otherwise over all.
     """
     names = list(PREDICTORS)
     x, y = table[names].to_numpy(dtype=np.float64), table[strength].to_numpy(dtype=np.float64)
@@ -280,14 +281,18 @@ _POINT = [PROCEDURE, THETA, PLANNED]
 
 
 def gains(runs: pd.DataFrame) -> pd.DataFrame:
-    """Return the runs with an activity, with the column `GAIN`: strength less the poured pile's strength."""
+    """Add the gain of strength, column `GAIN`, to the runs with an activity, and return these runs.
+
+    The gain is the strength less that of the poured pile (procedure static) of equal l/w and seed. Runs without such a
+    pile are left out.
+    """
     poured = runs[runs[PROCEDURE] == STATIC].groupby([ASPECT, SEED])[PEAK].mean().rename("poured")
     active = runs[runs[PROCEDURE] != STATIC].join(poured, on=[ASPECT, SEED], how="inner").reset_index(drop=True)
     return active.assign(**{GAIN: active[PEAK] - active["poured"]}).drop(columns="poured")
 
 
 def common_aspects(runs: pd.DataFrame) -> list[float]:
-    """Return the l/w that have the greatest number of combinations of procedure, θ and planned time."""
+    """Return the l/w at which the most combinations of procedure, θ and planned time were run."""
     counts = runs.drop_duplicates([ASPECT, *_POINT]).groupby(ASPECT).size()
     return [float(ratio) for ratio in counts.index[counts == counts.max()]]
 
@@ -321,10 +326,11 @@ def costs(runs: pd.DataFrame) -> pd.DataFrame:
 
 
 def _drawn_ratio(values: Floats) -> Interval:
-    """Return the mean gain over the mean energy with its 95 % interval, whose ends are NaN below 3 rows.
+    """Return the mean gain over the mean energy, with its 95 % interval by resampling the rows.
 
     `values` (n, 2) are gains and energies. For two procedures they are (n, 4), and the result is the first procedure's
-    gain per energy over the second's.
+    gain per energy over the second's. With fewer than 3 rows the ends of the interval are NaN, and so is the result for
+    two procedures.
     """
 
     def ratio(rows: Whole) -> Floats:
@@ -501,7 +507,7 @@ _by_aspect = one_by_one(ASPECT, "l/w = {:g}".format)
 
 
 def _bought(table: pd.DataFrame) -> list[Series]:
-    """Return a series for each θ of the internal oscillation, and for each other procedure."""
+    """Split a table into series of a figure: each θ of the internal oscillation, and each other activity."""
     others = [
         Series(
             rows=table[table[PROCEDURE] == name], label=name, properties={**procedure_marker(name), "linestyle": "none"}
@@ -587,7 +593,7 @@ def _extra(runs: pd.DataFrame) -> Mapping[str, pd.DataFrame]:
 
 
 def _shown(points: pd.DataFrame) -> pd.DataFrame:
-    """Return the points of the short table: static, shape change, strongest oscillation at each l/w."""
+    """Select the points of the short table: static, shape change, strongest internal oscillation per l/w."""
     swung = points[points[PROCEDURE] == INTERNAL]
     strongest = swung.loc[swung[PEAK].notna()].groupby(ASPECT)[PEAK].idxmax()
     return points[points[PROCEDURE].isin([STATIC, SHAPE]) | points.index.isin(strongest)]

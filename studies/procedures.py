@@ -118,7 +118,8 @@ def gains(procedure: str) -> Rows:
 def with_aspect(name: str, says: str, rows: Rows, quantity: str, sign: int = 1) -> Finding:
     """Make the finding that a quantity rises (sign +1) or falls (−1) with l/w.
 
-    `name` is the id of the finding, `says` its statement; the function `rows` selects the rows of the samples.
+    `name` is the id of the finding, `says` its statement, `quantity` a column; the function `rows` selects rows of the
+    table of samples.
     """
     return slope(name, says, quantity, ASPECT, sign=sign, rows=rows)
 
@@ -126,7 +127,8 @@ def with_aspect(name: str, says: str, rows: Rows, quantity: str, sign: int = 1) 
 def with_amplitude(name: str, says: str, quantity: str, sign: int = 1, rows: Rows = amplitudes) -> Finding:
     """Make the finding that a quantity rises (sign +1) or falls (−1) with θ at equal l/w and seed.
 
-    `name` is the id of the finding, `says` its statement; the function `rows` selects the rows of the samples.
+    `name` is the id of the finding, `says` its statement, `quantity` a column; the function `rows` selects rows of the
+    table of samples.
     """
     return slope(name, says, quantity, THETA, sign=sign, within=(ASPECT, SEED), rows=rows)
 
@@ -457,20 +459,20 @@ ENTANGLEMENT = (
 
 
 def heights(run: Run) -> History:
-    """Read the height of the centre of mass over h0 [-] against time, see `height_history`."""
+    """Read the height of the centre of mass, over that in the rest before the activity [-], against time."""
     values, times = height_history(run)
     return History(times=times, values=values, active=duration(activity(run)))
 
 
 def _energy_series(points: pd.DataFrame) -> list[Series]:
-    """Return a series per procedure, and one per further amplitude of the internal oscillation."""
+    """Split points into series of a figure: each procedure (internal: θ = `AMPLITUDE`), and each other θ."""
     internal = amplitudes(points)
     others = one_by_one(THETA, lambda theta: rf"internal, $\theta$ = {theta:g}°")
     return by_procedure(apart=0.004)(points) + others(internal[internal[THETA] != AMPLITUDE])
 
 
 def _aspect_series(points: pd.DataFrame) -> list[Series]:
-    """Return a series of the internal oscillation per aspect ratio, if it was run at several amplitudes."""
+    """Split points of the internal oscillation into a series per l/w; without l/w that have one θ only."""
     internal = amplitudes(points).sort_values(THETA)
     several = internal[internal.groupby(ASPECT)[THETA].transform("nunique") > 1]
     return one_by_one(ASPECT, lambda aspect: rf"$l/w$ = {aspect:g}")(several)

@@ -27,7 +27,7 @@ QUICK = "quick"
 
 @dataclass(frozen=True)
 class Script:
-    """A shipped study before it is loaded: its script, sweep file and variants of the sweep."""
+    """A shipped study that is not imported yet: names of its script and of the variants of its sweep file."""
 
     name: str  #: Name of the study, such as `strength-code`
     module: str  #: Name of the script, such as `strength`
@@ -45,9 +45,9 @@ class Script:
 
     @cached_property
     def found(self) -> str:
-        """Finding of the full study, with the folder of its results; empty if it was not published.
+        """What the full study found, in one sentence with the folder of its results; empty if unpublished.
 
-        Results are in the repository and not in installed packages.
+        It is read from `results/NAME/README.md`, which exists in the repository but not in installed packages.
         """
         page = FOLDER.parent / "results" / self.name / "README.md"
         lines = page.read_text(encoding="utf-8").splitlines() if page.is_file() else []
@@ -60,7 +60,10 @@ class Script:
         return replace(study, name=self.name)
 
     def sweep_file(self, *, quick: bool = False) -> Path:
-        """Return the sweep file with its variants, `FILE@VARIANT`; InputError if there is no quick variant."""
+        """Return the path of the sweep file with the variants to be applied, `FILE@VARIANT,VARIANT`.
+
+        `quick` adds the variant `quick`; InputError if the study has none.
+        """
         if quick and not self.quick:
             raise InputError(f"study {self.name} has no quick variant; leave --quick out")
         variants = [*self.variants, *([QUICK] if quick else [])]
@@ -89,7 +92,7 @@ STUDIES: Mapping[str, Script] = MappingProxyType({study.name: study for study in
 
 
 def shipped(name: str) -> Script:
-    """Return the shipped study of a name; InputError if it does not exist."""
+    """Return the shipped study with a name; InputError if there is none."""
     if name not in STUDIES:
         raise InputError(f"study {name!r} does not exist; {nearest(name, sorted(STUDIES))}")
     return STUDIES[name]

@@ -106,9 +106,9 @@ def length_of(run: Run) -> float:
 
 
 def local_crossings(frame: Frame, *, length: float, radius: float, top: float) -> NDArray[np.float64]:
-    """Return the local average crossing number (X, Y, Z) [-] in the inside of a pile.
+    """Return the local average crossing number (X, Y, Z) [-] at the points of a grid inside a pile.
 
-    Points fill a box around the container's axis, see `INNER` and `EDGE`.
+    The grid is a box around the container's axis; its size and pitch are `INNER`, `EDGE` and `PITCH`.
 
     Args:
         length: length of a rod [m].
@@ -124,13 +124,19 @@ def local_crossings(frame: Frame, *, length: float, radius: float, top: float) -
 
 
 def spanning_level(field: NDArray[np.float64]) -> float:
-    """Return the highest level above which the region of a field joins bottom and top; 0 if there is none."""
+    """Return the largest threshold at which the region of larger or equal values joins bottom and top.
+
+    `field` is the local average crossing number (X, Y, Z) [-]; the result is 0 if there is no such threshold.
+    """
     falling = np.unique(field)[::-1]
     return next((float(value) for value in falling if region_spans(field >= value, 2)), 0.0)
 
 
 def thresholds(runs: pd.DataFrame, column: str) -> dict[str, Profile]:
-    """Fit the threshold of ln(column) above which piles stand, for each series, by profile likelihood."""
+    """Compute the profile likelihood of the threshold of ln(`column`) above which piles stand, by series.
+
+    A series is `SHAKEN`, `POURED` or `SLIPPERY`. Runs without a value above 0 in the column are left out.
+    """
     own = runs[(runs[column] > 0) & np.isfinite(runs[column])]
     if own.empty:
         return {}
@@ -141,7 +147,10 @@ def thresholds(runs: pd.DataFrame, column: str) -> dict[str, Profile]:
 
 
 def onsets(runs: pd.DataFrame) -> pd.DataFrame:
-    """Tabulate the values at which half of the piles stand: a row per series and column."""
+    """Tabulate the threshold at which half of the piles stand, with its 95 % interval.
+
+    The table has a row per series (`SHAKEN`, `POURED` or `SLIPPERY`) and column (`SLENDER`, `LEVEL` or `DENSITY`).
+    """
     rows = []
     for column in (SLENDER, LEVEL, DENSITY):
         for series, one in thresholds(runs, column).items():
@@ -178,10 +187,10 @@ def stands_from(table: pd.DataFrame) -> Outcome:
 
 
 def ratio_of(runs: pd.DataFrame, column: str, one: str, other: str) -> tuple[float, float, float]:
-    """Compare the thresholds of two series in a column.
+    """Compare the thresholds of the series `one` and `other` in a column, see `thresholds`.
 
-    Returns the logarithm of their ratio, its 95 % half-width, and the p-value of equal thresholds. Half-widths of both
-    thresholds are added in squares. All results are NaN if a series has no threshold.
+    Returns ln(threshold of `one` / threshold of `other`), its 95 % half-width, and the p-value of equal thresholds. The
+    half-width is the root of the sum of the squared half-widths of both. All are NaN if one threshold is unknown.
     """
     found = thresholds(runs, column)
     if not {one, other} <= set(found) or not (found[one].known and found[other].known):
@@ -191,7 +200,10 @@ def ratio_of(runs: pd.DataFrame, column: str, one: str, other: str) -> tuple[flo
 
 
 def one_level(runs: pd.DataFrame, *, other: str) -> Outcome:
-    """Judge whether piles of the series `other` begin to stand at the spanning level of shaken piles."""
+    """Judge whether piles of another series begin to stand at the same spanning level as shaken piles.
+
+    `other` is `POURED` or `SLIPPERY`.
+    """
     ratios = {column: ratio_of(runs, column, other, SHAKEN) for column in (LEVEL, SLENDER, DENSITY)}
     cells = []
     for column, (value, half, chance) in ratios.items():

@@ -45,7 +45,11 @@ QUANTITIES = declare(
 
 
 def measure(run: Run) -> Row:
-    """Measure φ and crossings before and after shaking, and read the variant from the run's name."""
+    """Measure φ and crossings before and after shaking; return the run's row, with its variant.
+
+    A variant is a choice of the contact model, see `VARIANTS`. It is read from the name of the run, VARIANT_seedNUMBER;
+    InputError if the name is another one.
+    """
     found = re.fullmatch(r"(.+)_seed(\d+)", run.path.name)
     if found is None or int(found[2]) != run.manifest.seed:
         raise InputError(
@@ -55,9 +59,10 @@ def measure(run: Run) -> Row:
 
 
 def changes(runs: pd.DataFrame, column: str) -> dict[str, Difference]:
-    """Return the change of a column's mean against the baseline [%] by variant, with Welch's interval.
+    """Return the change of a column's mean against the baseline [%] by variant, with its 95 % interval.
 
-    The baseline's mean, which changes are divided by, is taken as exact.
+    The baseline is the variant of the first run. Its mean counts as exact where changes are divided by it. The
+    intervals are Welch's.
     """
     means = {str(name): mean_over_seeds(part[column]) for name, part in runs.groupby(VARIANT, sort=False)}
     first, *others = means
@@ -81,7 +86,10 @@ def summarise(runs: pd.DataFrame) -> dict[str, pd.DataFrame]:
 
 
 def depends(name: str) -> Finding:
-    """Make the finding that a quantity, key of `COMPARED`, depends on a parameter of the contact model."""
+    """Make the finding that a quantity depends on a parameter of the contact model.
+
+    `name` is the quantity, a key of `COMPARED`.
+    """
     column = COMPARED[name]
 
     def outcome(runs: pd.DataFrame) -> Outcome:

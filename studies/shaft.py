@@ -53,7 +53,7 @@ QUANTITIES = declare(
 
 
 def measure(run: Run) -> Row:
-    """Measure a run of one activity, and torques and the energy ledger during the activity."""
+    """Measure the pile, the torques of the motors and the residual of the energy ledger; return the row."""
     row, scene, series = procedure_row(run), load_scene(run.path / "scene.yaml"), run.series
     active = series["phase"] == activity(run).index
     row |= {SHAFT: scene.motor.stiffness_N_m_per_rad, CONTACT: scene.fidelity.stiffness_N_per_m}
@@ -67,7 +67,7 @@ def measure(run: Run) -> Row:
 
 
 def with_shaft(stiffness: float, *, contact: float = SOFT_CONTACT) -> Rows:
-    """Return a function that selects the rows with a shaft [N m/rad] and a contact stiffness [N/m]."""
+    """Return a function that selects rows by stiffness of the shaft [N m/rad] and of contacts [N/m]."""
     return lambda table: table[np.isclose(table[SHAFT], stiffness) & np.isclose(table[CONTACT], contact)]
 
 

@@ -132,7 +132,10 @@ def angle_of(run: Run) -> float:
 
 
 def links_per_body(frame: Frame) -> float:
-    """Return linked pairs per body [-]: pairs of which one body passes through the other's polygon."""
+    """Return the number of linked pairs over the number of bodies [-].
+
+    A pair is linked if one body passes through the polygon that the other spans.
+    """
     graph = entanglement_graph(polygon_crossings(frame.segments, frame.body), least=1)
     return len(graph.i) / frame.count
 
@@ -169,7 +172,7 @@ def chains_through(frame: Frame, forces: RecordedForces, level: float) -> float:
 
 
 def force_history(run: Run) -> History:
-    """Read the force on the hook over W [-] against the displacement of the hook [mm]."""
+    """Read the force on the hook over the weight of a staple [-] against the hook's displacement [mm]."""
     pull = read_pull(run, run.series, run.phases[-1].index)
     times, force = moving_mean(pull)
     displacement = 1e3 * np.interp(times, pull.edges, pull.raised)
@@ -177,9 +180,9 @@ def force_history(run: Run) -> History:
 
 
 def ratio(table: pd.DataFrame, gamma: float, *, times: float) -> Effect:
-    """Return the effect that peak force at 20° is over `times` that at 90° after vibration at Γ = `gamma`.
+    """Compare the peak forces at 20° and at 90° after vibration at Γ = `gamma`, as an effect to be judged.
 
-    Its value is the mean over seeds of ln(peak force at 20° / at 90°), its threshold ln `times`.
+    Its value is the mean over seeds of ln(peak force at 20° / peak force at 90°), its threshold is ln `times`.
     """
     own = table[table[GAMMA] == gamma]
     mean = narrow_less_square(own.assign(log=np.log(own[PEAK])), "log")

@@ -126,7 +126,7 @@ def measure(run: Run) -> Row:
 
 
 def force_history(run: Run) -> History:
-    """Read the force on the hook over n W_s [-] against the displacement of the hook [mm]."""
+    """Read the force on the hook over the pile's weight [-] against the hook's displacement [mm]."""
     pull = read_pull(run, run.series, run.phases[-1].index)
     times, force = moving_mean(pull)
     displacement = 1e3 * np.interp(times, pull.edges, pull.raised)
@@ -188,7 +188,7 @@ def other_order(table: pd.DataFrame) -> Outcome:
 def strongest(rows: Rows, suffix: str = "") -> tuple[Finding, Finding]:
     """Make the findings that peak force is greatest after shape change, least after internal oscillation.
 
-    `rows` selects the rows of the table, which `suffix` states at the end of the statements.
+    `rows` selects rows of the table of samples; `suffix` says in the statements which rows these are.
     """
     keys: dict[str, Any] = {"beside": (STATIC,), "bounds": HELD_FAST, "rows": rows}
     most, least = (f"has the {one} peak force of the three procedures{suffix}" for one in ("highest", "least"))
@@ -205,8 +205,8 @@ def with_crossings(
 ) -> tuple[Finding, Finding]:
     """Make the findings that peak force rises with ⟨N⟩: over all procedures, and over the amplitudes θ.
 
-    `rows` and `theta` select the runs of the first and of the second finding; `within` and `within_theta` are the
-    columns whose values make their blocks.
+    `rows` selects the runs of the first finding, `theta` those of the second. Only runs of one block are compared: runs
+    that agree in the columns `within` (first finding) or `within_theta` (second).
     """
     keys: dict[str, Any] = {"bounds": HELD_FAST, "unit": "n W_s per link"}
     where, where_theta = (", ".join(map(symbol, columns)) for columns in (within, within_theta))

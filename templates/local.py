@@ -176,6 +176,7 @@ def run_folder(
 
     Args:
         slots: Number of runs at once; one per core if not given.
+        command: Returns the command that computes a run.
         poll_s: Time between updates of the display [s].
         grace_s: Time between one signal to stop and the next stronger one [s].
 
@@ -268,7 +269,10 @@ class _Runner:
         return Outcome(name=entry.name, status="failed", cause=status.cause or _cause(log, returncode), wall_s=wall_s)
 
     def _stop(self, waiting: set[Future[Outcome | None]]) -> None:
-        """Stop all runs by SIGINT, SIGTERM and SIGKILL, one after the other; Ctrl-C skips a wait."""
+        """Stop all runs: send SIGINT, after `grace_s` SIGTERM, then SIGKILL; Ctrl-C skips a wait.
+
+        `waiting` are the runs that have not ended; those that have not begun are cancelled.
+        """
         with self.guard:
             self.stopping = True
         for future in waiting:
@@ -300,7 +304,11 @@ class _Runner:
         )
 
     def _left(self, running: dict[str, float]) -> float:
-        """Return the expected wall time left [s], corrected by true over expected time of finished runs."""
+        """Return the expected wall time left [s].
+
+        Expected times of runs are corrected by the ratio of true to expected time of the finished runs. `running` has
+        the wall times so far [s] of the running ones by name.
+        """
         expected = {entry.name: entry.expected_s for entry in self.folder.entries}
         done = [outcome for outcome in self.outcomes.values() if outcome.status == "done"]
         planned = sum(expected[outcome.name] for outcome in done)

@@ -92,7 +92,10 @@ def _bar(length: float, thickness: float, radius: float, kind: type[Particle] = 
 
 
 def _spoilt_place(engine: Engine, what: str, place: Iterable[float]) -> tuple[float, float, float]:
-    """Return the position (3,) [m] out of bounds, as `what` says, to which a body at `place` is moved."""
+    """Return an invalid position (3,) [m], to which the caller moves a body that is at `place`.
+
+    `what`, a key of `hard.broken.SPOILT`, says in which way the position is invalid.
+    """
     (x, y, z), reach, radius = place, engine.particle.reach, engine.particle.radius
     return {
         "position": (x, y, math.nan),
@@ -169,7 +172,7 @@ class LinksAccess(_Access):
         return {"motor_law": motor_law_of(scene)}
 
     def ball(self) -> Particle:
-        """Return a particle that, turned by `ball_turn`, hits the floor like a ball (BALL_RADIUS, BALL_MASS)."""
+        """Return a body that hits the floor like a ball of BALL_RADIUS and BALL_MASS if turned by `ball_turn`."""
         # The engine has no balls: an upright stub touches the floor with its round end.
         return _bar(2 * BALL_RADIUS, STUB_THICKNESS, BALL_RADIUS / 2)
 
@@ -245,7 +248,11 @@ class LinksAccess(_Access):
         motors.momentum[0] = row[18:20] * middle[2] + np.array([[row[20], row[21]], [row[21], row[20]]]) @ rates
 
     def burden(self, engine: Engine, k: int, ratio: float, *, rise: float) -> None:
-        """Multiply the weight of smarticle `k` by `ratio`; on the engine `links` within the time `rise` [s]."""
+        """Multiply the weight of smarticle `k` by `ratio`.
+
+        On the engine `links` this is an external force, which rises linearly within the time `rise` [s]. On YADE mass
+        and inertia change at once.
+        """
         # All smarticles on links have one mass, so that an external force is added.
         own = _links(engine)
         if not isinstance(own, Pushed):
@@ -268,9 +275,9 @@ class LinksAccess(_Access):
         return np.array(readings.torques[0])
 
     def spoil(self, engine: Engine, what: str) -> None:
-        """Set an invalid state of the second smarticle, or of its last link.
+        """Set an invalid state of the second smarticle, on YADE of its last link if it is articulated.
 
-        `what` is a key of `hard.broken.SPOILT`.
+        `what`, a key of `hard.broken.SPOILT`, is the kind of invalid state.
         """
         bodies = _links(engine)._world.bodies
         if what == "velocity":

@@ -48,9 +48,10 @@ ONE_STRAND = {"base": "standard", "rows": 1, "stiffness_N_per_m": 500.0}  #: Fid
 
 
 def scene_data(access: EngineAccess, *phases: Mapping[str, Any], per_layer: int = 6, **keys: Any) -> dict[str, Any]:
-    """Return a scene as a dictionary: a deposit of smarticles, by default six, then the given phases.
+    """Return a scene as a dictionary: a deposit of smarticles, then the given phases.
 
-    The fidelity is draft unless `keys` names another one; on all engines contacts have the stiffness of draft on YADE.
+    Smarticles are deposited in layers of `per_layer`. There are six smarticles at the fidelity draft, with a contact
+    stiffness of 250 N/m on all engines. `keys` are keys of the scene that are added or replace these values.
     """
     fidelity = {"base": "draft", "stiffness_N_per_m": 250.0}
     given = {"schema_version": 1, "engine": access.name, "name": "hard", "seed": 1, "count": 6, "fidelity": fidelity}
@@ -58,7 +59,10 @@ def scene_data(access: EngineAccess, *phases: Mapping[str, Any], per_layer: int 
 
 
 def scene(access: EngineAccess, *phases: Mapping[str, Any], **keys: Any) -> Scene:
-    """Return a scene of one smarticle: a deposit, then the given phases, by default a relax phase."""
+    """Return a scene of one smarticle: a deposit, then the given phases; if none are given, a relax phase.
+
+    `keys` are further keys of the scene.
+    """
     return scene_of(scene_data(access, *(phases or (RELAX,)), count=1, **keys))
 
 
@@ -134,8 +138,9 @@ def drive(
 ) -> Iterator[float]:
     """Actuate the motors for a duration [s], and yield after each control period.
 
-    Yields the time since the start [s]. `targets` returns the angles of all barbs [rad] at this time. `each` is called
-    after every step. The control period [s] is that of the scene unless `interval` is given.
+    Yields the time since the start [s]. `targets` gets this time, and returns the angles of all barbs [rad], two per
+    smarticle. `each` is called after every step. The control period [s] is that of the scene unless `interval` is
+    given.
     """
     interval = interval or scene.fidelity.control_interval_s
     steps = round(interval / engine.time_step)

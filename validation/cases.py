@@ -99,7 +99,7 @@ def case(
     """Register a function `(access, **options) -> list[Answer]` as case `name` with a known answer.
 
     `about` describes the simulation, `theory` is the formula or source of the answer. `absent` has, by engine, the
-    reason why the case does not apply to it.
+    reason why the case does not apply to it. `options` are the keyword arguments with which a test calls the function.
     """
     return _register(CASES, name, options, about, theory, absent or {})
 

@@ -47,7 +47,7 @@ def yade() -> Iterator[ProcessPoolExecutor]:
 
 @pytest.fixture
 def call(request: pytest.FixtureRequest) -> Callable[..., Any]:
-    """Return `run(engine, function, ...)`, which calls a function here (links) or in YADE's process."""
+    """Return `run(engine, function, ...)`: it calls the function in this process (links) or in YADE's."""
 
     def run(engine: str, function: Callable[..., Any], /, *arguments: Any, **options: Any) -> Any:
         if engine == "links":

@@ -256,11 +256,11 @@ def check_run(path: Path, scene: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def energy_errors(path: Path) -> tuple[float, float]:
-    """Return the relative errors of the energy in the series of a run.
+    """Return two relative errors of the energy in a run, from the series in its directory `path`.
 
-    The supplied energy is `added_energy_J`, from the heights and speeds of poured smarticles, plus the work of motors
-    and container. The errors are the largest excess of the stored energy over the supplied energy [1], and the largest
-    residual of the ledger over the dissipated energy [1]; NaN if the series contains NaN.
+    They are the largest excess of the stored energy over the supplied energy [1], and the largest residual of the
+    ledger over the dissipated energy [1]; NaN if the series contains NaN. The supplied energy is `added_energy_J`, from
+    the heights and speeds of poured smarticles, plus the work of motors and container.
     """
     with h5py.File(path / "series.h5") as file:
         series = {name: np.asarray(dataset[()], dtype=float) for name, dataset in file.items()}

@@ -1,4 +1,4 @@
-"""Shaken piles: packing fraction and crossings before and after shaking, and Gravish's points."""
+"""Packing fraction φ and crossings ⟨N⟩ of piles before and after shaking, and Gravish's values of φ."""
 
 import hashlib
 import math
@@ -92,12 +92,15 @@ def gravish_note(aspects: Sequence[float]) -> str:
 
 
 def phi(stage: str, definition: str = DEFINITION) -> str:
-    """Return the name of the column of φ at a stage, by a definition of φ."""
+    """Return the name of the column of φ at a stage, by one of the definitions of φ (`DEFINITIONS`).
+
+    A stage is a key of `STAGES`, such as `phi_0` before shaking, or a result of `at_time`.
+    """
     return f"{stage} {definition} [-]"
 
 
 def at_time(time: float) -> str:
-    """Return the name, for `phi`, of the stage after some time of shaking [s]."""
+    """Return the name of the stage at a time since shaking began [s], such as `phi 5 s`; see `phi`."""
     return f"phi {time:g} s"
 
 
@@ -122,7 +125,11 @@ def common_friction(run: Run) -> float:
 
 
 def timed_row(run: Run, known: Mapping[str, object]) -> dict[str, object]:
-    """Measure φ at each stage and at `TIMES` during shaking; return the run's row, which includes `known`."""
+    """Measure φ and crossings before and after shaking, and φ at `TIMES` during it; return the run's row.
+
+    `known` are columns of the row that the caller knows, such as friction. φ at a time is the mean over the `WINDOW`
+    before it; times after the end of shaking have no column.
+    """
     history = packing_history(run)
     row = {**known, **measured_row(run, [DEFINITION])}
     for time in TIMES:
@@ -140,10 +147,11 @@ def while_shaken(run: Run) -> History:
 
 
 def measured_row(run: Run, definitions: Sequence[str]) -> dict[str, object]:
-    """Measure φ and crossings before and after shaking; return the run's row.
+    """Measure φ and crossings ⟨N⟩ before and after shaking; return the run's row of the table of runs.
 
-    φ is measured by `DEFINITION` and the given definitions; costly definitions are measured in the last frame only.
-    InputError if the run has no shaking after another phase, or a frame is missing.
+    φ is measured by `DEFINITION` and by all `definitions`. It is the mean over the last frames of a phase; by a
+    definition of `COSTLY_DEFINITIONS` it is that of the last frame. InputError if no phase of shaking follows another
+    phase, or a phase to be measured has no frame.
     """
     shakes = [phase for phase in run.phases if phase.type == _SHAKE]
     if not shakes or shakes[0].index == 0:

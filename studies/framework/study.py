@@ -1,4 +1,4 @@
-"""Studies: measure, columns, findings and figures, from which `analyse` makes results."""
+"""A study and its analysis: runs are measured and averaged, findings judged, and figures drawn."""
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -38,7 +38,7 @@ _MEANS = "Means over seeds ± standard error."
 
 @dataclass(frozen=True, kw_only=True)
 class Report:
-    """Results of a study."""
+    """Results of an analysis: tables, findings with their verdicts, and the files that were written."""
 
     header: Sequence[str]  #: Header of the short table of points
     rows: Sequence[Sequence[str]] = field(repr=False)  #: Rows of the short table of points
@@ -53,7 +53,7 @@ class Report:
 
 @dataclass(frozen=True, kw_only=True)
 class Study:
-    """A study: its measures of a run, averaged columns, findings and figures."""
+    """A study: how to measure a run, which columns to average, and its findings and figures."""
 
     name: str  #: Name of the study on the command line and in the provenance
     title: str  #: Heading of the text
@@ -87,7 +87,7 @@ class Study:
     pictured: Mapping[str, object] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        """Raise InputError if a figure is split by a column that is no key."""
+        """Raise InputError if a figure has a series or a panel per value of a column that is no key."""
         keys = [key.column for key in self.keys]
         for figure in self.figures:
             if getattr(figure, "table", "points") == "points":
@@ -109,12 +109,14 @@ class Study:
         command: str,
         earlier: Mapping[str, MeasuredRun] | None = None,
     ) -> Report:
-        """Measure runs and write tables, text, provenance and figures; existing files are replaced.
+        """Measure runs, and write tables, text, provenance and figures into a folder.
 
-        InputError if no run is done, the runs must not be averaged or compared, or the output is no folder.
+        Existing files are replaced. A footer is the text below a table or figure on the origin of its results.
+        InputError if no run is done, `reject_unlike` rejects the runs, or the folder cannot be made.
 
         Args:
             run_dirs: directories of the runs; runs that are not done or cannot be read are listed as missing.
+            output: folder for the files; it is made if it does not exist.
             note: how the runs differ from the full study, for footers.
             full: what the full study found, for footers; empty if these runs are the full study.
             command: command line, for footers.
@@ -149,14 +151,19 @@ class Study:
         )
 
     def measured(self, run: Run) -> MeasuredRun:
-        """Measure one finished run and return its rows of the table of runs."""
+        """Measure one finished run, and return it with its rows of the table of runs."""
         measured = self.measure(run)
         if isinstance(measured, MeasuredRun):
             return measured
         return MeasuredRun(run=run, rows=[measured] if isinstance(measured, Mapping) else measured)
 
     def reject_unlike(self, found: Collected) -> None:
-        """Raise InputError for runs that must not be averaged or compared, and for seeds that are given twice."""
+        """Raise InputError if runs that would be averaged or compared are unlike, or a point has a seed twice.
+
+        Runs are unlike if they differ in fidelity but agree in the columns `same_fidelity`, if they differ in the
+        number of smarticles but agree in `same_count`, or if they differ in a column that is a key of `constant` but
+        agree in the columns of its value. With `one_engine` they are unlike, too, if they differ in the engine.
+        """
 
         def cells(columns: Sequence[str]) -> Callable[[MeasuredRun], tuple[object, ...]]:
             return lambda run: tuple(run.row[name] for name in columns)
@@ -179,10 +186,10 @@ class Study:
         return ", ".join(f"{label} {cell}" for label, cell in cells if cell)
 
     def tabulate(self, runs: pd.DataFrame, times: pd.DataFrame | None = None) -> dict[str, pd.DataFrame]:
-        """Make all tables from the table of runs and the histories.
+        """Return all tables by name, made from the table of runs and the table `times` of histories, if any.
 
-        The tables are `runs`, `points`, `engines` if there are several engines, `times` if there are histories, and the
-        tables of `extra`.
+        The tables are `runs`, `points` (means over seeds), `times` if given, and those of `extra`, which may replace
+        `points`. If it does not, and runs are of several engines, the table `engines` compares these.
         """
         runs = sort_rows(runs, self.order, self.keys) if self.order else runs
         extra = self.extra(runs)
@@ -214,12 +221,19 @@ class Study:
         return sort_rows(pd.DataFrame(rows), columns, self.keys)
 
     def judge(self, tables: Mapping[str, pd.DataFrame]) -> tuple[Judged, ...]:
-        """Judge all findings by the samples of the judging engine, or by the tables that a finding names."""
+        """Judge all findings, and return them with their verdicts.
+
+        A finding is judged by the samples, or by the `tables` that it names. If runs are of several engines, the
+        samples are those of one engine, see `judging`.
+        """
         samples = self.samples(judging(tables["runs"]))
         return tuple(finding.judge(samples, tables) for finding in self.findings)
 
     def table(self, tables: Mapping[str, pd.DataFrame]) -> tuple[list[str], list[list[str]]]:
-        """Return header and rows of the short table of points: keys, seeds, and quantities with a label."""
+        """Return header and rows of the short table of points as text: keys, seeds, labelled quantities.
+
+        `tables` are those of `tabulate`; the function `shown` selects the points.
+        """
         points = self.shown(tables["points"])
         keys = [Key(column=ENGINE, label="engine")] if engines_of(points) else []
         keys += [key for key in self.keys if key.column in points]
@@ -236,7 +250,10 @@ class Study:
             return [path for figure in self.figures for path in figure.draw(output / figure.name, analysis)]
 
     def text(self, tables: Mapping[str, pd.DataFrame], judged: Sequence[Judged], table: Sequence[str]) -> list[str]:
-        """Return the lines of the Markdown file: findings, remarks, and the short table of points."""
+        """Return the lines of the Markdown file: findings, remarks, and the short table of points.
+
+        The argument `table` has the lines of the short table in Markdown.
+        """
         findings = [
             [one.finding.says, one.ours, f"**{one.verdict}**{one.needed and f'; {one.needed}'}", one.criterion]
             for one in judged
@@ -251,7 +268,10 @@ class Study:
         ]
 
     def statements(self, tables: Mapping[str, pd.DataFrame]) -> list[str]:
-        """Return statements for footers: points, seeds, engines, remarks, error bars and criterion."""
+        """Return sentences on the origin of the results, which are printed below tables.
+
+        They state points, seeds, engines, remarks, what error bars are, and the criterion of the verdicts.
+        """
         every = tables["runs"]
         runs = judging(every)
         parts = []

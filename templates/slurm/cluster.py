@@ -61,7 +61,10 @@ def format_time(seconds: float) -> str:
 
 
 class Partition(Strict):
-    """One partition (queue) of a cluster; "here" stands for the value of the submitting machine."""
+    """One partition (queue) of a cluster.
+
+    The cores or the memory of a node may be given as "here": those of the machine that submits.
+    """
 
     cores_per_node: int | Literal["here"]
     memory_per_node_mib: int | Literal["here"]  #: Memory of one node [MiB]

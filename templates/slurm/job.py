@@ -64,7 +64,10 @@ class Request:
 
 
 def plan_request(expected_s: Sequence[float], cluster: Cluster, wishes: Wishes) -> Request:
-    """Return the request for runs with expected wall times [s] and `wishes`; InputError above a limit."""
+    """Return the request for an array job that computes runs with expected wall times [s].
+
+    InputError if it exceeds a limit of the cluster.
+    """
     name, partition = cluster.partition(wishes.partition)
     where = f"partition {name} of {cluster.name}"
     memory, ranks = wishes.memory_mib or MEMORY_PER_RUN_MIB, wishes.ranks or 1
@@ -113,9 +116,11 @@ def plan_request(expected_s: Sequence[float], cluster: Cluster, wishes: Wishes) 
 
 
 def _runs_per_task(count: int, partition: Partition, wanted: int | None, memory: int) -> int:
-    """Return the number of runs per task: `wanted`, or by default for equal tasks that fill a node.
+    """Return the number of runs per task, for `count` runs that need a `memory` [MiB] each.
 
-    `count` is the number of runs, `memory` that of one run [MiB].
+    It is the smaller of `wanted` and `count`; but a `wanted` above the cores of a node is returned unchanged, so that
+    the caller can reject it. If `wanted` is None, a task gets as many runs as a node has cores and memory for, or fewer
+    if all tasks can then be equal.
     """
     if wanted is not None:
         return wanted if wanted > partition.cores else min(wanted, count)
@@ -161,7 +166,7 @@ def smarticles_words() -> tuple[str, ...]:
 
 
 def job_name(sweep: str, token: str) -> str:
-    """Return a job name without special characters, with a token that makes it unique."""
+    """Return a job name: the sweep's without special characters, and a token that makes it unique."""
     plain = re.sub(r"[^A-Za-z0-9._-]+", "-", sweep).strip("-.")[:40]
     return f"{plain or 'sweep'}.{token}"
 
@@ -174,6 +179,8 @@ def render_script(
     Args:
         sweep: Directory of the sweep.
         number: Name of the submission's folder in `jobs/`.
+        name: Name of the job.
+        count: Number of runs.
         command: Command that starts `smarticles`, as words.
     """
     folder = f"jobs/{number}"

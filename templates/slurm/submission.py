@@ -92,7 +92,10 @@ def draft(
 
     Args:
         path: Directory of the sweep, which may be absent.
+        name: Name of the sweep.
+        entries: Runs to be submitted.
         reference: Name of a cluster in this package, or a file that ends in .toml.
+        wishes: Options of the user.
         token: Text that makes the name of the job unique; random if not given.
     """
     cluster = load_cluster(reference)
@@ -162,7 +165,10 @@ def _store(folder: Folder, submission: Submission) -> None:
 
 
 def tasks_of_runs(found: Sequence[Submission]) -> dict[str, Task]:
-    """Return the task of each run by the run's name: the newest unended task, else the newest task.
+    """Return the task that computes each run, by the name of the run.
+
+    `found` are the submissions of a sweep, oldest first. If a run is in several tasks, the newest one that has not
+    ended is taken, or the newest one if all have ended.
 
     Raises:
         QueueError: Slurm's queue cannot be queried.
@@ -283,7 +289,10 @@ def parse_job_id(answer: str, script: Path) -> int:
 
 
 def _ask_queue(names: Sequence[str]) -> list[Task]:
-    """Query the tasks of jobs by job name, because Slurm reports the number of an old job as an error."""
+    """Query Slurm's queue for the tasks of jobs with the given names.
+
+    Names are used because Slurm reports the number of an old job as an error.
+    """
     if not names:
         return []
     asked = ("--noheader", "--array", "--states=all", f"--name={','.join(names)}", "--format=%j|%F|%K|%T|%r")

@@ -94,7 +94,7 @@ class Folder:
         """Return runs in the order in which to start them, those with the longest expected time first.
 
         If the sweep is computed seed by seed, all runs with its first seed come before all runs with the second. Runs
-        with `again` come last.
+        that repeat another run with other constants (`again`) come last.
         """
         seeds = list(dict.fromkeys(entry.values.get(SEED) for entry in self.entries))
         ranks = {seed: rank for rank, seed in enumerate(seeds) if self.manifest.seed_by_seed}
@@ -113,7 +113,7 @@ class Folder:
         return [Run(self.run(entry)) for entry in self.entries]
 
     def log(self, entry: Entry) -> Path:
-        """Return the path of the output of a run's process."""
+        """Return the path of the text file with the output of a run's process."""
         return self.path / "logs" / f"{entry.name}.txt"
 
     def is_done(self, entry: Entry) -> bool:

@@ -10,13 +10,14 @@ from dem.scene.reading import apply_override
 
 
 def as_template(data: Any, names: Mapping[str, str], source: str) -> str:
-    """Return the data of a scene as the text of a template with variables.
+    """Return the text of a template for a sweep: a scene in YAML with variables in place of some values.
 
     InputError if the scene has text that a template would execute.
 
     Args:
-        data: data of the scene; the values of the keys in `names` are replaced in place.
-        names: name of the variable of each key of the scene, with dots for nested keys.
+        data: content of the scene; it is changed in place.
+        names: name of the variable by the key whose value it replaces; dots separate nested keys, as in
+            `motor.law`.
         source: scene or its file, for messages.
     """
     text = _dumped(data)

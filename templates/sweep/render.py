@@ -32,7 +32,10 @@ MOST_MEMORY, MOST_SECONDS = 2**28, 1.0
 
 
 class _TooLongError(BaseException):
-    """Raised when a rendering takes too long; a BaseException, since Jinja2 catches errors in constants."""
+    """Raised when a rendering takes too long.
+
+    It is a BaseException since Jinja2 catches every Exception while it computes constants.
+    """
 
 
 @contextmanager
@@ -65,7 +68,10 @@ def _stop(_number: int, _frame: FrameType | None) -> None:
 
 
 def _environment(finalize: Callable[..., Any] | None = None) -> ImmutableSandboxedEnvironment:
-    """Return a sandbox in which an unknown name is an error."""
+    """Return a sandboxed environment of Jinja2 in which an unknown name is an error.
+
+    `finalize` converts the value of each `{{ … }}` before it is inserted; None: no conversion.
+    """
     return ImmutableSandboxedEnvironment(
         undefined=jinja2.StrictUndefined,
         finalize=finalize,
@@ -84,7 +90,10 @@ def _plain(value: Value) -> bool:
 
 
 def _check(value: Value, rule: str) -> None:
-    """Raise Jinja2's error, with the text `rule`, if a value is undefined, no plain data, or too long."""
+    """Raise an error of Jinja2 if a value is undefined, no plain data, or too long.
+
+    Its message ends with `rule`.
+    """
     if isinstance(value, jinja2.Undefined):
         str(value)  # StrictUndefined raises, with the name
     if not _plain(value):
@@ -125,7 +134,10 @@ _FAILURES = (
 
 
 def evaluate(expression: str, values: Mapping[str, Value], source: str) -> Value:
-    """Return the value of a Jinja2 expression such as `(n / 2) | round | int`; `source` is for errors."""
+    """Return the value of a Jinja2 expression such as `(n / 2) | round | int`.
+
+    InputError if it fails or has an unknown name; `source` says in the message where the expression is.
+    """
     try:
         with _limited():
             result = _environment().compile_expression(expression, undefined_to_none=False)(**values)
@@ -136,7 +148,10 @@ def evaluate(expression: str, values: Mapping[str, Value], source: str) -> Value
 
 
 def render_text(template: str, values: Mapping[str, Value], source: str) -> str:
-    """Render a template as text; InputError, with `source` as its place, if it fails or lacks a name."""
+    """Render a template as text.
+
+    InputError if it fails or has an unknown name; `source` says in the message where the template is.
+    """
     try:
         with _limited():
             return _environment().from_string(template).render(**values)
@@ -145,7 +160,10 @@ def render_text(template: str, values: Mapping[str, Value], source: str) -> str:
 
 
 def render_yaml(template: str, values: Mapping[str, Value], source: str) -> Any:
-    """Render a template of YAML and return its data; InputError with `source` and line on an error."""
+    """Render a template of YAML, and return its data.
+
+    InputError if it fails or has an unknown name; the message has `source`, the place of the template, and the line.
+    """
     prefix = "value"
     while prefix in template or prefix in repr(values):
         prefix += "x"

@@ -168,7 +168,7 @@ class SweepFile(Strict):
 
 @dataclass(frozen=True, kw_only=True)
 class Sweep:
-    """A sweep file with its scene template and its table; `table` has the rows that `only` selects."""
+    """A sweep file that has been read, with its scene template and the selected rows of its table."""
 
     path: Path
     text: str
@@ -180,7 +180,10 @@ class Sweep:
 
 
 def load_sweep(path: Path) -> Sweep:
-    """Read a sweep, FILE or FILE@VARIANT,VARIANT, with its template and table; InputError if invalid."""
+    """Read a sweep file with its scene template and its table; InputError if one is invalid.
+
+    `path` is FILE or FILE@VARIANT,VARIANT; variants are patches in the file, which are applied in this order.
+    """
     name, _, variants = path.name.partition("@")
     text = read_text(path.with_name(name), "sweep file")
     data = parse_yaml(text, str(path))
@@ -250,7 +253,7 @@ def on_engine(sweep: Sweep, engine: str) -> Sweep:
     """Return a sweep with all runs on one engine; repetitions on another engine are left out.
 
     Raises:
-        InputError: The sweep has no constant `engine`.
+        InputError: The sweep has no constant `engine`, or `engine` is a variable of its points.
     """
     content = sweep.content
     points = content.points
@@ -336,7 +339,9 @@ def _read_table(path: Path, table: Table | None) -> tuple[list[dict[str, Value]]
 def matching(
     rows: Sequence[dict[str, Value]], only: Mapping[str, Sequence[Value]], where: str, nouns: tuple[str, str]
 ) -> list[dict[str, Value]]:
-    """Return the rows with a wanted value in each variable of `only`; raise InputError if there are none.
+    """Return the rows that have, in each variable named in `only`, one of the values listed there.
+
+    InputError if no row is left, or a variable or a value of `only` occurs in no row.
 
     Args:
         where: Place of `only`, for messages.

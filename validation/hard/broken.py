@@ -168,9 +168,10 @@ def late(access: EngineAccess, out: Path) -> list[Check]:
 
 
 def cost(access: EngineAccess, out: Path, *, fidelity: str, count: int, activity: str, seconds: float) -> list[Check]:
-    """Measure the share of the watchdog in the processor time of a run.
+    """Check that the watchdog takes a small share of the processor time of a run.
 
-    The first check is measured separately, since it loads compiled code and would dominate the share of a short run.
+    Its first check is measured separately, since it loads compiled code and would dominate the share of a short run.
+    `activity` is "at rest", "shaken" or "swinging"; it lasts `seconds`.
     """
     phases: dict[str, dict[str, Any]] = {
         "at rest": {"type": "relax"},

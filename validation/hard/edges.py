@@ -73,7 +73,7 @@ def one(access: EngineAccess, out: Path) -> list[Check]:
 
 @hard("checkpoint at the last step", {})
 def checkpoint_last(access: EngineAccess, out: Path) -> list[Check]:
-    """End a run at a checkpoint; the last check must work on the reloaded engine, without contacts yet."""
+    """End a run at a checkpoint, after which contacts are unknown until the next step; it must be sound."""
     recording = {"series_interval_s": 0.01, "frame_interval_s": 0.04, "checkpoint_interval_s": 0.01}
     run = whole(scene_data(access, RELAX, count=2, recording=recording), out)
     return run.sound() + run.weight_on_floor(0.02)
@@ -146,7 +146,7 @@ def no_torque(access: EngineAccess, out: Path) -> list[Check]:
 @hard("τ_max / 1000, stall", {"law": "stall", "count": 6}, {"count": 40})
 @hard("τ_max / 1000, slip", {"law": "slip", "count": 6}, {"count": 40})
 def weak_motors(access: EngineAccess, out: Path, *, law: str, count: int) -> list[Check]:
-    """Actuate motors of a torque law with a torque limit too small to lift the barbs."""
+    """Actuate motors with a torque limit too small to lift the barbs; `law` is their torque law."""
     limit = TORQUE_LIMIT / 1000
     motor = {"law": law, "torque_limit_N_m": limit}
     run = whole(scene_data(access, turn(40, 0.3), RELAX, count=count, motor=motor), out)

@@ -44,7 +44,7 @@ def start(path: Path, out: Path) -> subprocess.Popen[bytes]:
 
 
 def finish(process: subprocess.Popen[bytes], what: str) -> float:
-    """Wait until a process has ended; return its processor time [s].
+    """Wait until a process has ended, by itself or by SIGKILL; return its processor time [s].
 
     RunError, whose message begins with `what`, if the process failed.
     """
@@ -56,7 +56,10 @@ def finish(process: subprocess.Popen[bytes], what: str) -> float:
 
 
 def kill_after(process: subprocess.Popen[bytes], seconds: float, what: str) -> bool:
-    """Kill a process, named `what`, after processor time [s]; return False if the process ended before."""
+    """Kill a process after `seconds` of processor time; return False if it ended before.
+
+    RunError, whose message begins with `what`, if the process failed.
+    """
     ticks = os.sysconf("SC_CLK_TCK")
     while True:
         try:
@@ -74,7 +77,7 @@ def kill_after(process: subprocess.Popen[bytes], seconds: float, what: str) -> b
 
 
 def results(out: Path) -> dict[str, bytes]:
-    """Return the bytes of the series, frames and collections of a run, by file name relative to `out`."""
+    """Return the bytes of the series, the frames and the `.pvd` files of a run, by path relative to `out`."""
     files = [out / "series.h5", *out.glob("*.pvd"), *(out / "frames").iterdir()]
     return {str(path.relative_to(out)): path.read_bytes() for path in files}
 
@@ -112,10 +115,11 @@ def _phase_of(out: Path) -> str:
 
 
 def kills(engine: str, number: int, folder: Path, *, seed: int) -> list[dict[str, Any]]:
-    """Kill `number` runs of one scene at random times; compare each with the uninterrupted run.
+    """Kill `number` runs of one scene at random times, resume them, and compare their results.
 
-    Returns one row of the table per kill. `seed` is that of the scene and of the random times. Run directories of equal
-    runs are removed. RunError if a run failed, or two uninterrupted runs differ.
+    Each is compared with an uninterrupted run; its row of the table is returned. `seed` is that of the scene and of the
+    random times. Run directories without a difference are removed. RunError if a run failed, or two uninterrupted runs
+    differ.
     """
     rng, path, whole = random.Random(1000 * seed + 1), folder / f"{seed}.yaml", folder / f"whole-{seed}"
     write_text(path, json.dumps(scene_to_kill(engine, seed)))

@@ -1,7 +1,7 @@
-"""Find the time steps above which smarticles chatter and simulations blow up.
+"""Find the time steps above which smarticles at rest chatter (keep moving) and simulations blow up.
 
-Scenes reject time steps above the stable step, so the engines are built directly. A few smarticles are released at
-time steps from 0.5 to 4 times the stable step. *Chatter*: smarticles that should be at rest move. *Blow-up*: the energy
+Scenes reject time steps above the stable step, so the engines are built directly. A few smarticles are released at time
+steps from 0.5 to 4 times the stable step. *Chatter*: smarticles that should be at rest move. *Blow-up*: the energy
 grows without supply, or positions become NaN. Each setting is run with several seeds, which vary the initial poses.
 """
 
@@ -171,12 +171,12 @@ def climb(engine: str, name: str, seed: int) -> list[dict[str, Any]]:
 
 
 def onset(name: str, runs: pd.DataFrame) -> dict[str, Any]:
-    """Return a setting's row of the table of onsets, made from its runs (rows of `climb`).
+    """Make a setting's row of the table of onsets from its runs, which are rows of `climb`.
 
-    "chatter from" and "blow-up from" are time steps as multiples of the stable step: each seed has the smallest one at
-    which it chatters or blows up, inf if it never does; the row has the least and the most of all seeds. A blow-up
-    counts as chatter. Chatter is NaN for stacks that still move at half the stable step, and for crossed or random
-    smarticles, which may rock at any time step.
+    For each seed, the onset is the smallest time step, over the stable step, at which smarticles chatter or the
+    simulation blows up; inf if they never do. The row has the least and the greatest onset of all seeds, for chatter
+    and for blow-up. A blow-up counts as chatter, too. Chatter is NaN for stacks that still move at half the stable
+    step, and for crossed or random smarticles, which may rock at any time step.
     """
     factor, speed, rise = (pd.to_numeric(runs[column], errors="coerce") for column in (FACTOR, SPEED, RISE))
     small, blown = factor <= 0.9, rise > BLOW_UP

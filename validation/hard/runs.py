@@ -82,7 +82,7 @@ class Watched:
         return mask
 
     def sound(self, *, rest: float | None = 0.02, depth: float = 0.5) -> list[Check]:
-        """Return the checks of every successful run.
+        """Return the checks that hold for every successful run, on its end, overlaps, energy and final speed.
 
         `rest` is the limit of the speed at the end [m/s]; None: not checked. `depth` is the limit of the overlap over
         the sphere diameter [1].

@@ -33,7 +33,7 @@ from validation.hard.runs import Noting, whole
 @hard("drop at 10 m/s, welded", {"articulated": False, "time": 0.1}, {"time": 0.45})
 @hard("drop at 10 m/s, articulated", {"articulated": True, "time": 0.1}, {"time": 0.45})
 def drop(access: EngineAccess, out: Path, *, articulated: bool, time: float) -> list[Check]:
-    """Throw a smarticle at the floor at 10 m/s."""
+    """Throw a smarticle at the floor at 10 m/s, and simulate for a `time` [s]."""
     speed = 10.0
     scene, engine, recorder = watched(scene_data(access, shape_change(), count=1), out)
     add(engine, (0, 0, 0.02), TILTED)
@@ -69,9 +69,9 @@ def drop(access: EngineAccess, out: Path, *, articulated: bool, time: float) -> 
 
 @hard("articulated smarticles land", {"time": 0.2})
 def landing(access: EngineAccess, out: Path, *, time: float) -> list[Check]:
-    """Drop articulated smarticles on each other.
+    """Drop articulated smarticles on each other; the watchdog must not stop the run.
 
-    Torques reach 10 τ_max, and the watchdog must not stop the run.
+    The torques of the motors must exceed three times their limit.
     """
     scene, engine, recorder = watched(scene_data(access, shape_change(), count=4), out)
     limits = recorder.watchdog
@@ -213,8 +213,8 @@ def mass_ratio(
 ) -> list[Check]:
     """Multiply the weight of the upper or the lower of two stacked smarticles by `ratio`.
 
-    Contacts with the stiffness of draft cannot carry the weight, which the watchdog must report. Contacts stiffer by
-    the factor `ratio` must carry it.
+    With a contact `stiffness` of 250 N/m, that of draft, contacts cannot carry the weight, which the watchdog must
+    report. With 1e6 N/m they must carry it.
     """
     carries = stiffness > 250 * ratio / 10
     data = scene_data(access, count=2, fidelity={"base": "draft", "stiffness_N_per_m": stiffness})

@@ -25,7 +25,10 @@ FRICTION = 0.4
 
 
 def lowest(access: EngineAccess, particle: Particle) -> Array:
-    """Return x and y of a flat body's contact points with the floor, from its centre of mass: (n, 2) [m]."""
+    """Return x and y of the points at which a flat body touches the floor, (n, 2) [m].
+
+    They are relative to the centre of mass, in the body frame.
+    """
     ends = access.ends(particle)
     found: Array = ends[ends[:, 2] < ends[:, 2].min() + 1e-9, :2]
     return found
@@ -315,7 +318,11 @@ def _sunk_theory(points: Array, *, stiffness: float, weight: float) -> float:
 
 
 def flat_impact(access: EngineAccess, *, rows: int, pitch: float, restitution: float = 0.7) -> dict[str, float]:
-    """Throw a smarticle flat at the floor, and let another rest there; return a row of the table `clumps`."""
+    """Throw a smarticle flat at the floor, and let another rest there; return a row of the table `clumps`.
+
+    On YADE links are `rows` rows of spheres, a `pitch` of sphere diameters apart; on `links` the pitch is 0. The
+    contact law is that of a scene with this `restitution`.
+    """
     fidelity = {"base": "standard", "rows": rows} | ({"pitch": pitch} if pitch else {})
     one = scene(access, fidelity=fidelity, contact={"restitution": restitution})
     law, boxes, points = law_of(one), one.smarticle.boxes, lowest(access, one.particle)
@@ -364,6 +371,9 @@ def flat_checks(access: EngineAccess, *, rows: int, pitch: float) -> list[Answer
 
 
 def flat_impacts(access: EngineAccess) -> list[dict[str, float]]:
-    """Return rows of the table `clumps` for several numbers of contact points (spheres or strands)."""
+    """Return rows of the table `clumps`, made by `flat_impact`, for several numbers of contact points.
+
+    Rows and pitch of the spheres vary on YADE, the number of rows on `links`.
+    """
     settings = ROWS_AND_PITCHES if access.name == "yade" else STRANDS
     return [flat_impact(access, rows=rows, pitch=pitch) for rows, pitch in settings]

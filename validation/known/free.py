@@ -23,10 +23,11 @@ ABOUT_MIDDLE = np.array([10.0, 40.0, 5.0])  # [rad/s], body frame; mainly about 
 
 
 def fall(access: EngineAccess, dt: float, *, time: float, throw: float, centred: bool) -> tuple[Array, float, float]:
-    """Throw a smarticle upwards [m/s] without rotation, for a time [s].
+    """Throw a smarticle upwards at the velocity `throw` [m/s] without rotation; simulate for a `time` [s].
 
-    `centred` corrects the velocity for the half step between velocities and positions. Returns the displacement of the
-    centre of mass (3,) [m], the upward velocity half a step before the end [m/s], and the angle of rotation [rad].
+    Velocities of the leapfrog scheme belong to half a step before the positions; `centred` corrects the initial
+    velocity for this. Returns the displacement of the centre of mass (3,) [m], the upward velocity half a step before
+    the end [m/s], and the angle of rotation [rad].
     """
     one = scene(access)
     engine = access.build(one.particle, law_of(one), dt=dt, gravity=G)

@@ -122,10 +122,10 @@ def droop(access: EngineAccess, *, aspect_ratio: float = 0.7, fidelity: str = "s
     absent=NO_TILT,
 )
 def tilt(access: EngineAccess, *, sweeps: int = 1) -> list[Answer]:
-    """Turn the barbs of a horizontal, held smarticle by 105°, `sweeps` times, and measure their tilt.
+    """Turn the barbs of a horizontal smarticle by 105°, `sweeps` times; measure their tilt by gravity.
 
-    YADE's bonds accumulate moments step by step and rotate them with half of the twist. A tilt computed by bonds would
-    have an error of 100 % after one sweep.
+    The middle link is held. YADE's own bonds accumulate moments step by step and rotate them with half of the twist; if
+    hinges were such bonds, the tilt would have an error of 100 % after one sweep.
     """
     one = hinged(access)
     engine = access.build_hinged(one, gravity=G)
@@ -191,14 +191,15 @@ def pendulum(access: EngineAccess, *, aspect_ratio: float = 0.7) -> list[Answer]
 
 
 def shaft_mode(one: Scene, pin: float, *, held: bool) -> tuple[float, Array]:
-    """Compute the vibration mode of the barbs on their shafts, between rigid motions and pin vibrations.
+    """Compute the vibration mode of a U whose barbs turn on their shafts, both in the same sense.
 
-    The five coordinates describe a U whose barbs turn in the same sense: displacement of the middle link along its
-    axis, rotation of the middle link, rotation of the barbs, and the gap of hinge 1 along and across the middle link
-    (hinge 2: equal along, opposite across). Rigid pins and a fixed middle link remove coordinates.
+    The five coordinates are the displacement of the middle link along its axis, its rotation, the rotation of the
+    barbs, and the gap of hinge 1 along and across the middle link (hinge 2: equal along, opposite across). Rigid
+    motions and vibrations of the pins are other modes.
 
-    `pin` is the stiffness of a pin [N/m], which may be inf; the middle link is fixed if `held`. Returns the angular
-    frequency [rad/s], and the mode (5,) [m or rad] for a twist of 1 rad.
+    `pin` is the stiffness of a pin [N/m]; if it is inf, there are no gaps. The middle link is fixed if `held`. Returns
+    the angular frequency [rad/s], and the coordinates (5,) [m or rad] at which barbs are turned by 1 rad against the
+    middle link.
     """
     boxes, (mass, own, lever) = one.smarticle.boxes, _barb(one)
     along = np.array([1.0, 0.0, -lever, 1.0, 0.0])
@@ -217,7 +218,10 @@ def shaft_mode(one: Scene, pin: float, *, held: bool) -> tuple[float, Array]:
 
 
 def floating(access: EngineAccess, one: Scene, *, held: bool, dt: float | None = None) -> Engine:
-    """Build an engine with a U, without gravity, whose barbs vibrate by 0.01 rad; `held`: middle fixed."""
+    """Build an engine without gravity for one smarticle whose barbs vibrate by 0.01 rad, see `shaft_mode`.
+
+    The middle link is fixed if `held`.
+    """
     engine = access.build_hinged(one, gravity=0.0, dt=dt)
     add(engine, (0, 0, 0.05))
     engine.motors.articulate()

@@ -311,7 +311,10 @@ SPREAD = 8e-5  # m
 
 
 def _spread(law: ContactLaw, number: int) -> tuple[ContactLaw, float]:
-    """Return a contact law with stiffnesses up to 10 % higher and an initial gap [m], for sample `number`."""
+    """Vary a contact law and the initial gap with the sample `number`.
+
+    Returns the law with stiffnesses up to 10 % higher, and the gap [m].
+    """
     factor = 1 + 0.1 * (0.569840 * number % 1)
     springs = {key: factor * getattr(law, key) for key in ("normal_stiffness", "tangential_stiffness")}
     return dataclasses.replace(law, **springs), 1e-4 + SPREAD * (0.754878 * number % 1)
