@@ -8,7 +8,7 @@ from pydantic import Field
 
 from dem.engine.effect import EffectName
 from dem.engine.interface import Engine
-from dem.phases.phase import CHECK_INTERVAL, Memory, Phase, SceneView, Stage
+from dem.phases.phase import CHECK_INTERVAL, Memory, Phase, SceneView, Stage, time_left
 from dem.setting.part import Part, Speed
 from dem.setting.vibration import Vibration
 
@@ -81,8 +81,11 @@ class Compress(Part, Phase):
 
     def first_memory(self, scene: SceneView) -> Memory:
         # `start`: height of the plate above the floor at the beginning [m]; `leg`: number of the loading (even) or
-        # unloading (odd); at the last check, `sum`: force on the plate summed over steps [N], and `step`.
-        return {"start": None, "leg": 0, "sum": 0.0, "step": 0, "due": 0.0, "touched": False, "short": False}
+        # unloading (odd), `way`: how far the plate was down when it began [m], `begun` and `arrival`: when it began,
+        # and when it ends in any case [s]. At the last check, `sum`: force on the plate summed over steps [N]; `step`:
+        # number of steps; `due`: time of the next check [s]. `touched`, `short`: for warnings.
+        numbers = dict.fromkeys(("way", "begun", "arrival", "sum", "due"), 0.0)
+        return {"start": None, "leg": 0, "step": 0, "touched": False, "short": False, **numbers}
 
     def proceed(self, stage: Stage, engine: Engine) -> float:
         memory, boundaries = stage.memory, engine.boundaries
@@ -90,38 +93,48 @@ class Compress(Part, Phase):
             engine.motors.weld()
             if boundaries.plate_height is None:
                 boundaries.place_plate(float(engine.state().tops.max()) + engine.particle.radius)
-            memory["start"] = _height(engine)
-            self._check_from_now(memory, engine)
-            boundaries.move_plate(-self.speed_m_per_s)
-        elif engine.time > memory["due"] - engine.time_step / 2:
-            force = (float(boundaries.plate_sum[2]) - memory["sum"]) / (engine.steps - memory["step"])
-            self._check_from_now(memory, engine)
-            if not self._turn(stage, engine, force / _area(stage.scene)):
+            assert boundaries.plate_height is not None
+            memory["start"] = boundaries.plate_height - boundaries.floor
+            self._begin_leg(memory, engine)
+        else:
+            arrived = not time_left(engine, memory["arrival"])
+            if (arrived or not time_left(engine, memory["due"])) and not self._turn(stage, engine, arrived=arrived):
                 return 0.0
-        return max(float(memory["due"]) - engine.time, engine.time_step)
+        return min(time_left(engine, memory["due"]), time_left(engine, memory["arrival"])) or engine.time_step
+
+    def _begin_leg(self, memory: Memory, engine: Engine) -> None:
+        """Move the plate down or up, and note when it arrives at its end."""
+        up = bool(memory["leg"] % 2)
+        way = memory["way"] if up else self.strain * memory["start"] - memory["way"]
+        memory.update(begun=engine.time, arrival=engine.time + way / self.speed_m_per_s)
+        engine.boundaries.move_plate(self.speed_m_per_s if up else -self.speed_m_per_s)
+        self._check_from_now(memory, engine)
 
     def _check_from_now(self, memory: Memory, engine: Engine) -> None:
-        """Note the force sum, and set the time of the next check."""
+        """Note the force on the plate summed over steps, and set the time of the next check."""
         interval = min(CHECK_INTERVAL, PER_CHECK * engine.particle.diameter / self.speed_m_per_s)
-        due = engine.time + self.whole_periods(interval)
+        due = engine.time + max(engine.time_step, self.whole_periods(interval))
         memory.update(sum=float(engine.boundaries.plate_sum[2]), step=engine.steps, due=due)
 
-    def _turn(self, stage: Stage, engine: Engine, stress: float) -> bool:
-        """Turn the plate round if its leg has ended; return whether the phase goes on."""
+    def _turn(self, stage: Stage, engine: Engine, *, arrived: bool) -> bool:
+        """Check the stress, and turn the plate round if its leg has ended; return whether the phase goes on."""
         memory, boundaries = stage.memory, engine.boundaries
-        strain = 1 - _height(engine) / memory["start"]
+        steps = max(1, engine.steps - memory["step"])
+        stress = (float(boundaries.plate_sum[2]) - memory["sum"]) / steps / _area(stage.scene)
+        self._check_from_now(memory, engine)
         memory["touched"] = memory["touched"] or stress > 0
-        if memory["leg"] % 2:
-            ended = stress <= self.unload_stress_Pa or strain <= 0
+        up = memory["leg"] % 2
+        if up:
+            ended = stress <= self.unload_stress_Pa
         else:
-            loaded = self.stress_Pa is not None and stress >= self.stress_Pa
-            ended = loaded or strain >= self.strain
-            memory["short"] = memory["short"] or (ended and not loaded and self.stress_Pa is not None)
-        if not ended:
+            ended = self.stress_Pa is not None and stress >= self.stress_Pa
+            memory["short"] = memory["short"] or (arrived and not ended and self.stress_Pa is not None)
+        if not (ended or arrived):
             return True
+        memory["way"] += (-1 if up else 1) * self.speed_m_per_s * (engine.time - memory["begun"])
         memory["leg"] += 1
         if memory["leg"] < self.legs:
-            boundaries.move_plate(self.speed_m_per_s if memory["leg"] % 2 else -self.speed_m_per_s)
+            self._begin_leg(memory, engine)
             return True
         boundaries.move_plate(0.0)
         if self.afterwards == "remove":
@@ -134,13 +147,6 @@ class Compress(Part, Phase):
                 "raise strain or lower stress_Pa"
             )
         return False
-
-
-def _height(engine: Engine) -> float:
-    """Return the height of the plate above the floor [m]."""
-    height = engine.boundaries.plate_height
-    assert height is not None  # the phase has placed it
-    return height - engine.boundaries.floor
 
 
 def _area(scene: SceneView) -> float:

@@ -221,7 +221,7 @@ PHASES: list[dict[str, Any]] = [
      "vibration": VIBRATION},
     {"type": "relax", "duration_s": 0.3},
     {"type": "remove-container", "duration_s": 0.1},
-    {"type": "compress", "strain": 0.1, "speed_m_per_s": 0.05, "vibration": VIBRATION},
+    {"type": "compress", "strain": 0.4, "speed_m_per_s": 0.05, "vibration": VIBRATION},
     {"type": "lift", "radius_m": 0.004, "distance_m": 0.006, "speed_m_per_s": 0.06, "duration_s": 0.15},
     {"type": "release"},
     {"type": "relax", "duration_s": 0.2},
@@ -283,12 +283,13 @@ def test_the_works_of_plate_and_grips_are_their_forces_times_ways(series: Series
         (10, "grip_moved_force_N", "elongation_m", -1),
     ):
         inside = np.flatnonzero(series["phase"] == phase)
-        quiet = inside[(series.time[inside] > series.time[inside[0]] + 0.064)]  # after the vibration
+        since = series.time[inside] - series.time[inside[0]]
+        quiet = inside[(since > 0.064) & (since < 0.096)]  # after the vibration, and before the grip arrives
         steps = np.diff(series[way][quiet])
         forces = series[force][quiet[1:], 2]
         weight = series["grip_moved_count"][quiet[1:]] * WEIGHT if phase == 10 else 0.0
         work = float((sign * (forces - weight) * steps).sum())
-        assert work == pytest.approx(np.ptp(series["container_work_J"][quiet]), rel=0.02), phase
+        assert work == pytest.approx(np.diff(series["container_work_J"][quiet]).sum(), rel=0.02), phase
 
 
 WEIGHT = small({"engine": "links", "particle": STAPLE}).model.mass * G
@@ -308,7 +309,7 @@ def test_the_plate_turns_at_the_stress_and_at_none(series: Series) -> None:
     assert np.isnan(series["plate_z_m"][series["phase"] < 3]).all()
     assert np.isnan(series["plate_z_m"][series["phase"] == 7]).all()  # the second compression removed it
     strained = (series["plate_z_m"] - series["container_z_m"])[series["phase"] == 6]
-    assert strained[-1] / strained[0] == pytest.approx(0.9, abs=0.01)
+    assert strained[-1] / strained[0] == pytest.approx(0.6, abs=0.01)
 
 
 def test_what_is_lifted_comes_along(series: Series) -> None:
