@@ -93,10 +93,10 @@ PLATE_COLUMNS = _columns(
 )
 # In scenes with grips of rigid bodies.
 GRIP_COLUMNS = _columns(
-    grip_fixed_force_N="force on the grip that rests (x, y, z), without the weight of what it holds, mean since the "
-    "sample before; NaN while nothing is gripped",
-    grip_moved_force_N="force on the grip that moves (x, y, z), without the weight of what it holds, mean since the "
-    "sample before; NaN while nothing is gripped",
+    grip_fixed_force_N="force of other smarticles, floor and wall on what the grip that rests holds (x, y, z), "
+    "mean since the sample before; NaN while nothing is gripped",
+    grip_moved_force_N="force of other smarticles, floor and wall on what the grip that moves holds (x, y, z), "
+    "mean since the sample before; NaN while nothing is gripped",
     elongation_m="way of the grip that moves, against the one that rests; NaN while nothing is gripped",
     grip_distance_m="distance between the means of the centres of mass of what both grips hold; NaN without two grips",
     grip_fixed_count="smarticles that the grip that rests holds",

@@ -30,7 +30,7 @@ def problems(scene: SceneView, engine: str) -> Iterator[str]:
     yield from _of_recording(scene)
     for index, phase in enumerate(scene.phases):
         if engine != "links" and (what := beyond(phase)):
-            yield f"phases.{index}: {what} of {phase.kind} is computed on engine: links only; use that, or leave it out"
+            yield f"phases.{index} ({phase.kind}): {what}: only engine: links computes that; use it, or leave it out"
         yield from phase.check(scene, index)
         if phase.vibrated_by is not None:
             yield from check_shaking(scene, f"phases.{index}.vibration", phase.vibrated_by)
