@@ -238,6 +238,10 @@ class GripsDouble:
     def places(self) -> Array:
         return self.moved
 
+    @property
+    def made(self) -> int:
+        return sum(call[0] == "hold" for call in self.calls)
+
     def hold(self, bodies: Sequence[int]) -> int:
         self.calls.append(("hold", *bodies))
         self.held.append(list(bodies))

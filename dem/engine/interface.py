@@ -274,6 +274,10 @@ class Grips(Protocol):
         """Let go of all bodies; there are no grips then."""
 
     @property
+    def made(self) -> int:
+        """Number of grips since the start, with those that have let go."""
+
+    @property
     def sums(self) -> Array:
         """(G, 3) forces on the grips with the weight of what they hold [N], summed over all steps since `hold`."""
 

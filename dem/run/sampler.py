@@ -16,7 +16,7 @@ from dem.plan.effects import ADDS
 from dem.record.columns import COLUMNS, EVERY, GRIP_COLUMNS, STRAIN_COLUMNS, Columns
 from dem.record.packing import packing_fraction
 
-KEPT = ("before", "hooks", "plate", "grips", "strain")  # keys of `Sampler.memory`
+KEPT = ("before", "hooks", "plate", "grips", "grips_made", "strain")  # keys of `Sampler.memory`
 
 
 @dataclass
@@ -27,7 +27,7 @@ class Sampler:
     effects: Set[EffectName] = frozenset()  #: Effects of the scene
     memory: dict[str, Any] = field(default_factory=lambda: dict.fromkeys(KEPT))
     """Plain data of the previous sample. `before`: time [s], impulse of gravity [N s], momentum [kg m/s]; `hooks`,
-    `plate`, `grips` and `strain`: number of steps, and forces summed over steps [N]."""
+    `plate`, `grips` and `strain`: number of steps, and forces summed over steps [N]; `grips_made`: number of grips."""
 
     @property
     def described(self) -> Columns:
@@ -59,7 +59,7 @@ class Sampler:
             extra |= self._grip_row(engine)
             # The momentum balance includes the grips, with the weight of what they hold.
             pulls = extra["grip_fixed_force_N"] + extra["grip_moved_force_N"]
-            container_force -= np.nan_to_num(pulls) - [0.0, 0.0, _held_weight(engine.grips)]
+            container_force -= np.nan_to_num(pulls - [0.0, 0.0, _held_weight(engine.grips)])
         if EffectName.WALL_REMOVAL in self.effects:
             outside = np.hypot(state.positions[:, 0], state.positions[:, 1]) > engine.cylinder.radius
             extra["outside_count"] = np.count_nonzero(outside)
@@ -126,6 +126,8 @@ class Sampler:
         if grips is None or not len(grips.counts):
             self.memory["grips"] = None
             return row
+        if self.memory["grips_made"] != grips.made:  # sums begin anew
+            self.memory.update(grips=None, grips_made=grips.made)
         # The last grip moves; the one before it rests, if there is one.
         moved, up = grips.moved, np.array([0.0, 0.0, 1.0])
         forces = self._mean_since("grips", engine.steps, grips.sums) + grips.weights[:, None] * up

@@ -271,6 +271,7 @@ class Grips(NamedTuple):
     force: Array  #: (G, 3) forces on the grips in the last step, with the weight of what they hold [N]
     sums: Array  #: (G, 3) these forces, summed over all steps [N]
     rides: Array  #: (1,) 1 where grips are shaken with the floor, else 0
+    made: NDArray[np.int64]  #: (1,) number of grips since the start
 
 
 PER_GRIP = ("speed", "moved", "force", "sums")  # fields of `Grips` with a row for each grip

@@ -28,6 +28,7 @@ class LinksGrips:
     def hold(self, bodies: Sequence[int]) -> int:
         own, number = self._all, len(self._all.speed)
         own.of[list(bodies)] = number + 1
+        own.made[0] += 1
         more: dict[str, Any] = {name: np.append(getattr(own, name), np.zeros((1, 3)), axis=0) for name in PER_GRIP}
         self._world.grips = own._replace(**more)
         return number
@@ -39,6 +40,10 @@ class LinksGrips:
         self._all.of[:] = 0
         none: dict[str, Any] = {name: np.zeros((0, 3)) for name in PER_GRIP}
         self._world.grips = self._all._replace(**none)
+
+    @property
+    def made(self) -> int:
+        return int(self._all.made[0])
 
     @property
     def sums(self) -> Array:
