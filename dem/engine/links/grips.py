@@ -60,7 +60,8 @@ class LinksGrips:
     @property
     def places(self) -> Array:
         of, positions = self._all.of, self._world.bodies.position
-        return np.array([positions[of == k + 1].mean(axis=0) for k in range(len(self._all.speed))]).reshape(-1, 3)
+        totals = [positions[of == k + 1].sum(axis=0) for k in range(len(self._all.speed))]
+        return np.array(totals).reshape(-1, 3) / np.maximum(1, self.counts)[:, None]
 
     @property
     def weights(self) -> Array:
