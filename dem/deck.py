@@ -25,7 +25,7 @@ from dem.phases.take_over import TakeOver, poses_of
 from dem.plan.steps import time_steps
 from dem.record.files import write_text
 from dem.scene.reading import scene_hash
-from dem.scene.rules import foreign
+from dem.scene.rules import beyond, foreign
 from dem.scene.scene import Scene
 
 PassivePhase = TakeOver | Relax | Shake | RemoveContainer
@@ -80,7 +80,9 @@ def _foreign(scene: Scene) -> Iterator[str]:
     for index, phase in enumerate(scene.phases):
         if phase.pours:
             yield f"phases.{index} ({phase.kind}): a pour (run it here, and begin with take-over of that run)"
-        elif not phase.actuates and not isinstance(phase, PassivePhase):
+        elif isinstance(phase, Shake) and (phase.sweeps or phase.taps is not None):
+            yield f"phases.{index} ({phase.kind}): taps or a sweep (run the scene here on engine: lammps)"
+        elif not phase.actuates and not beyond(phase) and not isinstance(phase, PassivePhase):
             yield f"phases.{index} ({phase.kind})"
 
 

@@ -40,7 +40,11 @@ STABLE_STEP = 5e-4  # s; nothing here is unstable
 
 @dataclass(kw_only=True)
 class BoundariesDouble:
-    """Floor, wall and hooks; the upper hook is pulled down by a spring, `hook_stiffness` [N/m], as it is raised."""
+    """Floor, wall, hooks and plate.
+
+    The upper hook is pulled down by a spring, `hook_stiffness` [N/m], as it is raised. The plate is pushed up by a
+    spring, `plate_stiffness` [N/m], below the height `plate_rest` [m].
+    """
 
     calls: Calls
     top: float = math.inf
@@ -48,6 +52,11 @@ class BoundariesDouble:
     upper_start: float | None = None
     planar: bool = False
     hook_stiffness: float = 0.0
+    plate_stiffness: float = 0.0
+    plate_rest: float = 0.0
+    plate_height: float | None = None
+    plate_sum: Array = field(default_factory=lambda: np.zeros(3))
+    _plate_speed: float = 0.0
     floor: float = 0.0
     velocity: float = 0.0
     walled: bool = True
@@ -74,9 +83,15 @@ class BoundariesDouble:
     def upper_height(self) -> float:
         return self.floor + (self.upper_start or 0.0) + self._moved[1]
 
-    def shake(self, *, amplitude: float, frequency: float, walls: bool = True) -> None:
+    def shake(self, *, amplitude: float, frequency: float, walls: bool = True, from_rest: bool = False) -> None:
         self.calls.append(("shake", amplitude, frequency) if walls else ("shake the floor", amplitude, frequency))
         self._shaken, self._clock = (self.floor, amplitude, 2 * math.pi * frequency), 0.0
+        if from_rest:
+            self._shaken, self._clock = (self.floor + amplitude, *self._shaken[1:]), -0.25 / frequency
+
+    def stop_shaking(self) -> None:
+        self.calls.append(("stop shaking",))
+        self._shaken, self.velocity = None, 0.0
 
     def lift_wall(self, speed: float) -> None:
         self.calls.append(("lift_wall", speed))
@@ -85,6 +100,18 @@ class BoundariesDouble:
     def raise_upper(self, speed: float) -> None:
         self.calls.append(("raise_upper", speed))
         self._speeds = (self._speeds[0], speed)
+
+    def place_plate(self, height: float) -> None:
+        self.calls.append(("place_plate", height))
+        self.plate_height = height
+
+    def move_plate(self, speed: float) -> None:
+        self.calls.append(("move_plate", speed))
+        self._plate_speed = speed
+
+    def remove_plate(self) -> None:
+        self.calls.append(("remove_plate",))
+        self.plate_height = None
 
     def stop(self) -> None:
         self.calls.append(("stop",))
@@ -102,6 +129,10 @@ class BoundariesDouble:
             self.floor = start + amplitude * math.sin(omega * self._clock)
             self.velocity = amplitude * omega * math.cos(omega * self._clock)
         self._moved = (self._moved[0] + self._speeds[0] * dt, self._moved[1] + self._speeds[1] * dt)
+        if self.plate_height is not None:
+            self.plate_height += self._plate_speed * dt
+            pressed = max(0.0, self.plate_rest - self.plate_height)
+            self.plate_sum = self.plate_sum + np.array([0.0, 0.0, self.plate_stiffness * pressed])
         if len(self.hook_sums):
             self.hook_sums = self.hook_sums - [[0, 0, 0], [0, 0, self.hook_stiffness * self._moved[1]]]
 
@@ -184,6 +215,58 @@ class StringsDouble:
         self.sums = self.sums + np.outer(np.sign(self.ties[:, 0]), [self.tension, 0.0, 0.0])
 
 
+@dataclass(kw_only=True)
+class GripsDouble:
+    """Grips that hold nothing, and a spring of `stiffness` [N/m] between the first two along z."""
+
+    calls: Calls
+    stiffness: float = 0.0
+    sums: Array = field(default_factory=lambda: np.zeros((0, 3)))
+    moved: Array = field(default_factory=lambda: np.zeros((0, 3)))
+    held: list[list[int]] = field(default_factory=list)
+    _speeds: Array = field(default_factory=lambda: np.zeros((0, 3)))
+
+    @property
+    def weights(self) -> Array:
+        return np.zeros(len(self.held))
+
+    @property
+    def counts(self) -> NDArray[np.int64]:
+        return np.array([len(bodies) for bodies in self.held], dtype=np.int64)
+
+    @property
+    def places(self) -> Array:
+        return self.moved
+
+    @property
+    def made(self) -> int:
+        return sum(call[0] == "hold" for call in self.calls)
+
+    def hold(self, bodies: Sequence[int]) -> int:
+        self.calls.append(("hold", *bodies))
+        self.held.append(list(bodies))
+        self.sums, self.moved, self._speeds = (
+            np.append(each, np.zeros((1, 3)), axis=0) for each in (self.sums, self.moved, self._speeds)
+        )
+        return len(self.held) - 1
+
+    def move(self, grip: int, velocity: tuple[float, float, float]) -> None:
+        self.calls.append(("move", grip, *velocity))
+        self._speeds[grip] = velocity
+
+    def release(self) -> None:
+        self.calls.append(("release",))
+        self.held = []
+        self.sums = self.moved = self._speeds = np.zeros((0, 3))
+
+    def step(self, dt: float) -> None:
+        """Go on by dt [s]."""
+        if len(self.moved) == 2:
+            self.moved = self.moved + self._speeds * dt
+            pull = self.stiffness * float(self.moved[1, 2] - self.moved[0, 2])
+            self.sums = self.sums + np.array([[0.0, 0.0, pull], [0.0, 0.0, -pull]])
+
+
 @dataclass
 class LedgerDouble:
     """Energies, exact."""
@@ -223,6 +306,7 @@ class EngineDouble:
     cpu_elsewhere: float = 0.0
     calls: Calls = field(default_factory=list)
     filaments: None = None
+    grips: GripsDouble | None = None
     ledger: LedgerDouble = field(default_factory=LedgerDouble)
 
     def __post_init__(self) -> None:
@@ -274,6 +358,8 @@ class EngineDouble:
         falling = ~carried
         self.boundaries.step(dt)
         self.strings.step(dt)
+        if self.grips is not None:
+            self.grips.step(dt)
         self.time, self.steps = self.time + dt, self.steps + 1
         self._seconds += dt * self.count
         if self.planar:

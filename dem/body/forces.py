@@ -15,7 +15,7 @@ from dem.body.particle import LINKS
 
 Number = TypeVar("Number", int, Numbers)
 
-BOUNDARIES = ("floor", "wall", "lower hook", "upper hook", "channel's lower wall", "channel's upper wall")
+BOUNDARIES = ("floor", "wall", "lower hook", "upper hook", "channel's lower wall", "channel's upper wall", "plate")
 """Names of the rigid boundaries; recorded files hold indices of this tuple."""
 FLOOR, WALL, LOWER_HOOK, UPPER_HOOK, CHANNEL = range(5)  # indices of `BOUNDARIES`; CHANNEL: the first of two walls
 NONE = -1

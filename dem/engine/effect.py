@@ -28,6 +28,8 @@ class EffectName(StrEnum):
     TORQUE_CAP = "torque cap"
     HOOKS = "hooks"
     WALL_REMOVAL = "wall removal"
+    PLATE = "plate"
+    GRIPS = "grips"
     FILAMENTS = "filaments"
     ENERGIES = "energies"
     ENERGY_ACCOUNT = "energy account"

@@ -1,8 +1,8 @@
 """The interface of engines, which compute the physics of a run.
 
 An `Engine` is a running simulation: bodies are added to a container or a plane, and time is advanced. It has the
-parts `boundaries`, `motors`, `strings`, `filaments` and `ledger`. `dem.engine.kinds` lists the engines, with facts that
-are known without a simulation; `tests/double.py` implements the interface in memory.
+parts `boundaries`, `motors`, `strings`, `filaments`, `grips` and `ledger`. `dem.engine.kinds` lists the engines, with
+facts that are known without a simulation; `tests/double.py` implements the interface in memory.
 
 Heights, velocities and forces are in the laboratory frame. Engines sum some forces over all steps: the difference of
 two sums, divided by the number of steps in between, is a mean force that misses no impact.
@@ -46,7 +46,7 @@ class MotorReadings:
 
 
 class Boundaries(Protocol):
-    """Rigid boundaries: floor and wall, hooks, or the walls of a channel."""
+    """Rigid boundaries: floor and wall, hooks and plate, or the walls of a channel."""
 
     # -- where they are ----------------------------------------------------------------------------------------
 
@@ -82,25 +82,48 @@ class Boundaries(Protocol):
     def upper_height(self) -> float:
         """Height of the upper hook's centre [m]; undefined in scenes without hooks."""
 
+    @property
+    def plate_height(self) -> float | None:
+        """Height of the plate's lower face [m]; None while there is no plate."""
+
     # -- how they move -----------------------------------------------------------------------------------------
 
-    def shake(self, *, amplitude: float, frequency: float, walls: bool = True) -> None:
+    def shake(self, *, amplitude: float, frequency: float, walls: bool = True, from_rest: bool = False) -> None:
         """Shake the container from now on, by A sin(2πf t) about its present height, with t = 0 now.
+
+        What a hook or a plate moves by itself is added.
 
         Args:
             amplitude: A [m].
             frequency: f [Hz].
-            walls: whether wall and hooks move with the floor.
+            walls: whether wall, hooks and plate move with the floor.
+            from_rest: by A (1 - cos(2πf t)) instead, upwards from the present height, so that it begins at rest.
 
         Raises:
             RunError: the engine was built without a shaker.
         """
+
+    def stop_shaking(self) -> None:
+        """Stop the shaking at the present heights; what moves by itself goes on."""
 
     def lift_wall(self, speed: float) -> None:
         """Move the wall upwards at a speed [m/s] from now on."""
 
     def raise_upper(self, speed: float) -> None:
         """Move the upper hook upwards at a speed [m/s] from now on."""
+
+    def place_plate(self, height: float) -> None:
+        """Put a horizontal plate, as wide as the container, at a height of its lower face [m]; it is at rest.
+
+        Raises:
+            RunError: the engine has no plates.
+        """
+
+    def move_plate(self, speed: float) -> None:
+        """Move the plate upwards at a speed [m/s] from now on; downwards if it is negative."""
+
+    def remove_plate(self) -> None:
+        """Remove the plate; the elastic energy of its contacts counts as dissipated."""
 
     def stop(self) -> None:
         """Stop all boundaries at their present heights."""
@@ -113,6 +136,10 @@ class Boundaries(Protocol):
     @property
     def hook_sums(self) -> Array:
         """(2, 3) forces on the lower and the upper hook [N], summed over all steps; (0, 3) without hooks."""
+
+    @property
+    def plate_sum(self) -> Array:
+        """(3,) force on the plate [N], summed over all steps."""
 
     @property
     def channel_sums(self) -> Array:
@@ -234,6 +261,43 @@ class Filaments(Protocol):
         """Energies of all filaments at present, and work on them since the start."""
 
 
+class Grips(Protocol):
+    """Grips that hold rigid bodies, which move with their grip and do not turn, while smarticles are welded."""
+
+    def hold(self, bodies: Sequence[int]) -> int:
+        """Hold bodies by a new grip, which is at rest; return its number."""
+
+    def move(self, grip: int, velocity: tuple[float, float, float]) -> None:
+        """Move a grip with a velocity [m/s] from now on."""
+
+    def release(self) -> None:
+        """Let go of all bodies; there are no grips then."""
+
+    @property
+    def made(self) -> int:
+        """Number of grips since the start, with those that have let go."""
+
+    @property
+    def sums(self) -> Array:
+        """(G, 3) forces on the grips with the weight of what they hold [N], summed over all steps since `hold`."""
+
+    @property
+    def weights(self) -> Array:
+        """(G,) weight of what each grip holds [N]."""
+
+    @property
+    def counts(self) -> Numbers:
+        """(G,) number of bodies that each grip holds."""
+
+    @property
+    def moved(self) -> Array:
+        """(G, 3) way of each grip since `hold` [m], without shaking."""
+
+    @property
+    def places(self) -> Array:
+        """(G, 3) means of the centres of mass of what each grip holds [m]."""
+
+
 class EnergyLedger(Protocol):
     """Energy ledger: work and dissipation, summed step by step.
 
@@ -292,6 +356,10 @@ class Engine(Protocol):
     @property
     def filaments(self) -> Filaments | None:
         """Filaments; None where bodies are rigid."""
+
+    @property
+    def grips(self) -> Grips | None:
+        """Grips of rigid bodies; None if the scene has no phase that needs them."""
 
     @property
     def ledger(self) -> EnergyLedger:

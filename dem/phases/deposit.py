@@ -84,9 +84,9 @@ class Deposit(Part, Phase):
                 f"least {least - height:.3g} m or lower layer_height_w"
             )
 
-    def expected_duration(self, count: int) -> float:
+    def expected_duration(self, scene: SceneView) -> float:
         layer = LAYER_SECONDS if self.every_s is None else self.every_s
-        return layer * math.ceil(count / self.per_layer) + SETTLE_SECONDS
+        return layer * math.ceil(scene.count / self.per_layer) + SETTLE_SECONDS
 
     def peak_speed(self, gravity: float) -> float:
         return self.thrown_at_m_per_s

@@ -6,6 +6,7 @@ from pydantic import Field
 
 from dem.phases.actuate import Actuate, InternalOscillation, ShapeChange
 from dem.phases.arrange import Arrange
+from dem.phases.compress import Compress
 from dem.phases.deposit import Deposit
 from dem.phases.lift import Lift, Release
 from dem.phases.pull_hook import PullHook
@@ -14,6 +15,7 @@ from dem.phases.remove_container import RemoveContainer
 from dem.phases.shake import Shake
 from dem.phases.strain import Strain
 from dem.phases.take_over import TakeOver
+from dem.phases.tension import Tension
 from dem.phases.wriggle import Wriggle
 
 AnyPhase = Annotated[
@@ -30,7 +32,9 @@ AnyPhase = Annotated[
     | Strain
     | Wriggle
     | Lift
-    | Release,
+    | Release
+    | Compress
+    | Tension,
     Field(discriminator="type"),
 ]
 KINDS = get_args(get_args(AnyPhase)[0])

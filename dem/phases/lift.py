@@ -1,39 +1,44 @@
-"""Phases that grip parts of filaments, raise them, and release them."""
+"""Phases that grip parts of filaments, or whole rigid bodies, raise them, and let them go."""
 
 import math
+from collections.abc import Iterator, Mapping
 from typing import ClassVar, Literal, Self
 
 import numpy as np
 from pydantic import Field, model_validator
 
-from dem.engine.interface import Engine, Filaments
+from dem.arrays import Array, Flags
+from dem.engine.effect import EffectName
+from dem.engine.interface import Engine, Filaments, Grips
 from dem.phases.phase import Memory, Phase, SceneView, Stage, time_left
 from dem.setting.hooks import TOLERANCE
 from dem.setting.part import Duration, Length, Part, Speed
 
 
 class Lift(Part, Phase):
-    """Grip parts of filaments, raise them at constant speed, and hold them until a `release`.
+    """Grip parts of filaments, or rigid bodies, raise them at constant speed, and hold them until a `release`.
 
-    Active bending goes on. The gripping end piece is not simulated as a body, so that nothing touches it.
+    Of filaments nodes are gripped, and activity goes on. Rigid bodies are gripped as a whole, by their centre of mass,
+    and do not turn; smarticles are welded. The end piece itself touches nothing: it is where nodes or bodies are
+    gripped.
     """
 
-    of_filaments: ClassVar[bool] = True
+    needs_links: ClassVar[str] = "a grip"
     type: Literal["lift"]
     grips: Literal["near", "tails"] = Field(
         "near",
-        description="what is gripped: near, all nodes near the container's axis, as by an end piece; tails, the last "
-        "node of each filament, as at the surface of a liquid",
+        description="what is gripped: near, all nodes or bodies near the container's axis, as by an end piece; tails, "
+        "the last node of each filament, as at the surface of a liquid",
     )
     radius_m: Length | None = Field(
-        None, description="largest distance of gripped nodes from the container's axis [m]; default: any"
+        None, description="largest distance of gripped nodes or bodies from the container's axis [m]; default: any"
     )
     above_m: float | None = Field(
         None,
         ge=0,
         le=1.0,
-        description="least height of gripped nodes above the floor [m]; default: near, the mean height of the centres "
-        "of mass; tails, 0",
+        description="least height of gripped nodes or bodies above the floor [m]; default: near, the mean height of "
+        "the centres of mass; tails, 0",
     )
     distance_m: Length = Field(..., description="how far they are raised [m]")
     speed_m_per_s: Speed = Field(..., description="speed [m/s]")
@@ -52,6 +57,26 @@ class Lift(Part, Phase):
             )
         return self
 
+    def check(self, scene: SceneView, index: int) -> Iterator[str]:
+        if _flexible(scene):
+            return
+        if self.grips == "tails":
+            yield f"phases.{index}.grips: tails are those of filaments; use near for rigid bodies"
+        for later, phase in enumerate(scene.phases[index:], index):
+            if isinstance(phase, Release):
+                return
+            if phase.actuates:
+                yield (
+                    f"phases.{later}: {phase.kind} moves barbs of smarticles that phases.{index} (lift) still grips; "
+                    "add release before"
+                )
+
+    def calls(self, scene: SceneView, index: int) -> Mapping[EffectName, str]:
+        if _flexible(scene):
+            return {}
+        why = f"phase {index} raises one by {1e3 * self.distance_m:.3g} mm at {1e3 * self.speed_m_per_s:.3g} mm/s"
+        return {EffectName.GRIPS: why}
+
     def pushing_speed(self, gravity: float) -> float:
         return self.speed_m_per_s
 
@@ -63,37 +88,48 @@ class Lift(Part, Phase):
         return {"grip": None, "arrival": None, "end": None}
 
     def proceed(self, stage: Stage, engine: Engine) -> float:
-        memory, filaments = stage.memory, engine.filaments
-        assert filaments is not None  # the scene was checked
+        memory = stage.memory
         if memory["end"] is None:
-            held = self._held(engine, filaments)
-            if not held:
-                memory["warning"] = (
-                    f"nothing was gripped: no filament has a node that phases.{stage.index} grips; raise radius_m or "
-                    "lower above_m"
-                )
-            grip = filaments.grip(held)
+            self._grip(memory, stage.index, engine)
             arrival = engine.time + self.distance_m / self.speed_m_per_s
-            memory.update(grip=grip, arrival=arrival, end=engine.time + self.duration_s)
-            filaments.move(grip, (0.0, 0.0, self.speed_m_per_s))
+            memory.update(arrival=arrival, end=engine.time + self.duration_s)
+            _movers(engine).move(memory["grip"], (0.0, 0.0, self.speed_m_per_s))
         if memory["arrival"] is not None:
             if left := time_left(engine, memory["arrival"]):
                 return left
             memory["arrival"] = None
-            filaments.move(memory["grip"], (0.0, 0.0, 0.0))
+            _movers(engine).move(memory["grip"], (0.0, 0.0, 0.0))
         return time_left(engine, memory["end"])
 
-    def _held(self, engine: Engine, filaments: Filaments) -> dict[int, list[int]]:
-        """Return the numbers of the nodes that are gripped, by the number of their filament."""
+    def _grip(self, memory: Memory, index: int, engine: Engine) -> None:
+        """Grip nodes or bodies; warn if there are none."""
+        if engine.filaments is not None:
+            nodes, what = self._nodes(engine, engine.filaments), "filament has a node"
+            memory["grip"], empty = engine.filaments.grip(nodes), not nodes
+        else:
+            assert engine.grips is not None  # the scene calls for them
+            engine.motors.weld()
+            bodies, what = np.flatnonzero(self._near(engine, engine.state().positions)).tolist(), "body is"
+            memory["grip"], empty = engine.grips.hold(bodies), not bodies
+        if empty:
+            memory["warning"] = (
+                f"nothing was gripped: no {what} that phases.{index} grips; raise radius_m or lower above_m"
+            )
+
+    def _near(self, engine: Engine, places: Array) -> Flags:
+        """Return (n,) whether places (n, 3) [m] are near the axis and high enough."""
         floor, state = engine.boundaries.floor, engine.state()
         least = self.above_m
         if least is None:
             least = 0.0 if self.grips == "tails" else float(state.positions[:, 2].mean()) - floor
         radius = math.inf if self.radius_m is None else self.radius_m
+        return (np.hypot(places[:, 0], places[:, 1]) <= radius) & (places[:, 2] - floor >= least)
+
+    def _nodes(self, engine: Engine, filaments: Filaments) -> dict[int, list[int]]:
+        """Return the numbers of the nodes that are gripped, for each filament that has any."""
         found = {}
         for k in range(engine.count):
-            nodes = filaments.points(k)
-            near = (np.hypot(nodes[:, 0], nodes[:, 1]) <= radius) & (nodes[:, 2] - floor >= least)
+            near = self._near(engine, filaments.points(k))
             if self.grips == "tails":
                 near[:-1] = False
             if near.any():
@@ -104,14 +140,27 @@ class Lift(Part, Phase):
 class Release(Part, Phase):
     """Release all nodes that earlier phases grip; takes no simulated time."""
 
-    of_filaments: ClassVar[bool] = True
     type: Literal["release"]
+
+    def check(self, scene: SceneView, index: int) -> Iterator[str]:
+        if not _flexible(scene) and not any(isinstance(phase, Lift) for phase in scene.phases[:index]):
+            yield f"phases.{index}: release, but no phase before grips anything; add lift before, or leave it out"
 
     @property
     def known_duration(self) -> float:
         return 0.0
 
     def proceed(self, stage: Stage, engine: Engine) -> float:
-        assert engine.filaments is not None  # the scene was checked
-        engine.filaments.release()
+        _movers(engine).release()
         return 0.0
+
+
+def _flexible(scene: SceneView) -> bool:
+    return scene.mixture is not None and scene.mixture.flexible
+
+
+def _movers(engine: Engine) -> Filaments | Grips:
+    """Return what moves and releases grips: of filaments, or of rigid bodies."""
+    found = engine.filaments or engine.grips
+    assert found is not None  # the scene was checked
+    return found

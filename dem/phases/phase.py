@@ -21,6 +21,7 @@ from dem.errors import RunError
 from dem.setting.container import Container
 from dem.setting.part import Duration, Part, Speed
 from dem.setting.plane import Plane
+from dem.setting.vibration import Vibration
 
 CHECK_INTERVAL = 0.01  # s between checks whether a layer has come down, a pile has settled, or a force is too large
 SETTLE_SECONDS = 0.35  # s, typical time in which a poured pile settles
@@ -44,7 +45,27 @@ class Stage:
         return self.phase.prepare(self.scene, self.index)
 
     def proceed(self, engine: Engine) -> float:
-        return self.phase.proceed(self, engine)
+        """Do what is due in the phase and its vibration; return the time until the next call [s], 0 at the end."""
+        wait = self.phase.proceed(self, engine)
+        vibration = self.phase.vibrated_by
+        return wait if vibration is None else self._vibrate(vibration, engine, wait)
+
+    def _vibrate(self, vibration: Vibration, engine: Engine, wait: float) -> float:
+        """Switch the vibration as is due; return the time until the next call [s], `wait` at most."""
+        begun = float(self.memory.setdefault("vibration_begun", engine.time))
+        # Half a step early, as all that is due at a time.
+        on, until = vibration.next_switch(engine.time - begun + engine.time_step / 2)
+        on = on and wait > 0
+        if on != self.memory.get("vibrates", False):
+            self.memory["vibrates"] = on
+            if on:
+                amplitude = vibration.amplitude(self.scene.gravity_m_per_s2)
+                engine.boundaries.shake(
+                    amplitude=amplitude, frequency=vibration.frequency_hz, walls=vibration.moves == "container"
+                )
+            else:
+                engine.boundaries.stop_shaking()
+        return min(wait, max(engine.time_step, begun + until - engine.time))
 
 
 class Phase:
@@ -60,6 +81,7 @@ class Phase:
     """Whether nothing drives the smarticles; φ_0 and φ_f are measured before and after phases that drive them."""
     pours: ClassVar[bool] = False  #: Whether the phase pours bodies
     frees: ClassVar[bool] = False  #: Whether the phase takes the container away
+    needs_links: ClassVar[str] = ""  #: What of the phase only the engine links computes, in words; "": nothing
     planar: ClassVar[bool | None] = False
     """Whether the phase is possible in a plane only (True), in a container only (False), or in both (None)."""
 
@@ -67,6 +89,11 @@ class Phase:
     def kind(self) -> str:
         """The phase's `type` in a scene file."""
         return str(getattr(self, "type"))  # noqa: B009 - a field of the part that this is mixed into
+
+    @property
+    def vibrated_by(self) -> Vibration | None:
+        """Vibration of the container while the phase does something else; None without it."""
+        return getattr(self, "vibration", None)
 
     def check(self, scene: SceneView, index: int) -> Iterator[str]:
         """Yield the errors of this phase, `scene.phases[index]`, one line each: key, value and what to do.
@@ -92,9 +119,14 @@ class Phase:
         """Simulated time that the phase takes [s]; None where a criterion ends it."""
         return getattr(self, "duration_s", None)
 
-    def expected_duration(self, count: int) -> float:
-        """Return the simulated time of the phase [s], estimated from `count` bodies if a criterion ends it."""
+    def expected_duration(self, scene: SceneView) -> float:
+        """Return the simulated time of the phase [s]; an estimate if a criterion ends the phase."""
         return self.known_duration or 0.0
+
+    @property
+    def peak_acceleration(self) -> float:
+        """Greatest peak acceleration Γ of the container, in units of gravity [1]; 0 at rest."""
+        return 0.0 if self.vibrated_by is None else self.vibrated_by.peak_acceleration_g
 
     speed_key: ClassVar[str] = "speed_m_per_s"  #: Key of the phase to which `pushing_speed` is proportional
 
@@ -112,7 +144,8 @@ class Phase:
         Args:
             gravity: acceleration of gravity [m/s²].
         """
-        return self.pushing_speed(gravity)
+        shaken = 0.0 if self.vibrated_by is None else self.vibrated_by.peak_speed(gravity)
+        return self.pushing_speed(gravity) + shaken
 
     @property
     def raises(self) -> float:
@@ -127,6 +160,19 @@ class Phase:
     def calls(self, scene: SceneView, index: int) -> Mapping[EffectName, str]:
         """Return the effects that the phase needs: the reason in words, by the name of the effect."""
         return {}
+
+    def vibrating(self, scene: SceneView, index: int) -> Mapping[EffectName, str]:
+        """Return the effect of the vibration with its reason, for `calls`; nothing without vibration."""
+        if self.vibrated_by is None:
+            return {}
+        return {EffectName.CONTAINER_MOTION: f"phase {index}: {self.vibrated_by.to_text(scene.gravity_m_per_s2)}"}
+
+    def whole_periods(self, interval: float) -> float:
+        """Return an interval [s], with vibration rounded to whole periods, over which inertia has no mean force."""
+        if self.vibrated_by is None:
+            return interval
+        frequency = self.vibrated_by.frequency_hz
+        return max(1, round(interval * frequency)) / frequency
 
     def begin(self, scene: SceneView, index: int) -> Stage:
         """Return the stage of the phase at its beginning."""

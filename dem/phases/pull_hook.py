@@ -10,6 +10,7 @@ from dem.engine.interface import Engine
 from dem.phases.phase import CHECK_INTERVAL, Memory, Phase, SceneView, Stage, time_left
 from dem.setting.hooks import TOLERANCE, Hooks, with_defaults
 from dem.setting.part import Duration, Force, Length, Part, Speed
+from dem.setting.vibration import Vibration
 
 HELD_SECONDS = 0.1  # s, time for which the force is measured on a hook that the force limit has stopped
 
@@ -30,6 +31,8 @@ class PullHook(Part, Phase):
         description="force on the raised hook, averaged over 0.01 s, at which it stops [N]; the phase ends 0.1 s "
         "later; null: no limit. The force is unbounded when a rigid smarticle holds both hooks",
     )
+
+    vibration: Vibration | None = Field(None, description="vibration of the container meanwhile; null: none")
 
     @model_validator(mode="after")
     def _arrives(self) -> Self:
@@ -82,7 +85,8 @@ class PullHook(Part, Phase):
         until = "" if self.force_limit_N is None else f", or until it takes {self.force_limit_N:.3g} N"
         return {
             EffectName.HOOKS: f"phase {index} raises the upper one by {1e3 * self.distance_m:.3g} mm at "
-            f"{1e3 * self.speed_m_per_s:.3g} mm/s{until}"
+            f"{1e3 * self.speed_m_per_s:.3g} mm/s{until}",
+            **self.vibrating(scene, index),
         }
 
     def first_memory(self, scene: SceneView) -> Memory:
@@ -105,10 +109,13 @@ class PullHook(Part, Phase):
             if limit is not None and force_sum - memory["force_sum"] > limit * (memory["step"] - step):
                 memory.update(arrival=engine.time, end=engine.time + HELD_SECONDS)
         if memory["raising"] and (left := time_left(engine, memory["arrival"])):
-            return left if self.force_limit_N is None else min(CHECK_INTERVAL, left)
+            return left if self.force_limit_N is None else min(self.whole_periods(CHECK_INTERVAL), left)
         if memory["raising"]:
             memory["raising"] = False
-            engine.boundaries.stop()
+            if self.vibration is None:
+                engine.boundaries.stop()
+            else:
+                engine.boundaries.raise_upper(0.0)
         left = time_left(engine, memory["end"])
         if not left and memory.get("felt") == _force_sum(engine):
             memory["warning"] = (

@@ -204,7 +204,7 @@ class TakeOver(Part, Phase):
             "m/s), and velocities are not taken over; use a frame at the end of a relax phase",
         )
 
-    def expected_duration(self, count: int) -> float:
+    def expected_duration(self, scene: SceneView) -> float:
         # Nothing falls: the pile settles in little more than `hold_s`.
         return self.settle.hold_s + TAKEN_SECONDS
 

@@ -18,6 +18,8 @@ ADDS: Mapping[EffectName, Adds] = {
     EffectName.STRINGS: Adds(series=tuple(columns.STRAIN_COLUMNS)),
     EffectName.MOTORS: Adds(series=tuple(columns.MOTOR_COLUMNS), arrays=tuple(columns.MOTOR_FIELDS)),
     EffectName.HOOKS: Adds(series=tuple(columns.HOOK_COLUMNS)),
+    EffectName.PLATE: Adds(series=tuple(columns.PLATE_COLUMNS), python="reads its force every 10 ms or more often"),
+    EffectName.GRIPS: Adds(series=tuple(columns.GRIP_COLUMNS)),
     EffectName.WALL_REMOVAL: Adds(
         series=tuple(columns.RELEASE_COLUMNS), python="checks the pile's top every 10 ms while the wall is lifted"
     ),
@@ -115,6 +117,8 @@ def _reasons(scene: Scene) -> Mapping[EffectName, tuple[bool, str]]:
         **_motors(scene, by_phases.get(EffectName.ARTICULATION, [])),
         EffectName.HOOKS: _hooks(scene, ", ".join(by_phases.get(EffectName.HOOKS, []))),
         EffectName.WALL_REMOVAL: phases(EffectName.WALL_REMOVAL, "no phase of type remove-container"),
+        EffectName.PLATE: phases(EffectName.PLATE, "no phase of type compress"),
+        EffectName.GRIPS: phases(EffectName.GRIPS, "no phase of type tension"),
         EffectName.FILAMENTS: _filaments(scene),
         EffectName.ENERGIES: (recording.energies, energies),
         EffectName.ENERGY_ACCOUNT: every("dissipation_interval_s", "dissipation is sampled"),

@@ -158,7 +158,7 @@ def planned_phases(scene: Scene) -> tuple[PlannedPhase, ...]:
     """Return the phases of a scene with their time steps and expected wall times."""
     kind, phases = engine_kind(scene.engine), []
     for index, (phase, dt) in enumerate(zip(scene.phases, time_steps(scene), strict=True)):
-        estimate = phase.expected_duration(scene.count)
+        estimate = phase.expected_duration(scene)
         wall = kind.seconds_per_second(scene, dt, scene.activity(index)) * estimate
         phases.append(PlannedPhase(index, phase.kind, phase.known_duration, estimate, wall, dt))
     return tuple(phases)
@@ -238,7 +238,7 @@ def engine_warnings(scene: Scene) -> tuple[str, ...]:
 def recording_warnings(scene: Scene) -> tuple[str, ...]:
     """Return warnings about intervals of recording that are longer than the run, one line each."""
     known = all(phase.known_duration is not None for phase in scene.phases)
-    length = sum(phase.expected_duration(scene.count) for phase in scene.phases)
+    length = sum(phase.expected_duration(scene) for phase in scene.phases)
     run = f"the whole run, {'' if known else 'about '}{length:.3g} s"
     intervals = {key: getattr(scene.recording, key) for key in _LEFT_OUT}
     return tuple(

@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Sequence
+from typing import Any
 
 from dem.engine.kinds import engine_kind
 from dem.errors import InputError
@@ -105,14 +106,18 @@ def _check_speeds(scene: Scene, steps: Sequence[float]) -> None:
     """
     diameter = scene.sphere_diameter
     for index, (phase, step) in enumerate(zip(scene.phases, steps, strict=True)):
-        most = MOST_PER_STEP * diameter / step
-        speed = phase.pushing_speed(scene.gravity_m_per_s2)
-        if speed > most:
-            key, unit = phase.speed_key, unit_of(phase.speed_key)[1]
-            value = getattr(phase, key)
+        most, gravity, vibration = MOST_PER_STEP * diameter / step, scene.gravity_m_per_s2, phase.vibrated_by
+        moving: list[tuple[str, float, Any]] = [(phase.speed_key, phase.pushing_speed(gravity), phase)]
+        if vibration is not None:
+            moving.append(("peak_acceleration_g", vibration.peak_speed(gravity), vibration))
+        for key, speed, part in moving:
+            if speed <= most:
+                continue
+            unit, value = unit_of(key)[1], getattr(part, key)
+            where = key if part is phase else f"vibration.{key}"
             # Half a percent less, so that the three digits are not above it.
             raise InputError(
-                f"phases.{index}.{key}: {value:g} {unit} ({phase.kind}) is {speed * step / diameter:.3g} sphere "
+                f"phases.{index}.{where}: {value:g} {unit} ({phase.kind}) is {speed * step / diameter:.3g} sphere "
                 f"diameters in a time step of {step:.3g} s, which contacts cannot follow; use at most "
                 f"{0.995 * value * most / speed:.3g} {unit} or a shorter fidelity.time_step_s"
             )

@@ -88,6 +88,22 @@ HOOK_COLUMNS = _columns(
     ),
     hook_upper_z_m=("upper hook z", "height of the upper hook's centre"),
 )
+# In scenes that compress the pile. Forces are means since the sample before.
+PLATE_COLUMNS = _columns(
+    plate_force_N="force of the smarticles on the plate (x, y, z), mean since the sample before",
+    plate_z_m="height of the plate's lower face; NaN while there is no plate",
+)
+# In scenes with grips of rigid bodies.
+GRIP_COLUMNS = _columns(
+    grip_fixed_force_N="force of other smarticles, floor and wall on what the grip that rests holds (x, y, z), "
+    "mean since the sample before; NaN while nothing is gripped",
+    grip_moved_force_N="force of other smarticles, floor and wall on what the grip that moves holds (x, y, z), "
+    "mean since the sample before; NaN while nothing is gripped",
+    elongation_m="way of the grip that moves, against the one that rests; NaN while nothing is gripped",
+    grip_distance_m="distance between the means of the centres of mass of what both grips hold; NaN without two grips",
+    grip_fixed_count="smarticles that the grip that rests holds",
+    grip_moved_count="smarticles that the grip that moves holds",
+)
 # In scenes that take the container away.
 RELEASE_COLUMNS = _columns(
     whole_names=True,
@@ -117,7 +133,7 @@ FILAMENT_COLUMNS = _columns(
 )
 EVERY: Columns = {
     **{**COLUMNS, **MOTOR_COLUMNS, **ENERGY_COLUMNS, **LEDGER_COLUMNS},
-    **{**HOOK_COLUMNS, **RELEASE_COLUMNS, **STRAIN_COLUMNS, **FILAMENT_COLUMNS},
+    **{**HOOK_COLUMNS, **PLATE_COLUMNS, **GRIP_COLUMNS, **RELEASE_COLUMNS, **STRAIN_COLUMNS, **FILAMENT_COLUMNS},
 }
 """Columns of all scenes together."""
 
@@ -143,7 +159,8 @@ FORCE_FIELDS = _columns(
     first_link="link on which the force acts: 0 barb 1, 1 middle link, 2 barb 2",
     second_smarticle=("second", "number of the smarticle that exerts the force, the higher one; -1 for a boundary"),
     second_link="link that exerts the force: 0 barb 1, 1 middle link, 2 barb 2; -1 for a boundary",
-    fixture="boundary that exerts the force: 0 floor, 1 wall, 2 lower hook, 3 upper hook, 4 and 5 the channel's walls; "
+    fixture="boundary that exerts the force: 0 floor, 1 wall, 2 lower hook, 3 upper hook, 4 and 5 the channel's walls, "
+    "6 plate; "
     "-1 between smarticles",
     normal_force_N="sum of the normal forces at the points of contact, above 0",
     tangential_force_N="magnitude of the sum of the tangential forces at the points of contact",

@@ -11,10 +11,12 @@ from dem.arrays import Array
 from dem.body.chain import extent
 from dem.body.state import PileState
 from dem.engine.effect import EffectName
-from dem.engine.interface import Engine, Filaments
+from dem.engine.interface import Engine, Filaments, Grips
 from dem.plan.effects import ADDS
-from dem.record.columns import COLUMNS, EVERY, STRAIN_COLUMNS, Columns
+from dem.record.columns import COLUMNS, EVERY, GRIP_COLUMNS, STRAIN_COLUMNS, Columns
 from dem.record.packing import packing_fraction
+
+KEPT = ("before", "hooks", "plate", "grips", "grips_made", "strain")  # keys of `Sampler.memory`
 
 
 @dataclass
@@ -23,9 +25,9 @@ class Sampler:
 
     radius: float  #: Radius for packing fractions [m]; NaN: packing fractions have no meaning
     effects: Set[EffectName] = frozenset()  #: Effects of the scene
-    memory: dict[str, Any] = field(default_factory=lambda: dict.fromkeys(("before", "hooks", "strain")))
-    """Plain data of the previous sample. `before`: time [s], impulse of gravity [N s], momentum [kg m/s]; `hooks` and
-    `strain`: number of steps, and forces summed over steps [N]."""
+    memory: dict[str, Any] = field(default_factory=lambda: dict.fromkeys(KEPT))
+    """Plain data of the previous sample. `before`: time [s], impulse of gravity [N s], momentum [kg m/s]; `hooks`,
+    `plate`, `grips` and `strain`: number of steps, and forces summed over steps [N]; `grips_made`: number of grips."""
 
     @property
     def described(self) -> Columns:
@@ -48,6 +50,16 @@ class Sampler:
                 "hook_lower_force_N": lower,
                 "hook_upper_z_m": engine.boundaries.upper_height,
             }
+        if EffectName.PLATE in self.effects:
+            (force,) = self._mean_since("plate", engine.steps, engine.boundaries.plate_sum[None])
+            container_force -= force
+            height = engine.boundaries.plate_height
+            extra |= {"plate_force_N": force, "plate_z_m": math.nan if height is None else height}
+        if EffectName.GRIPS in self.effects:
+            extra |= self._grip_row(engine)
+            # The momentum balance includes the grips, with the weight of what they hold.
+            pulls = extra["grip_fixed_force_N"] + extra["grip_moved_force_N"]
+            container_force -= np.nan_to_num(pulls - [0.0, 0.0, _held_weight(engine.grips)])
         if EffectName.WALL_REMOVAL in self.effects:
             outside = np.hypot(state.positions[:, 0], state.positions[:, 1]) > engine.cylinder.radius
             extra["outside_count"] = np.count_nonzero(outside)
@@ -108,6 +120,25 @@ class Sampler:
             return np.full_like(sums, math.nan)
         return np.asarray((sums - np.array(previous[1])) / (steps - previous[0]))
 
+    def _grip_row(self, engine: Engine) -> dict[str, Any]:
+        grips, none = engine.grips, np.full(3, math.nan)
+        row: dict[str, Any] = dict.fromkeys(GRIP_COLUMNS, math.nan)
+        row |= {"grip_fixed_force_N": none, "grip_moved_force_N": none, "grip_fixed_count": 0, "grip_moved_count": 0}
+        if grips is None or not len(grips.counts):
+            self.memory["grips"] = None
+            return row
+        if self.memory["grips_made"] != grips.made:  # sums begin anew
+            self.memory.update(grips=None, grips_made=grips.made)
+        # The last grip moves; the one before it rests, if there is one.
+        moved, up = grips.moved, np.array([0.0, 0.0, 1.0])
+        forces = self._mean_since("grips", engine.steps, grips.sums) + grips.weights[:, None] * up
+        row |= {"grip_moved_force_N": forces[-1], "grip_moved_count": grips.counts[-1]}
+        if len(forces) == 1:
+            return row | {"grip_fixed_force_N": np.zeros(3), "elongation_m": np.linalg.norm(moved[0])}
+        row |= {"grip_fixed_force_N": forces[-2], "grip_fixed_count": grips.counts[-2]}
+        row["elongation_m"] = np.linalg.norm(moved[-1] - moved[-2])
+        return row | {"grip_distance_m": np.linalg.norm(np.subtract(*grips.places[-2:]))}
+
     def _strain_row(self, engine: Engine, state: PileState) -> dict[str, Any]:
         strings, none = engine.strings, np.full(3, math.nan)
         row: dict[str, Any] = dict.fromkeys(STRAIN_COLUMNS, math.nan)
@@ -124,6 +155,11 @@ class Sampler:
         row["chain_length_m"] = float(np.ptp(strings.ties[:, 0]))
         means = self._mean_since("strain", engine.steps, sums)
         return row | dict(zip(list(STRAIN_COLUMNS)[:4], means, strict=True))
+
+
+def _held_weight(grips: Grips | None) -> float:
+    """Return the weight of all that grips hold [N]."""
+    return 0.0 if grips is None else float(grips.weights.sum())
 
 
 def _motor_row(engine: Engine, state: PileState) -> dict[str, Any]:

@@ -26,6 +26,19 @@ ADDED_KEYS: Mapping[str, Mapping[str, Any]] = MappingProxyType(
     {"shake": {"moves": "container"}, "deposit": {"every_s": None, "thrown_at_m_per_s": 0.0}}
 )
 """Keys of phases that were added to version 1 of the format, by type of phase, with their defaults."""
+NEWER_KEYS: Mapping[str, Mapping[str, Any]] = MappingProxyType(
+    {
+        "shake": {
+            "frequency_end_hz": None,
+            "peak_acceleration_end_g": None,
+            "ramp": "linear",
+            "taps": None,
+            "rest_s": 0.5,
+        },
+        "pull-hook": {"vibration": None},
+    }
+)
+"""Further ones, which no protocol fills in."""
 
 
 def parse_scene(data: Any, *, source: str, folder: Path | None = None) -> Scene:
@@ -142,6 +155,7 @@ def _plain(scene: Scene) -> dict[str, Any]:
     if scene.protocol is None:
         optional += [(data, {"protocol": None}), (data["container"], {"packing_radius_m": None})]
         optional += [(phase, ADDED_KEYS.get(phase["type"], {})) for phase in data["phases"]]
+    optional += [(phase, NEWER_KEYS.get(phase["type"], {})) for phase in data["phases"]]
     for part, defaults in optional:
         for key, default in defaults.items():
             if part[key] == default:

@@ -6,8 +6,9 @@ from collections.abc import Iterator
 import numpy as np
 
 from dem.phases.kinds import KINDS
-from dem.phases.phase import SceneView
+from dem.phases.phase import Phase, SceneView
 from dem.phases.remove_container import RemoveContainer
+from dem.phases.shake import check_shaking
 from dem.setting.hooks import TOLERANCE, Hooks
 from dem.setting.motor import Motor
 from dem.setting.smarticle import Smarticle
@@ -33,7 +34,11 @@ def problems(scene: SceneView, engine: str) -> Iterator[str]:
             f"{scene.motor.law} on engine: {engine}; use engine: links or law: servo, or leave it out"
         )
     for index, phase in enumerate(scene.phases):
+        if engine != "links" and (what := beyond(phase)):
+            yield f"phases.{index} ({phase.kind}): {what}: only engine: links computes that; use it, or leave it out"
         yield from phase.check(scene, index)
+        if phase.vibrated_by is not None:
+            yield from check_shaking(scene, f"phases.{index}.vibration", phase.vibrated_by)
     if scene.hooks is not None:
         yield from _of_bars(scene.hooks)
         yield from _of_room(scene, scene.hooks)
@@ -258,6 +263,13 @@ def foreign(scene: SceneView) -> Iterator[str]:
             yield f"phases.{index}.speed_m_per_s: a wall that is lifted (use null, gone at once)"
         elif phase.actuates:
             yield f"phases.{index} ({phase.kind}): motors"
+        elif what := beyond(phase):
+            yield f"phases.{index} ({phase.kind}): {what}"
+
+
+def beyond(phase: Phase) -> str:
+    """Return what of a phase only the engine links computes, in words; "" if every engine computes it."""
+    return phase.needs_links or ("vibration" if phase.vibrated_by is not None else "")
 
 
 def _of_lammps(scene: SceneView) -> Iterator[str]:

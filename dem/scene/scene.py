@@ -348,7 +348,7 @@ class Scene(Part):
     @property
     def activities(self) -> frozenset[Activity]:
         """Activities of all phases that take simulated time."""
-        durations = [phase.expected_duration(self.count) for phase in self.phases]
+        durations = [phase.expected_duration(self) for phase in self.phases]
         return frozenset(self.activity(index) for index, duration in enumerate(durations) if duration > 0)
 
     @cached_property

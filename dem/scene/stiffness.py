@@ -1,11 +1,12 @@
 """Estimate the overlaps in a scene from its loads and speeds, and the stiffness that it needs.
 
-Three loads are estimated:
+Four loads are estimated:
 
 - the hardest impact: of the typical effective mass, at the greatest speed that a phase or a motor causes plus the speed
   of a fall from the height w;
 - the pile's weight times 1 + Γ, shared by two contacts of each smarticle that can lie on the floor;
-- the pile's weight on the four contacts of a hook that lifts it.
+- the pile's weight on the four contacts of a hook that lifts it;
+- the greatest force of a plate, shared by two contacts of each smarticle that can lie on the floor.
 
 The overlap of an impact is inversely proportional to the root of the stiffness, other overlaps to the stiffness itself.
 """
@@ -14,9 +15,9 @@ import math
 from typing import NamedTuple
 
 from dem.body.particle import mean_width
+from dem.phases.compress import Compress
 from dem.phases.phase import SceneView
 from dem.phases.pull_hook import PullHook
-from dem.phases.shake import Shake
 from dem.physics.contact import typical_effective_mass
 
 # Overlaps over a link's mean width that `stiffness_for` aims at. The named stiffnesses have these overlaps in the
@@ -43,12 +44,15 @@ def expected_overlaps(scene: SceneView) -> tuple[Overlap, ...]:
     speed = math.sqrt(max(speeds) ** 2 + 2 * gravity * width)
     mass = max(map(typical_effective_mass, scene.bodies))
     impact = speed * math.sqrt(mass / stiffness) / thickness
-    shaken = max((phase.peak_acceleration_g for phase in scene.phases if isinstance(phase, Shake)), default=0.0)
+    shaken = max(phase.peak_acceleration for phase in scene.phases)
     pile = scene.count * model.mass * gravity
     lying = max(1.0, min(scene.count, math.pi * scene.cylinder.radius**2 / width**2))
     loads = {"the pile's weight": pile * (1 + shaken) / (2 * lying)}
     if any(isinstance(phase, PullHook) for phase in scene.phases):
         loads["a hook that lifts the pile"] = pile / 4
+    plates = [phase.load(scene) for phase in scene.phases if isinstance(phase, Compress)]
+    if any(plates):
+        loads["a plate that compresses the pile"] = max(plates) / (2 * lying)
     wanted = WANTED[scene.fidelity.base]
     found = [Overlap(f"an impact at {speed:.2g} m/s", impact, (impact / wanted) ** 2 * stiffness)]
     found += [Overlap(name, load / stiffness / thickness, load / thickness / wanted) for name, load in loads.items()]

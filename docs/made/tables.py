@@ -21,6 +21,8 @@ _SETS = (
     ("With `recording.energy`", "ENERGY_COLUMNS"),
     ("With `recording.dissipation_interval_s`", "LEDGER_COLUMNS"),
     ("In scenes with hooks", "HOOK_COLUMNS"),
+    ("In scenes with a phase `compress`", "PLATE_COLUMNS"),
+    ("In scenes with grips of rigid bodies", "GRIP_COLUMNS"),
     ("In scenes that take the container away", "RELEASE_COLUMNS"),
     ("In scenes that strain a chain", "STRAIN_COLUMNS"),
     ("In scenes of filaments", "FILAMENT_COLUMNS"),

@@ -138,10 +138,15 @@ def held_fast(pull: HookPull, asked: SceneData) -> bool:
 
     The peak force is then a lower bound. `asked` is the scene's entry for this phase.
     """
+    return held_fast_of(pull.raised, asked)
+
+
+def held_fast_of(ways: Floats, asked: SceneData) -> bool:
+    """Return whether a force limit stopped what has moved by `ways` (n,) [m] in a finished phase, see `held_fast`."""
     if asked.get("force_limit_N") is None:
-        return False  # nothing else stops a hook
-    # The last sample may be one interval before the hook's arrival.
-    last = pull.raised[-1] + np.diff(pull.raised).max()
+        return False  # nothing else stops it
+    # The last sample may be one interval before the arrival.
+    last = ways[-1] + np.diff(ways).max()
     return bool(last < 0.99 * asked["distance_m"])
 
 

@@ -70,6 +70,18 @@ def hang(data: dict[str, Any], *, settle: float, pull: float) -> dict[str, Any]:
     }
 
 
+def tap_and_sweep(data: dict[str, Any], *, index: int) -> dict[str, Any]:
+    """Heights of the floor in every step of a phase, without bodies, and of the hooks at its end."""
+    scene = scene_of(data)
+    engine = cases.build(scene, cylinder=scene.cylinder, shaken=True)
+    stage, heights = scene.phases[index].begin(scene, index), [0.0]
+    while wait := stage.proceed(engine):
+        for _ in range(max(1, round(wait / engine.time_step))):
+            engine.advance(1)
+            heights.append(engine.boundaries.floor)
+    return {"heights": np.array(heights), "time_step": engine.time_step}
+
+
 def remove(data: dict[str, Any], *, count: int, settle: float, watch: float) -> dict[str, Any]:
     """A pile at rest whose wall goes away at once: contacts and energies before, right after, and while it spreads."""
     scene = scene_of(data)

@@ -28,6 +28,23 @@ def test_a_hook_reads_the_weight_that_hangs_on_it(simulate: Simulate, scene_data
     assert hung["carried"] == pytest.approx(hung["expected"], rel=5e-3)
 
 
+def test_taps_and_cycles_of_a_sweep_end_where_they_began(simulate: Simulate, scene_data: SceneData) -> None:
+    shake = {"type": "shake", "frequency_hz": 50, "peak_acceleration_g": 2}
+    taps = {**shake, "taps": 2, "rest_s": 0.01}
+    swept = {**shake, "duration_s": 0.2, "frequency_end_hz": 100}
+    data = scene_data({"phases": [{"type": "deposit"}, taps, swept]})
+    tapped = simulate(boundary_cases.tap_and_sweep, data, index=1)
+    amplitude, dt = 2 * 9.81 / (2 * np.pi * 50) ** 2, tapped["time_step"]
+    assert tapped["heights"].max() == pytest.approx(2 * amplitude, rel=1e-3)
+    assert tapped["heights"].min() > -1e-9
+    assert np.abs(np.diff(tapped["heights"])).max() / dt == pytest.approx(2 * 9.81 / (2 * np.pi * 50), rel=1e-3)
+    assert abs(tapped["heights"][-1]) < 1e-8
+    heights = simulate(boundary_cases.tap_and_sweep, data, index=2)["heights"]
+    begins = np.flatnonzero((heights[:-1] <= 1e-9) & (heights[1:] > 1e-9)) * dt
+    np.testing.assert_allclose(50 * begins + 250 * begins**2 / 2, np.arange(15), atol=0.01)
+    assert abs(heights[-1]) < 1e-7
+
+
 def test_the_pull_does_the_work_of_its_force(simulate: Simulate, scene_data: SceneData, tmp_path: Path) -> None:
     data = scene_data(
         {

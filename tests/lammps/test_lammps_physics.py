@@ -66,6 +66,25 @@ def test_the_floor_carries_what_lies_on_it(build: Build) -> None:
     assert not math.isnan(engine.ledger.given)
 
 
+def test_a_tap_begins_and_ends_at_rest_and_carries_what_lies_on_the_floor(build: Build) -> None:
+    engine = build(small({"container": {"radius_m": 0.0105}}))
+    put(engine, (0, 0, engine.particle.radius))
+    engine.advance(200)
+    rested, steps = engine.state().positions[0, 2], round(1 / 30 / engine.time_step)
+    frequency = 1 / (steps * engine.time_step)
+    engine.boundaries.shake(amplitude=1e-4, frequency=frequency, from_rest=True)
+    assert engine.boundaries.floor == pytest.approx(0.0, abs=1e-15)
+    for part in range(1, 5):
+        engine.advance(steps * part // 4 - steps * (part - 1) // 4)
+        turn = 2 * math.pi * (steps * part // 4) / steps
+        assert engine.boundaries.floor == pytest.approx(1e-4 * (1 - math.cos(turn)), abs=1e-12)
+        assert engine.state().positions[0, 2] - rested == pytest.approx(engine.boundaries.floor, abs=3e-6)
+    engine.boundaries.stop_shaking()
+    assert engine.boundaries.floor == pytest.approx(0.0, abs=1e-12)
+    engine.advance(100)
+    assert engine.state().positions[0, 2] == pytest.approx(rested, abs=1e-7)
+
+
 def test_the_wall_holds_until_it_is_taken_away(build: Build) -> None:
     engine = build(small({"container": {"radius_m": 0.0105}}), gravity=0.0)
     put(engine, (0, 0, 0.01), turns=(Rotation.from_rotvec([0.2, 0.1, 0]),), speed=0.1)

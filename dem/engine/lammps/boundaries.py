@@ -28,11 +28,12 @@ class LammpsBoundaries:
     clock: Callable[[], tuple[int, float]]  #: Returns the number of steps made, and the time step [s]
     walled: bool = True
     _omega: float = 0.0  # ω [rad/s]
-    _begun: int = 0  # step at which the shaking began
+    _begun: float = 0  # step at which the sine is at its middle, the first one of the shaking or a quarter later
     _parts: dict[str, Part] = field(default_factory=lambda: {"floor": Part(), "wall": Part()})
 
     upper_height = math.nan
     hook_sums = channel_sums = np.zeros((0, 3))
+    plate_height, plate_sum = None, np.zeros(3)
 
     def _phase(self) -> float:
         steps, dt = self.clock()
@@ -72,11 +73,14 @@ class LammpsBoundaries:
     def raised(self) -> float | None:
         return 0.0 if self.enclosed else None
 
-    def shake(self, *, amplitude: float, frequency: float, walls: bool = True) -> None:
+    def shake(self, *, amplitude: float, frequency: float, walls: bool = True, from_rest: bool = False) -> None:
         self._hold()
         self._begun, self._omega = self.clock()[0], 2 * math.pi * frequency
+        if from_rest:  # a quarter of a period later, and from the lowest point
+            self._begun += 0.25 / (frequency * self.clock()[1])
         for name in ("floor", "wall") if walls and self.walled else ("floor",):
             self._parts[name].amplitude = amplitude
+            self._parts[name].base += amplitude if from_rest else 0.0
         self.send(self.variables())
 
     def stop(self) -> None:
@@ -88,11 +92,23 @@ class LammpsBoundaries:
             part.base, part.amplitude = self._height(name), 0.0
         self._omega = 0.0
 
+    def stop_shaking(self) -> None:
+        self.stop()
+
     def lift_wall(self, speed: float) -> None:
         raise RunError("engine: lammps cannot lift the wall")
 
     def raise_upper(self, speed: float) -> None:
         raise RunError("engine: lammps has no hooks")
+
+    def place_plate(self, height: float) -> None:
+        raise RunError("engine: lammps has no plates")
+
+    def move_plate(self, speed: float) -> None:
+        """Do nothing without a plate."""
+
+    def remove_plate(self) -> None:
+        """Do nothing without a plate."""
 
     def remove_wall(self) -> None:
         self.walled = False
@@ -101,7 +117,7 @@ class LammpsBoundaries:
     def variables(self) -> Iterator[str]:
         """Yield the commands that set the variables for the heights of floor and wall."""
         yield f"variable omega equal {self._omega:.17g}"
-        yield f"variable begun equal {self._begun}"
+        yield f"variable begun equal {self._begun!r}"
         for name, part in self._parts.items():
             yield f"variable {name}_base equal {part.base:.17g}"
             yield f"variable {name}_amplitude equal {part.amplitude:.17g}"

@@ -136,7 +136,7 @@ class LammpsEngine:
         self._thrown = 0.0
         self._contacts: Contacts | None = None
         self.boundaries: LammpsBoundaries = LammpsBoundaries(cylinder, self._send, lambda: (self.steps, self.time_step))
-        self.motors, self.strings, self.filaments = NoMotors(), NoStrings(), None
+        self.motors, self.strings, self.filaments, self.grips = NoMotors(), NoStrings(), None, None
         self.ledger: LammpsLedger = LammpsLedger(
             lambda: self.boundaries.moving, lambda: self.contacts.elastic_energy(law)
         )

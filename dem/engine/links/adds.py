@@ -21,6 +21,8 @@ ADDS: Mapping[EffectName, Adds] = {
     EffectName.MOTORS: Adds(python="one control update of all motors per control period"),
     EffectName.HOOKS: Adds(shapes=("square bars",)),
     EffectName.WALL_REMOVAL: Adds(python="the lower edge of a wall, while it is lifted"),
+    EffectName.PLATE: Adds(shapes=("plane",)),
+    EffectName.GRIPS: Adds(engines=("hold",)),
     EffectName.FILAMENTS: Adds(
         engines=("move_segments", "push_nodes", "kick_nodes", "drift_nodes"), python="bends between all segments"
     ),
@@ -37,6 +39,7 @@ ORDER = (
     "pull",
     "push_nodes",
     "kick",
+    "hold",
     "kick_nodes",
     "settle",
     "drift",

@@ -16,7 +16,7 @@ Array = NDArray[np.float64]
 Indices = NDArray[np.int32]
 
 PLANE = 27  # numbers that describe the plane geometry of a smarticle, see `dem.engine.links.motion.planar`
-FLOOR, WALL, LOWER, UPPER, CHANNEL = range(5)  # rows of `Ground.force`; the channel has two
+FLOOR, WALL, LOWER, UPPER, CHANNEL, PLATE, BOUNDARIES = 0, 1, 2, 3, 4, 6, 7  # rows of `Ground`; the channel has two
 BINS = 4  # of the search for neighbours, per link
 LEDGER = 10  # numbers of a row of the ledger, see `dem.engine.links.contact.pairs.enter`
 SLOTS = 3  # points at which a pair of segments can touch, see `dem.engine.links.contact.meeting`
@@ -152,8 +152,8 @@ class Kept(NamedTuple):
 class Ground(NamedTuple):
     """Floor and wall, and the motion of all boundaries.
 
-    Arrays of 4 hold values for floor, wall, lower hook and upper hook, arrays of 6 also for a channel's lower and upper
-    wall.
+    Rows of arrays of 7 are floor, wall, lower hook, upper hook, a channel's lower and upper wall, and plate. The walls
+    of a channel never move.
     """
 
     #: (tiers,) heights of the lower ends of the wall's tiers above `place` of the wall, lowest first [m]
@@ -162,13 +162,14 @@ class Ground(NamedTuple):
     top: float  #: Height of the wall's upper end above `place` of the wall [m]
     #: (2,) whether the wall exists, and whether it was lifted, so that links can touch its outside
     flags: NDArray[np.int64]
-    place: Array  #: (4,) heights [m]; for the wall the rise since the start
-    speed: Array  #: (4,) vertical velocities [m/s]
-    base: Array  #: (4,) heights at which the shaking began [m]
-    shaken: NDArray[np.int64]  #: (4,) whether a boundary is shaken
+    place: Array  #: (7,) heights [m]; of the wall: its rise since the start; of the plate: inf while there is none
+    speed: Array  #: (7,) vertical velocities [m/s]
+    rise: Array  #: (7,) the part of these velocities that is not shaking [m/s]
+    base: Array  #: (7,) heights about which boundaries are shaken [m]
+    shaken: NDArray[np.int64]  #: (7,) whether a boundary is shaken
     wave: Array  #: (3,) amplitude [m], angular frequency 2πf [rad/s] and time of the beginning [s] of the shaking
-    force: Array  #: (6, 3) forces of the bodies on the boundaries in the last step [N]
-    sums: Array  #: (6, 3) forces of the bodies on the boundaries, summed over all steps [N]
+    force: Array  #: (7, 3) forces of the bodies on the boundaries in the last step [N]
+    sums: Array  #: (7, 3) these forces, summed over all steps [N]
 
 
 class Hooks(NamedTuple):
@@ -269,6 +270,21 @@ class Filaments(NamedTuple):
     sums: Array  #: (SUMS,) energies exchanged since the start [J], see `bending.DAMPED`
 
 
+class Grips(NamedTuple):
+    """G grips that hold rigid bodies."""
+
+    of: NDArray[np.int64]  #: (N,) number of the grip that holds each body, counted from 1; 0: free
+    speed: Array  #: (G, 3) velocities, without the shaking [m/s]
+    moved: Array  #: (G, 3) ways at these velocities [m]
+    force: Array  #: (G, 3) forces on the grips in the last step, with the weight of what they hold [N]
+    sums: Array  #: (G, 3) these forces, summed over all steps [N]
+    rides: Array  #: (1,) 1 where grips are shaken with the floor, else 0
+    made: NDArray[np.int64]  #: (1,) number of grips since the start
+
+
+PER_GRIP = ("speed", "moved", "force", "sums")  # fields of `Grips` with a row for each grip
+
+
 class System(NamedTuple):
     """All data of one simulation that kernels read or write."""
 
@@ -289,6 +305,7 @@ class System(NamedTuple):
     #: (n, LEDGER) forces that dissipate energy, see `contact.pairs.enter`; None if dissipation is not recorded
     ledger: Any
     filaments: Any  #: `Filaments`; None where no body is flexible
+    grips: Any  #: `Grips`; None in scenes without grips of rigid bodies
 
 
 class Scratch(NamedTuple):

@@ -8,7 +8,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from dem.engine.links.arrays import CHANNEL, FLOOR, LOWER, UPPER, WALL, Ground
+from dem.engine.links.arrays import BOUNDARIES, CHANNEL, FLOOR, LOWER, PLATE, UPPER, WALL, Ground
 from dem.engine.links.world import World
 from dem.errors import RunError
 from dem.setting.container import Cylinder
@@ -19,8 +19,9 @@ Array = NDArray[np.float64]
 
 
 def ground_for(cylinder: Cylinder, hooks: tuple[Cross, Cross] | None, channel: Channel | None) -> Ground:
-    """Return the arrays of floor, wall, hooks and channel at the start of a run; the floor is at z = 0."""
-    place = np.zeros(4)
+    """Return the boundaries at the start: floor at z = 0, or the table of a plane."""
+    place = np.zeros(BOUNDARIES)
+    place[PLATE] = math.inf
     if channel is not None:
         place[FLOOR] = channel.table
     if hooks is not None:
@@ -31,12 +32,13 @@ def ground_for(cylinder: Cylinder, hooks: tuple[Cross, Cross] | None, channel: C
         top=cylinder.height,
         flags=np.array([int(channel is None), 0]),
         place=place,
-        speed=np.zeros(4),
-        base=np.zeros(4),
-        shaken=np.zeros(4, dtype=np.int64),
+        speed=np.zeros(BOUNDARIES),
+        rise=np.zeros(BOUNDARIES),
+        base=np.zeros(BOUNDARIES),
+        shaken=np.zeros(BOUNDARIES, dtype=np.int64),
         wave=np.zeros(3),
-        force=np.zeros((6, 3)),
-        sums=np.zeros((6, 3)),
+        force=np.zeros((BOUNDARIES, 3)),
+        sums=np.zeros((BOUNDARIES, 3)),
     )
 
 
@@ -91,46 +93,77 @@ class LinksBoundaries:
     def raised(self) -> float | None:
         if not self.enclosed:
             return None
+        grips, lifted = self._world.grips, 0.0
+        if grips is not None:
+            lifted = float(grips.moved[:, 2].max(initial=0.0))
         if self._world.hooks is None:
-            return 0.0
+            return lifted
         height = self.upper_height - self.floor
-        return None if height > self._top else max(0.0, height - float(self._starts[UPPER]))
+        return None if height > self._top else max(lifted, height - float(self._starts[UPPER]))
 
     @property
     def upper_height(self) -> float:
         return float(self._ground.place[UPPER])
 
+    @property
+    def plate_height(self) -> float | None:
+        height = float(self._ground.place[PLATE])
+        return height if math.isfinite(height) else None
+
     # -- how they move -----------------------------------------------------------------------------------------
 
-    def shake(self, *, amplitude: float, frequency: float, walls: bool = True) -> None:
+    def shake(self, *, amplitude: float, frequency: float, walls: bool = True, from_rest: bool = False) -> None:
         if not self._shaken:
             raise RunError("the engine was built without a shaker")
-        ground, hooked = self._ground, walls and self._world.hooks is not None
+        ground, hooked, world = self._ground, walls and self._world.hooks is not None, self._world
         ground.base[:] = ground.place
-        ground.speed[:] = 0.0
-        ground.shaken[:] = [1, walls and ground.flags[0], hooked, hooked]
-        ground.wave[:] = amplitude, 2 * math.pi * frequency, self._world.time
+        ground.speed[:] = ground.rise
+        ground.shaken[:] = [1, walls and ground.flags[0], hooked, hooked, 0, 0, walls and self.plate_height is not None]
+        ground.wave[:] = amplitude, 2 * math.pi * frequency, world.time
+        if world.grips is not None:
+            world.grips.rides[0] = float(walls)
+        if from_rest:
+            ground.base[ground.shaken != 0] += amplitude
+            ground.wave[2] += 0.25 / frequency
+
+    def stop_shaking(self) -> None:
+        self._ground.shaken[:] = 0
+        self._ground.wave[:] = 0.0
+        self._ground.speed[:] = self._ground.rise
 
     def lift_wall(self, speed: float) -> None:
-        self._ground.speed[WALL] = speed
+        self._move(WALL, speed)
         if not self._ground.flags[1]:
             self._ground.flags[1] = 1
             self._world.add_rim(float(self._ground.bottoms[0]), float(self._ground.radii[0]))
 
     def raise_upper(self, speed: float) -> None:
-        self._ground.speed[UPPER] = speed
+        self._move(UPPER, speed)
+
+    def place_plate(self, height: float) -> None:
+        self._ground.place[PLATE] = self._ground.base[PLATE] = height
+
+    def move_plate(self, speed: float) -> None:
+        self._move(PLATE, speed)
+
+    def remove_plate(self) -> None:
+        self._removed(self._world.remove_plate)
+
+    def _move(self, part: int, speed: float) -> None:
+        self._ground.rise[part] = speed
+        if not self._ground.shaken[part]:  # otherwise the next step computes it
+            self._ground.speed[part] = speed
 
     def stop(self) -> None:
-        self._ground.speed[:] = 0.0
-        self._ground.shaken[:] = 0
-        self._ground.wave[:] = 0.0
+        self._ground.rise[:] = 0.0
+        self.stop_shaking()
 
     def remove_wall(self) -> None:
         self._removed(self._remove_wall)
 
     def _remove_wall(self) -> None:
         ground, world = self._ground, self._world
-        ground.speed[WALL] = 0.0
+        ground.speed[WALL] = ground.rise[WALL] = 0.0
         ground.shaken[WALL] = 0
         world.remove_wall()
 
@@ -144,7 +177,12 @@ class LinksBoundaries:
     def channel_sums(self) -> Array:
         channel = self._world.channel
         there = channel is not None and math.isfinite(channel[0])
-        return self._ground.sums[CHANNEL:].copy() if there else np.zeros((0, 3))
+        return self._ground.sums[CHANNEL:PLATE].copy() if there else np.zeros((0, 3))
+
+    @property
+    def plate_sum(self) -> Array:
+        total: Array = self._ground.sums[PLATE].copy()
+        return total
 
     @property
     def container_force(self) -> Array:

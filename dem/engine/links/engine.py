@@ -23,6 +23,7 @@ from dem.engine.links.boundaries import LinksBoundaries, ground_for
 from dem.engine.links.contact import queries
 from dem.engine.links.contact.queries import BETWEEN, DEEPEST, ELASTIC, FASTEST, HIGHEST, LOWEST, WIDEST
 from dem.engine.links.filaments import LinksFilaments
+from dem.engine.links.grips import LinksGrips
 from dem.engine.links.ledger import LinksLedger
 from dem.engine.links.motors import LinksMotors
 from dem.engine.links.stepping import LOST
@@ -63,6 +64,7 @@ class LinksEngine:
         channel: table and walls instead of the container; all motion is then confined to a plane.
         strengths: (N, 2) factors on torque limit and stiffness of the motors [1]; None: 1 for all motors.
         wave_seed: seed of the waves of actively bending filaments.
+        gripped: whether grips will hold rigid bodies.
     """
 
     def __init__(
@@ -80,6 +82,7 @@ class LinksEngine:
         channel: Channel | None = None,
         strengths: Array | None = None,
         wave_seed: int = 0,
+        gripped: bool = False,
     ) -> None:
         self.particle = particle
         self.cylinder = cylinder
@@ -101,6 +104,9 @@ class LinksEngine:
             self._world.add_rim(height, radius)
         if channel is not None:
             self._world.channel = np.array([math.inf if channel.width is None else channel.width / 2])
+        if gripped:
+            self._world.allow_grips()
+        self.grips = LinksGrips(self._world) if gripped else None
         self.filaments = LinksFilaments(self._world) if self._world.filaments is not None else None
         self.ledger = LinksLedger(self._world, self.filaments)
         self.boundaries = LinksBoundaries(self._world, cylinder, shaken=shaken, removed=self.ledger.removed)
@@ -199,6 +205,8 @@ class LinksEngine:
             return self.filaments.mean_unbalanced()
         weight, relative = self._first_mass * self.gravity, self._relative_masses
         forces = self._world.bodies.load[:, :3] - weight * relative[:, None] * [0.0, 0.0, 1.0]
+        if self._world.grips is not None:  # what is held is in no balance
+            forces[self._world.grips.of != 0] = 0.0
         return float(np.linalg.norm(forces, axis=1).mean() / (weight * float(relative.mean())))
 
     def neighbours(self) -> NDArray[np.int64]:
@@ -275,7 +283,7 @@ class LinksEngine:
         """Return the deep bodies that touch two boundaries whose distance has changed.
 
         Args:
-            held: (N, 6) whether each body touches each boundary.
+            held: (N, 7) whether each body touches each boundary.
             deep: (N,) whether each body has a deep contact.
             least: smallest change of distance that counts [m].
         """

@@ -17,7 +17,7 @@ from dem.engine.links.stable_step import filament_stable_time_step, links_stable
 
 # Groups of arrays without which `advance` is compiled where a scene has none of them.
 OF_FILAMENTS = frozenset({"bends", "filaments", "flexible", "stretch"})
-OPTIONAL = OF_FILAMENTS | {"channel", "cords", "hooks", "ledger", "motors", "rims"}
+OPTIONAL = OF_FILAMENTS | {"channel", "cords", "grips", "hooks", "ledger", "motors", "rims"}
 
 
 class LinksKind:
@@ -77,6 +77,7 @@ class LinksKind:
             channel=scene.channel,
             strengths=scene.motor_strengths,
             wave_seed=scene.wave_seed,
+            gripped=scene.calls_for(EffectName.GRIPS),
         )
 
 
@@ -89,6 +90,7 @@ def _present(scene: Demand) -> Iterator[frozenset[str]]:
     known = {
         "channel": scene.channel is not None,
         **dict.fromkeys(OF_FILAMENTS, scene.mixture is not None and scene.mixture.flexible),
+        "grips": scene.calls_for(EffectName.GRIPS),
         "hooks": scene.hooks is not None,
         "ledger": scene.recording.dissipation_interval_s is not None,
         "rims": scene.channel is None and bool(scene.cylinder.upper),

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import Any, NamedTuple
 
-from dem.engine.links.arrays import Array, Bodies, Ground, Parts, Scratch, Segments, System
+from dem.engine.links.arrays import BOUNDARIES, Array, Bodies, Ground, Parts, Scratch, Segments, System
 from dem.engine.links.compiler import kernel, part
 from dem.engine.links.contact.barrier import FINEST, Step, ticks_for
 from dem.engine.links.contact.boundaries import push_boundaries
@@ -19,6 +19,7 @@ from dem.engine.links.motion.bending import (
     push_nodes,
     resolve_nodes,
 )
+from dem.engine.links.motion.holding import carry_grips, hold
 from dem.engine.links.motion.motoring import update
 from dem.engine.links.motion.moving import drift, gather, kick, resolve_speeds
 from dem.engine.links.motion.poses import find_motions, pose
@@ -46,10 +47,10 @@ def shaken_to(ground: Ground, time: float) -> None:
     """Move the shaken boundaries to their heights at a time [s]; `place` and `speed` are written."""
     if ground.wave[1] > 0.0:
         phase = ground.wave[1] * (time - ground.wave[2])
-        for k in range(4):
+        for k in range(BOUNDARIES):
             if ground.shaken[k]:
                 ground.place[k] = ground.base[k] + ground.wave[0] * math.sin(phase)
-                ground.speed[k] = ground.wave[0] * ground.wave[1] * math.cos(phase)
+                ground.speed[k] = ground.rise[k] + ground.wave[0] * ground.wave[1] * math.cos(phase)
 
 
 @part
@@ -119,7 +120,7 @@ def act(
     if cords is not None:
         pulling = pull(bodies, parts, cords, motors, step)
     gather(bodies, parts)
-    resolve_speeds(shapes, bodies, parts, segments, system.gravity, step)
+    resolve_speeds(shapes, bodies, parts, segments, system.gravity, step, system.grips)
     push_nodes(system.filaments, parts, system.gravity, ledger, step)
     resolve_nodes(system.filaments, shapes.radius, bodies, step)
     if motors is not None and tick == 0 and motors.due[1] == 0:
@@ -132,12 +133,12 @@ def act(
     totals[PAST] = length
     totals[WORK] += acting * pulling
     weight = length / dt
-    for k in range(6):
+    for k in range(BOUNDARIES):
         for d in range(3):
             ground.sums[k, d] += weight * ground.force[k, d]
-        if k < 4:
-            totals[WORK] -= ground.force[k, 2] * ground.speed[k] * acting
-    kick(shapes, bodies, parts, motors, system.gravity, system.planar, acting)
+        totals[WORK] -= ground.force[k, 2] * ground.speed[k] * acting
+    kick(shapes, bodies, parts, motors, system.gravity, system.planar, acting, system.grips)
+    totals[WORK] += hold(system.grips, shapes, bodies, ground, system.gravity, acting, weight)
     kick_nodes(system.filaments, acting)
     if motors is not None:
         motors.elapsed[0] += acting
@@ -145,9 +146,13 @@ def act(
         totals[LOST] += lost + settle(shapes, bodies, parts, segments, ledger, motors, system.filaments, acting)
     drift(shapes, bodies, motors, length, scratch.plane)
     drift_nodes(system.filaments, length)
-    for k in range(4):
-        if not ground.shaken[k]:
-            ground.place[k] += ground.speed[k] * length
+    carry_grips(system.grips, length)
+    for k in range(BOUNDARIES):
+        moved = ground.rise[k] * length
+        if ground.shaken[k]:
+            ground.base[k] += moved
+        else:
+            ground.place[k] += moved
     if cords is not None:
         for k in range(cords.anchor.shape[0]):
             cords.anchor[k, 0] += cords.speed[k] * length

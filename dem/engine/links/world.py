@@ -17,9 +17,11 @@ from dem.body.particle import LINKS, Particle
 from dem.body.placement import Poses
 from dem.body.state import FilamentState, PileState, RigidState, State
 from dem.engine.links.arrays import (
+    BOUNDARIES,
     LEDGER,
     MOTION,
     PLANE,
+    PLATE,
     STRETCH,
     Bends,
     Bodies,
@@ -27,6 +29,7 @@ from dem.engine.links.arrays import (
     Cells,
     Cords,
     Filaments,
+    Grips,
     Ground,
     Hooks,
     Kept,
@@ -82,8 +85,8 @@ class Contacts:
     #: (M, 2) numbers of two bodies that touch, the lower number first; a pair may occur more than once
     pairs: NDArray[np.int64]
     touches: NDArray[np.int64]  #: (N,) number of points of contact of each body
-    depths: Array  #: (N,) largest overlap of each body over the overlap at which axes meet [1]
-    held: NDArray[np.bool_]  #: (N, 6) whether each body touches each boundary, in the order of `Ground.force`
+    depths: Array  #: (N,) largest overlap of each body, over that at which axes, or an axis and a surface, meet [1]
+    held: NDArray[np.bool_]  #: (N, 7) whether each body touches each boundary, in the order of `Ground.force`
     elastic_energy: float  #: Energy in the springs of all contacts [J]
 
 
@@ -117,6 +120,7 @@ class World:
     channel: Array | None = None
     cords: Cords | None = None
     filaments: Filaments | None = None  #: Arrays of filaments; None if no shape is flexible
+    grips: Grips | None = None  #: Arrays of the grips of rigid bodies; None in scenes without them
 
     def __post_init__(self) -> None:
         own = () if self.particle is None else (smarticle_shape(self.particle),)
@@ -213,6 +217,8 @@ class World:
                 fresh.plane[i, 14:18] = kind.inertia
                 invert(fresh.plane[i])
         self.bodies = joined(self.bodies, fresh)
+        if self.grips is not None:
+            self.grips = self.grips._replace(of=longer(self.grips.of, self.count))
         self._lay_out_parts()
         old = self.pairs
         self.pairs = pairs_for(self.count, len(self.segments.line), len(old.first))._replace(
@@ -326,15 +332,31 @@ class World:
     def remove_wall(self) -> None:
         """Remove the wall and the memory of contacts with it."""
         first = slots_for(self.hooks, None)
-        walls = [slot for slot in range(END_SLOTS) if slot % boundaries.SURFACES] + list(
-            range(first, slots_for(self.hooks, self.rims))
-        )
+        ends = [slot for slot in range(END_SLOTS) if slot % boundaries.SURFACES not in (0, boundaries.COVER)]
+        walls = ends + list(range(first, slots_for(self.hooks, self.rims)))
         self.kept.slip[:, walls] = 0.0
         self.kept.used[:, walls] = 0
         self.kept.contacts[:] = self.kept.used.sum(axis=1)
         self.ground.flags[0] = 0
         self.rims = None
         self.kept = Kept(self.kept.slip[:, :first].copy(), self.kept.used[:, :first].copy(), self.kept.contacts)
+
+    def allow_grips(self) -> None:
+        """Let grips hold bodies later; must be called before bodies are added."""
+        none = np.zeros((0, 3))
+        self.grips = Grips(
+            np.zeros(0, np.int64), none, none.copy(), none.copy(), none.copy(), np.zeros(1), np.zeros(1, np.int64)
+        )
+
+    def remove_plate(self) -> None:
+        """Remove the plate and the memory of contacts with it."""
+        covers = range(boundaries.COVER, END_SLOTS, boundaries.SURFACES)
+        self.kept.slip[:, covers] = 0.0
+        self.kept.used[:, covers] = 0
+        self.kept.contacts[:] = self.kept.used.sum(axis=1)
+        self.ground.place[PLATE] = math.inf
+        self.ground.speed[PLATE] = self.ground.rise[PLATE] = 0.0
+        self.ground.shaken[PLATE] = 0
 
     def set_articulated(self, articulated: bool) -> None:
         """Make each link of a smarticle a part of its own, or the whole smarticle one part."""
@@ -381,7 +403,7 @@ class World:
         law, wall_law = self.laws
         return System(
             self.shapes, law, wall_law, self.bodies, self.parts, self.segments, self.pairs, self.kept, self._known,
-            self.gravity, self.planar, self.skins, self.hinged, self.cords, self.ledger, self.filaments,
+            self.gravity, self.planar, self.skins, self.hinged, self.cords, self.ledger, self.filaments, self.grips,
         )  # fmt: skip
 
     @property
@@ -452,7 +474,7 @@ class World:
     def _room(self) -> Found:
         n = self.count
         return Found(
-            np.zeros((self.pairs.counts[0], 2), np.int32), np.zeros(n, np.int64), np.zeros((n, 6), np.bool_),
+            np.zeros((self.pairs.counts[0], 2), np.int32), np.zeros(n, np.int64), np.zeros((n, BOUNDARIES), np.bool_),
             np.zeros(n), self.meeting, self.scratch.contacts,
         )  # fmt: skip
 
@@ -514,6 +536,7 @@ class World:
             "rims": self.rims,
             "cords": self.cords,
             "filaments": self.filaments,
+            "grips": self.grips,
         }
         return {name: group for name, group in groups.items() if group is not None}
 
@@ -546,6 +569,7 @@ class World:
         self.kept = group(Kept, "kept")
         self.cords = group(Cords, "cords") if "cords.anchor" in arrays else None
         self.filaments = group(Filaments, "filaments") if "filaments.body" in arrays else None
+        self.grips = group(Grips, "grips") if "grips.of" in arrays else None
         self.make_room()
 
 

@@ -132,18 +132,21 @@ class YadeBoundaries:
     def _bodies(self) -> list[int]:
         return [*self.container, *(bar for hook in self.hooks for bar in hook)]
 
-    def shake(self, *, amplitude: float, frequency: float, walls: bool = True) -> None:
+    def shake(self, *, amplitude: float, frequency: float, walls: bool = True, from_rest: bool = False) -> None:
         if self._shaker is None:
             raise RunError("the engine was built without a shaker")
         # YADE sets v(t) = -Aω sin(ωt + φ) before the integrator moves by v dt. Half a step is added to the phase, so
         # that each move uses the velocity at its middle and the position follows z(t) to second order, without drift.
         omega, simulation = 2 * math.pi * frequency, self._yade.omega
-        phase = -math.pi / 2 - omega * (simulation.time - simulation.dt / 2)
+        phase = (-math.pi if from_rest else -math.pi / 2) - omega * (simulation.time - simulation.dt / 2)
         self._shaker.A = self._yade.vector(0, 0, amplitude)
         self._shaker.f = self._yade.vector(0, 0, frequency)
         self._shaker.fi = self._yade.vector(0, 0, phase)
         self._shaker.ids = self.moving = self._bodies if walls else self.container[-1:]
         self._shaker.dead = False
+
+    def stop_shaking(self) -> None:
+        self.stop()
 
     def lift_wall(self, speed: float) -> None:
         self._move(self.container[:-1], speed)
@@ -156,6 +159,21 @@ class YadeBoundaries:
             self._shaker.dead = True
         self._move(self._bodies, 0.0)
         self.moving = []
+
+    plate_height = None
+
+    @property
+    def plate_sum(self) -> Array:
+        return np.zeros(3)
+
+    def place_plate(self, height: float) -> None:
+        raise RunError("engine: yade has no plates")
+
+    def move_plate(self, speed: float) -> None:
+        """Do nothing without a plate."""
+
+    def remove_plate(self) -> None:
+        """Do nothing without a plate."""
 
     def remove_wall(self) -> None:
         self.book_removal(self._remove_wall)

@@ -94,7 +94,7 @@ class YadeEngine:
         self.boundaries.book_removal = self.ledger.book_removal
         self.motors = YadeMotors(self._yade, self._assembly, self.ledger, motor_law, strengths)
         self.strings = YadeStrings(self._yade, self._assembly)
-        self.filaments = None
+        self.filaments = self.grips = None
         add_engines(self._yade, adds, law, hinges=hinge_law, gravity=gravity, radius=particle.radius)
         self.set_time_step(time_step)
         self.boundaries.bind()

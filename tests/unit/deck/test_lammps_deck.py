@@ -108,6 +108,8 @@ OPEN, SWING = {"type": "shape-change"}, {"type": "internal-oscillation", "theta_
         ([{**REMOVE, "speed_m_per_s": 0.1}], {}, ["phases.1.speed_m_per_s: a wall that is lifted"]),
         ([RELAX, OPEN, SWING], {}, ["phases.2 (shape-change): motors", "phases.3 (internal-oscillation): motors"]),
         ([{"type": "pull-hook"}], HOOKS, ["hooks", "phases.1 (pull-hook)"]),
+        ([{"type": "shake", "taps": 2}], {}, ["phases.1 (shake): taps or a sweep"]),
+        ([{"type": "shake", "frequency_end_hz": 50}], {}, ["phases.1 (shake): taps or a sweep"]),
     ],
 )
 def test_what_cannot_be_carried_over_is_rejected_by_name(

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from double import EngineDouble
+from double import EngineDouble, GripsDouble
 from scenes import small
 from scipy.spatial.transform import Rotation
 
@@ -94,6 +94,46 @@ def test_forces_on_hooks_are_means_and_no_part_of_the_containers() -> None:
     assert row["hook_upper_z_m"] == engine.boundaries.upper_height == 0.01
     engine.advance(5)
     assert sample(sampler, engine)["hook_upper_force_N"] == pytest.approx([0, 0, 0])
+
+
+def test_the_force_on_a_plate_is_a_mean_and_no_part_of_the_containers() -> None:
+    engine, sampler = engine_with([0.0]), Sampler(RADIUS, {EffectName.PLATE})
+    assert math.isnan(sample(sampler, engine)["plate_z_m"])
+    engine.advance(10)
+    engine.boundaries.place_plate(0.03)
+    engine.boundaries.plate_sum = np.array([0.0, 1.0, 4.0])
+    row = sample(sampler, engine)
+    assert row["plate_force_N"] == pytest.approx([0, 0.1, 0.4])
+    assert row["plate_z_m"] == 0.03
+    assert row["container_force_N"] == pytest.approx([0, -0.1, -0.4 - engine.particle.boxes.mass * 9.81])
+
+
+def test_forces_on_grips_are_means_since_these_grips_hold() -> None:
+    engine, sampler = engine_with([0.0]), Sampler(RADIUS, {EffectName.GRIPS})
+    assert sample(sampler, engine)["grip_moved_count"] == 0
+    grips = engine.grips = GripsDouble(calls=engine.calls)
+    grips.hold([0])
+    grips.hold([1, 2])
+    row = sample(sampler, engine)  # as of no time
+    assert np.isnan(row["grip_moved_force_N"]).all()
+    assert (row["grip_fixed_count"], row["grip_moved_count"], row["elongation_m"]) == (1, 2, 0)
+    engine.advance(10)
+    grips.sums, grips.moved = np.array([[0, 0, 5.0], [1.0, 0, -7.0]]), np.array([[0, 0, 0], [0, 3e-3, 4e-3]])
+    row = sample(sampler, engine)
+    assert row["grip_fixed_force_N"] == pytest.approx([0, 0, 0.5])
+    assert row["grip_moved_force_N"] == pytest.approx([0.1, 0, -0.7])
+    assert row["elongation_m"] == row["grip_distance_m"] == pytest.approx(5e-3)
+    assert row["container_force_N"] == pytest.approx([-0.1, 0, 0.2 - engine.particle.boxes.mass * 9.81])
+    # Others that hold within one interval are others, however many.
+    grips.release()
+    grips.hold([4])
+    engine.advance(10)
+    row = sample(sampler, engine)
+    assert np.isnan(row["grip_moved_force_N"]).all()
+    assert math.isnan(row["grip_distance_m"])
+    grips.release()
+    row = sample(sampler, engine)
+    assert math.isnan(row["elongation_m"])
 
 
 def test_a_pile_without_a_wall_has_no_packing_fraction_and_counts_those_outside() -> None:

@@ -109,7 +109,7 @@ def test_keys_are_printed_with_range_and_meaning(smarticles: Smarticles) -> None
     whole = smarticles("keys").out
     names = whole.partition("more, by `smarticles keys NAME`: ")[2].replace("\n", " ").strip().split(", ")
     assert {"motor", "shake", "container", "recording", "fidelity", "phases", "barbs"} <= set(names)
-    assert "one of: actuate, arrange, deposit" in smarticles("keys", "phases").out.replace("\n", " ")
+    assert "one of: actuate, arrange, compress, deposit" in smarticles("keys", "phases").out.replace("\n", " ")
     assert all(smarticles("keys", name).status == 0 for name in names)
     wrong = smarticles("keys", "moter")
     assert (wrong.status, wrong.err) == (

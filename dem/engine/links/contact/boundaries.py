@@ -1,4 +1,4 @@
-"""Contacts of links with boundaries: floor, round wall, its edges, the walls of a channel, and hooks.
+"""Contacts of links with boundaries: floor, plate, round wall, its edges, the walls of a channel, and hooks.
 
 `contacts_of_segment` alone computes the geometry of these contacts. Forces, queries and recorded contacts read the rows
 that it writes.
@@ -18,6 +18,7 @@ from dem.engine.links.arrays import (
     CHANNEL,
     FLOOR,
     LOWER,
+    PLATE,
     SPIN,
     WALL,
     Array,
@@ -43,7 +44,8 @@ from dem.engine.links.vectors import Vector, add, along, dot, put, scale, sub, v
 # [m]; fraction of a full contact's springs and dashpots that acts here [1]; energy over kn/2 u² [1]; the point on the
 # link's axis [m]; normal, from the boundary [1]; overlap at which axes, or an axis and a surface, would meet [m].
 SLOT, PART, DEPTH, SHARE, FACTOR, AXIS, NORMAL, ROOM, COLUMNS = 0, 1, 2, 3, 4, 5, 8, 11, 12
-SURFACES = 3  # of an end of a link
+SURFACES = 4  # of an end of a link: floor, wall, a tier's ceiling and edge, plate
+COVER = 3
 END_SLOTS = 2 * SURFACES
 
 GOLDEN = (math.sqrt(5) - 1) / 2
@@ -123,6 +125,9 @@ def contacts_of_segment(
             depth = radius - (z - ground.place[FLOOR])
             if depth > 0.0:
                 count = _note(rows, count, SURFACES * end, FLOOR, depth, radius, point, (0.0, 0.0, 1.0))
+            depth = radius - (ground.place[PLATE] - z)
+            if depth > 0.0:
+                count = _note(rows, count, SURFACES * end + COVER, PLATE, depth, radius, point, (0.0, 0.0, -1.0))
             inner = ground.radii[ground.radii.shape[0] - 1] - radius
             if ground.flags[0] != 0 and x * x + y * y > inner * inner:
                 count = _contacts_with_wall(radius, ground, SURFACES * end, point, rows, count)
@@ -293,8 +298,7 @@ def place_and_motion(
     """
     normal, part_of = vector(contact, NORMAL), int(contact[PART])
     place = sub(vector(contact, AXIS), scale(radius - 0.5 * contact[DEPTH], normal))
-    speed = ground.speed[part_of] if part_of < CHANNEL else 0.0
-    return place, velocity_at(parts, row, place), speed, dot(vector(parts.motion[row], SPIN), normal)
+    return place, velocity_at(parts, row, place), ground.speed[part_of], dot(vector(parts.motion[row], SPIN), normal)
 
 
 @part

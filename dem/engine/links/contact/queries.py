@@ -49,8 +49,8 @@ class Found(NamedTuple):
 
     met: Indices  #: (P, 2) numbers of the two bodies of each pair of segments that touch
     touches: Any  #: (N,) number of points of contact of each body
-    held: Any  #: (N, 6) whether each body touches each boundary, in the order of `Ground.force`
-    depth: Array  #: (N,) largest overlap of each body over its room, the overlap at which axes meet [1]
+    held: Any  #: (N, 7) whether each body touches each boundary, in the order of `Ground.force`
+    depth: Array  #: (N,) largest overlap of each body, over that at which axes, or an axis and a surface, meet [1]
     out: Array  #: Scratch of `meet`
     rows: Array  #: Scratch of `contacts_of_segment`
 

@@ -15,6 +15,7 @@ from dem.engine.links.arrays import Array, Bodies, Parts, Segments
 from dem.engine.links.compiler import inlined, part
 from dem.engine.links.contact.barrier import LONGEST, STRIDE, Step
 from dem.engine.links.contact.pairs import velocity_at
+from dem.engine.links.motion.holding import is_held
 from dem.engine.links.motion.motoring import ITERATIONS, contact_torques, free_torques, middle_of_step
 from dem.engine.links.motion.planar import planar_at, rates, spin_of
 from dem.engine.links.motion.poses import along_normal
@@ -34,8 +35,10 @@ def gather(bodies: Bodies, parts: Parts) -> None:
 
 
 @part
-def kick(shapes: Shapes, bodies: Bodies, parts: Parts, motors: Any, gravity: float, planar: bool, dt: float) -> None:
-    """Change momenta by the forces in `load`, by weight and by motors.
+def kick(
+    shapes: Shapes, bodies: Bodies, parts: Parts, motors: Any, gravity: float, planar: bool, dt: float, grips: Any
+) -> None:
+    """Change momenta of bodies that no grip holds by the forces in `load`, by weight and by motors.
 
     Args:
         bodies: `velocity` and `momentum` are written.
@@ -44,10 +47,11 @@ def kick(shapes: Shapes, bodies: Bodies, parts: Parts, motors: Any, gravity: flo
         gravity: g [m/s²].
         planar: whether bodies move only in the xy plane and turn only about z, without weight.
         dt: time for which the forces act [s]: half of the last and half of the next sub-step.
+        grips: the grips; None where there are none.
     """
     velocity, momentum, load, across = bodies.velocity, bodies.momentum, bodies.load, 0.0 if planar else 1.0
     for i in range(velocity.shape[0]):
-        if is_flexible(shapes.flexible, bodies.shape[i]):
+        if is_flexible(shapes.flexible, bodies.shape[i]) or is_held(grips, i):
             continue
         share = dt / shapes.mass[bodies.shape[i]]
         velocity[i, 0] += share * load[i, 0]
@@ -74,7 +78,7 @@ def kick(shapes: Shapes, bodies: Bodies, parts: Parts, motors: Any, gravity: flo
 
 @part
 def resolve_speeds(
-    shapes: Shapes, bodies: Bodies, parts: Parts, segments: Segments, gravity: float, step: Step
+    shapes: Shapes, bodies: Bodies, parts: Parts, segments: Segments, gravity: float, step: Step, grips: Any
 ) -> None:
     """Increase `step.need` if a segment could enter another segment too deeply within a time step.
 
@@ -82,11 +86,12 @@ def resolve_speeds(
         bodies: the bodies, with the present forces in `load`.
         gravity: g [m/s²].
         step: `need` is increased.
+        grips: the grips, whose forces do not move the bodies that they hold; None if there are no grips.
     """
     velocity, spin, load = bodies.velocity, bodies.spin, bodies.load
     for i in range(velocity.shape[0]):
         k = bodies.shape[i]
-        if is_flexible(shapes.flexible, k):
+        if is_flexible(shapes.flexible, k) or is_held(grips, i):
             continue
         limit, reach, per_force = LONGEST * shapes.radius[k], shapes.reach[k], step.whole / shapes.mass[k]
         gain = per_force * per_force * (load[i, 0] ** 2 + load[i, 1] ** 2 + load[i, 2] ** 2)

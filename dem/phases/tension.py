@@ -1,0 +1,139 @@
+"""The phase that pulls the pile apart between two grips."""
+
+from collections.abc import Iterator, Mapping
+from typing import ClassVar, Literal, Self
+
+import numpy as np
+from pydantic import Field, model_validator
+
+from dem.engine.effect import EffectName
+from dem.engine.interface import Engine, Grips
+from dem.errors import RunError
+from dem.phases.phase import CHECK_INTERVAL, Memory, Phase, SceneView, Stage, time_left
+from dem.phases.pull_hook import HELD_SECONDS
+from dem.setting.hooks import TOLERANCE
+from dem.setting.part import Duration, Force, Length, Part, Speed
+from dem.setting.vibration import Vibration
+
+FIXED, MOVED = 0, 1  # numbers of the grips, since others have let go
+
+
+class Tension(Part, Phase):
+    """Hold both ends of the pile by grips, and move one of them away at constant speed, with smarticles welded.
+
+    A grip holds the bodies whose centre of mass is within a distance of the outermost one at its end. They move with
+    the grip and do not turn. The grip at the bottom, or at lower x or y, rests. At the end of the phase both let go.
+    """
+
+    needs_links: ClassVar[str] = "grips of rigid bodies"
+    type: Literal["tension"]
+    axis: Literal["x", "y", "z"] = Field("z", description="direction of the pull")
+    grip_m: Length = Field(
+        ..., description="distance along the axis from the outermost centre of mass within which a grip holds [m]"
+    )
+    distance_m: Length = Field(..., description="how far the grip moves [m]")
+    speed_m_per_s: Speed = Field(..., description="speed of the grip [m/s]")
+    duration_s: Duration = Field(
+        default_factory=lambda data: data["distance_m"] / data["speed_m_per_s"],
+        description="length of the phase [s]; default: until the grip has arrived; in a longer phase it then rests",
+    )
+    force_limit_N: Force | None = Field(
+        None,
+        description="pull on the moving grip, averaged over 0.01 s, at which it stops [N]; the phase ends 0.1 s later; "
+        "null: no limit. The pull is unbounded when a chain of rigid bodies holds both grips",
+    )
+    vibration: Vibration | None = Field(None, description="vibration of the container meanwhile; null: none")
+
+    @model_validator(mode="after")
+    def _arrives(self) -> Self:
+        needed = self.distance_m / self.speed_m_per_s
+        if self.duration_s < needed * (1 - TOLERANCE):
+            raise ValueError(
+                f"duration_s: {self.duration_s:g} s is too short to move the grip by distance_m = {self.distance_m:g} "
+                f"m at speed_m_per_s = {self.speed_m_per_s:g} m/s; use at least {needed:.6g} s"
+            )
+        return self
+
+    def check(self, scene: SceneView, index: int) -> Iterator[str]:
+        if scene.mixture is not None and scene.mixture.flexible:
+            yield f"phases.{index}: tension holds rigid bodies, but particle has filaments; use lift, which grips nodes"
+        if self.axis != "z" and not any(phase.frees for phase in scene.phases[:index]):
+            yield (
+                f"phases.{index}.axis: a pull along {self.axis} would end at the wall; take it away by "
+                "remove-container before, or use axis: z"
+            )
+        if scene.count < 2:
+            yield f"count: {scene.count} smarticle, but phases.{index} (tension) holds one at each end; use at least 2"
+
+    def pushing_speed(self, gravity: float) -> float:
+        return self.speed_m_per_s
+
+    @property
+    def raises(self) -> float:
+        return self.distance_m if self.axis == "z" else 0.0
+
+    def calls(self, scene: SceneView, index: int) -> Mapping[EffectName, str]:
+        until = "" if self.force_limit_N is None else f", or until it takes {self.force_limit_N:.3g} N"
+        why = (
+            f"phase {index} moves one along {self.axis} by {1e3 * self.distance_m:.3g} mm at "
+            f"{1e3 * self.speed_m_per_s:.3g} mm/s{until}; each holds {1e3 * self.grip_m:.3g} mm of the pile"
+        )
+        return {EffectName.GRIPS: why, **self.vibrating(scene, index)}
+
+    def first_memory(self, scene: SceneView) -> Memory:
+        # At the last check, `pull`: pull on the moving grip summed over steps [N]; `step`: number of steps.
+        return {"arrival": None, "end": None, "moving": False, "due": 0.0, "pull": 0.0, "step": 0}
+
+    def proceed(self, stage: Stage, engine: Engine) -> float:
+        memory, grips, limit = stage.memory, engine.grips, self.force_limit_N
+        assert grips is not None  # the scene calls for them
+        if memory["end"] is None:
+            engine.motors.weld()
+            grips.release()  # what a lift still holds
+            for bodies in self._ends(stage, engine):
+                grips.hold(bodies)
+            self._move(grips, self.speed_m_per_s)
+            arrival = engine.time + self.distance_m / self.speed_m_per_s
+            memory.update(arrival=arrival, end=engine.time + self.duration_s, moving=True)
+            self._check_from_now(memory, engine, grips)
+        elif memory["moving"] and limit is not None and engine.time > memory["due"] - engine.time_step / 2:
+            pull, step = memory["pull"], memory["step"]
+            self._check_from_now(memory, engine, grips)
+            if memory["pull"] - pull > limit * (engine.steps - step):
+                memory.update(arrival=engine.time, end=engine.time + HELD_SECONDS)
+        if memory["moving"] and (left := time_left(engine, memory["arrival"])):
+            return left if limit is None else min(max(memory["due"] - engine.time, engine.time_step), left)
+        if memory["moving"]:
+            memory["moving"] = False
+            self._move(grips, 0.0)
+        left = time_left(engine, memory["end"])
+        if not left:
+            grips.release()
+        return left
+
+    @property
+    def _along(self) -> int:
+        return "xyz".index(self.axis)
+
+    def _move(self, grips: Grips, speed: float) -> None:
+        velocity = [0.0, 0.0, 0.0]
+        velocity[self._along] = speed
+        grips.move(MOVED, (velocity[0], velocity[1], velocity[2]))
+
+    def _check_from_now(self, memory: Memory, engine: Engine, grips: Grips) -> None:
+        """Note the pull summed over steps, and set the time of the next check."""
+        weight = float(grips.weights[MOVED]) if self.axis == "z" else 0.0
+        pull = -float(grips.sums[MOVED, self._along]) - weight * engine.steps
+        memory.update(pull=pull, step=engine.steps, due=engine.time + self.whole_periods(CHECK_INTERVAL))
+
+    def _ends(self, stage: Stage, engine: Engine) -> tuple[list[int], list[int]]:
+        """Return the numbers of the bodies at the end that rests and at the end that moves."""
+        places = engine.state().positions[:, self._along]
+        low, high = float(places.min()), float(places.max())
+        if high - low <= 2 * self.grip_m:
+            raise RunError(
+                f"phases.{stage.index}.grip_m: grips of {self.grip_m:g} m at both ends hold the whole pile, whose "
+                f"centres are within {high - low:.3g} m along {self.axis}; use less than {(high - low) / 2:.3g} m"
+            )
+        ends = places <= low + self.grip_m, places >= high - self.grip_m
+        return np.flatnonzero(ends[0]).tolist(), np.flatnonzero(ends[1]).tolist()

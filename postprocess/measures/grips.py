@@ -1,0 +1,115 @@
+"""Measure pulls by grips: force against elongation between two grips, and what a grip picks up.
+
+The pull is the force with which other bodies, floor and wall hold back what the moving grip holds. On what the resting
+grip holds they pull the other way, less the push of the floor. The strain is the elongation over the distance between
+the means of the centres of both grips' bodies at the beginning. What a grip has picked up is the weight that hangs on
+it, over that of one body.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from dem.record.run import Run
+from dem.record.series import Series
+from postprocess.geometry.links import Floats
+from postprocess.measures.pull import END, WINDOW, held_fast_of, weight_of_one
+from postprocess.measures.registry import PhaseMeasure, Quantity, Shown
+
+TENSION, LIFT = "tension", "lift"  #: Types of phases
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class TensionTest:
+    """Pull and elongation between two grips at n samples."""
+
+    elongations: Floats  #: (n,) way of the moving grip [m]
+    pulls: Floats  #: (n,) pull on the moving grip, mean since the sample before [N]
+    held: Floats  #: (n,) pull on the grip that rests, mean since the sample before [N]
+    length: float  #: Distance between the grips at the beginning [m]
+    interval: float  #: Time between samples [s]
+
+    @property
+    def window(self) -> Floats:
+        """Weights of a moving mean over `WINDOW`."""
+        count = min(max(round(WINDOW / self.interval), 1), len(self.pulls))
+        return np.full(count, 1 / count)
+
+    @property
+    def work(self) -> float:
+        """Work of the pull, ∫ F dx [J]."""
+        return float(self.pulls @ np.diff(self.elongations, prepend=0.0))
+
+
+def read_tension(run: Run, series: Series, phase: int) -> TensionTest:
+    """Read pull and elongation of the phase with the given index, as far as the run has come."""
+    axis = "xyz".index(run.scene["phases"][phase]["axis"])
+    inside = np.flatnonzero(_held_in(series, phase))
+    elongations = series["elongation_m"][inside]
+    # The first sample has no sample with the grips before it.
+    return TensionTest(
+        elongations=elongations,
+        pulls=-np.nan_to_num(series["grip_moved_force_N"][inside, axis]),
+        held=np.nan_to_num(series["grip_fixed_force_N"][inside, axis]),
+        length=float(series["grip_distance_m"][inside[0]] - elongations[0]),
+        interval=float(np.median(np.diff(series.time[inside]))),
+    )
+
+
+def has_grips(series: Series, phase: int) -> bool:
+    """Return whether a series holds at least two samples of a grip in the phase with this index."""
+    return "elongation_m" in series.data and int(_held_in(series, phase).sum()) >= 2
+
+
+def _held_in(series: Series, phase: int) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
+    return np.asarray((series["phase"] == phase) & np.isfinite(series["elongation_m"]))
+
+
+def _of_tension(run: Run, series: Series, phase: int) -> tuple[float, ...]:
+    test, asked = read_tension(run, series, phase), run.scene["phases"][phase]
+    whole = weight_of_one(run) * run.manifest.count
+    means, places = (np.convolve(each, test.window, mode="valid") for each in (test.pulls, test.elongations))
+    highest = int(means.argmax())
+    held = float(np.convolve(test.held, test.window, mode="valid")[highest])
+    ended = run.phases[phase].end_s is not None
+    return (
+        float(means[highest]) / whole,
+        float(places[highest]) / test.length,
+        held / whole,
+        test.work,
+        float(held_fast_of(test.elongations, asked)) if ended else float("nan"),
+    )
+
+
+def _of_lift(run: Run, series: Series, phase: int) -> tuple[float, ...]:
+    inside = np.flatnonzero(_held_in(series, phase) & np.isfinite(series["grip_moved_force_N"][:, 2]))
+    last = inside[series.time[inside] > series.time[inside[-1]] - END]
+    held = float(series["grip_moved_count"][last[-1]])
+    return held, held - float(series["grip_moved_force_N"][last, 2].mean()) / weight_of_one(run)
+
+
+MEASURES = (
+    PhaseMeasure(
+        name="tension between grips",
+        phases=(TENSION,),
+        quantities=(
+            Quantity("peak pull over n W_s", "-", Shown(heading="peak F/nW", place=45, form=".3f")),
+            Quantity("strain at the peak pull", "-", Shown(heading="strain at it", place=46, form=".3f")),
+            Quantity("pull on the resting grip at the peak over n W_s", "-"),
+            Quantity("work of the pull", "J", Shown(heading="work of the pull [mJ]", place=47, form=".3g", factor=1e3)),
+            Quantity("pull held fast", "-"),
+        ),
+        take=_of_tension,
+        available_for=has_grips,
+    ),
+    PhaseMeasure(
+        name="pick-up by a grip",
+        phases=(LIFT,),
+        quantities=(
+            Quantity("gripped", "smarticles"),
+            Quantity("picked up", "smarticles", Shown(heading="picked up", place=48, form=".1f")),
+        ),
+        take=_of_lift,
+        available_for=has_grips,
+    ),
+)
