@@ -251,6 +251,10 @@ class Particle:
     def filament(self) -> None:
         """None: links are rigid."""
 
+    @property
+    def linkage(self) -> None:
+        """None: hinges are those of barbs."""
+
     @cached_property
     def _rows(self) -> Array:
         """(rows,) [m]: offsets along the normal; outermost spheres reach exactly ±t1/2."""

@@ -18,6 +18,7 @@ from dem.body.chain import Tie
 from dem.body.filament import Activity, FilamentEnergies
 from dem.body.forces import ContactForces
 from dem.body.kinds import Mixture
+from dem.body.linkage import Undulation
 from dem.body.particle import Particle
 from dem.body.placement import Poses
 from dem.body.state import PileState
@@ -196,42 +197,50 @@ class Strings(Protocol):
 
 
 class Filaments(Protocol):
-    """What flexible bodies do by themselves, and grips that hold nodes of them."""
+    """What filaments, or linkages, do by themselves, and grips that hold nodes, or links, of them."""
 
-    def act(self, activity: Activity | None, *, ramp: float = 0.0) -> None:
-        """Let filaments bend by themselves from now on.
+    def act(self, activity: Activity | Undulation | None, *, ramp: float = 0.0) -> None:
+        """Let filaments, or linkages, bend by themselves from now on.
 
         Args:
-            activity: what they do; None: they return to the curvature that they prefer at rest.
-            ramp: time in which the new curvature grows from 0 [s].
+            activity: what they do, `Undulation` for linkages; None: they return to the curvature that they prefer at
+                rest, or the angles at the start.
+            ramp: time in which the new curvature, or the swings, grow from 0 [s].
         """
 
     def points(self, filament: int) -> Array:
-        """Return the nodes (n, 3) of a filament [m]."""
+        """Return the nodes (n, 3) of a filament, or middles of the links of a linkage [m]."""
 
     def grip(self, nodes: Mapping[int, Sequence[int]]) -> int:
-        """Hold nodes by a new grip, which is at rest; return its number.
+        """Hold nodes, or links, by a new grip, which is at rest; return its number.
 
         Args:
-            nodes: for each filament, its nodes that are held; negative numbers count from its end.
+            nodes: for each body, its nodes or links that are held; negative numbers count from its end.
         """
 
     def move(self, grip: int, velocity: tuple[float, float, float]) -> None:
         """Move a grip with a velocity [m/s] from now on."""
 
     def release(self, grip: int | None = None) -> None:
-        """Let go of all nodes that a grip holds; None: all grips."""
+        """Let go of all that a grip holds; None: all grips."""
 
     @property
     def held(self) -> int:
-        """Number of filaments that a grip holds."""
+        """Number of bodies that a grip holds."""
 
     def force(self, grip: int | None = None) -> Array:
-        """Return the force (3,) of a grip on its nodes in the last step [N]; None: of all grips together."""
+        """Return the force (3,) of a grip on what it holds in the last step [N]; None: of all grips together."""
+
+    def mean_unbalanced(self) -> float:
+        """Return the mean net force on a body over its weight in the liquid [1]."""
+
+    @property
+    def gap(self) -> float:
+        """Widest gap at a joint [m]; 0 for filaments."""
 
     @property
     def energies(self) -> FilamentEnergies:
-        """Energies of all filaments at present, and work on them since the start."""
+        """Energies of all bodies at present, and work on them since the start."""
 
 
 class EnergyLedger(Protocol):
@@ -284,7 +293,7 @@ class Engine(Protocol):
 
     @property
     def filaments(self) -> Filaments | None:
-        """Filaments; None where bodies are rigid."""
+        """Filaments, or linkages; None where bodies are rigid."""
 
     @property
     def ledger(self) -> EnergyLedger:

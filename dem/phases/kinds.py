@@ -14,6 +14,7 @@ from dem.phases.remove_container import RemoveContainer
 from dem.phases.shake import Shake
 from dem.phases.strain import Strain
 from dem.phases.take_over import TakeOver
+from dem.phases.undulate import Undulate
 from dem.phases.wriggle import Wriggle
 
 AnyPhase = Annotated[
@@ -29,6 +30,7 @@ AnyPhase = Annotated[
     | Arrange
     | Strain
     | Wriggle
+    | Undulate
     | Lift
     | Release,
     Field(discriminator="type"),

@@ -18,7 +18,7 @@ class Lift(Part, Phase):
     Activity goes on. The end piece itself touches nothing: it is where nodes are gripped.
     """
 
-    of_filaments: ClassVar[bool] = True
+    bends: ClassVar[frozenset[str]] = frozenset({"filament", "chain"})
     type: Literal["lift"]
     grips: Literal["near", "tails"] = Field(
         "near",
@@ -104,7 +104,7 @@ class Lift(Part, Phase):
 class Release(Part, Phase):
     """Let go of everything that earlier phases grip; takes no time."""
 
-    of_filaments: ClassVar[bool] = True
+    bends: ClassVar[frozenset[str]] = frozenset({"filament", "chain"})
     type: Literal["release"]
 
     @property

@@ -52,7 +52,8 @@ class Phase:
     actuates: ClassVar[bool] = False  #: Whether motors move or hold the barbs
     begins: ClassVar[bool] = False  #: Whether the phase adds the smarticles; a run begins with one such phase
     of_smarticles: ClassVar[bool] = False  #: Whether the phase has no meaning for other bodies than smarticles
-    of_filaments: ClassVar[bool] = False  #: Whether the phase has no meaning for other bodies than filaments
+    bends: ClassVar[frozenset[str]] = frozenset()
+    """Shapes of bodies that change their shape, without which the phase has no meaning; none: it needs no such bodies."""
     sources: ClassVar[frozenset[str]] = frozenset()
     """Keys that say where content is found that another key fixes by its hash; the scene's hash omits them."""
     at_rest: ClassVar[bool] = False

@@ -14,9 +14,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dem.body.filament import Filament
+from dem.body.linkage import Linkage
 from dem.body.linear import matrix_product, positive_definite
 from dem.body.particle import Particle
 from dem.engine.links.arrays import PLANE
+from dem.engine.links.joints import pins_of
 from dem.engine.links.motion.bending import RESOLVED
 from dem.engine.links.motion.planar import lay_out
 from dem.engine.links.shapes import AT_END, AT_START, RADIUS, Shape, filament_shape, smarticle_shape
@@ -128,7 +130,44 @@ def rigid_stable_time_step(shapes: Sequence[Shape], law: ContactLaw) -> float:
     return min(_rigid_step(shape, law) for shape in shapes)
 
 
-def _rigid_step(shape: Shape, law: ContactLaw) -> float:
+def linkage_stable_time_step(linkage: Linkage, links: Sequence[Shape], law: ContactLaw) -> float:
+    """Return the largest stable time step [s] over the stiffest modes of the links of a linkage among others.
+
+    They are those of rigid bodies, with the joints at both ends of a link, which the neighbours move against it: since
+    |a + b|² ≤ 2 (|a|² + |b|²), a joint of stiffness k is never stiffer than 2 k on each of its links by itself.
+
+    Args:
+        links: shapes of the links.
+    """
+    pin, damping, off, off_damping = pins_of(linkage, law)
+    found, known = [], {}
+    for k, (bars, shape) in enumerate(zip(linkage.links, links, strict=True)):
+        stiffness, resisting = np.zeros((6, 6)), np.zeros((6, 6))
+        for number, side in ((k - 1, -1), (k, 1)):
+            if not 0 <= number < len(linkage.joints):
+                continue
+            joint, place = linkage.joints[number], np.array([side * bars.lengths[0] / 2, 0.0, 0.0])
+            push = matrix_product(_motion(place).T, _motion(place))
+            # The second of two axes turns about the first, and may have any direction across it.
+            own = np.array(joint.axes if len(joint.axes) != 2 else joint.axes[:1] if side > 0 else joint.axes[1:])
+            turns = matrix_product(own.T, own)
+            across = np.eye(3) - turns
+            several = len(joint.axes) == 2
+            for matrix, of_pin, about, law_of in (
+                (stiffness, pin, max(off, several * joint.stiffness), joint.stiffness),
+                (resisting, damping, max(off_damping, several * joint.damping), joint.damping),
+            ):
+                matrix += 2 * of_pin * push
+                matrix[3:, 3:] += 2 * (about * across + law_of * turns)
+        key = (shape.mass, stiffness.tobytes(), resisting.tobytes())  # most links are alike
+        if key not in known:
+            known[key] = _rigid_step(shape, law, (stiffness, resisting))
+        found.append(known[key])
+    return min(found)
+
+
+def _rigid_step(shape: Shape, law: ContactLaw, joints: Mode | None = None) -> float:
+    """Return the stable step of a body, or of a link with the stiffness and damping of its joints."""
     mass = np.diag([*[shape.mass] * 3, *shape.inertia[:3]])
     places: dict[tuple[int, int], list[Array]] = {}  # strands at each end of each bar
     for line, link, shared in zip(shape.lines, shape.link, shape.shared, strict=True):
@@ -151,7 +190,10 @@ def _rigid_step(shape: Shape, law: ContactLaw) -> float:
         push = _motion(top)
         heave += matrix_product(push[[up]].T, push[[up]])
         rub += matrix_product(push[across].T, push[across])
-    return _step_of_modes(mass, [*modes, *_modes_of_pile(law, heave, rub)])
+    modes += _modes_of_pile(law, heave, rub)
+    if joints is not None:
+        modes = [(stiffness + joints[0], resisting + joints[1]) for stiffness, resisting in modes]
+    return _step_of_modes(mass, modes)
 
 
 def _modes_of_end(law: ContactLaw, tips: Array) -> list[Mode]:

@@ -19,6 +19,7 @@ from dem.engine.links.motion.bending import (
     push_nodes,
     resolve_nodes,
 )
+from dem.engine.links.motion.joining import drift_links, kick_links, pose_linkages, push_joints
 from dem.engine.links.motion.motoring import update
 from dem.engine.links.motion.moving import drift, gather, kick, resolve_speeds
 from dem.engine.links.motion.poses import find_motions, pose
@@ -120,6 +121,7 @@ def act(
     resolve_speeds(shapes, bodies, parts, segments, system.gravity, step)
     push_nodes(system.filaments, parts, system.gravity, ledger, step)
     resolve_nodes(system.filaments, shapes.radius, bodies, step)
+    push_joints(system.linkages, system.gravity, step)
     if motors is not None and tick == 0 and motors.due[1] == 0:
         # After the forces, whose velocities are those of before, as in the kick: so that work and dissipation agree.
         update(shapes, bodies, motors)
@@ -137,12 +139,14 @@ def act(
             totals[WORK] -= ground.force[k, 2] * ground.speed[k] * acting
     kick(shapes, bodies, parts, motors, system.gravity, system.planar, acting)
     kick_nodes(system.filaments, acting)
+    kick_links(system.linkages, system.gravity, acting)
     if motors is not None:
         motors.elapsed[0] += acting
     if ledger is not None:
         totals[LOST] += lost + settle(shapes, bodies, parts, segments, ledger, motors, system.filaments, acting)
     drift(shapes, bodies, motors, length, scratch.plane)
     drift_nodes(system.filaments, length)
+    drift_links(system.linkages, length, scratch.plane)
     for k in range(4):
         if not ground.shaken[k]:
             ground.place[k] += ground.speed[k] * length
@@ -178,6 +182,7 @@ def advance(steps: int, clock: Clock, system: System, scratch: Scratch, totals: 
             shaken_to(ground, clock.begin + (clock.made + made_now + tick / FINEST) * dt)
             pose(system.shapes, system.bodies, system.parts, system.segments, system.motors)
             pose_filaments(system.filaments, system.bodies, system.parts, system.segments)
+            pose_linkages(system.linkages, system.bodies, system.parts, system.segments)
             if update_lists(system.bodies, system.segments, system.pairs, scratch.cells, system.skins) == FULL:
                 totals[TICK] = tick
                 return made_now

@@ -415,7 +415,7 @@ def _wait(gait: Array) -> float:
 
 
 @part
-def _turn_wave(gait: Array, dt: float) -> None:
+def turn_wave(gait: Array, dt: float) -> None:
     """Turn the preferred curvature by a sub-step, reverse it where its time has come, and change its factor."""
     change, rest = gait[CHANGE] * dt, gait[TARGET] - gait[FACTOR]
     gait[FACTOR] = gait[TARGET] if abs(rest) <= change else gait[FACTOR] + math.copysign(change, rest)
@@ -443,7 +443,7 @@ def drift_nodes(filaments: Any, dt: float) -> None:
         return
     for f in range(filaments.body.shape[0]):
         first, last = filaments.begin[f], filaments.begin[f + 1] - 1
-        _turn_wave(filaments.gait[f], dt)
+        turn_wave(filaments.gait[f], dt)
         for i in range(first, last + 1):
             put(filaments.position[i], 0, along(vector(filaments.position[i], 0), dt, vector(filaments.velocity[i], 0)))
         for i in range(first, last):
