@@ -59,7 +59,7 @@ class Linkage:
 
     links: tuple[Bars, ...]  #: Each along x of its own frame, with its middle at the origin
     joints: tuple[Joint, ...]
-    pin_stiffness: float | None = None  #: Of the springs that keep joints together; None: that of contacts [N/m]
+    pin_stiffness: float | None = None  #: Of the springs that keep joints together; None: twice that of contacts [N/m]
 
     @cached_property
     def effective_mass(self) -> float:

@@ -380,6 +380,15 @@ class LinkageState(BarState):
         """(M, 2, 3) both ends of all links [m]."""
         return self.links.segments
 
+    @cached_property
+    def gaps(self) -> Array:
+        """(N, 1) widest gap between ends of links at a joint of each linkage [m]."""
+        inner = np.flatnonzero(np.diff(self.body) == 0)
+        apart = np.linalg.norm(self.segments[inner + 1, 0] - self.segments[inner, 1], axis=1)
+        found = np.zeros((self.count, 1))
+        np.maximum.at(found[:, 0], self.body[inner], apart)
+        return found
+
     @property
     def normals(self) -> Array:
         """(M, 3) unit vectors along the normal of each link; zeros where the section is round [1]."""

@@ -25,6 +25,7 @@ class EffectName(StrEnum):
     HOOKS = "hooks"
     WALL_REMOVAL = "wall removal"
     FILAMENTS = "filaments"
+    JOINTS = "joints"
     ENERGIES = "energies"
     ENERGY_ACCOUNT = "energy account"
     SERIES = "series"

@@ -46,6 +46,14 @@ class MotorReadings:
     halted: Flags  #: Whether a motor was stopped at the last control update; for "slip" and "servo": was at its limit
 
 
+@dataclass(frozen=True, kw_only=True)
+class JointReadings:
+    """State of the joints of all linkages."""
+
+    motor_torque: float  #: Greatest torque of a motor about one axis in the last step [N m]
+    broken: int  #: Number of joints that are broken
+
+
 class Boundaries(Protocol):
     """Rigid boundaries: floor and wall, hooks, or the walls of a channel."""
 
@@ -235,8 +243,8 @@ class Filaments(Protocol):
         """Return the mean net force on a body over its weight in the liquid [1]."""
 
     @property
-    def gap(self) -> float:
-        """Widest gap at a joint [m]; 0 for filaments."""
+    def joints(self) -> JointReadings | None:
+        """State of the joints of linkages; None for filaments."""
 
     @property
     def energies(self) -> FilamentEnergies:

@@ -53,7 +53,7 @@ class Phase:
     begins: ClassVar[bool] = False  #: Whether the phase adds the smarticles; a run begins with one such phase
     of_smarticles: ClassVar[bool] = False  #: Whether the phase has no meaning for other bodies than smarticles
     bends: ClassVar[frozenset[str]] = frozenset()
-    """Shapes of bodies that change their shape, without which the phase has no meaning; none: it needs no such bodies."""
+    """Shapes of bodies that change their shape, of which the phase needs one; none: it needs no such bodies."""
     sources: ClassVar[frozenset[str]] = frozenset()
     """Keys that say where content is found that another key fixes by its hash; the scene's hash omits them."""
     at_rest: ClassVar[bool] = False

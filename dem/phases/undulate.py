@@ -97,8 +97,8 @@ class Undulate(Part, Phase):
             if fastest > joint.speed * TOO_FAST:
                 yield (
                     f"{key}.{where}amplitude_deg: {math.degrees(swing.amplitude):g}° at {self.frequency_Hz:g} Hz needs "
-                    f"{fastest:.3g} rad/s at joint {swing.joint}, whose speed_limit_rad_per_s is {joint.speed:g}; swing "
-                    "less or slower"
+                    f"{fastest:.3g} rad/s at joint {swing.joint}, whose speed_limit_rad_per_s is {joint.speed:g}; "
+                    "swing less or slower"
                 )
 
     def first_memory(self, scene: SceneView) -> Memory:

@@ -65,7 +65,7 @@ class Watchdog:
                 needed beside overlaps, which YADE underestimates where a centre is beyond wall or floor.
             raised: rise of the upper hook above the floor [m], by which it may have lifted bodies; None: the wall
                 does not enclose the pile.
-            gaps: (N, 2) distances between the links of each hinge [m]; None while welded.
+            gaps: (N, k) distances between the links of hinges, or joints, of each body [m]; None: it has none.
         """
         positions = state.positions
         speeds = state.speeds
@@ -85,7 +85,7 @@ class Watchdog:
                 (~np.less_equal(gaps, self.gap)).any(axis=1),
                 time,
                 f"links more than {self.gap:.3g} m apart at a hinge (most {gaps.max(initial=0):.3g} m)",
-                f"{LOWER_STEP}, or raise fidelity.hinge_stiffness_N_per_m",
+                f"{LOWER_STEP}, or raise fidelity.hinge_stiffness_N_per_m (of chains particle.pin_stiffness_N_per_m)",
             )
         points = positions[:, None] if points is None else points
         above = points[..., 2] - floor

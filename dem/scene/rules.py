@@ -81,7 +81,7 @@ def _of_bending(scene: SceneView, engine: str) -> Iterator[str]:
     """Yield what filaments and chains cannot have, and what only they have."""
     kinds = () if scene.mixture is None else scene.mixture.kinds
     shapes = {kind.name if kind.bends else "" for kind in kinds} or {""}
-    if scene.liquid is not None and shapes != {"filament"}:
+    if scene.liquid is not None and "filament" not in shapes:
         yield "liquid: only filaments float in it; add particle: {shape: filament, …}, or leave liquid out"
     for index, phase in enumerate(scene.phases):
         if phase.bends and not shapes & phase.bends:

@@ -352,16 +352,18 @@ class Chain(Shaped):
     links: Annotated[int, Field(ge=2, le=200)] | None = Field(
         None, description="number of links of one length [1]; default: that of the lengths in link_m"
     )
-    link_m: Annotated[
-        tuple[Length, ...], BeforeValidator(_as_list, json_schema_input_type=Length | list[Length])
-    ] = Field(..., min_length=1, max_length=200, description="lengths of the links, from joint to joint, one or all [m]")
+    link_m: Annotated[tuple[Length, ...], BeforeValidator(_as_list, json_schema_input_type=Length | list[Length])] = (
+        Field(
+            ..., min_length=1, max_length=200, description="lengths of the links, from joint to joint, one or all [m]"
+        )
+    )
     joints: Annotated[
         tuple[AnyJoint, ...], BeforeValidator(_as_list, json_schema_input_type=AnyJoint | list[AnyJoint])
     ] = Field(..., min_length=1, max_length=199, description="one joint for all places between links, or one for each")
     pin_stiffness_N_per_m: Stiffness | None = Field(
         None,
         description="stiffness of the springs that keep ends of links together, and links in line where they cannot "
-        "turn [N/m]; default: that of contacts",
+        "turn [N/m]; default: twice that of contacts",
     )
 
     def layout(self) -> tuple[Array, Array]:  # noqa: D102

@@ -17,7 +17,7 @@ from dem.body.forces import ContactForces, contacts_of_points
 from dem.body.kinds import Mixture
 from dem.body.particle import Particle
 from dem.body.placement import Poses
-from dem.body.state import PileState
+from dem.body.state import LinkageState, PileState
 from dem.engine.interface import Filaments, Saved
 from dem.engine.links.boundaries import LinksBoundaries, ground_for
 from dem.engine.links.contact import queries
@@ -264,7 +264,7 @@ class LinksEngine:
             lowest=found[LOWEST],
             highest=found[HIGHEST],
             widest=found[WIDEST],
-            gap=0.0 if self.filaments is None else self.filaments.gap,
+            gap=float(state.gaps.max(initial=0.0)) if isinstance(state, LinkageState) else 0.0,
             deepest=found[DEEPEST] * self.particle.diameter,
             elastic_energy=found[ELASTIC] + self.ledger.deformation,
         )

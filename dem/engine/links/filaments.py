@@ -112,9 +112,8 @@ class LinksFilaments:
             yield number, filament
 
     @property
-    def gap(self) -> float:
-        """0, since segments share their nodes [m]."""
-        return 0.0
+    def joints(self) -> None:
+        """None, since segments share their nodes."""
 
     def mean_unbalanced(self) -> float:
         """Return the mean net force on a filament over its weight in the liquid [1], without nodes that are held."""

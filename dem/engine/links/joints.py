@@ -18,20 +18,22 @@ from dem.physics.contact import ContactLaw
 
 Array = NDArray[np.float64]
 
+PIN = 2.0  # stiffness of a pin over that of a contact: a joint bears what contacts do to the links on both sides
 LAWS = {"free": joining.FREE, "elastic": joining.ELASTIC, "motor": joining.MOTOR}
 
 
 def pins_of(linkage: Linkage, law: ContactLaw) -> tuple[float, float, float, float]:
     """Return stiffness [N/m] and damping [N s/m] of pins, and about directions in which links cannot turn.
 
-    A pin is as stiff as a contact unless the linkage has a stiffness of its own, and has the damping ratio of contacts.
+    A pin is `PIN` times as stiff as a contact unless the linkage has a stiffness of its own, and has the damping ratio
+    of contacts.
     About a direction in which links cannot turn [N m/rad, N m s/rad] two pins act at half the width from the axis; the
     width is the diameter of the round rod that has the links' axial inertia, so that such a twist is about as fast as
     other motions of a pin.
     """
     link = linkage.links[0]
     half = 4 * float(link.inertia[0]) / link.mass  # half of the square of the width [m²]
-    stiffness = linkage.pin_stiffness or law.normal_stiffness
+    stiffness = linkage.pin_stiffness or PIN * law.normal_stiffness
     damping = law.normal_damping * math.sqrt(stiffness / law.normal_stiffness)
     return stiffness, damping, half * stiffness, half * damping
 
@@ -120,12 +122,14 @@ def linkages_at(
         lost=np.zeros((n, joining.LOST)),
         grip=np.zeros(n, np.int64),
         broken=np.zeros(n, np.uint8),
-        **{name: np.zeros((n, 3)) for name in ("angle", "torque")},
-        **{name: np.zeros((0, 3)) for name in ("grip_speed", "grip_force")},
+        angle=np.zeros((n, 3)),
+        torque=np.zeros((n, 3)),
+        grip_speed=np.zeros((0, 3)),
+        grip_force=np.zeros((0, 3)),
     )
     more = {
         name: np.concatenate([getattr(old, name), getattr(fresh, name)])
         for name in Linkages._fields
         if isinstance(getattr(old, name), np.ndarray) and name != "sums"
     }
-    return old._replace(**more, links=joined(old.links, links))
+    return old._replace(links=joined(old.links, links), **more)  # type: ignore[arg-type] # of arrays alone

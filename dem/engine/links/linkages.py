@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from dem.body.filament import Activity, FilamentEnergies
 from dem.body.linkage import Linkage, Undulation
+from dem.engine.interface import JointReadings
 from dem.engine.links.arrays import Linkages
 from dem.engine.links.joints import swings_of
 from dem.engine.links.motion import bending, joining
@@ -93,12 +94,12 @@ class LinksLinkages:
         gait[:, bending.CHANGE] = math.inf if ramp == 0 else 1.0 / ramp
 
     def _linkage(self, body: int) -> Linkage:
-        found = self._world.kinds[self._world.bodies.shape[body]].linkage
+        found: Linkage | None = self._world.kinds[self._world.bodies.shape[body]].linkage
         assert found is not None
         return found
 
     def mean_unbalanced(self) -> float:
-        """Return the mean net force on a linkage over its weight [1], of those that no grip holds; 0 if there is none."""
+        """Return the mean net force on linkages that no grip holds over their weight [1]; 0 if there are none."""
         world, own = self._world, self._all
         free = np.add.reduceat(own.grip, own.begin[:-1]) == 0
         weights = world.shapes.mass[world.bodies.shape] * world.gravity
@@ -116,28 +117,18 @@ class LinksLinkages:
         return self._all.torque
 
     @property
-    def motor_torque(self) -> float:
-        """Greatest torque of a motor about one axis in the last step [N m]."""
-        return float(np.abs(self._all.torque[self._all.law == joining.MOTOR]).max(initial=0.0))
-
-    @property
-    def broken(self) -> int:
-        """Number of joints that are broken."""
-        return int(self._all.broken.sum())
-
-    @property
-    def gap(self) -> float:
-        """Widest gap between ends of links at a joint [m]."""
-        return float(self._measured[5])
-
-    @property
-    def _measured(self) -> Array:
-        found, world = np.zeros(6), self._world
-        world.posed()
-        joining.measure_linkages(world.jointed, world.gravity, found)
-        return found
+    def joints(self) -> JointReadings:
+        """State of the joints of all linkages."""
+        own = self._all
+        torque = float(np.abs(own.torque[own.law == joining.MOTOR]).max(initial=0.0))
+        return JointReadings(motor_torque=torque, broken=int(own.broken.sum()))
 
     @property
     def energies(self) -> FilamentEnergies:
-        """Energies at this instant, and work up to it; `stretching` is that of pins, `bending` that of elastic joints."""
-        return FilamentEnergies(*(float(value) for value in (*self._measured[:5], *self._all.sums)))
+        """Energies at this instant, and work up to it; of pins as `stretching`, of elastic joints as `bending`."""
+        found, world = np.zeros(5), self._world
+        world.posed()
+        jointed = world.jointed
+        assert jointed is not None
+        joining.measure_linkages(jointed, world.gravity, found)
+        return FilamentEnergies(*(float(value) for value in (*found, *self._all.sums)))

@@ -163,7 +163,9 @@ def kind_shape(kind: Kind) -> Shape:
     if kind.filament is not None:
         return filament_shape(kind.filament)
     shape = rigid_shape(kind.bars, kind.rows, kind.radius)
-    return replace(shape, effective_mass=typical_effective_mass(kind), linkage=kind.linkage)
+    shape = replace(shape, effective_mass=typical_effective_mass(kind), linkage=kind.linkage)
+    # Links of a linkage that fold touch each other but for neighbours: none owns the joint where a third one touches.
+    return shape if kind.linkage is None else replace(shape, shared=np.zeros_like(shape.shared))
 
 
 def link_shapes(kind: Kind) -> list[Shape]:

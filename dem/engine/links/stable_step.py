@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dem.body.filament import Filament
-from dem.body.linkage import Linkage
 from dem.body.linear import matrix_product, positive_definite
+from dem.body.linkage import Linkage
 from dem.body.particle import Particle
 from dem.engine.links.arrays import PLANE
 from dem.engine.links.joints import pins_of
@@ -139,31 +139,35 @@ def linkage_stable_time_step(linkage: Linkage, links: Sequence[Shape], law: Cont
     Args:
         links: shapes of the links.
     """
+    known: dict[bytes, float] = {}
+    for number, shape in enumerate(links):
+        joints = _joints_of(linkage, number, law)
+        key = shape.lines.tobytes() + joints[0].tobytes() + joints[1].tobytes()
+        if key not in known:  # most links are alike
+            known[key] = _rigid_step(shape, law, joints)
+    return min(known.values())
+
+
+def _joints_of(linkage: Linkage, number: int, law: ContactLaw) -> Mode:
+    """Return stiffness and damping (6, 6) of the joints at both ends of a link, for motions of this link alone."""
     pin, damping, off, off_damping = pins_of(linkage, law)
-    found, known = [], {}
-    for k, (bars, shape) in enumerate(zip(linkage.links, links, strict=True)):
-        stiffness, resisting = np.zeros((6, 6)), np.zeros((6, 6))
-        for number, side in ((k - 1, -1), (k, 1)):
-            if not 0 <= number < len(linkage.joints):
-                continue
-            joint, place = linkage.joints[number], np.array([side * bars.lengths[0] / 2, 0.0, 0.0])
-            push = matrix_product(_motion(place).T, _motion(place))
-            # The second of two axes turns about the first, and may have any direction across it.
-            own = np.array(joint.axes if len(joint.axes) != 2 else joint.axes[:1] if side > 0 else joint.axes[1:])
-            turns = matrix_product(own.T, own)
-            across = np.eye(3) - turns
-            several = len(joint.axes) == 2
-            for matrix, of_pin, about, law_of in (
-                (stiffness, pin, max(off, several * joint.stiffness), joint.stiffness),
-                (resisting, damping, max(off_damping, several * joint.damping), joint.damping),
-            ):
-                matrix += 2 * of_pin * push
-                matrix[3:, 3:] += 2 * (about * across + law_of * turns)
-        key = (shape.mass, stiffness.tobytes(), resisting.tobytes())  # most links are alike
-        if key not in known:
-            known[key] = _rigid_step(shape, law, (stiffness, resisting))
-        found.append(known[key])
-    return min(found)
+    stiffness, resisting, half = np.zeros((6, 6)), np.zeros((6, 6)), linkage.links[number].lengths[0] / 2
+    for before in (number - 1, number):
+        if not 0 <= before < len(linkage.joints):
+            continue
+        joint, side = linkage.joints[before], 1 if before == number else -1
+        motion = _motion(np.array([side * half, 0.0, 0.0]))
+        push = 2 * matrix_product(motion.T, motion)
+        # The second of two axes turns about the first, seen from either link, and may have any direction across it.
+        axes = joint.axes if len(joint.axes) != 2 else joint.axes[:1] if side > 0 else joint.axes[1:]
+        turns = 2 * matrix_product(np.array(axes).T, np.array(axes))
+        across = 2 * np.eye(3) - turns
+        several = len(joint.axes) == 2
+        stiffness += pin * push
+        stiffness[3:, 3:] += joint.stiffness * turns + max(off, several * joint.stiffness) * across
+        resisting += damping * push
+        resisting[3:, 3:] += joint.damping * turns + max(off_damping, several * joint.damping) * across
+    return stiffness, resisting
 
 
 def _rigid_step(shape: Shape, law: ContactLaw, joints: Mode | None = None) -> float:

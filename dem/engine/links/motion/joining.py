@@ -265,7 +265,9 @@ def _turn_any(linkages: Linkages, j: int, spin: Vector, wave: Vector, past: floa
         total = scale(most / size, total)
     axes = linkages.links.axes
     for k in range(3):
-        linkages.torque[j, k] = axes[j, 0, 2 - k] * total[0] + axes[j, 1, 2 - k] * total[1] + axes[j, 2, 2 - k] * total[2]
+        linkages.torque[j, k] = (
+            axes[j, 0, 2 - k] * total[0] + axes[j, 1, 2 - k] * total[1] + axes[j, 2, 2 - k] * total[2]
+        )
     if law == MOTOR:
         return none, none, total
     return spring, resisting, none
@@ -410,12 +412,12 @@ def drift_links(linkages: Any, dt: float, row: Array) -> None:
 
 @kernel
 def measure_linkages(linkages: Linkages, gravity: float, found: Array) -> None:
-    """Add up the energies of all linkages, which are posed, and find the widest gap.
+    """Add up the energies of all linkages, which are posed.
 
     Args:
         gravity: g [m/s²].
-        found: (6,) written: kinetic and potential energy, of pins, of the laws of joints, and of directions in which
-            links cannot turn [J]; the widest gap of a joint [m].
+        found: (5,) written: kinetic and potential energy, of pins, of the laws of joints, and of directions in which
+            links cannot turn [J].
     """
     found[:] = 0.0
     links = linkages.links
@@ -428,5 +430,3 @@ def measure_linkages(linkages: Linkages, gravity: float, found: Array) -> None:
             found[2] += pin
             found[3] += elastic
             found[4] += off
-            _, gap = _gap(linkages, i)
-            found[5] = max(found[5], math.sqrt(dot(gap, gap)))
