@@ -10,7 +10,7 @@ from dem.setting.part import Duration, Part
 
 
 class Relax(Part, Phase):
-    """Let the pile rest under gravity, with smarticles welded, filaments quiet, and chains as their motors held them first."""
+    """Let the pile rest under gravity, with smarticles welded, filaments quiet, and chains as poured."""
 
     planar: ClassVar[bool | None] = None
     at_rest: ClassVar[bool] = True

@@ -280,6 +280,7 @@ class Linkages(NamedTuple):
     angle: Array  #: (L, 3) angles in the last step [rad]
     torque: Array  #: (L, 3) of spring, dashpot or motor about each axis in the last step [N m]
     broken: NDArray[np.uint8]  #: (L,) whether a joint is broken
+    driven: NDArray[np.int64]  #: (1,) number of joints with motors
     lost: Array  #: (L, LOST) scratch: what takes and gives energy in a step
     grip: NDArray[np.int64]  #: (L,) number of the grip that holds a link, plus 1; 0: free
     grip_speed: Array  #: (G, 3) velocities of the grips [m/s]

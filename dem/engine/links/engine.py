@@ -250,7 +250,7 @@ class LinksEngine:
         )
 
     def extremes(self, state: PileState) -> Extremes | None:
-        """Return the extremes; None if an overlap needs a full check. Hinges of smarticles are rigid: their gap is 0."""
+        """Return the extremes; None if an overlap needs a full check. Hinges of smarticles have no gaps."""
         if state.bodies is None:
             velocities = state.smarticles.link_velocities.reshape(-1, 3)
         else:

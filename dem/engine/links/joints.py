@@ -77,8 +77,9 @@ def none_of(shapes: Sequence[Shape]) -> Linkages:
     f, i = np.zeros, np.int64
     return Linkages(
         f(0, np.int32), f(1, np.int32), f((0, bending.GAIT)), f(0, i), f(0, i), f((0, joining.JOINT)),
-        f((0, 3, joining.SWING)), f((0, 4)), f((0, 3)), f((0, 3)), f((0, 3)), f(0, np.uint8), f((0, joining.LOST)),
-        f(0, i), f((0, 3)), f((0, 3)), f(bending.SUMS), bodies_for(0), table_of(shapes), None, None,
+        f((0, 3, joining.SWING)), f((0, 4)), f((0, 3)), f((0, 3)), f((0, 3)), f(0, np.uint8), f(1, i),
+        f((0, joining.LOST)), f(0, i), f((0, 3)), f((0, 3)), f(bending.SUMS), bodies_for(0), table_of(shapes), None,
+        None,
     )  # fmt: skip
 
 
@@ -130,6 +131,7 @@ def linkages_at(
     more = {
         name: np.concatenate([getattr(old, name), getattr(fresh, name)])
         for name in Linkages._fields
-        if isinstance(getattr(old, name), np.ndarray) and name != "sums"
+        if isinstance(getattr(old, name), np.ndarray) and name not in ("sums", "driven")
     }
+    more["driven"] = old.driven + sum(joint.law == "motor" for joint in linkage.joints)
     return old._replace(links=joined(old.links, links), **more)  # type: ignore[arg-type] # of arrays alone

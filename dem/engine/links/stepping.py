@@ -139,7 +139,7 @@ def act(
             totals[WORK] -= ground.force[k, 2] * ground.speed[k] * acting
     kick(shapes, bodies, parts, motors, system.gravity, system.planar, acting)
     kick_nodes(system.filaments, acting)
-    kick_links(system.linkages, system.gravity, acting)
+    kick_links(system.linkages, system.gravity, ledger, acting)
     if motors is not None:
         motors.elapsed[0] += acting
     if ledger is not None:

@@ -64,7 +64,9 @@ def test_a_written_scene_is_read_as_the_same_one() -> None:
 
 
 def test_an_undulation_is_a_wave_besides_the_motors_of_the_table() -> None:
-    scene = small(deepcopy(SCENE) | {"phases.1": TABLE | {"amplitude_deg": 10, "wavelength_lengths": 0.5, "frequency_Hz": 2}})
+    scene = small(
+        deepcopy(SCENE) | {"phases.1": TABLE | {"amplitude_deg": 10, "wavelength_lengths": 0.5, "frequency_Hz": 2}}
+    )
     phase, linkage = scene.phases[1], scene.bodies[0].linkage
     assert isinstance(phase, Undulate)
     assert linkage is not None
@@ -85,7 +87,9 @@ def test_a_plan_has_their_step_and_effects() -> None:
     assert joints.why.startswith("3 motor")
     stiff = plan(small(deepcopy(SCENE) | {"particle.pin_stiffness_N_per_m": 1e5}))
     assert stiff.stable_time_step_s == pytest.approx(found.stable_time_step_s / math.sqrt(1e5 / 2000), rel=0.5)
-    twisted = plan(small(deepcopy(SCENE) | {"particle.joints": {**MOTOR, "axes": [[1, 0, 0]], "damping_N_m_s_per_rad": 1e-3}}))
+    twisted = plan(
+        small(deepcopy(SCENE) | {"particle.joints": {**MOTOR, "axes": [[1, 0, 0]], "damping_N_m_s_per_rad": 1e-3}})
+    )
     assert any("particle.joints" in line for line in twisted.warnings)
 
 

@@ -367,12 +367,13 @@ def _hold(linkages: Linkages, gravity: float, dt: float) -> None:
 
 
 @part
-def kick_links(linkages: Any, gravity: float, dt: float) -> None:
+def kick_links(linkages: Any, gravity: float, ledger: Any, dt: float) -> None:
     """Change the momenta of links by the loads of this instant, and sum what took and gave energy.
 
     Args:
-        linkages: `links`, `parts.motion`, `grip_force` and `sums` are written.
+        linkages: `links`, `grip_force` and `sums` are written, and `parts.motion` where they are needed.
         gravity: g [m/s²].
+        ledger: None where nothing reads what dashpots took.
         dt: time over which they act [s].
     """
     if linkages is None:
@@ -380,6 +381,8 @@ def kick_links(linkages: Any, gravity: float, dt: float) -> None:
     links, sums = linkages.links, linkages.sums
     _hold(linkages, gravity, dt)
     kick(linkages.shapes, links, linkages.parts, None, gravity, False, dt)
+    if ledger is None and linkages.driven[0] == 0:
+        return
     find_motions(linkages.shapes, links, linkages.parts, None)
     for f in range(linkages.body.shape[0]):
         for j in range(linkages.begin[f], linkages.begin[f + 1] - 1):
