@@ -12,6 +12,7 @@ BENT = 150.0  # deg, the farthest that links are bent at rest or by motors: beyo
 ACROSS = 1e-6  # cosine of the angle between two axes, up to which they count as perpendicular
 
 Direction = tuple[float, float, float]
+Number = Annotated[int, Field(ge=1, le=3)]
 Bend = Annotated[float, Field(ge=-BENT, le=BENT)]
 Torque = Annotated[float, Field(ge=1e-15, le=1e6)]  # N m
 Damping = Annotated[float, Field(ge=0, le=1e6)]  # N m s/rad
@@ -35,7 +36,7 @@ def _listed(value: Any) -> Any:
     return value if isinstance(value, list | tuple) else (value,)
 
 
-Axes = Annotated[tuple[Direction, ...], BeforeValidator(_axes, json_schema_input_type=int | list[Direction])]
+Axes = Annotated[tuple[Direction, ...], BeforeValidator(_axes, json_schema_input_type=Number | list[Direction])]
 Bends = Annotated[tuple[Bend, ...], BeforeValidator(_listed, json_schema_input_type=Bend | list[Bend])]
 
 

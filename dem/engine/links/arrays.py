@@ -288,6 +288,7 @@ class Linkages(NamedTuple):
     sums: Array  #: (SUMS,) see `dem.engine.links.motion.bending.DAMPED`
     links: Bodies  #: The links
     shapes: Shapes  #: Of the links of all kinds, kind by kind
+    bodies: Any  #: `Bodies` that the linkages are
     parts: Any  #: `Parts` by link, which share their arrays with those of the bodies
     segments: Any  #: `Segments` by link, likewise
 

@@ -31,8 +31,8 @@ RATES: Mapping[Activity, Rates] = {
 }
 LOOK = 2.4e-7  # s per control update of a smarticle
 BENDS = 1.2  # cost of a filament's segment over that of a smarticle's link, of 480 each with 5.7 neighbours of a body
-# Cost of a link of a chain over that of a smarticle's link, of 300 each at rest with 5.3 and 6.8 to 10.5 neighbours of a
-# body: 1.6 to 1.9 with free joints or motors, of one to three axes, while other work used both cores.
+# Cost of a link of a chain over that of a smarticle's link, of 300 each at rest with 5.3 and 6.8 to 10.5 neighbours of
+# a body: 1.6 to 1.9 with free joints or motors, of one to three axes, while other work used both cores.
 JOINS = 1.8
 RIM = 1.1e-7  # s per edge of a wall of tiers, smarticle and step
 # Cost of a sample and of a frame [s]: a constant, and an addition per smarticle.

@@ -79,7 +79,7 @@ def none_of(shapes: Sequence[Shape]) -> Linkages:
         f(0, np.int32), f(1, np.int32), f((0, bending.GAIT)), f(0, i), f(0, i), f((0, joining.JOINT)),
         f((0, 3, joining.SWING)), f((0, 4)), f((0, 3)), f((0, 3)), f((0, 3)), f(0, np.uint8), f(1, i),
         f((0, joining.LOST)), f(0, i), f((0, 3)), f((0, 3)), f(bending.SUMS), bodies_for(0), table_of(shapes), None,
-        None,
+        None, None,
     )  # fmt: skip
 
 

@@ -182,7 +182,7 @@ def advance(steps: int, clock: Clock, system: System, scratch: Scratch, totals: 
             shaken_to(ground, clock.begin + (clock.made + made_now + tick / FINEST) * dt)
             pose(system.shapes, system.bodies, system.parts, system.segments, system.motors)
             pose_filaments(system.filaments, system.bodies, system.parts, system.segments)
-            pose_linkages(system.linkages, system.bodies, system.parts, system.segments)
+            pose_linkages(system.linkages)
             if update_lists(system.bodies, system.segments, system.pairs, scratch.cells, system.skins) == FULL:
                 totals[TICK] = tick
                 return made_now

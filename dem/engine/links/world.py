@@ -421,7 +421,7 @@ class World:
             return None
         each = np.arange(len(self.segments.line) + 1, dtype=np.int32)
         parts, segments = self.parts._replace(begin=each), self.segments._replace(begin=each)
-        return self.linkages._replace(parts=parts, segments=segments)
+        return self.linkages._replace(bodies=self.bodies, parts=parts, segments=segments)
 
     @property
     def _known(self) -> Boundaries:
@@ -439,7 +439,7 @@ class World:
         if self.filaments is not None:
             pose_filaments_from_python(self.filaments, self.bodies, self.parts, self.segments)
         if (jointed := self.jointed) is not None:
-            pose_linkages_from_python(jointed, self.bodies, self.parts, self.segments)
+            pose_linkages_from_python(jointed)
         return self.bodies
 
     def state(self) -> PileState:

@@ -18,7 +18,7 @@ from __future__ import annotations
 import math
 from typing import Any, NamedTuple
 
-from dem.engine.links.arrays import Array, Bodies, Linkages, Parts, Segments
+from dem.engine.links.arrays import Array, Bodies, Linkages
 from dem.engine.links.compiler import inlined, kernel, part
 from dem.engine.links.contact.barrier import Step
 from dem.engine.links.contact.pairs import velocity_at
@@ -48,17 +48,17 @@ Quaternion = tuple[float, float, float, float]
 
 
 @part
-def pose_linkages(linkages: Any, bodies: Bodies, parts: Parts, segments: Segments) -> None:
+def pose_linkages(linkages: Any) -> None:
     """Bring everything up to date that follows from the links of linkages.
 
     Args:
-        bodies: `position` and `velocity` are written.
-        parts: `motion` is written.
-        segments: `line` and `bends.ends` are written.
+        linkages: `position` and `velocity` of `bodies`, `motion` of `parts`, `line` and `bends.ends` of `segments` are
+            written.
     """
     if linkages is None:
         return
-    links, shapes = linkages.links, linkages.shapes
+    links, shapes, bodies = linkages.links, linkages.shapes, linkages.bodies
+    parts, segments = linkages.parts, linkages.segments
     pose(shapes, links, linkages.parts, linkages.segments, None)
     for f in range(linkages.body.shape[0]):
         place, velocity, mass = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), 0.0
@@ -74,9 +74,9 @@ def pose_linkages(linkages: Any, bodies: Bodies, parts: Parts, segments: Segment
 
 
 @kernel
-def pose_linkages_from_python(linkages: Linkages, bodies: Bodies, parts: Parts, segments: Segments) -> None:
+def pose_linkages_from_python(linkages: Linkages) -> None:
     """Call `pose_linkages` from Python."""
-    pose_linkages(linkages, bodies, parts, segments)
+    pose_linkages(linkages)
 
 
 # -- rotations ---------------------------------------------------------------------------------------------------
