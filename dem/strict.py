@@ -18,6 +18,7 @@ _UNITS = {
     **{word: word for word in ("m", "s", "g", "w", "N", "J", "kg", "rad", "deg")},
     **{"hz": "Hz", "m3": "m³", "s2": "s²", "per": "/"},
 }
+_TAGS = ("type", "shape", "law")  # keys that say which member of a union a mapping is
 _OF_A_KEY = "[key]"  # last step of pydantic's path if the key itself is wrong
 # A message that begins with a key is about that key, within the place that pydantic reports.
 _OWN_KEY = re.compile(r"\w[\w.]*(?=: )")
@@ -198,11 +199,11 @@ def _text(kind: str, message: str, value: Any, context: Mapping[str, Any], unit:
 def _place(steps: Sequence[int | str], data: Any) -> tuple[str, bool]:
     """Return pydantic's path to a value as a key of the file, and whether the file holds the value.
 
-    In a discriminated union the path has an extra step, the value of `type` or `shape`, which is no key.
+    In a discriminated union the path has an extra step, the value of `type`, `shape` or `law`, which is no key.
     """
     node, keys, given = data, [], True
     for step in steps:
-        if isinstance(node, Mapping) and step not in node and step in (node.get("type"), node.get("shape")):
+        if isinstance(node, Mapping) and step not in node and step in map(node.get, _TAGS):
             continue
         if isinstance(node, Mapping) and isinstance(step, int):
             continue  # one item that the file gives without a list

@@ -1,8 +1,10 @@
 """Kinds of bodies in a pile, with the spheres that represent them, and the kind of each body."""
 
+from __future__ import annotations
+
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Protocol
 
@@ -11,6 +13,7 @@ import numpy as np
 from dem.arrays import Array, Numbers
 from dem.body.bars import Bars
 from dem.body.filament import Filament
+from dem.body.linkage import Linkage
 from dem.body.particle import HINGE_CLEARANCE, Particle, smallest_effective_mass
 
 
@@ -19,7 +22,11 @@ class Body(Protocol):
 
     @property
     def filament(self) -> Filament | None:
-        """Filament that a flexible body consists of; None for a rigid body."""
+        """Filament that a flexible body consists of; None for other bodies."""
+
+    @property
+    def linkage(self) -> Linkage | None:
+        """Links and joints of a chain; None for other bodies."""
 
     @property
     def mass(self) -> float:
@@ -63,8 +70,20 @@ class Kind:
     rows: int  #: Rows of spheres, or strands, side by side along the normal of each bar; 1 for a round section
     diameter: float  #: Diameter of a sphere, or strand [m]
     pitch: float  #: Largest distance of neighbouring spheres along a bar [m]
-    #: Filament of a flexible body, whose `bars` are its segments in the shape in which it is poured; None: rigid
+    #: Filament of a flexible body, whose `bars` are its segments in the shape in which it is poured; None: other bodies
     filament: Filament | None = None
+    linkage: Linkage | None = None  #: Links and joints if it is a linkage; its bars are then its links as poured
+
+    @property
+    def bends(self) -> bool:
+        """Whether the body changes its shape."""
+        return self.filament is not None or self.linkage is not None
+
+    @cached_property
+    def pieces(self) -> tuple[Kind, ...]:
+        """The links of a linkage as bodies by themselves; none of other bodies."""
+        own = () if self.linkage is None else self.linkage.links
+        return tuple(replace(self, name="link", bars=bars, linkage=None) for bars in own)
 
     @property
     def mass(self) -> float:
@@ -183,8 +202,18 @@ class Mixture:
 
     @property
     def flexible(self) -> bool:
-        """Whether the bodies are filaments; a pile has either filaments or rigid bodies."""
+        """Whether the bodies are filaments; a pile has only filaments, only linkages, or only rigid bodies."""
         return self.kinds[0].filament is not None
+
+    @property
+    def jointed(self) -> bool:
+        """Whether the bodies are linkages."""
+        return self.kinds[0].linkage is not None
+
+    @cached_property
+    def pieces(self) -> Mixture:
+        """The links of all kinds of linkages, kind by kind, as kinds of their own."""
+        return Mixture(tuple(piece for kind in self.kinds for piece in kind.pieces), np.zeros(0, np.int64))
 
     @cached_property
     def masses(self) -> Array:

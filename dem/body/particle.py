@@ -254,6 +254,10 @@ class Particle:
     def filament(self) -> None:
         """None: links are rigid."""
 
+    @property
+    def linkage(self) -> None:
+        """None: hinges are those of barbs."""
+
     @cached_property
     def _rows(self) -> Array:
         """(rows,) [m]: offsets of the rows of spheres along the normal; outermost spheres reach to ±t1/2."""

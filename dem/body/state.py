@@ -100,7 +100,11 @@ class BarState:
 
     def spheres(self) -> Array:
         """Return (N, S, 3) centres of all spheres [m]; a body with fewer than S spheres repeats its last one."""
-        raise NotImplementedError
+        sizes, rows = self.mixture.sizes[self.kind], []
+        for start, kind in zip(np.cumsum(sizes) - sizes, self._kinds, strict=True):
+            ends = self.segments[start + kind.links]
+            rows.append(ends[:, 0] + kind.stations[:, None] * (ends[:, 1] - ends[:, 0]))
+        return padded(rows) if rows else np.zeros((0, 1, 3))
 
     @property
     def count(self) -> int:
@@ -317,14 +321,6 @@ class FilamentState(BarState):
         rolls = (self.rolls[self._starts] / np.sqrt(squares))[:, None] * edges
         return np.asarray(rolls + np.cross(edges, opening) / squares[:, None])
 
-    def spheres(self) -> Array:
-        """Return (N, S, 3) centres of all spheres [m]; a body with fewer than S spheres repeats its last one."""
-        first, rows = self._begin[:-1] - np.arange(self.count), []
-        for start, kind in zip(first, self._kinds, strict=True):
-            ends = self.segments[start + kind.links]
-            rows.append(ends[:, 0] + kind.stations[:, None] * (ends[:, 1] - ends[:, 0]))
-        return padded(rows) if rows else np.zeros((0, 1, 3))
-
     @cached_property
     def _rolling(self) -> Array:
         """(M,) angular momenta of the segments about their axes [kg m²/s]."""
@@ -349,6 +345,79 @@ class FilamentState(BarState):
         """Return the potential energy of weight less buoyancy [J], 0 at `floor` [m]; gravity in m/s²."""
         shares = np.array([filament.weight_share for filament in self._filaments])
         return float((self._masses * shares * gravity * (self.positions[:, 2] - floor)).sum())
+
+
+@dataclass(frozen=True)
+class LinkageState(BarState):
+    """Poses and velocities of the M links of N linkages of several kinds, in the laboratory frame."""
+
+    mixture: Mixture
+    kind: Numbers  #: (N,) kind of each linkage
+    links: RigidState  #: Of all links, linkage by linkage, of the kinds `Mixture.pieces`
+
+    @property
+    def count(self) -> int:
+        """Number of linkages, N."""
+        return len(self.kind)
+
+    def _mean(self, values: Array) -> Array:
+        """Return the means (N, 3) over the mass of each linkage, of values (M, 3) of links."""
+        sizes, masses = self.mixture.sizes[self.kind], self.mixture.pieces.masses[self.links.kind]
+        sums = np.add.reduceat(masses[:, None] * values, np.cumsum(sizes) - sizes) if self.count else values[:0]
+        return np.asarray(sums / self._masses[:, None])
+
+    @cached_property
+    def positions(self) -> Array:  # type: ignore[override]
+        """(N, 3) centres of mass [m]."""
+        return self._mean(self.links.positions)
+
+    @cached_property
+    def velocities(self) -> Array:  # type: ignore[override]
+        """(N, 3) velocities of the centres of mass [m/s]."""
+        return self._mean(self.links.velocities)
+
+    @property
+    def segments(self) -> Array:
+        """(M, 2, 3) both ends of all links [m]."""
+        return self.links.segments
+
+    @cached_property
+    def gaps(self) -> Array:
+        """(N, 1) widest gap between ends of links at a joint of each linkage [m]."""
+        inner = np.flatnonzero(np.diff(self.body) == 0)
+        apart = np.linalg.norm(self.segments[inner + 1, 0] - self.segments[inner, 1], axis=1)
+        found = np.zeros((self.count, 1))
+        np.maximum.at(found[:, 0], self.body[inner], apart)
+        return found
+
+    @property
+    def normals(self) -> Array:
+        """(M, 3) unit vectors along the normal of each link; zeros where the section is round [1]."""
+        return self.links.normals
+
+    @property
+    def bar_velocities(self) -> Array:
+        """(M, 3) velocities of the links' centres [m/s]."""
+        return self.links.velocities
+
+    @property
+    def bar_spins(self) -> Array:
+        """(M, 3) angular velocities of the links [rad/s]."""
+        return self.links.spins
+
+    @property
+    def angular_momentum(self) -> Array:
+        """(3,) angular momentum of all linkages about the origin [kg m²/s]."""
+        return self.links.angular_momentum
+
+    @property
+    def kinetic_energy(self) -> float:
+        """Translational and rotational kinetic energy of all links [J]."""
+        return self.links.kinetic_energy
+
+    def potential_energy(self, gravity: float, floor: float) -> float:
+        """Return the gravitational energy [J] of all linkages, 0 at the height `floor` [m]; gravity in m/s²."""
+        return self.links.potential_energy(gravity, floor)
 
 
 @dataclass(frozen=True)

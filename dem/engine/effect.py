@@ -31,6 +31,7 @@ class EffectName(StrEnum):
     PLATE = "plate"
     GRIPS = "grips"
     FILAMENTS = "filaments"
+    JOINTS = "joints"
     ENERGIES = "energies"
     ENERGY_ACCOUNT = "energy account"
     SERIES = "series"

@@ -18,6 +18,7 @@ from dem.body.chain import Tie
 from dem.body.filament import Activity, FilamentEnergies
 from dem.body.forces import ContactForces
 from dem.body.kinds import Mixture
+from dem.body.linkage import Undulation
 from dem.body.particle import Particle
 from dem.body.placement import Poses
 from dem.body.state import PileState
@@ -43,6 +44,14 @@ class MotorReadings:
     torques: Array  #: Torques on the barbs since the last control update [N m]; positive torques increase the angle
     work: Array  #: Work on the links since the start, ∫ τ dα up to the last control update [J]
     halted: Flags  #: Whether the last control update halted a motor, or under "slip" and "servo" found it at its limit
+
+
+@dataclass(frozen=True, kw_only=True)
+class JointReadings:
+    """State of the joints of all linkages."""
+
+    motor_torque: float  #: Greatest torque of a motor about one axis in the last step [N m]
+    broken: int  #: Number of joints that are broken
 
 
 class Boundaries(Protocol):
@@ -223,42 +232,50 @@ class Strings(Protocol):
 
 
 class Filaments(Protocol):
-    """Filaments: their active bending, the grips that hold their nodes, and their energies."""
+    """Filaments or linkages: their active bending, the grips that hold their nodes or links, and their energies."""
 
-    def act(self, activity: Activity | None, *, ramp: float = 0.0) -> None:
-        """Set the preferred curvature of all filaments from now on.
+    def act(self, activity: Activity | Undulation | None, *, ramp: float = 0.0) -> None:
+        """Set the preferred curvature of all filaments, or the gait of all linkages, from now on.
 
         Args:
-            activity: wave of preferred curvature; None: the filaments' own preferred curvature.
-            ramp: time in which the new preferred curvature grows from 0 [s].
+            activity: wave of preferred curvature, or for linkages the gait of their motors; None: filaments return to
+                their own preferred curvature, linkages to the angles at the start.
+            ramp: time in which the new preferred curvature, or the swings, grow from 0 [s].
         """
 
     def points(self, filament: int) -> Array:
-        """Return the nodes (n, 3) of a filament [m]."""
+        """Return the nodes (n, 3) of a filament, or middles of the links of a linkage [m]."""
 
     def grip(self, nodes: Mapping[int, Sequence[int]]) -> int:
-        """Hold nodes by a new grip, which is at rest; return the number of the grip.
+        """Hold nodes or links by a new grip, which is at rest; return the number of the grip.
 
         Args:
-            nodes: numbers of the held nodes, by the number of their filament; -1 is a filament's last node.
+            nodes: numbers of the held nodes or links, by the number of their body; negative numbers count from its end.
         """
 
     def move(self, grip: int, velocity: tuple[float, float, float]) -> None:
         """Move a grip with a velocity [m/s] from now on."""
 
     def release(self, grip: int | None = None) -> None:
-        """Release all nodes that a grip holds; None: the nodes of all grips."""
+        """Release all nodes or links that a grip holds; None: those of all grips."""
 
     @property
     def held(self) -> int:
-        """Number of filaments of which at least one node is held by a grip."""
+        """Number of bodies of which a grip holds at least one node or link."""
 
     def force(self, grip: int | None = None) -> Array:
-        """Return the force (3,) of a grip on its nodes in the last step [N]; None: the sum over all grips."""
+        """Return the force (3,) of a grip on its nodes or links in the last step [N]; None: the sum over all grips."""
+
+    def mean_unbalanced(self) -> float:
+        """Return the mean net force on a body over its weight in the liquid [1]."""
+
+    @property
+    def joints(self) -> JointReadings | None:
+        """State of the joints of linkages; None for filaments."""
 
     @property
     def energies(self) -> FilamentEnergies:
-        """Energies of all filaments at present, and work on them since the start."""
+        """Energies of all bodies at present, and work on them since the start."""
 
 
 class Grips(Protocol):
@@ -355,7 +372,7 @@ class Engine(Protocol):
 
     @property
     def filaments(self) -> Filaments | None:
-        """Filaments; None where bodies are rigid."""
+        """Filaments, or linkages; None where bodies are rigid."""
 
     @property
     def grips(self) -> Grips | None:

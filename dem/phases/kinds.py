@@ -16,6 +16,7 @@ from dem.phases.shake import Shake
 from dem.phases.strain import Strain
 from dem.phases.take_over import TakeOver
 from dem.phases.tension import Tension
+from dem.phases.undulate import Undulate
 from dem.phases.wriggle import Wriggle
 
 AnyPhase = Annotated[
@@ -31,6 +32,7 @@ AnyPhase = Annotated[
     | Arrange
     | Strain
     | Wriggle
+    | Undulate
     | Lift
     | Release
     | Compress

@@ -1,4 +1,4 @@
-"""Phases that grip parts of filaments, or whole rigid bodies, raise them, and let them go."""
+"""Phases that grip nodes of filaments, links of chains, or whole rigid bodies, raise them, and release them."""
 
 import math
 from collections.abc import Iterator, Mapping
@@ -16,11 +16,11 @@ from dem.setting.part import Duration, Length, Part, Speed
 
 
 class Lift(Part, Phase):
-    """Grip parts of filaments, or rigid bodies, raise them at constant speed, and hold them until a `release`.
+    """Grip nodes of filaments, links of chains, or rigid bodies, raise them at constant speed, and hold them.
 
-    Of filaments nodes are gripped, and activity goes on. Rigid bodies are gripped as a whole, by their centre of mass,
-    and do not turn; smarticles are welded. The end piece itself touches nothing: it is where nodes or bodies are
-    gripped.
+    A `release` ends the hold. Filaments and chains go on with active bending. Rigid bodies are gripped as a whole, by
+    their centre of mass, and do not turn; smarticles are welded. The gripping end piece is not simulated as a body, so
+    that nothing touches it.
     """
 
     needs_links: ClassVar[str] = "a grip"
@@ -58,7 +58,7 @@ class Lift(Part, Phase):
         return self
 
     def check(self, scene: SceneView, index: int) -> Iterator[str]:
-        if _flexible(scene):
+        if _bends(scene):
             return
         if self.grips == "tails":
             yield f"phases.{index}.grips: tails are those of filaments; use near for rigid bodies"
@@ -72,7 +72,7 @@ class Lift(Part, Phase):
                 )
 
     def calls(self, scene: SceneView, index: int) -> Mapping[EffectName, str]:
-        if _flexible(scene):
+        if _bends(scene):
             return {}
         why = f"phase {index} raises one by {1e3 * self.distance_m:.3g} mm at {1e3 * self.speed_m_per_s:.3g} mm/s"
         return {EffectName.GRIPS: why}
@@ -102,9 +102,9 @@ class Lift(Part, Phase):
         return time_left(engine, memory["end"])
 
     def _grip(self, memory: Memory, index: int, engine: Engine) -> None:
-        """Grip nodes or bodies; warn if there are none."""
+        """Grip nodes, links or bodies; warn if there are none."""
         if engine.filaments is not None:
-            nodes, what = self._nodes(engine, engine.filaments), "filament has a node"
+            nodes, what = self._nodes(engine, engine.filaments), "body has a node or link"
             memory["grip"], empty = engine.filaments.grip(nodes), not nodes
         else:
             assert engine.grips is not None  # the scene calls for them
@@ -126,7 +126,7 @@ class Lift(Part, Phase):
         return (np.hypot(places[:, 0], places[:, 1]) <= radius) & (places[:, 2] - floor >= least)
 
     def _nodes(self, engine: Engine, filaments: Filaments) -> dict[int, list[int]]:
-        """Return the numbers of the nodes that are gripped, for each filament that has any."""
+        """Return the numbers of the nodes, or links, that are gripped, by the number of their filament or chain."""
         found = {}
         for k in range(engine.count):
             near = self._near(engine, filaments.points(k))
@@ -143,7 +143,7 @@ class Release(Part, Phase):
     type: Literal["release"]
 
     def check(self, scene: SceneView, index: int) -> Iterator[str]:
-        if not _flexible(scene) and not any(isinstance(phase, Lift) for phase in scene.phases[:index]):
+        if not _bends(scene) and not any(isinstance(phase, Lift) for phase in scene.phases[:index]):
             yield f"phases.{index}: release, but no phase before grips anything; add lift before, or leave it out"
 
     @property
@@ -155,12 +155,13 @@ class Release(Part, Phase):
         return 0.0
 
 
-def _flexible(scene: SceneView) -> bool:
-    return scene.mixture is not None and scene.mixture.flexible
+def _bends(scene: SceneView) -> bool:
+    """Return whether the bodies are filaments or chains."""
+    return scene.mixture is not None and (scene.mixture.flexible or scene.mixture.jointed)
 
 
 def _movers(engine: Engine) -> Filaments | Grips:
-    """Return what moves and releases grips: of filaments, or of rigid bodies."""
+    """Return the part of the engine that moves and releases grips: of filaments and chains, or of rigid bodies."""
     found = engine.filaments or engine.grips
     assert found is not None  # the scene was checked
     return found

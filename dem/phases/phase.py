@@ -74,7 +74,8 @@ class Phase:
     actuates: ClassVar[bool] = False  #: Whether motors move or hold the barbs
     begins: ClassVar[bool] = False  #: Whether the phase adds the bodies, which only the first phase of a run does
     of_smarticles: ClassVar[bool] = False  #: Whether the phase needs smarticles
-    of_filaments: ClassVar[bool] = False  #: Whether the phase needs filaments
+    bends: ClassVar[frozenset[str]] = frozenset()
+    """Shapes of bodies that change their shape, of which the phase needs at least one; empty: it needs none."""
     sources: ClassVar[frozenset[str]] = frozenset()
     """Keys that locate content, such as `run`; the scene's hash has the content's hash in their place."""
     at_rest: ClassVar[bool] = False

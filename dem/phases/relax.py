@@ -10,7 +10,7 @@ from dem.setting.part import Duration, Part
 
 
 class Relax(Part, Phase):
-    """Let the pile rest under gravity, with smarticles welded and without active bending of filaments."""
+    """Let the pile rest under gravity, with smarticles welded, filaments without active bending, chains as poured."""
 
     planar: ClassVar[bool | None] = None
     at_rest: ClassVar[bool] = True

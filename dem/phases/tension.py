@@ -55,8 +55,8 @@ class Tension(Part, Phase):
         return self
 
     def check(self, scene: SceneView, index: int) -> Iterator[str]:
-        if scene.mixture is not None and scene.mixture.flexible:
-            yield f"phases.{index}: tension holds rigid bodies, but particle has filaments; use lift, which grips nodes"
+        if scene.mixture is not None and (scene.mixture.flexible or scene.mixture.jointed):
+            yield f"phases.{index}: tension holds rigid bodies, but particle has others; use lift, which grips parts"
         if self.axis != "z" and not any(phase.frees for phase in scene.phases[:index]):
             yield (
                 f"phases.{index}.axis: a pull along {self.axis} would end at the wall; take it away by "

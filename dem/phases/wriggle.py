@@ -20,7 +20,7 @@ class Wriggle(Part, Phase):
     Waves begin at random phases, and go on in later phases until the next `wriggle` or `relax`.
     """
 
-    of_filaments: ClassVar[bool] = True
+    bends: ClassVar[frozenset[str]] = frozenset({"filament"})
     type: Literal["wriggle"]
     duration_s: Duration = Field(..., description="length of the phase [s]")
     curvature_per_m: float = Field(..., ge=0, le=1e5, description="amplitude of the preferred curvature [1/m]")

@@ -31,6 +31,8 @@ def typical_effective_mass(body: Body) -> float:
     """
     if body.filament is not None:  # only what is near the contact gives way
         return body.filament.effective_mass
+    if body.linkage is not None:
+        return body.linkage.effective_mass
     inverse = 1.0 / body.inertia
     x, y, z = body.centres.T
     rotation = (inverse[0] * (y**2 + z**2) + inverse[1] * (x**2 + z**2) + inverse[2] * (x**2 + y**2)) / 3

@@ -24,6 +24,7 @@ ADDS: Mapping[EffectName, Adds] = {
         series=tuple(columns.RELEASE_COLUMNS), python="checks the pile's top every 10 ms while the wall is lifted"
     ),
     EffectName.FILAMENTS: Adds(series=tuple(columns.FILAMENT_COLUMNS)),
+    EffectName.JOINTS: Adds(series=tuple(columns.JOINT_COLUMNS)),
     EffectName.ENERGIES: Adds(series=tuple(columns.ENERGY_COLUMNS)),
     EffectName.ENERGY_ACCOUNT: Adds(series=tuple(columns.LEDGER_COLUMNS)),
     EffectName.SERIES: Adds(
@@ -120,6 +121,7 @@ def _reasons(scene: Scene) -> Mapping[EffectName, tuple[bool, str]]:
         EffectName.PLATE: phases(EffectName.PLATE, "no phase of type compress"),
         EffectName.GRIPS: phases(EffectName.GRIPS, "no phase of type tension"),
         EffectName.FILAMENTS: _filaments(scene),
+        EffectName.JOINTS: _joints(scene),
         EffectName.ENERGIES: (recording.energies, energies),
         EffectName.ENERGY_ACCOUNT: every("dissipation_interval_s", "dissipation is sampled"),
         EffectName.SERIES: every("series_interval_s", "a sample"),
@@ -174,6 +176,15 @@ def _filaments(scene: Scene) -> tuple[bool, str]:
         around = f"a liquid of {liquid.density_kg_per_m3:g} kg/m³ and {liquid.viscosity_Pa_s:g} Pa s"
     segments = scene.mixture.mean([len(kind.bars.points) for kind in scene.mixture.kinds])
     return True, f"{segments:g} segments each; {around}"
+
+
+def _joints(scene: Scene) -> tuple[bool, str]:
+    linkages = [] if scene.mixture is None else [kind.linkage for kind in scene.mixture.kinds if kind.linkage]
+    if not linkages:
+        return False, "particle has no shape chain"
+    joints = [joint for linkage in linkages for joint in linkage.joints]
+    laws = {law: sum(joint.law == law for joint in joints) for law in ("free", "elastic", "motor")}
+    return True, ", ".join(f"{number} {law}" for law, number in laws.items() if number) + " of all kinds of chains"
 
 
 def _hooks(scene: Scene, pulls: str) -> tuple[bool, str]:

@@ -13,7 +13,7 @@ from dem.scene.stiffness import expected_overlaps, too_soft
 from dem.setting.fidelity import Fidelity
 from dem.setting.protocol import PARTS, PROTOCOLS, applies
 
-SHORT_STEP = 1e-6  # s; filaments that need shorter steps are warned about
+SHORT_STEP = 1e-6  # s; filaments and chains that need shorter steps are warned about
 _LEFT_OUT = {
     "series_interval_s": "one sample is taken, at the start",
     "frame_interval_s": "no frame is written",
@@ -212,12 +212,17 @@ def warnings_of(scene: Scene) -> tuple[str, ...]:
 
 
 def _step_warnings(scene: Scene) -> tuple[str, ...]:
-    """Return a one-line warning if stiffness or damping of filaments needs very short steps; () otherwise."""
-    if scene.mixture is None or not scene.mixture.flexible:
+    """Return a one-line warning if filaments or joints need very short steps, else ()."""
+    if scene.mixture is None or not (scene.mixture.flexible or scene.mixture.jointed):
         return ()
     step = min(time_steps(scene))
     if step >= SHORT_STEP:
         return ()
+    if scene.mixture.jointed:
+        return (
+            f"particle.joints: they need time steps of {step:.2g} s, {1 / step:.2g} for a second; use less stiffness "
+            "and damping, or thicker links, or axes that do not turn links about themselves",
+        )
     return (
         f"particle.young_modulus_Pa: filaments need time steps of {step:.2g} s, {1 / step:.2g} for a second; make them "
         "softer, with less stretching_time_s and bending_time_s, or of fewer segments",

@@ -131,9 +131,22 @@ FILAMENT_COLUMNS = _columns(
     grip_force_N="force of all grips on the filaments (x, y, z), in the last step",
     gripped_count="filaments that a grip holds",
 )
+# In scenes with chains of links.
+JOINT_COLUMNS = _columns(
+    joint_energy_J="energy of elastic joints; hinge_elastic_energy_J has it, too",
+    pin_energy_J="energy of the springs that keep joints together; hinge_elastic_energy_J has it, too",
+    pin_gap_m="widest gap between ends of links at a joint",
+    joint_motor_torque_N_m="greatest torque of a joint's motor, in the last step",
+    joint_motor_work_J="work of the motors of joints, since the start",
+    broken_joints="joints that are broken",
+    held_work_J="work of grips on chains since the start; container_work_J has it, too",
+    held_force_N="force of all grips on the chains (x, y, z), in the last step",
+    held_count="chains that a grip holds",
+)
 EVERY: Columns = {
     **{**COLUMNS, **MOTOR_COLUMNS, **ENERGY_COLUMNS, **LEDGER_COLUMNS},
-    **{**HOOK_COLUMNS, **PLATE_COLUMNS, **GRIP_COLUMNS, **RELEASE_COLUMNS, **STRAIN_COLUMNS, **FILAMENT_COLUMNS},
+    **{**HOOK_COLUMNS, **PLATE_COLUMNS, **GRIP_COLUMNS, **RELEASE_COLUMNS, **STRAIN_COLUMNS},
+    **{**FILAMENT_COLUMNS, **JOINT_COLUMNS},
 }
 """Columns of all scenes together."""
 

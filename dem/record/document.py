@@ -71,7 +71,12 @@ class Kind(Document):
 
     @property
     def flexible(self) -> bool:
-        """Whether the bodies are filaments."""
+        """Whether the bodies are filaments or chains, which change their shape."""
+        return self.shape in ("filament", "chain")
+
+    @property
+    def capped(self) -> bool:
+        """Whether round caps reach beyond the ends of the bodies."""
         return self.shape == "filament"
 
 

@@ -26,6 +26,9 @@ from dem.run.watchdog import Watchdog
 from dem.scene.reading import scene_hash
 from dem.scene.scene import Scene
 
+PIN_LIMIT = (
+    0.5  # gap at a joint of chains, whose pins give way about as contacts do; wider ones would let links through
+)
 GAP_LIMIT = 0.2  # gap of a hinge in sphere diameters; it is up to 0.01 in a pile and 0.02 at an impact of 3 m/s
 SPEED_MARGIN = 5.0  # limit of speeds, over the speed of a fall over the container's height or of the shaking
 # Overlap in sphere diameters, from which on the forces of wall and floor decrease or point outwards, and chains slip
@@ -123,7 +126,7 @@ def build_watchdog(scene: Scene) -> Watchdog:
     return Watchdog(
         cylinder=scene.cylinder,
         speed=SPEED_MARGIN * max(fall, fastest),
-        gap=GAP_LIMIT * diameter,
+        gap=(PIN_LIMIT if scene.mixture is not None and scene.mixture.jointed else GAP_LIMIT) * diameter,
         depth=(BARRIER_LIMIT if scene.smooth else DEPTH_LIMIT) * diameter,
         missed=MISSED_LIMIT if scene.smooth else math.inf,
         # Without gravity no height corresponds to an energy.

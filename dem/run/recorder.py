@@ -10,7 +10,7 @@ import meshio
 from numpy.typing import NDArray
 
 from dem.arrays import Array
-from dem.body.state import PileState
+from dem.body.state import LinkageState, PileState
 from dem.engine.interface import Engine
 from dem.record.forces import force_mesh
 from dem.record.frame import centreline_mesh, motor_fields, segment_mesh, sphere_mesh
@@ -84,6 +84,7 @@ class Recorder:
             elastic = extremes.elastic_energy
         else:
             gaps = engine.motors.gaps() if engine.motors.articulated else None
+            gaps = state.gaps if isinstance(state, LinkageState) else gaps
             watchdog.check(state, floor=floor, time=time, points=self.points(state), raised=raised, gaps=gaps)
             overlaps = engine.overlaps(watchdog.depth)
             watchdog.check_depths(overlaps, time=time)

@@ -9,9 +9,9 @@ import numpy as np
 
 from dem.arrays import Array
 from dem.body.chain import extent
-from dem.body.state import PileState
+from dem.body.state import LinkageState, PileState
 from dem.engine.effect import EffectName
-from dem.engine.interface import Engine, Filaments, Grips
+from dem.engine.interface import Engine, Filaments, Grips, JointReadings
 from dem.plan.effects import ADDS
 from dem.record.columns import COLUMNS, EVERY, GRIP_COLUMNS, STRAIN_COLUMNS, Columns
 from dem.record.packing import packing_fraction
@@ -86,7 +86,8 @@ class Sampler:
         if EffectName.MOTORS in self.effects:
             row |= _motor_row(engine, state)
         if engine.filaments is not None:
-            row |= _filament_row(engine.filaments)
+            joints = engine.filaments.joints
+            row |= _filament_row(engine.filaments) if joints is None else _joint_row(engine.filaments, joints, state)
         if EffectName.ENERGIES in self.effects:
             row |= {
                 "gravitational_energy_J": state.potential_energy(engine.gravity, 0.0),
@@ -201,10 +202,26 @@ def _filament_row(filaments: Filaments) -> dict[str, Any]:
     }
 
 
+def _joint_row(linkages: Filaments, joints: JointReadings, state: PileState) -> dict[str, Any]:
+    assert isinstance(state, LinkageState)
+    energies = linkages.energies
+    return {
+        "joint_energy_J": energies.bending,
+        "pin_energy_J": energies.stretching + energies.twisting,
+        "pin_gap_m": state.gaps.max(initial=0.0),
+        "joint_motor_torque_N_m": joints.motor_torque,
+        "joint_motor_work_J": energies.active,
+        "broken_joints": joints.broken,
+        "held_work_J": energies.gripped,
+        "held_force_N": linkages.force(),
+        "held_count": linkages.held,
+    }
+
+
 def _ledger_row(engine: Engine, row: Mapping[str, Any]) -> dict[str, Any]:
     contacts, hinges = engine.ledger.elastic()
     given = engine.ledger.added + row.get("motor_work_J", 0.0) + row["container_work_J"]
-    given += row.get("active_work_J", 0.0)
+    given += row.get("active_work_J", 0.0) + row.get("joint_motor_work_J", 0.0)
     stored = row["kinetic_energy_J"] + row["gravitational_energy_J"] + contacts + hinges
     return {
         "added_energy_J": engine.ledger.added,

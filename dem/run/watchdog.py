@@ -70,7 +70,7 @@ class Watchdog:
                 underestimates overlaps beyond wall or floor.
             raised: distance by which the upper hook may have lifted bodies since the start [m]; None: the wall does not
                 enclose the pile, and only the floor bounds it.
-            gaps: (N, 2) distances between the links of each hinge [m]; None while welded.
+            gaps: (N, k) distances between the links of each hinge or joint of a body [m]; None: none can open.
         """
         positions = state.positions
         speeds = state.speeds
@@ -90,7 +90,7 @@ class Watchdog:
                 (~np.less_equal(gaps, self.gap)).any(axis=1),
                 time,
                 f"links more than {self.gap:.3g} m apart at a hinge (most {gaps.max(initial=0):.3g} m)",
-                f"{LOWER_STEP}, or raise fidelity.hinge_stiffness_N_per_m",
+                f"{LOWER_STEP}, or raise fidelity.hinge_stiffness_N_per_m (of chains particle.pin_stiffness_N_per_m)",
             )
         points = positions[:, None] if points is None else points
         above = points[..., 2] - floor

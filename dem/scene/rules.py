@@ -18,7 +18,7 @@ def problems(scene: SceneView, engine: str) -> Iterator[str]:
     """Yield an error message for each problem of a scene on an engine: key, value and what to do."""
     if scene.mixture is not None:
         yield from _of_particle(scene)
-    yield from _of_filaments(scene, engine)
+    yield from _of_bending(scene, engine)
     if scene.plane is None:
         yield from _of_order(scene)
         yield from _of_container(scene)
@@ -87,29 +87,31 @@ def _of_particle(scene: SceneView) -> Iterator[str]:
             )
 
 
-def _of_filaments(scene: SceneView, engine: str) -> Iterator[str]:
-    """Yield an error for each key or phase that does not go with filaments, or that needs them and has none."""
-    mixture = scene.mixture
-    flexible = [kind.filament is not None for kind in mixture.kinds] if mixture is not None else [False]
-    if not any(flexible):
-        if scene.liquid is not None:
-            yield "liquid: only filaments float in it; add particle: {shape: filament, …}, or leave liquid out"
-        for index, phase in enumerate(scene.phases):
-            if phase.of_filaments:
-                yield (
-                    f"phases.{index}: {phase.kind} needs filaments; add particle: {{shape: filament, …}}, or leave the "
-                    "phase out"
-                )
+def _of_bending(scene: SceneView, engine: str) -> Iterator[str]:
+    """Yield an error for each key or phase that does not go with filaments or chains, or that needs them."""
+    kinds = () if scene.mixture is None else scene.mixture.kinds
+    shapes = {kind.name if kind.bends else "" for kind in kinds} or {""}
+    if scene.liquid is not None and "filament" not in shapes:
+        yield "liquid: only filaments float in it; add particle: {shape: filament, …}, or leave liquid out"
+    for index, phase in enumerate(scene.phases):
+        if phase.bends and not shapes & phase.bends:
+            named = " or ".join(sorted(phase.bends))
+            yield (
+                f"phases.{index}: {phase.kind} needs {named}s; add particle: {{shape: {named}, …}}, or leave the "
+                "phase out"
+            )
+    if shapes == {""}:
         return
+    bent = max(shapes)
     if engine != "links":
-        yield f"particle: filament on engine: {engine}, whose bodies are rigid; use engine: links"
-    if not all(flexible):
-        yield "particle: filaments and rigid shapes do not mix; use shapes that are all filament, or none of them"
+        yield f"particle: {bent} on engine: {engine}, whose bodies are rigid; use engine: links"
+    if len(shapes) > 1:
+        yield f"particle: {bent}s and other shapes do not mix; use shapes that are all {bent}, or none of them"
     if scene.recording.contact_forces:
-        yield "recording.contact_forces: forces at contacts of filaments are not recorded; leave it out"
+        yield f"recording.contact_forces: forces at contacts of {bent}s are not recorded; leave it out"
     for index, phase in enumerate(scene.phases):
         if phase.kind == "take-over":
-            yield f"phases.{index}: take-over reads runs of rigid bodies only; pour the filaments by 'deposit'"
+            yield f"phases.{index}: take-over reads runs of rigid bodies only; pour the {bent}s by 'deposit'"
 
 
 def _of_section(scene: SceneView) -> Iterator[str]:

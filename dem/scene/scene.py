@@ -38,7 +38,7 @@ from dem.setting.part import REFERENCE_ASPECT_RATIO, Part
 from dem.setting.plane import Channel, Plane
 from dem.setting.protocol import Protocol, with_protocol
 from dem.setting.recording import Recording
-from dem.setting.shapes import AnyShape, Flexible, Shaped, listed, numbers_of_shapes
+from dem.setting.shapes import AnyShape, Chain, Flexible, Shaped, listed, numbers_of_shapes
 from dem.setting.smarticle import Smarticle
 from dem.strict import explained
 
@@ -312,7 +312,7 @@ class Scene(Part):
 
     @property
     def wave_seed(self) -> int:
-        """Seed of the waves of actively bending filaments."""
+        """Seed of the waves of actively bending filaments and chains."""
         return self.seed_for("waves") % 2**32  # exact in an array of floats
 
     @property
@@ -380,14 +380,18 @@ class Scene(Part):
     def _kind(self, shape: Shaped, factor: float) -> Kind:
         bars = shape.bars(factor)
         normal, in_plane = bars.thickness_normal, bars.thickness_in_plane
-        # Rows have a meaning only across the wide side of a flat section.
-        rows = self.fidelity.rows if normal > (self.fidelity.diameter_m or in_plane) and not bars.round else 1
+        linkage = shape.linkage(factor) if isinstance(shape, Chain) else None
+        # Rows have a meaning only across the wide side of a flat section; links of a chain have one.
+        wide = normal > (self.fidelity.diameter_m or in_plane) and not bars.round and linkage is None
+        rows = self.fidelity.rows if wide else 1
         diameter = self._diameter_of(normal, in_plane, rows, disc=bars.round)
         filament = None
         if isinstance(shape, Flexible):
             filament = shape.filament(factor, None if self.liquid is None else self.liquid.immersing)
         pitch = self._pitch * diameter
-        return Kind(name=shape.tag(), bars=bars, rows=rows, diameter=diameter, pitch=pitch, filament=filament)
+        return Kind(
+            name=shape.tag(), bars=bars, rows=rows, diameter=diameter, pitch=pitch, filament=filament, linkage=linkage
+        )
 
     @property
     def model(self) -> Particle | Mixture:

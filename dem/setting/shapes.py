@@ -11,8 +11,10 @@ from scipy.special import ndtri
 from dem.arrays import Array
 from dem.body.bars import Bars
 from dem.body.filament import Filament, Liquid, PreferredCurvature
+from dem.body.linkage import Linkage, layout_of, link_of
 from dem.errors import InputError
-from dem.setting.part import LONGEST_LENGTH, Density, Length, Part
+from dem.setting.joints import AnyJoint
+from dem.setting.part import LONGEST_LENGTH, Density, Length, Part, Stiffness
 
 SIZES = 16  # equally frequent lengths that stand in for a spread of lengths
 NORMAL, IN_PLANE = 1.27e-3, 0.5e-3  # m, the section of the paper's smarticles
@@ -344,8 +346,68 @@ class Flexible(Shaped):
         )
 
 
+def _as_list(value: Any) -> Any:
+    return value if isinstance(value, list | tuple) else (value,)
+
+
+class Chain(Shaped):
+    """Rigid links joined end to end, with a law at each joint, on the engine links."""
+
+    shape: Literal["chain"]
+    links: Annotated[int, Field(ge=2, le=200)] | None = Field(
+        None, description="number of links of one length [1]; default: that of the lengths in link_m"
+    )
+    link_m: Annotated[tuple[Length, ...], BeforeValidator(_as_list, json_schema_input_type=Length | list[Length])] = (
+        Field(
+            ..., min_length=1, max_length=200, description="lengths of the links, from joint to joint, one or all [m]"
+        )
+    )
+    joints: Annotated[
+        tuple[AnyJoint, ...], BeforeValidator(_as_list, json_schema_input_type=AnyJoint | list[AnyJoint])
+    ] = Field(..., min_length=1, max_length=199, description="one joint for all places between links, or one for each")
+    pin_stiffness_N_per_m: Stiffness | None = Field(
+        None,
+        description="stiffness of the springs that keep ends of links together, and links in line where they cannot "
+        "turn [N/m]; default: twice that of contacts",
+    )
+
+    def layout(self) -> tuple[Array, Array]:  # noqa: D102
+        return layout_of(self._lengths, [joint.joint() for joint in self._all_joints])
+
+    @property
+    def _lengths(self) -> tuple[float, ...]:
+        number, given = self.links or len(self.link_m), self.link_m
+        if len(given) not in (1, number):
+            raise InputError(f"link_m: {len(given)} lengths for links: {number}; give one for all, or leave links out")
+        if number < 2:
+            raise InputError("links: one link is no chain; give links: 2 or more, or a list link_m")
+        return given * number if len(given) == 1 else given
+
+    @property
+    def _all_joints(self) -> tuple[AnyJoint, ...]:
+        return self.joints * (len(self._lengths) - 1) if len(self.joints) == 1 else self.joints
+
+    def linkage(self, factor: float) -> Linkage:
+        """Return links and joints, with the lengths of links multiplied by a factor [1]."""
+        body = self.bars(factor)
+        return Linkage(
+            links=tuple(
+                link_of(
+                    factor * length,
+                    thickness_normal=body.thickness_normal,
+                    thickness_in_plane=body.thickness_in_plane,
+                    density=body.density,
+                    disc=body.round,
+                )
+                for length in self._lengths
+            ),
+            joints=tuple(joint.joint() for joint in self._all_joints),
+            pin_stiffness=self.pin_stiffness_N_per_m,
+        )
+
+
 AnyShape = Annotated[
-    Rod | Staple | Z | S | Hook | C | Cross | Star | Ring | Free | Flexible,
+    Rod | Staple | Z | S | Hook | C | Cross | Star | Ring | Free | Flexible | Chain,
     Field(discriminator="shape"),
 ]
 SHAPES = get_args(get_args(AnyShape)[0])

@@ -13,7 +13,7 @@ Schema = Mapping[str, Any]
 
 _UNIT = re.compile(r"\s*\[([^\[\]]{1,20})\]")
 _LIMITS = {"minimum": "≥", "exclusiveMinimum": ">", "maximum": "≤", "exclusiveMaximum": "<"}
-TAGS = ("type", "shape")  # keys that say which of several mappings one is
+TAGS = ("type", "shape", "law")  # keys that say which of several mappings one is
 _TYPES = {"number": "number", "integer": "whole number", "string": "text", "boolean": "true or false", "null": "null"}
 _HEAD = ("key", "type", "unit", "range", "default", "meaning")
 
@@ -73,9 +73,11 @@ def _table(definition: Schema) -> str:
 
 
 def _options(entry: Schema) -> Iterator[Schema]:
-    """Yield the alternative types of an entry of the schema, without null."""
+    """Yield the alternative types of an entry of the schema, those inside alternatives included, without null."""
     for option in entry.get("anyOf", [entry]):
-        if option.get("type") != "null":
+        if "anyOf" in option:
+            yield from _options(option)
+        elif option.get("type") != "null":
             yield option
 
 

@@ -26,6 +26,7 @@ _SETS = (
     ("In scenes that take the container away", "RELEASE_COLUMNS"),
     ("In scenes that strain a chain", "STRAIN_COLUMNS"),
     ("In scenes of filaments", "FILAMENT_COLUMNS"),
+    ("In scenes of chains of links", "JOINT_COLUMNS"),
 )
 
 

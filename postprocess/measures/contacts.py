@@ -131,7 +131,7 @@ def strands_of(frame: Frame, run: Run) -> Strands:
     own = np.repeat(np.arange(len(kind)), [len(offsets[k]) for k in kind])
     aside = np.concatenate([np.zeros(0), *(offsets[k] for k in kind)])
     # The round caps of filaments reach beyond their ends.
-    caps = np.array([one.flexible for one in kinds])[kind]
+    caps = np.array([one.capped for one in kinds])[kind]
     inner = inner_axes(frame.segments, np.where(caps, 0.0, diameter / 2))
     axes = inner[own] + (aside[:, None] * frame.bars.normals[own])[:, None]
     return Strands(axes, frame.body[own], frame.link[own], diameter[own])

@@ -117,7 +117,7 @@ def rigid_in_space(run: Run) -> bool:
 
 
 def is_flexible(run: Run) -> bool:
-    """Return whether the bodies of a run are filaments."""
+    """Return whether the bodies of a run are filaments or chains of links."""
     return any(kind.flexible for kind in run.manifest.kinds or ())
 
 

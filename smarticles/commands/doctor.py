@@ -106,6 +106,8 @@ _COMPILED = (
     ("chain of robots, strings", "chain", ("fidelity.rows=1",)),
     ("filaments", "worms", ()),
     ("filaments; dissipation recorded", "worms", (_LEDGER,)),
+    ("chains of links", "snakes", ()),
+    ("chains of links; dissipation recorded", "snakes", (_LEDGER,)),
 )
 
 

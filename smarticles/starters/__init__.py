@@ -39,7 +39,7 @@ BODIES: Mapping[str, tuple[str, str]] = MappingProxyType(
 )
 """Descriptions and values of the key `particle`, by kind."""
 
-KINDS = ("shaken", "actuated", "hook", "melting", "casting", "collapse", "chain", "worms", *BODIES)
+KINDS = ("shaken", "actuated", "hook", "melting", "casting", "collapse", "chain", "worms", "snakes", *BODIES)
 """Kinds in the order of the help; the first is the default."""
 
 

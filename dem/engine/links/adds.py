@@ -26,6 +26,9 @@ ADDS: Mapping[EffectName, Adds] = {
     EffectName.FILAMENTS: Adds(
         engines=("move_segments", "push_nodes", "kick_nodes", "drift_nodes"), python="bends between all segments"
     ),
+    EffectName.JOINTS: Adds(
+        engines=("pose_linkages", "push_joints", "kick_links", "drift_links"), python="every joint twice in a step"
+    ),
     EffectName.ENERGY_ACCOUNT: Adds(engines=("settle",), python="every contact's velocity twice in a step"),
     EffectName.CHECKPOINTS: Adds(python="copies all arrays once per checkpoint"),
 }
@@ -33,15 +36,19 @@ ADDS: Mapping[EffectName, Adds] = {
 ORDER = (
     "pose",
     "move_segments",
+    "pose_linkages",
     "update_lists",
     "push_apart",
     "push_boundaries",
     "pull",
     "push_nodes",
+    "push_joints",
     "kick",
     "hold",
     "kick_nodes",
+    "kick_links",
     "settle",
     "drift",
     "drift_nodes",
+    "drift_links",
 )

@@ -285,6 +285,38 @@ class Grips(NamedTuple):
 PER_GRIP = ("speed", "moved", "force", "sums")  # fields of `Grips` with a row for each grip
 
 
+class Linkages(NamedTuple):
+    """F linkages with L links in all. A joint has the number of the link before it; the last link of each has none.
+
+    A link is a body by itself in `links`, moved by the kernels of rigid bodies; its part and its segment have its
+    number. See `dem.engine.links.motion.joining` for the columns.
+    """
+
+    body: Indices  #: (F,) body that each linkage is
+    begin: Indices  #: (F + 1,) where the links of each begin
+    gait: Array  #: (F, GAIT) time of the motors' waves, as that of filaments
+    law: NDArray[np.int64]  #: (L,) of each joint, see `joining.FREE`
+    axes: NDArray[np.int64]  #: (L,) number of axes of each joint; 3 of a broken one
+    row: Array  #: (L, JOINT) constants of each joint
+    swing: Array  #: (L, 3, SWING) motion of the motor about each axis
+    rest: Array  #: (L, 4) angles at rest [rad]; of joints with three axes a quaternion [1]
+    command: Array  #: (L, 3) angles that motors hold [rad]
+    angle: Array  #: (L, 3) angles in the last step [rad]
+    torque: Array  #: (L, 3) of spring, dashpot or motor about each axis in the last step [N m]
+    broken: NDArray[np.uint8]  #: (L,) whether a joint is broken
+    driven: NDArray[np.int64]  #: (1,) number of joints with motors
+    lost: Array  #: (L, LOST) scratch: what takes and gives energy in a step
+    grip: NDArray[np.int64]  #: (L,) number of the grip that holds a link, plus 1; 0: free
+    grip_speed: Array  #: (G, 3) velocities of the grips [m/s]
+    grip_force: Array  #: (G, 3) forces of the grips on their links in the last step [N]
+    sums: Array  #: (SUMS,) see `dem.engine.links.motion.bending.DAMPED`
+    links: Bodies  #: The links
+    shapes: Shapes  #: Of the links of all kinds, kind by kind
+    bodies: Any  #: `Bodies` that the linkages are
+    parts: Any  #: `Parts` by link, which share their arrays with those of the bodies
+    segments: Any  #: `Segments` by link, likewise
+
+
 class System(NamedTuple):
     """All data of one simulation that kernels read or write."""
 
@@ -304,7 +336,8 @@ class System(NamedTuple):
     cords: Any  #: `Cords`; None if no string is tied
     #: (n, LEDGER) forces that dissipate energy, see `contact.pairs.enter`; None if dissipation is not recorded
     ledger: Any
-    filaments: Any  #: `Filaments`; None where no body is flexible
+    filaments: Any  #: `Filaments`; None if no body is a filament
+    linkages: Any  #: `Linkages`; None if no body is a linkage
     grips: Any  #: `Grips`; None in scenes without grips of rigid bodies
 
 

@@ -31,6 +31,9 @@ RATES: Mapping[Activity, Rates] = {
 }
 LOOK = 2.4e-7  # s per control update of a smarticle
 BENDS = 1.2  # cost of a filament's segment over that of a smarticle's link, of 480 each with 5.7 neighbours of a body
+# Cost of a link of a chain over that of a smarticle's link, of 300 each at rest with 5.3 and 6.8 to 10.5 neighbours of
+# a body: 1.6 to 1.9 with free joints or motors, of one to three axes, while other work used both cores.
+JOINS = 1.8
 RIM = 1.1e-7  # s per edge of a wall of tiers, smarticle and step
 # Cost of a sample and of a frame [s]: a constant, and an addition per smarticle.
 SAMPLE, FRAME = (1e-4, 1e-6), (1.5e-3, 1.5e-5)
@@ -61,7 +64,7 @@ def seconds_per_second(scene: Demand, time_step: float, activity: Activity) -> f
         links, strands = 1.0 if scene.smarticle.boxes.barb_length > 0 else 1 / 3, float(scene.fidelity.rows)
     else:  # bars of a body, over a smarticle's three
         links = mixture.mean([len(kind.bars.points) / 3 for kind in mixture.kinds])
-        links *= BENDS if mixture.flexible else 1.0
+        links *= BENDS if mixture.flexible else JOINS if mixture.jointed else 1.0
         strands = mixture.mean([kind.rows for kind in mixture.kinds])
     per_step = rates.step * (1 + MORE_CONTACTS * (1 - 1 / strands)) + RIM * strands * len(scene.cylinder.upper)
     each = links * (per_step / time_step + rates.second * strands**MORE_PAIRS)

@@ -17,14 +17,15 @@ from dem.body.forces import ContactForces, contacts_of_points
 from dem.body.kinds import Mixture
 from dem.body.particle import Particle
 from dem.body.placement import Poses
-from dem.body.state import PileState
-from dem.engine.interface import Saved
+from dem.body.state import LinkageState, PileState
+from dem.engine.interface import Filaments, Saved
 from dem.engine.links.boundaries import LinksBoundaries, ground_for
 from dem.engine.links.contact import queries
 from dem.engine.links.contact.queries import BETWEEN, DEEPEST, ELASTIC, FASTEST, HIGHEST, LOWEST, WIDEST
 from dem.engine.links.filaments import LinksFilaments
 from dem.engine.links.grips import LinksGrips
 from dem.engine.links.ledger import LinksLedger
+from dem.engine.links.linkages import LinksLinkages
 from dem.engine.links.motors import LinksMotors
 from dem.engine.links.stepping import LOST
 from dem.engine.links.strings import LinksStrings
@@ -52,7 +53,7 @@ class LinksEngine:
     """`dem.engine.interface.Engine` on links.
 
     Args:
-        particle: one smarticle, or a mixture of rigid bodies or of filaments.
+        particle: one smarticle, or a mixture of rigid bodies, of filaments or of linkages.
         cylinder: the container; its floor is at z = 0 at the start.
         law: contact law.
         gravity: g, downwards [m/s²].
@@ -63,7 +64,7 @@ class LinksEngine:
         hooks: the lower and the upper hook; None: no hooks.
         channel: table and walls instead of the container; all motion is then confined to a plane.
         strengths: (N, 2) factors on torque limit and stiffness of the motors [1]; None: 1 for all motors.
-        wave_seed: seed of the waves of actively bending filaments.
+        wave_seed: seed of the waves of actively bending filaments and linkages.
         gripped: whether grips will hold rigid bodies.
     """
 
@@ -107,7 +108,11 @@ class LinksEngine:
         if gripped:
             self._world.allow_grips()
         self.grips = LinksGrips(self._world) if gripped else None
-        self.filaments = LinksFilaments(self._world) if self._world.filaments is not None else None
+        self.filaments: Filaments | None = None
+        if self._world.filaments is not None:
+            self.filaments = LinksFilaments(self._world)
+        elif self._world.linkages is not None:
+            self.filaments = LinksLinkages(self._world)
         self.ledger = LinksLedger(self._world, self.filaments)
         self.boundaries = LinksBoundaries(self._world, cylinder, shaken=shaken, removed=self.ledger.removed)
         self.motors = LinksMotors(self._world, motor_law, strengths)
@@ -274,7 +279,7 @@ class LinksEngine:
             lowest=found[LOWEST],
             highest=found[HIGHEST],
             widest=found[WIDEST],
-            gap=0.0,
+            gap=float(state.gaps.max(initial=0.0)) if isinstance(state, LinkageState) else 0.0,
             deepest=found[DEEPEST] * self.particle.diameter,
             elastic_energy=found[ELASTIC] + self.ledger.deformation,
         )

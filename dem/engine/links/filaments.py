@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dem.body.filament import Activity, Filament, FilamentEnergies, PreferredCurvature
+from dem.body.linkage import Undulation
 from dem.engine.links.arrays import Filaments
 from dem.engine.links.motion import bending
 from dem.engine.links.rods import wave_of
@@ -76,13 +77,14 @@ class LinksFilaments:
         force: Array = forces.sum(axis=0) if grip is None else forces[grip].copy()
         return force
 
-    def act(self, activity: Activity | None, *, ramp: float = 0.0) -> None:
+    def act(self, activity: Activity | Undulation | None, *, ramp: float = 0.0) -> None:
         """Set the preferred curvature of all filaments from now on; the present angle ψ of each wave is kept.
 
         Args:
             activity: wave of preferred curvature; None: the filaments' own preferred curvature.
             ramp: time in which the new preferred curvature grows from 0 [s].
         """
+        assert not isinstance(activity, Undulation)  # the scene was checked
         gait = self._all.gait
         for number, filament in self._kinds_of():
             own = filament.curvature or PreferredCurvature(amplitudes=0.0)
@@ -108,6 +110,10 @@ class LinksFilaments:
             filament = world.kinds[world.bodies.shape[body]].filament
             assert filament is not None
             yield number, filament
+
+    @property
+    def joints(self) -> None:
+        """None, since segments share their nodes."""
 
     def mean_unbalanced(self) -> float:
         """Return the mean net force on a filament over its weight less buoyancy [1], held nodes left out."""

@@ -12,12 +12,18 @@ from dem.engine.links.adds import ADDS, ORDER
 from dem.engine.links.cache import announce, is_kept, stamp
 from dem.engine.links.cost import COMPILE_FIRST, COMPILE_MORE, seconds_per_second
 from dem.engine.links.engine import LinksEngine
-from dem.engine.links.shapes import kind_shape
-from dem.engine.links.stable_step import filament_stable_time_step, links_stable_time_step, rigid_stable_time_step
+from dem.engine.links.shapes import kind_shape, link_shapes
+from dem.engine.links.stable_step import (
+    filament_stable_time_step,
+    linkage_stable_time_step,
+    links_stable_time_step,
+    rigid_stable_time_step,
+)
 
 # Groups of arrays without which `advance` is compiled where a scene has none of them.
 OF_FILAMENTS = frozenset({"bends", "filaments", "flexible", "stretch"})
-OPTIONAL = OF_FILAMENTS | {"channel", "cords", "grips", "hooks", "ledger", "motors", "rims"}
+OF_LINKAGES = frozenset({"bends", "flexible", "linkages"})
+OPTIONAL = OF_FILAMENTS | OF_LINKAGES | {"channel", "cords", "grips", "hooks", "ledger", "motors", "rims"}
 
 
 class LinksKind:
@@ -42,6 +48,9 @@ class LinksKind:
         if scene.mixture is not None:
             shapes, law = [kind_shape(kind) for kind in scene.mixture.kinds], contact_law_of(scene)
             rods = [shape.filament for shape in shapes if shape.filament is not None]
+            if scene.mixture.jointed:
+                pairs = [(kind.linkage, link_shapes(kind)) for kind in scene.mixture.kinds]
+                return min(linkage_stable_time_step(one, links, law) for one, links in pairs if one is not None)
             if rods:
                 return min(filament_stable_time_step(rod, law, shapes[0].effective_mass) for rod in rods)
             return rigid_stable_time_step(shapes, law)
@@ -87,9 +96,12 @@ def _present(scene: Demand) -> Iterator[frozenset[str]]:
     The first set of names is for phases without motors, the second one for phases with motors. A set is left out if
     the scene has no such phase.
     """
+    mixture, of_bodies = scene.mixture, frozenset[str]()
+    if mixture is not None:
+        of_bodies = OF_FILAMENTS if mixture.flexible else OF_LINKAGES if mixture.jointed else of_bodies
     known = {
         "channel": scene.channel is not None,
-        **dict.fromkeys(OF_FILAMENTS, scene.mixture is not None and scene.mixture.flexible),
+        **dict.fromkeys(of_bodies, True),
         "grips": scene.calls_for(EffectName.GRIPS),
         "hooks": scene.hooks is not None,
         "ledger": scene.recording.dissipation_interval_s is not None,

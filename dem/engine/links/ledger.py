@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from dem.body.filament import FilamentEnergies
-from dem.engine.links.filaments import LinksFilaments
+from dem.engine.interface import Filaments
 from dem.engine.links.stepping import LOST, WORK
 from dem.engine.links.world import World
 
@@ -15,7 +15,7 @@ NONE = FilamentEnergies(*(0.0,) * len(FilamentEnergies._fields))  #: Energies of
 class LinksLedger:
     """`dem.engine.interface.EnergyLedger` on links."""
 
-    def __init__(self, world: World, filaments: LinksFilaments | None) -> None:
+    def __init__(self, world: World, filaments: Filaments | None) -> None:
         self._world = world
         self._filaments = filaments
         self.added = 0.0
@@ -43,11 +43,11 @@ class LinksLedger:
 
     @property
     def deformation(self) -> float:
-        """Elastic energy of filaments [J]; 0 without filaments."""
+        """Elastic energy of filaments, or of the joints of linkages [J]; 0 without either."""
         return self._energies.elastic
 
     def elastic(self) -> tuple[float, float]:
-        """Return the elastic energy of all contacts and that of filaments [J]; rigid hinges have none."""
+        """Return the elastic energy of all contacts, and that of filaments or of the joints of linkages [J]."""
         return self._world.contacts().elastic_energy, self.deformation
 
     def take_in(self) -> None:

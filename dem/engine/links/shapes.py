@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from dem.body.bars import Bars, first_ends, owners
 from dem.body.filament import Filament
 from dem.body.kinds import Kind
+from dem.body.linkage import Linkage
 from dem.body.particle import Particle
 from dem.engine.links.compiler import inlined
 from dem.physics.contact import typical_effective_mass
@@ -51,7 +52,7 @@ class Shape:
     """Shape of a body, in a frame with its origin at the centre of mass.
 
     The axes of the frame are those of the middle link of a smarticle, the principal axes of a
-    rigid body, or those of the laboratory for a filament.
+    rigid body, or those of the laboratory for a filament; the segments of a linkage are those of its links as poured.
     """
 
     mass: float  #: Mass of the body [kg]
@@ -62,7 +63,13 @@ class Shape:
     shared: NDArray[np.uint8]  #: (M,) ends that another segment owns, as bits `AT_START` and `AT_END`
     effective_mass: float  #: Harmonic mean of the effective mass over points and directions [kg]; damping depends on it
     planar: Planar | None = None  #: Geometry of a smarticle; None for other bodies
-    filament: Filament | None = None  #: Kind of filament of a flexible body; None for rigid bodies and smarticles
+    filament: Filament | None = None  #: Kind of filament of a flexible body; None for other bodies
+    linkage: Linkage | None = None  #: Links and joints of a linkage; None for other bodies
+
+    @property
+    def flexible(self) -> bool:
+        """Whether each link is a part that kernels of filaments or linkages move."""
+        return self.filament is not None or self.linkage is not None
 
     @property
     def reach(self) -> float:
@@ -82,7 +89,7 @@ class Shapes(NamedTuple):
     first: NDArray[np.int64]  #: (K + 1,) index in `lines` of the first segment of each shape, then M
     lines: Array  #: (M, LINE) segments in the frame of the body; for the columns see `START`
     link: NDArray[np.int64]  #: (M,) link of each segment
-    flexible: Any  #: (K,) whether the body is a filament, which `motion.bending` moves; None if no shape is flexible
+    flexible: Any  #: (K,) whether kernels of filaments or linkages move such bodies; None if they move none
 
 
 @inlined
@@ -95,7 +102,7 @@ def is_flexible(flexible: Any, kind: int) -> bool:
 
 def table_of(shapes: Sequence[Shape]) -> Shapes:
     """Return shapes as arrays for the kernels."""
-    flexible = np.array([shape.filament is not None for shape in shapes], dtype=np.uint8)
+    flexible = np.array([shape.flexible for shape in shapes], dtype=np.uint8)
     return Shapes(
         mass=np.array([shape.mass for shape in shapes]),
         radius=np.array([shape.lines[:, RADIUS].min() for shape in shapes]),
@@ -159,7 +166,20 @@ def kind_shape(kind: Kind) -> Shape:
     if kind.filament is not None:
         return filament_shape(kind.filament)
     shape = rigid_shape(kind.bars, kind.rows, kind.radius)
-    return replace(shape, effective_mass=typical_effective_mass(kind))
+    shape = replace(shape, effective_mass=typical_effective_mass(kind), linkage=kind.linkage)
+    # Links of a linkage that fold touch each other but for neighbours: none owns the joint where a third one touches.
+    return shape if kind.linkage is None else replace(shape, shared=np.zeros_like(shape.shared))
+
+
+def link_shapes(kind: Kind) -> list[Shape]:
+    """Return the shapes of the links of a linkage, each along x of its own frame; none of another body."""
+    found = []
+    for number, piece in enumerate(kind.pieces):
+        own, free = piece.bars, kind.bars.free[number]
+        half = float(own.lengths[0]) / 2 - kind.radius * free
+        shape = rigid_shape(own, 1, kind.radius)
+        found.append(replace(shape, lines=_lines(np.array([[-half[0], 0.0, 0.0, half.sum(), 0.0, 0.0]]), kind.radius)))
+    return found
 
 
 def rigid_shape(bars: Bars, rows: int = 1, radius: float | None = None) -> Shape:

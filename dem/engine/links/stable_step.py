@@ -15,8 +15,10 @@ from numpy.typing import NDArray
 
 from dem.body.filament import Filament
 from dem.body.linear import matrix_product, positive_definite
+from dem.body.linkage import Linkage
 from dem.body.particle import Particle
 from dem.engine.links.arrays import PLANE
+from dem.engine.links.joints import pins_of
 from dem.engine.links.motion.bending import RESOLVED
 from dem.engine.links.motion.planar import lay_out
 from dem.engine.links.shapes import AT_END, AT_START, RADIUS, Shape, filament_shape, smarticle_shape
@@ -129,7 +131,48 @@ def rigid_stable_time_step(shapes: Sequence[Shape], law: ContactLaw) -> float:
     return min(_rigid_step(shape, law) for shape in shapes)
 
 
-def _rigid_step(shape: Shape, law: ContactLaw) -> float:
+def linkage_stable_time_step(linkage: Linkage, links: Sequence[Shape], law: ContactLaw) -> float:
+    """Return the largest stable time step [s] over the stiffest modes of the links of a linkage among others.
+
+    They are those of rigid bodies, with the joints at both ends of a link, which the neighbours move against it: since
+    |a + b|² ≤ 2 (|a|² + |b|²), a joint of stiffness k is never stiffer than 2 k on each of its links by itself.
+
+    Args:
+        links: shapes of the links.
+    """
+    known: dict[bytes, float] = {}
+    for number, shape in enumerate(links):
+        joints = _joints_of(linkage, number, law)
+        key = shape.lines.tobytes() + joints[0].tobytes() + joints[1].tobytes()
+        if key not in known:  # most links are alike
+            known[key] = _rigid_step(shape, law, joints)
+    return min(known.values())
+
+
+def _joints_of(linkage: Linkage, number: int, law: ContactLaw) -> Mode:
+    """Return stiffness and damping (6, 6) of the joints at both ends of a link, for motions of this link alone."""
+    pin, damping, off, off_damping = pins_of(linkage, law)
+    stiffness, resisting, half = np.zeros((6, 6)), np.zeros((6, 6)), linkage.links[number].lengths[0] / 2
+    for before in (number - 1, number):
+        if not 0 <= before < len(linkage.joints):
+            continue
+        joint, side = linkage.joints[before], 1 if before == number else -1
+        motion = _motion(np.array([side * half, 0.0, 0.0]))
+        push = 2 * matrix_product(motion.T, motion)
+        # The second of two axes turns about the first, seen from either link, and may have any direction across it.
+        axes = joint.axes if len(joint.axes) != 2 else joint.axes[:1] if side > 0 else joint.axes[1:]
+        turns = 2 * matrix_product(np.array(axes).T, np.array(axes))
+        across = 2 * np.eye(3) - turns
+        several = len(joint.axes) == 2
+        stiffness += pin * push
+        stiffness[3:, 3:] += joint.stiffness * turns + max(off, several * joint.stiffness) * across
+        resisting += damping * push
+        resisting[3:, 3:] += joint.damping * turns + max(off_damping, several * joint.damping) * across
+    return stiffness, resisting
+
+
+def _rigid_step(shape: Shape, law: ContactLaw, joints: Mode | None = None) -> float:
+    """Return the stable step of a body, or of a link with the stiffness and damping of its joints."""
     mass = np.diag([*[shape.mass] * 3, *shape.inertia[:3]])
     places: dict[tuple[int, int], list[Array]] = {}  # strands at each end of each bar
     for line, link, shared in zip(shape.lines, shape.link, shape.shared, strict=True):
@@ -152,7 +195,10 @@ def _rigid_step(shape: Shape, law: ContactLaw) -> float:
         push = _motion(top)
         heave += matrix_product(push[[up]].T, push[[up]])
         rub += matrix_product(push[across].T, push[across])
-    return _step_of_modes(mass, [*modes, *_modes_of_pile(law, heave, rub)])
+    modes += _modes_of_pile(law, heave, rub)
+    if joints is not None:
+        modes = [(stiffness + joints[0], resisting + joints[1]) for stiffness, resisting in modes]
+    return _step_of_modes(mass, modes)
 
 
 def _modes_of_end(law: ContactLaw, tips: Array) -> list[Mode]:

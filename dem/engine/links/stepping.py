@@ -20,6 +20,7 @@ from dem.engine.links.motion.bending import (
     resolve_nodes,
 )
 from dem.engine.links.motion.holding import carry_grips, hold
+from dem.engine.links.motion.joining import drift_links, kick_links, pose_linkages, push_joints
 from dem.engine.links.motion.motoring import update
 from dem.engine.links.motion.moving import drift, gather, kick, resolve_speeds
 from dem.engine.links.motion.poses import find_motions, pose
@@ -123,6 +124,7 @@ def act(
     resolve_speeds(shapes, bodies, parts, segments, system.gravity, step, system.grips)
     push_nodes(system.filaments, parts, system.gravity, ledger, step)
     resolve_nodes(system.filaments, shapes.radius, bodies, step)
+    push_joints(system.linkages, system.gravity, step)
     if motors is not None and tick == 0 and motors.due[1] == 0:
         # After the forces, whose velocities are those of before, as in the kick: so that work and dissipation agree.
         update(shapes, bodies, motors)
@@ -140,12 +142,14 @@ def act(
     kick(shapes, bodies, parts, motors, system.gravity, system.planar, acting, system.grips)
     totals[WORK] += hold(system.grips, shapes, bodies, ground, system.gravity, acting, weight)
     kick_nodes(system.filaments, acting)
+    kick_links(system.linkages, system.gravity, ledger, acting)
     if motors is not None:
         motors.elapsed[0] += acting
     if ledger is not None:
         totals[LOST] += lost + settle(shapes, bodies, parts, segments, ledger, motors, system.filaments, acting)
     drift(shapes, bodies, motors, length, scratch.plane)
     drift_nodes(system.filaments, length)
+    drift_links(system.linkages, length, scratch.plane)
     carry_grips(system.grips, length)
     for k in range(BOUNDARIES):
         moved = ground.rise[k] * length
@@ -186,6 +190,7 @@ def advance(steps: int, clock: Clock, system: System, scratch: Scratch, totals: 
             shaken_to(ground, clock.begin + (clock.made + made_now + tick / FINEST) * dt)
             pose(system.shapes, system.bodies, system.parts, system.segments, system.motors)
             pose_filaments(system.filaments, system.bodies, system.parts, system.segments)
+            pose_linkages(system.linkages)
             if update_lists(system.bodies, system.segments, system.pairs, scratch.cells, system.skins) == FULL:
                 totals[TICK] = tick
                 return made_now

@@ -15,7 +15,7 @@ from dem.body.kinds import Mixture
 from dem.body.linear import matrix_product
 from dem.body.particle import LINKS, Particle
 from dem.body.placement import Poses
-from dem.body.state import FilamentState, PileState, RigidState, State
+from dem.body.state import FilamentState, LinkageState, PileState, RigidState, State
 from dem.engine.links.arrays import (
     BOUNDARIES,
     LEDGER,
@@ -34,6 +34,7 @@ from dem.engine.links.arrays import (
     Hooks,
     Kept,
     Law,
+    Linkages,
     Motoring,
     Pairs,
     Parts,
@@ -56,11 +57,14 @@ from dem.engine.links.contact.queries import (
     forces_of_pairs,
     query_all,
 )
+from dem.engine.links.joints import linkages_at
+from dem.engine.links.joints import none_of as no_linkages
 from dem.engine.links.motion.bending import pose_filaments_from_python
+from dem.engine.links.motion.joining import pose_linkages_from_python
 from dem.engine.links.motion.planar import invert, lay_out
 from dem.engine.links.motion.poses import find_links, pose_all
 from dem.engine.links.rods import apart, filaments_at, none_of
-from dem.engine.links.shapes import LINE, RADIUS, Shape, kind_shape, smarticle_shape, table_of
+from dem.engine.links.shapes import LINE, RADIUS, Shape, kind_shape, link_shapes, smarticle_shape, table_of
 from dem.engine.links.stepping import PAST, Clock, advance
 from dem.errors import reject
 from dem.physics.contact import ContactLaw
@@ -119,7 +123,8 @@ class World:
     rims: Rims | None = None
     channel: Array | None = None
     cords: Cords | None = None
-    filaments: Filaments | None = None  #: Arrays of filaments; None if no shape is flexible
+    filaments: Filaments | None = None  #: Arrays of filaments; None if no body is a filament
+    linkages: Linkages | None = None  #: Arrays of linkages; None if no body is a linkage
     grips: Grips | None = None  #: Arrays of the grips of rigid bodies; None in scenes without them
 
     def __post_init__(self) -> None:
@@ -138,8 +143,10 @@ class World:
                 (law.wall_damping * walls, law.wall_friction),
             )
         )
-        if self.shapes.flexible is not None:
+        if any(kind.filament is not None for kind in self.kinds):
             self.filaments = none_of()
+        if self.mixture is not None and self.mixture.jointed:
+            self.linkages = no_linkages([shape for kind in self.mixture.kinds for shape in link_shapes(kind)])
         self.bodies: Bodies = bodies_for(0)
         self.pairs: Pairs = pairs_for(0, 0, 256)
         self.cells: Cells = cells_for(0, 0, 0, 256)
@@ -185,6 +192,9 @@ class World:
         if self.filaments is not None:
             self._add_posed_filaments(poses, turns, speed)
             return
+        if self.linkages is not None:
+            self._add_posed_linkages(poses, turns, speed)
+            return
         if poses.kinds is not None:
             self.add_bodies(poses.kinds, poses.positions, turns, speed=speed)
             return
@@ -213,7 +223,7 @@ class World:
                 assert self.particle is not None  # the shape of smarticles follows from it
                 fresh.alpha[i] = self.particle.boxes.angles
                 lay_out(kind.planar, *self.particle.boxes.angles, fresh.plane[i])
-            elif kind.filament is None:
+            elif not kind.flexible:
                 fresh.plane[i, 14:18] = kind.inertia
                 invert(fresh.plane[i])
         self.bodies = joined(self.bodies, fresh)
@@ -263,10 +273,32 @@ class World:
         bodies = np.arange(first, self.count)
         self.filaments = filaments_at(self.filaments, filament, bodies, points, velocities, starts, seed)
 
+    def _add_posed_linkages(self, poses: Poses, turns: Array, speed: float) -> None:
+        """Add linkages of a mixture in the shape in which they are poured."""
+        assert self.mixture is not None
+        assert poses.kinds is not None
+        assert self.linkages is not None
+        assert not self.planar
+        first, rng = self.count, np.random.default_rng([self.wave_seed, self.count])
+        self.add_bodies(poses.kinds, poses.positions, turns, speed=speed)
+        begins = np.cumsum([0, *self.mixture.sizes])
+        for body, (k, place, turn) in enumerate(zip(poses.kinds, poses.positions, turns, strict=True), first):
+            kind = self.mixture.kinds[k]
+            assert kind.linkage is not None
+            links = bodies_for(len(kind.bars.points))
+            links.position[:] = matrix_product(kind.bars.ends.mean(axis=1), turn.T) + place
+            links.turn[:] = [quaternion_of(own) for own in matrix_product(turn, kind.bars.frames)]
+            links.velocity[:, 2] = -speed
+            links.shape[:] = begins[k] + np.arange(len(links.shape))
+            self.linkages = linkages_at(
+                self.linkages, kind.linkage, body, links, self.contact,
+                start=float(rng.uniform(0, 2 * math.pi)), seed=self.wave_seed,
+            )  # fmt: skip
+
     def _lay_out_parts(self) -> None:
         """Make the arrays of parts and segments for the present bodies."""
         shapes, kinds = self.bodies.shape, self.kinds
-        flexible = np.array([kind.filament is not None for kind in kinds])
+        flexible = np.array([kind.flexible for kind in kinds])
         sizes = np.array([len(kind.lines) for kind in kinds])
         parts = np.where(flexible, sizes, [3 if kind.planar is not None else 1 for kind in kinds])[shapes]
         flexible, sizes = flexible[shapes], sizes[shapes]
@@ -289,13 +321,12 @@ class World:
             part=(begin[body] + (moved + bent) * own).astype(np.int32),
             shared=np.concatenate([np.zeros(0, np.uint8), *(kinds[k].shared for k in shapes)]),
             first=np.append(np.flatnonzero(fresh), len(own)).astype(np.int32),
-            bends=None if self.filaments is None else self._bends(sizes),
+            bends=None if self.shapes.flexible is None else self._bends(sizes),
         )
 
     def _bends(self, sizes: NDArray[np.int64]) -> Bends:
         """Return `Segments.bends` for the present bodies; `sizes`: (N,) number of segments of each."""
-        rods = [kind.filament for kind in self.kinds]
-        least = np.array([0 if rod is None else apart(rod) for rod in rods], dtype=np.int32)
+        least = np.array([_apart(kind) for kind in self.kinds], dtype=np.int32)
         return Bends(np.repeat(least[self.bodies.shape], sizes), np.zeros((int(sizes.sum()), 6)))
 
     def _make_room_at_boundaries(self) -> None:
@@ -403,8 +434,18 @@ class World:
         law, wall_law = self.laws
         return System(
             self.shapes, law, wall_law, self.bodies, self.parts, self.segments, self.pairs, self.kept, self._known,
-            self.gravity, self.planar, self.skins, self.hinged, self.cords, self.ledger, self.filaments, self.grips,
+            self.gravity, self.planar, self.skins, self.hinged, self.cords, self.ledger, self.filaments, self.jointed,
+            self.grips,
         )  # fmt: skip
+
+    @property
+    def jointed(self) -> Linkages | None:
+        """Linkages as argument of kernels: with parts and segments by link, of which a link has one each."""
+        if self.linkages is None:
+            return None
+        each = np.arange(len(self.segments.line) + 1, dtype=np.int32)
+        parts, segments = self.parts._replace(begin=each), self.segments._replace(begin=each)
+        return self.linkages._replace(bodies=self.bodies, parts=parts, segments=segments)
 
     @property
     def _known(self) -> Boundaries:
@@ -421,6 +462,8 @@ class World:
         pose_all(self.shapes, self.bodies, self.parts, self.segments, self.hinged)
         if self.filaments is not None:
             pose_filaments_from_python(self.filaments, self.bodies, self.parts, self.segments)
+        if (jointed := self.jointed) is not None:
+            pose_linkages_from_python(jointed)
         return self.bodies
 
     def state(self) -> PileState:
@@ -444,6 +487,14 @@ class World:
                 self.mixture,
                 bodies.shape.astype(np.int64),
                 *(each.copy() for each in (own.position, own.velocity, own.spin)),
+            )
+        if self.mixture is not None and self.linkages is not None:
+            links = self.linkages.links
+            each = (links.position, links.axes, links.velocity, links.spin)
+            return LinkageState(
+                self.mixture,
+                bodies.shape.astype(np.int64),
+                RigidState(self.mixture.pieces, links.shape.astype(np.int64), *(values.copy() for values in each)),
             )
         if self.mixture is not None:
             moving = (bodies.position.copy(), bodies.axes.copy(), bodies.velocity.copy(), bodies.spin.copy())
@@ -537,6 +588,8 @@ class World:
             "cords": self.cords,
             "filaments": self.filaments,
             "grips": self.grips,
+            "linkages": self.linkages,
+            "jointed": None if self.linkages is None else self.linkages.links,
         }
         return {name: group for name, group in groups.items() if group is not None}
 
@@ -570,7 +623,17 @@ class World:
         self.cords = group(Cords, "cords") if "cords.anchor" in arrays else None
         self.filaments = group(Filaments, "filaments") if "filaments.body" in arrays else None
         self.grips = group(Grips, "grips") if "grips.of" in arrays else None
+        if self.linkages is not None:
+            own = {name[9:]: array for name, array in arrays.items() if name.startswith("linkages.")}
+            self.linkages = self.linkages._replace(**own, links=group(Bodies, "jointed"))  # type: ignore[arg-type]
         self.make_room()
+
+
+def _apart(kind: Shape) -> int:
+    """Return by how much numbers of segments of one body differ at least that can touch; 0: none can."""
+    if kind.linkage is not None:
+        return 2  # links with a common joint do not
+    return 0 if kind.filament is None else apart(kind.filament)
 
 
 def quaternion_of(matrix: Array) -> Array:

@@ -18,6 +18,7 @@ from dem.record.columns import (
     FILAMENT_COLUMNS,
     GRIP_COLUMNS,
     HOOK_COLUMNS,
+    JOINT_COLUMNS,
     LEDGER_COLUMNS,
     MOTOR_COLUMNS,
     PLATE_COLUMNS,
@@ -82,7 +83,7 @@ def test_knobs_are_compared_with_those_of_the_name_in_this_scene() -> None:
 def test_every_column_belongs_to_one_effect() -> None:
     declared = [name for adds in ADDS.values() for name in adds.series]
     tables = (COLUMNS, MOTOR_COLUMNS, ENERGY_COLUMNS, LEDGER_COLUMNS, HOOK_COLUMNS, RELEASE_COLUMNS, STRAIN_COLUMNS)
-    tables += (FILAMENT_COLUMNS, PLATE_COLUMNS, GRIP_COLUMNS)
+    tables += (FILAMENT_COLUMNS, JOINT_COLUMNS, PLATE_COLUMNS, GRIP_COLUMNS)
     assert sorted(declared) == sorted(name for table in tables for name in table)
     assert len(set(declared)) == len(declared)
 

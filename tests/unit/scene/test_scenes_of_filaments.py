@@ -79,7 +79,7 @@ def test_a_plan_has_their_step_and_effects() -> None:
     ({"particle.segments": 60}, "particle.shape: filament: bar 0: 0.0005 m long; make it longer than its thickness"),
     ({"particle.young_modulus_Pa": -1}, "particle.young_modulus_Pa: -1 is out of range; use at least 1"),
     ({"particle": {**WORM, "thickness_in_plane_m": 1e-3}}, "particle.diameter_m: a round section has no thicknesses"),
-    ({"particle": [WORM, {"shape": "rod", "length_m": 0.01}]}, "particle: filaments and rigid shapes do not mix"),
+    ({"particle": [WORM, {"shape": "rod", "length_m": 0.01}]}, "particle: filaments and other shapes do not mix"),
     ({"particle": None}, "liquid: only filaments float in it"),
     ({"particle": None, "liquid": None}, "phases.1: wriggle needs filaments"),
     ({"recording": {"contact_forces": True}}, "recording.contact_forces: forces at contacts of filaments"),

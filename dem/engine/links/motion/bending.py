@@ -443,8 +443,8 @@ def _wait(gait: Array) -> float:
 
 
 @part
-def _turn_wave(gait: Array, dt: float) -> None:
-    """Advance the wave of a filament's preferred curvature by a time `dt` [s].
+def turn_wave(gait: Array, dt: float) -> None:
+    """Advance the wave of a filament or a linkage by a time `dt` [s].
 
     Args:
         gait: (GAIT,) state of the wave, for the columns see `PSI`; factor, angle ψ and sense are updated.
@@ -475,7 +475,7 @@ def drift_nodes(filaments: Any, dt: float) -> None:
         return
     for f in range(filaments.body.shape[0]):
         first, last = filaments.begin[f], filaments.begin[f + 1] - 1
-        _turn_wave(filaments.gait[f], dt)
+        turn_wave(filaments.gait[f], dt)
         for i in range(first, last + 1):
             put(filaments.position[i], 0, along(vector(filaments.position[i], 0), dt, vector(filaments.velocity[i], 0)))
         for i in range(first, last):

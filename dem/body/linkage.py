@@ -1,0 +1,146 @@
+"""A body of rigid links that are joined end to end: what its joints allow, and their laws."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Literal
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from dem.arrays import Array
+from dem.body.bars import Bars
+from dem.body.linear import applied, matrix_product
+from dem.errors import InputError
+
+Three = tuple[float, float, float]
+Law = Literal["free", "elastic", "motor"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Joint:
+    """What joins a link to the one after it.
+
+    Frames of links have x along the link and z along its normal. At angles of 0 the frames of both links are parallel.
+    """
+
+    #: Directions about which the links turn, unit vectors in the frames at angles of 0: one, a hinge; two at right
+    #: angles, the first fixed in the link before and the second in the link after; three, any direction
+    axes: tuple[Three, ...]
+    law: Law = "free"
+    stiffness: float = 0.0  #: Of the elastic joint, or of the motor about its command [N m/rad]
+    damping: float = 0.0  #: [N m s/rad]
+    #: Angles about each axis without torque; of three axes a rotation vector, along these axes [rad]
+    rest: Three = (0.0, 0.0, 0.0)
+    poured: Three = (0.0, 0.0, 0.0)  #: Angles at the start, which motors hold, likewise [rad]
+    most: float = math.inf  #: Torque at which an elastic joint yields, or the limit of a motor [N m]
+    breaks: float = math.inf  #: Moment in any direction at which an elastic joint breaks [N m]
+    speed: float = math.inf  #: Greatest speed of a motor's command [rad/s]
+
+    def vector(self, angles: Three) -> Array:
+        """Return the sum (3,) of angles [rad] times their axes, in the frame of the link before."""
+        return np.asarray((np.array(angles)[: len(self.axes), None] * np.array(self.axes)).sum(axis=0))
+
+    @property
+    def turn(self) -> Array:
+        """(3, 3) rotation of the link after against the link before at the start."""
+        if len(self.axes) > 2:
+            return np.asarray(Rotation.from_rotvec(self.vector(self.poured)).as_matrix())
+        found = np.eye(3)
+        for axis, angle in zip(self.axes, self.poured, strict=False):
+            found = matrix_product(found, Rotation.from_rotvec(angle * np.array(axis)).as_matrix())
+        return found
+
+
+@dataclass(frozen=True, kw_only=True)
+class Linkage:
+    """One kind of linkage: n links and the n - 1 joints between them."""
+
+    links: tuple[Bars, ...]  #: Each along x of its own frame, with its middle at the origin
+    joints: tuple[Joint, ...]
+    pin_stiffness: float | None = None  #: Of the springs that keep joints together; None: twice that of contacts [N/m]
+
+    @cached_property
+    def effective_mass(self) -> float:
+        """Typical effective mass of a contact [kg]: the mean over the links, as if each were by itself."""
+        return float(np.mean([link.effective_mass for link in self.links]))
+
+    @property
+    def has_motors(self) -> bool:
+        """Whether any joint has a motor."""
+        return any(joint.law == "motor" for joint in self.joints)
+
+    @cached_property
+    def places(self) -> Array:
+        """(n - 1,) distances of the joints from the start of the first link, along the links [m]."""
+        return np.cumsum([float(link.lengths[0]) for link in self.links])[:-1]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Swing:
+    """Motion of one motor about one axis: centre + amplitude sin(ψ + phase)."""
+
+    joint: int  #: Number of the joint, from 0
+    axis: int = 0  #: Number of its axis, from 0
+    centre: float | None = None  #: None: the angle at the start [rad]
+    amplitude: float = 0.0  #: [rad]
+    phase: float = 0.0  #: [rad]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Undulation:
+    """What the motors of linkages do: swings of given joints, and a wave that travels along all others."""
+
+    rate: float  #: dψ/dt [rad/s]
+    amplitude: float = 0.0  #: Of the wave about the first axis of each motor [rad]
+    wavelength: float = math.inf  #: Of the wave, in lengths of the linkage [1]
+    swings: Sequence[Swing] = ()
+    reversal_rate: float = 0.0  #: Mean number of reversals of ψ per second, at random times; 0: none [1/s]
+    together: bool = False  #: Whether ψ of all linkages begins at 0, not at random
+
+    def swings_of(self, linkage: Linkage) -> list[Swing]:
+        """Return the swings of all motors of a linkage; one that is not given swings by the wave."""
+        given = {swing.joint for swing in self.swings}
+        whole = sum(float(link.lengths[0]) for link in linkage.links)
+        return [
+            *self.swings,
+            *(
+                Swing(joint=k, amplitude=self.amplitude, phase=-2 * math.pi * place / (whole * self.wavelength))
+                for k, (joint, place) in enumerate(zip(linkage.joints, linkage.places, strict=True))
+                if joint.law == "motor" and k not in given
+            ),
+        ]
+
+
+def link_of(length: float, *, thickness_normal: float, thickness_in_plane: float, density: float, disc: bool) -> Bars:
+    """Return a link of a length [m] and a section of two thicknesses [m], a disc or flat."""
+    return Bars(
+        points=np.array([[[-length / 2, 0.0, 0.0], [length / 2, 0.0, 0.0]]]),
+        normals=np.array([[0.0, 0.0, 1.0]]),
+        thickness_normal=thickness_normal,
+        thickness_in_plane=thickness_in_plane,
+        density=density,
+        round=disc,
+    )
+
+
+def layout_of(lengths: Sequence[float], joints: Sequence[Joint]) -> tuple[Array, Array]:
+    """Return both ends (n, 2, 3) [m] and the normals (n, 3) of links as they are poured.
+
+    Raises:
+        InputError: the number of joints is not that of the places between links.
+    """
+    if len(joints) != len(lengths) - 1:
+        raise InputError(
+            f"joints: {len(joints)} for {len(lengths)} links; give one for all, or a list of {len(lengths) - 1}"
+        )
+    frame, place, points, normals = np.eye(3), np.zeros(3), [], []
+    for k, length in enumerate(lengths):
+        if k:
+            frame = matrix_product(frame, joints[k - 1].turn)
+        end = place + length * frame[:, 0]
+        points.append([place, end])
+        normals.append(applied(frame, np.array([[0.0, 0.0, 1.0]]))[0])
+        place = end
+    return np.array(points), np.array(normals)
