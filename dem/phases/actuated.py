@@ -103,11 +103,13 @@ class ActuatedPhase(Phase):
         return self.follow(stage, engine)
 
     def follow(self, stage: Stage, engine: Engine, check_every: int | None = None) -> float:
-        """Articulate smarticles, and make the control updates that are due.
+        """Pass the next control updates to the motors, as many as the engine takes at once.
+
+        The first call articulates the smarticles.
 
         Args:
-            check_every: a call ends after each multiple of this number of updates, so that the caller can check the
-                pile; None: no such end.
+            check_every: no call goes beyond a multiple of this number of updates, counted from the beginning of the
+                phase, so that the caller can check the pile there; None: no such limit.
 
         Returns:
             The simulated time until the next call [s]; 0 at the end of the phase.

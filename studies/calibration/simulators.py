@@ -58,7 +58,7 @@ def read_runs(path: Path) -> pd.DataFrame:
 
 
 class TableSimulator:
-    """Runs made elsewhere, one wave: a table with a column for each variable and each measure."""
+    """Simulator whose only wave of runs is a table made elsewhere: a row per run, a column per variable and measure."""
 
     def __init__(self, problem: Problem, table: pd.DataFrame, source: str) -> None:
         if problem.content.waves != 1:

@@ -129,7 +129,10 @@ def _wrapped(angle: float) -> float:
 
 @inlined
 def _angle(d: Vector, u: Vector, w: Vector) -> tuple[float, Vector]:
-    """Return the angle of a direction d from u towards w [rad], and its change per rotation of d."""
+    """Return the angle [rad] from u towards w of d's projection on their plane, and the gradient of this angle [1].
+
+    The gradient is by a small rotation of d. u and w are perpendicular unit vectors.
+    """
     c, s = dot(d, u), dot(d, w)
     return math.atan2(s, c), scale(1 / (c * c + s * s), cross(d, sub(scale(c, w), scale(s, u))))
 

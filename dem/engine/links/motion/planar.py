@@ -55,8 +55,8 @@ def lay_out(planar: Planar, alpha1: float, alpha2: float, row: Array) -> None:
         row: (PLANE,) written. 0 to 1: centre of mass from the middle link's centre [m]; 2 to 5: centres of barb 1 and
             barb 2 from the centre of mass [m]; 6 to 9: u_1 and u_2 [m]; 10 to 13: directions of barb 1 and barb 2 [1];
             14 to 17: inertia xx, yy, zz, xy [kg m²]; 18 to 19: b [kg m²]; 20: A_11 = A_22, 21: A_12 [kg m²]; 22 to
-            23: see `invert`; 24 to 26: elements 11, 22 and 12 of the mobility (A - b bᵀ/I_zz)⁻¹ [1/(kg m²)]: changes
-            of the rates of a free smarticle over impulses of its motors.
+            23: see `invert`; 24 to 26: elements 11, 22 and 12 of the mobility (A - b bᵀ/I_zz)⁻¹ [1/(kg m²)],
+            by which impulses of motors change the rates of the angles of a free smarticle.
     """
     lay_out_at(planar, alpha1, alpha2, row)
 
