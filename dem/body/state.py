@@ -118,7 +118,7 @@ class BarState:
 
     @property
     def bodies(self) -> Self:
-        """This state."""
+        """This state, since the bodies are no smarticles."""
         return self
 
     @property
@@ -480,7 +480,7 @@ class State:
 
     @property
     def smarticles(self) -> State:
-        """This state."""
+        """This state, since the bodies are no smarticles."""
         return self
 
     @property

@@ -40,8 +40,8 @@ class Watchdog:
 
         Args:
             floor: height of the floor [m].
-            raised: None if the wall does not enclose the pile, so that it is not checked. A number, for `check` the
-                rise of the upper hook [m], has no effect here.
+            raised: None: the wall does not enclose the pile and is not checked. Any number: it is checked; the value
+                matters only to `check`.
         """
         inside = extremes.lowest >= floor
         if raised is not None:

@@ -107,7 +107,7 @@ class Subject:
         return union([extent(visible_meshes(self.bodies, self.frames[i], axes[2]).values(), axes) for i in indices])
 
     def values(self, indices: Iterable[int], style: Style) -> list[Floats]:
-        """Return the values (N, 3) of the coloured field for each of some frames."""
+        """Return the coloured field in each of some frames, a number per link (N, L): of a vector its length."""
         return [scalars(style.field, self.frames[i], self.run) for i in indices]
 
 
