@@ -480,7 +480,7 @@ class State:
 
     @property
     def smarticles(self) -> State:
-        """This state, since the bodies are no smarticles."""
+        """This state, since the bodies are smarticles."""
         return self
 
     @property
