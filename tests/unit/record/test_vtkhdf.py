@@ -211,7 +211,7 @@ def test_a_killed_process_loses_no_frame_that_it_has_written(tmp_path: Path) -> 
         assert number >= max(written, first)
         holds(path, counts[:number])
         first = number
-    assert first > 8
+    assert first >= 8  # one frame at least before each kill
 
 
 def test_a_reader_begins_again_if_the_file_changes_meanwhile(tmp_path: Path) -> None:
