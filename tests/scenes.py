@@ -72,13 +72,13 @@ def chain(changes: Mapping[str, Any] | None = None) -> Scene:
     return parse_scene(changed(CHAIN, changes or {}), source="chain.yaml")
 
 
-def make_boxes(ratio: float = 0.7, angles: tuple[float, float] = U, scale: float = 1.0) -> Boxes:
-    """The paper's smarticle with barbs of l/w and angles [deg], all lengths scaled."""
+def make_boxes(ratio: float = 0.7, angles: tuple[float, float] = U) -> Boxes:
+    """The paper's smarticle with barbs of l/w and angles [deg]."""
     return Boxes(
-        middle_length=W * scale,
-        barb_length=ratio * W * scale,
-        thickness_normal=T1 * scale,
-        thickness_in_plane=T2 * scale,
+        middle_length=W,
+        barb_length=ratio * W,
+        thickness_normal=T1,
+        thickness_in_plane=T2,
         density=RHO,
         angles=(math.radians(angles[0]), math.radians(angles[1])),
     )

@@ -37,6 +37,15 @@ def run_until(scene: Scene, out: Path, when: float) -> None:
         run_scene(scene, out, command="", progress=False, builders=builders)
 
 
+def assert_goes_on(scene: Scene, whole: Run, out: Path, when: float) -> None:
+    """Stop a run of a scene at a time [s], resume it, and compare frames and series with a whole run, bit by bit."""
+    run_until(scene, out, when)
+    run_scene(scene, out, command="", progress=False, resume=True)
+    assert_equal_frames(whole, Run(out))
+    for name, values in Run(out).series.items():
+        np.testing.assert_array_equal(values, whole.series[name], err_msg=name)
+
+
 def assert_equal_frames(one: Run, other: Run) -> None:
     """Compare places, velocities and kinds in all frames of two runs, more than four each, bit by bit."""
     assert len(one.frames) == len(other.frames) > 4

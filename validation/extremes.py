@@ -32,7 +32,7 @@ Array = NDArray[np.float64]
 SECONDS = 0.3  # duration of the phase after the pour
 
 
-def draw_scene(number: int, engine: str = "links") -> dict[str, Any]:
+def draw_scene(number: int) -> dict[str, Any]:
     """Return a random scene as a dictionary; `number` is the seed of the draw and of the scene."""
     rng = np.random.default_rng([28, number])
 
@@ -50,7 +50,7 @@ def draw_scene(number: int, engine: str = "links") -> dict[str, Any]:
     kind = int(rng.integers(4))
     scene: dict[str, Any] = {
         "schema_version": 1,
-        "engine": engine,
+        "engine": "links",
         "name": f"extreme {number}",
         "seed": number,
         "count": int(rng.integers(2, 41)),

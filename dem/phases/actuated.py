@@ -393,7 +393,7 @@ def _up(value: float, digits: int = 3) -> str:
     return f"{math.ceil(value * scale * (1 - TOLERANCE)) / scale:g}"
 
 
-def _down(value: float, digits: int = 3) -> str:
-    """Return, as text, a positive number rounded down to a number of significant digits."""
-    scale = 10.0 ** (digits - 1 - math.floor(math.log10(value)))
+def _down(value: float) -> str:
+    """Return, as text, a positive number rounded down to three significant digits."""
+    scale = 10.0 ** (2 - math.floor(math.log10(value)))
     return f"{math.floor(value * scale * (1 + TOLERANCE)) / scale:g}"

@@ -82,12 +82,9 @@ def truncate(path: Path, number: int) -> None:
         _change(path, lambda root: _truncate(root, number))
 
 
-def read_times(path: Path, what: str = "frames") -> Array:
-    """Return the times of all steps, (n,) float64 [s]; raise InputError if the file is missing or damaged.
-
-    `what` names the content of the file in error messages.
-    """
-    return _read(path, what, lambda root: np.asarray(_rows(root, "Steps/Values", 0, _count(root)), np.float64))
+def read_times(path: Path) -> Array:
+    """Return the times of all steps, (n,) float64 [s]; raise InputError if the file is missing or damaged."""
+    return _read(path, "frames", lambda root: np.asarray(_rows(root, "Steps/Values", 0, _count(root)), np.float64))
 
 
 def read_step(path: Path, number: int) -> meshio.Mesh:

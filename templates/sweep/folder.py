@@ -247,10 +247,10 @@ def create_folder(
     return folder
 
 
-def _some(what: str, names: Sequence[str], most: int = 8) -> str:
-    """Return `what` and the first `most` names as text; an empty text if there is no name."""
-    more = f" and {len(names) - most} more" if len(names) > most else ""
-    return f"{what}{', '.join(names[:most])}{more}" if names else ""
+def _some(what: str, names: Sequence[str]) -> str:
+    """Return `what` and the first eight names as text; an empty text if there is no name."""
+    more = f" and {len(names) - 8} more" if len(names) > 8 else ""
+    return f"{what}{', '.join(names[:8])}{more}" if names else ""
 
 
 def open_folder(path: Path) -> Folder:

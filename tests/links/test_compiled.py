@@ -21,11 +21,11 @@ print(hashlib.sha256(bodies.position.tobytes() + bodies.turn.tobytes()).hexdiges
 """
 
 
-def run(cache: Path) -> tuple[str, str]:
+def run(cache: Path, program: str = PROGRAM) -> tuple[str, str]:
     """What a fresh process computes with a cache folder, and what it says."""
     path = os.pathsep.join([str(HERE), *sys.path])
     done = subprocess.run(
-        [sys.executable, "-c", PROGRAM],
+        [sys.executable, "-c", program],
         env={**os.environ, "SMARTICLES_CACHE_DIR": str(cache), "PYTHONPATH": path},
         capture_output=True,
         text=True,
@@ -79,14 +79,7 @@ def test_a_folder_that_cannot_be_written_is_told_once(tmp_path: Path) -> None:
     blocked.write_text("not a folder")
     program = "import logging, builds; logging.basicConfig(format='%(message)s')\n"
     program += "made = builds.engine(); made.add(builds.at([0, 0, 1.0])); made.state(); print(made.count)"
-    path = os.pathsep.join([str(HERE), *sys.path])
-    done = subprocess.run(
-        [sys.executable, "-c", program],
-        env={**os.environ, "SMARTICLES_CACHE_DIR": str(blocked), "PYTHONPATH": path},
-        capture_output=True,
-        text=True,
-        check=True,
-    )
-    assert done.stdout.strip() == "1"
-    assert done.stderr.count("compiled code cannot be kept") == 1
-    assert "SMARTICLES_CACHE_DIR" in done.stderr
+    printed, said = run(blocked, program)
+    assert printed == "1"
+    assert said.count("compiled code cannot be kept") == 1
+    assert "SMARTICLES_CACHE_DIR" in said

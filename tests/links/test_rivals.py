@@ -50,27 +50,17 @@ def flat(folder: Path, height: float) -> Path:
     return folder
 
 
-def given_of(
-    setting: Setting, pile: Path, folder: Path, *, activity: str, seconds: float, gamma: float = GAMMA
-) -> Task:
-    """Make the task of an engine: contacts that hardly spring back, as those of the others do not."""
-    scene = bench.scene_of(setting, activity, pile, count=1, seed=1, seconds=seconds, sample=SAMPLE)
+def simulated(engine: str, folder: Path, seconds: float) -> Outcome:
+    """Shake one smarticle, put down from 0.1 mm; contacts hardly spring back, as those of the other engines."""
+    setting = setting_of(engine)
+    pile = flat(folder / "pile", 0.735e-3)
+    scene = bench.scene_of(setting, SHAKE, pile, count=1, seed=1, seconds=seconds, sample=SAMPLE)
     scene["contact"] = {"restitution": 0.01}
     scene["container"] = {"radius_m": 0.0234}
-    if activity == SHAKE:
-        scene["phases"][-1]["peak_acceleration_g"] = gamma
-    return Task(parse_scene(scene, source="x"), folder, SAMPLE)
-
-
-def simulated(
-    engine: str, tmp_path: Path, *, activity: str, seconds: float, gamma: float = GAMMA
-) -> tuple[Task, Outcome]:
-    """One smarticle, put down from a tenth of a millimetre."""
-    setting = setting_of(engine)
-    pile = flat(tmp_path / "pile", 0.735e-3)
-    given = given_of(setting, pile, tmp_path, activity=activity, seconds=seconds, gamma=gamma)
+    scene["phases"][-1]["peak_acceleration_g"] = GAMMA
     module = importlib.import_module(f"benchmarks.rivals.{ENGINES[engine].module}")
-    return given, module.simulate(given, setting.knobs)
+    outcome: Outcome = module.simulate(Task(parse_scene(scene, source="x"), folder, SAMPLE), setting.knobs)
+    return outcome
 
 
 def flight(times: Array) -> tuple[Array, float]:
@@ -92,7 +82,7 @@ def flight(times: Array) -> tuple[Array, float]:
 
 @pytest.mark.parametrize("engine", CHOSEN)
 def test_a_smarticle_is_thrown_as_far_as_theory_says(engine: str, tmp_path: Path) -> None:
-    _, found = simulated(engine, tmp_path, activity=SHAKE, seconds=0.03)
+    found = simulated(engine, tmp_path, 0.03)
     heights = found.positions[:, 0, 1, 2]
     times = SAMPLE * np.arange(1, len(heights) - 1)
     expected, lands = flight(times)

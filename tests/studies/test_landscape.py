@@ -132,16 +132,16 @@ def table(strength: Callable[[pd.DataFrame, np.random.Generator], Any]) -> pd.Da
     return runs
 
 
-def correlations(runs: pd.DataFrame, scope: str, *, part: str = EVERY) -> tuple[pd.DataFrame, pd.DataFrame]:
+def correlations(runs: pd.DataFrame, scope: str) -> tuple[pd.DataFrame, pd.DataFrame]:
     first, second = (
-        one[(one[STRENGTH] == PEAK) & (one[SCOPE] == scope) & (one[PART] == part)].reset_index()
+        one[(one[STRENGTH] == PEAK) & (one[SCOPE] == scope) & (one[PART] == EVERY)].reset_index()
         for one in predicted(runs)
     )
     return first, second
 
 
-def judged(runs: pd.DataFrame, *, correlated: bool = True) -> dict[str, Judged]:
-    ranked, compared = predicted(runs) if correlated else (pd.DataFrame(), pd.DataFrame())
+def judged(runs: pd.DataFrame) -> dict[str, Judged]:
+    ranked, compared = predicted(runs)
     tables = {"runs": runs, "predictors": ranked, "comparisons": compared, "cost": costs(runs)}
     return {one.id: one.judge(runs, tables) for one in STUDY.findings}
 

@@ -81,11 +81,10 @@ class Watched:
         mask: np.ndarray = self.series["phase"] == phase
         return mask
 
-    def sound(self, *, rest: float | None = 0.02, depth: float = 0.5) -> list[Check]:
+    def sound(self, *, rest: float | None = 0.02) -> list[Check]:
         """Return the checks that hold for every successful run, on its end, overlaps, energy and final speed.
 
-        `rest` is the limit of the speed at the end [m/s]; None: not checked. `depth` is the limit of the overlap over
-        the sphere diameter [1].
+        `rest` is the limit of the speed at the end [m/s]; None: not checked.
         """
         checks = [Check("ends", "done" if self.error is None else ": ".join(self.error), "done", self.error is None)]
         if self.error is not None:
@@ -98,7 +97,7 @@ class Watched:
         rise = self.nearest.get("energy", 0.0)
         checks += [
             below("samples that are no numbers [1]", broken, 0.5),
-            below("deepest contact at any check [d]", build.DEPTH_LIMIT * self.nearest.get("depth", 0.0), depth),
+            below("deepest contact at any check [d]", build.DEPTH_LIMIT * self.nearest.get("depth", 0.0), 0.5),
             near("height of the centre of mass at the end [m]", height, half, half),
             below("energy from nowhere over the watchdog's limit [1]", rise, 0.5),
         ]

@@ -32,14 +32,14 @@ HEIGHT = 0.004  # m, of the second smarticle above the first
 LMP = shutil.which("lmp")
 
 
-def source(folder: Path, *, apart: float = 0.03, low: float = 1e-3, high: float = 2 * HEIGHT) -> Path:
+def source(folder: Path) -> Path:
     """A run of two smarticles: one lies on the floor, its barbs along x; the other hangs askew beside it."""
     run = SyntheticRun(count=2, phases=("deposit", "relax"))
     folder.mkdir()
     write_manifest(folder, run)
     boxes = parse_scene(SMALL, source="x").particle.boxes
     turns = np.array([np.eye(3), Rotation.from_rotvec([0.5, 1.0, 0.3]).as_matrix()])
-    places = np.array([[-apart / 2, 0.0, low], [apart / 2, 0.0, low + high]])
+    places = np.array([[-0.015, 0.0, 1e-3], [0.015, 0.0, 1e-3 + 2 * HEIGHT]])
     still = np.zeros((2, 3))
     FrameWriter(folder).write(mesh_of(State.rigid(boxes, places, turns, still, still).vertices, phase=1), 0.0)
     write_ending(folder, run.phases, [(0, 1), (1, 2)], status="done", wall=1.0)

@@ -17,9 +17,9 @@ FLOOR = -0.003
 TIERS = ((RADIUS, 0.006), (0.018, 0.008), (0.0125, 0.06))  # radius and height
 
 
-def bodies_at(directory, index=-1, kinds=ALL):
+def bodies_at(directory, index=-1):
     run, frames = open_run(directory), read_frames(directory)
-    bodies = Bodies(run, kinds, fields_of(run))
+    bodies = Bodies(run, ALL, fields_of(run))
     bodies.hold(frames)
     return bodies.at(frames[index])
 

@@ -18,26 +18,22 @@ def line(start, end):
     return np.linspace(start, end, 4)
 
 
-def block(radius, low, high, centre=(0.0, 0.0), gap=GAP):
+def block(radius, low, high):
     """Upright needles on rings in a cylinder, closer than the ball is wide, their surfaces on its faces."""
     inner = radius - T / 2
     feet = [(0.0, 0.0)]
-    for ring in np.linspace(gap, inner, math.ceil(inner / gap)):
-        turns = 2 * math.pi * np.arange(math.ceil(2 * math.pi * ring / gap)) / math.ceil(2 * math.pi * ring / gap)
+    for ring in np.linspace(GAP, inner, math.ceil(inner / GAP)):
+        number = math.ceil(2 * math.pi * ring / GAP)
+        turns = 2 * math.pi * np.arange(number) / number
         feet += [(ring * math.cos(turn), ring * math.sin(turn)) for turn in turns]
-    return np.array(
-        [
-            line([centre[0] + x, centre[1] + y, low + T / 2], [centre[0] + x, centre[1] + y, high - T / 2])
-            for x, y in feet
-        ]
-    )
+    return np.array([line([x, y, low + T / 2], [x, y, high - T / 2]) for x, y in feet])
 
 
-def brick(size, corner, gap=GAP):
+def brick(size, corner):
     """Level needles along x in a box, their surfaces on its faces."""
     low = np.asarray(corner) + T / 2
     high = np.asarray(corner) + np.asarray(size) - T / 2
-    ys, zs = (np.linspace(low[k], high[k], math.ceil((high[k] - low[k]) / gap) + 1) for k in (1, 2))
+    ys, zs = (np.linspace(low[k], high[k], math.ceil((high[k] - low[k]) / GAP) + 1) for k in (1, 2))
     return np.array([line([low[0], y, z], [high[0], y, z]) for y in ys for z in zs])
 
 
