@@ -19,6 +19,7 @@ _UNITS = {
     **{"hz": "Hz", "m3": "m³", "s2": "s²", "per": "/"},
 }
 _TAGS = ("type", "shape", "law")  # keys that say which member of a union a mapping is
+_TAG_OF = {"particle": "shape", "joints": "law"}  # the one that a key needs; all others need `type`
 _OF_A_KEY = "[key]"  # last step of pydantic's path if the key itself is wrong
 # A message that begins with a key is about that key, within the place that pydantic reports.
 _OWN_KEY = re.compile(r"\w[\w.]*(?=: )")
@@ -50,7 +51,7 @@ _TEXTS = {
     "list_type": _NO_LIST,
     "dict_type": "{shown} is not keys and values; write them as {{key: value}}",
     "model_type": "{shown} is not keys and values; write them as {{key: value}}",
-    "model_attributes_type": "{shown} is not keys and values; write them as {{type: …}}",
+    "model_attributes_type": "{shown} is not keys and values; write them as {{{tag_key}: …}}",
     "union_tag_not_found": "{tag_key}: missing in {shown}; write which one it is, see `smarticles schema`",
     "union_tag_invalid": "{tag_key}: {shown_tag} is not known; {choice}",
 }
@@ -131,9 +132,9 @@ def explained(error: ValidationError, data: Any, *, described: str) -> str:
         if found["type"] == "default_factory_not_called" or (found["type"] == "too_short" and found["input"]):
             continue
         place, given = _place(found["loc"], data)
-        text = _text(
-            found["type"], found["msg"], found["input"], found.get("ctx", {}), unit_of(place.rpartition(".")[2])[1]
-        )
+        names = [step for step in found["loc"] if isinstance(step, str)]
+        context = {"discriminator": _TAG_OF.get(names[-1] if names else "", "type")} | found.get("ctx", {})
+        text = _text(found["type"], found["msg"], found["input"], context, unit_of(place.rpartition(".")[2])[1])
         if found["type"] == "missing":
             text, given = f"{text}, see {described}", True
         if place:

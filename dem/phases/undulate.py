@@ -76,7 +76,13 @@ class Undulate(Part, Phase):
         key = f"phases.{index}"
         if not any(linkage.has_motors for linkage in linkages):
             yield f"{key}: undulate needs motors, but no joint has law: motor; give one, or leave the phase out"
-        for number, motion in enumerate(self.joints):
+        places = [(motion.joint, motion.axis) for motion in self.joints]
+        for number, (motion, place) in enumerate(zip(self.joints, places, strict=True)):
+            if (first := places.index(place)) < number:
+                yield (
+                    f"{key}.joints.{number}: joint {motion.joint}, axis {motion.axis} moves by joints.{first} already; "
+                    "leave one of them out"
+                )
             for linkage in linkages:
                 yield from _of_motion(f"{key}.joints.{number}", motion, linkage)
         for linkage in linkages:

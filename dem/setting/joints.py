@@ -1,7 +1,7 @@
 """Joints between the links of a chain: part of the key `particle` of a scene."""
 
 import math
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Any, Literal, Self, get_args
 
 from pydantic import BeforeValidator, Field, model_validator
 
@@ -53,6 +53,13 @@ class _Joint(Part):
         description="angles at the start, one number or one for each axis, of three axes a rotation vector [deg]; "
         "default: those at rest of an elastic joint, otherwise 0; motors hold them",
     )
+
+    @classmethod
+    def nearest_key(cls, key: str) -> str:
+        """Return advice about an unknown key: the laws that have it, or what any part advises."""
+        having = [kind for kind in _Joint.__subclasses__() if key in kind.known_keys()]
+        laws = " or ".join(get_args(kind.model_fields["law"].annotation)[0] for kind in having)
+        return f"it belongs in law: {laws}" if laws else super().nearest_key(key)
 
     @model_validator(mode="after")
     def _possible(self) -> Self:

@@ -280,6 +280,35 @@ def test_a_joint_that_yields_keeps_its_torque_and_its_energy_is_accounted_for(ax
 
 
 @pytest.mark.parametrize("axes", [1, 2, 3])
+def test_a_joint_that_yields_by_more_than_it_bends_in_each_step_takes_its_torque_times_the_angle(axes: int) -> None:
+    scene = chains({**SPRING, "axes": axes, "yield_N_m": 2e-7}, links=3)
+    engine, linkages = one(scene)
+    links(engine).velocity[:, 1] = -0.3, 0.6, -0.3
+    steps = []
+    for _ in range(100):
+        before = linkages.angles[:2, 0].copy()
+        engine.advance(1)
+        steps.append(np.abs(linkages.angles[:2, 0] - before))
+    assert np.max(steps) > 2 * 2e-7 / 2e-4
+    assert linkages.energies.damped == pytest.approx(2e-7 * np.sum(steps), rel=0.03)
+
+
+@pytest.mark.parametrize("axes", [1, 2, 3])
+def test_a_damped_motor_does_not_lag_behind_a_command_that_moves_steadily(axes: int) -> None:
+    phase = {"type": "undulate", "duration_s": 1.0, "frequency_Hz": 0, "ramp_s": 0.0}
+    phase["joints"] = [{"joint": 0, "centre_deg": 120}]
+    motor = {**MOTOR, "axes": axes, "speed_limit_rad_per_s": 5.0, "damping_N_m_s_per_rad": 4e-5}
+    scene = chains(motor, links=2, phases=[{"type": "deposit"}, phase])
+    engine, _ = one(scene)
+    scene.phases[1].begin(scene, 1).proceed(engine)
+    engine.advance(round(0.3 / engine.time_step))
+    linkages = engine._world.linkages
+    assert linkages is not None
+    assert linkages.command[0, 0] > 1.0
+    assert linkages.angle[0, 0] == pytest.approx(linkages.command[0, 0], abs=1e-3)  # against it, 5 · 4e-5/2e-3 = 0.1
+
+
+@pytest.mark.parametrize("axes", [1, 2, 3])
 def test_a_joint_that_breaks_leaves_its_links_pinned_and_free(axes: int) -> None:
     joint = {**SPRING, "axes": axes, "break_N_m": 1e-5}
     engine, linkages = one(chains(joint, links=3), gravity=G)

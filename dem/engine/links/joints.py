@@ -109,6 +109,7 @@ def linkages_at(
     gait = np.zeros((1, bending.GAIT))
     gait[:, bending.SENSE] = gait[:, bending.FACTOR] = gait[:, bending.TARGET] = 1.0
     gait[:, bending.WAIT] = math.inf
+    poured = np.array([*(joint.poured for joint in linkage.joints), np.zeros(3)])
     gait[:, bending.SEED], gait[:, bending.NUMBER], gait[:, bending.PSI] = seed, body, start
     fresh = old._replace(
         body=np.array([body], np.int32),
@@ -119,11 +120,11 @@ def linkages_at(
         row=np.array([*(row_of(linkage, k, law) for k in range(n - 1)), np.zeros(joining.JOINT)]),
         swing=swings_of(linkage, ()),
         rest=np.array([*(rest_of(joint) for joint in linkage.joints), np.zeros(4)]),
-        command=np.array([*(joint.poured for joint in linkage.joints), np.zeros(3)]),
+        command=poured.copy(),
         lost=np.zeros((n, joining.LOST)),
         grip=np.zeros(n, np.int64),
         broken=np.zeros(n, np.uint8),
-        angle=np.zeros((n, 3)),
+        angle=poured,
         torque=np.zeros((n, 3)),
         grip_speed=np.zeros((0, 3)),
         grip_force=np.zeros((0, 3)),

@@ -22,7 +22,9 @@ from dem.engine.links.stable_step import (
 
 # Groups of arrays without which `advance` is compiled where a scene has none of them.
 OF_FILAMENTS = frozenset({"bends", "filaments", "flexible", "stretch"})
-OF_LINKAGES = frozenset({"bends", "flexible", "linkages"})
+OF_LINKAGES = frozenset(
+    {"bends", "linkages"}
+)  # their links are rigid: one of the two tables of shapes lacks "flexible"
 OPTIONAL = OF_FILAMENTS | OF_LINKAGES | {"channel", "cords", "grips", "hooks", "ledger", "motors", "rims"}
 
 

@@ -108,7 +108,10 @@ class LinksLinkages:
 
     @property
     def angles(self) -> Array:
-        """(L, 3) angles of all joints in the last step [rad]; a joint has the number of the link before it."""
+        """(L, 3) angles of all joints in the last step [rad], not of free ones with three axes.
+
+        A joint has the number of the link before it.
+        """
         return self._all.angle
 
     @property

@@ -104,6 +104,12 @@ def _quaternion(row: Array) -> Quaternion:
 
 
 @inlined
+def _reversed(angles: Array) -> Vector:
+    """Return the rotation vector of angles in the order of the axes z, y, x [rad]."""
+    return angles[2], angles[1], angles[0]
+
+
+@inlined
 def _vector_of(a: Quaternion) -> Vector:
     """Return the rotation vector of a unit quaternion, of up to half a turn [rad]."""
     sign = 1.0 if a[0] >= 0.0 else -1.0
@@ -225,11 +231,12 @@ def _bend(
     row, law = linkages.row[j], linkages.law[j]
     stiffness, most, spring, resisting, motor = row[STIFFNESS], row[MOST], 0.0, 0.0, 0.0
     if law == ELASTIC:
-        e = _wrapped(angle - linkages.rest[j, axis])
+        e, last = _wrapped(angle - linkages.rest[j, axis]), _wrapped(linkages.angle[j, axis] - linkages.rest[j, axis])
         if stiffness * abs(e) > most:
             kept = math.copysign(most / stiffness, e)
             linkages.rest[j, axis] += e - kept
-            linkages.sums[DAMPED] += 0.5 * stiffness * (e * e - kept * kept)
+            # Leapfrog does the work of the mean of the torques of both steps.
+            linkages.sums[DAMPED] += 0.5 * stiffness * (last + kept) * (e - kept)
             e = kept
         spring, resisting = -stiffness * e, -row[DAMPING] * rate
     if law == MOTOR:
@@ -244,20 +251,23 @@ def _bend(
 def _turn_any(linkages: Linkages, j: int, spin: Vector, wave: Vector, past: float) -> tuple[Vector, Vector, Vector]:
     """Return the torques of spring, dashpot and motor of a joint with three axes on the link after [N m]."""
     row, law, none = linkages.row[j], linkages.law[j], (0.0, 0.0, 0.0)
-    rotation = _rotation(linkages, j)
+    rotation, before = _rotation(linkages, j), _rotation_by(_reversed(linkages.angle[j]))
     x, y, z = _vector_of(rotation)
     linkages.angle[j, 0], linkages.angle[j, 1], linkages.angle[j, 2] = z, y, x  # in the order of the axes
     stiffness, most, target = row[STIFFNESS], row[MOST], _quaternion(linkages.rest[j])
     if law == MOTOR:
+        old = _rotation_by(_reversed(linkages.command[j]))
         z, _ = _follow(linkages, j, 0, wave, past)
         y, _ = _follow(linkages, j, 1, wave, past)
         x, _ = _follow(linkages, j, 2, wave, past)
         target = _rotation_by((x, y, z))
+        of_command = scale(1 / past, _vector_of(_product(target, _inverse(old))))
+        spin = sub(spin, turned(linkages.links, j, *of_command))
     e = _vector_of(_product(rotation, _inverse(target)))
     size = math.sqrt(dot(e, e))
     if law == ELASTIC and stiffness * size > most:
-        kept = most / (stiffness * size)
-        linkages.sums[DAMPED] += 0.5 * stiffness * size * size * (1 - kept * kept)
+        kept, last = most / (stiffness * size), _vector_of(_product(before, _inverse(target)))
+        linkages.sums[DAMPED] += 0.5 * stiffness * (1 - kept) * dot(along(last, kept, e), e)  # as about one axis
         e = scale(kept, e)
         rest, target = linkages.rest[j], _product(_inverse(_rotation_by(e)), rotation)
         rest[0], rest[1], rest[2], rest[3] = target
