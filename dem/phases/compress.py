@@ -149,6 +149,16 @@ class Compress(Part, Phase):
         return False
 
 
+def check_plate_is_gone(scene: SceneView, index: int) -> Iterator[str]:
+    """Yield what is wrong with phase `index`, which raises bodies, if an earlier phase leaves its plate on the pile."""
+    before = [(k, phase) for k, phase in enumerate(scene.phases[:index]) if isinstance(phase, Compress)]
+    if before and before[-1][1].afterwards == "stay":
+        yield (
+            f"phases.{index}: {scene.phases[index].kind} would raise bodies into the plate that phases.{before[-1][0]} "
+            "(compress) leaves there; use afterwards: remove"
+        )
+
+
 def _area(scene: SceneView) -> float:
     """Return the area of the plate [m²]."""
     return math.pi * scene.container.radius_m**2
