@@ -149,7 +149,7 @@ class Lift(Part, Phase):
 
 
 class Release(Part, Phase):
-    """Release all nodes that earlier phases grip; takes no simulated time."""
+    """Release all that earlier phases grip; takes no simulated time."""
 
     type: Literal["release"]
 
