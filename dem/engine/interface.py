@@ -122,7 +122,7 @@ class Boundaries(Protocol):
         """Move the upper hook upwards at a speed [m/s] from now on."""
 
     def place_plate(self, height: float) -> None:
-        """Put a horizontal plate, as wide as the container, at a height of its lower face [m]; it is at rest.
+        """Put a horizontal plate without edges at a height of its lower face [m]; it is at rest.
 
         Raises:
             RunError: the engine has no plates.

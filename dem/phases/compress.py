@@ -19,8 +19,8 @@ Stress = Annotated[float, Field(ge=1e-6, le=1e12)]
 class Compress(Part, Phase):
     """Lower a horizontal plate onto the pile, to a stress or a strain, once or in cycles, with smarticles welded.
 
-    The plate begins at the pile's highest point, or where an earlier phase has left it. It is as wide as the container,
-    and has the contact law of the container. With the wall this is an oedometer; after remove-container the pile may
+    The plate begins at the pile's highest point, or where an earlier phase has left it. It has no edge, and the contact
+    law of the container. With the wall this is an oedometer; after remove-container the pile may
     give way to the sides. The stress is the vertical force on the plate over π radius_m², the strain is the distance
     that the plate has come down in this phase over its height above the floor at the beginning.
     """
@@ -49,8 +49,8 @@ class Compress(Part, Phase):
             )
         if scene.container.tiers is not None:
             yield (
-                f"phases.{index}: the plate of compress is as wide as the container, but container.tiers get narrower; "
-                "give container.radius_m instead"
+                f"phases.{index}: the plate of compress has no edge and would run into container.tiers, which get "
+                "narrower; give container.radius_m instead"
             )
         if scene.hooks is not None:
             yield f"phases.{index}: the plate of compress would run into the hooks; leave hooks or the phase out"
@@ -147,6 +147,16 @@ class Compress(Part, Phase):
                 "raise strain or lower stress_Pa"
             )
         return False
+
+
+def check_plate_is_gone(scene: SceneView, index: int) -> Iterator[str]:
+    """Yield what is wrong with phase `index`, which raises bodies, if an earlier phase leaves its plate on the pile."""
+    before = [(k, phase) for k, phase in enumerate(scene.phases[:index]) if isinstance(phase, Compress)]
+    if before and before[-1][1].afterwards == "stay":
+        yield (
+            f"phases.{index}: {scene.phases[index].kind} would raise bodies into the plate that phases.{before[-1][0]} "
+            "(compress) leaves there; use afterwards: remove"
+        )
 
 
 def _area(scene: SceneView) -> float:

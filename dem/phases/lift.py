@@ -10,6 +10,7 @@ from pydantic import Field, model_validator
 from dem.arrays import Array, Flags
 from dem.engine.effect import EffectName
 from dem.engine.interface import Engine, Filaments, Grips
+from dem.phases.compress import Compress, check_plate_is_gone
 from dem.phases.phase import Memory, Phase, SceneView, Stage, time_left
 from dem.setting.hooks import TOLERANCE
 from dem.setting.part import Duration, Length, Part, Speed
@@ -58,6 +59,15 @@ class Lift(Part, Phase):
         return self
 
     def check(self, scene: SceneView, index: int) -> Iterator[str]:
+        yield from check_plate_is_gone(scene, index)
+        for later, phase in enumerate(scene.phases[index:], index):
+            if phase.kind in ("release", "tension"):
+                break
+            if isinstance(phase, Compress):
+                yield (
+                    f"phases.{later}: the plate of compress would run into what phases.{index} (lift) still grips; add "
+                    "release before"
+                )
         if _bends(scene):
             return
         if self.grips == "tails":
@@ -104,17 +114,18 @@ class Lift(Part, Phase):
     def _grip(self, memory: Memory, index: int, engine: Engine) -> None:
         """Grip nodes, links or bodies; warn if there are none."""
         if engine.filaments is not None:
-            nodes, what = self._nodes(engine, engine.filaments), "body has a node or link"
+            nodes, what = self._nodes(engine, engine.filaments), "body has a node or link that"
             memory["grip"], empty = engine.filaments.grip(nodes), not nodes
         else:
             assert engine.grips is not None  # the scene calls for them
             engine.motors.weld()
-            bodies, what = np.flatnonzero(self._near(engine, engine.state().positions)).tolist(), "body is"
+            bodies, what = (
+                np.flatnonzero(self._near(engine, engine.state().positions)).tolist(),
+                "body has its centre of mass where",
+            )
             memory["grip"], empty = engine.grips.hold(bodies), not bodies
         if empty:
-            memory["warning"] = (
-                f"nothing was gripped: no {what} that phases.{index} grips; raise radius_m or lower above_m"
-            )
+            memory["warning"] = f"nothing was gripped: no {what} phases.{index} grips; raise radius_m or lower above_m"
 
     def _near(self, engine: Engine, places: Array) -> Flags:
         """Return (n,) whether places (n, 3) [m] are near the axis and high enough."""
@@ -138,7 +149,7 @@ class Lift(Part, Phase):
 
 
 class Release(Part, Phase):
-    """Release all nodes that earlier phases grip; takes no simulated time."""
+    """Release all that earlier phases grip; takes no simulated time."""
 
     type: Literal["release"]
 

@@ -129,7 +129,10 @@ class Phase:
         """Greatest peak acceleration Γ of the container, in units of gravity [1]; 0 at rest."""
         return 0.0 if self.vibrated_by is None else self.vibrated_by.peak_acceleration_g
 
-    speed_key: ClassVar[str] = "speed_m_per_s"  #: Key of the phase to which `pushing_speed` is proportional
+    @property
+    def speed_key(self) -> str:
+        """Key of the phase to which `pushing_speed` is proportional."""
+        return "speed_m_per_s"
 
     def pushing_speed(self, gravity: float) -> float:
         """Return the greatest speed [m/s] of the boundary that the phase moves; 0 if it moves none.

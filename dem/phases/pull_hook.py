@@ -90,8 +90,9 @@ class PullHook(Part, Phase):
         }
 
     def first_memory(self, scene: SceneView) -> Memory:
-        # At the last check, `force_sum`: vertical force on the hook, summed over steps [N]; `step`: number of steps.
-        return {"arrival": None, "end": None, "raising": False, "force_sum": 0.0, "step": 0}
+        # At the last check, `force_sum`: vertical force on the hook, summed over steps [N]; `step`: number of steps;
+        # `due`: time of the next check [s].
+        return {"arrival": None, "end": None, "raising": False, "force_sum": 0.0, "step": 0, "due": 0.0}
 
     def proceed(self, stage: Stage, engine: Engine) -> float:
         memory = stage.memory
@@ -100,16 +101,16 @@ class PullHook(Part, Phase):
             memory.update(arrival=arrival, end=engine.time + self.duration_s, raising=True, felt=_force_sum(engine))
             engine.motors.weld()
             engine.boundaries.raise_upper(self.speed_m_per_s)
-            memory.update(force_sum=_force_sum(engine)[2], step=engine.steps)
-        elif memory["raising"]:
+            self._check_from_now(memory, engine)
+        elif memory["raising"] and (self.vibration is None or not time_left(engine, memory.get("due", 0.0))):
             # Whether the mean force on the hook since the last check exceeds its limit.
             force_sum, step = memory["force_sum"], memory["step"]
-            memory.update(force_sum=_force_sum(engine)[2], step=engine.steps)
+            self._check_from_now(memory, engine)
             limit = self.force_limit_N
             if limit is not None and force_sum - memory["force_sum"] > limit * (memory["step"] - step):
                 memory.update(arrival=engine.time, end=engine.time + HELD_SECONDS)
         if memory["raising"] and (left := time_left(engine, memory["arrival"])):
-            return left if self.force_limit_N is None else min(self.whole_periods(CHECK_INTERVAL), left)
+            return left if self.force_limit_N is None else min(max(memory["due"] - engine.time, engine.time_step), left)
         if memory["raising"]:
             memory["raising"] = False
             if self.vibration is None:
@@ -123,6 +124,11 @@ class PullHook(Part, Phase):
                 "hooks.upper_height_m or raise count"
             )
         return left
+
+    def _check_from_now(self, memory: Memory, engine: Engine) -> None:
+        """Note the force on the hook summed over steps, and set the time of the next check."""
+        due = engine.time + self.whole_periods(CHECK_INTERVAL)
+        memory.update(force_sum=_force_sum(engine)[2], step=engine.steps, due=due)
 
 
 # (a, b): the default is a w + b t2.

@@ -7,6 +7,7 @@ from pydantic import Field
 
 from dem.engine.effect import EffectName
 from dem.engine.interface import Engine
+from dem.errors import RunError
 from dem.phases.phase import CHECK_INTERVAL, Memory, Phase, SceneView, Stage, time_left
 from dem.setting.part import Duration, Part, Speed
 
@@ -65,3 +66,15 @@ class RemoveContainer(Part, Phase):
             else:
                 return min(CHECK_INTERVAL, left)
         return left
+
+
+def check_wall_is_gone(engine: Engine, floor: str) -> None:
+    """Raise RunError if the wall is still around the pile; `floor`: the floor in words."""
+    if not engine.boundaries.walled:
+        return
+    edge = engine.boundaries.wall_bottom - engine.boundaries.floor
+    side = "above" if edge > 0 else "below"
+    raise RunError(
+        f"the wall is still around the pile, its lower edge {abs(edge):.3g} m {side} {floor}: remove-container was too "
+        "short to lift it over the pile; raise duration_s or speed_m_per_s of that phase"
+    )

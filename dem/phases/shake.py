@@ -2,14 +2,14 @@
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from typing import Any, ClassVar, Literal, Self
+from typing import Any, Literal, Self
 
 from pydantic import Field, model_validator
 
 from dem.engine.effect import EffectName
 from dem.engine.interface import Engine
-from dem.errors import RunError
 from dem.phases.phase import Memory, Phase, SceneView, Stage, time_left
+from dem.phases.remove_container import check_wall_is_gone
 from dem.setting.hooks import TOLERANCE
 from dem.setting.part import Duration, Part
 from dem.setting.vibration import Moved, PeakAcceleration, ShakingFrequency, Vibration, shaking_amplitude
@@ -28,7 +28,6 @@ class Shake(Part, Phase):
     away the unbounded floor is shaken, with all smarticles on it.
     """
 
-    speed_key: ClassVar[str] = "peak_acceleration_g"
     type: Literal["shake"]
     duration_s: Duration = Field(20.0, description="length of the phase [s]; default with taps: until the last rest")
     frequency_hz: ShakingFrequency = Field(30.0, description="f, frequency [Hz]; of a sweep: at the start")
@@ -97,6 +96,8 @@ class Shake(Part, Phase):
     def _between(self, start: float, end: float | None, place: float) -> float:
         if end is None:
             return start
+        if place == 1:
+            return end  # without rounding
         return start + (end - start) * place if self.ramp == "linear" else start * (end / start) ** place
 
     def cycle_start(self, number: int) -> float:
@@ -123,6 +124,21 @@ class Shake(Part, Phase):
     @property
     def peak_acceleration(self) -> float:
         return max(acceleration for _, acceleration in self._course)
+
+    @property
+    def fastest(self) -> tuple[float, float]:
+        """Frequency [Hz] and Γ [1] where the peak speed is greatest."""
+        return max(self._course, key=lambda one: one[1] / one[0])
+
+    @property
+    def speed_key(self) -> str:
+        end = self.fastest[1] == self.peak_acceleration_end_g != self.peak_acceleration_g
+        return "peak_acceleration_end_g" if end else "peak_acceleration_g"
+
+    def frequency_key(self, frequency: float) -> str:
+        """Return the key that sets a frequency [Hz] of the course."""
+        end = frequency == self.frequency_end_hz != self.frequency_hz
+        return "frequency_end_hz" if end else "frequency_hz"
 
     def warnings(self, scene: SceneView, index: int) -> Sequence[str]:
         if not 0 < self.peak_acceleration < 1:
@@ -152,7 +168,8 @@ class Shake(Part, Phase):
         frequency, acceleration = max(self._course, key=lambda one: shaking_amplitude(one[1], one[0], gravity))
         # Taps go up from where the floor rests.
         alone = self.moves == "floor" and self.taps is None
-        yield from _of_amplitude(scene, f"phases.{index}", frequency, acceleration, floor_alone=alone)
+        key = f"phases.{index}.{self.frequency_key(frequency)}"
+        yield from _of_amplitude(scene, key, frequency, acceleration, floor_alone=alone)
 
     def first_memory(self, scene: SceneView) -> Memory:
         return {"begun": False}
@@ -177,14 +194,8 @@ class Shake(Part, Phase):
         return self.duration_s
 
     def _begin(self, stage: Stage, engine: Engine) -> None:
-        if _freed(stage.scene, stage.index) and engine.boundaries.walled:
-            edge = engine.boundaries.wall_bottom - engine.boundaries.floor
-            side = "above" if edge > 0 else "below"
-            raise RunError(
-                f"the wall is still around the pile, its lower edge {abs(edge):.3g} m {side} the floor that is to be "
-                "shaken: remove-container was too short to lift it over the pile; raise duration_s or speed_m_per_s of "
-                "that phase"
-            )
+        if _freed(stage.scene, stage.index):
+            check_wall_is_gone(engine, "the floor that is to be shaken")
         stage.memory["begun"] = True
         engine.motors.weld()
 
@@ -238,11 +249,12 @@ class Shake(Part, Phase):
 def check_shaking(scene: SceneView, where: str, vibration: Vibration) -> Iterator[str]:
     """Yield what is wrong with a vibration, which is at the key `where`."""
     alone = vibration.moves == "floor"
-    yield from _of_amplitude(scene, where, vibration.frequency_hz, vibration.peak_acceleration_g, floor_alone=alone)
+    key, frequency = f"{where}.frequency_hz", vibration.frequency_hz
+    yield from _of_amplitude(scene, key, frequency, vibration.peak_acceleration_g, floor_alone=alone)
 
 
 def _of_amplitude(
-    scene: SceneView, where: str, frequency: float, acceleration: float, *, floor_alone: bool
+    scene: SceneView, key: str, frequency: float, acceleration: float, *, floor_alone: bool
 ) -> Iterator[str]:
     # The floor must not drop below the wall's lower edge.
     amplitude, depth = shaking_amplitude(acceleration, frequency, scene.gravity_m_per_s2), -scene.cylinder.bottom
@@ -250,13 +262,13 @@ def _of_amplitude(
     if amplitude > most:
         least = frequency * math.sqrt(amplitude / most)
         yield (
-            f"{where}.frequency_hz: {frequency:g} Hz at Γ = {acceleration:g} moves the container by A = "
+            f"{key}: {frequency:g} Hz at Γ = {acceleration:g} moves the container by A = "
             f"{amplitude:.3g} m up and down, at most {most:.3g} m are computed; use at least {1.005 * least:.3g} Hz"
         )
     if floor_alone and amplitude > depth:
         yield (
-            f"{where}.moves: the floor alone would go {amplitude:.3g} m down, and the wall ends {depth:.3g} m below "
-            "the floor; use a lower peak_acceleration_g, a higher frequency_hz, or moves: container"
+            f"{key.rpartition('.')[0]}.moves: the floor alone would go {amplitude:.3g} m down, and the wall ends "
+            f"{depth:.3g} m below the floor; use a lower peak_acceleration_g, a higher frequency_hz or moves: container"
         )
 
 

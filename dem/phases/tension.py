@@ -9,8 +9,10 @@ from pydantic import Field, model_validator
 from dem.engine.effect import EffectName
 from dem.engine.interface import Engine, Grips
 from dem.errors import RunError
+from dem.phases.compress import check_plate_is_gone
 from dem.phases.phase import CHECK_INTERVAL, Memory, Phase, SceneView, Stage, time_left
 from dem.phases.pull_hook import HELD_SECONDS
+from dem.phases.remove_container import check_wall_is_gone
 from dem.setting.hooks import TOLERANCE
 from dem.setting.part import Duration, Force, Length, Part, Speed
 from dem.setting.vibration import Vibration
@@ -62,6 +64,8 @@ class Tension(Part, Phase):
                 f"phases.{index}.axis: a pull along {self.axis} would end at the wall; take it away by "
                 "remove-container before, or use axis: z"
             )
+        if self.axis == "z":
+            yield from check_plate_is_gone(scene, index)
         if scene.count < 2:
             yield f"count: {scene.count} smarticle, but phases.{index} (tension) holds one at each end; use at least 2"
 
@@ -88,6 +92,8 @@ class Tension(Part, Phase):
         memory, grips, limit = stage.memory, engine.grips, self.force_limit_N
         assert grips is not None  # the scene calls for them
         if memory["end"] is None:
+            if self.axis != "z":
+                check_wall_is_gone(engine, "the floor")
             engine.motors.weld()
             grips.release()  # what a lift still holds
             for bodies in self._ends(stage, engine):

@@ -8,10 +8,12 @@ import math
 from collections.abc import Iterator
 
 from dem.errors import InputError
+from dem.phases.compress import Compress
 from dem.phases.deposit import Deposit
 from dem.phases.shake import Shake
 from dem.scene.scene import Scene
 from dem.setting.part import LONGEST_LENGTH
+from dem.setting.vibration import shaking_amplitude
 
 # Least height over the estimated rise of bodies, of a wall whose height the scene gives. Of random extreme scenes on
 # links, all stayed inside that had estimates up to 0.9 of the wall. Of eight that threw bodies, with estimates from
@@ -33,7 +35,12 @@ def check_ends(scene: Scene) -> None:
         if isinstance(phase, Deposit):
             problems = _of_pour(scene, phase)
         elif isinstance(phase, Shake):
-            problems = _of_shaking(scene, phase, index)
+            frequency, peak = phase.fastest
+            key, amplitude = f"phases.{index}.{phase.frequency_key(frequency)}", phase.amplitude(scene.gravity_m_per_s2)
+            problems = _of_shaking(scene, key, frequency, peak, amplitude)
+        elif (vibration := phase.vibrated_by) is not None and not isinstance(phase, Compress):  # it has a lid
+            key, amplitude = f"phases.{index}.vibration.frequency_hz", vibration.amplitude(scene.gravity_m_per_s2)
+            problems = _of_shaking(scene, key, vibration.frequency_hz, vibration.peak_acceleration_g, amplitude)
         for problem in problems:
             raise InputError(problem)
 
@@ -55,19 +62,20 @@ def _of_pour(scene: Scene, pour: Deposit) -> Iterator[str]:
         )
 
 
-def _of_shaking(scene: Scene, shake: Shake, index: int) -> Iterator[str]:
-    gravity, peak = scene.gravity_m_per_s2, shake.peak_acceleration_g
+def _of_shaking(scene: Scene, key: str, frequency: float, peak: float, amplitude: float) -> Iterator[str]:
+    # `frequency` [Hz] and `peak`, Γ [1], where the speed is greatest; `amplitude`: the greatest one [m].
+    gravity = scene.gravity_m_per_s2
     if peak <= 1:  # nothing leaves the floor
         return
     # The wall is at its lowest when the body is at its highest.
-    speed = (1 + scene.contact.restitution) * shake.pushing_speed(gravity)
-    rise = shake.amplitude(gravity) + speed**2 / (2 * gravity)
+    speed = (1 + scene.contact.restitution) * shaking_amplitude(peak, frequency, gravity) * 2 * math.pi * frequency
+    rise = amplitude + speed**2 / (2 * gravity)
     least = _factor(scene) * rise
     if least > scene.cylinder.height:
         yield (
-            f"phases.{index}.frequency_hz: {shake.frequency_hz:g} Hz at Γ = {peak:g} throws smarticles up by "
+            f"{key}: {frequency:g} Hz at Γ = {peak:g} throws smarticles up by "
             f"{rise:.3g} m, out of the wall of {scene.cylinder.height:.3g} m; use at least "
-            f"{1.005 * shake.frequency_hz * math.sqrt(least / scene.cylinder.height):.3g} Hz{_higher(MARGIN * rise)}"
+            f"{1.005 * frequency * math.sqrt(least / scene.cylinder.height):.3g} Hz{_higher(MARGIN * rise)}"
         )
 
 

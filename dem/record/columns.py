@@ -64,8 +64,8 @@ MOTOR_COLUMNS = _columns(
 # In scenes that ask for energy.
 ENERGY_COLUMNS = _columns(
     gravitational_energy_J="gravitational energy of all smarticles, zero at the floor's height at the start",
-    container_work_J="work of the moving container, hook or strings on the smarticles since the start, without "
-    "the weight of hook and container",
+    container_work_J="work of the moving container, plate, hook, grips or strings on the smarticles since the "
+    "start, without the weight of hook and container",
 )
 # In scenes that sample dissipation.
 LEDGER_COLUMNS = _columns(

@@ -7,6 +7,7 @@ import numpy as np
 
 from dem.phases.kinds import KINDS
 from dem.phases.phase import Phase, SceneView
+from dem.phases.pull_hook import PullHook
 from dem.phases.remove_container import RemoveContainer
 from dem.phases.shake import check_shaking
 from dem.setting.hooks import TOLERANCE, Hooks
@@ -221,7 +222,7 @@ def _of_bars(hooks: Hooks) -> Iterator[str]:
 
 def _of_room(scene: SceneView, hooks: Hooks) -> Iterator[str]:
     cylinder, top = scene.cylinder, hooks.upper_height_m + hooks.side_m / 2
-    pulled = next((k for k, phase in enumerate(scene.phases) if phase.raises), None)
+    pulled = next((k for k, phase in enumerate(scene.phases) if isinstance(phase, PullHook)), None)
     highest = scene.ample_height()
     if pulled is not None and top - hooks.side_m > highest:
         yield (
@@ -234,7 +235,7 @@ def _of_room(scene: SceneView, hooks: Hooks) -> Iterator[str]:
             f"{cylinder.height:g} m; use at most {cylinder.height - hooks.side_m / 2:g} m"
         )
     # Tiers are narrower upwards: a hook that fits into the highest tier that it reaches fits into all below.
-    raised = sum(phase.raises for phase in scene.phases)
+    raised = sum(phase.raises for phase in scene.phases if isinstance(phase, PullHook))
     free = float(cylinder.inner_radii(np.array([top + raised]))[0])
     lowest = float(cylinder.inner_radii(np.array([hooks.lower_height_m + hooks.side_m / 2]))[0])
     lower, upper = hooks.crosses

@@ -39,9 +39,9 @@ def add(commands: Commands) -> None:
         text="""
 Reads the frames (VTK) and series (HDF5) of finished, failed and running simulations. The table has one
 row per phase: means over the last frames of the phase, with standard errors (SE). The packing
-fraction φ is given by several definitions; the column names the definition. Phases that pull a hook
-or strain a chain have columns for forces. If DIR is a sweep, all its runs with frames are measured,
-and CSV and JSON have a column for each variable of the sweep. --by averages over all runs that have
+fraction φ is given by several definitions; the column names the definition. Phases with a plate, grips,
+a hook or strings have columns for forces. If DIR is a sweep, all its runs with frames are measured, and
+CSV and JSON have a column for each variable of the sweep. --by averages over all runs that have
 equal values in some columns, for example over seeds. --also adds measures that take long or that few
 need: crossing-number, closed-linking, orientation, caging. Tables are kept in the run directories, so
 that runs which have not changed are not measured again.""",

@@ -55,6 +55,20 @@ def test_the_force_of_a_plate_on_elastic_contacts_is_stiffness_times_overlap() -
     assert work == pytest.approx(STIFFNESS * pressed**2 / 2, rel=0.03)
 
 
+def test_the_work_of_a_plate_that_often_turns_is_in_the_springs() -> None:
+    made = rods([[0, 0, RADIUS]])
+    made.boundaries.place_plate(2 * RADIUS)
+    made.boundaries.move_plate(-1e-3)
+    made.advance(round(0.01 / DT))
+    for _ in range(40):
+        for speed in (1e-3, -1e-3):
+            made.boundaries.move_plate(speed)
+            made.advance(round(0.012 / DT))  # until it has left the rod, where a turn does no work
+    stored = made.ledger.elastic()[0] + made.state().kinetic_energy
+    # Of a force for half a step at each turn, the error would be 16 %.
+    assert made.ledger.container_work == pytest.approx(stored, rel=0.01)
+
+
 def test_a_removed_plate_leaves_nothing_behind() -> None:
     made = rods([[0, 0, RADIUS - 1e-7]])
     made.boundaries.place_plate(2 * RADIUS - 1e-6)
@@ -283,8 +297,11 @@ def test_the_works_of_plate_and_grips_are_their_forces_times_ways(series: Series
         steps = np.diff(series[way][quiet])
         forces = series[force][quiet[1:], 2]
         weight = series["grip_moved_count"][quiet[1:]] * WEIGHT if phase == 10 else 0.0
-        work = float((sign * (forces - weight) * steps).sum())
-        assert work == pytest.approx(np.diff(series["container_work_J"][quiet]).sum(), rel=0.02), phase
+        # In the step of a turn, half of the force's work is of the way before.
+        steady = np.append(False, np.isclose(steps[1:], steps[:-1], rtol=1e-6))
+        assert steady.sum() > 4
+        work = float((sign * (forces - weight) * steps)[steady].sum())
+        assert work == pytest.approx(np.diff(series["container_work_J"][quiet])[steady].sum(), rel=0.02), phase
 
 
 WEIGHT = small({"engine": "links", "particle": STAPLE}).model.mass * G

@@ -144,7 +144,11 @@ class LinksBoundaries:
         self._ground.place[PLATE] = self._ground.base[PLATE] = height
 
     def move_plate(self, speed: float) -> None:
+        before = float(self._ground.speed[PLATE])
         self._move(PLATE, speed)
+        if not self._ground.shaken[PLATE]:
+            # The next force acts for half a step before now and half a step after; then the speed follows `rise`.
+            self._ground.speed[PLATE] = 0.5 * (before + speed)
 
     def remove_plate(self) -> None:
         self._removed(self._world.remove_plate)

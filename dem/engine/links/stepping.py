@@ -157,6 +157,7 @@ def act(
             ground.base[k] += moved
         else:
             ground.place[k] += moved
+            ground.speed[k] = ground.rise[k]
     if cords is not None:
         for k in range(cords.anchor.shape[0]):
             cords.anchor[k, 0] += cords.speed[k] * length

@@ -275,6 +275,15 @@ def test_new_keys_at_their_defaults_change_no_hash() -> None:
         ([{**TENSION, "duration_s": 0.1}], {}, "phases.1.duration_s: 0.1 s", "use at least 0.4 s"),
         ([{**LIFT, "grips": "tails"}], {}, "phases.1.grips", "use near"),
         ([LIFT, {"type": "shape-change"}], {}, "phases.2: shape-change", "add release before"),
+        ([LIFT, COMPRESS], {}, "phases.2: the plate of compress would run into", "add release before"),
+        ([{**COMPRESS, "afterwards": "stay"}, LIFT], {}, "phases.2: lift would raise", "use afterwards: remove"),
+        ([{**COMPRESS, "afterwards": "stay"}, TENSION], {}, "phases.2: tension would raise", "afterwards: remove"),
+        (
+            [{"type": "shake", "frequency_end_hz": 0.01}],
+            {},
+            "phases.1.frequency_end_hz: 0.01 Hz",
+            "use at least 0.06",
+        ),
         ([{"type": "release"}], {}, "phases.1: release", "add lift before"),
         ([{"type": "shake", "taps": 4, "duration_s": 1}], {}, "phases.1.duration_s: 1 s", "leave it out"),
         ([{"type": "shake", "ramp": "log", "peak_acceleration_g": 0}], {}, "phases.1.ramp: log", "use linear"),
@@ -316,4 +325,6 @@ def test_tension_between_grips_is_not_for_filaments() -> None:
 
 
 def test_allowed_blocks_after_the_wall_has_gone() -> None:
+    stays = {**COMPRESS, "afterwards": "stay"}
+    with_phase(REMOVE, stays, {**TENSION, "axis": "x"}, COMPRESS, LIFT, {"type": "release"}, COMPRESS)
     with_phase(REMOVE, {**TENSION, "axis": "x"}, COMPRESS, LIFT, {"type": "release"}, {"type": "shape-change"})

@@ -8,6 +8,7 @@ from scenes import small
 
 from dem.phases.phase import CHECK_INTERVAL, Stage
 from dem.phases.pull_hook import HELD_SECONDS, PullHook
+from dem.setting.vibration import Vibration
 
 DT, SPEED, DISTANCE = 1e-4, 0.01, 0.004
 ARRIVAL = DISTANCE / SPEED
@@ -28,7 +29,8 @@ def pull(stiffness: float, *, anew: bool = False, **keys: Any) -> tuple[EngineDo
         if anew:
             memory, pulling = pulling.memory, phase.begin(scene, 1)
             pulling.memory = dict(memory)
-    assert engine.calls == [("raise_upper", SPEED), ("stop",)]
+    if phase.vibration is None:
+        assert engine.calls == [("raise_upper", SPEED), ("stop",)]
     return engine, engine.boundaries.upper_height - start, pulling
 
 
@@ -48,6 +50,13 @@ def test_a_held_hook_stops_at_the_first_check_with_a_mean_above_its_limit() -> N
     assert reached - 2 * DT <= raised / SPEED <= reached + CHECK_INTERVAL + 2 * DT
     assert raised < 0.6 * DISTANCE
     assert engine.time == pytest.approx(raised / SPEED + HELD_SECONDS, abs=2 * DT)
+
+
+def test_the_force_under_vibration_is_averaged_over_whole_periods_whenever_it_switches() -> None:
+    # Checks are 0.02 s apart. From 0.02 s to 0.04 s the mean is 0.003 N, in the last tenth of that time 0.0039 N.
+    vibration = Vibration(peak_acceleration_g=0.0, frequency_hz=50, windows_s=((0.038, 9),))
+    _, raised, _ = pull(10.0, force_limit_N=0.0035, vibration=vibration)
+    assert raised / SPEED == pytest.approx(0.06, abs=2 * DT)
 
 
 def test_what_a_pull_remembers_is_enough_to_resume() -> None:

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from double import EngineDouble
+from double import EngineDouble, GripsDouble
 from scenes import chain, small
 
 from dem.errors import InputError, RunError
@@ -195,8 +195,17 @@ def test_a_wall_is_removed_at_once_or_when_it_is_clear_of_the_pile() -> None:
     assert bottoms[-1] < top < bottoms[-1] + 0.1 * CHECK_INTERVAL * 1.01
 
 
-def test_a_wall_that_is_not_clear_stays_and_a_later_shake_fails() -> None:
-    scene, engine = begin({"type": "remove-container", "duration_s": 0.1, "speed_m_per_s": 0.01}, {"type": "shake"})
+@pytest.mark.parametrize(
+    "later",
+    [
+        {"type": "shake"},
+        {"type": "tension", "axis": "x", "grip_m": 0.001, "distance_m": 0.01, "speed_m_per_s": 0.01},
+    ],
+)
+def test_a_wall_that_is_not_clear_stays_and_a_later_shake_or_pull_fails(later: dict[str, Any]) -> None:
+    phases = {"type": "remove-container", "duration_s": 0.1, "speed_m_per_s": 0.01}, later
+    scene, engine = begin(*phases, engine="links")
+    engine.grips = GripsDouble(calls=engine.calls)
     run_phase(scene, engine)
     assert engine.calls == [("lift_wall", 0.01), ("stop",)]
     assert engine.boundaries.walled

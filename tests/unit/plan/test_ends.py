@@ -2,6 +2,7 @@
 
 import math
 import re
+from typing import Any
 
 import pytest
 import yaml
@@ -70,6 +71,31 @@ def test_what_the_floor_throws_over_the_wall_is_rejected_with_two_ways_out() -> 
     time_steps(shaken(float(frequency)))
     time_steps(shaken(13, height=float(height)))
     time_steps(shaken(5, peak=1))  # nothing leaves the floor
+
+
+@pytest.mark.parametrize(
+    ("phase", "key"),
+    [
+        (
+            {"type": "shake", "peak_acceleration_g": 1, "peak_acceleration_end_g": 15, "frequency_hz": 20},
+            "frequency_hz",
+        ),
+        ({"type": "shake", "peak_acceleration_g": 5, "frequency_hz": 90, "frequency_end_hz": 8}, "frequency_end_hz"),
+        (
+            {
+                "type": "tension",
+                "grip_m": 0.005,
+                "distance_m": 0.004,
+                "speed_m_per_s": 0.01,
+                "vibration": {"peak_acceleration_g": 15, "frequency_hz": 20},
+            },
+            "vibration.frequency_hz",
+        ),
+    ],
+)
+def test_the_key_is_named_that_throws_smarticles_over_the_wall(phase: dict[str, Any], key: str) -> None:
+    with pytest.raises(InputError, match=rf"^phases\.1\.{key}: \S+ Hz at Γ = (5|15) throws smarticles up"):
+        check_ends(small({"engine": "links", "container": {"height_m": 0.1}, "phases": [{"type": "deposit"}, phase]}))
 
 
 def test_a_wall_that_is_taken_away_is_not_in_the_way() -> None:
