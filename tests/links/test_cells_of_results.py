@@ -42,10 +42,13 @@ CELLS = [
     ("engines", "hook_links_seed2"),
     ("chain", "baseline_n2_hH0.520_seed1"),
     ("finite-size", "lw0.09_n100_seed1"),
+    ("shaft", "shape-change_lw1.00_k3.0_seed1"),
     pytest.param("chain-bodies", "baseline_n2_hH0.520_seed1", marks=pytest.mark.engine),
     *(
         pytest.param(*cell, marks=pytest.mark.long)
         for cell in (
+            ("procedures-main", "shape-change_lw1.00_links_seed1"),
+            ("procedures-main-rigid", "shape-change_lw1.00_links_seed1"),
             ("procedures", "shape-change_lw1.10_links_seed1"),
             ("procedures-code", "shape-change_lw1.10_links_seed1"),
             ("factors", "text_halt_mu0.4_lw1.00_seed1"),
