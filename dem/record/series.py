@@ -145,6 +145,10 @@ class Series(Mapping[str, NDArray[Any]]):
         """Return the index of the sample nearest to a time [s]."""
         return int(np.argmin(np.abs(self.time - time)))
 
+    def known(self, name: str, phase: int) -> NDArray[np.int64]:
+        """Return the indices of a phase's samples at which a quantity (n,) is finite; none without the quantity."""
+        return np.flatnonzero((self.data["phase"] == phase) & np.isfinite(self.data.get(name, np.nan)))
+
 
 def read_series(directory: Path | str) -> Series:
     """Return the time series of a run directory, whose run may be done, failed or still running."""

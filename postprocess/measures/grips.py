@@ -13,7 +13,7 @@ import numpy as np
 from dem.record.run import Run
 from dem.record.series import Series
 from postprocess.geometry.links import Floats
-from postprocess.measures.pull import END, WINDOW, held_fast_of, weight_of_one
+from postprocess.measures.pull import END, averaged, held_fast_of, interval_of, weight_of_one
 from postprocess.measures.registry import PhaseMeasure, Quantity, Shown
 
 TENSION, LIFT = "tension", "lift"  #: Types of phases
@@ -30,12 +30,6 @@ class TensionTest:
     interval: float  #: Time between samples [s]
 
     @property
-    def window(self) -> Floats:
-        """Weights of a moving mean over `WINDOW`."""
-        count = min(max(round(WINDOW / self.interval), 1), len(self.pulls))
-        return np.full(count, 1 / count)
-
-    @property
     def work(self) -> float:
         """Work of the pull, ∫ F dx [J]."""
         return float(self.pulls @ np.diff(self.elongations, prepend=0.0))
@@ -44,7 +38,7 @@ class TensionTest:
 def read_tension(run: Run, series: Series, phase: int) -> TensionTest:
     """Read pull and elongation of the phase with the given index, as far as the run has come."""
     axis = "xyz".index(run.scene["phases"][phase]["axis"])
-    inside = np.flatnonzero(_held_in(series, phase))
+    inside = series.known("elongation_m", phase)
     elongations = series["elongation_m"][inside]
     # The first sample has no sample with the grips before it.
     return TensionTest(
@@ -52,37 +46,33 @@ def read_tension(run: Run, series: Series, phase: int) -> TensionTest:
         pulls=-np.nan_to_num(series["grip_moved_force_N"][inside, axis]),
         held=np.nan_to_num(series["grip_fixed_force_N"][inside, axis]),
         length=float(series["grip_distance_m"][inside[0]] - elongations[0]),
-        interval=float(np.median(np.diff(series.time[inside]))),
+        interval=interval_of(series.time[inside]),
     )
 
 
 def has_grips(series: Series, phase: int) -> bool:
     """Return whether a series holds at least two samples of a grip in the phase with this index."""
-    return "elongation_m" in series.data and int(_held_in(series, phase).sum()) >= 2
-
-
-def _held_in(series: Series, phase: int) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
-    return np.asarray((series["phase"] == phase) & np.isfinite(series["elongation_m"]))
+    return len(series.known("elongation_m", phase)) >= 2
 
 
 def _of_tension(run: Run, series: Series, phase: int) -> tuple[float, ...]:
     test, asked = read_tension(run, series, phase), run.scene["phases"][phase]
     whole = weight_of_one(run) * run.manifest.count
-    means, places = (np.convolve(each, test.window, mode="valid") for each in (test.pulls, test.elongations))
+    means, places, held = (averaged(each, test.interval) for each in (test.pulls, test.elongations, test.held))
     highest = int(means.argmax())
-    held = float(np.convolve(test.held, test.window, mode="valid")[highest])
     ended = run.phases[phase].end_s is not None
     return (
         float(means[highest]) / whole,
         float(places[highest]) / test.length,
-        held / whole,
+        float(held[highest]) / whole,
         test.work,
         float(held_fast_of(test.elongations, asked)) if ended else float("nan"),
     )
 
 
 def _of_lift(run: Run, series: Series, phase: int) -> tuple[float, ...]:
-    inside = np.flatnonzero(_held_in(series, phase) & np.isfinite(series["grip_moved_force_N"][:, 2]))
+    inside = series.known("elongation_m", phase)
+    inside = inside[np.isfinite(series["grip_moved_force_N"][inside, 2])]
     last = inside[series.time[inside] > series.time[inside[-1]] - END]
     held = float(series["grip_moved_count"][last[-1]])
     return held, held - float(series["grip_moved_force_N"][last, 2].mean()) / weight_of_one(run)

@@ -53,7 +53,7 @@ class Compression:
 
 def read_compression(run: Run, series: Series, phase: int) -> Compression:
     """Read stress and strain of the phase with the given index, as far as the run has come."""
-    inside = np.flatnonzero((series["phase"] == phase) & np.isfinite(series["plate_z_m"]))
+    inside = series.known("plate_z_m", phase)
     height = series["plate_z_m"] - series["container_z_m"]
     area, times = float(np.pi * run.scene["container"]["radius_m"] ** 2), series.time[inside]
     speed, begun = run.scene["phases"][phase]["speed_m_per_s"], run.phases[phase].start_s or 0.0
@@ -70,9 +70,7 @@ def read_compression(run: Run, series: Series, phase: int) -> Compression:
 
 def has_plate(series: Series, phase: int) -> bool:
     """Return whether a series holds at least two samples of the plate in the phase with this index."""
-    if "plate_z_m" not in series.data:
-        return False
-    return int(((series["phase"] == phase) & np.isfinite(series["plate_z_m"])).sum()) >= 2
+    return len(series.known("plate_z_m", phase)) >= 2
 
 
 def _of_plate(run: Run, series: Series, phase: int) -> tuple[float, ...]:

@@ -83,7 +83,7 @@ def read_pull(run: Run, series: Series, phase: int) -> HookPull:
         raise InputError(f"{series.path}: no force of a hook throughout phase {phase} of {run.path}; run it again")
     span = np.concatenate([[inside[0] - 1], inside])
     resting = force[: inside[0]][series["phase"][: inside[0]] == phase - 1]
-    resting = resting[np.isfinite(resting)][-max(1, _samples(series.time[span], END)) :]
+    resting = resting[np.isfinite(resting)][-_samples(END, interval_of(series.time[span]), len(inside)) :]
     work = series.data.get("container_work_J")
     return HookPull(
         edges=series.time[span] - series.time[span[0]],
@@ -101,13 +101,23 @@ def weight_of_one(run: Run) -> float:
 
 
 def moving_mean(pull: HookPull, window: float = WINDOW) -> tuple[Floats, Floats]:
-    """Return the moving mean of the force: middles of the windows (m,) [s] and mean forces (m,) [N].
+    """Return the moving mean of the force: middles of the windows (m,) [s] and mean forces (m,) [N]."""
+    interval = interval_of(pull.edges)
+    return averaged(pull.times, interval, window), averaged(pull.force, interval, window)
+
+
+def averaged(values: Floats, interval: float, window: float = WINDOW) -> Floats:
+    """Return the moving mean (m,) of values (n,) at samples that are an `interval` [s] apart.
 
     The window [s] is rounded to whole samples: at least one, at most all.
     """
-    count = _samples(pull.edges, window)
-    weights = np.full(count, 1 / count)
-    return np.convolve(pull.times, weights, mode="valid"), np.convolve(pull.force, weights, mode="valid")
+    count = _samples(window, interval, len(values))
+    return np.convolve(values, np.full(count, 1 / count), mode="valid")
+
+
+def interval_of(times: Floats) -> float:
+    """Return the median time between successive samples [s], by their times (n,) [s]."""
+    return float(np.median(np.diff(times)))
 
 
 def peak(pull: HookPull, window: float = WINDOW) -> Peak:
@@ -172,12 +182,9 @@ def has_pull(series: Series, phase: int) -> bool:
     return "hook_upper_force_N" in series.data and int((series["phase"] == phase).sum()) >= 2
 
 
-def _samples(edges: Floats, window: float) -> int:
-    """Return the number of samples that a window [s] holds: at least one, at most all n.
-
-    `edges` (n + 1,) are the times between which the n samples lie [s], see `HookPull.edges`.
-    """
-    return min(max(round(window / float(np.median(np.diff(edges)))), 1), len(edges) - 1)
+def _samples(window: float, interval: float, most: int) -> int:
+    """Return how many samples, an `interval` [s] apart, a window [s] holds: at least one, at most `most`."""
+    return min(max(round(window / interval), 1), most)
 
 
 MEASURES = (

@@ -18,6 +18,15 @@ def test_series_holds_values_units_and_descriptions(run):
         series.time[0] = 1
 
 
+def test_samples_at_which_a_quantity_is_known(run):
+    with h5py.File(run / "series.h5", "r+") as file:
+        file["phase"][...] = [0, 1, 1]
+        file["kinetic_energy_J"][...] = [1.0, np.nan, 2.0]
+    series = read_series(run)
+    assert [series.known("kinetic_energy_J", phase).tolist() for phase in (0, 1, 2)] == [[0], [2], []]
+    assert series.known("heat", 0).tolist() == []
+
+
 def test_unknown_name_lists_what_there_is(run):
     with pytest.raises(InputError, match=r"no series 'heat'; choose one of: .*kinetic_energy_J"):
         read_series(run)["heat"]
