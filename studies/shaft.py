@@ -26,6 +26,7 @@ from studies.framework.procedures import (
     PROCEDURE,
     SHAPE,
     activity,
+    of_procedure,
     procedure_row,
 )
 from studies.framework.runs import ASPECT_KEY, Key, Row, declare
@@ -66,30 +67,33 @@ def measure(run: Run) -> Row:
     return row
 
 
-def with_shaft(stiffness: float, *, contact: float = SOFT_CONTACT) -> Rows:
-    """Return a function that selects rows by stiffness of the shaft [N m/rad] and of contacts [N/m]."""
-    return lambda table: table[np.isclose(table[SHAFT], stiffness) & np.isclose(table[CONTACT], contact)]
-
-
-def _of_shape(rows: Rows) -> Rows:
-    return lambda table: rows(table)[rows(table)[PROCEDURE] == SHAPE]
-
-
 def _soft_contacts(table: pd.DataFrame) -> pd.DataFrame:
     return table[np.isclose(table[CONTACT], SOFT_CONTACT)]
 
 
+def _with_shaft(stiffness: float) -> Rows:
+    """Return a function that selects rows with soft contacts by the stiffness of the shaft [N m/rad]."""
+    return lambda table: _soft_contacts(table[np.isclose(table[SHAFT], stiffness)])
+
+
+def _of_shape(rows: Rows) -> Rows:
+    """Return a function that selects those rows that `rows` selects and that have a shape change."""
+    return lambda table: of_procedure(rows(table), SHAPE)
+
+
 def _stiff_contacts_cost(table: pd.DataFrame) -> list[Effect]:
-    shape = table[(table[PROCEDURE] == SHAPE) & (table[SHAFT] == table[SHAFT].max())]
-    hard = shape[shape[CONTACT] > SOFT_CONTACT]
-    both = pairs(hard, _soft_contacts(shape), ENERGY)
+    """Compare the energies of a shape change with stiff and with soft contacts, for the stiffest shaft."""
+    shape = of_procedure(table[table[SHAFT] == table[SHAFT].max()], SHAPE)
+    both = pairs(shape[shape[CONTACT] > SOFT_CONTACT], _soft_contacts(shape), ENERGY)
     ratio = mean_over_seeds(np.log10(both["one"] / both["other"]))
     text = f"{10**ratio.value:.3g} ×/÷ {10**ratio.half_width:.3g} (n = {ratio.count})" if ratio.count > 1 else "no data"
     return [Effect(label="energy at 4000 N/m over that at 500 N/m, geometric mean and 95 %:", value=ratio, text=text)]
 
 
-SOFT, RIGID = with_shaft(3e-3), with_shaft(3.0)
-_PLACES = (("soft", "soft shafts, 0.003 N m/rad", SOFT), ("rigid", "rigid motors, 3 N m/rad", RIGID))
+_ENDS = (
+    ("soft", "soft shafts, 0.003 N m/rad", _with_shaft(3e-3)),
+    ("rigid", "rigid motors, 3 N m/rad", _with_shaft(3.0)),
+)  #: Softest and stiffest shaft: end of ids of findings, begin of statements, rows
 
 FINDINGS = (
     slope(
@@ -102,7 +106,7 @@ FINDINGS = (
     ),
     *(
         finding
-        for end, says, rows in _PLACES
+        for end, says, rows in _ENDS
         for finding in (
             above(f"shape-entangles-most-{end}", f"{says}: shape change entangles more than internal oscillation",
                   CROSSINGS, SHAPE, (INTERNAL,), rows=rows),
