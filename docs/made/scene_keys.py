@@ -74,11 +74,11 @@ def _table(definition: Schema) -> str:
 
 def _options(entry: Schema) -> Iterator[Schema]:
     """Yield the alternative types of an entry of the schema, those inside alternatives included, without null."""
-    for option in entry.get("anyOf", [entry]):
-        if "anyOf" in option:
+    if "anyOf" in entry:
+        for option in entry["anyOf"]:
             yield from _options(option)
-        elif option.get("type") != "null":
-            yield option
+    elif entry.get("type") != "null":
+        yield entry
 
 
 def _type(entry: Schema) -> str:
