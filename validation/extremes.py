@@ -250,7 +250,7 @@ def check_run(path: Path, scene: Mapping[str, Any]) -> dict[str, Any]:
         "pairs of axes crossed [1]": len(crossed),
         "farthest moved between frames [t]": moved,
         "energy above what was put in [1]": excess,
-        "largest residual over dissipated [1]": residual,
+        "largest residual over dissipated until then [1]": residual,
         "wrong": "; ".join(wrong),
     }
 
@@ -258,9 +258,11 @@ def check_run(path: Path, scene: Mapping[str, Any]) -> dict[str, Any]:
 def energy_errors(path: Path) -> tuple[float, float]:
     """Return two relative errors of the energy in a run, from the series in its directory `path`.
 
-    They are the largest excess of the stored energy over the supplied energy [1], and the largest residual of the
-    ledger over the dissipated energy [1]; NaN if the series contains NaN. The supplied energy is `added_energy_J`, from
-    the heights and speeds of poured smarticles, plus the work of motors and container.
+    The first is the largest excess of the stored energy, as a fraction of the energy supplied until then [1]: that of
+    poured smarticles by their heights and speeds (`added_energy_J`), and the work of motors and container. The second
+    is the largest residual of the ledger, as a fraction of the energy dissipated until then [1]. Soon after the start,
+    when little has been dissipated, this fraction can be large although the residual is small. Both are NaN if the
+    series contains NaN.
     """
     with h5py.File(path / "series.h5") as file:
         series = {name: np.asarray(dataset[()], dtype=float) for name, dataset in file.items()}

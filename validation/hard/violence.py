@@ -262,9 +262,10 @@ for _above in (False, True):
 
 
 def lid(access: EngineAccess, out: Path, *, count: int, stiffness: float) -> list[Check]:
-    """Press on a column of smarticles of l/w = 1.8 with ten times its weight, let it rest, then shake at Γ = 10.
+    """Load a column of smarticles of l/w = 1.8 with ten times its weight, at rest and shaken at Γ = 10.
 
-    No phase has a lid: the weight of the highest smarticle is raised instead.
+    The lid is the highest smarticle, whose weight is raised. The plate of the phase `compress` has a prescribed motion,
+    not a weight.
     """
     fidelity = {"base": "draft", "stiffness_N_per_m": stiffness}
     shake = {"type": "shake", "duration_s": 0.2, "frequency_hz": 30, "peak_acceleration_g": 10}
