@@ -1,9 +1,9 @@
 """Measure pulls by grips: force against elongation between two grips, and what a grip picks up.
 
-The pull is the force with which other bodies, floor and wall hold back what the moving grip holds. On what the resting
-grip holds they pull the other way, less the push of the floor. The strain is the elongation over the distance between
-the means of the centres of both grips' bodies at the beginning. What a grip has picked up is the weight that hangs on
-it, over that of one body.
+The pull is the force with which other bodies, floor and wall hold back what the moving grip holds. The pull on the
+resting grip is their force on what it holds, in the direction in which the other grip moves; along z it includes the
+push of the floor. The strain is the elongation over the distance between the means of the centres of both grips' bodies
+at the beginning. What a grip has picked up is the weight that hangs on it, over that of one body.
 """
 
 from dataclasses import dataclass

@@ -1,4 +1,4 @@
-"""Reading scenes of chains of links: what they become, and what is refused in one line."""
+"""Reading scenes of chains of links: what they become, and what is rejected in one line."""
 
 import math
 from copy import deepcopy
@@ -26,7 +26,7 @@ SCENE: dict[str, Any] = {
 TABLE = {"type": "undulate", "duration_s": 1, "joints": [{"joint": 1, "amplitude_deg": 20, "phase_deg": 90}]}
 
 
-def refused(changes: dict[str, Any]) -> str:
+def rejected(changes: dict[str, Any]) -> str:
     with pytest.raises(InputError) as error:
         small(deepcopy(SCENE) | changes)
     return str(error.value).removeprefix("scene.yaml: ")
@@ -135,6 +135,6 @@ def test_a_plan_has_their_step_and_effects() -> None:
     ({"plane": {}}, "plane: motion in a plane is that of smarticles"),
 ])  # fmt: skip
 def test_one_line_says_what_is_wrong_and_what_to_do(changes: dict[str, Any], message: str) -> None:
-    found = refused(changes)
+    found = rejected(changes)
     assert found.startswith(message)
     assert "\n" not in found
