@@ -193,7 +193,7 @@ def shaken(access: EngineAccess, out: Path, *, count: int, seconds: float, rest:
 
 @hard("thrown out of the container", {"count": 6, "seconds": 0.5}, {"count": 60})
 def thrown_out(access: EngineAccess, out: Path, *, count: int, seconds: float) -> list[Check]:
-    """Shake at Γ = 30 in a low container, until smarticles are thrown out."""
+    """Shake at Γ = 30 in a low container: the scene is rejected, and a run without this check is stopped."""
     shake = {"type": "shake", "duration_s": seconds, "frequency_hz": 20, "peak_acceleration_g": 30}
     # Shaking that moves the floor by more than a twentieth of a diameter in a step is rejected.
     stiff = {} if access.name == "yade" else {"stiffness_N_per_m": 5000}
