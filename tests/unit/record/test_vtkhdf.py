@@ -200,7 +200,7 @@ def test_a_killed_process_loses_no_frame_that_it_has_written(tmp_path: Path) -> 
                 acknowledged.write_text(f"{number + 1}", encoding="ascii")
             os._exit(0)
         until = time.monotonic() + 60
-        while int(acknowledged.read_text(encoding="ascii") or 0) <= first:  # a busy machine starts late
+        while int(acknowledged.read_text(encoding="ascii") or 0) < first + 2:  # a busy machine starts late
             assert time.monotonic() < until
             time.sleep(0.01)
         time.sleep(random.uniform(0.0, 0.1))
@@ -211,7 +211,7 @@ def test_a_killed_process_loses_no_frame_that_it_has_written(tmp_path: Path) -> 
         assert number >= max(written, first)
         holds(path, counts[:number])
         first = number
-    assert first >= 8  # one frame at least before each kill
+    assert first > 8
 
 
 def test_a_reader_begins_again_if_the_file_changes_meanwhile(tmp_path: Path) -> None:
