@@ -1,4 +1,4 @@
-"""A body of rigid links that are joined end to end: what its joints allow, and their laws."""
+"""Describe linkages, bodies of rigid links joined end to end: their joints, and gaits of their motors."""
 
 import math
 from collections.abc import Sequence
@@ -20,18 +20,18 @@ Law = Literal["free", "elastic", "motor"]
 
 @dataclass(frozen=True, kw_only=True)
 class Joint:
-    """What joins a link to the one after it.
+    """Joint between a link and the one after it.
 
     Frames of links have x along the link and z along its normal. At angles of 0 the frames of both links are parallel.
     """
 
-    #: Directions about which the links turn, unit vectors in the frames at angles of 0: one, a hinge; two at right
-    #: angles, the first fixed in the link before and the second in the link after; three, any direction
+    #: Unit vectors about which the links turn, in their common frame at angles of 0. One: a hinge; two at right angles:
+    #: the first is fixed in the link before, the second in the link after; three: the links turn about any direction
     axes: tuple[Three, ...]
     law: Law = "free"
-    stiffness: float = 0.0  #: Of the elastic joint, or of the motor about its command [N m/rad]
-    damping: float = 0.0  #: [N m s/rad]
-    #: Angles about each axis without torque; of three axes a rotation vector, along these axes [rad]
+    stiffness: float = 0.0  #: Of an elastic joint, or of a motor about its command [N m/rad]
+    damping: float = 0.0  #: Likewise [N m s/rad]
+    #: Angles about the axes without torque; for three axes the components, along these, of a rotation vector [rad]
     rest: Three = (0.0, 0.0, 0.0)
     poured: Three = (0.0, 0.0, 0.0)  #: Angles at the start, which motors hold, likewise [rad]
     most: float = math.inf  #: Torque at which an elastic joint yields, or the limit of a motor [N m]
@@ -39,7 +39,7 @@ class Joint:
     speed: float = math.inf  #: Greatest speed of a motor's command [rad/s]
 
     def vector(self, angles: Three) -> Array:
-        """Return the sum (3,) of angles [rad] times their axes, in the frame of the link before."""
+        """Return the rotation vector (3,) of angles about the axes [rad], the sum of angle times axis."""
         return np.asarray((np.array(angles)[: len(self.axes), None] * np.array(self.axes)).sum(axis=0))
 
     @property
@@ -79,7 +79,7 @@ class Linkage:
 
 @dataclass(frozen=True, kw_only=True)
 class Swing:
-    """Motion of one motor about one axis: centre + amplitude sin(ψ + phase)."""
+    """Motion of one motor about one axis: centre + amplitude sin(ψ + phase), with ψ of the `Undulation`."""
 
     joint: int  #: Number of the joint, from 0
     axis: int = 0  #: Number of its axis, from 0
@@ -90,17 +90,17 @@ class Swing:
 
 @dataclass(frozen=True, kw_only=True)
 class Undulation:
-    """What the motors of linkages do: swings of given joints, and a wave that travels along all others."""
+    """Gait of the motors of linkages: swings of given joints, and a wave that travels along all others."""
 
-    rate: float  #: dψ/dt [rad/s]
+    rate: float  #: dψ/dt, up to its sign, which reversals change [rad/s]
     amplitude: float = 0.0  #: Of the wave about the first axis of each motor [rad]
     wavelength: float = math.inf  #: Of the wave, in lengths of the linkage [1]
-    swings: Sequence[Swing] = ()
+    swings: Sequence[Swing] = ()  #: Motions of joints that do not follow the wave
     reversal_rate: float = 0.0  #: Mean number of reversals of ψ per second, at random times; 0: none [1/s]
     together: bool = False  #: Whether ψ of all linkages begins at 0, not at random
 
     def swings_of(self, linkage: Linkage) -> list[Swing]:
-        """Return the swings of all motors of a linkage; one that is not given swings by the wave."""
+        """Return the swings of all motors of a linkage: those in `swings`, and the wave for other joints."""
         given = {swing.joint for swing in self.swings}
         whole = sum(float(link.lengths[0]) for link in linkage.links)
         return [

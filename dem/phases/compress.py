@@ -12,23 +12,24 @@ from dem.phases.phase import CHECK_INTERVAL, Memory, Phase, SceneView, Stage, ti
 from dem.setting.part import Part, Speed
 from dem.setting.vibration import Vibration
 
-PER_CHECK = 0.01  # sphere diameters that the plate moves between two checks of the stress
+PER_CHECK = 0.01  # longest way of the plate between two checks of the stress, in sphere diameters
 Stress = Annotated[float, Field(ge=1e-6, le=1e12)]
 
 
 class Compress(Part, Phase):
-    """Lower a horizontal plate onto the pile, to a stress or a strain, once or in cycles, with smarticles welded.
+    """Compress the pile by a plate, to a stress or a strain, once or in cycles, with smarticles welded.
 
-    The plate begins at the pile's highest point, or where an earlier phase has left it. It has no edge, and the contact
-    law of the container. With the wall this is an oedometer; after remove-container the pile may
-    give way to the sides. The stress is the vertical force on the plate over π radius_m², the strain is the distance
-    that the plate has come down in this phase over its height above the floor at the beginning.
+    The plate begins at the pile's highest point, or where an earlier phase has left it. It is horizontal, and has no
+    edge and the container's contact law. With the wall this is an oedometer; after remove-container the pile may give
+    way to the sides.
+    The stress is the vertical force on the plate over π radius_m². The strain is the distance that the plate has come
+    down in this phase, over its height above the floor at the beginning.
     """
 
     needs_links: ClassVar[str] = "a plate"
     type: Literal["compress"]
     stress_Pa: Stress | None = Field(
-        None, description="mean stress at which a loading ends [Pa]; null: each ends at `strain`"
+        None, description="stress at which a loading ends [Pa]; null: each ends at `strain`"
     )
     strain: float = Field(0.3, ge=1e-6, le=0.95, description="largest strain, at which a loading ends in any case [1]")
     speed_m_per_s: Speed = Field(..., description="speed of the plate, downwards and upwards [m/s]")
@@ -81,9 +82,9 @@ class Compress(Part, Phase):
 
     def first_memory(self, scene: SceneView) -> Memory:
         # `start`: height of the plate above the floor at the beginning [m]; `leg`: number of the loading (even) or
-        # unloading (odd), `way`: how far the plate was down when it began [m], `begun` and `arrival`: when it began,
-        # and when it ends in any case [s]. At the last check, `sum`: force on the plate summed over steps [N]; `step`:
-        # number of steps; `due`: time of the next check [s]. `touched`, `short`: for warnings.
+        # unloading (odd), `way`: distance of the plate below its start when the leg began [m], `begun` and `arrival`:
+        # when it began, and when it ends in any case [s]. At the last check, `sum`: force on the plate summed over
+        # steps [N]; `step`: number of steps; `due`: time of the next check [s]. `touched`, `short`: for warnings.
         numbers = dict.fromkeys(("way", "begun", "arrival", "sum", "due"), 0.0)
         return {"start": None, "leg": 0, "step": 0, "touched": False, "short": False, **numbers}
 
@@ -103,7 +104,7 @@ class Compress(Part, Phase):
         return min(time_left(engine, memory["due"]), time_left(engine, memory["arrival"])) or engine.time_step
 
     def _begin_leg(self, memory: Memory, engine: Engine) -> None:
-        """Move the plate down or up, and note when it arrives at its end."""
+        """Begin a loading or an unloading, and note when the plate arrives at the end of its way."""
         up = bool(memory["leg"] % 2)
         way = memory["way"] if up else self.strain * memory["start"] - memory["way"]
         memory.update(begun=engine.time, arrival=engine.time + way / self.speed_m_per_s)
@@ -111,13 +112,13 @@ class Compress(Part, Phase):
         self._check_from_now(memory, engine)
 
     def _check_from_now(self, memory: Memory, engine: Engine) -> None:
-        """Note the force on the plate summed over steps, and set the time of the next check."""
+        """Note the sum of the plate's force up to now, and set the time of the next check."""
         interval = min(CHECK_INTERVAL, PER_CHECK * engine.particle.diameter / self.speed_m_per_s)
         due = engine.time + max(engine.time_step, self.whole_periods(interval))
         memory.update(sum=float(engine.boundaries.plate_sum[2]), step=engine.steps, due=due)
 
     def _turn(self, stage: Stage, engine: Engine, *, arrived: bool) -> bool:
-        """Check the stress, and turn the plate round if its leg has ended; return whether the phase goes on."""
+        """Check the stress, and begin the next leg if this one has ended; return whether the phase goes on."""
         memory, boundaries = stage.memory, engine.boundaries
         steps = max(1, engine.steps - memory["step"])
         stress = (float(boundaries.plate_sum[2]) - memory["sum"]) / steps / _area(stage.scene)
@@ -150,7 +151,7 @@ class Compress(Part, Phase):
 
 
 def check_plate_is_gone(scene: SceneView, index: int) -> Iterator[str]:
-    """Yield what is wrong with phase `index`, which raises bodies, if an earlier phase leaves its plate on the pile."""
+    """Yield an error about phase `index`, which raises bodies, if a plate is still on the pile."""
     before = [(k, phase) for k, phase in enumerate(scene.phases[:index]) if isinstance(phase, Compress)]
     if before and before[-1][1].afterwards == "stay":
         yield (
@@ -160,5 +161,5 @@ def check_plate_is_gone(scene: SceneView, index: int) -> Iterator[str]:
 
 
 def _area(scene: SceneView) -> float:
-    """Return the area of the plate [m²]."""
+    """Return the area to which the stress refers, that of the container [m²]."""
     return math.pi * scene.container.radius_m**2

@@ -1,4 +1,4 @@
-"""Phases that grip nodes of filaments, links of chains, or whole rigid bodies, raise them, and release them."""
+"""The phases that grip and raise nodes of filaments, links of chains or rigid bodies, and release them."""
 
 import math
 from collections.abc import Iterator, Mapping
@@ -17,11 +17,11 @@ from dem.setting.part import Duration, Length, Part, Speed
 
 
 class Lift(Part, Phase):
-    """Grip nodes of filaments, links of chains, or rigid bodies, raise them at constant speed, and hold them.
+    """Grip nodes of filaments, links of chains, or rigid bodies, raise them at constant speed, hold them.
 
-    A `release` ends the hold. Filaments and chains go on with active bending. Rigid bodies are gripped as a whole, by
-    their centre of mass, and do not turn; smarticles are welded. The gripping end piece is not simulated as a body, so
-    that nothing touches it.
+    They are held until a `release`. Filaments and chains continue their active bending. Rigid bodies are chosen by
+    their centre of mass, gripped as a whole, and do not turn; smarticles are welded. The end piece that grips is not
+    simulated as a body, so that nothing touches it.
     """
 
     needs_links: ClassVar[str] = "a grip"
@@ -42,7 +42,7 @@ class Lift(Part, Phase):
         "the centres of mass; tails, 0",
     )
     distance_m: Length = Field(..., description="how far they are raised [m]")
-    speed_m_per_s: Speed = Field(..., description="speed [m/s]")
+    speed_m_per_s: Speed = Field(..., description="speed of the grip [m/s]")
     duration_s: Duration = Field(
         default_factory=lambda data: data["distance_m"] / data["speed_m_per_s"],
         description="length of the phase [s]; default: until they have arrived; in a longer phase they are then held",
@@ -112,7 +112,7 @@ class Lift(Part, Phase):
         return time_left(engine, memory["end"])
 
     def _grip(self, memory: Memory, index: int, engine: Engine) -> None:
-        """Grip nodes, links or bodies; warn if there are none."""
+        """Grip the nodes, links or bodies that are near; note a warning if there are none."""
         if engine.filaments is not None:
             nodes, what = self._nodes(engine, engine.filaments), "body has a node or link that"
             memory["grip"], empty = engine.filaments.grip(nodes), not nodes
@@ -128,7 +128,7 @@ class Lift(Part, Phase):
             memory["warning"] = f"nothing was gripped: no {what} phases.{index} grips; raise radius_m or lower above_m"
 
     def _near(self, engine: Engine, places: Array) -> Flags:
-        """Return (n,) whether places (n, 3) [m] are near the axis and high enough."""
+        """Return (n,) whether places (n, 3) [m] are within `radius_m` of the axis and high enough."""
         floor, state = engine.boundaries.floor, engine.state()
         least = self.above_m
         if least is None:
@@ -137,7 +137,7 @@ class Lift(Part, Phase):
         return (np.hypot(places[:, 0], places[:, 1]) <= radius) & (places[:, 2] - floor >= least)
 
     def _nodes(self, engine: Engine, filaments: Filaments) -> dict[int, list[int]]:
-        """Return the numbers of the nodes, or links, that are gripped, by the number of their filament or chain."""
+        """Return the numbers of the nodes or links to grip, by the number of their filament or chain."""
         found = {}
         for k in range(engine.count):
             near = self._near(engine, filaments.points(k))
@@ -149,7 +149,7 @@ class Lift(Part, Phase):
 
 
 class Release(Part, Phase):
-    """Release all that earlier phases grip; takes no simulated time."""
+    """Release all that earlier phases grip; this takes no simulated time."""
 
     type: Literal["release"]
 
@@ -172,7 +172,7 @@ def _bends(scene: SceneView) -> bool:
 
 
 def _movers(engine: Engine) -> Filaments | Grips:
-    """Return the part of the engine that moves and releases grips: of filaments and chains, or of rigid bodies."""
+    """Return the part of the engine that has the grips: of filaments and chains, or of rigid bodies."""
     found = engine.filaments or engine.grips
     assert found is not None  # the scene was checked
     return found

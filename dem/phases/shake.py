@@ -17,14 +17,14 @@ from dem.setting.vibration import Moved, PeakAcceleration, ShakingFrequency, Vib
 # Largest amplitude in sphere diameters. The rounding of positions at this height, 2⁻⁵³ of it, is 1e-11 diameters, still
 # far below the overlap of a lone smarticle at rest, about 1e-4 diameters.
 MOST_AMPLITUDE = 1e5
-PLACES = 100  # of a sweep at which its largest amplitude and speed are searched
+PLACES = 100  # number of places of a sweep at which its largest amplitude and speed are searched
 
 
 class Shake(Part, Phase):
     """Shake the container, or its floor alone, vertically: z = A sin(2πft) with A = Γg/(2πf)².
 
-    A sweep changes Γ and f from cycle to cycle up to values at the end. With `taps` the container makes single cycles,
-    each from its lowest point, z = A (1 - cos(2πft)), with rests between them. After a phase that takes the container
+    A sweep changes Γ and f from cycle to cycle, towards their values at the end. With `taps` the container makes single
+    cycles from its lowest point, z = A (1 - cos(2πft)), with a rest after each. After a phase that takes the container
     away the unbounded floor is shaken, with all smarticles on it.
     """
 
@@ -52,7 +52,7 @@ class Shake(Part, Phase):
     @model_validator(mode="before")
     @classmethod
     def _until_the_last_rest(cls, data: Any) -> Any:
-        """Fill in `duration_s` of taps, if all that it depends on are numbers."""
+        """Fill in the default of `duration_s` of taps, if the other keys are valid."""
         if not isinstance(data, Mapping) or data.get("taps") is None or "duration_s" in data:
             return data
         try:
@@ -84,7 +84,7 @@ class Shake(Part, Phase):
         return math.fsum(1 / self.at(self._place(k))[0] + self.rest_s for k in range(count))
 
     def _place(self, tap: int) -> float:
-        """Return the place of a tap in the ramp, 0 of the first and 1 of the last one."""
+        """Return the place of a tap in the ramp, from 0 for the first tap to 1 for the last one."""
         return tap / max(1, (self.taps or 1) - 1)
 
     def at(self, place: float) -> tuple[float, float]:
@@ -101,7 +101,7 @@ class Shake(Part, Phase):
         return start + (end - start) * place if self.ramp == "linear" else start * (end / start) ** place
 
     def cycle_start(self, number: int) -> float:
-        """Return the time since the start of a sweep at which a cycle begins, ∫ f dt = `number` [s]; inf: never."""
+        """Return the time since the start of a sweep when cycle `number` begins, ∫ f dt = `number` [s]; inf: never."""
         begin, end, duration = self.frequency_hz, self.frequency_end_hz, self.duration_s
         if end is None or end == begin:
             return number / begin
@@ -118,7 +118,7 @@ class Shake(Part, Phase):
 
     @property
     def _course(self) -> list[tuple[float, float]]:
-        """Pairs of f [Hz] and Γ [1] at places of the ramp."""
+        """Pairs of f [Hz] and Γ [1] along the ramp; a single pair without a sweep."""
         return [self.at(k / PLACES) for k in range(PLACES + 1)] if self.sweeps else [self.at(0.0)]
 
     @property
@@ -136,7 +136,7 @@ class Shake(Part, Phase):
         return "peak_acceleration_end_g" if end else "peak_acceleration_g"
 
     def frequency_key(self, frequency: float) -> str:
-        """Return the key that sets a frequency [Hz] of the course."""
+        """Return the key of the scene to change for another frequency than this [Hz], of those along the ramp."""
         end = frequency == self.frequency_end_hz != self.frequency_hz
         return "frequency_end_hz" if end else "frequency_hz"
 
@@ -234,7 +234,7 @@ class Shake(Part, Phase):
 
     @staticmethod
     def _whole(wait: float, engine: Engine) -> float:
-        """Return a time [s] as a whole number of steps, so that cycles end where they began."""
+        """Return a time [s], rounded to whole steps, so that cycles end where they began."""
         return max(1, round(wait / engine.time_step)) * engine.time_step
 
     def _move(self, engine: Engine, frequency: float, acceleration: float, gravity: float) -> None:
@@ -247,7 +247,7 @@ class Shake(Part, Phase):
 
 
 def check_shaking(scene: SceneView, where: str, vibration: Vibration) -> Iterator[str]:
-    """Yield what is wrong with a vibration, which is at the key `where`."""
+    """Yield errors about a vibration, which is at the key `where`."""
     alone = vibration.moves == "floor"
     key, frequency = f"{where}.frequency_hz", vibration.frequency_hz
     yield from _of_amplitude(scene, key, frequency, vibration.peak_acceleration_g, floor_alone=alone)

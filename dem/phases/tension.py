@@ -17,21 +17,21 @@ from dem.setting.hooks import TOLERANCE
 from dem.setting.part import Duration, Force, Length, Part, Speed
 from dem.setting.vibration import Vibration
 
-FIXED, MOVED = 0, 1  # numbers of the grips, since others have let go
+FIXED, MOVED = 0, 1  # numbers of the grips; all others are released before
 
 
 class Tension(Part, Phase):
-    """Hold both ends of the pile by grips, and move one of them away at constant speed, with smarticles welded.
+    """Hold both ends of the pile by grips, and move one away at constant speed, with smarticles welded.
 
-    A grip holds the bodies whose centre of mass is within a distance of the outermost one at its end. They move with
-    the grip and do not turn. The grip at the bottom, or at lower x or y, rests. At the end of the phase both let go.
+    A grip holds the bodies whose centre of mass is within `grip_m` of the outermost one at its end. They move with the
+    grip and do not turn. The grip at the bottom, or at lower x or y, rests. At the end of the phase both are released.
     """
 
     needs_links: ClassVar[str] = "grips of rigid bodies"
     type: Literal["tension"]
     axis: Literal["x", "y", "z"] = Field("z", description="direction of the pull")
     grip_m: Length = Field(
-        ..., description="distance along the axis from the outermost centre of mass within which a grip holds [m]"
+        ..., description="distance along the axis from the outermost centre of mass within which bodies are held [m]"
     )
     distance_m: Length = Field(..., description="how far the grip moves [m]")
     speed_m_per_s: Speed = Field(..., description="speed of the grip [m/s]")
@@ -58,7 +58,7 @@ class Tension(Part, Phase):
 
     def check(self, scene: SceneView, index: int) -> Iterator[str]:
         if scene.mixture is not None and (scene.mixture.flexible or scene.mixture.jointed):
-            yield f"phases.{index}: tension holds rigid bodies, but particle has others; use lift, which grips parts"
+            yield f"phases.{index}: tension holds rigid bodies, but particle bends; use lift: it grips nodes or links"
         if self.axis != "z" and not any(phase.frees for phase in scene.phases[:index]):
             yield (
                 f"phases.{index}.axis: a pull along {self.axis} would end at the wall; take it away by "
@@ -127,7 +127,7 @@ class Tension(Part, Phase):
         grips.move(MOVED, (velocity[0], velocity[1], velocity[2]))
 
     def _check_from_now(self, memory: Memory, engine: Engine, grips: Grips) -> None:
-        """Note the pull summed over steps, and set the time of the next check."""
+        """Note the sum of the pull up to now, and set the time of the next check."""
         weight = float(grips.weights[MOVED]) if self.axis == "z" else 0.0
         pull = -float(grips.sums[MOVED, self._along]) - weight * engine.steps
         memory.update(pull=pull, step=engine.steps, due=engine.time + self.whole_periods(CHECK_INTERVAL))

@@ -12,7 +12,7 @@ from dem.phases.phase import Memory, Phase, SceneView, Stage
 from dem.setting.joints import BENT, Bend
 from dem.setting.part import Duration, Part
 
-TOO_FAST = 1 + 1e-9  # of a motor's speed limit
+TOO_FAST = 1 + 1e-9  # factor on limits of angle and speed that leaves room for rounding
 
 Amplitude = Annotated[float, Field(ge=0, le=BENT)]
 
@@ -28,7 +28,7 @@ class Motion(Part):
 
     @property
     def swing(self) -> Swing:
-        """The same in radians."""
+        """Motion with its angles in radians."""
         return Swing(
             joint=self.joint,
             axis=self.axis,
@@ -39,7 +39,7 @@ class Motion(Part):
 
 
 class Undulate(Part, Phase):
-    """Let motors bend chains: a wave travels along each, or each motor swings as a table says.
+    """Bend chains by their motors: a wave travels along each chain, or motors swing as a table says.
 
     The motion goes on in later phases until the next `undulate` or `relax`.
     """
@@ -49,7 +49,7 @@ class Undulate(Part, Phase):
     duration_s: Duration = Field(..., description="length of the phase [s]")
     frequency_Hz: float = Field(1.0, ge=0, le=1e4, description="periods per second; 0: motors hold still [Hz]")
     amplitude_deg: Amplitude = Field(
-        0.0, description="amplitude of the wave, about the first axis of each motor that joints does not name [deg]"
+        0.0, description="amplitude of the wave, about the first axis of each motor that `joints` does not name [deg]"
     )
     wavelength_lengths: float | None = Field(
         None,
@@ -63,10 +63,10 @@ class Undulate(Part, Phase):
         None,
         ge=1e-3,
         le=1e6,
-        description="mean number of periods between two reversals of time, which come at random [1]; default: none",
+        description="mean number of periods between two reversals of the motion, at random times [1]; default: none",
     )
     starts: Literal["random", "together"] = Field(
-        "random", description="random, each chain begins at a random point of the period; together, all begin at 0"
+        "random", description="random: each chain begins at a random point of the period; together: all at its start"
     )
     ramp_s: float = Field(0.2, ge=0, le=1e6, description="time in which angles grow from those at the start [s]")
 
@@ -112,7 +112,7 @@ class Undulate(Part, Phase):
 
     @property
     def undulation(self) -> Undulation:
-        """What the motors do."""
+        """Gait of the motors, with angles in radians."""
         turns = self.turns_between_reversals
         return Undulation(
             rate=2 * math.pi * self.frequency_Hz,
@@ -133,7 +133,7 @@ class Undulate(Part, Phase):
 
 
 def _of_motion(key: str, motion: Motion, linkage: Linkage) -> Iterator[str]:
-    """Yield what is wrong with the motion of one motor."""
+    """Yield errors about the motion of one motor in a kind of chain."""
     number = len(linkage.joints)
     if motion.joint >= number:
         yield f"{key}.joint: there is no joint {motion.joint} in a chain of {number + 1} links; use 0 to {number - 1}"

@@ -1,7 +1,8 @@
-"""Reject scenes that cannot end well: without damping, or with a wall that bodies are thrown over.
+"""Reject scenes that would fail: pours without damping, and walls over which bodies are thrown.
 
-A body that is thrown down at v rebounds with e v. A body at rest that the floor hits at v leaves with (1 + e) v. Both
-rise by the square of their speed over 2g. Other bodies and the height of the pile are not considered.
+With restitution e, a body that is thrown down at speed v rebounds with e v. A body at rest that the floor hits at v
+leaves with (1 + e) v. Both rise by the square of their speed over 2g. Other bodies and the height of the pile are not
+considered.
 """
 
 import math
@@ -15,12 +16,12 @@ from dem.scene.scene import Scene
 from dem.setting.part import LONGEST_LENGTH
 from dem.setting.vibration import shaking_amplitude
 
-# Least height over the estimated rise of bodies, of a wall whose height the scene gives. Of random extreme scenes on
-# links, all stayed inside that had estimates up to 0.9 of the wall. Of eight that threw bodies, with estimates from
-# 0.93 to 1.9, three lost some over the wall; of three that shook them, with estimates from 1.0 on, all did.
+# Least height of a wall over the estimated rise of bodies, if the scene gives the height. In random extreme scenes on
+# links, no body left the container with estimates up to 0.9 of the wall. With estimates from 0.93 to 1.9, three of
+# eight pours with thrown bodies lost some over the wall; with estimates from 1.0 on, three of three shakes did.
 MARGIN = 1.1
-# The same for walls of the default height. Up to 50 bodies thrown at 2 m/s, as by the protocol code, rise to 0.5 to 1.0
-# of the wall at an estimate of 1.04.
+# The same ratio for walls of the default height. Up to 50 bodies thrown at 2 m/s, as under the code's rules, rise to
+# between 0.5 and 1.0 of the wall at an estimate of 1.04.
 DOUBT = 0.9
 
 
@@ -38,7 +39,7 @@ def check_ends(scene: Scene) -> None:
             frequency, peak = phase.fastest
             key, amplitude = f"phases.{index}.{phase.frequency_key(frequency)}", phase.amplitude(scene.gravity_m_per_s2)
             problems = _of_shaking(scene, key, frequency, peak, amplitude)
-        elif (vibration := phase.vibrated_by) is not None and not isinstance(phase, Compress):  # it has a lid
+        elif (vibration := phase.vibrated_by) is not None and not isinstance(phase, Compress):  # it has a plate
             key, amplitude = f"phases.{index}.vibration.frequency_hz", vibration.amplitude(scene.gravity_m_per_s2)
             problems = _of_shaking(scene, key, vibration.frequency_hz, vibration.peak_acceleration_g, amplitude)
         for problem in problems:
@@ -84,5 +85,5 @@ def _factor(scene: Scene) -> float:
 
 
 def _higher(least: float) -> str:
-    """Return a way out by the height of the wall [m], if any wall may be so high."""
+    """Return the advice to raise the wall to a height [m]; empty if no wall may be so high."""
     return f" or container.height_m: {1.005 * least:.3g}" if 1.005 * least < LONGEST_LENGTH else ""

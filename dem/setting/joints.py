@@ -8,8 +8,8 @@ from pydantic import BeforeValidator, Field, model_validator
 from dem.body.linkage import Joint, Three
 from dem.setting.part import Part, Turning
 
-BENT = 150.0  # deg, the farthest that links are bent at rest or by motors: beyond it they would lie on each other
-ACROSS = 1e-6  # cosine of the angle between two axes, up to which they count as perpendicular
+BENT = 150.0  # deg, largest angle at rest or of a motor: beyond it, links would lie on each other
+ACROSS = 1e-6  # largest cosine of the angle between two axes that count as perpendicular
 
 Direction = tuple[float, float, float]
 Number = Annotated[int, Field(ge=1, le=3)]
@@ -50,13 +50,13 @@ class _Joint(Part):
     poured_deg: Bends | None = Field(
         None,
         max_length=3,
-        description="angles at the start, one number or one for each axis, of three axes a rotation vector [deg]; "
+        description="angles at the start: one number, or one for each axis; for three axes a rotation vector [deg]; "
         "default: those at rest of an elastic joint, otherwise 0; motors hold them",
     )
 
     @classmethod
     def nearest_key(cls, key: str) -> str:
-        """Return advice about an unknown key: the laws that have it, or what any part advises."""
+        """Return advice about an unknown key: the laws that have it, or else the advice for any part."""
         having = [kind for kind in _Joint.__subclasses__() if key in kind.known_keys()]
         laws = " or ".join(get_args(kind.model_fields["law"].annotation)[0] for kind in having)
         return f"it belongs in law: {laws}" if laws else super().nearest_key(key)
@@ -98,7 +98,7 @@ def _radians(degrees: tuple[float, ...]) -> Three:
 
 
 class FreeJoint(_Joint):
-    """Links that turn without any torque."""
+    """Joint without torque: links turn freely about its axes."""
 
     law: Literal["free"]
 
@@ -107,7 +107,7 @@ class FreeJoint(_Joint):
 
 
 class ElasticJoint(_Joint):
-    """A torsional spring with a dashpot at each axis; with three axes, against the whole rotation."""
+    """Torsional spring with a dashpot about each axis; with three axes, one against the whole rotation."""
 
     law: Literal["elastic"]
     stiffness_N_m_per_rad: float = Field(..., gt=0, le=1e6, description="stiffness about each axis [N m/rad]")
@@ -139,14 +139,14 @@ class ElasticJoint(_Joint):
 
 
 class MotorJoint(_Joint):
-    """A motor at each axis, which turns the links towards its command with a limited torque."""
+    """Motor about each axis, which turns the links towards its command with a limited torque."""
 
     law: Literal["motor"]
     torque_limit_N_m: Torque = Field(..., description="greatest torque [N m]; of three axes in any direction")
     stiffness_N_m_per_rad: float = Field(
         ..., gt=0, le=1e6, description="torque over the angle by which the links lag behind the command [N m/rad]"
     )
-    damping_N_m_s_per_rad: Damping = Field(0.0, description="torque over the rate of this angle [N m s/rad]")
+    damping_N_m_s_per_rad: Damping = Field(0.0, description="torque over the rate of change of this angle [N m s/rad]")
     speed_limit_rad_per_s: Turning = Field(6.0, description="greatest speed of the command [rad/s]")
 
     def joint(self) -> Joint:  # noqa: D102

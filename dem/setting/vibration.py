@@ -1,4 +1,4 @@
-"""Vibration of the container during a phase that does something else."""
+"""Vibration of the container during a test of the pile: key `vibration` of a phase."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ class Vibration(Part):
         return self
 
     def amplitude(self, gravity: float) -> float:
-        """Return the amplitude [m]; gravity in m/s²."""
+        """Return the amplitude A [m]; gravity in m/s²."""
         return shaking_amplitude(self.peak_acceleration_g, self.frequency_hz, gravity)
 
     def peak_speed(self, gravity: float) -> float:
@@ -55,7 +55,7 @@ class Vibration(Part):
         return self.amplitude(gravity) * 2 * math.pi * self.frequency_hz
 
     def next_switch(self, elapsed: float) -> tuple[bool, float]:
-        """Return whether it vibrates after a time since the phase began, and when that changes next; times in s."""
+        """Return whether it vibrates at a time of the phase [s], and the time of the next change [s]."""
         for on, off in self.windows_s or ((0.0, math.inf),):
             if elapsed < on:
                 return False, on

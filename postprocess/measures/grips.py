@@ -1,9 +1,10 @@
 """Measure pulls by grips: force against elongation between two grips, and what a grip picks up.
 
-The pull is the force with which other bodies, floor and wall hold back what the moving grip holds. The pull on the
-resting grip is their force on what it holds, in the direction in which the other grip moves; along z it includes the
-push of the floor. The strain is the elongation over the distance between the means of the centres of both grips' bodies
-at the beginning. What a grip has picked up is the weight that hangs on it, over that of one body.
+The pull is the force with which other bodies, floor and wall hold back the bodies of the moving grip. The pull on the
+resting grip is their force on its bodies, in the direction in which the other grip moves; along z it includes the push
+of the floor. The strain is the elongation over the distance between the grips at the beginning, each at the mean of the
+centres of mass of its bodies. What a grip has picked up is the weight that it bears, gripped bodies included, over the
+weight of one body.
 """
 
 from dataclasses import dataclass
@@ -23,7 +24,7 @@ TENSION, LIFT = "tension", "lift"  #: Types of phases
 class TensionTest:
     """Pull and elongation between two grips at n samples."""
 
-    elongations: Floats  #: (n,) way of the moving grip [m]
+    elongations: Floats  #: (n,) displacements of the moving grip [m]
     pulls: Floats  #: (n,) pull on the moving grip, mean since the sample before [N]
     held: Floats  #: (n,) pull on the grip that rests, mean since the sample before [N]
     length: float  #: Distance between the grips at the beginning [m]
@@ -51,7 +52,7 @@ def read_tension(run: Run, series: Series, phase: int) -> TensionTest:
 
 
 def has_grips(series: Series, phase: int) -> bool:
-    """Return whether a series holds at least two samples of a grip in the phase with this index."""
+    """Return whether a series has at least two samples with a grip in the phase with this index."""
     return len(series.known("elongation_m", phase)) >= 2
 
 

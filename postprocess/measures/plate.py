@@ -1,8 +1,8 @@
-"""Measure a compression by a plate: stress against strain, peak, work, stiffness of the first unloading.
+"""Measure a compression by a plate: stress and strain, peak, work, stiffness of the first unloading.
 
-The stress is the upward force of the pile on the plate over π R², R being the container's radius; a sample is the mean
-over the time since the previous one. The strain is the way of the plate since the phase began, downwards, over its
-height above the floor then.
+The stress is the upward force of the pile on the plate over π R², with the container's radius R; a sample is the mean
+over the time since the previous one. The strain is the downward displacement of the plate since the phase began, over
+its height above the floor at that time.
 """
 
 from dataclasses import dataclass
@@ -35,7 +35,7 @@ class Compression:
 
     @property
     def unloading_modulus(self) -> float:
-        """Slope of stress by strain in the first unloading, between fractions `UNLOADED` [Pa]; NaN without it."""
+        """Slope of stress over strain in the first unloading, between `UNLOADED` [Pa]; NaN without unloading."""
         backward = np.flatnonzero(np.diff(self.strains) < 0)
         if not len(backward):
             return float("nan")
@@ -69,7 +69,7 @@ def read_compression(run: Run, series: Series, phase: int) -> Compression:
 
 
 def has_plate(series: Series, phase: int) -> bool:
-    """Return whether a series holds at least two samples of the plate in the phase with this index."""
+    """Return whether a series has at least two samples with a plate in the phase with this index."""
     return len(series.known("plate_z_m", phase)) >= 2
 
 

@@ -15,7 +15,7 @@ Array = NDArray[np.float64]
 
 
 class LinksGrips:
-    """`dem.engine.interface.Grips` on links; for worlds with `grips`."""
+    """`dem.engine.interface.Grips` on links, for worlds with `grips`."""
 
     def __init__(self, world: World) -> None:
         self._world = world

@@ -1,4 +1,4 @@
-"""Arrays of linkages, as the kernels of `dem.engine.links.motion.joining` want them."""
+"""Make the arrays of linkages for the kernels of `dem.engine.links.motion.joining`."""
 
 from __future__ import annotations
 
@@ -23,13 +23,15 @@ LAWS = {"free": joining.FREE, "elastic": joining.ELASTIC, "motor": joining.MOTOR
 
 
 def pins_of(linkage: Linkage, law: ContactLaw) -> tuple[float, float, float, float]:
-    """Return stiffness [N/m] and damping [N s/m] of pins, and about directions in which links cannot turn.
+    """Return the constants of a pin, and of the springs against rotations about other directions.
 
     A pin is `PIN` times as stiff as a contact unless the linkage has a stiffness of its own, and has the damping ratio
-    of contacts.
-    About a direction in which links cannot turn [N m/rad, N m s/rad] two pins act at half the width from the axis; the
-    width is the diameter of the round rod that has the links' axial inertia, so that such a twist is about as fast as
-    other motions of a pin.
+    of contacts. The springs against rotation are those of two pins at half a width from the axis. The width is the
+    diameter of the round rod that has the links' axial inertia, so that rotations are about as fast as other motions
+    of a pin.
+
+    Returns:
+        Stiffness [N/m] and damping [N s/m] of a pin, stiffness [N m/rad] and damping [N m s/rad] against rotation.
     """
     link = linkage.links[0]
     half = 4 * float(link.inertia[0]) / link.mass  # half of the square of the width [m²]
@@ -39,7 +41,7 @@ def pins_of(linkage: Linkage, law: ContactLaw) -> tuple[float, float, float, flo
 
 
 def row_of(linkage: Linkage, number: int, law: ContactLaw) -> Array:
-    """Return the constants (JOINT,) of a joint."""
+    """Return the constants (JOINT,) of the joint with a number, in the columns of `joining`."""
     joint, before, after = linkage.joints[number], linkage.links[number], linkage.links[number + 1]
     axis = np.array(joint.axes[0])
     across = np.array(joint.axes[1]) if len(joint.axes) == 2 else np.cross(axis, np.eye(3)[np.abs(axis).argmin()])
@@ -52,7 +54,7 @@ def row_of(linkage: Linkage, number: int, law: ContactLaw) -> Array:
 
 
 def rest_of(joint: Joint) -> Array:
-    """Return the angles at rest (4,) of a joint [rad], or of three axes a quaternion (w, x, y, z)."""
+    """Return the rotation (4,) at rest of a joint: angles [rad]; of three axes a quaternion (w, x, y, z)."""
     if len(joint.axes) < 3:
         return np.array([*joint.rest, 0.0])
     x, y, z, w = Rotation.from_rotvec(joint.vector(joint.rest)).as_quat()
@@ -60,7 +62,7 @@ def rest_of(joint: Joint) -> Array:
 
 
 def swings_of(linkage: Linkage, swings: Sequence[Swing]) -> Array:
-    """Return the motions (n, 3, SWING) of all motors of a linkage; those that are not given hold still."""
+    """Return the motions (n, 3, SWING) about all axes; those without a swing hold the angle at the start."""
     found = np.zeros((len(linkage.links), 3, joining.SWING))
     for k, joint in enumerate(linkage.joints):
         found[k, :, joining.QUIET] = found[k, :, joining.CENTRE] = joint.poured
@@ -73,7 +75,7 @@ def swings_of(linkage: Linkage, swings: Sequence[Swing]) -> Array:
 
 
 def none_of(shapes: Sequence[Shape]) -> Linkages:
-    """Return the arrays of no linkages, with the shapes of the links of all kinds."""
+    """Return arrays that hold no linkage yet, with the shapes of the links of all kinds."""
     f, i = np.zeros, np.int64
     return Linkages(
         f(0, np.int32), f(1, np.int32), f((0, bending.GAIT)), f(0, i), f(0, i), f((0, joining.JOINT)),
@@ -93,14 +95,14 @@ def linkages_at(
     start: float,
     seed: int,
 ) -> Linkages:
-    """Return the linkages of `old` and a new one.
+    """Return the linkages of `old` with a new one at the end.
 
     Args:
-        body: its number among all bodies.
-        links: its links, with positions, turns, velocities and shapes.
-        law: of the contacts, which pins follow.
-        start: ψ of the waves of its motors at the start [rad].
-        seed: of the times at which waves reverse, together with the number of the body.
+        body: number of the new linkage among all bodies.
+        links: links of the new linkage, with positions, turns, velocities and shapes.
+        law: law of the contacts; pins take their stiffness and damping ratio from it.
+        start: angle ψ of the new linkage's wave at the start [rad].
+        seed: with `body`, seed of the times at which the wave reverses.
     """
     n = len(linkage.links)
     for row, link in zip(links.plane, linkage.links, strict=True):

@@ -1,4 +1,4 @@
-"""What a run does with linkages on the links engine, and asks of them."""
+"""Grips, gaits and energies of linkages on the engine links."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ Array = NDArray[np.float64]
 
 
 class LinksLinkages:
-    """`dem.engine.interface.Filaments` on links: what a run does with the linkages of a world, and asks of them."""
+    """`dem.engine.interface.Filaments` on links, for worlds with linkages."""
 
     def __init__(self, world: World) -> None:
         self._world = world
@@ -35,14 +35,14 @@ class LinksLinkages:
         return slice(int(begin[linkage]), int(begin[linkage + 1]))
 
     def points(self, linkage: int) -> Array:
-        """Return a view of the middles (n, 3) of the links of a linkage [m]."""
+        """Return the middles (n, 3) of the links of a linkage [m], as a view of the engine's array."""
         return self._all.links.position[self._links(linkage)]
 
     def grip(self, links: Mapping[int, Sequence[int]]) -> int:
         """Hold links by a new grip, which is at rest; return its number.
 
         Args:
-            links: for each linkage, its links that are held, and do not turn; negative numbers count from its end.
+            links: numbers of the held links, which do not turn, by the number of their linkage; -1 is its last link.
         """
         all_, number = self._all, len(self._all.grip_speed)
         for linkage, own in links.items():
@@ -56,27 +56,27 @@ class LinksLinkages:
         self._all.grip_speed[grip] = velocity
 
     def release(self, grip: int | None = None) -> None:
-        """Let go of all links that a grip holds; None: all grips."""
+        """Release all links that a grip holds; None: the links of all grips."""
         own = self._all.grip
         own[(own != 0) & ((grip is None) | (own == (grip or 0) + 1))] = 0
 
     @property
     def held(self) -> int:
-        """Number of linkages that a grip holds."""
+        """Number of linkages of which at least one link is held by a grip."""
         own = self._all
         return len(np.unique(np.searchsorted(own.begin, np.flatnonzero(own.grip), side="right")))
 
     def force(self, grip: int | None = None) -> Array:
-        """Return the force (3,) of a grip on its links in the last step [N]; None: of all grips together."""
+        """Return the force (3,) of a grip on its links in the last step [N]; None: the sum over all grips."""
         forces = self._all.grip_force
         force: Array = forces.sum(axis=0) if grip is None else forces[grip].copy()
         return force
 
     def act(self, activity: Activity | Undulation | None, *, ramp: float = 0.0) -> None:
-        """Let motors swing from now on.
+        """Set the gait of the motors of all linkages from now on.
 
         Args:
-            activity: what they do; None: they return to the angles at the start.
+            activity: swings of motors; None: they return to the angles at the start.
             ramp: time in which the swings grow from 0 [s].
         """
         assert not isinstance(activity, Activity)  # the scene was checked
@@ -99,7 +99,7 @@ class LinksLinkages:
         return found
 
     def mean_unbalanced(self) -> float:
-        """Return the mean net force on linkages that no grip holds over their weight [1]; 0 if there are none."""
+        """Return the mean net force on a linkage over its weight [1], held ones left out; 0 if all are held."""
         world, own = self._world, self._all
         free = np.add.reduceat(own.grip, own.begin[:-1]) == 0
         weights = world.shapes.mass[world.bodies.shape] * world.gravity
@@ -108,9 +108,9 @@ class LinksLinkages:
 
     @property
     def angles(self) -> Array:
-        """(L, 3) angles of all joints in the last step [rad], not of free ones with three axes.
+        """(L, 3) angles about the axes of all joints in the last step [rad].
 
-        A joint has the number of the link before it.
+        A joint has the number of the link before it. Free joints with three axes keep the angles at the start.
         """
         return self._all.angle
 
@@ -128,7 +128,10 @@ class LinksLinkages:
 
     @property
     def energies(self) -> FilamentEnergies:
-        """Energies at this instant, and work up to it; of pins as `stretching`, of elastic joints as `bending`."""
+        """Present energies, and energies exchanged up to now.
+
+        `stretching` is the energy of pins, `bending` that of elastic joints.
+        """
         found, world = np.zeros(5), self._world
         world.posed()
         jointed = world.jointed

@@ -1,4 +1,4 @@
-"""Rigid bodies that grips hold: they move with their grip and do not turn."""
+"""Move rigid bodies that grips hold: with their grip, and without rotation."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ def hold(
 
 @part
 def carry_grips(grips: Any, length: float) -> None:
-    """Add the ways of a sub-step [s] to `grips.moved`."""
+    """Add the displacements of all grips in a sub-step of a length [s] to `grips.moved`."""
     if grips is not None:
         for k in range(grips.moved.shape[0]):
             for d in range(3):

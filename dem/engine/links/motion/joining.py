@@ -1,12 +1,13 @@
-"""Motion of linkages: rigid links, the springs that keep their joints together, and the laws of the joints.
+"""Move linkages: rigid links, the springs that keep their joints together, and the laws of the joints.
 
 Links are moved by the kernels of rigid bodies. A joint adds to the loads of both links
 
-- a pin: a spring and a dashpot between the ends, whose force acts at one point on both;
-- about directions in which they cannot turn a spring and a dashpot as stiff as a pin is at half the width of the link;
-- about each axis the torque of its law. With the direction d of the link after, at the angle θ from u towards w about
-  the axis, a rotation δφ of that link changes θ by g·δφ, g = d × (c w - s u)/(c² + s²), c = d·u, s = d·w: a torque
-  τ g about it and -τ g about the link before does the work τ dθ, also where the axis is not quite kept.
+- a pin: a spring and a dashpot between the ends of the links. Their force acts at one point on both links;
+- a spring and a dashpot against rotations about all directions that are no axes, see `joints.pins_of`;
+- the torque τ of the joint's law about each axis. The angle θ about an axis is that of d, a direction of the link
+  after, from u towards w; u and w are fixed in the link before, across the axis. A small rotation δφ of the link after
+  changes θ by g·δφ, with g = d × (c w - s u)/(c² + s²), c = d·u, s = d·w. So τ g on the link after and -τ g on the link
+  before do the work τ dθ, also if the axes of both links are not quite parallel.
 
 Forces and torques come in pairs, so that momentum and angular momentum are kept to rounding. Springs are derivatives of
 energies, so that leapfrog keeps the energy of passive joints up to an oscillation that falls with the square of the
@@ -28,17 +29,17 @@ from dem.engine.links.motion.planar import direction
 from dem.engine.links.motion.poses import find_motions, pose
 from dem.engine.links.vectors import Vector, add, along, cross, dot, moving, put, put_more, scale, sub, turned, vector
 
-FREE, ELASTIC, MOTOR, NONE = range(4)  # laws; none: after the last link
+FREE, ELASTIC, MOTOR, NONE = range(4)  # laws; NONE: there is no joint after the last link
 # Columns of a joint: distances of the pin from the middles of the links before and after [m]; stiffness [N/m] and
-# damping [N s/m] of the pin; the same about directions in which links cannot turn [N m/rad, N m s/rad]; stiffness
-# [N m/rad] and damping [N m s/rad] of the law; torque at which it yields, or limit of a motor, and moment at which it
-# breaks [N m]; greatest speed of a command [rad/s]; first axis, and a direction across it: the second axis [1].
+# damping [N s/m] of the pin; both against rotations about directions that are no axes [N m/rad, N m s/rad];
+# stiffness [N m/rad] and damping [N m s/rad] of the law; torque at which it yields, or limit of a motor, and moment at
+# which it breaks [N m]; greatest speed of a command [rad/s]; first axis, and the second one or one across [1].
 BEFORE, AFTER, PIN, PIN_DAMPING, OFF, OFF_DAMPING, STIFFNESS, DAMPING, MOST, BREAKS, SPEED = range(11)
 AXIS, ACROSS, JOINT = 11, 14, 17
 # Columns of a swing: angle at the start, centre and amplitude [rad], cosine and sine of the phase.
 QUIET, CENTRE, AMPLITUDE, COSINE, SINE, SWING = range(6)
-# Columns of what changes energy: force of the pin's dashpot [N] and where it acts [m], torques of dashpots and of
-# motors [N m], power of dashpots and of motors before the kick [W].
+# Columns of `lost`, from which work and dissipation follow: force of the pin's dashpot [N] and where it acts [m],
+# torques of dashpots and of motors [N m], power of dashpots and of motors before the kick [W].
 RESISTING, PLACE, RESISTING_TORQUE, MOTOR_TORQUE, RESISTING_POWER, MOTOR_POWER, LOST = 0, 3, 6, 9, 12, 13, 14
 
 Quaternion = tuple[float, float, float, float]
@@ -49,7 +50,7 @@ Quaternion = tuple[float, float, float, float]
 
 @part
 def pose_linkages(linkages: Any) -> None:
-    """Bring everything up to date that follows from the links of linkages.
+    """Update all arrays that follow from the positions and velocities of links.
 
     Args:
         linkages: `position` and `velocity` of `bodies`, `motion` of `parts`, `line` and `bends.ends` of `segments` are
@@ -135,28 +136,31 @@ def _wrapped(angle: float) -> float:
 
 @inlined
 def _angle(d: Vector, u: Vector, w: Vector) -> tuple[float, Vector]:
-    """Return the angle [rad] from u towards w of d's projection on their plane, and the gradient of this angle [1].
+    """Return the angle [rad] from u towards w of d's projection on their plane, and its gradient [1].
 
-    The gradient is by a small rotation of d. u and w are perpendicular unit vectors.
+    The change of the angle in a small rotation of d is the gradient times this rotation. u and w are perpendicular unit
+    vectors.
     """
     c, s = dot(d, u), dot(d, w)
     return math.atan2(s, c), scale(1 / (c * c + s * s), cross(d, sub(scale(c, w), scale(s, u))))
 
 
 class Turn(NamedTuple):
-    """How two links of a joint with one or two axes are turned against each other."""
+    """Rotation of the link after a joint with one or two axes against the link before."""
 
-    off: float  #: Of two axes: cosine of the angle between them; of one: 1 less that between its directions in both
-    across: Vector  #: Direction of the torque that would restore it, times a sine [1]
+    #: Departure from the axes, 0 if kept [1]. One axis: 1 - cos of the angle between its directions in both links; two
+    #: axes: cos of the angle between them
+    off: float
+    across: Vector  #: Two axes: gradient of `off` by rotations of the link after, see `_angle`; one: less it [1]
     one: float  #: Angle about the first axis [rad]
     two: float  #: Angle about the second axis [rad]
-    first: Vector  #: Change of the first angle per rotation of the link after
-    second: Vector  #: Change of the second angle per rotation of the link after
+    first: Vector  #: Gradient of `one` by rotations of the link after [1]
+    second: Vector  #: Gradient of `two`, likewise [1]
 
 
 @inlined
 def _turn(linkages: Linkages, j: int) -> Turn:
-    """Return how a joint with one or two axes is turned."""
+    """Return the rotation at a joint with one or two axes."""
     row, links = linkages.row[j], linkages.links
     a1, u1 = turned(links, j, *vector(row, AXIS)), turned(links, j, *vector(row, ACROSS))
     a2, u2 = turned(links, j + 1, *vector(row, AXIS)), turned(links, j + 1, *vector(row, ACROSS))
@@ -178,7 +182,7 @@ def _rotation(linkages: Linkages, j: int) -> Quaternion:
 
 @inlined
 def _gap(linkages: Linkages, j: int) -> tuple[Vector, Vector]:
-    """Return the middle of both ends at a joint, and the end of the link after less that of the link before [m]."""
+    """Return the middle between the ends of both links at a joint, and the gap from the first one [m]."""
     row, axes, position = linkages.row[j], linkages.links.axes, linkages.links.position
     x1 = axes[j, 0, 0], axes[j, 1, 0], axes[j, 2, 0]
     x2 = axes[j + 1, 0, 0], axes[j + 1, 1, 0], axes[j + 1, 2, 0]
@@ -188,7 +192,7 @@ def _gap(linkages: Linkages, j: int) -> tuple[Vector, Vector]:
 
 @inlined
 def _stored(linkages: Linkages, j: int) -> tuple[float, float, float]:
-    """Return the energies of a joint's pin, of its law, and of directions in which links cannot turn [J]."""
+    """Return the energies of a joint's pin, of its law, and of the springs against other rotations [J]."""
     row, law, elastic, off = linkages.row[j], linkages.law[j], 0.0, 0.0
     _, gap = _gap(linkages, j)
     if linkages.axes[j] < 3:
@@ -212,8 +216,8 @@ def _follow(linkages: Linkages, j: int, axis: int, wave: Vector, past: float) ->
     """Move a motor's command towards its schedule; return the command [rad] and its rate [rad/s].
 
     Args:
-        wave: cosine and sine of ψ, and the factor on the swing.
-        past: time since the last step [s].
+        wave: cosine and sine of the wave's angle ψ, and the factor on the swing, below 1 in a ramp.
+        past: length of the last step [s].
     """
     swing, (c, s, factor) = linkages.swing[j, axis], wave
     there = swing[CENTRE] - swing[QUIET] + swing[AMPLITUDE] * (s * swing[COSINE] + c * swing[SINE])
@@ -227,7 +231,7 @@ def _follow(linkages: Linkages, j: int, axis: int, wave: Vector, past: float) ->
 def _bend(
     linkages: Linkages, j: int, axis: int, angle: float, rate: float, wave: Vector, past: float
 ) -> tuple[float, float, float]:
-    """Return the torques of spring, dashpot and motor about an axis [N m]; a spring beyond its limit yields."""
+    """Return torques of spring, dashpot and motor about an axis [N m]; a spring above its limit yields."""
     row, law = linkages.row[j], linkages.law[j]
     stiffness, most, spring, resisting, motor = row[STIFFNESS], row[MOST], 0.0, 0.0, 0.0
     if law == ELASTIC:
@@ -339,12 +343,12 @@ def _push_joint(linkages: Linkages, j: int, wave: Vector, past: float) -> None:
 
 @part
 def push_joints(linkages: Any, gravity: float, step: Step) -> None:
-    """Write the loads of all links: of contacts, and of joints.
+    """Write the loads of all links by contacts and joints.
 
     Args:
-        linkages: with the loads of contacts in `parts`; all but constants are written.
+        linkages: the loads by contacts are read from `parts`; all arrays but constants are written.
         gravity: g [m/s²].
-        step: `need` is written.
+        step: `need` is increased where links are fast.
     """
     if linkages is None:
         return
@@ -362,7 +366,7 @@ def push_joints(linkages: Any, gravity: float, step: Step) -> None:
 
 @inlined
 def _hold(linkages: Linkages, gravity: float, dt: float) -> None:
-    """Add the loads of grips, which move their links at a given velocity without rotation."""
+    """Make the loads of held links such that they move with their grip and do not turn; sum its work."""
     links = linkages.links
     linkages.grip_force[:] = 0.0
     for i in range(links.position.shape[0]):
@@ -381,13 +385,13 @@ def _hold(linkages: Linkages, gravity: float, dt: float) -> None:
 
 @part
 def kick_links(linkages: Any, gravity: float, ledger: Any, dt: float) -> None:
-    """Change the momenta of links by the loads of this instant, and sum what took and gave energy.
+    """Change the momenta of links by the present loads, and sum the work of dashpots, motors and grips.
 
     Args:
-        linkages: `links`, `grip_force` and `sums` are written, and `parts.motion` where they are needed.
+        linkages: `links`, `grip_force` and `sums` are written, and `parts.motion` if the sums need it.
         gravity: g [m/s²].
-        ledger: None where nothing reads what dashpots took.
-        dt: time over which they act [s].
+        ledger: None if nothing reads the dissipation of dashpots; it is then left out where there are no motors.
+        dt: time for which the loads act [s].
     """
     if linkages is None:
         return
@@ -409,7 +413,7 @@ def kick_links(linkages: Any, gravity: float, ledger: Any, dt: float) -> None:
 
 @part
 def drift_links(linkages: Any, dt: float, row: Array) -> None:
-    """Move all links by a sub-step, and turn the waves of their motors.
+    """Move all links by a sub-step, and advance the waves of their motors.
 
     Args:
         linkages: `links` and `gait` are written.
@@ -428,12 +432,12 @@ def drift_links(linkages: Any, dt: float, row: Array) -> None:
 
 @kernel
 def measure_linkages(linkages: Linkages, gravity: float, found: Array) -> None:
-    """Add up the energies of all linkages, which are posed.
+    """Add up the energies of all linkages, after `pose_linkages`.
 
     Args:
         gravity: g [m/s²].
-        found: (5,) written: kinetic and potential energy, of pins, of the laws of joints, and of directions in which
-            links cannot turn [J].
+        found: (5,) written: kinetic energy, potential energy, energies of pins, of elastic joints, and of the springs
+            against other rotations [J].
     """
     found[:] = 0.0
     links = linkages.links
