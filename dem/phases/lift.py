@@ -168,7 +168,7 @@ class Release(Part, Phase):
 
 def _bends(scene: SceneView) -> bool:
     """Return whether the bodies are filaments or chains."""
-    return scene.mixture is not None and (scene.mixture.flexible or scene.mixture.jointed)
+    return scene.mixture is not None and scene.mixture.bends
 
 
 def _movers(engine: Engine) -> Filaments | Grips:

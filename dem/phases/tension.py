@@ -17,7 +17,7 @@ from dem.setting.hooks import TOLERANCE
 from dem.setting.part import Duration, Force, Length, Part, Speed
 from dem.setting.vibration import Vibration
 
-FIXED, MOVED = 0, 1  # numbers of the grips, since others have let go
+MOVED = 1  # number of the grip that moves; the one at rest is 0, since others have let go
 
 
 class Tension(Part, Phase):
@@ -57,7 +57,7 @@ class Tension(Part, Phase):
         return self
 
     def check(self, scene: SceneView, index: int) -> Iterator[str]:
-        if scene.mixture is not None and (scene.mixture.flexible or scene.mixture.jointed):
+        if scene.mixture is not None and scene.mixture.bends:
             yield f"phases.{index}: tension holds rigid bodies, but particle has others; use lift, which grips parts"
         if self.axis != "z" and not any(phase.frees for phase in scene.phases[:index]):
             yield (
