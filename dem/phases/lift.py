@@ -60,21 +60,16 @@ class Lift(Part, Phase):
 
     def check(self, scene: SceneView, index: int) -> Iterator[str]:
         yield from check_plate_is_gone(scene, index)
+        if self.grips == "tails" and not _bends(scene):
+            yield f"phases.{index}.grips: tails are those of filaments; use near for rigid bodies"
         for later, phase in enumerate(scene.phases[index:], index):
-            if phase.kind in ("release", "tension"):
-                break
+            if phase.lets_go:
+                return
             if isinstance(phase, Compress):
                 yield (
                     f"phases.{later}: the plate of compress would run into what phases.{index} (lift) still grips; add "
                     "release before"
                 )
-        if _bends(scene):
-            return
-        if self.grips == "tails":
-            yield f"phases.{index}.grips: tails are those of filaments; use near for rigid bodies"
-        for later, phase in enumerate(scene.phases[index:], index):
-            if isinstance(phase, Release):
-                return
             if phase.actuates:
                 yield (
                     f"phases.{later}: {phase.kind} moves barbs of smarticles that phases.{index} (lift) still grips; "
@@ -151,6 +146,7 @@ class Lift(Part, Phase):
 class Release(Part, Phase):
     """Release all that earlier phases grip; takes no simulated time."""
 
+    lets_go: ClassVar[bool] = True
     type: Literal["release"]
 
     def check(self, scene: SceneView, index: int) -> Iterator[str]:

@@ -82,6 +82,7 @@ class Phase:
     """Whether nothing drives the smarticles; φ_0 and φ_f are measured before and after phases that drive them."""
     pours: ClassVar[bool] = False  #: Whether the phase pours bodies
     frees: ClassVar[bool] = False  #: Whether the phase takes the container away
+    lets_go: ClassVar[bool] = False  #: Whether the phase releases all that earlier phases grip
     needs_links: ClassVar[str] = ""  #: What of the phase only the engine links computes, in words; "": nothing
     planar: ClassVar[bool | None] = False
     """Whether the phase is possible in a plane only (True), in a container only (False), or in both (None)."""

@@ -27,6 +27,7 @@ class Tension(Part, Phase):
     the grip and do not turn. The grip at the bottom, or at lower x or y, rests. At the end of the phase both let go.
     """
 
+    lets_go: ClassVar[bool] = True
     needs_links: ClassVar[str] = "grips of rigid bodies"
     type: Literal["tension"]
     axis: Literal["x", "y", "z"] = Field("z", description="direction of the pull")
