@@ -12,7 +12,7 @@ from dem.errors import RunError
 from dem.phases.compress import check_plate_is_gone
 from dem.phases.phase import CHECK_INTERVAL, Memory, Phase, SceneView, Stage, time_left
 from dem.phases.pull_hook import HELD_SECONDS
-from dem.phases.remove_container import check_wall_is_gone
+from dem.phases.remove_container import check_wall_is_gone, is_freed
 from dem.setting.hooks import TOLERANCE
 from dem.setting.part import Duration, Force, Length, Part, Speed
 from dem.setting.vibration import Vibration
@@ -60,7 +60,7 @@ class Tension(Part, Phase):
     def check(self, scene: SceneView, index: int) -> Iterator[str]:
         if scene.mixture is not None and scene.mixture.bends:
             yield f"phases.{index}: tension holds rigid bodies, but particle has others; use lift, which grips parts"
-        if self.axis != "z" and not any(phase.frees for phase in scene.phases[:index]):
+        if self.axis != "z" and not is_freed(scene, index):
             yield (
                 f"phases.{index}.axis: a pull along {self.axis} would end at the wall; take it away by "
                 "remove-container before, or use axis: z"
