@@ -199,6 +199,24 @@ class Phase:
         raise NotImplementedError
 
 
+class TimedPhase(Phase):
+    """Base of phases that act once, at their beginning, and then last for `known_duration`."""
+
+    def first_memory(self, scene: SceneView) -> Memory:
+        return {"begun": False}
+
+    def proceed(self, stage: Stage, engine: Engine) -> float:
+        if stage.memory["begun"]:
+            return 0.0
+        stage.memory["begun"] = True
+        self.act(engine)
+        return self.known_duration or 0.0
+
+    def act(self, engine: Engine) -> None:
+        """Do what the phase does, at its beginning."""
+        raise NotImplementedError
+
+
 class SceneView(Demand, Protocol):
     """The members of a scene that phases use, described in `dem.scene.scene.Scene`."""
 
