@@ -210,6 +210,11 @@ class Mixture:
         """Whether the bodies are linkages."""
         return self.kinds[0].linkage is not None
 
+    @property
+    def bends(self) -> bool:
+        """Whether the bodies change their shape: filaments or linkages."""
+        return self.kinds[0].bends
+
     @cached_property
     def pieces(self) -> Mixture:
         """The links of all kinds of linkages, kind by kind, as kinds of their own."""

@@ -9,6 +9,7 @@ from pydantic import Field
 from dem.engine.effect import EffectName
 from dem.engine.interface import Engine
 from dem.phases.phase import CHECK_INTERVAL, Memory, Phase, SceneView, Stage, time_left
+from dem.phases.travel import check_from_now
 from dem.setting.part import Part, Speed
 from dem.setting.vibration import Vibration
 
@@ -83,9 +84,9 @@ class Compress(Part, Phase):
     def first_memory(self, scene: SceneView) -> Memory:
         # `start`: height of the plate above the floor at the beginning [m]; `leg`: number of the loading (even) or
         # unloading (odd), `way`: distance of the plate below its start when the leg began [m], `begun` and `arrival`:
-        # when it began, and when it ends in any case [s]. At the last check, `sum`: force on the plate summed over
-        # steps [N]; `step`: number of steps; `due`: time of the next check [s]. `touched`, `short`: for warnings.
-        numbers = dict.fromkeys(("way", "begun", "arrival", "sum", "due"), 0.0)
+        # when it began, and when it ends in any case [s]. At the last check, `force_sum`: force on the plate summed
+        # over steps [N]; `step`: number of steps; `due`: time of the next check [s]. `touched`, `short`: for warnings.
+        numbers = dict.fromkeys(("way", "begun", "arrival", "force_sum", "due"), 0.0)
         return {"start": None, "leg": 0, "step": 0, "touched": False, "short": False, **numbers}
 
     def proceed(self, stage: Stage, engine: Engine) -> float:
@@ -114,14 +115,14 @@ class Compress(Part, Phase):
     def _check_from_now(self, memory: Memory, engine: Engine) -> None:
         """Note the sum of the plate's force up to now, and set the time of the next check."""
         interval = min(CHECK_INTERVAL, PER_CHECK * engine.particle.diameter / self.speed_m_per_s)
-        due = engine.time + max(engine.time_step, self.whole_periods(interval))
-        memory.update(sum=float(engine.boundaries.plate_sum[2]), step=engine.steps, due=due)
+        interval = max(engine.time_step, self.whole_periods(interval))
+        check_from_now(memory, engine, force_sum=float(engine.boundaries.plate_sum[2]), interval=interval)
 
     def _turn(self, stage: Stage, engine: Engine, *, arrived: bool) -> bool:
         """Check the stress, and begin the next leg if this one has ended; return whether the phase goes on."""
         memory, boundaries = stage.memory, engine.boundaries
         steps = max(1, engine.steps - memory["step"])
-        stress = (float(boundaries.plate_sum[2]) - memory["sum"]) / steps / _area(stage.scene)
+        stress = (float(boundaries.plate_sum[2]) - memory["force_sum"]) / steps / _area(stage.scene)
         self._check_from_now(memory, engine)
         memory["touched"] = memory["touched"] or stress > 0
         up = memory["leg"] % 2

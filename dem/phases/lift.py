@@ -12,7 +12,7 @@ from dem.engine.effect import EffectName
 from dem.engine.interface import Engine, Filaments, Grips
 from dem.phases.compress import Compress, check_plate_is_gone
 from dem.phases.phase import Memory, Phase, SceneView, Stage, time_left
-from dem.setting.hooks import TOLERANCE
+from dem.phases.travel import reject_early_end, travel_time, travel_to_text
 from dem.setting.part import Duration, Length, Part, Speed
 
 
@@ -44,37 +44,27 @@ class Lift(Part, Phase):
     distance_m: Length = Field(..., description="how far they are raised [m]")
     speed_m_per_s: Speed = Field(..., description="speed of the grip [m/s]")
     duration_s: Duration = Field(
-        default_factory=lambda data: data["distance_m"] / data["speed_m_per_s"],
+        default_factory=travel_time,
         description="length of the phase [s]; default: until they have arrived; in a longer phase they are then held",
     )
 
     @model_validator(mode="after")
     def _arrives(self) -> Self:
-        needed = self.distance_m / self.speed_m_per_s
-        if self.duration_s < needed * (1 - TOLERANCE):
-            raise ValueError(
-                f"duration_s: {self.duration_s:g} s is too short to raise by distance_m = {self.distance_m:g} m at "
-                f"speed_m_per_s = {self.speed_m_per_s:g} m/s; use at least {needed:.6g} s"
-            )
+        reject_early_end("raise", duration=self.duration_s, distance=self.distance_m, speed=self.speed_m_per_s)
         return self
 
     def check(self, scene: SceneView, index: int) -> Iterator[str]:
         yield from check_plate_is_gone(scene, index)
+        if self.grips == "tails" and not _bends(scene):
+            yield f"phases.{index}.grips: tails are those of filaments; use near for rigid bodies"
         for later, phase in enumerate(scene.phases[index:], index):
-            if phase.kind in ("release", "tension"):
-                break
+            if phase.lets_go:
+                return
             if isinstance(phase, Compress):
                 yield (
                     f"phases.{later}: the plate of compress would run into what phases.{index} (lift) still grips; add "
                     "release before"
                 )
-        if _bends(scene):
-            return
-        if self.grips == "tails":
-            yield f"phases.{index}.grips: tails are those of filaments; use near for rigid bodies"
-        for later, phase in enumerate(scene.phases[index:], index):
-            if isinstance(phase, Release):
-                return
             if phase.actuates:
                 yield (
                     f"phases.{later}: {phase.kind} moves barbs of smarticles that phases.{index} (lift) still grips; "
@@ -84,7 +74,7 @@ class Lift(Part, Phase):
     def calls(self, scene: SceneView, index: int) -> Mapping[EffectName, str]:
         if _bends(scene):
             return {}
-        why = f"phase {index} raises one by {1e3 * self.distance_m:.3g} mm at {1e3 * self.speed_m_per_s:.3g} mm/s"
+        why = f"phase {index} raises one {travel_to_text(self.distance_m, self.speed_m_per_s)}"
         return {EffectName.GRIPS: why}
 
     def pushing_speed(self, gravity: float) -> float:
@@ -151,6 +141,7 @@ class Lift(Part, Phase):
 class Release(Part, Phase):
     """Release all that earlier phases grip; this takes no simulated time."""
 
+    lets_go: ClassVar[bool] = True
     type: Literal["release"]
 
     def check(self, scene: SceneView, index: int) -> Iterator[str]:
@@ -168,7 +159,7 @@ class Release(Part, Phase):
 
 def _bends(scene: SceneView) -> bool:
     """Return whether the bodies are filaments or chains."""
-    return scene.mixture is not None and (scene.mixture.flexible or scene.mixture.jointed)
+    return scene.mixture is not None and scene.mixture.bends
 
 
 def _movers(engine: Engine) -> Filaments | Grips:

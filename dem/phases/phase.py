@@ -82,6 +82,7 @@ class Phase:
     """Whether nothing drives the smarticles; φ_0 and φ_f are measured before and after phases that drive them."""
     pours: ClassVar[bool] = False  #: Whether the phase pours bodies
     frees: ClassVar[bool] = False  #: Whether the phase takes the container away
+    lets_go: ClassVar[bool] = False  #: Whether the phase releases all that earlier phases grip
     needs_links: ClassVar[str] = ""  #: What of the phase only the engine links computes, in words; "": nothing
     planar: ClassVar[bool | None] = False
     """Whether the phase is possible in a plane only (True), in a container only (False), or in both (None)."""
@@ -195,6 +196,24 @@ class Phase:
         Raises:
             RunError: the phase cannot go on, or its criterion was not met in time; one line with values and limits.
         """
+        raise NotImplementedError
+
+
+class TimedPhase(Phase):
+    """Base of phases that act once, at their beginning, and then last for `known_duration`."""
+
+    def first_memory(self, scene: SceneView) -> Memory:
+        return {"begun": False}
+
+    def proceed(self, stage: Stage, engine: Engine) -> float:
+        if stage.memory["begun"]:
+            return 0.0
+        stage.memory["begun"] = True
+        self.act(engine)
+        return self.known_duration or 0.0
+
+    def act(self, engine: Engine) -> None:
+        """Do what the phase does, at its beginning."""
         raise NotImplementedError
 
 

@@ -8,11 +8,17 @@ from pydantic import Field, model_validator
 from dem.engine.effect import EffectName
 from dem.engine.interface import Engine
 from dem.phases.phase import CHECK_INTERVAL, Memory, Phase, SceneView, Stage, time_left
-from dem.setting.hooks import TOLERANCE, Hooks, with_defaults
+from dem.phases.travel import (
+    check_from_now,
+    reject_early_end,
+    stop_at_limit,
+    travel_left,
+    travel_time,
+    travel_to_text,
+)
+from dem.setting.hooks import Hooks, with_defaults
 from dem.setting.part import Duration, Force, Length, Part, Speed
 from dem.setting.vibration import Vibration
-
-HELD_SECONDS = 0.1  # s, time for which the force is measured on a hook that the force limit has stopped
 
 
 class PullHook(Part, Phase):
@@ -23,7 +29,7 @@ class PullHook(Part, Phase):
     distance_m: Length = Field(..., description="how far the hook is raised [m]; default: 2w")
     speed_m_per_s: Speed = Field(..., description="speed of the hook [m/s]; default: w per second")
     duration_s: Duration = Field(
-        default_factory=lambda data: data["distance_m"] / data["speed_m_per_s"],
+        default_factory=travel_time,
         description="length of the phase [s]; default: until the hook has arrived; in a longer phase it then rests",
     )
     force_limit_N: Force | None = Field(
@@ -36,12 +42,7 @@ class PullHook(Part, Phase):
 
     @model_validator(mode="after")
     def _arrives(self) -> Self:
-        needed = self.distance_m / self.speed_m_per_s
-        if self.duration_s < needed * (1 - TOLERANCE):
-            raise ValueError(
-                f"duration_s: {self.duration_s:g} s is too short to raise the hook by distance_m = "
-                f"{self.distance_m:g} m at speed_m_per_s = {self.speed_m_per_s:g} m/s; use at least {needed:.6g} s"
-            )
+        reject_early_end("raise the hook", duration=self.duration_s, distance=self.distance_m, speed=self.speed_m_per_s)
         return self
 
     def check(self, scene: SceneView, index: int) -> Iterator[str]:
@@ -82,12 +83,8 @@ class PullHook(Part, Phase):
         return self.distance_m
 
     def calls(self, scene: SceneView, index: int) -> Mapping[EffectName, str]:
-        until = "" if self.force_limit_N is None else f", or until it takes {self.force_limit_N:.3g} N"
-        return {
-            EffectName.HOOKS: f"phase {index} raises the upper one by {1e3 * self.distance_m:.3g} mm at "
-            f"{1e3 * self.speed_m_per_s:.3g} mm/s{until}",
-            **self.vibrating(scene, index),
-        }
+        travel = travel_to_text(self.distance_m, self.speed_m_per_s, self.force_limit_N)
+        return {EffectName.HOOKS: f"phase {index} raises the upper one {travel}", **self.vibrating(scene, index)}
 
     def first_memory(self, scene: SceneView) -> Memory:
         # At the last check, `force_sum`: vertical force on the hook, summed over steps [N]; `step`: number of steps;
@@ -103,14 +100,10 @@ class PullHook(Part, Phase):
             engine.boundaries.raise_upper(self.speed_m_per_s)
             self._check_from_now(memory, engine)
         elif memory["raising"] and (self.vibration is None or not time_left(engine, memory.get("due", 0.0))):
-            # Whether the mean force on the hook since the last check exceeds its limit.
-            force_sum, step = memory["force_sum"], memory["step"]
+            stop_at_limit(memory, engine, force_sum=_force_sum(engine)[2], limit=self.force_limit_N)
             self._check_from_now(memory, engine)
-            limit = self.force_limit_N
-            if limit is not None and force_sum - memory["force_sum"] > limit * (memory["step"] - step):
-                memory.update(arrival=engine.time, end=engine.time + HELD_SECONDS)
-        if memory["raising"] and (left := time_left(engine, memory["arrival"])):
-            return left if self.force_limit_N is None else min(max(memory["due"] - engine.time, engine.time_step), left)
+        if memory["raising"] and (left := travel_left(memory, engine, limit=self.force_limit_N)):
+            return left
         if memory["raising"]:
             memory["raising"] = False
             if self.vibration is None:
@@ -126,9 +119,8 @@ class PullHook(Part, Phase):
         return left
 
     def _check_from_now(self, memory: Memory, engine: Engine) -> None:
-        """Note the force on the hook summed over steps, and set the time of the next check."""
-        due = engine.time + self.whole_periods(CHECK_INTERVAL)
-        memory.update(force_sum=_force_sum(engine)[2], step=engine.steps, due=due)
+        interval = self.whole_periods(CHECK_INTERVAL)
+        check_from_now(memory, engine, force_sum=_force_sum(engine)[2], interval=interval)
 
 
 # (a, b): the default is a w + b t2.

@@ -68,6 +68,11 @@ class RemoveContainer(Part, Phase):
         return left
 
 
+def is_freed(scene: SceneView, index: int) -> bool:
+    """Return whether a phase before phase `index` takes the container away."""
+    return any(before.frees for before in scene.phases[:index])
+
+
 def check_wall_is_gone(engine: Engine, floor: str) -> None:
     """Raise RunError if the wall is still around the pile; `floor`: the floor in words."""
     if not engine.boundaries.walled:

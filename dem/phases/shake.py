@@ -9,7 +9,7 @@ from pydantic import Field, model_validator
 from dem.engine.effect import EffectName
 from dem.engine.interface import Engine
 from dem.phases.phase import Memory, Phase, SceneView, Stage, time_left
-from dem.phases.remove_container import check_wall_is_gone
+from dem.phases.remove_container import check_wall_is_gone, is_freed
 from dem.setting.hooks import TOLERANCE
 from dem.setting.part import Duration, Part
 from dem.setting.vibration import Moved, PeakAcceleration, ShakingFrequency, Vibration, shaking_amplitude
@@ -153,7 +153,7 @@ class Shake(Part, Phase):
         return max(shaking_amplitude(g, f, gravity) * 2 * math.pi * f for f, g in self._course)
 
     def calls(self, scene: SceneView, index: int) -> Mapping[EffectName, str]:
-        alone = ", the floor alone" if _freed(scene, index) or self.moves == "floor" else ""
+        alone = ", the floor alone" if is_freed(scene, index) or self.moves == "floor" else ""
         gravity, (end_f, end_g) = scene.gravity_m_per_s2, self.at(1.0)
         ends = (self.peak_acceleration_g, end_g), (self.frequency_hz, end_f)
         acceleration, frequency = (f"{a:g}" if a == b else f"{a:g} to {b:g}" for a, b in ends)
@@ -175,40 +175,35 @@ class Shake(Part, Phase):
         return {"begun": False}
 
     def proceed(self, stage: Stage, engine: Engine) -> float:
-        memory = stage.memory
-        if not memory["begun"]:
-            self._begin(stage, engine)
-            # `cycle`: number of cycles, or taps, that have begun; `moves`: whether a tap is not over.
-            memory.update({"begin": engine.time, "cycle": 0, "moves": False} if self.sweeps or self.taps else {})
-        elif not (self.sweeps or self.taps):
-            engine.boundaries.stop()
-            return 0.0
-        gravity = stage.scene.gravity_m_per_s2
+        memory, gravity = stage.memory, stage.scene.gravity_m_per_s2
+        begins = not memory["begun"]
+        if begins:
+            if is_freed(stage.scene, stage.index):
+                check_wall_is_gone(engine, "the floor that is to be shaken")
+            engine.motors.weld()
+            # `begin`: time at the beginning of the phase [s]; `cycle`: number of cycles, or taps, that have begun;
+            # `moves`: whether a tap is not over.
+            memory.update(begun=True, begin=engine.time, cycle=0, moves=False)
         if self.taps is not None:
             return self._tap(memory, engine, gravity)
         if self.sweeps:
             return self._sweep(memory, engine, gravity)
-        engine.boundaries.shake(
-            amplitude=self.amplitude(gravity), frequency=self.frequency_hz, walls=self.moves == "container"
-        )
+        if not begins:
+            engine.boundaries.stop()
+            return 0.0
+        self._move(engine, self.frequency_hz, self.peak_acceleration_g, gravity)
         return self.duration_s
-
-    def _begin(self, stage: Stage, engine: Engine) -> None:
-        if _freed(stage.scene, stage.index):
-            check_wall_is_gone(engine, "the floor that is to be shaken")
-        stage.memory["begun"] = True
-        engine.motors.weld()
 
     def _sweep(self, memory: Memory, engine: Engine, gravity: float) -> float:
         """Begin the next cycle of a sweep; return its length [s], 0 at the end of the phase."""
-        if not time_left(engine, memory["begin"] + self.duration_s):
+        wait = time_left(engine, memory["begin"] + self.duration_s)
+        if not wait:
             engine.boundaries.stop()
             return 0.0
         first, last = (self.cycle_start(memory["cycle"] + k) for k in (0, 1))
         memory["cycle"] += 1
         place = (first + min(last, self.duration_s)) / (2 * self.duration_s)
         frequency, acceleration = self.at(min(1.0, place))
-        wait = time_left(engine, memory["begin"] + self.duration_s)
         if last < self.duration_s * (1 + TOLERANCE):
             wait = self._whole(memory["begin"] + last - engine.time, engine)
             frequency = 1 / wait
@@ -270,7 +265,3 @@ def _of_amplitude(
             f"{key.rpartition('.')[0]}.moves: the floor alone would go {amplitude:.3g} m down, and the wall ends "
             f"{depth:.3g} m below the floor; use a lower peak_acceleration_g, a higher frequency_hz or moves: container"
         )
-
-
-def _freed(scene: SceneView, index: int) -> bool:
-    return any(before.frees for before in scene.phases[:index])

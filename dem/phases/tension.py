@@ -11,13 +11,19 @@ from dem.engine.interface import Engine, Grips
 from dem.errors import RunError
 from dem.phases.compress import check_plate_is_gone
 from dem.phases.phase import CHECK_INTERVAL, Memory, Phase, SceneView, Stage, time_left
-from dem.phases.pull_hook import HELD_SECONDS
-from dem.phases.remove_container import check_wall_is_gone
-from dem.setting.hooks import TOLERANCE
+from dem.phases.remove_container import check_wall_is_gone, is_freed
+from dem.phases.travel import (
+    check_from_now,
+    reject_early_end,
+    stop_at_limit,
+    travel_left,
+    travel_time,
+    travel_to_text,
+)
 from dem.setting.part import Duration, Force, Length, Part, Speed
 from dem.setting.vibration import Vibration
 
-FIXED, MOVED = 0, 1  # numbers of the grips; all others are released before
+MOVED = 1  # number of the grip that moves; the grip at rest is 0, since all others are released before
 
 
 class Tension(Part, Phase):
@@ -27,6 +33,7 @@ class Tension(Part, Phase):
     grip and do not turn. The grip at the bottom, or at lower x or y, rests. At the end of the phase both are released.
     """
 
+    lets_go: ClassVar[bool] = True
     needs_links: ClassVar[str] = "grips of rigid bodies"
     type: Literal["tension"]
     axis: Literal["x", "y", "z"] = Field("z", description="direction of the pull")
@@ -36,7 +43,7 @@ class Tension(Part, Phase):
     distance_m: Length = Field(..., description="how far the grip moves [m]")
     speed_m_per_s: Speed = Field(..., description="speed of the grip [m/s]")
     duration_s: Duration = Field(
-        default_factory=lambda data: data["distance_m"] / data["speed_m_per_s"],
+        default_factory=travel_time,
         description="length of the phase [s]; default: until the grip has arrived; in a longer phase it then rests",
     )
     force_limit_N: Force | None = Field(
@@ -48,18 +55,13 @@ class Tension(Part, Phase):
 
     @model_validator(mode="after")
     def _arrives(self) -> Self:
-        needed = self.distance_m / self.speed_m_per_s
-        if self.duration_s < needed * (1 - TOLERANCE):
-            raise ValueError(
-                f"duration_s: {self.duration_s:g} s is too short to move the grip by distance_m = {self.distance_m:g} "
-                f"m at speed_m_per_s = {self.speed_m_per_s:g} m/s; use at least {needed:.6g} s"
-            )
+        reject_early_end("move the grip", duration=self.duration_s, distance=self.distance_m, speed=self.speed_m_per_s)
         return self
 
     def check(self, scene: SceneView, index: int) -> Iterator[str]:
-        if scene.mixture is not None and (scene.mixture.flexible or scene.mixture.jointed):
+        if scene.mixture is not None and scene.mixture.bends:
             yield f"phases.{index}: tension holds rigid bodies, but particle bends; use lift: it grips nodes or links"
-        if self.axis != "z" and not any(phase.frees for phase in scene.phases[:index]):
+        if self.axis != "z" and not is_freed(scene, index):
             yield (
                 f"phases.{index}.axis: a pull along {self.axis} would end at the wall; take it away by "
                 "remove-container before, or use axis: z"
@@ -77,16 +79,14 @@ class Tension(Part, Phase):
         return self.distance_m if self.axis == "z" else 0.0
 
     def calls(self, scene: SceneView, index: int) -> Mapping[EffectName, str]:
-        until = "" if self.force_limit_N is None else f", or until it takes {self.force_limit_N:.3g} N"
-        why = (
-            f"phase {index} moves one along {self.axis} by {1e3 * self.distance_m:.3g} mm at "
-            f"{1e3 * self.speed_m_per_s:.3g} mm/s{until}; each holds {1e3 * self.grip_m:.3g} mm of the pile"
-        )
+        travel = travel_to_text(self.distance_m, self.speed_m_per_s, self.force_limit_N)
+        why = f"phase {index} moves one along {self.axis} {travel}; each holds {1e3 * self.grip_m:.3g} mm of the pile"
         return {EffectName.GRIPS: why, **self.vibrating(scene, index)}
 
     def first_memory(self, scene: SceneView) -> Memory:
-        # At the last check, `pull`: pull on the moving grip summed over steps [N]; `step`: number of steps.
-        return {"arrival": None, "end": None, "moving": False, "due": 0.0, "pull": 0.0, "step": 0}
+        # At the last check, `force_sum`: force of the pile on the moving grip along the axis, summed over steps [N];
+        # `step`: number of steps; `due`: time of the next check [s].
+        return {"arrival": None, "end": None, "moving": False, "due": 0.0, "force_sum": 0.0, "step": 0}
 
     def proceed(self, stage: Stage, engine: Engine) -> float:
         memory, grips, limit = stage.memory, engine.grips, self.force_limit_N
@@ -102,13 +102,11 @@ class Tension(Part, Phase):
             arrival = engine.time + self.distance_m / self.speed_m_per_s
             memory.update(arrival=arrival, end=engine.time + self.duration_s, moving=True)
             self._check_from_now(memory, engine, grips)
-        elif memory["moving"] and limit is not None and engine.time > memory["due"] - engine.time_step / 2:
-            pull, step = memory["pull"], memory["step"]
+        elif memory["moving"] and not time_left(engine, memory["due"]):
+            stop_at_limit(memory, engine, force_sum=self._force_sum(engine, grips), limit=limit)
             self._check_from_now(memory, engine, grips)
-            if memory["pull"] - pull > limit * (engine.steps - step):
-                memory.update(arrival=engine.time, end=engine.time + HELD_SECONDS)
-        if memory["moving"] and (left := time_left(engine, memory["arrival"])):
-            return left if limit is None else min(max(memory["due"] - engine.time, engine.time_step), left)
+        if memory["moving"] and (left := travel_left(memory, engine, limit=limit)):
+            return left
         if memory["moving"]:
             memory["moving"] = False
             self._move(grips, 0.0)
@@ -127,10 +125,13 @@ class Tension(Part, Phase):
         grips.move(MOVED, (velocity[0], velocity[1], velocity[2]))
 
     def _check_from_now(self, memory: Memory, engine: Engine, grips: Grips) -> None:
-        """Note the sum of the pull up to now, and set the time of the next check."""
+        interval = self.whole_periods(CHECK_INTERVAL)
+        check_from_now(memory, engine, force_sum=self._force_sum(engine, grips), interval=interval)
+
+    def _force_sum(self, engine: Engine, grips: Grips) -> float:
+        """Return the force on the moving grip along the axis, without weight, summed over all steps [N]."""
         weight = float(grips.weights[MOVED]) if self.axis == "z" else 0.0
-        pull = -float(grips.sums[MOVED, self._along]) - weight * engine.steps
-        memory.update(pull=pull, step=engine.steps, due=engine.time + self.whole_periods(CHECK_INTERVAL))
+        return float(grips.sums[MOVED, self._along]) + weight * engine.steps
 
     def _ends(self, stage: Stage, engine: Engine) -> tuple[list[int], list[int]]:
         """Return the numbers of the bodies at the end that rests and at the end that moves."""

@@ -8,11 +8,10 @@ from pydantic import Field
 
 from dem.body.linkage import Linkage, Swing, Undulation
 from dem.engine.interface import Engine
-from dem.phases.phase import Memory, Phase, SceneView, Stage
+from dem.phases.phase import SceneView, TimedPhase
+from dem.setting.hooks import TOLERANCE
 from dem.setting.joints import BENT, Bend
 from dem.setting.part import Duration, Part
-
-TOO_FAST = 1 + 1e-9  # factor on limits of angle and speed that leaves room for rounding
 
 Amplitude = Annotated[float, Field(ge=0, le=BENT)]
 
@@ -38,7 +37,7 @@ class Motion(Part):
         )
 
 
-class Undulate(Part, Phase):
+class Undulate(Part, TimedPhase):
     """Bend chains by their motors: a wave travels along each chain, or motors swing as a table says.
 
     The motion goes on in later phases until the next `undulate` or `relax`.
@@ -94,21 +93,18 @@ class Undulate(Part, Phase):
             joint, where = linkage.joints[swing.joint], named.get((swing.joint, swing.axis), "")
             centre = joint.poured[swing.axis] if swing.centre is None else swing.centre
             farthest = math.degrees(abs(centre) + swing.amplitude)
-            if farthest > BENT * TOO_FAST:
+            if farthest > BENT * (1 + TOLERANCE):
                 yield (
                     f"{key}.{where}amplitude_deg: {math.degrees(swing.amplitude):g}° about {math.degrees(centre):g}° "
                     f"bends joint {swing.joint} by {farthest:g}°; keep within {BENT:g}°"
                 )
             fastest = 2 * math.pi * self.frequency_Hz * swing.amplitude
-            if fastest > joint.speed * TOO_FAST:
+            if fastest > joint.speed * (1 + TOLERANCE):
                 yield (
                     f"{key}.{where}amplitude_deg: {math.degrees(swing.amplitude):g}° at {self.frequency_Hz:g} Hz needs "
                     f"{fastest:.3g} rad/s at joint {swing.joint}, whose speed_limit_rad_per_s is {joint.speed:g}; "
                     "swing less or slower"
                 )
-
-    def first_memory(self, scene: SceneView) -> Memory:
-        return {"begun": False}
 
     @property
     def undulation(self) -> Undulation:
@@ -123,13 +119,9 @@ class Undulate(Part, Phase):
             together=self.starts == "together",
         )
 
-    def proceed(self, stage: Stage, engine: Engine) -> float:
-        if stage.memory["begun"]:
-            return 0.0
-        stage.memory["begun"] = True
+    def act(self, engine: Engine) -> None:
         assert engine.filaments is not None  # the scene was checked
         engine.filaments.act(self.undulation, ramp=self.ramp_s)
-        return self.duration_s
 
 
 def _of_motion(key: str, motion: Motion, linkage: Linkage) -> Iterator[str]:

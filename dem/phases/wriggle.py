@@ -8,13 +8,13 @@ from pydantic import Field
 
 from dem.body.filament import Activity
 from dem.engine.interface import Engine
-from dem.phases.phase import Memory, Phase, SceneView, Stage
+from dem.phases.phase import SceneView, TimedPhase
 from dem.setting.part import Duration, Length, Part
 
 TIGHTEST = 0.5  # of a filament's curvature times its diameter: a bend in which it would touch itself
 
 
-class Wriggle(Part, Phase):
+class Wriggle(Part, TimedPhase):
     """Let filaments bend actively: in each, a wave of preferred curvature turns about the axis.
 
     Waves begin at random phases, and go on in later phases until the next `wriggle` or `relax`.
@@ -48,9 +48,6 @@ class Wriggle(Part, Phase):
             f"into itself; use less than {most:.3g}",
         )
 
-    def first_memory(self, scene: SceneView) -> Memory:
-        return {"begun": False}
-
     @property
     def activity(self) -> Activity:
         """Wave of preferred curvature that the filaments follow."""
@@ -62,10 +59,6 @@ class Wriggle(Part, Phase):
             reversal_rate=0.0 if turns is None else self.frequency_Hz / turns,
         )
 
-    def proceed(self, stage: Stage, engine: Engine) -> float:
-        if stage.memory["begun"]:
-            return 0.0
-        stage.memory["begun"] = True
+    def act(self, engine: Engine) -> None:
         assert engine.filaments is not None  # the scene was checked
         engine.filaments.act(self.activity, ramp=self.ramp_s)
-        return self.duration_s

@@ -6,7 +6,6 @@ considered.
 """
 
 import math
-from collections.abc import Iterator
 
 from dem.errors import InputError
 from dem.phases.compress import Compress
@@ -32,38 +31,34 @@ def check_ends(scene: Scene) -> None:
     for index, phase in enumerate(scene.phases):
         if phase.frees:
             return
-        problems: Iterator[str] = iter(())
         if isinstance(phase, Deposit):
-            problems = _of_pour(scene, phase)
+            _check_pour(scene, phase)
         elif isinstance(phase, Shake):
             frequency, peak = phase.fastest
             key, amplitude = f"phases.{index}.{phase.frequency_key(frequency)}", phase.amplitude(scene.gravity_m_per_s2)
-            problems = _of_shaking(scene, key, frequency, peak, amplitude)
+            _check_shaking(scene, key, frequency, peak, amplitude)
         elif (vibration := phase.vibrated_by) is not None and not isinstance(phase, Compress):  # it has a plate
             key, amplitude = f"phases.{index}.vibration.frequency_hz", vibration.amplitude(scene.gravity_m_per_s2)
-            problems = _of_shaking(scene, key, vibration.frequency_hz, vibration.peak_acceleration_g, amplitude)
-        for problem in problems:
-            raise InputError(problem)
+            _check_shaking(scene, key, vibration.frequency_hz, vibration.peak_acceleration_g, amplitude)
 
 
-def _of_pour(scene: Scene, pour: Deposit) -> Iterator[str]:
+def _check_pour(scene: Scene, pour: Deposit) -> None:
     contact, gravity, speed = scene.contact, scene.gravity_m_per_s2, pour.thrown_at_m_per_s
     if contact.restitution == 1:
-        yield (
+        raise InputError(
             "contact.restitution: 1 means contacts without damping, so that what phases.0 (deposit) pours goes on "
             "bouncing and vibrating, and never counts as settled; use at most 0.95"
         )
     rise = (contact.restitution * speed) ** 2 / (2 * gravity)
-    least = _factor(scene) * rise
-    if least > scene.cylinder.height:
-        yield (
+    if (excess := _excess(scene, rise)) > 1:
+        raise InputError(
             f"phases.0.thrown_at_m_per_s: what is thrown at {speed:g} m/s rebounds by {rise:.3g} m at "
             f"contact.restitution = {contact.restitution:g}, out of the wall of {scene.cylinder.height:.3g} m; use at "
-            f"most {0.995 * speed * math.sqrt(scene.cylinder.height / least):.3g} m/s{_higher(MARGIN * rise)}"
+            f"most {0.995 * speed / math.sqrt(excess):.3g} m/s{_or_higher(rise)}"
         )
 
 
-def _of_shaking(scene: Scene, key: str, frequency: float, peak: float, amplitude: float) -> Iterator[str]:
+def _check_shaking(scene: Scene, key: str, frequency: float, peak: float, amplitude: float) -> None:
     # `frequency` [Hz] and `peak`, Γ [1], where the speed is greatest; `amplitude`: the greatest one [m].
     gravity = scene.gravity_m_per_s2
     if peak <= 1:  # nothing leaves the floor
@@ -71,19 +66,20 @@ def _of_shaking(scene: Scene, key: str, frequency: float, peak: float, amplitude
     # The wall is at its lowest when the body is at its highest.
     speed = (1 + scene.contact.restitution) * shaking_amplitude(peak, frequency, gravity) * 2 * math.pi * frequency
     rise = amplitude + speed**2 / (2 * gravity)
-    least = _factor(scene) * rise
-    if least > scene.cylinder.height:
-        yield (
+    if (excess := _excess(scene, rise)) > 1:
+        raise InputError(
             f"{key}: {frequency:g} Hz at Γ = {peak:g} throws smarticles up by "
             f"{rise:.3g} m, out of the wall of {scene.cylinder.height:.3g} m; use at least "
-            f"{1.005 * frequency * math.sqrt(least / scene.cylinder.height):.3g} Hz{_higher(MARGIN * rise)}"
+            f"{1.005 * frequency * math.sqrt(excess):.3g} Hz{_or_higher(rise)}"
         )
 
 
-def _factor(scene: Scene) -> float:
-    return DOUBT if scene.container.height_m is None else MARGIN
+def _excess(scene: Scene, rise: float) -> float:
+    """Return the height that a wall needs for a rise of bodies [m], over the height of the scene's wall [1]."""
+    return (DOUBT if scene.container.height_m is None else MARGIN) * rise / scene.cylinder.height
 
 
-def _higher(least: float) -> str:
-    """Return the advice to raise the wall to a height [m]; empty if no wall may be so high."""
-    return f" or container.height_m: {1.005 * least:.3g}" if 1.005 * least < LONGEST_LENGTH else ""
+def _or_higher(rise: float) -> str:
+    """Return the advice to raise the wall for a rise of bodies [m]; empty if no wall may be so high."""
+    least = 1.005 * MARGIN * rise
+    return f" or container.height_m: {least:.3g}" if least < LONGEST_LENGTH else ""

@@ -213,7 +213,7 @@ def warnings_of(scene: Scene) -> tuple[str, ...]:
 
 def _step_warnings(scene: Scene) -> tuple[str, ...]:
     """Return a one-line warning if filaments or joints need very short steps, else ()."""
-    if scene.mixture is None or not (scene.mixture.flexible or scene.mixture.jointed):
+    if scene.mixture is None or not scene.mixture.bends:
         return ()
     step = min(time_steps(scene))
     if step >= SHORT_STEP:

@@ -173,8 +173,7 @@ FORCE_FIELDS = _columns(
     second_smarticle=("second", "number of the smarticle that exerts the force, the higher one; -1 for a boundary"),
     second_link="link that exerts the force: 0 barb 1, 1 middle link, 2 barb 2; -1 for a boundary",
     fixture="boundary that exerts the force: 0 floor, 1 wall, 2 lower hook, 3 upper hook, 4 and 5 the channel's walls, "
-    "6 plate; "
-    "-1 between smarticles",
+    "6 plate; -1 between smarticles",
     normal_force_N="sum of the normal forces at the points of contact, above 0",
     tangential_force_N="magnitude of the sum of the tangential forces at the points of contact",
     force_N="total force on the first smarticle (x, y, z), summed over the points of contact",

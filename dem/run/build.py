@@ -26,10 +26,9 @@ from dem.run.watchdog import Watchdog
 from dem.scene.reading import scene_hash
 from dem.scene.scene import Scene
 
-PIN_LIMIT = (
-    0.5  # gap at a joint of chains, whose pins give way about as contacts do; wider ones would let links through
-)
 GAP_LIMIT = 0.2  # gap of a hinge in sphere diameters; it is up to 0.01 in a pile and 0.02 at an impact of 3 m/s
+# The same at a joint of chains, whose pins give way about as much as contacts; links could pass through wider gaps.
+PIN_LIMIT = 0.5
 SPEED_MARGIN = 5.0  # limit of speeds, over the speed of a fall over the container's height or of the shaking
 # Overlap in sphere diameters, from which on the forces of wall and floor decrease or point outwards, and chains slip
 # through each other. Shaking at Γ = 10 with the fidelity draft reaches 0.4.

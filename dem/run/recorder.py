@@ -83,8 +83,8 @@ class Recorder:
         if extremes is not None and watchdog.within_limits(extremes, floor=floor, raised=raised):
             elastic = extremes.elastic_energy
         else:
-            gaps = engine.motors.gaps() if engine.motors.articulated else None
-            gaps = state.gaps if isinstance(state, LinkageState) else gaps
+            hinges = engine.motors.gaps() if engine.motors.articulated else None
+            gaps = state.gaps if isinstance(state, LinkageState) else hinges
             watchdog.check(state, floor=floor, time=time, points=self.points(state), raised=raised, gaps=gaps)
             overlaps = engine.overlaps(watchdog.depth)
             watchdog.check_depths(overlaps, time=time)

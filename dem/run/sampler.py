@@ -11,7 +11,7 @@ from dem.arrays import Array
 from dem.body.chain import extent
 from dem.body.state import LinkageState, PileState
 from dem.engine.effect import EffectName
-from dem.engine.interface import Engine, Filaments, Grips, JointReadings
+from dem.engine.interface import Engine, Filaments, JointReadings
 from dem.plan.effects import ADDS
 from dem.record.columns import COLUMNS, EVERY, GRIP_COLUMNS, STRAIN_COLUMNS, Columns
 from dem.record.packing import packing_fraction
@@ -56,10 +56,10 @@ class Sampler:
             height = engine.boundaries.plate_height
             extra |= {"plate_force_N": force, "plate_z_m": math.nan if height is None else height}
         if EffectName.GRIPS in self.effects:
-            extra |= self._grip_row(engine)
+            grip_row, pull = self._grip_row(engine)
+            extra |= grip_row
             # The momentum balance includes the grips, with the weight of what they hold.
-            pulls = extra["grip_fixed_force_N"] + extra["grip_moved_force_N"]
-            container_force -= np.nan_to_num(pulls - [0.0, 0.0, _held_weight(engine.grips)])
+            container_force -= np.nan_to_num(pull)
         if EffectName.WALL_REMOVAL in self.effects:
             outside = np.hypot(state.positions[:, 0], state.positions[:, 1]) > engine.cylinder.radius
             extra["outside_count"] = np.count_nonzero(outside)
@@ -121,24 +121,26 @@ class Sampler:
             return np.full_like(sums, math.nan)
         return np.asarray((sums - np.array(previous[1])) / (steps - previous[0]))
 
-    def _grip_row(self, engine: Engine) -> dict[str, Any]:
+    def _grip_row(self, engine: Engine) -> tuple[dict[str, Any], Array]:
+        """Return columns about grips, and the force [N] on all of them together; NaN where it is unknown."""
         grips, none = engine.grips, np.full(3, math.nan)
         row: dict[str, Any] = dict.fromkeys(GRIP_COLUMNS, math.nan)
         row |= {"grip_fixed_force_N": none, "grip_moved_force_N": none, "grip_fixed_count": 0, "grip_moved_count": 0}
         if grips is None or not len(grips.counts):
             self.memory["grips"] = None
-            return row
+            return row, none
         if self.memory["grips_made"] != grips.made:  # sums begin anew
             self.memory.update(grips=None, grips_made=grips.made)
         # The last grip moves; the one before it rests, if there is one.
         moved, up = grips.moved, np.array([0.0, 0.0, 1.0])
         forces = self._mean_since("grips", engine.steps, grips.sums) + grips.weights[:, None] * up
+        pull = forces.sum(axis=0) - grips.weights.sum() * up
         row |= {"grip_moved_force_N": forces[-1], "grip_moved_count": grips.counts[-1]}
         if len(forces) == 1:
-            return row | {"grip_fixed_force_N": np.zeros(3), "elongation_m": np.linalg.norm(moved[0])}
+            return row | {"grip_fixed_force_N": np.zeros(3), "elongation_m": np.linalg.norm(moved[0])}, pull
         row |= {"grip_fixed_force_N": forces[-2], "grip_fixed_count": grips.counts[-2]}
         row["elongation_m"] = np.linalg.norm(moved[-1] - moved[-2])
-        return row | {"grip_distance_m": np.linalg.norm(np.subtract(*grips.places[-2:]))}
+        return row | {"grip_distance_m": np.linalg.norm(np.subtract(*grips.places[-2:]))}, pull
 
     def _strain_row(self, engine: Engine, state: PileState) -> dict[str, Any]:
         strings, none = engine.strings, np.full(3, math.nan)
@@ -156,11 +158,6 @@ class Sampler:
         row["chain_length_m"] = float(np.ptp(strings.ties[:, 0]))
         means = self._mean_since("strain", engine.steps, sums)
         return row | dict(zip(list(STRAIN_COLUMNS)[:4], means, strict=True))
-
-
-def _held_weight(grips: Grips | None) -> float:
-    """Return the weight of all that grips hold [N]."""
-    return 0.0 if grips is None else float(grips.weights.sum())
 
 
 def _motor_row(engine: Engine, state: PileState) -> dict[str, Any]:

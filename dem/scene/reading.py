@@ -38,7 +38,7 @@ NEWER_KEYS: Mapping[str, Mapping[str, Any]] = MappingProxyType(
         "pull-hook": {"vibration": None},
     }
 )
-"""Further ones, which no protocol fills in."""
+"""Keys of phases that were added later, by type of phase, with their defaults; no protocol fills them in."""
 
 
 def parse_scene(data: Any, *, source: str, folder: Path | None = None) -> Scene:
@@ -136,9 +136,9 @@ def apply_override(data: Any, override: str) -> None:
 def _plain(scene: Scene) -> dict[str, Any]:
     """Return the resolved scene as plain data, without default values of keys added to the format later.
 
-    Without such keys, among them `ADDED_KEYS`, the hashes of older scenes do not change. A scene with a protocol keeps
-    `packing_radius_m` and `ADDED_KEYS`, since the protocol may have filled them in. A scene of other bodies than
-    smarticles has no key `smarticle`.
+    Without such keys, among them `ADDED_KEYS` and `NEWER_KEYS`, the hashes of older scenes do not change. A scene with
+    a protocol keeps `packing_radius_m` and `ADDED_KEYS`, since the protocol may have filled them in. A scene of other
+    bodies than smarticles has no key `smarticle`.
     """
     data = scene.model_dump(mode="json")
     smarticle = data["smarticle"]

@@ -380,7 +380,7 @@ class Scene(Part):
     def _kind(self, shape: Shaped, factor: float) -> Kind:
         bars = shape.bars(factor)
         normal, in_plane = bars.thickness_normal, bars.thickness_in_plane
-        linkage = shape.linkage(factor) if isinstance(shape, Chain) else None
+        linkage = shape.linkage(factor, bars) if isinstance(shape, Chain) else None
         # Rows have a meaning only across the wide side of a flat section; links of a chain have one.
         wide = normal > (self.fidelity.diameter_m or in_plane) and not bars.round and linkage is None
         rows = self.fidelity.rows if wide else 1

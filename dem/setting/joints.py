@@ -6,7 +6,7 @@ from typing import Annotated, Any, Literal, Self, get_args
 from pydantic import BeforeValidator, Field, model_validator
 
 from dem.body.linkage import Joint, Three
-from dem.setting.part import Part, Turning
+from dem.setting.part import Part, Turning, as_list
 
 BENT = 150.0  # deg, largest angle at rest or of a motor: beyond it, links would lie on each other
 ACROSS = 1e-6  # largest cosine of the angle between two axes that count as perpendicular
@@ -32,12 +32,8 @@ def _axes(value: Any) -> Any:
     return value
 
 
-def _listed(value: Any) -> Any:
-    return value if isinstance(value, list | tuple) else (value,)
-
-
 Axes = Annotated[tuple[Direction, ...], BeforeValidator(_axes, json_schema_input_type=Number | list[Direction])]
-Bends = Annotated[tuple[Bend, ...], BeforeValidator(_listed, json_schema_input_type=Bend | list[Bend])]
+Bends = Annotated[tuple[Bend, ...], BeforeValidator(as_list, json_schema_input_type=Bend | list[Bend])]
 
 
 class _Joint(Part):
@@ -67,7 +63,7 @@ class _Joint(Part):
             if not math.hypot(*axis) > 0:
                 raise ValueError(f"axes.{number}: a direction of length 0; give e.g. [0, 0, 1]")
         if len(self.axes) == 2:
-            one, two = (tuple(c / math.hypot(*axis) for c in axis) for axis in self.axes)
+            one, two = self._directions
             cosine = abs(sum(a * b for a, b in zip(one, two, strict=True)))
             if cosine > ACROSS:
                 raise ValueError(
@@ -80,7 +76,8 @@ class _Joint(Part):
         return self
 
     @property
-    def _three_axes(self) -> tuple[Three, ...]:
+    def _directions(self) -> tuple[Three, ...]:
+        """Directions of the axes, of length 1."""
         return tuple((x / n, y / n, z / n) for x, y, z in self.axes for n in [math.hypot(x, y, z)])
 
     @property
@@ -103,7 +100,7 @@ class FreeJoint(_Joint):
     law: Literal["free"]
 
     def joint(self) -> Joint:  # noqa: D102 - as in the base class
-        return Joint(axes=self._three_axes, poured=self._poured)
+        return Joint(axes=self._directions, poured=self._poured)
 
 
 class ElasticJoint(_Joint):
@@ -127,7 +124,7 @@ class ElasticJoint(_Joint):
     def joint(self) -> Joint:  # noqa: D102
         rest = _radians(self.rest_angle_deg)
         return Joint(
-            axes=self._three_axes,
+            axes=self._directions,
             law="elastic",
             stiffness=self.stiffness_N_m_per_rad,
             damping=self.damping_N_m_s_per_rad,
@@ -151,7 +148,7 @@ class MotorJoint(_Joint):
 
     def joint(self) -> Joint:  # noqa: D102
         return Joint(
-            axes=self._three_axes,
+            axes=self._directions,
             law="motor",
             stiffness=self.stiffness_N_m_per_rad,
             damping=self.damping_N_m_s_per_rad,

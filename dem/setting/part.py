@@ -1,7 +1,7 @@
 """Base of the parts of a scene, and types of numbers that several parts use."""
 
 import difflib
-from typing import Annotated, get_args
+from typing import Annotated, Any, get_args
 
 from pydantic import AfterValidator, Field
 
@@ -49,6 +49,11 @@ class Part(Strict):
         """Return the name of this part in scene files: the value of its `type` or `shape`, or else its key."""
         kind = cls.model_fields.get("type") or cls.model_fields.get("shape")
         return str(get_args(kind.annotation)[0]) if kind else cls.__name__.lower()
+
+
+def as_list(value: Any) -> Any:
+    """Return an unvalidated list as it is, and any other value as the only item of a tuple."""
+    return value if isinstance(value, list | tuple) else (value,)
 
 
 def in_hinge_range(angle: float) -> float:

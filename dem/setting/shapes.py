@@ -14,7 +14,7 @@ from dem.body.filament import Filament, Liquid, PreferredCurvature
 from dem.body.linkage import Linkage, layout_of, link_of
 from dem.errors import InputError
 from dem.setting.joints import AnyJoint
-from dem.setting.part import LONGEST_LENGTH, Density, Length, Part, Stiffness
+from dem.setting.part import LONGEST_LENGTH, Density, Length, Part, Stiffness, as_list
 
 SIZES = 16  # equally frequent lengths that stand in for a spread of lengths
 NORMAL, IN_PLANE = 1.27e-3, 0.5e-3  # m, the section of the paper's smarticles
@@ -346,10 +346,6 @@ class Flexible(Shaped):
         )
 
 
-def _as_list(value: Any) -> Any:
-    return value if isinstance(value, list | tuple) else (value,)
-
-
 class Chain(Shaped):
     """Rigid links joined end to end, with a law at each joint, on the engine links."""
 
@@ -357,13 +353,13 @@ class Chain(Shaped):
     links: Annotated[int, Field(ge=2, le=200)] | None = Field(
         None, description="number of links of one length [1]; default: that of the lengths in link_m"
     )
-    link_m: Annotated[tuple[Length, ...], BeforeValidator(_as_list, json_schema_input_type=Length | list[Length])] = (
+    link_m: Annotated[tuple[Length, ...], BeforeValidator(as_list, json_schema_input_type=Length | list[Length])] = (
         Field(
             ..., min_length=1, max_length=200, description="lengths of the links, from joint to joint, one or all [m]"
         )
     )
     joints: Annotated[
-        tuple[AnyJoint, ...], BeforeValidator(_as_list, json_schema_input_type=AnyJoint | list[AnyJoint])
+        tuple[AnyJoint, ...], BeforeValidator(as_list, json_schema_input_type=AnyJoint | list[AnyJoint])
     ] = Field(..., min_length=1, max_length=199, description="one joint for all places between links, or one for each")
     pin_stiffness_N_per_m: Stiffness | None = Field(
         None,
@@ -387,9 +383,11 @@ class Chain(Shaped):
     def _all_joints(self) -> tuple[AnyJoint, ...]:
         return self.joints * (len(self._lengths) - 1) if len(self.joints) == 1 else self.joints
 
-    def linkage(self, factor: float) -> Linkage:
-        """Return links and joints, with the lengths of links multiplied by a factor [1]."""
-        body = self.bars(factor)
+    def linkage(self, factor: float, body: Bars) -> Linkage:
+        """Return links and joints, with the lengths of links multiplied by a factor [1].
+
+        `body` is the result of `bars` for this factor.
+        """
         return Linkage(
             links=tuple(
                 link_of(

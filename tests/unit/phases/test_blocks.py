@@ -328,3 +328,7 @@ def test_allowed_blocks_after_the_wall_has_gone() -> None:
     stays = {**COMPRESS, "afterwards": "stay"}
     with_phase(REMOVE, stays, {**TENSION, "axis": "x"}, COMPRESS, LIFT, {"type": "release"}, COMPRESS)
     with_phase(REMOVE, {**TENSION, "axis": "x"}, COMPRESS, LIFT, {"type": "release"}, {"type": "shape-change"})
+
+
+def test_what_a_lift_holds_is_free_after_a_tension() -> None:
+    with_phase(LIFT, TENSION, COMPRESS, {"type": "shape-change"})

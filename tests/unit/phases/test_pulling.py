@@ -7,7 +7,8 @@ from double import EngineDouble
 from scenes import small
 
 from dem.phases.phase import CHECK_INTERVAL, Stage
-from dem.phases.pull_hook import HELD_SECONDS, PullHook
+from dem.phases.pull_hook import PullHook
+from dem.phases.travel import HELD_SECONDS
 from dem.setting.vibration import Vibration
 
 DT, SPEED, DISTANCE = 1e-4, 0.01, 0.004

@@ -136,6 +136,18 @@ def test_forces_on_grips_are_means_since_these_grips_hold() -> None:
     assert math.isnan(row["elongation_m"])
 
 
+def test_forces_on_all_grips_are_no_part_of_the_containers() -> None:
+    engine, sampler = engine_with([0.0]), Sampler(RADIUS, {EffectName.GRIPS})
+    grips = engine.grips = GripsDouble(calls=engine.calls)
+    for body in range(3):
+        grips.hold([body])
+    sample(sampler, engine)
+    engine.advance(10)
+    grips.sums = np.array([[2.0, 0, 0], [0, 3.0, 0], [0, 0, 4.0]])
+    weight = engine.particle.boxes.mass * 9.81
+    assert sample(sampler, engine)["container_force_N"] == pytest.approx([-0.2, -0.3, -0.4 - weight])
+
+
 def test_a_pile_without_a_wall_has_no_packing_fraction_and_counts_those_outside() -> None:
     sampler, engine = Sampler(RADIUS, {EffectName.WALL_REMOVAL}), engine_with([0.01, 0.02, 0.03])
     engine.positions[0, 0] = 1.01 * RADIUS
