@@ -1,4 +1,4 @@
-"""What filaments and linkages have in common on the engine links: grips, the ramp of an activity, and energies."""
+"""Grips, ramp and energies, which filaments and linkages have in common on the engine links."""
 
 from __future__ import annotations
 
@@ -76,7 +76,7 @@ class FlexibleBodies:
         return len(np.unique(np.searchsorted(own.begin, np.flatnonzero(own.grip), side="right")))
 
     def force(self, grip: int | None = None) -> Array:
-        """Return the force (3,) of a grip on its nodes or links in the last step [N]; None: the sum over all grips."""
+        """Return the force (3,) of a grip on its nodes or links in the last step [N]; None: of all grips."""
         forces = self._all.grip_force
         force: Array = forces.sum(axis=0) if grip is None else forces[grip].copy()
         return force

@@ -33,7 +33,7 @@ class LinksLinkages(FlexibleBodies):
         self._world.linkages = self._all._replace(**fields)
 
     def points(self, linkage: int) -> Array:
-        """Return the positions (n, 3) of the middles of a linkage's links [m], as a view of the engine's array."""
+        """Return the middles (n, 3) of a linkage's links [m], as a view of the engine's array."""
         return self._all.links.position[self._members(linkage)]
 
     def grip(self, links: Mapping[int, Sequence[int]]) -> int:

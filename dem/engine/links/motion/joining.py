@@ -1,4 +1,4 @@
-"""Motion of linkages: rigid links, the springs that keep their joints together, and the laws of the joints.
+"""Motion of linkages: rigid links, springs that keep their joints together, and laws of the joints.
 
 Links are moved by the kernels of rigid bodies. A joint adds to the loads of both links
 
@@ -49,7 +49,7 @@ Quaternion = tuple[float, float, float, float]
 
 @part
 def pose_linkages(linkages: Any) -> None:
-    """Bring everything up to date that follows from the links of linkages.
+    """Compute positions and motion of linkages, and of their parts and segments, from the links.
 
     Args:
         linkages: `position` and `velocity` of `bodies`, `motion` of `parts`, `line` and `bends.ends` of `segments` are
@@ -75,7 +75,7 @@ def pose_linkages(linkages: Any) -> None:
 
 @kernel
 def pose_linkages_from_python(linkages: Linkages) -> None:
-    """Call `pose_linkages` from Python."""
+    """Do what `pose_linkages` does, for calls from Python."""
     pose_linkages(linkages)
 
 
@@ -135,7 +135,7 @@ def _wrapped(angle: float) -> float:
 
 @inlined
 def _angle(d: Vector, u: Vector, w: Vector) -> tuple[float, Vector]:
-    """Return the angle [rad] from u towards w of d's projection on their plane, and the gradient of this angle [1].
+    """Return the angle from u towards w of d's projection on their plane [rad], and its gradient [1].
 
     The gradient is by a small rotation of d. u and w are perpendicular unit vectors.
     """
@@ -146,12 +146,14 @@ def _angle(d: Vector, u: Vector, w: Vector) -> tuple[float, Vector]:
 class Turn(NamedTuple):
     """How two links of a joint with one or two axes are turned against each other."""
 
-    off: float  #: Of two axes: cosine of the angle between them; of one: 1 less that between its directions in both
-    across: Vector  #: Direction of the torque that would restore it, times a sine [1]
+    #: How far the joint is off its axes [1]: with two axes the cosine of the angle between them; with one axis 1 less
+    #: the cosine of the angle between the axis of the link before and that of the link after
+    off: float
+    across: Vector  #: Direction of the torque that restores the axes, times the sine of the angle in `off` [1]
     one: float  #: Angle about the first axis [rad]
-    two: float  #: Angle about the second axis [rad]
-    first: Vector  #: Change of the first angle per rotation of the link after
-    second: Vector  #: Change of the second angle per rotation of the link after
+    two: float  #: Angle about the second axis [rad]; 0 if there is one axis
+    first: Vector  #: Gradient of the first angle by a rotation of the link after [1]
+    second: Vector  #: Gradient of the second angle by a rotation of the link after [1]
 
 
 @inlined
@@ -178,7 +180,10 @@ def _rotation(linkages: Linkages, j: int) -> Quaternion:
 
 @inlined
 def _gap(linkages: Linkages, j: int) -> tuple[Vector, Vector]:
-    """Return the middle of both ends at a joint, and the end of the link after less that of the link before [m]."""
+    """Return the place of a joint and its gap [m].
+
+    The place is the middle between both ends, the gap the end of the link after less that of the link before.
+    """
     row, axes, position = linkages.row[j], linkages.links.axes, linkages.links.position
     x1 = axes[j, 0, 0], axes[j, 1, 0], axes[j, 2, 0]
     x2 = axes[j + 1, 0, 0], axes[j + 1, 1, 0], axes[j + 1, 2, 0]
@@ -188,7 +193,7 @@ def _gap(linkages: Linkages, j: int) -> tuple[Vector, Vector]:
 
 @inlined
 def _stored(linkages: Linkages, j: int) -> tuple[float, float, float]:
-    """Return the energies of a joint's pin, of its law, and of directions in which links cannot turn [J]."""
+    """Return the energies of a joint's pin, elastic law, and directions in which links cannot turn [J]."""
     row, law, elastic, off = linkages.row[j], linkages.law[j], 0.0, 0.0
     _, gap = _gap(linkages, j)
     if linkages.axes[j] < 3:
@@ -227,7 +232,14 @@ def _follow(linkages: Linkages, j: int, axis: int, wave: Vector, past: float) ->
 def _bend(
     linkages: Linkages, j: int, axis: int, angle: float, rate: float, wave: Vector, past: float
 ) -> tuple[float, float, float]:
-    """Return the torques of spring, dashpot and motor about an axis [N m]; a spring beyond its limit yields."""
+    """Return the torques of spring, dashpot and motor about an axis [N m]; springs yield at their limit.
+
+    Args:
+        angle: present angle about the axis [rad].
+        rate: rate of this angle [rad/s].
+        wave: cosine and sine of ψ, and the factor on the swing.
+        past: time since the last step [s].
+    """
     row, law = linkages.row[j], linkages.law[j]
     stiffness, most, spring, resisting, motor = row[STIFFNESS], row[MOST], 0.0, 0.0, 0.0
     if law == ELASTIC:
@@ -249,7 +261,13 @@ def _bend(
 
 @inlined
 def _turn_any(linkages: Linkages, j: int, spin: Vector, wave: Vector, past: float) -> tuple[Vector, Vector, Vector]:
-    """Return the torques of spring, dashpot and motor of a joint with three axes on the link after [N m]."""
+    """Return the torques of spring, dashpot and motor of a joint with three axes on the link after [N m].
+
+    Args:
+        spin: spin of the link after less that of the link before [rad/s].
+        wave: cosine and sine of ψ, and the factor on the swing.
+        past: time since the last step [s].
+    """
     row, law, none = linkages.row[j], linkages.law[j], (0.0, 0.0, 0.0)
     rotation, before = _rotation(linkages, j), _rotation_by(_reversed(linkages.angle[j]))
     x, y, z = _vector_of(rotation)
@@ -339,12 +357,12 @@ def _push_joint(linkages: Linkages, j: int, wave: Vector, past: float) -> None:
 
 @part
 def push_joints(linkages: Any, gravity: float, step: Step) -> None:
-    """Write the loads of all links: of contacts, and of joints.
+    """Compute the loads of contacts and joints on all links.
 
     Args:
-        linkages: with the loads of contacts in `parts`; all but constants are written.
+        linkages: the linkages, with the loads of contacts in `parts`; all arrays but constants are written.
         gravity: g [m/s²].
-        step: `need` is written.
+        step: `need` is increased if a link moves too fast for a time step.
     """
     if linkages is None:
         return
@@ -362,7 +380,7 @@ def push_joints(linkages: Any, gravity: float, step: Step) -> None:
 
 @inlined
 def _hold(linkages: Linkages, gravity: float, dt: float) -> None:
-    """Add the loads of grips, which move their links at a given velocity without rotation."""
+    """Replace loads on held links by loads that give them the velocity of their grip, and no rotation."""
     links = linkages.links
     linkages.grip_force[:] = 0.0
     for i in range(links.position.shape[0]):
@@ -381,13 +399,13 @@ def _hold(linkages: Linkages, gravity: float, dt: float) -> None:
 
 @part
 def kick_links(linkages: Any, gravity: float, ledger: Any, dt: float) -> None:
-    """Change the momenta of links by the loads of this instant, and sum what took and gave energy.
+    """Change the momenta of links by the present loads, and sum the energies that are exchanged.
 
     Args:
-        linkages: `links`, `grip_force` and `sums` are written, and `parts.motion` where they are needed.
+        linkages: `links`, `grip_force` and `sums` are written, and `parts.motion` if there is a ledger or a motor.
         gravity: g [m/s²].
-        ledger: None where nothing reads what dashpots took.
-        dt: time over which they act [s].
+        ledger: forces that dissipate energy; None if dissipation is not recorded.
+        dt: time over which the loads act [s].
     """
     if linkages is None:
         return
@@ -428,7 +446,7 @@ def drift_links(linkages: Any, dt: float, row: Array) -> None:
 
 @kernel
 def measure_linkages(linkages: Linkages, gravity: float, found: Array) -> None:
-    """Add up the energies of all linkages, which are posed.
+    """Add up the present energies of all linkages; `pose_linkages` must have been called before.
 
     Args:
         gravity: g [m/s²].
