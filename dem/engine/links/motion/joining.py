@@ -149,7 +149,7 @@ class Turn(NamedTuple):
     #: How far the joint is off its axes [1]: with two axes the cosine of the angle between them; with one axis 1 less
     #: the cosine of the angle between the axis of the link before and that of the link after
     off: float
-    across: Vector  #: Direction of the torque that restores the axes, times the sine of the angle in `off` [1]
+    across: Vector  #: Axis of the torque that restores the axes, times the sine of the angle in `off` [1]
     one: float  #: Angle about the first axis [rad]
     two: float  #: Angle about the second axis [rad]; 0 if there is one axis
     first: Vector  #: Gradient of the first angle by a rotation of the link after [1]
