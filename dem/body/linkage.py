@@ -1,4 +1,4 @@
-"""Describe linkages, bodies of rigid links joined end to end: their joints, and gaits of their motors."""
+"""A body of rigid links that are joined end to end: geometry, joints, and the motion of its motors."""
 
 import math
 from collections.abc import Sequence
@@ -20,7 +20,7 @@ Law = Literal["free", "elastic", "motor"]
 
 @dataclass(frozen=True, kw_only=True)
 class Joint:
-    """Joint between a link and the one after it.
+    """Joint between a link and the link after it.
 
     Frames of links have x along the link and z along its normal. At angles of 0 the frames of both links are parallel.
     """
@@ -29,12 +29,12 @@ class Joint:
     #: the first is fixed in the link before, the second in the link after; three: the links turn about any direction
     axes: tuple[Three, ...]
     law: Law = "free"
-    stiffness: float = 0.0  #: Of an elastic joint, or of a motor about its command [N m/rad]
-    damping: float = 0.0  #: Likewise [N m s/rad]
-    #: Angles about the axes without torque; for three axes the components, along these, of a rotation vector [rad]
+    stiffness: float = 0.0  #: Stiffness of the elastic joint, or of the motor about its command [N m/rad]
+    damping: float = 0.0  #: Damping of the joint, or of a motor's angle against its command [N m s/rad]
+    #: Angles at which an elastic joint has no torque; of three axes the components of a rotation vector [rad]
     rest: Three = (0.0, 0.0, 0.0)
-    poured: Three = (0.0, 0.0, 0.0)  #: Angles at the start, which motors hold, likewise [rad]
-    most: float = math.inf  #: Torque at which an elastic joint yields, or the limit of a motor [N m]
+    poured: Three = (0.0, 0.0, 0.0)  #: Angles at the start, which motors hold; in the form of `rest` [rad]
+    most: float = math.inf  #: Torque at which an elastic joint yields, or torque limit of a motor [N m]
     breaks: float = math.inf  #: Moment in any direction at which an elastic joint breaks [N m]
     speed: float = math.inf  #: Greatest speed of a motor's command [rad/s]
 
@@ -44,7 +44,7 @@ class Joint:
 
     @property
     def turn(self) -> Array:
-        """(3, 3) rotation of the link after against the link before at the start."""
+        """(3, 3) rotation from the frame of the link after to that of the link before, at the start."""
         if len(self.axes) > 2:
             return np.asarray(Rotation.from_rotvec(self.vector(self.poured)).as_matrix())
         found = np.eye(3)
@@ -57,9 +57,9 @@ class Joint:
 class Linkage:
     """One kind of linkage: n links and the n - 1 joints between them."""
 
-    links: tuple[Bars, ...]  #: Each along x of its own frame, with its middle at the origin
-    joints: tuple[Joint, ...]
-    pin_stiffness: float | None = None  #: Of the springs that keep joints together; None: twice that of contacts [N/m]
+    links: tuple[Bars, ...]  #: The links, each along x of its own frame, with its middle at the origin
+    joints: tuple[Joint, ...]  #: Joint k is between the links k and k + 1
+    pin_stiffness: float | None = None  #: Stiffness of springs between ends of links [N/m]; None: twice a contact's
 
     @cached_property
     def effective_mass(self) -> float:
@@ -79,28 +79,28 @@ class Linkage:
 
 @dataclass(frozen=True, kw_only=True)
 class Swing:
-    """Motion of one motor about one axis: centre + amplitude sin(ψ + phase), with ψ of the `Undulation`."""
+    """Motion of one motor about one axis: its command is centre + amplitude sin(ψ + phase)."""
 
     joint: int  #: Number of the joint, from 0
     axis: int = 0  #: Number of its axis, from 0
-    centre: float | None = None  #: None: the angle at the start [rad]
-    amplitude: float = 0.0  #: [rad]
-    phase: float = 0.0  #: [rad]
+    centre: float | None = None  #: Mean of the command [rad]; None: the angle at the start
+    amplitude: float = 0.0  #: Greatest distance of the command from its mean [rad]
+    phase: float = 0.0  #: Phase against ψ [rad]
 
 
 @dataclass(frozen=True, kw_only=True)
 class Undulation:
-    """Gait of the motors of linkages: swings of given joints, and a wave that travels along all others."""
+    """Gait of the motors of linkages: swings of given joints, and a wave along all other joints."""
 
-    rate: float  #: dψ/dt, up to its sign, which reversals change [rad/s]
-    amplitude: float = 0.0  #: Of the wave about the first axis of each motor [rad]
-    wavelength: float = math.inf  #: Of the wave, in lengths of the linkage [1]
-    swings: Sequence[Swing] = ()  #: Motions of joints that do not follow the wave
+    rate: float  #: Rate at which ψ, the angle of wave and swings, grows [rad/s]
+    amplitude: float = 0.0  #: Amplitude of the wave, about the first axis of each motor [rad]
+    wavelength: float = math.inf  #: Length of the wave over that of the linkage [1]
+    swings: Sequence[Swing] = ()  #: Motions of single motors; their joints do not follow the wave
     reversal_rate: float = 0.0  #: Mean number of reversals of ψ per second, at random times; 0: none [1/s]
     together: bool = False  #: Whether ψ of all linkages begins at 0, not at random
 
     def swings_of(self, linkage: Linkage) -> list[Swing]:
-        """Return the swings of all motors of a linkage: those in `swings`, and the wave for other joints."""
+        """Return the swings of all motors of a linkage: those of `swings`, and those of the wave."""
         given = {swing.joint for swing in self.swings}
         whole = sum(float(link.lengths[0]) for link in linkage.links)
         return [
@@ -114,7 +114,7 @@ class Undulation:
 
 
 def link_of(length: float, *, thickness_normal: float, thickness_in_plane: float, density: float, disc: bool) -> Bars:
-    """Return a link of a length [m] and a section of two thicknesses [m], a disc or flat."""
+    """Return a link of a length [m] with a section of two thicknesses [m]; `disc`: whether it is round."""
     return Bars(
         points=np.array([[[-length / 2, 0.0, 0.0], [length / 2, 0.0, 0.0]]]),
         normals=np.array([[0.0, 0.0, 1.0]]),
@@ -126,10 +126,14 @@ def link_of(length: float, *, thickness_normal: float, thickness_in_plane: float
 
 
 def layout_of(lengths: Sequence[float], joints: Sequence[Joint]) -> tuple[Array, Array]:
-    """Return both ends (n, 2, 3) [m] and the normals (n, 3) of links as they are poured.
+    """Return both ends (n, 2, 3) [m] and the normals (n, 3) of the links of a linkage as it is poured.
+
+    Args:
+        lengths: lengths of the n links [m].
+        joints: the joints between them.
 
     Raises:
-        InputError: the number of joints is not that of the places between links.
+        InputError: there are not n - 1 joints.
     """
     if len(joints) != len(lengths) - 1:
         raise InputError(

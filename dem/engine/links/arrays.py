@@ -286,35 +286,35 @@ PER_GRIP = ("speed", "moved", "force", "sums")  # fields of `Grips` with a row f
 
 
 class Linkages(NamedTuple):
-    """F linkages with L links in all. A joint has the number of the link before it; the last link of each has none.
+    """F linkages with L links in all, and G grips. A joint has the number of the link before it.
 
-    A link is a body by itself in `links`, moved by the kernels of rigid bodies; its part and its segment have its
-    number. See `dem.engine.links.motion.joining` for the columns.
+    Entries of joints are unused at the last link of a linkage. Each link is a body in `links`, which the kernels of
+    rigid bodies move; its part and its segment have its number. For columns see `dem.engine.links.motion.joining`.
     """
 
-    body: Indices  #: (F,) body that each linkage is
-    begin: Indices  #: (F + 1,) where the links of each begin
-    gait: Array  #: (F, GAIT) time of the motors' waves, as that of filaments
-    law: NDArray[np.int64]  #: (L,) of each joint, see `joining.FREE`
+    body: Indices  #: (F,) number of each linkage among all bodies
+    begin: Indices  #: (F + 1,) number of the first link of each linkage, then L
+    gait: Array  #: (F, GAIT) state of the wave that the motors follow, columns from `bending.PSI` on
+    law: NDArray[np.int64]  #: (L,) law of each joint, see `joining.FREE`
     axes: NDArray[np.int64]  #: (L,) number of axes of each joint; 3 of a broken one
-    row: Array  #: (L, JOINT) constants of each joint
-    swing: Array  #: (L, 3, SWING) motion of the motor about each axis
+    row: Array  #: (L, JOINT) constants of each joint, columns from `joining.BEFORE` on
+    swing: Array  #: (L, 3, SWING) motion of the motor about each axis, columns from `joining.QUIET` on
     rest: Array  #: (L, 4) angles at rest [rad]; of joints with three axes a quaternion [1]
     command: Array  #: (L, 3) angles that motors hold [rad]
     angle: Array  #: (L, 3) angles in the last step [rad]
-    torque: Array  #: (L, 3) of spring, dashpot or motor about each axis in the last step [N m]
+    torque: Array  #: (L, 3) torque of spring, dashpot or motor about each axis in the last step [N m]
     broken: NDArray[np.uint8]  #: (L,) whether a joint is broken
     driven: NDArray[np.int64]  #: (1,) number of joints with motors
-    lost: Array  #: (L, LOST) scratch: what takes and gives energy in a step
-    grip: NDArray[np.int64]  #: (L,) number of the grip that holds a link, plus 1; 0: free
+    lost: Array  #: (L, LOST) scratch: forces that take or give energy in a step, columns from `joining.RESISTING` on
+    grip: NDArray[np.int64]  #: (L,) number of the grip that holds each link, plus 1; 0: free
     grip_speed: Array  #: (G, 3) velocities of the grips [m/s]
     grip_force: Array  #: (G, 3) forces of the grips on their links in the last step [N]
-    sums: Array  #: (SUMS,) see `dem.engine.links.motion.bending.DAMPED`
-    links: Bodies  #: The links
-    shapes: Shapes  #: Of the links of all kinds, kind by kind
-    bodies: Any  #: `Bodies` that the linkages are
-    parts: Any  #: `Parts` by link, which share their arrays with those of the bodies
-    segments: Any  #: `Segments` by link, likewise
+    sums: Array  #: (SUMS,) energies exchanged since the start [J], see `bending.DAMPED`
+    links: Bodies  #: All links, as bodies
+    shapes: Shapes  #: Shapes of the links of all kinds of linkages, kind by kind
+    bodies: Any  #: `Bodies` of the whole pile, with one row for each linkage
+    parts: Any  #: `Parts` of the whole pile, numbered by link
+    segments: Any  #: `Segments` of the whole pile, numbered by link
 
 
 class System(NamedTuple):

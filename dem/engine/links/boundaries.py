@@ -163,13 +163,7 @@ class LinksBoundaries:
         self.stop_shaking()
 
     def remove_wall(self) -> None:
-        self._removed(self._remove_wall)
-
-    def _remove_wall(self) -> None:
-        ground, world = self._ground, self._world
-        ground.speed[WALL] = ground.rise[WALL] = 0.0
-        ground.shaken[WALL] = 0
-        world.remove_wall()
+        self._removed(self._world.remove_wall)
 
     # -- what they feel ----------------------------------------------------------------------------------------
 

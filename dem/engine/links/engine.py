@@ -261,7 +261,7 @@ class LinksEngine:
     def extremes(self, state: PileState) -> Extremes | None:
         """Return extremes over all bodies; None if an overlap is so large that a full check is needed.
 
-        `Extremes.gap` is 0, since hinges are rigid.
+        `Extremes.gap` is the widest gap at a joint of a linkage; 0 for other bodies, since hinges are rigid.
 
         Args:
             state: present state of the bodies.

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dem.engine.links.arrays import PER_GRIP, Grips
-from dem.engine.links.world import World
+from dem.engine.links.world import World, longer
 
 Array = NDArray[np.float64]
 
@@ -29,7 +29,7 @@ class LinksGrips:
         own, number = self._all, len(self._all.speed)
         own.of[list(bodies)] = number + 1
         own.made[0] += 1
-        more: dict[str, Any] = {name: np.append(getattr(own, name), np.zeros((1, 3)), axis=0) for name in PER_GRIP}
+        more: dict[str, Any] = {name: longer(getattr(own, name), number + 1) for name in PER_GRIP}
         self._world.grips = own._replace(**more)
         return number
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,6 +14,7 @@ from dem.body.linkage import Joint, Linkage, Swing
 from dem.engine.links.arrays import Bodies, Linkages, bodies_for, joined
 from dem.engine.links.motion import bending, joining
 from dem.engine.links.motion.planar import invert
+from dem.engine.links.rods import gaits_of
 from dem.engine.links.shapes import Shape, table_of
 from dem.physics.contact import ContactLaw
 
@@ -23,15 +25,12 @@ LAWS = {"free": joining.FREE, "elastic": joining.ELASTIC, "motor": joining.MOTOR
 
 
 def pins_of(linkage: Linkage, law: ContactLaw) -> tuple[float, float, float, float]:
-    """Return the constants of a pin, and of the springs against rotations about other directions.
+    """Return stiffness and damping of pins [N/m, N s/m], and about directions in which links cannot turn.
 
-    A pin is `PIN` times as stiff as a contact unless the linkage has a stiffness of its own, and has the damping ratio
-    of contacts. The springs against rotation are those of two pins at half a width from the axis. The width is the
-    diameter of the round rod that has the links' axial inertia, so that rotations are about as fast as other motions
-    of a pin.
-
-    Returns:
-        Stiffness [N/m] and damping [N s/m] of a pin, stiffness [N m/rad] and damping [N m s/rad] against rotation.
+    A pin is `PIN` times as stiff as a contact, unless the linkage has a stiffness of its own, and has the damping ratio
+    of contacts. About a direction in which links cannot turn, stiffness and damping [N m/rad, N m s/rad] are those of
+    two pins at half the width from the axis. The width is the diameter of the round rod that has the links' axial
+    inertia, so that such a twist is about as fast as other motions of a pin.
     """
     link = linkage.links[0]
     half = 4 * float(link.inertia[0]) / link.mass  # half of the square of the width [m²]
@@ -41,7 +40,7 @@ def pins_of(linkage: Linkage, law: ContactLaw) -> tuple[float, float, float, flo
 
 
 def row_of(linkage: Linkage, number: int, law: ContactLaw) -> Array:
-    """Return the constants (JOINT,) of the joint with a number, in the columns of `joining`."""
+    """Return the constants (JOINT,) of joint `number`, in the columns from `joining.BEFORE` on."""
     joint, before, after = linkage.joints[number], linkage.links[number], linkage.links[number + 1]
     axis = np.array(joint.axes[0])
     across = np.array(joint.axes[1]) if len(joint.axes) == 2 else np.cross(axis, np.eye(3)[np.abs(axis).argmin()])
@@ -62,7 +61,10 @@ def rest_of(joint: Joint) -> Array:
 
 
 def swings_of(linkage: Linkage, swings: Sequence[Swing]) -> Array:
-    """Return the motions (n, 3, SWING) about all axes; those without a swing hold the angle at the start."""
+    """Return the motions (n, 3, SWING) of all motors of a linkage, in the columns from `joining.QUIET` on.
+
+    Motors without an entry in `swings` hold their angle at the start.
+    """
     found = np.zeros((len(linkage.links), 3, joining.SWING))
     for k, joint in enumerate(linkage.joints):
         found[k, :, joining.QUIET] = found[k, :, joining.CENTRE] = joint.poured
@@ -75,7 +77,7 @@ def swings_of(linkage: Linkage, swings: Sequence[Swing]) -> Array:
 
 
 def none_of(shapes: Sequence[Shape]) -> Linkages:
-    """Return arrays that hold no linkage yet, with the shapes of the links of all kinds."""
+    """Return arrays for a pile without linkages yet; `shapes`: shapes of the links of all kinds."""
     f, i = np.zeros, np.int64
     return Linkages(
         f(0, np.int32), f(1, np.int32), f((0, bending.GAIT)), f(0, i), f(0, i), f((0, joining.JOINT)),
@@ -95,46 +97,38 @@ def linkages_at(
     start: float,
     seed: int,
 ) -> Linkages:
-    """Return the linkages of `old` with a new one at the end.
+    """Return arrays of the linkages of `old` and of a new one.
 
     Args:
+        old: arrays of the linkages so far.
+        linkage: links and joints of the new linkage.
         body: number of the new linkage among all bodies.
         links: links of the new linkage, with positions, turns, velocities and shapes.
-        law: law of the contacts; pins take their stiffness and damping ratio from it.
-        start: angle ψ of the new linkage's wave at the start [rad].
-        seed: with `body`, seed of the times at which the wave reverses.
+        law: contact law, from which stiffness and damping of pins follow.
+        start: initial angle ψ of the waves of its motors [rad].
+        seed: seed of the times at which waves reverse.
     """
     n = len(linkage.links)
     for row, link in zip(links.plane, linkage.links, strict=True):
         row[14:17] = link.inertia
         invert(row)
-    gait = np.zeros((1, bending.GAIT))
-    gait[:, bending.SENSE] = gait[:, bending.FACTOR] = gait[:, bending.TARGET] = 1.0
-    gait[:, bending.WAIT] = math.inf
     poured = np.array([*(joint.poured for joint in linkage.joints), np.zeros(3)])
-    gait[:, bending.SEED], gait[:, bending.NUMBER], gait[:, bending.PSI] = seed, body, start
-    fresh = old._replace(
-        body=np.array([body], np.int32),
-        begin=np.array([len(old.law) + n], np.int32),
-        gait=gait,
-        law=np.array([*(LAWS[joint.law] for joint in linkage.joints), joining.NONE]),
-        axes=np.array([*(len(joint.axes) for joint in linkage.joints), 0]),
-        row=np.array([*(row_of(linkage, k, law) for k in range(n - 1)), np.zeros(joining.JOINT)]),
-        swing=swings_of(linkage, ()),
-        rest=np.array([*(rest_of(joint) for joint in linkage.joints), np.zeros(4)]),
-        command=poured.copy(),
-        lost=np.zeros((n, joining.LOST)),
-        grip=np.zeros(n, np.int64),
-        broken=np.zeros(n, np.uint8),
-        angle=poured,
-        torque=np.zeros((n, 3)),
-        grip_speed=np.zeros((0, 3)),
-        grip_force=np.zeros((0, 3)),
-    )
-    more = {
-        name: np.concatenate([getattr(old, name), getattr(fresh, name)])
-        for name in Linkages._fields
-        if isinstance(getattr(old, name), np.ndarray) and name not in ("sums", "driven")
+    fresh: dict[str, Any] = {
+        "body": np.array([body], np.int32),
+        "begin": np.array([len(old.law) + n], np.int32),
+        "gait": gaits_of(np.array([body]), np.array([start]), seed),
+        "law": np.array([*(LAWS[joint.law] for joint in linkage.joints), joining.NONE]),
+        "axes": np.array([*(len(joint.axes) for joint in linkage.joints), 0]),
+        "row": np.array([*(row_of(linkage, k, law) for k in range(n - 1)), np.zeros(joining.JOINT)]),
+        "swing": swings_of(linkage, ()),
+        "rest": np.array([*(rest_of(joint) for joint in linkage.joints), np.zeros(4)]),
+        "command": poured,
+        "angle": poured,
+        "torque": np.zeros((n, 3)),
+        "broken": np.zeros(n, np.uint8),
+        "lost": np.zeros((n, joining.LOST)),
+        "grip": np.zeros(n, np.int64),
     }
-    more["driven"] = old.driven + sum(joint.law == "motor" for joint in linkage.joints)
-    return old._replace(links=joined(old.links, links), **more)  # type: ignore[arg-type] # of arrays alone
+    arrays: dict[str, Any] = {name: np.concatenate([getattr(old, name), rows]) for name, rows in fresh.items()}
+    arrays["driven"] = old.driven + sum(joint.law == "motor" for joint in linkage.joints)
+    return old._replace(links=joined(old.links, links), **arrays)

@@ -22,9 +22,8 @@ from dem.engine.links.stable_step import (
 
 # Groups of arrays without which `advance` is compiled where a scene has none of them.
 OF_FILAMENTS = frozenset({"bends", "filaments", "flexible", "stretch"})
-OF_LINKAGES = frozenset(
-    {"bends", "linkages"}
-)  # their links are rigid: one of the two tables of shapes lacks "flexible"
+# Links of linkages are rigid: the table of their shapes has no "flexible", which therefore counts as absent.
+OF_LINKAGES = frozenset({"bends", "linkages"})
 OPTIONAL = OF_FILAMENTS | OF_LINKAGES | {"channel", "cords", "grips", "hooks", "ledger", "motors", "rims"}
 
 

@@ -53,6 +53,22 @@ def wave_of(filament: Filament, curvature: PreferredCurvature | None) -> Array:
     return wave
 
 
+def gaits_of(bodies: NDArray[np.int64], starts: Array | None, seed: int) -> Array:
+    """Return the states (F, GAIT) of the waves of new filaments or linkages, which do not turn yet.
+
+    Args:
+        bodies: (F,) numbers of the filaments or linkages among all bodies.
+        starts: (F,) initial angles ψ [rad]; None: 0.
+        seed: seed of the times at which waves reverse, together with the number of the body.
+    """
+    gait = np.zeros((len(bodies), bending.GAIT))
+    gait[:, bending.SENSE] = gait[:, bending.FACTOR] = gait[:, bending.TARGET] = 1.0
+    gait[:, bending.WAIT] = math.inf
+    gait[:, bending.SEED], gait[:, bending.NUMBER] = seed, bodies
+    gait[:, bending.PSI] = 0.0 if starts is None else starts
+    return gait
+
+
 def none_of() -> Filaments:
     """Return arrays for a pile without filaments."""
     f = np.zeros
@@ -87,11 +103,7 @@ def filaments_at(
     edges = np.diff(points, axis=1)
     extents = np.sqrt((edges**2).sum(axis=2))
     tangents = edges / extents[:, :, None]
-    gait = np.zeros((count, bending.GAIT))
-    gait[:, bending.SENSE] = gait[:, bending.FACTOR] = gait[:, bending.TARGET] = 1.0
-    gait[:, bending.WAIT] = math.inf
-    gait[:, bending.SEED], gait[:, bending.NUMBER] = seed, bodies
-    gait[:, bending.PSI] = 0.0 if starts is None else starts
+    gait = gaits_of(bodies, starts, seed)
     if filament.curvature is not None:
         own = filament.curvature
         gait[:, bending.RATE], gait[:, bending.REVERSALS] = own.rate, own.reversal_rate

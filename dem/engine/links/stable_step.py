@@ -132,7 +132,7 @@ def rigid_stable_time_step(shapes: Sequence[Shape], law: ContactLaw) -> float:
 
 
 def linkage_stable_time_step(linkage: Linkage, links: Sequence[Shape], law: ContactLaw) -> float:
-    """Return the largest stable time step [s] over the stiffest modes of the links of a linkage among others.
+    """Return the largest stable time step [s] over the stiffest modes of a linkage's links in a pile.
 
     They are those of rigid bodies, with the joints at both ends of a link, which the neighbours move against it: since
     |a + b|² ≤ 2 (|a|² + |b|²), a joint of stiffness k is never stiffer than 2 k on each of its links by itself.
@@ -150,7 +150,7 @@ def linkage_stable_time_step(linkage: Linkage, links: Sequence[Shape], law: Cont
 
 
 def _joints_of(linkage: Linkage, number: int, law: ContactLaw) -> Mode:
-    """Return stiffness and damping (6, 6) of the joints at both ends of a link, for motions of this link alone."""
+    """Return stiffness and damping (6, 6) of a link's joints, for motions of this link alone."""
     pin, damping, off, off_damping = pins_of(linkage, law)
     stiffness, resisting, half = np.zeros((6, 6)), np.zeros((6, 6)), linkage.links[number].lengths[0] / 2
     for before in (number - 1, number):

@@ -23,6 +23,7 @@ from dem.engine.links.arrays import (
     PLANE,
     PLATE,
     STRETCH,
+    WALL,
     Bends,
     Bodies,
     Boundaries,
@@ -110,7 +111,7 @@ class World:
     keep_ledger: bool  #: Whether to sum the energy that contacts dissipate
     more: tuple[Shape, ...] = ()  #: Shapes of further kinds of bodies
     mixture: Mixture | None = None  #: Kinds of bodies other than smarticles
-    wave_seed: int = 0  #: Seed of the waves of filaments, for initial phases and times of reversals
+    wave_seed: int = 0  #: Seed of the waves of filaments and linkages, for initial phases and times of reversals
     steps: int = 0  #: Number of steps made since the start
     time_step: float = math.nan  #: Length of further steps, dt [s]
     motors: Motoring | None = None  #: The motors; None before the first articulation
@@ -274,7 +275,7 @@ class World:
         self.filaments = filaments_at(self.filaments, filament, bodies, points, velocities, starts, seed)
 
     def _add_posed_linkages(self, poses: Poses, turns: Array, speed: float) -> None:
-        """Add linkages of a mixture in the shape in which they are poured."""
+        """Add linkages at poses, with rotations `turns` (N, 3, 3), in the shape in which they are poured."""
         assert self.mixture is not None
         assert poses.kinds is not None
         assert self.linkages is not None
@@ -364,10 +365,7 @@ class World:
         """Remove the wall and the memory of contacts with it."""
         first = slots_for(self.hooks, None)
         ends = [slot for slot in range(END_SLOTS) if slot % boundaries.SURFACES not in (0, boundaries.COVER)]
-        walls = ends + list(range(first, slots_for(self.hooks, self.rims)))
-        self.kept.slip[:, walls] = 0.0
-        self.kept.used[:, walls] = 0
-        self.kept.contacts[:] = self.kept.used.sum(axis=1)
+        self._forget_boundary(WALL, [*ends, *range(first, slots_for(self.hooks, self.rims))])
         self.ground.flags[0] = 0
         self.rims = None
         self.kept = Kept(self.kept.slip[:, :first].copy(), self.kept.used[:, :first].copy(), self.kept.contacts)
@@ -381,13 +379,21 @@ class World:
 
     def remove_plate(self) -> None:
         """Remove the plate and the memory of contacts with it."""
-        covers = range(boundaries.COVER, END_SLOTS, boundaries.SURFACES)
-        self.kept.slip[:, covers] = 0.0
-        self.kept.used[:, covers] = 0
-        self.kept.contacts[:] = self.kept.used.sum(axis=1)
+        self._forget_boundary(PLATE, range(boundaries.COVER, END_SLOTS, boundaries.SURFACES))
         self.ground.place[PLATE] = math.inf
-        self.ground.speed[PLATE] = self.ground.rise[PLATE] = 0.0
-        self.ground.shaken[PLATE] = 0
+
+    def _forget_boundary(self, part: int, slots: Sequence[int]) -> None:
+        """Stop a boundary, and remove the memory of contacts in some slots.
+
+        Args:
+            part: row of the boundary in `Ground`.
+            slots: columns of its contacts in `Kept`.
+        """
+        self.kept.slip[:, slots] = 0.0
+        self.kept.used[:, slots] = 0
+        self.kept.contacts[:] = self.kept.used.sum(axis=1)
+        self.ground.speed[part] = self.ground.rise[part] = 0.0
+        self.ground.shaken[part] = 0
 
     def set_articulated(self, articulated: bool) -> None:
         """Make each link of a smarticle a part of its own, or the whole smarticle one part."""
@@ -440,7 +446,7 @@ class World:
 
     @property
     def jointed(self) -> Linkages | None:
-        """Linkages as argument of kernels: with parts and segments by link, of which a link has one each."""
+        """Linkages as argument of kernels: with parts and segments by link, one of each per link."""
         if self.linkages is None:
             return None
         each = np.arange(len(self.segments.line) + 1, dtype=np.int32)
@@ -630,9 +636,9 @@ class World:
 
 
 def _apart(kind: Shape) -> int:
-    """Return by how much numbers of segments of one body differ at least that can touch; 0: none can."""
+    """Return the least difference of numbers of two segments of a body that can touch; 0: none can."""
     if kind.linkage is not None:
-        return 2  # links with a common joint do not
+        return 2  # links with a common joint cannot
     return 0 if kind.filament is None else apart(kind.filament)
 
 

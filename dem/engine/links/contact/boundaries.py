@@ -1,4 +1,4 @@
-"""Contacts of links with boundaries: floor, plate, round wall, its edges, the walls of a channel, and hooks.
+"""Contacts of links with boundaries: floor, plate, round wall with edges, walls of a channel, hooks.
 
 `contacts_of_segment` alone computes the geometry of these contacts. Forces, queries and recorded contacts read the rows
 that it writes.

@@ -1,4 +1,4 @@
-"""Move linkages: rigid links, the springs that keep their joints together, and the laws of the joints.
+"""Motion of linkages: rigid links, springs that keep their joints together, and laws of the joints.
 
 Links are moved by the kernels of rigid bodies. A joint adds to the loads of both links
 
@@ -50,7 +50,7 @@ Quaternion = tuple[float, float, float, float]
 
 @part
 def pose_linkages(linkages: Any) -> None:
-    """Update all arrays that follow from the positions and velocities of links.
+    """Compute positions and motion of linkages, and of their parts and segments, from the links.
 
     Args:
         linkages: `position` and `velocity` of `bodies`, `motion` of `parts`, `line` and `bends.ends` of `segments` are
@@ -76,7 +76,7 @@ def pose_linkages(linkages: Any) -> None:
 
 @kernel
 def pose_linkages_from_python(linkages: Linkages) -> None:
-    """Call `pose_linkages` from Python."""
+    """Do what `pose_linkages` does, for calls from Python."""
     pose_linkages(linkages)
 
 
@@ -136,7 +136,7 @@ def _wrapped(angle: float) -> float:
 
 @inlined
 def _angle(d: Vector, u: Vector, w: Vector) -> tuple[float, Vector]:
-    """Return the angle [rad] from u towards w of d's projection on their plane, and its gradient [1].
+    """Return the angle from u towards w of d's projection on their plane [rad], and its gradient [1].
 
     The change of the angle in a small rotation of d is the gradient times this rotation. u and w are perpendicular unit
     vectors.
@@ -148,14 +148,14 @@ def _angle(d: Vector, u: Vector, w: Vector) -> tuple[float, Vector]:
 class Turn(NamedTuple):
     """Rotation of the link after a joint with one or two axes against the link before."""
 
-    #: Departure from the axes, 0 if kept [1]. One axis: 1 - cos of the angle between its directions in both links; two
-    #: axes: cos of the angle between them
+    #: How far the joint is off its axes [1]: with two axes the cosine of the angle between them; with one axis 1 less
+    #: the cosine of the angle between the axis of the link before and that of the link after
     off: float
-    across: Vector  #: Two axes: gradient of `off` by rotations of the link after, see `_angle`; one: less it [1]
+    across: Vector  #: Axis of the torque that restores the axes, times the sine of the angle in `off` [1]
     one: float  #: Angle about the first axis [rad]
-    two: float  #: Angle about the second axis [rad]
-    first: Vector  #: Gradient of `one` by rotations of the link after [1]
-    second: Vector  #: Gradient of `two`, likewise [1]
+    two: float  #: Angle about the second axis [rad]; 0 if there is one axis
+    first: Vector  #: Gradient of the first angle by a rotation of the link after [1]
+    second: Vector  #: Gradient of the second angle by a rotation of the link after [1]
 
 
 @inlined
@@ -182,7 +182,10 @@ def _rotation(linkages: Linkages, j: int) -> Quaternion:
 
 @inlined
 def _gap(linkages: Linkages, j: int) -> tuple[Vector, Vector]:
-    """Return the middle between the ends of both links at a joint, and the gap from the first one [m]."""
+    """Return the place of a joint and its gap [m].
+
+    The place is the middle between both ends, the gap the end of the link after less that of the link before.
+    """
     row, axes, position = linkages.row[j], linkages.links.axes, linkages.links.position
     x1 = axes[j, 0, 0], axes[j, 1, 0], axes[j, 2, 0]
     x2 = axes[j + 1, 0, 0], axes[j + 1, 1, 0], axes[j + 1, 2, 0]
@@ -192,7 +195,7 @@ def _gap(linkages: Linkages, j: int) -> tuple[Vector, Vector]:
 
 @inlined
 def _stored(linkages: Linkages, j: int) -> tuple[float, float, float]:
-    """Return the energies of a joint's pin, of its law, and of the springs against other rotations [J]."""
+    """Return the energies of a joint's pin, elastic law, and directions in which links cannot turn [J]."""
     row, law, elastic, off = linkages.row[j], linkages.law[j], 0.0, 0.0
     _, gap = _gap(linkages, j)
     if linkages.axes[j] < 3:
@@ -231,7 +234,14 @@ def _follow(linkages: Linkages, j: int, axis: int, wave: Vector, past: float) ->
 def _bend(
     linkages: Linkages, j: int, axis: int, angle: float, rate: float, wave: Vector, past: float
 ) -> tuple[float, float, float]:
-    """Return torques of spring, dashpot and motor about an axis [N m]; a spring above its limit yields."""
+    """Return the torques of spring, dashpot and motor about an axis [N m]; springs yield at their limit.
+
+    Args:
+        angle: present angle about the axis [rad].
+        rate: rate of this angle [rad/s].
+        wave: cosine and sine of ψ, and the factor on the swing.
+        past: time since the last step [s].
+    """
     row, law = linkages.row[j], linkages.law[j]
     stiffness, most, spring, resisting, motor = row[STIFFNESS], row[MOST], 0.0, 0.0, 0.0
     if law == ELASTIC:
@@ -253,7 +263,13 @@ def _bend(
 
 @inlined
 def _turn_any(linkages: Linkages, j: int, spin: Vector, wave: Vector, past: float) -> tuple[Vector, Vector, Vector]:
-    """Return the torques of spring, dashpot and motor of a joint with three axes on the link after [N m]."""
+    """Return the torques of spring, dashpot and motor of a joint with three axes on the link after [N m].
+
+    Args:
+        spin: spin of the link after less that of the link before [rad/s].
+        wave: cosine and sine of ψ, and the factor on the swing.
+        past: time since the last step [s].
+    """
     row, law, none = linkages.row[j], linkages.law[j], (0.0, 0.0, 0.0)
     rotation, before = _rotation(linkages, j), _rotation_by(_reversed(linkages.angle[j]))
     x, y, z = _vector_of(rotation)
@@ -343,12 +359,12 @@ def _push_joint(linkages: Linkages, j: int, wave: Vector, past: float) -> None:
 
 @part
 def push_joints(linkages: Any, gravity: float, step: Step) -> None:
-    """Write the loads of all links by contacts and joints.
+    """Compute the loads of contacts and joints on all links.
 
     Args:
-        linkages: the loads by contacts are read from `parts`; all arrays but constants are written.
+        linkages: the linkages, with the loads of contacts in `parts`; all arrays but constants are written.
         gravity: g [m/s²].
-        step: `need` is increased where links are fast.
+        step: `need` is increased if a link moves too fast for a time step.
     """
     if linkages is None:
         return
@@ -366,7 +382,7 @@ def push_joints(linkages: Any, gravity: float, step: Step) -> None:
 
 @inlined
 def _hold(linkages: Linkages, gravity: float, dt: float) -> None:
-    """Make the loads of held links such that they move with their grip and do not turn; sum its work."""
+    """Replace loads on held links by loads that give them the velocity of their grip, and no rotation."""
     links = linkages.links
     linkages.grip_force[:] = 0.0
     for i in range(links.position.shape[0]):
@@ -385,13 +401,13 @@ def _hold(linkages: Linkages, gravity: float, dt: float) -> None:
 
 @part
 def kick_links(linkages: Any, gravity: float, ledger: Any, dt: float) -> None:
-    """Change the momenta of links by the present loads, and sum the work of dashpots, motors and grips.
+    """Change the momenta of links by the present loads, and sum the energies that are exchanged.
 
     Args:
-        linkages: `links`, `grip_force` and `sums` are written, and `parts.motion` if the sums need it.
+        linkages: `links`, `grip_force` and `sums` are written, and `parts.motion` if there is a ledger or a motor.
         gravity: g [m/s²].
-        ledger: None if nothing reads the dissipation of dashpots; it is then left out where there are no motors.
-        dt: time for which the loads act [s].
+        ledger: forces that dissipate energy; None if dissipation is not recorded.
+        dt: time over which the loads act [s].
     """
     if linkages is None:
         return
@@ -432,7 +448,7 @@ def drift_links(linkages: Any, dt: float, row: Array) -> None:
 
 @kernel
 def measure_linkages(linkages: Linkages, gravity: float, found: Array) -> None:
-    """Add up the energies of all linkages, after `pose_linkages`.
+    """Add up the present energies of all linkages; `pose_linkages` must have been called before.
 
     Args:
         gravity: g [m/s²].
