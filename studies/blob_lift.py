@@ -73,7 +73,7 @@ def measure(run: Run) -> Row:
     weight = run.manifest.count * run.manifest.smarticle_mass_kg * run.scene["gravity_m_per_s2"] * immersed
     return {
         **{name: cell for name, cell in run_columns(run).items() if name != ASPECT},
-        ACTIVE: float(run.scene["phases"][place - 1]["frequency_Hz"]),
+        ACTIVE: float(run.scene["phases"][place - 1]["frequency_hz"]),
         RISE: float(heights[-1] - heights[0]),
         SHARE: float(lifted.mean()),
         OTHERS: float(lifted[~held].mean()),
@@ -179,5 +179,5 @@ STUDY = Study(
         "Worms are filaments of 30 × 0.8 mm in water that bend into helices (250 1/m, wavelength 60 mm); 0 Hz: they "
         "hold the bends that they have. The paper's blobs have hundreds of living worms.",
     ),
-    pictured={"active_Hz": 0.0},
+    pictured={"active_hz": 0.0},
 )

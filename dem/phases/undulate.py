@@ -46,7 +46,7 @@ class Undulate(Part, TimedPhase):
     bends: ClassVar[frozenset[str]] = frozenset({"chain"})
     type: Literal["undulate"]
     duration_s: Duration = Field(..., description="length of the phase [s]")
-    frequency_Hz: float = Field(1.0, ge=0, le=1e4, description="periods per second; 0: motors hold still [Hz]")
+    frequency_hz: float = Field(1.0, ge=0, le=1e4, description="periods per second; 0: motors hold still [Hz]")
     amplitude_deg: Amplitude = Field(
         0.0, description="amplitude of the wave, about the first axis of each motor that `joints` does not name [deg]"
     )
@@ -98,10 +98,10 @@ class Undulate(Part, TimedPhase):
                     f"{key}.{where}amplitude_deg: {math.degrees(swing.amplitude):g}° about {math.degrees(centre):g}° "
                     f"bends joint {swing.joint} by {farthest:g}°; keep within {BENT:g}°"
                 )
-            fastest = 2 * math.pi * self.frequency_Hz * swing.amplitude
+            fastest = 2 * math.pi * self.frequency_hz * swing.amplitude
             if fastest > joint.speed * (1 + TOLERANCE):
                 yield (
-                    f"{key}.{where}amplitude_deg: {math.degrees(swing.amplitude):g}° at {self.frequency_Hz:g} Hz needs "
+                    f"{key}.{where}amplitude_deg: {math.degrees(swing.amplitude):g}° at {self.frequency_hz:g} Hz needs "
                     f"{fastest:.3g} rad/s at joint {swing.joint}, whose speed_limit_rad_per_s is {joint.speed:g}; "
                     "swing less or slower"
                 )
@@ -111,11 +111,11 @@ class Undulate(Part, TimedPhase):
         """Gait of the motors, with angles in radians."""
         turns = self.turns_between_reversals
         return Undulation(
-            rate=2 * math.pi * self.frequency_Hz,
+            rate=2 * math.pi * self.frequency_hz,
             amplitude=math.radians(self.amplitude_deg),
             wavelength=math.inf if self.wavelength_lengths is None else self.wavelength_lengths,
             swings=tuple(motion.swing for motion in self.joints),
-            reversal_rate=0.0 if turns is None else self.frequency_Hz / turns,
+            reversal_rate=0.0 if turns is None else self.frequency_hz / turns,
             together=self.starts == "together",
         )
 

@@ -24,7 +24,7 @@ class Wriggle(Part, TimedPhase):
     type: Literal["wriggle"]
     duration_s: Duration = Field(..., description="length of the phase [s]")
     curvature_per_m: float = Field(..., ge=0, le=1e5, description="amplitude of the preferred curvature [1/m]")
-    frequency_Hz: float = Field(
+    frequency_hz: float = Field(
         1.0, ge=0, le=1e4, description="turns of the wave per second; 0: filaments hold the bends that they have [Hz]"
     )
     wavelength_m: Length | None = Field(
@@ -55,8 +55,8 @@ class Wriggle(Part, TimedPhase):
         return Activity(
             curvature=self.curvature_per_m,
             wavelength=math.inf if self.wavelength_m is None else self.wavelength_m,
-            rate=2 * math.pi * self.frequency_Hz,
-            reversal_rate=0.0 if turns is None else self.frequency_Hz / turns,
+            rate=2 * math.pi * self.frequency_hz,
+            reversal_rate=0.0 if turns is None else self.frequency_hz / turns,
         )
 
     def act(self, engine: Engine) -> None:

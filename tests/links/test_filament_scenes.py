@@ -33,7 +33,7 @@ WORM: dict[str, Any] = {
 }
 PHASES = [
     {"type": "deposit", "per_layer": 4},
-    {"type": "wriggle", "duration_s": 0.3, "curvature_per_m": 150, "frequency_Hz": 2, "turns_between_reversals": 0.2},
+    {"type": "wriggle", "duration_s": 0.3, "curvature_per_m": 150, "frequency_hz": 2, "turns_between_reversals": 0.2},
     {"type": "lift", "radius_m": 0.006, "distance_m": 0.003, "speed_m_per_s": 0.03, "duration_s": 0.15},
     {"type": "release"},
     {"type": "relax", "duration_s": 0.1},

@@ -31,7 +31,7 @@ CHAIN: dict[str, Any] = {
     "density_kg_per_m3": 2500,
     "joints": [HINGE, {**HINGE, "axes": 2}, {**SPRING, "axes": 3, "yield_N_m": 3e-5}],
 }
-WAVE = {"type": "undulate", "duration_s": 0.2, "amplitude_deg": 50, "frequency_Hz": 4, "turns_between_reversals": 0.2}
+WAVE = {"type": "undulate", "duration_s": 0.2, "amplitude_deg": 50, "frequency_hz": 4, "turns_between_reversals": 0.2}
 PHASES = [
     {"type": "deposit", "per_layer": 4},
     WAVE,

@@ -31,7 +31,7 @@ MOTOR = {
     "damping_N_m_s_per_rad": 2e-5,
     "speed_limit_rad_per_s": 50,
 }
-TURN = {"type": "undulate", "duration_s": 1.0, "frequency_Hz": 0, "ramp_s": 0.0}  # of single motors, once
+TURN = {"type": "undulate", "duration_s": 1.0, "frequency_hz": 0, "ramp_s": 0.0}  # of single motors, once
 MIXED = [SPRING, {**SPRING, "axes": 2}, {**SPRING, "axes": 3}, {**SPRING, "axes": [[0.6, 0, 0.8]]}]
 
 
@@ -102,7 +102,7 @@ def energies(engine: LinksEngine, linkages: LinksLinkages, steps: int) -> Array:
 
 def test_momentum_of_a_chain_with_motors_is_kept_to_rounding() -> None:
     joints = [MOTOR, {**MOTOR, "axes": 2}, {**SPRING, "axes": 3, "damping_N_m_s_per_rad": 1e-6}, {**MOTOR, "axes": 3}]
-    wave = {"type": "undulate", "duration_s": 1.0, "amplitude_deg": 40, "frequency_Hz": 5, "wavelength_lengths": 0.8}
+    wave = {"type": "undulate", "duration_s": 1.0, "amplitude_deg": 40, "frequency_hz": 5, "wavelength_lengths": 0.8}
     wave |= {"turns_between_reversals": 0.3, "ramp_s": 0.01}
     scene = chains(joints, phases=[{"type": "deposit"}, wave])
     engine, linkages = one(scene)
@@ -269,7 +269,7 @@ def test_a_command_is_no_faster_than_its_speed_limit() -> None:
 
 
 def test_a_wave_travels_along_the_chain_and_a_table_sets_single_motors() -> None:
-    phase = {"type": "undulate", "duration_s": 1.0, "amplitude_deg": 20, "frequency_Hz": 2, "ramp_s": 0.0}
+    phase = {"type": "undulate", "duration_s": 1.0, "amplitude_deg": 20, "frequency_hz": 2, "ramp_s": 0.0}
     phase |= {"wavelength_lengths": 0.5, "starts": "together", "joints": [{"joint": 2, "centre_deg": 10}]}
     scene = chains(MOTOR, links=6, phases=[{"type": "deposit"}, phase])
     engine, _ = one(scene)

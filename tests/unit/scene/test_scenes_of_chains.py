@@ -65,7 +65,7 @@ def test_a_written_scene_is_read_as_the_same_one() -> None:
 
 def test_an_undulation_is_a_wave_besides_the_motors_of_the_table() -> None:
     scene = small(
-        deepcopy(SCENE) | {"phases.1": TABLE | {"amplitude_deg": 10, "wavelength_lengths": 0.5, "frequency_Hz": 2}}
+        deepcopy(SCENE) | {"phases.1": TABLE | {"amplitude_deg": 10, "wavelength_lengths": 0.5, "frequency_hz": 2}}
     )
     phase, linkage = scene.phases[1], scene.bodies[0].linkage
     assert isinstance(phase, Undulate)
@@ -123,7 +123,7 @@ def test_a_plan_has_their_step_and_effects() -> None:
     ({"phases.1": {**TABLE, "joints": [{"joint": 2, "axis": 1}]}}, "phases.1.joints.0.axis: joint 2 has no axis 1"),
     ({"phases.1": {**TABLE, "joints": [{"joint": 2}, {"joint": 1}, {"joint": 2, "amplitude_deg": 9}]}},
      "phases.1.joints.2: joint 2, axis 0 moves by joints.0 already; leave one of them out"),
-    ({"phases.1": {**TABLE, "frequency_Hz": 10}},
+    ({"phases.1": {**TABLE, "frequency_hz": 10}},
      "phases.1.joints.0.amplitude_deg: 20° at 10 Hz needs 21.9 rad/s at joint 1, whose speed_limit_rad_per_s is 10"),
     ({"phases.1": {**TABLE, "joints": [{"joint": 1, "centre_deg": 140, "amplitude_deg": 20}]}},
      "phases.1.joints.0.amplitude_deg: 20° about 140° bends joint 1 by 160°; keep within 150°"),

@@ -55,7 +55,7 @@ def test_a_scene_reads_what_it_writes_and_liquid_counts() -> None:
 
 
 def test_a_wriggle_says_what_filaments_do() -> None:
-    phase = Wriggle(type="wriggle", duration_s=1, curvature_per_m=80, frequency_Hz=2, turns_between_reversals=0.25)
+    phase = Wriggle(type="wriggle", duration_s=1, curvature_per_m=80, frequency_hz=2, turns_between_reversals=0.25)
     activity = phase.activity
     assert activity.rate == pytest.approx(4 * 3.14159265)
     # γ = α/2πλ
@@ -87,7 +87,7 @@ def test_a_plan_has_their_step_and_effects() -> None:
     ({"motor": {"law": "stall"}}, "motor: other shapes have no hinges"),
     ({"phases.2.duration_s": 1}, "phases.2.duration_s: 1 s is too short to raise by distance_m = 0.015 m"),
     ({"phases.2.speed_m_per_s": 0}, "phases.2.speed_m_per_s: 0 m/s is out of range"),
-    ({"phases.1.frequency_Hz": -1}, "phases.1.frequency_Hz: -1 is out of range; use at least 0"),
+    ({"phases.1.frequency_hz": -1}, "phases.1.frequency_hz: -1 Hz is out of range; use at least 0 Hz"),
     ({"container.radius_m": 0.01}, "container.radius_m: 0.01 m is narrower than a body"),
     ({"phases.2": {"type": "internal-oscillation", "theta_deg": 5, "duration_s": 1}},
      "phases.2: internal-oscillation needs smarticles, which have barbs, but particle has other shapes"),

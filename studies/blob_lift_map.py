@@ -1,0 +1,138 @@
+"""Where does it hold that a quiet blob of worms is lifted as a whole, and an active one left behind?
+
+The study `blob-lift` with other values of the two parameters that are known least, Young's modulus of a worm and
+friction, and of two numerical ones, the time step and the number of segments. A statement is found if it holds at every
+point.
+"""
+
+from collections.abc import Callable
+
+import pandas as pd
+
+from dem.record.run import Run
+from postprocess.report import figures as style
+from postprocess.statistics.points import SEED, paired_differences
+from postprocess.statistics.seeds import SeedMean, mean_over_seeds
+from studies.blob_lift import ACTIVE, OTHERS, QUANTITIES, RISE, SHARE, WHOLE
+from studies.blob_lift import measure as measure_lift
+from studies.framework.figures import Rows, Series, marker
+from studies.framework.findings import Effect, Finding, unit_of
+from studies.framework.runs import Key, Row
+from studies.framework.study import Study
+
+MODULUS, FRICTION = "Young's modulus [Pa]", "friction [-]"
+SEGMENTS, STEP = "segments of a worm [-]", "time step over the stable one [-]"
+KEYS = (
+    Key(column=MODULUS, label="E", form="g", unit=" kPa", scale=1e-3),
+    Key(column=FRICTION, label="μ", form="g"),
+    Key(column=SEGMENTS, label="segments", form="g"),
+    Key(column=STEP, label="step", form="g"),
+)
+COLUMNS = tuple(key.column for key in KEYS)
+
+
+def settings(run: Run) -> Row:
+    """Return what varies from point to point: modulus, friction, number of segments and time step of a run."""
+    scene = run.scene
+    return {
+        MODULUS: float(scene["particle"][0]["young_modulus_Pa"]),
+        FRICTION: float(scene["contact"]["friction_smarticle"]),
+        SEGMENTS: int(scene["particle"][0]["segments"]),
+        STEP: float(scene["fidelity"]["time_step_fraction"]),
+    }
+
+
+def point_name(row: pd.Series) -> str:
+    """Return the name of a point, such as `E 50 kPa, μ 0.3`; numerical parameters only where they are not the usual."""
+    usual = {SEGMENTS: 12, STEP: 0.92}
+    shown = (key for key in KEYS if row[key.column] != usual.get(key.column))
+    return ", ".join(f"{key.label} {key.text(row[key.column])}" for key in shown)
+
+
+def at_each_point(
+    table: pd.DataFrame,
+    label: str,
+    value: Callable[[pd.DataFrame], SeedMean],
+    *,
+    threshold: float = 0.0,
+    unit: str = "",
+) -> list[Effect]:
+    """Compute one effect from the runs of each point; the first one has a label, all have their points' names."""
+    names = table.apply(point_name, axis=1)
+    return [
+        Effect(
+            label=f"{label} at {name}" if number == 0 else f"at {name}",
+            value=value(table[names == name]),
+            threshold=threshold,
+            unit=unit,
+        )
+        for number, name in enumerate(names.unique())
+    ]
+
+
+def quiet_above_active(column: str) -> Callable[[pd.DataFrame], list[Effect]]:
+    """Return the outcome of comparing the quiet with the active blob, pair by pair of a seed, at each point."""
+
+    def difference(runs: pd.DataFrame) -> SeedMean:
+        ends = runs[ACTIVE].max(), runs[ACTIVE].min()
+        return mean_over_seeds(paired_differences(runs, column, ACTIVE, ends, [SEED])[column])
+
+    label = f"{QUANTITIES[column].label} of the quiet blob less that of the active one,"
+    return lambda table: at_each_point(table, label, difference, unit=unit_of(column))
+
+
+def _by_activity(points: pd.DataFrame) -> list[Series]:
+    looks = ((0.0, "quiet, 0 Hz", style.BLUE), (2.0, "active, 2 Hz", style.ORANGE))
+    return [
+        Series(rows=points[points[ACTIVE] == hertz], label=label, properties=marker("o", colour, colour))
+        for hertz, label, colour in looks
+    ]
+
+
+def measure(run: Run) -> Row:
+    """Measure how far a blob rose, and how many worms came along."""
+    return {**settings(run), **measure_lift(run)}
+
+
+STUDY = Study(
+    name="blob-lift-map",
+    title="A blob of worms on a stick: where the findings hold",
+    measure=measure,
+    same_count=(),
+    same_fidelity=COLUMNS,
+    keys=(*KEYS, Key(column=ACTIVE, label="active", form="g", unit=" Hz")),
+    order=(*COLUMNS, ACTIVE, SEED),
+    quantities=tuple(QUANTITIES.values()),
+    findings=(
+        Finding(
+            id="as-a-whole",
+            says="A quiet blob is entangled tightly enough to be lifted as a whole, at every point",
+            outcome=lambda quiet: at_each_point(
+                quiet,
+                "share of worms of the quiet blob that are lifted",
+                lambda runs: mean_over_seeds(runs[SHARE]),
+                threshold=WHOLE,
+            ),
+            rows=lambda table: table[table[ACTIVE] == 0],
+        ),
+        Finding(
+            id="quiet-above-active",
+            says="A quiet blob is lifted farther than an active one, at every point",
+            outcome=quiet_above_active(RISE),
+        ),
+        Finding(
+            id="more-come-along",
+            says="More of the worms that are not gripped come along with a quiet blob, at every point",
+            outcome=quiet_above_active(OTHERS),
+        ),
+    ),
+    figures=(
+        Rows(
+            name="map",
+            quantities=[QUANTITIES[SHARE], QUANTITIES[OTHERS]],
+            row=point_name,
+            split=_by_activity,
+        ),
+    ),
+    remarks=("Worms and phases are those of the study blob-lift, but for what a point's name says.",),
+)
