@@ -63,6 +63,13 @@ class Shake(Part, Phase):
 
     @model_validator(mode="after")
     def _possible(self) -> Self:
+        if self.taps is None and self.rest_s != Shake.model_fields["rest_s"].default:
+            raise ValueError(f"rest_s: {self.rest_s:g} s is the rest after a tap; give taps, or leave rest_s out")
+        if not self.sweeps and self.ramp == "log":
+            raise ValueError(
+                f"ramp: {self.ramp} has no end to go to; give frequency_end_hz or peak_acceleration_end_g, or leave "
+                "ramp out"
+            )
         if self.ramp == "log" and 0.0 in (self.peak_acceleration_g, self.peak_acceleration_end_g):
             raise ValueError("ramp: log has equal ratios, and Γ = 0 has none; use linear, or a small Γ")
         if self.taps is not None and self.duration_s < self.tapping_s * (1 - TOLERANCE):

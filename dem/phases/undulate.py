@@ -16,7 +16,7 @@ from dem.setting.part import Duration, Part
 Amplitude = Annotated[float, Field(ge=0, le=BENT)]
 
 
-class Motion(Part):
+class JointMotion(Part):
     """Motion of one motor: centre + amplitude sin(2π f t + phase)."""
 
     joint: int = Field(..., ge=0, lt=199, description="number of the joint, from 0 [1]")
@@ -57,7 +57,9 @@ class Undulate(Part, TimedPhase):
         description="wavelength over the length of the chain [1]; the wave travels from the first link to the last "
         "one; default: all motors swing together",
     )
-    joints: tuple[Motion, ...] = Field((), max_length=597, description="motions of single motors instead of the wave")
+    joints: tuple[JointMotion, ...] = Field(
+        (), max_length=597, description="motions of single motors instead of the wave"
+    )
     turns_between_reversals: float | None = Field(
         None,
         ge=1e-3,
@@ -124,7 +126,7 @@ class Undulate(Part, TimedPhase):
         engine.filaments.act(self.undulation, ramp=self.ramp_s)
 
 
-def _of_motion(key: str, motion: Motion, linkage: Linkage) -> Iterator[str]:
+def _of_motion(key: str, motion: JointMotion, linkage: Linkage) -> Iterator[str]:
     """Yield errors about the motion of one motor in a kind of chain."""
     number = len(linkage.joints)
     if motion.joint >= number:

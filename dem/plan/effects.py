@@ -119,7 +119,7 @@ def _reasons(scene: Scene) -> Mapping[EffectName, tuple[bool, str]]:
         EffectName.HOOKS: _hooks(scene, ", ".join(by_phases.get(EffectName.HOOKS, []))),
         EffectName.WALL_REMOVAL: phases(EffectName.WALL_REMOVAL, "no phase of type remove-container"),
         EffectName.PLATE: phases(EffectName.PLATE, "no phase of type compress"),
-        EffectName.GRIPS: phases(EffectName.GRIPS, "no phase of type tension"),
+        EffectName.GRIPS: phases(EffectName.GRIPS, "no phase of type tension or lift"),
         EffectName.FILAMENTS: _filaments(scene),
         EffectName.JOINTS: _joints(scene),
         EffectName.ENERGIES: (recording.energies, energies),

@@ -286,7 +286,10 @@ def test_new_keys_at_their_defaults_change_no_hash() -> None:
         ),
         ([{"type": "release"}], {}, "phases.1: release", "add lift before"),
         ([{"type": "shake", "taps": 4, "duration_s": 1}], {}, "phases.1.duration_s: 1 s", "leave it out"),
-        ([{"type": "shake", "ramp": "log", "peak_acceleration_g": 0}], {}, "phases.1.ramp: log", "use linear"),
+        ([{"type": "shake", "ramp": "log", "frequency_end_hz": 60, "peak_acceleration_g": 0}], {}, "phases.1.ramp: log",
+         "use linear"),
+        ([{"type": "shake", "ramp": "log"}], {}, "phases.1.ramp: log", "give frequency_end_hz"),
+        ([{"type": "shake", "rest_s": 0.1}], {}, "phases.1.rest_s: 0.1 s", "give taps"),
         ([{"type": "shake", "taps": 0}], {}, "phases.1.taps", "1"),
         (
             [{**COMPRESS, "vibration": {"peak_acceleration_g": 1, "windows_s": [[0.2, 0.1]]}}],
