@@ -191,12 +191,7 @@ class Mixture:
     of: Numbers = field(repr=False)  #: (N,) index in `kinds` for each body
 
     def mean(self, values: Sequence[float], kinds: Numbers | None = None) -> float:
-        """Return the mean over bodies of a quantity that each kind has; NaN without bodies.
-
-        Args:
-            values: (K,) value of the quantity for each kind.
-            kinds: (n,) kind of each body; None: all bodies of the pile.
-        """
+        """Return the mean of `values` (K,) of kinds over bodies of `kinds` (n,), or all; NaN without bodies."""
         each = np.array(values)[self.of if kinds is None else kinds]
         return float(each.mean()) if len(each) else float("nan")
 
@@ -301,12 +296,7 @@ def bodies_of(model: Particle | Mixture) -> tuple[Particle | Kind, ...]:
 
 
 def body_of(model: Particle | Mixture, kinds: Sequence[int] | Numbers, number: int) -> Particle | Kind:
-    """Return the smarticle or, in a mixture, the kind of one body.
-
-    Args:
-        kinds: (N,) index of each body's kind in the mixture.
-        number: number of the body.
-    """
+    """Return the smarticle or, in a mixture, the kind of body `number`; `kinds` (N,) are those of all."""
     return model if isinstance(model, Particle) else model.kinds[kinds[number]]
 
 

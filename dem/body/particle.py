@@ -51,10 +51,8 @@ def chain_mean_width(pitch: float) -> float:
     axes are √(1 - r²) diameters apart. The mean is taken over the positions of both chains along their axes (uniform
     over a period) and over isotropic directions (density sin γ), weighted by sin γ, the area of the parallelogram in
     the excluded volume.
-
-    Args:
-        pitch: distance of neighbouring sphere centres over the diameter [1]; below √2, from which on chains pass
-            through each other.
+    The pitch is the distance of neighbouring spheres over their diameter [1], below √2, from which on chains pass
+    through each other.
     """
     nodes, weights = np.polynomial.legendre.leggauss(24)
     angles = math.pi / 4 * (nodes + 1)
@@ -235,8 +233,7 @@ class SphereChain:
 class Particle:
     """A smarticle as engines compute it: its boxes, and the spheres that represent them in contacts.
 
-    Raises:
-        InputError: the spheres are larger than half the middle link's length.
+    InputError if the spheres are larger than half the middle link's length.
     """
 
     boxes: Boxes
@@ -391,11 +388,7 @@ def smallest_effective_mass(mass: float, inertia: Array, centres: Array) -> floa
     A force F in the direction n at a point r from the centre of mass accelerates that point along n by
     (1/m + (r × n)·I⁻¹(r × n)) F. The effective mass is the inverse of the largest eigenvalue of this mobility. It
     limits the stable time step: at barb tips it is several times smaller than the mass.
-
-    Args:
-        mass: [kg].
-        inertia: (3,) principal moments [kg m²].
-        centres: (n, 3) points, from the centre of mass, along the principal axes [m].
+    Arguments are the mass [kg], principal moments (3,) [kg m²], and points (n, 3) along the principal axes [m].
     """
     inverse, (x, y, z) = 1.0 / inertia, centres.T
     # A push on a sphere acts at its surface, but the normal passes through the centre.

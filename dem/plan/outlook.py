@@ -274,10 +274,8 @@ def protocol_lines(scene: Scene) -> tuple[str, ...]:
 def _protocol_keys(scene: Scene, rules: Mapping[str, Mapping[str, Any]]) -> Iterator[tuple[str, Any, Any]]:
     """Yield (key, value in the scene, value in the protocol) for each key of a scene that the protocol sets.
 
-    A key is dotted, such as `phases.0.moves`.
-
-    Args:
-        rules: the protocol: values by key, by part of the scene or type of phase.
+    A key is dotted, such as `phases.0.moves`. `rules` has the protocol's values by key, by part of the scene or type of
+    phase.
     """
     for part in PARTS:
         if applies(part, plane=scene.plane is not None, tiers=scene.container.tiers is not None):
