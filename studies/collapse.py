@@ -268,12 +268,8 @@ def _law_curves(
 ) -> dict[str, tuple[ArrayLike, ArrayLike]]:
     """Compute the fitted law ln(fτ) = Δ/Γ at one l/w, as a curve of a figure.
 
-    Args:
-        rows: rows with this l/w.
-        places: values of 1/Γ (n,).
-
-    Returns:
-        Values (n,) of ln(fτ) and their 95 % half-widths (n,), by the label of the curve.
+    The places are values of 1/Γ (n,). Returns values (n,) of ln(fτ) and 95 % half-widths (n,), by the label of the
+    curve.
     """
     points = judging(tables["points"])
     own = points[(points[DEFINITION] == REMAINING) & (points[ASPECT] == rows[ASPECT].iloc[0])].iloc[0]

@@ -78,8 +78,7 @@ def pairs_in_contact(frame: Frame, run: Run) -> ContactPairs:
     and spheres that still overlap while they move apart may have none. These percentages are from runs of 40 smarticles
     at draft, 60 at standard and 30 at reference fidelity.
 
-    Returns:
-        The pairs, with the least distance of two sphere centres or of two strands' axes.
+    The least distance is that of two sphere centres or of two strands' axes.
     """
     vertices, chain = checked_vertices(frame.vertices), chain_of(run)
     if chain.pitch > 0:
@@ -142,8 +141,7 @@ def _offsets(kind: Kind, rows: int) -> Floats:
 
     A bar with a flat side wider than a strand has n = `rows` strands; every other bar has one strand on its axis.
 
-    Source:
-        `dem.scene.scene.Scene.mixture`, `dem.engine.links.shapes.rigid_shape`.
+    Source: `dem.scene.scene.Scene.mixture`, `dem.engine.links.shapes.rigid_shape`.
     """
     reach = (kind.thickness_normal_m - kind.sphere_diameter_m) / 2
     return np.linspace(-reach, reach, rows) if rows > 1 and reach > 0 and not kind.round else np.zeros(1)

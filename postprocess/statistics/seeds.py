@@ -135,8 +135,7 @@ def difference(mean: SeedMean, baseline: SeedMean, *, scatter: Scatter | None = 
 
     The interval follows from `scatter`, common to both means, or, without it, from the error of each mean by Welch.
 
-    Source:
-        Welch, Biometrika 34 (1947) 28; degrees of freedom after Satterthwaite.
+    Source: Welch, Biometrika 34 (1947) 28; degrees of freedom after Satterthwaite.
     """
     value = mean.value - baseline.value
     if scatter is not None:

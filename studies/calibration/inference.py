@@ -147,11 +147,8 @@ def calibrate(problem: Problem, simulator: Simulator, say: Callable[[str], None]
     that the runs so far do not rule out. A condition is a combination of the data's variables, such as l/w and count;
     conditions without data to fit are run in the last wave only.
 
-    Args:
-        say: function that is called with a line of text about each wave.
-
-    Raises:
-        InputError: The budget is too small, or too few runs finished for an emulator.
+    `say` prints a line about each wave. InputError if the budget is too small, or too few runs finished for an
+    emulator.
     """
     size = problem.points_per_wave
     emulators: list[Emulator | None] = []
@@ -217,13 +214,9 @@ def first_points(problem: Problem, size: int) -> Array:
 def _next(candidates: Array, distances: Array, size: int) -> Array:
     """Return the points of the next wave: the first `size` candidates that are not ruled out, (size, d).
 
-    If fewer than `size` are not ruled out, the `size` least implausible candidates are returned. A candidate is ruled
-    out if its implausibility is above `CUTOFF`.
-
-    Args:
-        candidates: parameters (n, d), a Sobol sequence. Its part within a region fills the region evenly.
-        distances: implausibilities (n,) of the candidates [-].
-        size: number of points.
+    Candidates are parameters (n, d), a Sobol sequence, whose part within a region fills the region evenly. One is ruled
+    out if its implausibility, in `distances` (n,) [-], is above `CUTOFF`. If fewer than `size` are left, the `size`
+    least implausible candidates are returned.
     """
     limit = max(CUTOFF, float(np.partition(distances, size - 1)[size - 1]))
     return _rounded(candidates[distances <= limit][:size])
@@ -252,9 +245,8 @@ def emulate(problem: Problem, runs: pd.DataFrame) -> list[Emulator | None]:
 def _residuals(problem: Problem, emulators: Sequence[Emulator | None], theta: Array) -> tuple[Array, Array, Array]:
     """Return deviations of the J fitted data from the emulators at parameters (n, d), and variances.
 
-    Returns:
-        Data less emulator means, (n, J); variances of measurement and emulator together, (n, J); mean sizes s_j of the
-        measures, (J,).
+    Returns data less emulator means (n, J), variances of measurement and emulator together (n, J), and mean sizes s_j
+    of the measures (J,).
     """
     inputs, sizes = problem.scaled(theta), problem.sizes
     used = [(d, e, s) for d, e, s in zip(problem.data, emulators, sizes, strict=True) if d.fitted and e is not None]
@@ -292,9 +284,8 @@ def log_posterior(problem: Problem, emulators: Sequence[Emulator | None], draws:
 def sample(problem: Problem, emulators: Sequence[Emulator | None]) -> tuple[Array, Array, dict[str, float]]:
     """Sample the posterior by emcee.
 
-    Returns:
-        Thinned draws (m, d + 1) of the parameters and σ; the draw with the largest posterior density, (d + 1,);
-        diagnostics by name: autocorrelation time in steps, steps over it, acceptance, and number of effective draws.
+    Returns thinned draws (m, d + 1) of the parameters and σ; the draw with the largest posterior density, (d + 1,); and
+    diagnostics by name: autocorrelation time in steps, steps over it, acceptance, and number of effective draws.
     """
     import emcee  # noqa: PLC0415  (an extra)
 

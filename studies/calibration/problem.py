@@ -211,8 +211,7 @@ class Problem:
     def sweep(self, wave: int, theta: Array) -> tuple[Sweep, list[Point]]:
         """Return a wave (counted from 1) at parameters (n, d) as a sweep with its points.
 
-        Raises:
-            InputError: the file names no scene, the scene cannot be read, or a run's scene is not valid.
+        InputError if the file names no scene, the scene cannot be read, or a run's scene is not valid.
         """
         content = self.content
         source = content.template or content.scene
