@@ -87,12 +87,10 @@ class Kind:
 
     @property
     def mass(self) -> float:
-        """Mass [kg]."""
         return self.bars.mass
 
     @property
     def inertia(self) -> Array:
-        """(3,) principal moments about the centre of mass [kg m²]."""
         return self.bars.inertia
 
     @property
@@ -102,7 +100,6 @@ class Kind:
 
     @cached_property
     def size(self) -> float:
-        """Length of the longest bar [m]."""
         return float(self.bars.lengths.max())
 
     @cached_property
@@ -112,12 +109,10 @@ class Kind:
 
     @property
     def thicknesses(self) -> tuple[float, float]:
-        """Thickness along the normal and in the plane [m]."""
         return self.bars.thickness_normal, self.bars.thickness_in_plane
 
     @property
     def radius(self) -> float:
-        """Radius of the spheres [m]."""
         return self.diameter / 2
 
     def _stations(self, bar: int) -> Array:
@@ -159,7 +154,6 @@ class Kind:
 
     @property
     def centres(self) -> Array:
-        """(S, 3) centres of the spheres in the body's frame [m]."""
         return self._layout[0]
 
     @property
@@ -169,7 +163,6 @@ class Kind:
 
     @property
     def reach(self) -> float:
-        """Largest distance of a point of bars or spheres from the centre of mass [m]."""
         spheres = float(np.linalg.norm(self.centres, axis=1).max()) + self.radius
         half = self.diameter / 2 if self.bars.round else math.hypot(*self.thicknesses) / 2
         return max(spheres, float(np.linalg.norm(self.bars.ends, axis=2).max()) + half)

@@ -320,7 +320,6 @@ class Particle:
 
     @property
     def centres(self) -> Array:
-        """(S, 3) float64 [m]: sphere centres in the body frame."""
         return self._layout[0]
 
     @property
@@ -336,12 +335,10 @@ class Particle:
 
     @property
     def radius(self) -> float:
-        """Sphere radius [m]."""
         return self.chain.diameter / 2
 
     @property
     def reach(self) -> float:
-        """Largest distance [m] of a point of boxes or spheres from the centre of mass."""
         spheres = float(np.linalg.norm(self.centres, axis=1).max()) + self.radius
         half = math.hypot(self.boxes.thickness_normal, max(self.boxes.thicknesses_in_plane)) / 2
         return max(spheres, float(np.linalg.norm(self.boxes.vertices, axis=1).max()) + half)
@@ -353,27 +350,22 @@ class Particle:
 
     @property
     def mass(self) -> float:
-        """Mass of the smarticle [kg]."""
         return self.boxes.mass
 
     @property
     def inertia(self) -> Array:
-        """(3,) float64 [kg m²]: principal moments about the centre of mass, along the body axes."""
         return self.boxes.inertia
 
     @property
     def volume(self) -> float:
-        """Solid volume [m³], see `Boxes.volume`."""
         return self.boxes.volume
 
     @property
     def size(self) -> float:
-        """Length of the middle link, w [m]."""
         return self.boxes.middle_length
 
     @property
     def thicknesses(self) -> tuple[float, float]:
-        """Thickness along the normal and, of the barbs, in the plane [m]."""
         return self.boxes.thickness_normal, self.boxes.thickness_in_plane
 
     @property
