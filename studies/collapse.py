@@ -258,11 +258,6 @@ _HISTORIES = Histories(
 )
 
 
-def _with_bounds(table: pd.DataFrame) -> pd.DataFrame:
-    own = table[table[DEFINITION] == REMAINING]
-    return own.assign(**{LOG: own[LOG].where(own[CENSORED] == 0), AT_LEAST: own[LOG]})
-
-
 def _law_curves(
     tables: Mapping[str, pd.DataFrame], rows: pd.DataFrame, _: str, places: NDArray[np.float64]
 ) -> dict[str, tuple[ArrayLike, ArrayLike]]:
@@ -292,7 +287,9 @@ STUDY = Study(
             x=GAMMA,
             transform=lambda gamma: 1 / gamma,
             x_label=r"inverse peak acceleration $1/\Gamma$ [-]",
-            rows=_with_bounds,
+            rows=lambda table: table[table[DEFINITION] == REMAINING].assign(
+                **{LOG: table[LOG].where(table[CENSORED] == 0), AT_LEAST: table[LOG]}
+            ),
             bounds={LOG: AT_LEAST},
             split=one_by_one(ASPECT, lambda aspect: rf"$l/w$ = {aspect:g}"),
             fit=_law_curves,

@@ -93,7 +93,8 @@ def solid_of(shape: str, particle: Particle, positions: Array, frames: Array) ->
     Centres (N, 3, 3) [m] and axes (N, 3, 3, 3), in columns, are those of the links.
     """
     if shape == "boxes":
-        return _boxes(particle, positions, frames)
+        halves, owners = np.tile(halves_of(particle.boxes), (len(positions), 1)), np.arange(len(positions))
+        return Bars(positions.reshape(-1, 3), frames.reshape(-1, 3, 3), halves, np.repeat(owners, LINKS))
     return (_strands if shape == "strands" else _spheres)(particle, positions, frames)
 
 
@@ -101,12 +102,6 @@ def halves_of(boxes: Boxes) -> Array:
     """Return half the side lengths of each link of `boxes` along the axes of its frame, (3, 3) [m]."""
     sections = np.tile([boxes.thickness_in_plane, boxes.thickness_normal], (LINKS, 1))
     return np.column_stack([boxes.lengths, sections]) / 2
-
-
-def _boxes(particle: Particle, positions: Array, frames: Array) -> Bars:
-    count = len(positions)
-    halves = np.tile(halves_of(particle.boxes), (count, 1))
-    return Bars(positions.reshape(-1, 3), frames.reshape(-1, 3, 3), halves, np.repeat(np.arange(count), LINKS))
 
 
 def _strands(particle: Particle, positions: Array, frames: Array) -> Swept:

@@ -261,10 +261,6 @@ def at_wall(vertices: Vertices, *, diameter: float, wall_radius: float) -> Flags
     return touching
 
 
-def _statistics_of(frame: Frame, _: Run) -> tuple[float, float, float]:
-    return float(frame.contacts.std()), float(frame.contacts.max()), float((frame.contacts == 0).mean())
-
-
 def _rattlers_of(frame: Frame, run: Run) -> tuple[float]:
     loose = without_support(
         frame.vertices,
@@ -287,7 +283,11 @@ MEASURES = (
         name="contact statistics",
         place=51,
         quantities=(Quantity("contacts SD", "-"), Quantity("contacts most", "-"), Quantity("without contact", "-")),
-        take=_statistics_of,
+        take=lambda frame, _: (
+            float(frame.contacts.std()),
+            float(frame.contacts.max()),
+            float((frame.contacts == 0).mean()),
+        ),
     ),
     FrameMeasure(
         name="rattlers",

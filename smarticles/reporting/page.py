@@ -59,7 +59,8 @@ def words(*lines: str, tone: str = "plain") -> Markup:
 def table(caption: str, header: Sequence[Any], rows: Iterable[Sequence[Any]], *, folded: bool = False) -> Markup:
     """Return a table of at most `MAX_ROWS` rows; `folded`: show only its caption until a click."""
     cells = [[format_cell(value) for value in row] for row in rows]
-    numeric = [all_numbers([row[k] for row in cells]) for k in range(len(header))]
+    # Dashes and numbers, with or without error and percent sign.
+    numeric = [bool(cells) and all(_NUMBER.fullmatch(row[k].strip()) for row in cells) for k in range(len(header))]
     left_out = max(len(cells) - MAX_ROWS, 0)
     return Markup(_blocks.table(caption, header, cells[:MAX_ROWS], numeric, left_out, folded))
 
@@ -86,11 +87,6 @@ def turntable(caption: str, alt: str, views: Sequence[str]) -> Markup:
     """
     angles = [round(360 * number / len(views)) for number in range(len(views))]
     return Markup(_blocks.turntable(caption, alt, list(zip(views, angles, strict=True))))
-
-
-def all_numbers(cells: Sequence[str]) -> bool:
-    """Return whether every cell is a dash or a number, with or without error and percent sign."""
-    return bool(cells) and all(_NUMBER.fullmatch(cell.strip()) for cell in cells)
 
 
 def embedded(path: Path) -> str:

@@ -159,7 +159,12 @@ def calibrate(problem: Problem, simulator: Simulator, say: Callable[[str], None]
     for wave in range(1, problem.content.waves + 1):
         theta = simulator.planned(wave)
         if theta is None:
-            theta = first_points(problem, size) if wave == 1 else _next(candidates, distances, size)
+            theta = first_points(problem, size)
+            if wave > 1:
+                # The first candidates that are not ruled out, evenly in their region as parts of a Sobol sequence are;
+                # if too few are left, the least implausible ones.
+                limit = max(CUTOFF, float(np.partition(distances, size - 1)[size - 1]))
+                theta = _rounded(candidates[distances <= limit][:size])
         found = simulator.run(wave, theta)
         if found is None:
             return None
@@ -209,17 +214,6 @@ def first_points(problem: Problem, size: int) -> Array:
     """Return the first `size` points of a Sobol sequence in the priors, (size, d)."""
     sequence = qmc.Sobol(len(problem.names), rng=problem.content.first_seed)
     return _rounded(problem.from_unit(sequence.random_base2((size - 1).bit_length())[:size]))
-
-
-def _next(candidates: Array, distances: Array, size: int) -> Array:
-    """Return the points of the next wave: the first `size` candidates that are not ruled out, (size, d).
-
-    Candidates are parameters (n, d), a Sobol sequence, whose part within a region fills the region evenly. One is ruled
-    out if its implausibility, in `distances` (n,) [-], is above `CUTOFF`. If fewer than `size` are left, the `size`
-    least implausible candidates are returned.
-    """
-    limit = max(CUTOFF, float(np.partition(distances, size - 1)[size - 1]))
-    return _rounded(candidates[distances <= limit][:size])
 
 
 def _rounded(theta: Array) -> Array:
