@@ -1,7 +1,5 @@
 """Read centre lines of bodies from a file, such as those of a tomography, as segments."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, NoReturn

@@ -6,8 +6,6 @@ smarticle has no such plane, and an arbitrary plane through it is used. The engi
 the volumes that a sphere sweeps along the links.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

@@ -5,8 +5,6 @@ segment, `body` an array (M,) with the number of the body that each segment belo
 in ascending order of these numbers.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 from typing import NamedTuple
 

@@ -4,8 +4,6 @@ A frame holds the number of contacts of each smarticle as counted by the engine,
 from the vertices. Recorded forces at contacts are the subject of `force_chains`.
 """
 
-from __future__ import annotations
-
 import math
 from typing import NamedTuple
 

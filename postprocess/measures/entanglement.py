@@ -12,8 +12,6 @@ polygon: a straight one, one that branches or has several pieces (a star, a cros
 a plane. The average crossing number is defined for these, too.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass, field
 from typing import NamedTuple

@@ -1,7 +1,5 @@
 """Measure how high a pile stands above the container's floor."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 

@@ -4,11 +4,10 @@ Values by two definitions differ by several per cent, so each result names its d
 container, unless the scene states another radius with `container.packing_radius_m`.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import partial
 from types import MappingProxyType
 
 from dem.errors import InputError
@@ -146,6 +145,10 @@ def _packing_of_bars(frame: Frame, run: Run, *, definition: str, radius: float) 
     return float(body_volumes(frame, run).sum() / (math.pi * radius**2 * height))
 
 
+def _packing(definition: str, frame: Frame, run: Run) -> tuple[float]:
+    return (packing_of(frame, run, definition=definition),)
+
+
 # Experiments use the first definition: short tables call it φ and show its error.
 _SHOWN = {
     name: Shown(heading="φ" if place == 0 else name, place=10 + place, form=".4f", with_error=place == 0)
@@ -157,7 +160,7 @@ MEASURES = tuple(
         name=f"phi {definition}",
         place=70,
         quantities=(Quantity(f"phi {definition}", "-", _SHOWN[definition]),),
-        take=lambda frame, run, definition=definition: (packing_of(frame, run, definition=definition),),
+        take=partial(_packing, definition),
         available_for=in_space if definition in COSTLY_DEFINITIONS else any_in_space,
         definition=definition,
         costly=definition in COSTLY_DEFINITIONS,

@@ -1,7 +1,5 @@
 """Measure whole runs and return tables with one row per frame, or one row per phase."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """Write tables and other files so that no incomplete file is left, and format tables as Markdown."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path

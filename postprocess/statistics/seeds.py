@@ -4,8 +4,6 @@ Runs that differ in their seed alone are independent; their 95 % intervals are b
 error. Successive frames of one run are correlated, see `mean_with_error`.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Hashable, Iterable, Sequence
 from dataclasses import dataclass

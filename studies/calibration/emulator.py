@@ -5,8 +5,6 @@ made exactly at the conditions of the data, so that nothing needs to be interpol
 length scale nor one noise has to hold at all of them. (A condition may also change the count and the pour.)
 """
 
-from __future__ import annotations
-
 import math
 import warnings
 from collections.abc import Callable

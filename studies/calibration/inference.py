@@ -10,8 +10,6 @@ Sources:
     Bayesian Analysis 5, 619 (2010): history matching. Foreman-Mackey et al., PASP 125, 306 (2013): emcee.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Protocol

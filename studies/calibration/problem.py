@@ -3,8 +3,6 @@
 `smarticles calibrate --help` shows a calibration file with all its keys.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property

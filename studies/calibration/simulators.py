@@ -3,8 +3,6 @@
 `smarticles.commands.calibrate` computes runs as sweeps of scenes.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass

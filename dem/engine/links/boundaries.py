@@ -1,7 +1,5 @@
 """Rigid boundaries on the engine links: floor, round wall of one or more tiers, hooks, or a channel."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 

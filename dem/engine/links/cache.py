@@ -8,8 +8,6 @@ loads the code. A file's name states the types of arguments, and the fields that
 compiled. A checksum rejects damaged files. If the cache cannot be used, a run compiles without it.
 """
 
-from __future__ import annotations
-
 import hashlib
 import logging
 import math

@@ -8,8 +8,6 @@ Source: results/accuracy-links/cost.csv: one to three strands, 500 to 4000 N/m, 
 AMD EPYC virtual machine; results/scaling: N up to 10 000.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import NamedTuple
 

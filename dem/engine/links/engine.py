@@ -1,7 +1,5 @@
 """A running simulation on the engine links, behind the interface of all engines."""
 
-from __future__ import annotations
-
 import io
 import json
 import math

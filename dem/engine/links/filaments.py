@@ -1,7 +1,5 @@
 """Grips, active bending and energies of filaments on the engine links."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any

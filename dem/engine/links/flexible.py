@@ -1,7 +1,5 @@
 """Grips, ramp and energies, which filaments and linkages have in common on the engine links."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from typing import Any

@@ -1,7 +1,5 @@
 """Make the arrays of linkages for the kernels of `dem.engine.links.motion.joining`."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from typing import Any

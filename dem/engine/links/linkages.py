@@ -1,7 +1,5 @@
 """Grips, gaits and energies of linkages on the engine links."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Motors on the engine links; `dem.engine.links.motion.motoring` describes how they act."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

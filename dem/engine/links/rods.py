@@ -1,7 +1,5 @@
 """Make the arrays of filaments for the kernels of `dem.engine.links.motion.bending`."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -5,8 +5,6 @@ A flat link consists of several parallel swept segments, its strands. Strands ar
 two hinges; other shapes are rigid bodies, or filaments, which `dem.engine.links.motion.bending` moves.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple

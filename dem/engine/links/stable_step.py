@@ -4,8 +4,6 @@ Leapfrog takes the velocities of dashpots half a step late. With the matrices M 
 of a body in a mode, a step dt is stable while K dt² + 2 C dt - 4 M has no positive eigenvalue.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import replace
