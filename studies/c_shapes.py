@@ -14,6 +14,7 @@ from functools import partial
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
+from scipy.cluster.hierarchy import DisjointSet
 from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
@@ -169,25 +170,14 @@ def critical_links(graph: EntanglementGraph, generator: np.random.Generator) -> 
         neighbours[other].append(one)
     links, largest = np.zeros(number), np.zeros(number)
     for _ in range(ORDERS):
-        joined, sizes, here = list(range(number)), [0] * number, 0
-        greatest = 1
-
-        def root(one: int, joined: list[int] = joined) -> int:
-            while joined[one] != one:
-                joined[one] = joined[joined[one]]
-                one = joined[one]
-            return one
-
+        joined, here, greatest = DisjointSet(), 0, 1
         for step, body in enumerate(generator.permutation(number).tolist()):
-            sizes[body] = 1
+            joined.add(body)
             for other in neighbours[body]:
-                if sizes[other]:
+                if other in joined:
                     here += 1
-                    a, b = root(body), root(other)
-                    if a != b:
-                        joined[b] = a
-                        sizes[a] += sizes[b]
-                        greatest = max(greatest, sizes[a])
+                    joined.merge(body, other)
+            greatest = max(greatest, joined.subset_size(body))
             links[step] += here / (step + 1)
             largest[step] += greatest / (step + 1)
     links, largest = links / ORDERS, largest / ORDERS

@@ -148,8 +148,8 @@ def measured(scene: Scene, shape: str, positions: Array, frames: Array) -> dict[
 def planned(engines: Sequence[str], given: argparse.Namespace) -> Iterator[tuple[Setting, dict[str, Any]]]:
     """Yield the simulations that the options select: setting, and first columns of the row of the table.
 
-    The columns are `engine`, `setting`, `activity` and `seed`.
-    Of the options `given`, `seeds` and `activities` are used.
+    The columns are `engine`, `setting`, `activity` and `seed`. Of the options `given`, `seeds` and `activities` are
+    used.
     """
     for seed, setting in product(given.seeds, SETTINGS):
         if setting.engine in engines and not (setting.costly and seed != given.seeds[0]):

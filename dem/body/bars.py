@@ -65,9 +65,8 @@ class Bars:
     """S straight bars of one cross-section that form a rigid body.
 
     Mass and inertia are the sums over one box, or cylinder, per bar. Boxes overlap at joints, where mass counts twice,
-    as in the paper.
-    InputError if a bar is not longer than its thickness, a normal is along its bar, or bars touch elsewhere than at
-    joints.
+    as in the paper. InputError if a bar is not longer than its thickness, a normal is along its bar, or bars touch
+    elsewhere than at joints.
     """
 
     points: Array  #: (S, 2, 3) both ends of each bar [m], in any frame

@@ -50,9 +50,8 @@ def chain_mean_width(pitch: float) -> float:
     nearest to each other in a view along the common normal. If these spheres are r diameters apart in this view, the
     axes are √(1 - r²) diameters apart. The mean is taken over the positions of both chains along their axes (uniform
     over a period) and over isotropic directions (density sin γ), weighted by sin γ, the area of the parallelogram in
-    the excluded volume.
-    The pitch is the distance of neighbouring spheres over their diameter [1], below √2, from which on chains pass
-    through each other.
+    the excluded volume. The pitch is the distance of neighbouring spheres over their diameter [1], below √2, from which
+    on chains pass through each other.
     """
     nodes, weights = np.polynomial.legendre.leggauss(24)
     angles = math.pi / 4 * (nodes + 1)

@@ -161,6 +161,7 @@ def _named_fidelities(rows: Sequence[dict[str, str]]) -> dict[tuple[str, str], d
     """Return the rows of named fidelities by (engine, fidelity), engine by engine, from coarse to fine.
 
     Only rows whose errors have the same reference are returned: those with `engine` in the column `knob` if there are
+    any, otherwise those with `fidelity`.
     """
     named = {row[_VALUE]: row for row in rows if row[_KNOB] == "engine"} or {
         # Older tables lack the column.
@@ -230,8 +231,7 @@ def choose(
 ) -> Choice:
     """Choose the cheapest fidelity within `max_error`; if that is None, the most exact within `max_hours`.
 
-    One of the two limits must be given.
-    InputError, with a limit that can be kept, if no fidelity is within the limits.
+    One of the two limits must be given. InputError, with a limit that can be kept, if no fidelity is within the limits.
 
     The scene's own engine and fidelity are ignored. `max_error` is relative [1], of the quantities for which `table`
     was read; `max_hours` is wall time on one core [h].

@@ -213,8 +213,7 @@ class Scene(Part):
 
         A loose random packing of thin bars has the packing fraction φ ≈ 2.4 d/L, with d the mean width of the section
         and L the length of all three links (Gravish's φ_0 at l/w = 0, 0.7 and 1.4). The loosest pile is assumed to have
-        half this packing fraction.
-        The highest point of the hooks is at `hooks_top` [m].
+        half this packing fraction. The highest point of the hooks is at `hooks_top` [m].
         """
         # Smarticles may come to lie on a hook.
         pile = self._height_at(1.2)

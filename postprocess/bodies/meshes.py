@@ -393,9 +393,8 @@ def link_boxes(
 
     The cross-section of a straight smarticle may be turned around its length by any angle, which its vertices do not
     determine; an arbitrary angle is used. Links without length have no box. The mesh has two arrays of cell data:
-    `smarticle`, the index into the vertices (N, 4, 3) [m], and `link`, 0 to 2.
-    Thicknesses are t1, along the normal of the smarticle's plane, and t2 in it: for all links, or for barb 1, middle
-    link and barb 2 each [m].
+    `smarticle`, the index into the vertices (N, 4, 3) [m], and `link`, 0 to 2. Thicknesses are t1, along the normal of
+    the smarticle's plane, and t2 in it: for all links, or for barb 1, middle link and barb 2 each [m].
     """
     vertices = checked_vertices(vertices)
     in_plane = np.broadcast_to(thickness_in_plane, 3)

@@ -124,9 +124,9 @@ def visible_meshes(
 ) -> dict[str, pv.PolyData]:
     """Return the meshes of a frame by kind, [mm] above the floor, with lines as tubes.
 
-    A removed wall has the kind `ghost`.
-    The half of the wall in front, by the direction of view `forward` (3,), is cut away, unless this vector is zero. The
-    thickest line has the normal force `largest` [N]; the largest of the frame if not given.
+    A removed wall has the kind `ghost`. The half of the wall in front, by the direction of view `forward` (3,), is cut
+    away, unless this vector is zero. The thickest line has the normal force `largest` [N]; the largest of the frame if
+    not given.
     """
     made = bodies.at(frame)
     if "wall" in bodies.kinds and "wall" not in made and bodies.boundaries.removal is not None:
@@ -188,10 +188,9 @@ def add_bodies(plotter: Any, meshes: Mapping[str, pv.PolyData], frame: Frame, co
 class Canvas:
     """An off-screen window with one panel per run, one camera, one colour scale and one scale bar.
 
-    RunError if this machine lacks the libraries to draw without a display.
-    The extent (2, 2) in the camera's view is in [mm]. The link size of `run` sets the range of the shading of corners
-    (ambient occlusion), which takes most of the time of a picture and is left out by `quick`. Without `scale` there is
-    no colour bar.
+    RunError if this machine lacks the libraries to draw without a display. The extent (2, 2) in the camera's view is in
+    [mm]. The link size of `run` sets the range of the shading of corners (ambient occlusion), which takes most of the
+    time of a picture and is left out by `quick`. Without `scale` there is no colour bar.
     """
 
     def __init__(

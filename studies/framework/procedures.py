@@ -132,8 +132,8 @@ def height_history(run: Run) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Return the height of the centre of mass over h0 (n,) [-], and the times of its samples (n,) [s].
 
     h0 is the mean height in the rest before the activity, with which the samples begin; the time is 0 at the beginning
-    of the activity. Samples without a height are left out.
-    InputError if the phases are not one activity between two rests, or no sample of the first rest has a height.
+    of the activity. Samples without a height are left out. InputError if the phases are not one activity between two
+    rests, or no sample of the first rest has a height.
     """
     series, active = run.series, activity(run)
     height = np.asarray(series["com_height_m"], dtype=np.float64)

@@ -162,8 +162,7 @@ def tasks_of_runs(found: Sequence[Submission]) -> dict[str, Task]:
     """Return the task that computes each run, by the name of the run.
 
     `found` are the submissions of a sweep, oldest first. If a run is in several tasks, the newest one that has not
-    ended is taken, or the newest one if all have ended.
-    QueueError if Slurm's queue cannot be queried.
+    ended is taken, or the newest one if all have ended. QueueError if Slurm's queue cannot be queried.
     """
     by_name = {submission.job_name: submission for submission in found}
     order = {submission.job_name: place for place, submission in enumerate(found)}

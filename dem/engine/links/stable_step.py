@@ -67,9 +67,8 @@ def filament_stable_time_step(filament: Filament, law: ContactLaw, effective_mas
 
     In these modes neighbouring nodes move in opposite directions: along the filament, across it, or about its axis. The
     stiffness is that of stretching, bending or twisting plus that of contacts. Two cases of contacts are considered:
-    contacts at a tip, and contacts along both sides of the filament, one per diameter. The bodies that touch a node
-    are assumed to move opposite to it.
-    The damping in `law` was computed for the `effective_mass` of a body [kg].
+    contacts at a tip, and contacts along both sides of the filament, one per diameter. The bodies that touch a node are
+    assumed to move opposite to it. The damping in `law` was computed for the `effective_mass` of a body [kg].
     """
     length, mass = filament.segment_length, filament.mass / (filament.nodes - 1)
     share = math.sqrt(filament_shape(filament).effective_mass / effective_mass)
