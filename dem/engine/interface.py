@@ -154,10 +154,7 @@ class Boundaries(Protocol):
 
 
 class Motors(Protocol):
-    """Motors at the hinges.
-
-    Smarticles are welded (rigid) at first; they can be articulated and welded again.
-    """
+    """Motors at the hinges. Smarticles are welded at first, can be articulated and welded again."""
 
     @property
     def present(self) -> bool:

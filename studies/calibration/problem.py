@@ -179,10 +179,7 @@ class Problem:
         return found
 
     def log_prior(self, theta: Array) -> Array:
-        """Return ln of the prior density (n,), up to a constant, of parameters (n, d).
-
-        It is -inf outside the ranges.
-        """
+        """Return ln of the prior density (n,) of parameters (n, d), up to a constant; -inf out of range."""
         low, high = self.bounds
         found: Array = np.where(np.all((low <= theta) & (theta <= high), axis=1), 0.0, -np.inf)
         for k, prior in enumerate(self.content.free.values()):
