@@ -81,7 +81,7 @@ def expected_wall_s(scene: Scene) -> float:
 def compute(folder: Folder, *, jobs: int | None, command: str) -> list[Outcome]:
     """Compute the missing runs of a sweep on this machine.
 
-    `command` continues the sweep; KeyboardInterrupt with it after Ctrl-C.
+    After Ctrl-C, the KeyboardInterrupt names `command`, which continues the sweep.
     """
     from rich.console import Console  # noqa: PLC0415
 

@@ -184,7 +184,10 @@ class Mixture:
     of: Numbers = field(repr=False)  #: (N,) index in `kinds` for each body
 
     def mean(self, values: Sequence[float], kinds: Numbers | None = None) -> float:
-        """Return the mean of `values` (K,) of kinds over bodies of `kinds` (n,), or all; NaN without bodies."""
+        """Return the mean over bodies of a quantity that each kind has; NaN without bodies.
+
+        `values` (K,) are those of the kinds, `kinds` (n,) the kinds of the bodies; None: all bodies of the pile.
+        """
         each = np.array(values)[self.of if kinds is None else kinds]
         return float(each.mean()) if len(each) else float("nan")
 
