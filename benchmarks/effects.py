@@ -23,13 +23,10 @@ MEASURED = 1  # index of the compared phase; phase 0 is the pour
 
 
 def pairs(seconds: float, hinged_step: float) -> list[tuple[str, str, Changes, Changes]]:
-    """Return, for each effect, its name, what takes the time, and two dictionaries of scene keys.
+    """Return name, cause of cost, and scene keys without and with it, of each effect.
 
-    `scene_data` makes a scene of each dictionary: the first one without the effect, the second one with the effect.
-
-    Args:
-        seconds: duration of the compared phase [s].
-        hinged_step: time step of the scenes with hinges [s].
+    The compared phase lasts `seconds` [s]; scenes with hinges have the time step `hinged_step` [s]. `scene_data` makes
+    a scene of a dictionary of keys.
     """
     rest = {"type": "relax", "duration_s": seconds}
     still = {"type": "shake", "duration_s": seconds, "peak_acceleration_g": 0}
@@ -77,13 +74,7 @@ def pairs(seconds: float, hinged_step: float) -> list[tuple[str, str, Changes, C
 
 
 def scene_data(changes: Changes, *, count: int, seed: int) -> Changes:
-    """Return a scene as a dictionary: a pour of the paper's smarticles, then the phases of `changes`.
-
-    Args:
-        changes: `phases` after the pour, and other changed keys; `fidelity` is "draft" unless it is changed.
-        count: number of smarticles.
-        seed: seed of the scene.
-    """
+    """Return a scene: a pour of `count` of the paper's smarticles, then phases and other keys of `changes`."""
     data: Changes = {"schema_version": 1, "seed": seed, "count": count, "fidelity": "draft", **changes}
     recording = {"checkpoint_interval_s": None, **changes.get("recording", {})}
     phases = [{"type": "deposit"}, *changes["phases"]]
@@ -91,12 +82,9 @@ def scene_data(changes: Changes, *, count: int, seed: int) -> Changes:
 
 
 def row(effect: str, cause: str, costs: list[tuple[float, float]]) -> dict[str, Any]:
-    """Return a row of the table, by column: the relative cost of an effect [%], as median and quartiles.
+    """Return a row of the table: the relative cost of an effect [%], as median and quartiles.
 
-    Args:
-        effect: name of the effect.
-        cause: what takes the time, in words.
-        costs: for each pair of runs, the processor time per simulated time without and with the effect [s/s].
+    `costs` has the processor time per simulated time without and with the effect [s/s], for each pair of runs.
     """
     shares = [100 * (after / before - 1) for before, after in costs]
     low, _, high = statistics.quantiles(shares, n=4, method="inclusive") if len(shares) > 1 else [shares[0]] * 3

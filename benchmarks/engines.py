@@ -27,12 +27,7 @@ MEMORY, WHOLE = "peak memory [MiB]", "whole run [s]"
 
 
 def measured(folder: Path, run: dict[str, Any]) -> dict[str, Any]:
-    """Compute a run, and return its row of the table: the columns of `run`, then times and memory.
-
-    Args:
-        folder: folder of all runs.
-        run: engine, activity, fidelity, number of smarticles and seed, in this order, by column.
-    """
+    """Compute a run in the folder of all runs; return `run`, its known columns, with times and memory."""
     engine, activity, fidelity, count, seed = run.values()
     name = f"{engine}-{activity}-{fidelity}-{count}-{seed}"
     acting = {"type": activity, "duration_s": SECONDS, **ACTIVITIES[activity]}

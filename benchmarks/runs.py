@@ -21,10 +21,7 @@ def pile(
     """Return a scene as a dictionary: a pour of `count` smarticles, then the given phases.
 
     The container's radius is such that the pile is as high as the paper's pile of 270 smarticles.
-
-    Args:
-        per_layer: number of smarticles dropped at a time; None: in proportion to the floor's area, but 10 or more.
-        keys: other keys of the scene.
+    `per_layer` smarticles are dropped at a time; None: in proportion to the floor's area, but 10 or more.
     """
     widening = (count / PAPER_COUNT) ** 0.5
     per_layer = per_layer or max(PAPER_PER_LAYER, round(PAPER_PER_LAYER * widening**2))

@@ -36,9 +36,7 @@ WALL, PROCESSOR = "wall time per step and smarticle [us]", "processor time per s
 def time_intervals(run: Path) -> dict[str, Any]:
     """Load the last checkpoint of a run and time the shaking of its pile.
 
-    Returns:
-        `wall` and `processor`: lists of the wall time and the processor time of each interval [s]; mean number of
-        contacts per smarticle; and peak memory [MiB].
+    Returns lists of wall and processor time of each interval [s], contacts per smarticle, and peak memory [MiB].
     """
     scene, made_by = load_scene(run / "scene.yaml"), open_run(run).manifest.versions["links"]
     # The scene needs a phase that shakes, or the engine is built without a moving container.
@@ -66,14 +64,10 @@ def time_intervals(run: Path) -> dict[str, Any]:
 
 
 def row_of(run: Path, count: int, repeats: int) -> dict[str, Any]:
-    """Time the shaking of a pile in `repeats` separate processes; return a row of the table, by column.
+    """Time the shaking of a poured pile in `repeats` separate processes; return a row of the table.
 
     The times per step and smarticle use the least time of each interval among all repetitions. Contacts and peak memory
     are those of the last repetition.
-
-    Args:
-        run: run directory of the pour.
-        count: number of smarticles in the pile.
     """
     command = [sys.executable, "-m", "benchmarks.scaling", "--time-pile", str(run)]
     found = [

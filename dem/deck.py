@@ -40,9 +40,8 @@ DEEPEST = 0.05
 def passive(scene: Scene) -> State:
     """Return the initial state of a scene, at rest, after a check that a deck can describe the scene.
 
-    Raises:
-        InputError: LAMMPS cannot compute parts of the scene, which the message lists; or spheres of different
-            smarticles overlap by more than `DEEPEST` diameters, as in piles of another engine or fidelity.
+    InputError lists what LAMMPS cannot compute, or says that spheres overlap by more than `DEEPEST` diameters, as in
+    piles of another engine or fidelity.
     """
     found = list(_foreign(scene))
     if found:
@@ -89,9 +88,7 @@ def _foreign(scene: Scene) -> Iterator[str]:
 def write_deck(scene: Scene, folder: Path) -> None:
     """Make a folder and write the deck of a scene into it.
 
-    Raises:
-        InputError: as in `passive`, or the folder exists already or cannot be made.
-        RunError: a file cannot be written.
+    InputError as in `passive`, or if the folder exists or cannot be made; RunError if a file cannot be written.
     """
     state = passive(scene)
     if folder.exists():

@@ -14,14 +14,7 @@ class RunError(RuntimeError):
 
 
 def reject(failing: Any, time: float, cause: str, way_out: str) -> None:
-    """Raise RunError that names the failing smarticles; do nothing if none fails.
-
-    Args:
-        failing: (N,) whether each smarticle fails.
-        time: simulated time [s].
-        cause: what is wrong with the smarticles that fail.
-        way_out: what the user can do.
-    """
+    """Raise RunError with cause and way out that names the failing smarticles (N,); do nothing if none fails."""
     if failing.any():
         ids = failing.nonzero()[0]
         shown = ", ".join(str(k) for k in ids[:5]) + (", …" if len(ids) > 5 else "")
@@ -41,8 +34,7 @@ def shown(value: object) -> str:
 def nearest(word: str, known: Iterable[str], *, cutoff: float = 0.6) -> str:
     """Return `did you mean …` with the nearest known word, or the list of known words if none is near.
 
-    Args:
-        cutoff: least similarity of a near word, from 0 to 1, as in `difflib.get_close_matches`.
+    `cutoff` is the least similarity of a near word, from 0 to 1, as in `difflib.get_close_matches`.
     """
     words = list(known)
     close = difflib.get_close_matches(word, words, n=1, cutoff=cutoff)

@@ -121,9 +121,7 @@ def _kind(annotation: Any) -> str:
 def explained(error: ValidationError, data: Any, *, described: str) -> str:
     """Return pydantic's first errors in one line, each as `key: value and what is wrong; what to do`.
 
-    Args:
-        data: the mapping that was validated.
-        described: command or page that describes the keys, for the message.
+    `data` was validated; `described` is the command or page that describes the keys, for the message.
     """
     texts: dict[str, str] = {}
     filled: set[str] = set()  # places of values that the file does not hold
@@ -161,9 +159,7 @@ def unit_of(key: str) -> tuple[str, str]:
 def _text(kind: str, message: str, value: Any, context: Mapping[str, Any], unit: str) -> str:
     """Return what is wrong with a value, and advice to the user.
 
-    Args:
-        kind: pydantic's type of the error; `message` and `context` are pydantic's, too.
-        unit: unit of the value; "" for none.
+    `kind`, `message` and `context` are pydantic's; `unit` is that of the value, "" for none.
     """
     if kind == "value_error":
         return message.removeprefix("Value error, ")

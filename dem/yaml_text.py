@@ -68,8 +68,7 @@ def load_yaml(text: str, loader: type[Any] = StrictLoader) -> Any:
 
     `parse_yaml` does the same, and raises InputError with a message for users.
 
-    Args:
-        loader: `StrictLoader`, a subclass of it, or another loader that makes plain data only.
+    The loader is `StrictLoader`, a subclass, or another loader that makes plain data only.
     """
     if len(text) > LONGEST:
         raise yaml.YAMLError(f"more than {LONGEST} characters, which no scene or sweep needs; shorten it")
@@ -95,8 +94,7 @@ def load_yaml(text: str, loader: type[Any] = StrictLoader) -> Any:
 def _characters(node: yaml.Node, known: dict[yaml.Node, float]) -> float:
     """Return about how many characters a node has with all aliases written out; inf if it contains itself.
 
-    Args:
-        known: results for nodes that were counted before; updated.
+    `known` has results for nodes that were counted before; it is updated.
     """
     if node not in known:
         known[node] = math.inf  # of a node that contains itself

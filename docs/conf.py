@@ -1,7 +1,5 @@
 """Sphinx configuration. Pages load local files only and need no network."""
 
-from __future__ import annotations
-
 import sys
 from pathlib import Path
 

@@ -76,12 +76,9 @@ def write_trajectory(
 ) -> int:
     """Write frames of a run as a GSD file, and return their number.
 
-    Positions are those of the run, in metres. The box is as large as the bodies need, and around the origin.
-
-    Args:
-        frames: The frames with their numbers.
-        fields: Fields to write as `log/particles/NAME`.
-        first: The same frames without numbers; they are read first, to find the shapes and the size of the box.
+    Positions are those of the run, in metres. The box is as large as the bodies need, and around the origin. Fields are
+    written as `log/particles/NAME`. The frames `first` are the same without numbers; they are read first, to find the
+    shapes and the size of the box.
     """
     import gsd.hoomd  # noqa: PLC0415 - an extra
 

@@ -53,9 +53,7 @@ def read_kept(directory: Path, kind: str, key: str) -> pd.DataFrame | None:
 def keep(table: pd.DataFrame, directory: Path, kind: str, key: str) -> None:
     """Store a table of measures in a run directory; do nothing if the file cannot be written.
 
-    Args:
-        kind: what the table contains, such as `phases-phase-end`; part of the name of the file.
-        key: hash of the run's files and the program, by `key_of`.
+    `kind` is what the table contains, such as `phases-phase-end`; `key` is a hash from `key_of`.
     """
     rows = table.astype(object).to_numpy().tolist()
     text = json.dumps({"columns": list(table.columns), "rows": rows}, default=_plain)

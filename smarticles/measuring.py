@@ -35,9 +35,8 @@ def has_frames(directory: Path) -> bool:
 def sources(directories: Sequence[Path]) -> dict[Path, Mapping[str, Any]]:
     """Find the runs to measure in directories of runs and sweeps; InputError if a sweep has no frames.
 
-    Returns:
-        Values of the sweep's variables by run directory, empty for runs without a sweep. Runs of a sweep that have no
-        frames are left out.
+    Returns the values of the sweep's variables by run directory, empty for runs without a sweep. Runs of a sweep
+    without frames are left out.
     """
     from templates.sweep.folder import open_folder  # noqa: PLC0415
 
@@ -160,8 +159,7 @@ def _with_variables(table: pd.DataFrame, values: Mapping[str, Any]) -> pd.DataFr
 def of_phase(table: pd.DataFrame, phase: str) -> pd.DataFrame:
     """Select rows of a table of `measured` by type of phase; "last" selects the last phase of each run.
 
-    Raises:
-        InputError: no run has a phase of this type.
+    InputError if no run has a phase of this type.
     """
     if phase == "last":
         return table[table["phase"] == table.groupby("run")["phase"].transform("max")].reset_index(drop=True)

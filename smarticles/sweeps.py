@@ -28,13 +28,7 @@ if TYPE_CHECKING:
 def make_folder(file: Path, out: Path, command: str) -> Folder:
     """Write the scenes of a sweep file to a directory that may hold this sweep already; return it.
 
-    Args:
-        file: sweep file.
-        out: directory of the sweep.
-        command: command line to record in the manifest.
-
-    Raises:
-        InputError: the sweep is not valid, or the directory contains something else.
+    `command` is for the manifest. InputError if the sweep is not valid, or the directory contains something else.
     """
     from templates.sweep.expand import expand  # noqa: PLC0415
 
@@ -61,11 +55,8 @@ def folder_of(
 ) -> Folder:
     """Create the directory of an expanded sweep, or open a directory that already holds this sweep.
 
-    Args:
-        out: the directory, which is absent, empty, or holds this sweep.
-        command: command that makes it, for the record.
-        expected_s: expected wall time of each point [s]; None: it is estimated here.
-        extend: whether to add the missing runs to a directory that holds some of these runs and no others.
+    `command` makes the directory, for the record. Expected wall times of the points [s] are estimated if they are None.
+    With `extend` the missing runs are added to a directory that holds some of these runs and no others.
     """
     from templates.sweep.folder import create_folder  # noqa: PLC0415
 
@@ -90,12 +81,7 @@ def expected_wall_s(scene: Scene) -> float:
 def compute(folder: Folder, *, jobs: int | None, command: str) -> list[Outcome]:
     """Compute the missing runs of a sweep on this machine.
 
-    Args:
-        jobs: number of simultaneous runs; None: one per core.
-        command: command line that continues the sweep, for the message after Ctrl-C.
-
-    Raises:
-        KeyboardInterrupt: Ctrl-C was pressed; the message contains `command`.
+    After Ctrl-C, the KeyboardInterrupt names `command`, which continues the sweep.
     """
     from rich.console import Console  # noqa: PLC0415
 
@@ -159,12 +145,8 @@ def add_cluster_options(parser: Parser) -> None:
 def is_for_cluster(arguments: argparse.Namespace, *, allow_ranks: bool = False) -> bool:
     """Return whether the options request a job on a cluster.
 
-    Args:
-        arguments: parsed command line with --submit and the options of `add_cluster_options`.
-        allow_ranks: accept --ranks without a cluster, for a single run on this machine.
-
-    Raises:
-        InputError: an option for clusters is given without a cluster, or Slurm is not installed here.
+    With `allow_ranks`, --ranks is accepted without a cluster, for a single run on this machine. InputError if an option
+    for clusters is given without a cluster, or Slurm is not installed here.
     """
     from templates.slurm.submission import require_sbatch  # noqa: PLC0415
 
@@ -182,15 +164,8 @@ def is_for_cluster(arguments: argparse.Namespace, *, allow_ranks: bool = False) 
 def draft_of(path: Path, name: str, entries: Sequence[Entry], arguments: argparse.Namespace) -> Draft:
     """Plan and render a cluster job for runs of a sweep; write nothing.
 
-    Args:
-        path: directory of the sweep.
-        name: name of the sweep.
-        entries: runs of the job.
-        arguments: parsed command line with the options of `add_cluster_options`. Without --cluster, the cluster is that
-            of the latest job in the directory.
-
-    Raises:
-        InputError: there is neither --cluster nor an earlier job, or the request exceeds limits of the cluster.
+    Without --cluster the cluster is that of the latest job in the directory `path`. InputError if there is neither, or
+    the request exceeds limits of the cluster.
     """
     from templates.slurm.cluster import shipped_clusters  # noqa: PLC0415
     from templates.slurm.job import Wishes  # noqa: PLC0415

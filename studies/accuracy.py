@@ -182,12 +182,9 @@ def build_ladder(scene: Scene, *, source: str, knobs: Sequence[str] | None = Non
     Rungs that the scene cannot have, such as two rows of spheres in a square section, are left out of the ladder; it
     lists them with the reason.
 
-    Args:
-        source: path of the scene file, for messages.
-        knobs: knobs to change; None: all that change anything in this scene, except `engine`.
-
-    Raises:
-        InputError: the scene has no activity or sets the time step in seconds, or a given knob changes nothing in it.
+    `source` is the scene file, for messages. Knobs are by default all that change anything in this scene, except
+    `engine`. InputError if the scene has no activity or sets the time step in seconds, or a given knob changes nothing
+    in it.
     """
     types = [phase.type for phase in scene.phases]
     driven = bool(ACTUATED & set(types))
@@ -595,11 +592,7 @@ class Promises:
     name: str = "fidelities"
 
     def draw(self, path: Path, analysis: Analysis) -> list[Path]:
-        """Draw the largest error of each named fidelity against its cost, for the scene of an analysis.
-
-        Returns:
-            The files.
-        """
+        """Draw the largest error of each named fidelity against its cost; return the files."""
         table = analysis.tables["work_precision"]
         return self.compare(path, {next(iter(table[ACTIVITY].dropna()), ""): table}, analysis.footer)
 

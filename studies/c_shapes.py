@@ -14,6 +14,7 @@ from functools import partial
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
+from scipy.cluster.hierarchy import DisjointSet
 from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
@@ -127,11 +128,8 @@ def opening_of(run: Run) -> float:
 def linked(segments: Floats, body: NDArray[np.int64]) -> EntanglementGraph:
     """Return the graph in which two bodies are joined if their linking number is not 0.
 
-    Open curves are closed by a straight line between their ends.
-
-    Args:
-        segments: (M, 2, 3) end points of all segments [m].
-        body: (M,) number of the body of each segment.
+    Open curves are closed by a straight line between their ends. Segments are (M, 2, 3) [m], `body` (M,) numbers of
+    bodies.
     """
     return entanglement_graph(closed_linking(segments, body), least=1)
 
@@ -144,14 +142,8 @@ def links_per_body(graph: EntanglementGraph) -> float:
 def at_random(bodies: Floats, centres: Floats, radius: float, height: float, generator: np.random.Generator) -> Floats:
     """Place copies of bodies at random in a cylinder; return their segments (N S, 2, 3) [m], body by body.
 
-    Centres are uniform in the cylinder, orientations are uniform; bodies may overlap.
-
-    Args:
-        bodies: (N, S, 2, 3) end points of the S segments of each of N bodies [m].
-        centres: (N, 3) present centres of the bodies [m].
-        radius: radius of the cylinder [m].
-        height: height of the cylinder [m].
-        generator: source of random numbers.
+    Centres are uniform in the cylinder of a radius and height [m], orientations are uniform; bodies may overlap. They
+    have S segments each, (N, S, 2, 3) [m], and present centres (N, 3) [m].
     """
     count = len(bodies)
     away, angle = radius * np.sqrt(generator.random(count)), 2 * math.pi * generator.random(count)
@@ -169,8 +161,7 @@ def critical_links(graph: EntanglementGraph, generator: np.random.Generator) -> 
     the largest cluster are averaged over `ORDERS` orders. NaN if the share does not reach `GIANT` with all bodies, or
     exceeds it at every number of bodies.
 
-    Source:
-        Newman and Ziff, Phys. Rev. E 64, 016706 (2001).
+    Source: Newman and Ziff, Phys. Rev. E 64, 016706 (2001).
     """
     number = len(graph.bodies)
     neighbours: list[list[int]] = [[] for _ in range(number)]
@@ -179,25 +170,14 @@ def critical_links(graph: EntanglementGraph, generator: np.random.Generator) -> 
         neighbours[other].append(one)
     links, largest = np.zeros(number), np.zeros(number)
     for _ in range(ORDERS):
-        joined, sizes, here = list(range(number)), [0] * number, 0
-        greatest = 1
-
-        def root(one: int, joined: list[int] = joined) -> int:
-            while joined[one] != one:
-                joined[one] = joined[joined[one]]
-                one = joined[one]
-            return one
-
+        joined, here, greatest = DisjointSet(), 0, 1
         for step, body in enumerate(generator.permutation(number).tolist()):
-            sizes[body] = 1
+            joined.add(body)
             for other in neighbours[body]:
-                if sizes[other]:
+                if other in joined:
                     here += 1
-                    a, b = root(body), root(other)
-                    if a != b:
-                        joined[b] = a
-                        sizes[a] += sizes[b]
-                        greatest = max(greatest, sizes[a])
+                    joined.merge(body, other)
+            greatest = max(greatest, joined.subset_size(body))
             links[step] += here / (step + 1)
             largest[step] += greatest / (step + 1)
     links, largest = links / ORDERS, largest / ORDERS

@@ -258,22 +258,13 @@ _HISTORIES = Histories(
 )
 
 
-def _with_bounds(table: pd.DataFrame) -> pd.DataFrame:
-    own = table[table[DEFINITION] == REMAINING]
-    return own.assign(**{LOG: own[LOG].where(own[CENSORED] == 0), AT_LEAST: own[LOG]})
-
-
 def _law_curves(
     tables: Mapping[str, pd.DataFrame], rows: pd.DataFrame, _: str, places: NDArray[np.float64]
 ) -> dict[str, tuple[ArrayLike, ArrayLike]]:
     """Compute the fitted law ln(fτ) = Δ/Γ at one l/w, as a curve of a figure.
 
-    Args:
-        rows: rows with this l/w.
-        places: values of 1/Γ (n,).
-
-    Returns:
-        Values (n,) of ln(fτ) and their 95 % half-widths (n,), by the label of the curve.
+    The places are values of 1/Γ (n,). Returns values (n,) of ln(fτ) and 95 % half-widths (n,), by the label of the
+    curve.
     """
     points = judging(tables["points"])
     own = points[(points[DEFINITION] == REMAINING) & (points[ASPECT] == rows[ASPECT].iloc[0])].iloc[0]
@@ -296,7 +287,9 @@ STUDY = Study(
             x=GAMMA,
             transform=lambda gamma: 1 / gamma,
             x_label=r"inverse peak acceleration $1/\Gamma$ [-]",
-            rows=_with_bounds,
+            rows=lambda table: table[table[DEFINITION] == REMAINING].assign(
+                **{LOG: table[LOG].where(table[CENSORED] == 0), AT_LEAST: table[LOG]}
+            ),
             bounds={LOG: AT_LEAST},
             split=one_by_one(ASPECT, lambda aspect: rf"$l/w$ = {aspect:g}"),
             fit=_law_curves,

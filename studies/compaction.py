@@ -159,12 +159,7 @@ def _law_curves(
 ) -> dict[str, tuple[ArrayLike, ArrayLike]]:
     """Compute φ by both laws, averaged over runs of one coefficient of friction, as curves of a figure.
 
-    Args:
-        rows: rows of these runs in the table of runs.
-        times: (n,) [s].
-
-    Returns:
-        Values (n,) and their 95 % half-widths (n,), here NaN, by the name of the law.
+    Times are (n,) [s]. Returns values (n,) and their 95 % half-widths (n,), here NaN, by the name of the law.
     """
     fits = {law: rows[[law_column(law, name) for name in _MEANINGS][:5]].itertuples(index=False) for law in LAWS}
     means = {law: np.mean([Fit(law, *run).at(times) for run in runs], axis=0) for law, runs in fits.items()}

@@ -9,7 +9,6 @@ import math
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
 from dem.record.run import Run
 from postprocess.geometry.links import centres_of_mass
@@ -89,14 +88,10 @@ def lowest_rise(run: Run) -> float:
     for phase in (shaken - 1, shaken):
         part = frames.in_phase(phase)
         late = part.after(part.times[-1] - WINDOW)
-        lowest = [_lowest_tenth(centres_of_mass(one.vertices)[:, 2] - one.floor_z) for one in late]
-        heights.append(float(np.mean(lowest)))
+        levels = [centres_of_mass(one.vertices)[:, 2] - one.floor_z for one in late]
+        count = max(round(len(levels[0]) / 10), 1)
+        heights.append(float(np.mean([np.partition(each, count - 1)[:count].mean() for each in levels])))
     return (heights[1] - heights[0]) / run.manifest.middle_length_m
-
-
-def _lowest_tenth(heights: NDArray[np.float64]) -> float:
-    count = max(round(len(heights) / 10), 1)
-    return float(np.partition(heights, count - 1)[:count].mean())
 
 
 def points(runs: pd.DataFrame) -> pd.DataFrame:

@@ -363,13 +363,8 @@ def _law_curves(
 ) -> dict[str, tuple[ArrayLike, ArrayLike]]:
     """Compute the law q_∞ + a N^(-1/3) of a quantity, fitted at one l/w, as a curve of a figure.
 
-    Args:
-        rows: rows with this l/w.
-        column: column of the quantity.
-        places: values of N^(-1/3) (n,).
-
-    Returns:
-        Values (n,) and 95 % half-widths (n,) by the label of the curve; empty if there are too few sizes to fit.
+    Places are values of N^(-1/3) (n,). Returns values (n,) and 95 % half-widths (n,) by the label of the curve; empty
+    if there are too few sizes to fit.
     """
     law = fitted(tables["runs"], float(rows[ASPECT].iloc[0]), column)
     if law is None:

@@ -16,7 +16,6 @@ weight can be compared.
 
 import math
 import re
-from collections.abc import Mapping
 from functools import partial
 
 import numpy as np
@@ -518,11 +517,6 @@ def _bought(table: pd.DataFrame) -> list[Series]:
     return [*one_by_one(THETA, "internal, θ = {:g}°".format)(swung), *others]
 
 
-def _correlations(table: pd.DataFrame) -> pd.DataFrame:
-    rows = table[(table[STRENGTH] == PEAK) & (table[PART] == EVERY)]
-    return pd.concat([rows[rows[SCOPE] == scope] for scope in (WITHIN, ALL)])
-
-
 def _scopes(table: pd.DataFrame) -> list[Series]:
     styles = {WITHIN: marker("o", style.ORANGE, style.ORANGE), ALL: marker("D", style.BLUE, style.BLUE)}
     return [
@@ -567,7 +561,7 @@ FIGURES = (
         name="correlations",
         table="predictors",
         quantities=[Quantity(column=RHO, axis="rank correlation with strength [-]")],
-        rows=_correlations,
+        rows=lambda table: pd.concat([_at(table, PEAK, EVERY, scope) for scope in (WITHIN, ALL)]),
         row=lambda row: PREDICTORS[row[PREDICTOR]],
         split=_scopes,
         ends=(LOW, HIGH),
@@ -585,11 +579,6 @@ FIGURES = (
         notes=["Pairs of one l/w and seed, at the l/w at which everything was run; error bars count pairs."],
     ),
 )
-
-
-def _extra(runs: pd.DataFrame) -> Mapping[str, pd.DataFrame]:
-    predictors, comparisons = predicted(runs)
-    return {"predictors": predictors, "comparisons": comparisons, "cost": costs(runs)}
 
 
 def _shown(points: pd.DataFrame) -> pd.DataFrame:
@@ -612,7 +601,7 @@ STUDY = Study(
     quantities=tuple(QUANTITIES.values()),
     findings=FINDINGS,
     figures=FIGURES,
-    extra=_extra,
+    extra=lambda runs: dict(zip(("predictors", "comparisons"), predicted(runs), strict=True)) | {"cost": costs(runs)},
     shown=_shown,
     order=(ASPECT, PROCEDURE, THETA, PLANNED, SEED),
     bounds=(HELD_FAST, "held fast"),

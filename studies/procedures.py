@@ -116,20 +116,12 @@ def gains(procedure: str) -> Rows:
 
 
 def with_aspect(name: str, says: str, rows: Rows, quantity: str, sign: int = 1) -> Finding:
-    """Make the finding that a quantity rises (sign +1) or falls (−1) with l/w.
-
-    `name` is the id of the finding, `says` its statement, `quantity` a column; the function `rows` selects rows of the
-    table of samples.
-    """
+    """Make the finding that a quantity of the selected samples rises (sign +1) or falls (−1) with l/w."""
     return slope(name, says, quantity, ASPECT, sign=sign, rows=rows)
 
 
 def with_amplitude(name: str, says: str, quantity: str, sign: int = 1, rows: Rows = amplitudes) -> Finding:
-    """Make the finding that a quantity rises (sign +1) or falls (−1) with θ at equal l/w and seed.
-
-    `name` is the id of the finding, `says` its statement, `quantity` a column; the function `rows` selects rows of the
-    table of samples.
-    """
+    """Make the finding that a quantity rises (sign +1) or falls (−1) with θ at equal l/w and seed."""
     return slope(name, says, quantity, THETA, sign=sign, within=(ASPECT, SEED), rows=rows)
 
 

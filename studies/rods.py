@@ -108,12 +108,8 @@ def length_of(run: Run) -> float:
 def local_crossings(frame: Frame, *, length: float, radius: float, top: float) -> NDArray[np.float64]:
     """Return the local average crossing number (X, Y, Z) [-] at the points of a grid inside a pile.
 
-    The grid is a box around the container's axis; its size and pitch are `INNER`, `EDGE` and `PITCH`.
-
-    Args:
-        length: length of a rod [m].
-        radius: radius of the container [m].
-        top: height of the pile's top above the floor [m].
+    The grid is a box around the container's axis; its size and pitch are `INNER`, `EDGE` and `PITCH`. The length of a
+    rod, the radius of the container and the height of the pile's top above the floor are in [m].
     """
     side = 2 * INNER * radius
     across, up = (max(2, round(span / (PITCH * length)) + 1) for span in (side, (1 - 2 * EDGE) * top))

@@ -24,14 +24,15 @@ from dem.record.run import Run
 from postprocess.geometry.bars import body_centres
 from postprocess.measures.entanglement import polygon_crossings
 from postprocess.measures.graph import entanglement_graph
-from postprocess.measures.pull import PULL, WINDOW, held_fast, moving_mean, peak, read_pull, weight_of_one
+from postprocess.measures.pull import PULL, WINDOW, held_fast, peak, read_pull, weight_of_one
 from postprocess.statistics.points import SEED, paired_differences
 from postprocess.statistics.seeds import SeedMean, mean_over_seeds
-from studies.framework.figures import Histories, History, Means, one_by_one
+from studies.framework.figures import Histories, Means, one_by_one
 from studies.framework.findings import Effect, Finding, Outcome, means_by
 from studies.framework.provenance import Reference
 from studies.framework.runs import Key, Row, declare, last_columns, run_columns
 from studies.framework.study import COUNT, Study
+from studies.strength import force_history
 
 ANGLE, GAMMA = "crown-leg angle [deg]", "peak acceleration [g]"
 NARROW, SQUARE = 20.0, 90.0  #: The two angles that are compared [deg]
@@ -169,14 +170,6 @@ def chains_through(frame: Frame, forces: RecordedForces, level: float) -> float:
     tension = np.bincount(number.ravel(), upward)
     tension = tension[tension > 0]
     return float(tension.sum() ** 2 / (tension**2).sum()) if len(tension) else math.nan
-
-
-def force_history(run: Run) -> History:
-    """Read the force on the hook over the weight of a staple [-] against the hook's displacement [mm]."""
-    pull = read_pull(run, run.series, run.phases[-1].index)
-    times, force = moving_mean(pull)
-    displacement = 1e3 * np.interp(times, pull.edges, pull.raised)
-    return History(times=displacement, values=force / weight_of_one(run))
 
 
 def ratio(table: pd.DataFrame, gamma: float, *, times: float) -> Effect:
@@ -324,7 +317,7 @@ _BY_ANGLE = one_by_one(ANGLE, "{:g}°".format, last=0.6)
 FIGURES = (
     Histories(
         name="force_raised",
-        history=force_history,
+        history=partial(force_history, of_one=True),
         split=_BY_ANGLE,
         panels=GAMMA,
         panel="Γ = {:g}",

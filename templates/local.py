@@ -172,16 +172,9 @@ def run_folder(
     """Compute the unfinished runs of a sweep, and return one outcome per run in the order of the manifest.
 
     An unfinished run continues from its last checkpoint. A run without a checkpoint, or one that failed, starts from
-    its beginning; its old directory is renamed.
-
-    Args:
-        slots: Number of runs at once; one per core if not given.
-        command: Returns the command that computes a run.
-        poll_s: Time between updates of the display [s].
-        grace_s: Time between one signal to stop and the next stronger one [s].
-
-    Raises:
-        KeyboardInterrupt: Ctrl-C was pressed; all runs were stopped.
+    its beginning; its old directory is renamed. `slots` runs are computed at once, by default one per core; `command`
+    returns the command of a run. The display is updated every `poll_s` [s]; `grace_s` [s] lie between one signal to
+    stop and the next stronger one. KeyboardInterrupt after Ctrl-C, when all runs were stopped.
     """
     with folder.lock() as lock, display:
         runner = _Runner(folder, display, command, slots or usable_cores(), poll_s, grace_s, lock)

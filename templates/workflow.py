@@ -47,9 +47,7 @@ def _walltime(seconds: int) -> str:
 def write_workflow(folder: Folder, tool: str) -> Path:
     """Write the workflow of a sweep into its directory, and return the path.
 
-    Raises:
-        InputError: the directory has a file of this name with other content.
-        RunError: the file cannot be written.
+    InputError if the directory has a file of this name with other content; RunError if the file cannot be written.
     """
     path, text = folder.path / TOOLS[tool], workflow(tool, folder.name, folder.entries)
     if path.exists() and path.read_bytes() != text.encode():

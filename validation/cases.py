@@ -120,14 +120,10 @@ def ladder(  # noqa: PLR0917 # a row of a table
     A test runs it and compares the order at which errors fall with the time step with the expected order.
 
     Args:
-        name: name of the ladder in test ids and tables.
-        about: description of the simulation.
-        quantity: quantity whose error is returned, with its unit.
         size: size of the motion, in the unit of the quantity.
         steps: time steps [s], in decreasing order.
         scheme: expected order of convergence [1] and its reason, for all engines or by engine.
         phases: value of the function's argument `phases` in the short form of the test; None: it has no such argument.
-        options: further keyword arguments of the function.
     """
     by_engine = scheme if isinstance(scheme, dict) else dict.fromkeys(ENGINES, scheme)
     return _register(LADDERS, name, options, about, quantity, size, steps, by_engine, phases)

@@ -64,13 +64,7 @@ def scene_of(
 ) -> dict[str, Any]:
     """Return the scene of a setting as a dictionary: take-over of a poured pile, rest and activity.
 
-    Args:
-        activity: a key of `ACTIVITIES`.
-        poured: run directory of the pour.
-        count: number of smarticles.
-        seed: seed of the scene.
-        seconds: duration of the activity [s].
-        sample: time between two recorded frames [s].
+    The pile was poured in the run directory `poured`. The activity lasts `seconds`, frames are `sample` apart [s].
     """
     recording = {"frame_interval_s": sample, "series_interval_s": sample, "checkpoint_interval_s": None}
     data = {**data_of(count, seed, recording=recording), "engine": "links", **setting.scene}
@@ -103,10 +97,7 @@ def perform(task: Path) -> None:
 def run(folder: Path, setting: Setting, activity: str, seed: int, given: argparse.Namespace) -> Any:
     """Simulate a setting in a separate process; return its row of the table, without the columns of `planned`.
 
-    Args:
-        folder: folder of the poured piles and of all simulations; a missing pile is poured first.
-        activity: one of `setting.activities`.
-        given: options of the command line; `count` and `seconds` are used.
+    Missing piles are poured first. `given` are the options of the command line; `count` and `seconds` are used.
     """
     count, seconds, poured = given.count, given.seconds, folder / f"pile-{given.count}-{seed}"
     if not (poured / "done.json").exists():
@@ -130,10 +121,8 @@ def run(folder: Path, setting: Setting, activity: str, seed: int, given: argpars
 def measured(scene: Scene, shape: str, positions: Array, frames: Array) -> dict[str, float]:
     """Return overlaps [m], packing fractions and rate of sinking [m/s] of a simulation, by column.
 
-    Args:
-        shape: shape that the engine uses for contacts: "boxes", "strands" or "spheres".
-        positions: (2 + F, N, 3, 3) centres of the links at the times that `Outcome.positions` states [m].
-        frames: (2 + F, N, 3, 3, 3) axes of the links as columns, at the same times.
+    Contacts are those of the `shape` that the engine uses: "boxes", "strands" or "spheres". Centres (2 + F, N, 3, 3)
+    [m] and axes (2 + F, N, 3, 3, 3), in columns, of the links are at the times that `Outcome.positions` states.
     """
     before, rested, *acting = zip(positions, frames, strict=True)
     depths = np.array(
@@ -159,11 +148,8 @@ def measured(scene: Scene, shape: str, positions: Array, frames: Array) -> dict[
 def planned(engines: Sequence[str], given: argparse.Namespace) -> Iterator[tuple[Setting, dict[str, Any]]]:
     """Yield the simulations that the options select: setting, and first columns of the row of the table.
 
-    The columns are `engine`, `setting`, `activity` and `seed`.
-
-    Args:
-        engines: keys of `ENGINES` to use.
-        given: options of the command line; `seeds` and `activities` are used.
+    The columns are `engine`, `setting`, `activity` and `seed`. Of the options `given`, `seeds` and `activities` are
+    used.
     """
     for seed, setting in product(given.seeds, SETTINGS):
         if setting.engine in engines and not (setting.costly and seed != given.seeds[0]):

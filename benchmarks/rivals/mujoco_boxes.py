@@ -97,13 +97,9 @@ class InMujoco(World):
         body.add_geom(type=geom, size=sides, pos=centre, quat=_quaternion(frame), mass=0.0, **self._surface)
 
     def _servo(self, spec: Any, hinge: str, barb: int) -> None:
-        """Add a position servo at a hinge to MuJoCo's model `spec`.
+        """Add a position servo to MuJoCo's model `spec`, at the joint `hinge` of the link `barb`, 0 or 2.
 
         It is critically damped for the barb alone, with the middle link fixed.
-
-        Args:
-            hinge: name of the joint in the model.
-            barb: link that turns, 0 or 2.
         """
         limit, boxes = float(self.task.scene.torque_limit), self.task.boxes
         inertia = boxes.link_inertias[barb][2] + boxes.link_masses[barb] * (boxes.barb_length / 2) ** 2

@@ -37,13 +37,7 @@ class Bars:
         return self.centres, np.linalg.norm(self.halves, axis=1)
 
     def depths(self, pairs: Indices) -> Array:
-        """Return the overlaps (P,) [m] of pairs of boxes, by the separating-axis theorem.
-
-        A negative value means that the boxes are apart.
-
-        Args:
-            pairs: (P, 2) indices of the boxes.
-        """
+        """Return the overlaps (P,) [m] of pairs (P, 2) of boxes by separating axes; below 0: apart."""
         one, other = pairs.T
         between = self.centres[other] - self.centres[one]
         frames = np.concatenate([self.frames[one], self.frames[other]], axis=2)
@@ -76,11 +70,7 @@ class Swept:
         return (self.starts + self.ends) / 2, reaches
 
     def depths(self, pairs: Indices) -> Array:
-        """Return the overlaps (P,) [m] of pairs of swept segments; a negative value is a gap.
-
-        Args:
-            pairs: (P, 2) indices of the segments.
-        """
+        """Return the overlaps (P,) [m] of pairs (P, 2) of swept segments; a negative value is a gap."""
         one, other = pairs.T
         ends = self.starts[one], self.ends[one], self.starts[other], self.ends[other]
         return 2 * self.radius - segment_distances(*ends)
@@ -99,14 +89,12 @@ def deepest(solid: Bars | Swept) -> float:
 def solid_of(shape: str, particle: Particle, positions: Array, frames: Array) -> Bars | Swept:
     """Return all links of N smarticles in the shape that an engine uses for contacts.
 
-    Args:
-        shape: "boxes"; "strands", the swept segments of the engine `links`; or "spheres", the chains of spheres of YADE
-            and LAMMPS.
-        positions: (N, 3, 3) centres of the links [m].
-        frames: (N, 3, 3, 3) axes of the links as columns.
+    Shapes are "boxes"; "strands", the swept segments of the engine `links`; and "spheres", chains of YADE and LAMMPS.
+    Centres (N, 3, 3) [m] and axes (N, 3, 3, 3), in columns, are those of the links.
     """
     if shape == "boxes":
-        return _boxes(particle, positions, frames)
+        halves, owners = np.tile(halves_of(particle.boxes), (len(positions), 1)), np.arange(len(positions))
+        return Bars(positions.reshape(-1, 3), frames.reshape(-1, 3, 3), halves, np.repeat(owners, LINKS))
     return (_strands if shape == "strands" else _spheres)(particle, positions, frames)
 
 
@@ -116,20 +104,10 @@ def halves_of(boxes: Boxes) -> Array:
     return np.column_stack([boxes.lengths, sections]) / 2
 
 
-def _boxes(particle: Particle, positions: Array, frames: Array) -> Bars:
-    count = len(positions)
-    halves = np.tile(halves_of(particle.boxes), (count, 1))
-    return Bars(positions.reshape(-1, 3), frames.reshape(-1, 3, 3), halves, np.repeat(np.arange(count), LINKS))
-
-
 def _strands(particle: Particle, positions: Array, frames: Array) -> Swept:
     """Return the strands of all links: one or several equal segments side by side along a link's normal.
 
     The engine `links` has the same strands. A barb's strand goes from the hinge to a radius before the tip.
-
-    Args:
-        positions: (N, 3, 3) centres of the links [m].
-        frames: (N, 3, 3, 3) axes of the links as columns.
     """
     planar = planar_of(particle)
     barb = (-planar.arm, planar.tip - planar.arm)

@@ -95,10 +95,9 @@ class Task:
         return float(self.scene.phases[ACTIVITY].peak_speed(self.scene.gravity_m_per_s2))
 
     def walls(self) -> tuple[Array, Array]:
-        """Return the flat walls that replace the round wall, tangent to it, for engines without round walls.
+        """Return a point (FACETS, 3) [m] and the inward unit normal (FACETS, 3) of each flat wall.
 
-        Returns:
-            A point of each wall, (FACETS, 3) [m], and its unit normal into the container, (FACETS, 3).
+        The walls replace the round wall, tangent to it, for engines without round walls.
         """
         angles = 2 * math.pi * np.arange(FACETS) / FACETS
         outwards = np.column_stack([np.cos(angles), np.sin(angles), np.zeros(FACETS)])

@@ -16,12 +16,9 @@ JOINED = 1e-9  # of the longest bar: ends that are nearer are one joint
 
 
 def first_ends(points: Array) -> Numbers:
-    """Return (2 S,) a number for each end of segments that is the same for all ends at the same point.
+    """Return (2 S,) a number for each end of segments (S, 2, 3) [m], the same for all ends at one point.
 
     End e (0 or 1) of segment s has the number 2 s + e. Of all ends at a point, the lowest number is returned.
-
-    Args:
-        points: (S, 2, 3) ends of the segments [m].
     """
     places = points.reshape(-1, 3)
     longest = np.abs(points[:, 1] - points[:, 0]).max()
@@ -34,9 +31,7 @@ def owners(first: Numbers, inner: Flags) -> Flags:
     Every joint, where ends of several segments meet, has one owner: the first end there whose segment is joined at both
     of its ends, or the first end if there is no such segment. A free end owns its point.
 
-    Args:
-        first: (2 S,) number of the point of each end, from `first_ends`.
-        inner: (2 S,) whether the segment of each end is joined to other segments at both of its ends.
+    `first` are the numbers (2 S,) of `first_ends`; `inner` (2 S,): whether an end's segment is joined at both its ends.
     """
     order = np.lexsort((np.arange(len(first)), ~inner, first))
     found = np.zeros(len(first), np.bool_)
@@ -70,11 +65,8 @@ class Bars:
     """S straight bars of one cross-section that form a rigid body.
 
     Mass and inertia are the sums over one box, or cylinder, per bar. Boxes overlap at joints, where mass counts twice,
-    as in the paper.
-
-    Raises:
-        InputError: a bar is not longer than its thickness, a normal is along its bar, or bars cross or touch
-            elsewhere than at their joints.
+    as in the paper. InputError if a bar is not longer than its thickness, a normal is along its bar, or bars touch
+    elsewhere than at joints.
     """
 
     points: Array  #: (S, 2, 3) both ends of each bar [m], in any frame
@@ -231,11 +223,7 @@ class Bars:
     def axes(self, radius: float) -> tuple[Array, Array]:
         """Return the starts and the ends of the bars' axes, each (S, 3), in the body's frame [m].
 
-        Args:
-            radius: radius of a strand [m], by which free ends are moved inwards.
-
-        Raises:
-            InputError: a bar is so short that nothing is left of its axis.
+        Free ends are moved inwards by the `radius` of a strand [m]; InputError if nothing is left of a bar's axis.
         """
         pulled = radius * self.free
         if not (self.lengths > pulled.sum(axis=1)).all():

@@ -14,11 +14,7 @@ LEAST_NODES = 3  # one place that bends
 
 @dataclass(frozen=True, kw_only=True)
 class Liquid:
-    """A liquid at rest, in which filaments are immersed.
-
-    Raises:
-        InputError: a number is negative or not finite.
-    """
+    """A liquid at rest, in which filaments are immersed; InputError if a number is negative or not finite."""
 
     viscosity: float  #: Dynamic viscosity μ [Pa s]
     density: float  #: [kg/m³]
@@ -34,9 +30,7 @@ class PreferredCurvature:
     At inner node k and time t the two components of curvature in the frame of the filament's material are
     amplitude_k (cos(ψ + phase_k), sin(ψ + phase_k)), with dψ/dt = ± rate; the sign changes at random times. Phases that
     grow along the filament make a helix. γ = rate/(2π reversal_rate) is the mean number of turns between reversals.
-
-    Raises:
-        InputError: a number is not finite, or the reversal rate is negative.
+    InputError if a number is not finite, or the reversal rate is negative.
     """
 
     amplitudes: float | Array  #: Amplitude [1/m]: a number for all inner nodes, or (nodes - 2,)
@@ -96,9 +90,7 @@ class Filament:
 
     A stiffness that is left out follows from Young's modulus. Damping is that of a Kelvin–Voigt material: stress is
     E (ε + τ dε/dt), with the strain ε and two relaxation times τ: one for stretching and twisting, one for bending.
-
-    Raises:
-        InputError: a number is out of its range, or neither Young's modulus nor all three stiffnesses are given.
+    InputError if a number is out of range, or neither Young's modulus nor all three stiffnesses are given.
     """
 
     nodes: int  #: Number of nodes, at least 3

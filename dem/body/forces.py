@@ -37,10 +37,7 @@ class ContactForces:
 def at_links(smarticle: Number, link: Number, each: int = LINKS) -> Number:
     """Return codes of links, 0 or above, for `contacts_of_points`.
 
-    Args:
-        smarticle: numbers of the bodies.
-        link: number of each link, or bar, within its body.
-        each: largest number of links, or bars, of a body; the code is `each` × `smarticle` + `link`.
+    Links are given by their body and their number in it; no body has more than `each`. A code is `each` × body + link.
     """
     return each * smarticle + link
 
@@ -67,10 +64,8 @@ def contacts_of_points(
         second: (P,) codes of the links or boundaries that touch the links of `first`, from `at_links` and
             `at_boundaries`.
         loads: (P,) normal forces, 0 or above [N]; a contact whose points all have 0 is left out.
-        points: (P, 3) positions [m].
         friction: (P, 3) tangential forces on the links of `first` [N].
         forces: (P, 3) total forces on the links of `first` [N].
-        each: most links of a body, as given to `at_links`.
     """
     turned = (second >= 0) & (second < first)
     sign = np.where(turned, -1.0, 1.0)[:, None]

@@ -87,12 +87,10 @@ class Kind:
 
     @property
     def mass(self) -> float:
-        """Mass [kg]."""
         return self.bars.mass
 
     @property
     def inertia(self) -> Array:
-        """(3,) principal moments about the centre of mass [kg m²]."""
         return self.bars.inertia
 
     @property
@@ -102,7 +100,6 @@ class Kind:
 
     @cached_property
     def size(self) -> float:
-        """Length of the longest bar [m]."""
         return float(self.bars.lengths.max())
 
     @cached_property
@@ -112,12 +109,10 @@ class Kind:
 
     @property
     def thicknesses(self) -> tuple[float, float]:
-        """Thickness along the normal and in the plane [m]."""
         return self.bars.thickness_normal, self.bars.thickness_in_plane
 
     @property
     def radius(self) -> float:
-        """Radius of the spheres [m]."""
         return self.diameter / 2
 
     def _stations(self, bar: int) -> Array:
@@ -159,7 +154,6 @@ class Kind:
 
     @property
     def centres(self) -> Array:
-        """(S, 3) centres of the spheres in the body's frame [m]."""
         return self._layout[0]
 
     @property
@@ -169,7 +163,6 @@ class Kind:
 
     @property
     def reach(self) -> float:
-        """Largest distance of a point of bars or spheres from the centre of mass [m]."""
         spheres = float(np.linalg.norm(self.centres, axis=1).max()) + self.radius
         half = self.diameter / 2 if self.bars.round else math.hypot(*self.thicknesses) / 2
         return max(spheres, float(np.linalg.norm(self.bars.ends, axis=2).max()) + half)
@@ -193,9 +186,7 @@ class Mixture:
     def mean(self, values: Sequence[float], kinds: Numbers | None = None) -> float:
         """Return the mean over bodies of a quantity that each kind has; NaN without bodies.
 
-        Args:
-            values: (K,) value of the quantity for each kind.
-            kinds: (n,) kind of each body; None: all bodies of the pile.
+        `values` (K,) are those of the kinds, `kinds` (n,) the kinds of the bodies; None: all bodies of the pile.
         """
         each = np.array(values)[self.of if kinds is None else kinds]
         return float(each.mean()) if len(each) else float("nan")
@@ -301,12 +292,7 @@ def bodies_of(model: Particle | Mixture) -> tuple[Particle | Kind, ...]:
 
 
 def body_of(model: Particle | Mixture, kinds: Sequence[int] | Numbers, number: int) -> Particle | Kind:
-    """Return the smarticle or, in a mixture, the kind of one body.
-
-    Args:
-        kinds: (N,) index of each body's kind in the mixture.
-        number: number of the body.
-    """
+    """Return the smarticle or, in a mixture, the kind of body `number`; `kinds` (N,) are those of all."""
     return model if isinstance(model, Particle) else model.kinds[kinds[number]]
 
 

@@ -128,12 +128,7 @@ def link_of(length: float, *, thickness_normal: float, thickness_in_plane: float
 def layout_of(lengths: Sequence[float], joints: Sequence[Joint]) -> tuple[Array, Array]:
     """Return both ends (n, 2, 3) [m] and the normals (n, 3) of the links of a linkage as it is poured.
 
-    Args:
-        lengths: lengths of the n links [m].
-        joints: the joints between them.
-
-    Raises:
-        InputError: there are not n - 1 joints.
+    Lengths of the n links are in [m]; InputError unless there are n - 1 joints.
     """
     if len(joints) != len(lengths) - 1:
         raise InputError(

@@ -50,11 +50,8 @@ def chain_mean_width(pitch: float) -> float:
     nearest to each other in a view along the common normal. If these spheres are r diameters apart in this view, the
     axes are √(1 - r²) diameters apart. The mean is taken over the positions of both chains along their axes (uniform
     over a period) and over isotropic directions (density sin γ), weighted by sin γ, the area of the parallelogram in
-    the excluded volume.
-
-    Args:
-        pitch: distance of neighbouring sphere centres over the diameter [1]; below √2, from which on chains pass
-            through each other.
+    the excluded volume. The pitch is the distance of neighbouring spheres over their diameter [1], below √2, from which
+    on chains pass through each other.
     """
     nodes, weights = np.polynomial.legendre.leggauss(24)
     angles = math.pi / 4 * (nodes + 1)
@@ -235,8 +232,7 @@ class SphereChain:
 class Particle:
     """A smarticle as engines compute it: its boxes, and the spheres that represent them in contacts.
 
-    Raises:
-        InputError: the spheres are larger than half the middle link's length.
+    InputError if the spheres are larger than half the middle link's length.
     """
 
     boxes: Boxes
@@ -323,7 +319,6 @@ class Particle:
 
     @property
     def centres(self) -> Array:
-        """(S, 3) float64 [m]: sphere centres in the body frame."""
         return self._layout[0]
 
     @property
@@ -339,12 +334,10 @@ class Particle:
 
     @property
     def radius(self) -> float:
-        """Sphere radius [m]."""
         return self.chain.diameter / 2
 
     @property
     def reach(self) -> float:
-        """Largest distance [m] of a point of boxes or spheres from the centre of mass."""
         spheres = float(np.linalg.norm(self.centres, axis=1).max()) + self.radius
         half = math.hypot(self.boxes.thickness_normal, max(self.boxes.thicknesses_in_plane)) / 2
         return max(spheres, float(np.linalg.norm(self.boxes.vertices, axis=1).max()) + half)
@@ -356,27 +349,22 @@ class Particle:
 
     @property
     def mass(self) -> float:
-        """Mass of the smarticle [kg]."""
         return self.boxes.mass
 
     @property
     def inertia(self) -> Array:
-        """(3,) float64 [kg m²]: principal moments about the centre of mass, along the body axes."""
         return self.boxes.inertia
 
     @property
     def volume(self) -> float:
-        """Solid volume [m³], see `Boxes.volume`."""
         return self.boxes.volume
 
     @property
     def size(self) -> float:
-        """Length of the middle link, w [m]."""
         return self.boxes.middle_length
 
     @property
     def thicknesses(self) -> tuple[float, float]:
-        """Thickness along the normal and, of the barbs, in the plane [m]."""
         return self.boxes.thickness_normal, self.boxes.thickness_in_plane
 
     @property
@@ -391,11 +379,7 @@ def smallest_effective_mass(mass: float, inertia: Array, centres: Array) -> floa
     A force F in the direction n at a point r from the centre of mass accelerates that point along n by
     (1/m + (r × n)·I⁻¹(r × n)) F. The effective mass is the inverse of the largest eigenvalue of this mobility. It
     limits the stable time step: at barb tips it is several times smaller than the mass.
-
-    Args:
-        mass: [kg].
-        inertia: (3,) principal moments [kg m²].
-        centres: (n, 3) points, from the centre of mass, along the principal axes [m].
+    Arguments are the mass [kg], principal moments (3,) [kg m²], and points (n, 3) along the principal axes [m].
     """
     inverse, (x, y, z) = 1.0 / inertia, centres.T
     # A push on a sphere acts at its surface, but the normal passes through the centre.

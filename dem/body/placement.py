@@ -44,7 +44,8 @@ def place_layer(
     """Return random poses of `count` bodies without overlap, in a slab of a cylinder.
 
     Orientations are uniform over all rotations, centres uniform over the cylinder's section, and heights of the lowest
-    points uniform over the slab. Poses that overlap are drawn again. A slab that is too full is made higher.
+    points uniform over the slab. Poses that overlap are drawn again. A slab that is too full is made higher; RunError
+    if bodies still overlap after it was made higher `MOST_GROWTH` times.
 
     Args:
         bodies: one body, which is placed `count` times, or `count` bodies.
@@ -55,9 +56,6 @@ def place_layer(
         narrower: function from heights (n,) to inner radii (n,) of the cylinder [m], which must not increase with
             height; None: `radius` everywhere.
         thickest: radius of the largest obstacles, if it is above the radii of all `bodies` [m].
-
-    Raises:
-        RunError: some bodies still overlap after the slab was made higher `MOST_GROWTH` times.
     """
     each = bodies if isinstance(bodies, Sequence) else [bodies] * count
     thickest = max(thickest, *(body.radius for body in each))
@@ -107,11 +105,8 @@ def fitted_poses(boxes: Boxes, vertices: Array) -> tuple[Poses, Array]:
     Vertices do not determine the rotation of a straight shape about its length. The angle of this rotation is then
     arbitrary, but equal vertices give equal angles.
 
-    Args:
-        vertices: (N, 4, 3) barb tip, hinge, hinge, barb tip of each smarticle [m].
-
-    Returns:
-        The poses, and for each smarticle the largest distance between a given and a fitted vertex, (N,) [m].
+    Vertices (N, 4, 3) are barb tip, hinge, hinge, barb tip [m]. Returns the largest distance (N,) of a fitted vertex
+    [m], too.
 
     Source: Horn, J. Opt. Soc. Am. A 4, 629 (1987).
     """

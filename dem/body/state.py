@@ -108,22 +108,18 @@ class BarState:
 
     @property
     def count(self) -> int:
-        """Number of bodies, N."""
         return len(self.positions)
 
     @property
     def smarticles(self) -> State:
-        """Raise InputError, since these bodies have no barbs."""
         raise InputError("particle: these bodies are no smarticles, and have no barbs; leave particle out")
 
     @property
     def bodies(self) -> Self:
-        """This state, since the bodies are no smarticles."""
         return self
 
     @property
     def volume(self) -> float:
-        """Mean solid volume of the bodies present, or of all bodies of the scene if none is present [m³]."""
         return self.mixture.mean(self.mixture.volumes.tolist(), self.kind if self.count else None)
 
     @cached_property
@@ -143,12 +139,10 @@ class BarState:
 
     @cached_property
     def tops(self) -> Array:
-        """(N,) height of the highest point on the axes of each body's bars, or links [m]."""
         return self._largest(self.segments[..., 2].max(axis=1))
 
     @cached_property
     def speeds(self) -> Array:
-        """(N,) largest speed of the centres of each body's bars [m/s]."""
         return self._largest(np.linalg.norm(self.bar_velocities, axis=1))
 
     def _largest(self, values: Array) -> Array:
@@ -167,7 +161,6 @@ class BarState:
 
     @cached_property
     def momentum(self) -> Array:
-        """(3,) momentum of all bodies [kg m/s]."""
         return np.asarray((self._masses[:, None] * self.velocities).sum(axis=0))
 
 
@@ -190,30 +183,25 @@ class RigidState(BarState):
 
     @cached_property
     def segments(self) -> Array:
-        """(M, 2, 3) both ends of all bars [m]."""
         local = self.mixture.ends[self._bar_of_kind]
         turned = matrix_product(self.rotations[self.body, None], local[..., None])[..., 0]
         return np.asarray(turned + self.positions[self.body, None])
 
     @cached_property
     def normals(self) -> Array:
-        """(M, 3) unit vectors along the normal of each bar; zeros where the section is round [1]."""
         local = self.mixture.normals[self._bar_of_kind]
         return matrix_product(self.rotations[self.body], local[..., None])[..., 0]
 
     @cached_property
     def bar_velocities(self) -> Array:
-        """(M, 3) velocities of the bars' centres [m/s]."""
         arms = self.segments.mean(axis=1) - self.positions[self.body]
         return self.velocities[self.body] + np.cross(self.spins[self.body], arms)
 
     @cached_property
     def bar_spins(self) -> Array:
-        """(M, 3) angular velocities of the bars [rad/s]."""
         return self.spins[self.body]
 
     def spheres(self) -> Array:
-        """Return (N, S, 3) centres of all spheres [m]; a body with fewer than S spheres repeats its last one."""
         local = self.mixture.spheres[self.kind]
         return matrix_product(local, np.swapaxes(self.rotations, 1, 2)) + self.positions[:, None]
 
@@ -225,7 +213,6 @@ class RigidState(BarState):
 
     @cached_property
     def angular_momentum(self) -> Array:
-        """(3,) angular momentum of all bodies about the origin [kg m²/s]."""
         inertias, spins = self._own_spins
         own = matrix_product(self.rotations, (inertias * spins)[..., None])[..., 0]
         orbital = np.cross(self.positions, self._masses[:, None] * self.velocities)
@@ -233,12 +220,10 @@ class RigidState(BarState):
 
     @cached_property
     def kinetic_energy(self) -> float:
-        """Translational and rotational kinetic energy of all bodies [J]."""
         inertias, spins = self._own_spins
         return float(0.5 * ((self._masses[:, None] * self.velocities**2).sum() + (inertias * spins**2).sum()))
 
     def potential_energy(self, gravity: float, floor: float) -> float:
-        """Return the gravitational energy [J] of all bodies, 0 at the height `floor` [m]; gravity in m/s²."""
         return float((self._masses * gravity * (self.positions[:, 2] - floor)).sum())
 
 
@@ -255,7 +240,6 @@ class FilamentState(BarState):
 
     @property
     def count(self) -> int:
-        """Number of filaments, N."""
         return len(self.kind)
 
     @cached_property
@@ -284,17 +268,14 @@ class FilamentState(BarState):
 
     @cached_property
     def positions(self) -> Array:  # type: ignore[override]
-        """(N, 3) centres of mass [m]."""
         return self._mean(self.nodes)
 
     @cached_property
     def velocities(self) -> Array:  # type: ignore[override]
-        """(N, 3) velocities of the centres of mass [m/s]."""
         return self._mean(self.node_velocities)
 
     @cached_property
     def segments(self) -> Array:
-        """(M, 2, 3) both ends of all segments [m]."""
         return np.stack([self.nodes[self._starts], self.nodes[self._starts + 1]], axis=1)
 
     @cached_property
@@ -309,12 +290,10 @@ class FilamentState(BarState):
 
     @cached_property
     def bar_velocities(self) -> Array:
-        """(M, 3) velocities of the segments' centres [m/s]."""
         return 0.5 * (self.node_velocities[self._starts] + self.node_velocities[self._starts + 1])
 
     @cached_property
     def bar_spins(self) -> Array:
-        """(M, 3) angular velocities of the segments [rad/s]."""
         edges = self._edges
         opening = self.node_velocities[self._starts + 1] - self.node_velocities[self._starts]
         squares = (edges**2).sum(axis=1)
@@ -329,7 +308,6 @@ class FilamentState(BarState):
 
     @cached_property
     def angular_momentum(self) -> Array:
-        """(3,) angular momentum of all filaments about the origin [kg m²/s]."""
         edges = self._edges
         tangents = edges / np.sqrt((edges**2).sum(axis=1))[:, None]
         orbital = np.cross(self.nodes, self.node_masses[:, None] * self.node_velocities)
@@ -357,7 +335,6 @@ class LinkageState(BarState):
 
     @property
     def count(self) -> int:
-        """Number of linkages, N."""
         return len(self.kind)
 
     def _mean(self, values: Array) -> Array:
@@ -368,17 +345,14 @@ class LinkageState(BarState):
 
     @cached_property
     def positions(self) -> Array:  # type: ignore[override]
-        """(N, 3) centres of mass [m]."""
         return self._mean(self.links.positions)
 
     @cached_property
     def velocities(self) -> Array:  # type: ignore[override]
-        """(N, 3) velocities of the centres of mass [m/s]."""
         return self._mean(self.links.velocities)
 
     @property
     def segments(self) -> Array:
-        """(M, 2, 3) both ends of all links [m]."""
         return self.links.segments
 
     @cached_property
@@ -392,31 +366,25 @@ class LinkageState(BarState):
 
     @property
     def normals(self) -> Array:
-        """(M, 3) unit vectors along the normal of each link; zeros where the section is round [1]."""
         return self.links.normals
 
     @property
     def bar_velocities(self) -> Array:
-        """(M, 3) velocities of the links' centres [m/s]."""
         return self.links.velocities
 
     @property
     def bar_spins(self) -> Array:
-        """(M, 3) angular velocities of the links [rad/s]."""
         return self.links.spins
 
     @property
     def angular_momentum(self) -> Array:
-        """(3,) angular momentum of all linkages about the origin [kg m²/s]."""
         return self.links.angular_momentum
 
     @property
     def kinetic_energy(self) -> float:
-        """Translational and rotational kinetic energy of all links [J]."""
         return self.links.kinetic_energy
 
     def potential_energy(self, gravity: float, floor: float) -> float:
-        """Return the gravitational energy [J] of all linkages, 0 at the height `floor` [m]; gravity in m/s²."""
         return self.links.potential_energy(gravity, floor)
 
 
@@ -462,17 +430,14 @@ class State:
 
     @property
     def count(self) -> int:
-        """Number of smarticles, N."""
         return len(self.link_positions)
 
     @cached_property
     def positions(self) -> Array:
-        """(N, 3) centres of mass of the smarticles [m]."""
         return self._mean(self.link_positions)
 
     @cached_property
     def velocities(self) -> Array:
-        """(N, 3) velocities of the centres of mass [m/s]."""
         return self._mean(self.link_velocities)
 
     def _mean(self, values: Array) -> Array:
@@ -480,7 +445,6 @@ class State:
 
     @property
     def smarticles(self) -> State:
-        """This state, since the bodies are smarticles."""
         return self
 
     @property
@@ -489,17 +453,14 @@ class State:
 
     @property
     def volume(self) -> float:
-        """Mean solid volume of the bodies present, or of all bodies of the scene if none is present [m³]."""
         return self.boxes.volume
 
     @property
     def tops(self) -> Array:
-        """(N,) height of the highest point on the axes of each body's bars, or links [m]."""
         return np.asarray(self.vertices[..., 2].max(axis=1))
 
     @property
     def speeds(self) -> Array:
-        """(N,) largest speed of the centres of each smarticle's links [m/s]."""
         return np.asarray(np.linalg.norm(self.link_velocities, axis=-1).max(axis=-1))
 
     @cached_property
@@ -528,19 +489,16 @@ class State:
 
     @cached_property
     def momentum(self) -> Array:
-        """(3,) momentum of all smarticles [kg m/s]."""
         return np.asarray(self.boxes.mass * self.velocities.sum(axis=0))
 
     @cached_property
     def angular_momentum(self) -> Array:
-        """(3,) angular momentum of all smarticles about the origin [kg m²/s]."""
         orbital = np.cross(self.link_positions, self.link_velocities) * self.boxes.link_masses[None, :, None]
         own = np.einsum("nkij,nkj->nki", self.link_rotations, self.boxes.link_inertias * self._local_spins)
         return np.asarray((orbital + own).sum(axis=(0, 1)))
 
     @cached_property
     def kinetic_energy(self) -> float:
-        """Translational and rotational kinetic energy of all links [J]."""
         boxes = self.boxes
         translation = (boxes.link_masses[None, :, None] * self.link_velocities**2).sum()
         rotation = (boxes.link_inertias * self._local_spins**2).sum()
@@ -552,7 +510,6 @@ class State:
         return np.asarray(np.einsum("nkij,nki->nkj", self.link_rotations, self.link_spins))
 
     def potential_energy(self, gravity: float, floor: float) -> float:
-        """Return the gravitational energy [J] of all smarticles, 0 at the height `floor` [m]; gravity in m/s²."""
         heights = self.positions[:, 2] - floor
         return float(self.boxes.mass * gravity * heights.sum())
 

@@ -108,8 +108,7 @@ class Boundaries(Protocol):
             walls: whether wall, hooks and plate move with the floor.
             from_rest: by A (1 - cos(2πf t)) instead, upwards from the present height, so that it begins at rest.
 
-        Raises:
-            RunError: the engine was built without a shaker.
+        RunError if the engine was built without a shaker.
         """
 
     def stop_shaking(self) -> None:
@@ -122,10 +121,9 @@ class Boundaries(Protocol):
         """Move the upper hook upwards at a speed [m/s] from now on."""
 
     def place_plate(self, height: float) -> None:
-        """Put a horizontal plate without edges at a height of its lower face [m]; it is at rest.
+        """Put a horizontal plate without edges, at rest, at a height of its lower face [m].
 
-        Raises:
-            RunError: the engine has no plates.
+        RunError if the engine has no plates.
         """
 
     def move_plate(self, speed: float) -> None:
@@ -156,10 +154,7 @@ class Boundaries(Protocol):
 
 
 class Motors(Protocol):
-    """Motors at the hinges.
-
-    Smarticles are welded (rigid) at first; they can be articulated and welded again.
-    """
+    """Motors at the hinges. Smarticles are welded at first, can be articulated and welded again."""
 
     @property
     def present(self) -> bool:
@@ -249,8 +244,7 @@ class Filaments(Protocol):
     def grip(self, nodes: Mapping[int, Sequence[int]]) -> int:
         """Hold nodes or links by a new grip, which is at rest; return the number of the grip.
 
-        Args:
-            nodes: numbers of the held nodes or links, by the number of their body; negative numbers count from its end.
+        `nodes` are numbers of nodes or links by the number of their body; negative numbers count from its end.
         """
 
     def move(self, grip: int, velocity: tuple[float, float, float]) -> None:
@@ -451,23 +445,12 @@ class Engine(Protocol):
 
         None: on this engine extremes are not faster than a check of each body, or each body must be checked since the
         extremes alone do not show that all limits hold.
-
-        Args:
-            state: present state of the engine.
         """
 
     # -- checkpoints -------------------------------------------------------------------------------------------
 
     def save(self, scratch: Path) -> Saved:
-        """Return the state, from which `load` continues with identical bits.
-
-        Args:
-            scratch: folder for temporary files.
-        """
+        """Return the state, from which `load` continues with identical bits."""
 
     def load(self, saved: Saved, scratch: Path) -> None:
-        """Replace the state by one that `save` returned for an engine of this scene.
-
-        Args:
-            scratch: folder for temporary files.
-        """
+        """Replace the state by one that `save` returned for an engine of this scene."""

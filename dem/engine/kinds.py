@@ -33,12 +33,7 @@ class EngineKind(Protocol):
         """Return the largest stable time step [s]; `articulated`: whether barbs can turn or have turned."""
 
     def seconds_per_second(self, scene: Demand, time_step: float, activity: Activity) -> float:
-        """Return the estimated wall time per simulated time [1] of a phase on one core.
-
-        Args:
-            time_step: time step of the phase [s].
-            activity: kind of the phase.
-        """
+        """Return the estimated wall time per simulated time [1] of a phase on one core."""
 
     def seconds_to_compile(self, scene: Demand) -> float:
         """Return the estimated processor time [s] to compile the code that a scene needs and the cache lacks."""
@@ -46,8 +41,7 @@ class EngineKind(Protocol):
     def build(self, scene: Demand, time_step: float) -> Engine:
         """Return a simulation of a scene, without bodies yet.
 
-        Args:
-            time_step: shortest time step of all phases [s]; whether it is stable is not checked.
+        `time_step` is the shortest of all phases [s]; whether it is stable is not checked.
         """
 
 

@@ -26,8 +26,7 @@ Offsets = Annotated[
 def _length_of_motions(data: dict[str, Any]) -> float:
     """Return the longest duration of the motions of an `actuate` phase [s]; inf if one has no end.
 
-    Args:
-        data: values of the phase's fields, by name; motions are under `barbs`, `barb_1` and `barb_2`.
+    `data` are the phase's fields; motions are under `barbs`, `barb_1` and `barb_2`.
     """
     motions = [data[key] for key in ("barbs", "barb_1", "barb_2") if data.get(key) is not None]
     return max((motion.duration for motion in motions), default=math.inf)

@@ -63,11 +63,8 @@ class ActuatedPhase(Phase):
     def source_of(self, key: str) -> tuple[str, float | None]:
         """Return the key in the scene file that a user must change to change a parameter of a motion.
 
-        Args:
-            key: parameter of a motion in the phase's `Gait`, with dots for nesting, such as `barbs.steps.0.duration_s`.
-
-        Returns:
-            The key, relative to this phase, and its value; None if it is not given.
+        `key` has dots for nesting, such as `barbs.steps.0.duration_s`. Returns the key relative to this phase, and its
+        value; None if it is not given.
         """
         raise NotImplementedError
 
@@ -107,12 +104,8 @@ class ActuatedPhase(Phase):
 
         The first call articulates the smarticles.
 
-        Args:
-            check_every: no call goes beyond a multiple of this number of updates, counted from the beginning of the
-                phase, so that the caller can check the pile there; None: no such limit.
-
-        Returns:
-            The simulated time until the next call [s]; 0 at the end of the phase.
+        With `check_every`, no call goes beyond a multiple of this number of updates since the phase began, so that the
+        caller can check the pile there. Returns the simulated time until the next call [s]; 0 at the end of the phase.
         """
         update: int = stage.memory["look"]
         if update == 0:
@@ -286,10 +279,7 @@ def _of_control(scene: SceneView) -> Iterator[str]:
 def _whole_fraction(whole: float, parts: int) -> str:
     """Return a time of few digits of which `whole` is a multiple, as text [s].
 
-    Args:
-        whole: the multiple [s].
-        parts: least number of times that the returned time fits into `whole`. The smallest number that gives few
-            digits is used, or `parts` if none is found.
+    The time fits into `whole` at least `parts` times: the smallest number that gives few digits, or `parts`.
     """
     for more in range(parts, min(10 * parts, parts + MOST_PARTS) + 1):
         text = f"{whole / more:.3g}"
@@ -328,12 +318,9 @@ def _of_motions(scene: SceneView, index: int) -> Generator[str, None, tuple[floa
 
 
 def _of_range(place: str, present: float, swing: Sine | Triangle, reached: tuple[float, float]) -> Iterator[str]:
-    """Yield an error if a swing leaves the range of the hinges.
+    """Yield an error if a swing leaves the range of the hinges; `reached`: its lowest and highest angle [deg].
 
-    Args:
-        place: key in the scene file that sets the amplitude of the swing.
-        present: value of this key [deg].
-        reached: lowest and highest angle of the swing [deg].
+    `place` is the key in the scene file that sets the amplitude, `present` its value [deg].
     """
     lowest, highest = HINGE_RANGE
     too_low, too_high = lowest - reached[0], reached[1] - highest

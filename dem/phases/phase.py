@@ -136,19 +136,11 @@ class Phase:
         return "speed_m_per_s"
 
     def pushing_speed(self, gravity: float) -> float:
-        """Return the greatest speed [m/s] of the boundary that the phase moves; 0 if it moves none.
-
-        Args:
-            gravity: acceleration of gravity [m/s²].
-        """
+        """Return the greatest speed [m/s] of the boundary that the phase moves; 0 for none; gravity [m/s²]."""
         return 0.0
 
     def peak_speed(self, gravity: float) -> float:
-        """Return the greatest speed [m/s] that the phase gives to smarticles, without speeds from falls.
-
-        Args:
-            gravity: acceleration of gravity [m/s²].
-        """
+        """Return the greatest speed [m/s] that the phase gives to smarticles, but for falls; gravity [m/s²]."""
         shaken = 0.0 if self.vibrated_by is None else self.vibrated_by.peak_speed(gravity)
         return self.pushing_speed(gravity) + shaken
 
@@ -193,8 +185,7 @@ class Phase:
     def proceed(self, stage: Stage, engine: Engine) -> float:
         """Do what is due now; return the simulated time [s] until the next call, 0 at the end of the phase.
 
-        Raises:
-            RunError: the phase cannot go on, or its criterion was not met in time; one line with values and limits.
+        RunError, with values and limits, if the phase cannot go on, or its criterion was not met in time.
         """
         raise NotImplementedError
 
@@ -270,10 +261,7 @@ def waits_in_vain(memory: Memory, energy: float, longest: float) -> bool:
 
     Low gravity, bounces with little loss, or friction alone make long waits, but energy then decays all the time.
 
-    Args:
-        memory: memory of the stage, see `begin_wait`.
-        energy: kinetic energy of the pile [J].
-        longest: wait after which the pile must lose energy [s].
+    The memory is that of the stage, see `begin_wait`; the energy is the kinetic energy of the pile [J].
     """
     if "judged" not in memory:  # a run that an older version has begun
         memory.update(judged=0.0, energy=0.0, before=0.0)
@@ -288,12 +276,9 @@ def waits_in_vain(memory: Memory, energy: float, longest: float) -> bool:
 def has_settled(settle: Settle, memory: Memory, engine: Engine) -> bool:
     """Return whether the pile has settled; to be called every `CHECK_INTERVAL`.
 
-    Args:
-        memory: memory of the stage, see `begin_wait`. Its `waited` is the time since the wait began [s], which the
-            phase updates; `still` is the time for which both limits have held [s], which this function updates.
-
-    Raises:
-        RunError: the pile has not settled within `settle.timeout_s`, and no longer comes nearer to rest.
+    Of the memory, see `begin_wait`, `waited` is the time since the wait began [s], which the phase updates; `still`,
+    updated here, is the time for which both limits have held [s]. RunError if the pile has not settled within
+    `settle.timeout_s`, and no longer comes nearer to rest.
     """
     state = engine.state()
     speed = float(np.linalg.norm(state.velocities, axis=1).max())

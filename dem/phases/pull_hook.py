@@ -130,10 +130,8 @@ _DEFAULTS = {"distance_m": (2, 0), "speed_m_per_s": (1, 0)}
 def with_pull_defaults(phase: Any, sizes: tuple[float, float]) -> Any:
     """Return unvalidated data of a phase; in those of a pull-hook, missing keys are filled in.
 
-    Args:
-        phase: data of a phase of any type.
-        sizes: lengths from which the defaults follow [m]: (w, t2) of the smarticle, or (longest bar, smallest
-            thickness) of other bodies.
+    The defaults follow from `sizes` [m]: (w, t2) of the smarticle, or (longest bar, smallest thickness) of other
+    bodies.
     """
     pulls = isinstance(phase, Mapping) and phase.get("type") == "pull-hook"
     return with_defaults(phase, _DEFAULTS, sizes) if pulls else phase

@@ -67,9 +67,7 @@ class Taken:
 def take(path: Path, frame: int | str) -> Taken:
     """Return a frame of the run at a path, by its number or `LAST`.
 
-    Raises:
-        InputError: run or frame are missing or damaged, or the run has not ended; the message begins with the key that
-            is wrong, `run` or `frame`.
+    InputError, which begins with the wrong key, if run or frame are missing or damaged, or the run has not ended.
     """
     try:
         run = open_run(path)

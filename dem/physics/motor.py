@@ -34,11 +34,8 @@ class MotorLaw:
 def speed_factor(law: int, over: Any) -> Any:
     """Return the factor on a motor's speed limit [1].
 
-    It is `EASED` under the law "ease" at the torque limit, and otherwise 1.
-
-    Args:
-        law: index of the law in `LAWS`.
-        over: whether the torque has reached its limit.
+    It is `EASED` under the law "ease" at the torque limit, and otherwise 1. `law` is an index in `LAWS`; `over`:
+    whether the torque has reached its limit.
     """
     return 1.0 - (1.0 - EASED) * over if law == EASE else 1.0
 

@@ -44,10 +44,8 @@ class Extremes:
 def held_between(touched: Mapping[int, Collection[str]], raised: Mapping[str, float], least: float) -> tuple[Held, ...]:
     """Return the bodies that touch two boundaries whose distance has changed by more than `least` [m].
 
-    Args:
-        touched: names of the boundaries that a body touches, by the body's number.
-        raised: rise of each boundary since the start [m], by its name.
-        least: smallest change of distance that counts [m].
+    `touched` has the names of the boundaries that a body touches, `raised` the rise of each boundary since the start
+    [m].
     """
     return tuple(
         Held(k, (first, second), apart)

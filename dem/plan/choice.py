@@ -162,9 +162,6 @@ def _named_fidelities(rows: Sequence[dict[str, str]]) -> dict[tuple[str, str], d
 
     Only rows whose errors have the same reference are returned: those with `engine` in the column `knob` if there are
     any, otherwise those with `fidelity`.
-
-    Args:
-        rows: all rows of the table: texts by name of the column.
     """
     named = {row[_VALUE]: row for row in rows if row[_KNOB] == "engine"} or {
         # Older tables lack the column.
@@ -234,15 +231,10 @@ def choose(
 ) -> Choice:
     """Choose the cheapest fidelity within `max_error`; if that is None, the most exact within `max_hours`.
 
-    One of the two limits must be given.
+    One of the two limits must be given. InputError, with a limit that can be kept, if no fidelity is within the limits.
 
-    Args:
-        scene: the scene; its own engine and fidelity are ignored.
-        max_error: largest relative error of the quantities for which `table` was read [1].
-        max_hours: longest wall time on one core [h].
-
-    Raises:
-        InputError: no fidelity is within the limits; the message gives a limit that can be kept.
+    The scene's own engine and fidelity are ignored. `max_error` is relative [1], of the quantities for which `table`
+    was read; `max_hours` is wall time on one core [h].
     """
     plans: dict[str, Plan] = {}
     expected: list[Measured] = []
@@ -270,13 +262,8 @@ def pick(expected: Sequence[Measured], *, max_error: float | None, max_hours: fl
     are relative, if the reference takes at most `max_hours`. If it takes longer, each engine's finest fidelity within
     `max_hours` is a candidate, and the candidate with the least error is taken; unknown errors count as infinite.
 
-    Args:
-        expected: fidelities of all engines, those of one engine from coarse to fine.
-        max_error: largest relative error [1].
-        max_hours: longest wall time [h].
-
-    Raises:
-        InputError: no fidelity is within the limits, or the cheapest one within `max_error` takes too long.
+    `expected` has those of one engine from coarse to fine. InputError if none is within the limits, or the cheapest
+    within `max_error` takes too long.
     """
     quick = [one for one in expected if max_hours is None or one.hours <= max_hours]
     if max_error is None:

@@ -75,11 +75,13 @@ class Plan:
         smooth = f"smooth links of {_strands(self.most_strands)}"
         section = smooth if self.strands else f"{self.spheres_per_smarticle} spheres"
         wall = "in a plane" if self.planar else f"wall {1e3 * self.container_height_m:.0f} mm high"
+        first = next(k for k, phase in enumerate(self.phases) if phase.time_step_s == self.time_step_s)
+        earlier = f" from phase {first} on, {self.phases[0].time_step_s:.3g} s before" if first else ""
         lines = [
             f"{self.name}: {self.count} {self.bodies} of {section}, d = {1e3 * self.sphere_diameter_m:.3g} mm, {wall}",
             *self._engine_to_text(),
             *self.protocol,
-            self._steps_to_text(),
+            f"time step {self.time_step_s:.3g} s (stable up to {self.stable_time_step_s:.3g} s)" + earlier,
             "contacts give way by about "
             + ", ".join(f"{overlap:.2g} of a link's thickness in {cause}" for cause, overlap in self.overlaps.items()),
             "",
@@ -122,11 +124,6 @@ class Plan:
             f"fidelity {self.fidelity}: {_strands(self.strands)}, {self.stiffness_N_per_m:g} N/m, time step "
             f"{self.time_step_s / self.stable_time_step_s:.2g} of the stable one{usual}",
         ]
-
-    def _steps_to_text(self) -> str:
-        first = next(k for k, phase in enumerate(self.phases) if phase.time_step_s == self.time_step_s)
-        longest = f"time step {self.time_step_s:.3g} s (stable up to {self.stable_time_step_s:.3g} s)"
-        return f"{longest} from phase {first} on, {self.phases[0].time_step_s:.3g} s before" if first else longest
 
 
 def _wall_time(wall: float) -> str:
@@ -274,10 +271,8 @@ def protocol_lines(scene: Scene) -> tuple[str, ...]:
 def _protocol_keys(scene: Scene, rules: Mapping[str, Mapping[str, Any]]) -> Iterator[tuple[str, Any, Any]]:
     """Yield (key, value in the scene, value in the protocol) for each key of a scene that the protocol sets.
 
-    A key is dotted, such as `phases.0.moves`.
-
-    Args:
-        rules: the protocol: values by key, by part of the scene or type of phase.
+    A key is dotted, such as `phases.0.moves`. `rules` has the protocol's values by key, by part of the scene or type of
+    phase.
     """
     for part in PARTS:
         if applies(part, plane=scene.plane is not None, tiers=scene.container.tiers is not None):

@@ -33,9 +33,8 @@ def stable_step(scene: Scene) -> float:
 def time_step(scene: Scene) -> float:
     """Return the time step [s] of a scene, a whole fraction of its recording and control intervals.
 
-    Raises:
-        InputError: `fidelity.time_step_s` is above the stable step, contacts on the engine links are too soft, or a
-            servo's control interval has more than one step.
+    InputError if `fidelity.time_step_s` is above the stable step, contacts on the engine links are too soft, or a
+    servo's control interval has more than one step.
     """
     # On links the barrier bears any load, but large overlaps need many sub-steps.
     if scene.smooth and (soft := too_soft(scene)):
@@ -68,11 +67,8 @@ def time_steps(scene: Scene) -> tuple[float, ...]:
     step of a scene without motors, since their smarticles are still rigid in the initial shape. Their results are
     bitwise equal to those of that scene. Smarticles that are welded later keep the barb angles that their motors
     reached, for which the longer step is not known to be stable. In a plane, or if `fidelity.time_step_s` is given,
-    there is no exception.
-
-    Raises:
-        InputError: as in `time_step`, or a wall, hook, string or shaking moves too fast for the step of its phase, or
-            the scene cannot end, see `dem.plan.ends`.
+    there is no exception. InputError as in `time_step`, or if a wall, hook, string or shaking moves too fast for the
+    step of its phase, or the scene cannot end, see `dem.plan.ends`.
     """
     count, shortest = len(scene.phases), time_step(scene)
     first = next((k for k, phase in enumerate(scene.phases) if phase.actuates), count)
@@ -99,11 +95,7 @@ def _steps_in(interval: float, wanted: float) -> int:
 
 
 def _check_speeds(scene: Scene, steps: Sequence[float]) -> None:
-    """Raise InputError if boundaries or strings move so fast in a time step that contacts cannot follow.
-
-    Args:
-        steps: time step of each phase [s].
-    """
+    """Raise InputError if boundaries or strings move so fast in a time step that contacts cannot follow."""
     diameter = scene.sphere_diameter
     for index, (phase, step) in enumerate(zip(scene.phases, steps, strict=True)):
         most, gravity, vibration = MOST_PER_STEP * diameter / step, scene.gravity_m_per_s2, phase.vibrated_by

@@ -64,15 +64,9 @@ def write_checkpoint(folder: Path, checkpoint: Checkpoint) -> None:
 def read_checkpoint(folder: Path, *, scene_sha256: str, made_by: tuple[str, str]) -> tuple[Checkpoint, str | None]:
     """Read the newest undamaged checkpoint of a run directory.
 
-    Args:
-        scene_sha256: hash of the run's scene.
-        made_by: name and version of the present engine.
-
-    Returns:
-        The checkpoint, and a warning if the newest one is damaged and the previous one was read.
-
-    Raises:
-        InputError: there is no undamaged checkpoint, or it is of another format, engine or scene.
+    The run's scene has the hash `scene_sha256`; `made_by` are name and version of the present engine. A warning is
+    returned if the newest checkpoint is damaged and the previous one was read. InputError if there is no undamaged one,
+    or it is of another format, engine or scene.
     """
     damaged: list[str] = []
     for name in (CHECKPOINT, CHECKPOINT_BEFORE):

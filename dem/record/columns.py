@@ -20,10 +20,8 @@ Columns = Mapping[str, Column]  #: Datasets by name, in the order of the file
 def _columns(*, whole_names: bool = False, **described: str | tuple[str, str]) -> Columns:
     """Return columns by name, each with the unit that ends its name: `speed_m_per_s` has m/s.
 
-    Args:
-        whole_names: whether a column without a label of its own is labelled by its whole name; otherwise by its name
-            without the unit, with blanks for underscores.
-        described: by name of the column, its description, or a pair (label, description).
+    Each column is described, or has a pair (label, description). Without a label of its own it is labelled by its name
+    without the unit, with blanks for underscores; with `whole_names` by its whole name.
     """
     found = {}
     for name, text in described.items():

@@ -15,9 +15,8 @@ from dem.record.names import partial
 def whole(path: Path, *, before: Path | None = None, shared: bool = False) -> Iterator[Path]:
     """Context manager: yield a temporary path; rename it to `path` at the end, or remove it after an error.
 
-    Args:
-        before: path to which an existing file at `path` is moved first; None: that file is replaced.
-        shared: whether several processes may write the file at once; each then has its own temporary path.
+    An existing file is first moved to `before`, if given. With `shared` several processes may write the file at once,
+    each with its own temporary path.
     """
     name = f"{path.stem}.{os.getpid()}{path.suffix}" if shared else path.name
     temporary = path.with_name(partial(name))
@@ -36,12 +35,8 @@ def whole(path: Path, *, before: Path | None = None, shared: bool = False) -> It
 def write_whole(path: Path, write: Callable[[Path], object], *, make_folder: bool = True) -> None:
     """Write or replace a file, completely or not at all.
 
-    Args:
-        write: function that writes the content to a given path, which is temporary.
-        make_folder: whether to make the file's folder if it is missing.
-
-    Raises:
-        RunError: the disk is full or the folder cannot be written; an existing file is unchanged.
+    `write` writes the content to a given path, which is temporary; `make_folder`: whether to make a missing folder.
+    RunError if the disk is full or the folder cannot be written; an existing file is unchanged.
     """
     try:
         if make_folder:
@@ -69,25 +64,14 @@ def write_text(path: Path, text: str, *, make_folder: bool = True) -> None:
 
 
 def reject_inflated(archive: zipfile.ZipFile | None, most: int) -> None:
-    """Raise ValueError if a ZIP archive, which may be malicious, would unpack to too many bytes.
-
-    Args:
-        archive: the archive; None is accepted.
-        most: largest accepted number of unpacked bytes.
-    """
+    """Raise ValueError if a ZIP archive, which may be malicious, would unpack to more than `most` bytes."""
     total = sum(member.file_size for member in archive.infolist()) if archive else 0
     if total > most:
         raise ValueError(f"it would unpack to {total} bytes, at most {most} are possible")
 
 
 def cannot_read(what: str, path: Path, cause: BaseException | str, remedy: str) -> NoReturn:
-    """Raise InputError about a file that is missing, truncated or wrong.
-
-    Args:
-        what: kind of the file, for the message.
-        cause: what is wrong with the file.
-        remedy: what the user can do.
-    """
+    """Raise InputError about a file that is missing, truncated or wrong; `what` is its kind."""
     if isinstance(cause, BaseException):
         lines = str(cause).strip().splitlines()
         named = ": ".join([type(cause).__name__, *lines[:1]])

@@ -26,10 +26,7 @@ def force_mesh(found: ContactForces, positions: Array, *, time: float, phase: in
     A line goes from the centre of mass of the first smarticle to that of the second smarticle, or to the point of
     contact at a boundary.
 
-    Args:
-        positions: (N, 3) centres of mass of the smarticles [m].
-        time: simulated time [s].
-        phase: index of the phase in the scene.
+    Centres of mass are (N, 3) [m].
     """
     number, between = len(found.forces), found.boundaries == NONE
     ends = np.empty((number, 2, 3))

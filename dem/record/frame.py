@@ -107,13 +107,7 @@ def motor_fields(
 
 
 def segment_mesh(state: BarState, *, contacts: Numbers, time: float, floor: float, phase: int) -> meshio.Mesh:
-    """Return one frame of bodies of any shape as a mesh of lines, one for each of their M bars.
-
-    Args:
-        contacts: (N,) number of other bodies that each body touches.
-        time: simulated time [s].
-        floor: height of the container's floor [m].
-    """
+    """Return one frame of bodies of any shape as a mesh of lines, one for each of their M bars."""
     body = state.body
     number = len(body)
     data = {
@@ -232,8 +226,7 @@ class Frame:
 def read_frame(path: Path | str, number: int | None = None) -> Frame:
     """Return a frame of a `.vtu` or `.vtkhdf` file; raise InputError if it is missing or damaged.
 
-    Args:
-        number: number of the frame in its run; needed for `.vtkhdf`. None: from the name of the file.
+    The number of the frame in its run is needed for `.vtkhdf`. None: from the name of the file.
     """
     path = Path(path)
     if number is None:
@@ -254,9 +247,8 @@ def read_frame(path: Path | str, number: int | None = None) -> Frame:
     def per_link(name: str, kind: Any, *shape: int) -> NDArray[Any]:
         """Remove and return cell data by name: (N, 3, …) of smarticles, (M, …) of other bodies.
 
-        Args:
-            kind: type of the numbers that are returned.
-            shape: shape of the value of one link: none for a number, 3 for a vector.
+        Numbers of the type `kind` are returned; `shape` is that of the value of one link: none for a number, 3 for a
+        vector.
         """
         values = data.pop(name, None)
         if values is None:
@@ -317,9 +309,7 @@ def _form(
 ) -> tuple[int, ...]:
     """Return the shape of an array of link values: (N, 3) for smarticles, (M,) for other bodies.
 
-    Args:
-        reject: function that is called if the points or lines of the frame are damaged.
-        general: whether the bodies are no smarticles.
+    `reject` is called if points or lines are damaged; `general`: whether the bodies are no smarticles.
     """
     form: tuple[int, ...]
     if general:
@@ -343,10 +333,8 @@ def _form(
 def read_mesh(path: Path, what: str = "frame", remedy: str | None = None, *, number: int = 0) -> Any:
     """Return the mesh of a VTK file; raise InputError if it cannot be read.
 
-    Args:
-        what: kind of the file, for the message.
-        remedy: advice for the message; None: advice for frames.
-        number: number of the frame in its run, for a `.vtkhdf`, which holds all frames.
+    `what` is the kind of the file, `remedy` the advice for the message; None: that for frames. A `.vtkhdf`, which holds
+    all frames, needs the number of the frame in its run.
     """
     if path.suffix == ".vtkhdf":
         return read_step(path, number)

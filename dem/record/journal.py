@@ -24,9 +24,7 @@ _NUMBER = 8  # bytes of a whole number in a journal
 class Journaled(io.RawIOBase):
     """A file object for reading and writing, which writes changes to the disk in `commit` only.
 
-    Raises:
-        OSError: the file or its journal cannot be read.
-        ValueError: the journal is damaged.
+    OSError if the file or its journal cannot be read; ValueError if the journal is damaged.
     """
 
     def __init__(self, path: Path) -> None:
@@ -72,8 +70,7 @@ class Journaled(io.RawIOBase):
     def _spans(self, length: int) -> list[tuple[int, int, int, int]]:
         """Divide the next `length` bytes into pages, and move the position behind them.
 
-        Returns:
-            For each page its number, start and stop in the page, and the offset of these bytes in the data.
+        Returns, for each page, its number, start and stop in the page, and the offset of these bytes in the data.
         """
         spans, at, end = [], 0, self._place + length
         while self._place < end:

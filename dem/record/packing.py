@@ -13,23 +13,11 @@ def second_highest(heights: Array) -> float:
 
 
 def filled(count: int, *, solid_volume: float, radius: float, height: float) -> float:
-    """Return the packing fraction N V_s / (π r² z) [1] of N = `count` smarticles in a cylinder.
-
-    Args:
-        solid_volume: volume V_s of one smarticle [m³].
-        radius: radius r of the container [m].
-        height: height z of the pile [m].
-    """
+    """Return the packing fraction N V_s / (π r² z) [1] of `count` smarticles in a cylinder, in [m], [m³]."""
     return float(count * solid_volume / (math.pi * radius**2 * height))
 
 
 def packing_fraction(heights: Array, *, solid_volume: float, radius: float) -> float:
-    """Return the packing fraction φ [1]; NaN if fewer than two centres of mass are above the floor.
-
-    Args:
-        heights: (N,) heights of the centres of mass above the floor [m].
-        solid_volume: volume of one smarticle [m³].
-        radius: radius of the container [m].
-    """
+    """Return φ [1] from heights (N,) of centres of mass above the floor [m]; NaN for fewer than two above."""
     height = second_highest(heights)
     return filled(len(heights), solid_volume=solid_volume, radius=radius, height=height) if height > 0 else math.nan

@@ -31,13 +31,7 @@ class ProgressWriter:
         self._begun = monotonic()
 
     def begin(self, *, phase: str, start: float, time: float, end: float | None) -> None:
-        """Begin or resume a phase.
-
-        Args:
-            start: simulated time at which the phase began [s].
-            time: present simulated time [s].
-            end: simulated time at which the phase will end [s]; None: unknown.
-        """
+        """Begin or resume a phase at a simulated time [s]; its end is None if it is unknown."""
         self._progress = self._progress.model_copy(update={"phase": phase, "end_s": end})
         self._start = start
         self._resumed = (monotonic(), time)

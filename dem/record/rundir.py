@@ -48,12 +48,8 @@ def claimed(out: Path, *, resume: bool) -> Iterator[Claim]:
     """Lock a run directory while a run writes into it, and make it if needed.
 
     The operating system holds the lock and releases it with the end of the process, so that it is never stale.
-
-    Args:
-        resume: whether the directory must hold a run; otherwise it must be new or empty.
-
-    Raises:
-        InputError: the directory has other content, cannot be written, or another process writes into it.
+    With `resume` the directory must hold a run, otherwise it must be new or empty. InputError if not, if it cannot be
+    written, or if another process writes into it.
     """
     _check_content(out, resume=resume)
     try:

@@ -112,10 +112,8 @@ def check_times(path: Path, times: Sequence[float]) -> None:
 def _make(root: Any, name: str, empty: NDArray[Any], rows: int) -> None:
     """Create a dataset without rows.
 
-    Args:
-        empty: array without rows, (0, …), that has the type and the shape of the rows to come.
-        rows: number of rows in a chunk. Chunks of `_CHUNK` rows are compressed. Shorter ones are not, since they grow
-            with every step.
+    The array `empty` (0, …) has the type and the shape of the rows to come. Chunks of `_CHUNK` rows are compressed.
+    Shorter ones are not, since they grow with every step.
     """
     packed = {"compression": 4, "shuffle": True} if rows == _CHUNK else {}
     shape = empty.shape[1:]
@@ -144,13 +142,8 @@ def _append(root: Any, mesh: meshio.Mesh, time: float) -> None:
 def _lines(root: Any, lines: NDArray[np.int64], points: int) -> dict[str, Any]:
     """Add the lines of a step to the file, unless they are equal to the lines of the previous step.
 
-    Args:
-        lines: (n, 2) numbers of the points that lines join.
-        points: number of points of the step.
-
-    Returns:
-        Where the step's lines begin in the file: the values for the lists `PartOffsets`, `CellOffsets` and
-        `ConnectivityIdOffsets`, by these names.
+    Lines (n, 2) are numbers of the points that they join. Returns where they begin in the file: values for the lists
+    `PartOffsets`, `CellOffsets` and `ConnectivityIdOffsets`, by these names.
     """
     parts, number, stored = len(root["NumberOfPoints"]), len(lines), root["Lines"]
     part, cell, end = parts - 1, len(stored["Offsets"]) - (number + 1), len(stored["Connectivity"]) - 2 * number

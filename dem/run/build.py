@@ -48,19 +48,13 @@ KEPT_WITHIN = 0.01
 def build_engine(scene: Scene, dt: float) -> Engine:
     """Return the engine for a scene: a simulation to which no smarticles have been added yet.
 
-    Args:
-        dt: shortest time step of all phases [s]; whether it is stable is not checked.
+    `dt` is the shortest time step of all phases [s]; whether it is stable is not checked.
     """
     return engine_kind(scene.engine).build(scene, dt)
 
 
 def build_recorder(scene: Scene, out: Path, progress: ProgressWriter) -> Recorder:
-    """Return the recorder of a scene, with the watchdog that it calls.
-
-    Args:
-        out: run directory into which the recorder writes.
-        progress: writer that the recorder tells the progress of the run.
-    """
+    """Return the recorder of a scene, with the watchdog that it calls."""
     recording = scene.recording
     # A mould of tiers has no single radius, and a plane has none.
     radius = math.nan if scene.cylinder.upper or scene.plane else scene.container.measured_radius

@@ -73,11 +73,7 @@ class Recorder:
         self.next_step = engine.steps + max(1, round((self.samples * self.interval - engine.time) / engine.time_step))
 
     def watch(self, engine: Engine, state: PileState | None = None) -> None:
-        """Check state, overlaps and energy by the watchdog; raise RunError beyond a limit.
-
-        Args:
-            state: present state of the engine; None: it is queried.
-        """
+        """Check state (None: it is queried), overlaps and energy by the watchdog; RunError beyond a limit."""
         state, time, watchdog = state or engine.state(), engine.time, self.watchdog
         floor, raised, extremes = engine.boundaries.floor, engine.boundaries.raised, engine.extremes(state)
         if extremes is not None and watchdog.within_limits(extremes, floor=floor, raised=raised):

@@ -188,10 +188,7 @@ def _mark_ended(simulation: Simulation | None, claim: Claim, log: logging.Logger
     """Write the series and `failed.json` after an error has ended a run; return the cause in words.
 
     If the run failed, rather than being interrupted, the text ends with the time of the last checkpoint.
-
-    Args:
-        simulation: the run; None: the error came before it was built.
-        claim: lock of the run directory. If it shows that the directory was moved, nothing is written.
+    `simulation` is None if the error came before it was built. Nothing is written if the directory was moved.
     """
     status: Ended = "interrupted" if isinstance(error, StopRequestedError | KeyboardInterrupt) else "failed"
     cause = "interrupted by the user" if isinstance(error, KeyboardInterrupt) else str(error)
@@ -220,9 +217,7 @@ def manifest(
 ) -> Manifest:
     """Return the manifest of a run: how it was made, and the numbers of the scene that measures need.
 
-    Args:
-        steps: time step of each phase [s].
-        made_by: name and version of the engine.
+    `steps` are the time steps of each phase [s], `made_by` name and version of the engine.
     """
     model, origin = scene.model, scene.phases[0].origin
     boxes = None if isinstance(model, Mixture) else model.boxes

@@ -110,10 +110,8 @@ class Sampler:
     def _mean_since(self, name: str, steps: int, sums: Array) -> Array:
         """Return forces [N], averaged over the steps since the previous sample; NaN for the first sample.
 
-        Args:
-            name: key of `memory` with the sums of the previous sample.
-            steps: number of steps made since the start.
-            sums: forces summed over all steps [N].
+        `sums` are forces summed over all `steps` since the start [N]; `name` is the key of the previous sums in
+        `memory`.
         """
         previous = self.memory[name]
         self.memory[name] = [steps, sums.tolist()]

@@ -1,7 +1,5 @@
 """Have an engine compile all code that a scene needs, without simulating the scene."""
 
-from __future__ import annotations
-
 import numpy as np
 from scipy.spatial.transform import Rotation
 

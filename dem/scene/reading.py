@@ -44,9 +44,8 @@ NEWER_KEYS: Mapping[str, Mapping[str, Any]] = MappingProxyType(
 def parse_scene(data: Any, *, source: str, folder: Path | None = None) -> Scene:
     """Return the scene that plain data describe, or raise InputError in one line with file, key and value.
 
-    Args:
-        source: name of the data's origin in messages, e.g. a path.
-        folder: folder that paths of other runs are relative to; None: the working directory.
+    `source` names the data's origin in messages. Paths of other runs are relative to `folder`; None: the working
+    directory.
     """
     if problem := _not_a_scene(data):
         raise InputError(f"{source}: {problem}")
@@ -106,8 +105,7 @@ def load_scene(path: Path | str, overrides: Sequence[str] = ()) -> Scene:
 def apply_override(data: Any, override: str) -> None:
     """Change one key of a scene's data in place, by `KEY=VALUE` with dots for nesting and a YAML value.
 
-    Raises:
-        InputError: the override has another form, or the scene has no such key.
+    InputError if the override has another form, or the scene has no such key.
     """
     key, separator, text = override.partition("=")
     if not separator or not key:
@@ -166,8 +164,7 @@ def _plain(scene: Scene) -> dict[str, Any]:
 def dump_scene(scene: Scene, folder: Path | None = None) -> str:
     """Return the resolved scene as YAML, without the keys that `_plain` leaves out.
 
-    Args:
-        folder: folder to which paths of other runs are made relative; None: they are not changed.
+    With `folder`, paths of other runs are made relative to it.
     """
     data = _plain(scene)
     if folder is not None:

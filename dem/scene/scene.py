@@ -53,10 +53,7 @@ def _named(base: str, given: Mapping[str, Any], diameter: Any = None) -> Mapping
 
     On the engine links `rows` is 1 in a plane, for t1 ≤ t2, and if a sphere diameter is given.
 
-    Args:
-        base: name of the fidelity.
-        given: parts of the scene that are validated already, by name.
-        diameter: `fidelity.diameter_m`; None: not given.
+    `given` are parts of the scene that are validated already, by name; `diameter` is `fidelity.diameter_m` or None.
     """
     engine, smarticle = given.get("engine", ""), given.get("smarticle") or Smarticle()
     narrow = smarticle.thickness_normal_m <= smarticle.thickness_in_plane_m
@@ -216,10 +213,7 @@ class Scene(Part):
 
         A loose random packing of thin bars has the packing fraction φ ≈ 2.4 d/L, with d the mean width of the section
         and L the length of all three links (Gravish's φ_0 at l/w = 0, 0.7 and 1.4). The loosest pile is assumed to have
-        half this packing fraction.
-
-        Args:
-            hooks_top: height of the highest point of the hooks [m].
+        half this packing fraction. The highest point of the hooks is at `hooks_top` [m].
         """
         # Smarticles may come to lie on a hook.
         pile = self._height_at(1.2)
@@ -271,11 +265,8 @@ class Scene(Part):
         A bar is a chain of spheres, or on the engine links a sphere that is swept along the bar's axis. If
         `fidelity.diameter_m` is given, it is the diameter of all bars.
 
-        Args:
-            normal: thickness t1 of the bar, along the normal [m].
-            in_plane: thickness t2 of the bar, in its plane [m].
-            rows: number of rows of spheres along the normal.
-            disc: whether the cross-section is a disc.
+        The section has the thickness `normal` (t1) along the normal and `in_plane` (t2) [m], or with `disc` is a disc.
+        Spheres are in `rows` along the normal.
         """
         if self.fidelity.diameter_m is not None:
             return self.fidelity.diameter_m
@@ -405,10 +396,9 @@ class Scene(Part):
 
 
 def _sizes(given: Mapping[str, Any]) -> tuple[float, float]:
-    """Return w and t2 of the smarticle, or the longest bar and smallest thickness of other bodies [m].
+    """Return w and t2 of the smarticle, or longest bar and smallest thickness of other bodies [m].
 
-    Args:
-        given: parts of the scene that are validated already, by their names in the model.
+    `given` are parts of the scene that are validated already, by their names in the model.
     """
     if given.get("shapes"):
         bars = [shape.bars() for shape in given["shapes"]]

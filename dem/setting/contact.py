@@ -41,13 +41,8 @@ class Contact(Part):
 def with_preset(data: Any, folder: Path | None) -> Any:
     """Return a scene's data, not yet validated, with the values of the file that `contact.preset` names.
 
-    Keys that the scene gives beside `preset` have priority over those of the file.
-
-    Args:
-        folder: Folder that the path of the file is relative to; None: the working directory.
-
-    Raises:
-        ValueError: The file cannot be read, or does not hold valid keys of `contact`.
+    Keys that the scene gives beside `preset` have priority over those of the file. Its path is relative to `folder`;
+    None: the working directory. ValueError if the file cannot be read, or does not hold valid keys of `contact`.
     """
     contact = data.get("contact") if isinstance(data, Mapping) else None
     if not isinstance(contact, Mapping) or PRESET not in contact:

@@ -54,12 +54,7 @@ _HOOK_DEFAULTS = {"side_m": (0, 1), "length_m": (1, 0), "lower_height_m": (0, 10
 
 
 def with_hook_defaults(hooks: Any, sizes: tuple[float, float]) -> Any:
-    """Return unvalidated data of `Hooks`, with missing lengths computed from `sizes`.
-
-    Args:
-        hooks: the data; data that are no mapping are returned unchanged.
-        sizes: w and t2 of the smarticle, or the longest bar and smallest thickness of other bodies [m].
-    """
+    """Return unvalidated data of `Hooks`, with missing lengths from `sizes`, see `with_defaults`."""
     filled = with_defaults(hooks, _HOOK_DEFAULTS, sizes)
     return {"lower_length_m": filled["length_m"]} | filled if isinstance(filled, dict) else filled
 
@@ -111,8 +106,7 @@ class Cross:
     def obstacles(self, diameter: float) -> Array:
         """Return (n, 3) points in the bars [m], which stand for the bars when bodies are placed.
 
-        Args:
-            diameter: diameter of spheres [m]. A sphere whose centre is a diameter or more away from all points touches
+        A sphere of this `diameter` [m] touches no bar if its centre is a diameter or more away from all points.
                 no bar.
         """
         # No point of a bar is farther than √3/2 of the spacing from the grid, less than the radius that is kept away.

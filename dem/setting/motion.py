@@ -59,9 +59,8 @@ class BaseMotion(Part):
     def course(self, start: Array, home: Array) -> Course:
         """Return a function from the time [s] since the beginning of the motion to the angles [rad].
 
-        Args:
-            start: angles at the beginning of the motion [rad].
-            home: angles at the beginning of the phase [rad], in the shape of `start`.
+        `start` has the angles at the beginning of the motion, `home` those at the beginning of the phase, in its shape
+        [rad].
         """
         raise NotImplementedError
 

@@ -146,9 +146,7 @@ def _three_bars(
 ) -> tuple[Array, Array]:
     """Return the layout of a middle bar along x with an arm at each end; lengths in m.
 
-    Args:
-        angles: angle between each arm and the middle bar, 180 straight [deg].
-        twists: rotation of each arm about the middle bar [deg].
+    Angles are those between arms and middle bar, 180 straight; twists are rotations of arms about the middle bar [deg].
     """
     joints = np.array([[-middle / 2, 0.0, 0.0], [middle / 2, 0.0, 0.0]])
     bars, normals = [], []
@@ -424,8 +422,7 @@ def listed(value: Any) -> Any:
 def numbers_of_shapes(shapes: Sequence[Shaped], count: int) -> list[int]:
     """Return the number of bodies of each shape, of `count` bodies in all.
 
-    Raises:
-        ValueError: counts of the shapes do not add up to `count`, or only some shapes have a count.
+    ValueError if counts of the shapes do not add up to `count`, or only some shapes have a count.
     """
     counts = [shape.count for shape in shapes]
     given = [number for number in counts if number is not None]

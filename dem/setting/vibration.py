@@ -1,7 +1,5 @@
 """Vibration of the container during a test of the pile: key `vibration` of a phase."""
 
-from __future__ import annotations
-
 import math
 from typing import Annotated, Literal, Self
 

@@ -51,11 +51,7 @@ def _described(columns: Mapping[str, Any], what: str) -> str:
 
 
 def series_columns() -> str:
-    """Return tables of the datasets of `series.h5`, grouped by the scenes that record them.
-
-    Raises:
-        LookupError: a dataset is in no group.
-    """
+    """Return tables of the datasets of `series.h5` by scenes that record them; LookupError if one has no group."""
     from dem.record import columns  # noqa: PLC0415
 
     sets = {title: getattr(columns, name) for title, name in _SETS}
@@ -142,11 +138,7 @@ def command_help() -> str:
 
 
 def finding(readme: Path) -> tuple[str, str]:
-    """Return the heading and the finding of a README, its first two lines.
-
-    Raises:
-        LookupError: the file does not begin with a heading and a quoted line.
-    """
+    """Return heading and finding of a README, its first two lines; LookupError if it begins otherwise."""
     lines = [line for line in readme.read_text(encoding="utf-8").splitlines() if line.strip()]
     if not (len(lines) > 1 and lines[0].startswith("# ") and lines[1].startswith("> ")):
         msg = f"{readme}: must begin with a heading, '# …', and the finding in one line with its numbers, '> …'"

@@ -69,22 +69,6 @@ def _speed(frame: Frame, run: Run) -> Floats:
     return speed
 
 
-def _recorded_ids(frame: Frame, _: Run) -> NDArray[Any]:
-    return frame.smarticle_ids
-
-
-def _link_numbers(frame: Frame, _: Run) -> NDArray[Any]:
-    return frame.link if frame.bars is not None else np.tile(np.arange(LINKS), (frame.count, 1))
-
-
-def _has_smarticles(run: Run) -> bool:
-    return run.manifest.kinds is None
-
-
-def _has_kinds(run: Run) -> bool:
-    return run.manifest.kinds is not None
-
-
 def _records_forces(run: Run) -> bool:
     return run.forces is not None
 
@@ -137,12 +121,18 @@ def _chain(frame: Frame, _: Run) -> NDArray[Any]:
 
 
 FIELDS: tuple[Field, ...] = (
-    Field("smarticle_id", "-", "number of the smarticle, constant in all frames", _recorded_ids, kind="name"),
+    Field(
+        "smarticle_id",
+        "-",
+        "number of the smarticle, constant in all frames",
+        lambda frame, _: frame.smarticle_ids,
+        kind="name",
+    ),
     Field(
         "link",
         "-",
         "0 barb 1, 1 middle link, 2 barb 2; of other bodies the number of the bar",
-        _link_numbers,
+        lambda frame, _: frame.link if frame.bars is not None else np.tile(np.arange(LINKS), (frame.count, 1)),
         kind="name",
         of="link",
     ),
@@ -152,7 +142,7 @@ FIELDS: tuple[Field, ...] = (
         "kind of the body, a place in `kinds` of run.json; scenes with the key particle",
         lambda frame, _: frame.kind,
         kind="name",
-        available_for=_has_kinds,
+        available_for=lambda run: run.manifest.kinds is not None,
     ),
     Field("speed_m_per_s", "m/s", "of the smarticle's centre of mass", _speed, label="speed of its centre of mass"),
     Field(
@@ -194,7 +184,7 @@ FIELDS: tuple[Field, ...] = (
         "number of its cluster of smarticles whose spheres or strands touch in the engine, 0 the largest",
         _labels(contact_graph),
         kind="name",
-        available_for=_has_smarticles,
+        available_for=lambda run: run.manifest.kinds is None,
     ),
     Field(
         "entanglement_cluster",

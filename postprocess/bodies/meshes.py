@@ -146,8 +146,7 @@ def knots(vertices: Floats, from_hinge: float) -> Floats:
     hinge. Every second smarticle of a chain is rotated by 180°, so that N decides which barb of the last one is the
     outer one.
 
-    Source:
-        `dem.body.chain.Chain.ties`.
+    Source: `dem.body.chain.Chain.ties`.
     """
     last = len(vertices) - 1
     points = []
@@ -162,8 +161,7 @@ def _strings(run: Run, series: Series | None) -> ChainStrings | None:
 
     The anchors follow from the initial layout of the chain; motion of the chain before the test is neglected.
 
-    Source:
-        `dem.body.chain.Chain`, which lays out a chain.
+    Source: `dem.body.chain.Chain`, which lays out a chain.
     """
     planned = run.scene["phases"]
     phases = {phase["type"]: phase for phase in planned}
@@ -395,12 +393,8 @@ def link_boxes(
 
     The cross-section of a straight smarticle may be turned around its length by any angle, which its vertices do not
     determine; an arbitrary angle is used. Links without length have no box. The mesh has two arrays of cell data:
-    `smarticle`, the index into the vertices (N, 4, 3) [m], and `link`, 0 to 2.
-
-    Args:
-        thickness_normal: t1, along the normal of the smarticle's plane [m].
-        thickness_in_plane: t2, in the smarticle's plane [m]: one for all links, or one each for barb 1, middle link and
-            barb 2.
+    `smarticle`, the index into the vertices (N, 4, 3) [m], and `link`, 0 to 2. Thicknesses are t1, along the normal of
+    the smarticle's plane, and t2 in it: for all links, or for barb 1, middle link and barb 2 each [m].
     """
     vertices = checked_vertices(vertices)
     in_plane = np.broadcast_to(thickness_in_plane, 3)

@@ -1,7 +1,5 @@
 """Read centre lines of bodies from a file, such as those of a tomography, as segments."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, NoReturn
@@ -158,11 +156,7 @@ def _numbered(points: Floats, lines: Whole, data: dict[str, NDArray[Any]]) -> _L
     """Return the lines of a file with the numbers of the bodies to which they belong.
 
     The numbers are those of the cell data `BODY_FIELDS`. Without such data all lines that share points are one body.
-
-    Args:
-        points: (P, 3) coordinates of all points.
-        lines: (M, 2) indices of the two end points of each line.
-        data: Cell data by name, each with one value per line.
+    Points are (P, 3), lines (M, 2) indices of their two ends.
     """
     name = next((name for name in BODY_FIELDS if name in data), None)
     if name is None:

@@ -6,8 +6,6 @@ smarticle has no such plane, and an arbitrary plane through it is used. The engi
 the volumes that a sphere sweeps along the links.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 
@@ -97,8 +95,7 @@ def swept_axes(vertices: Floats, diameter: float) -> Floats:
     ends at the tips. A barb shorter than the radius shrinks to its hinge; without barbs the ends of the middle link
     move inwards.
 
-    Source:
-        `dem.engine.links.shapes`; the sphere chains of `dem.body.particle` lie along these axes too.
+    Source: `dem.engine.links.shapes`; the sphere chains of `dem.body.particle` lie along these axes too.
     """
     axes = vertices.copy()
     lengths = link_lengths(vertices)
@@ -153,8 +150,7 @@ def spheres(vertices: Floats, chain: Chain) -> Floats:
     The spheres at the hinges belong to the middle link. The first sphere of a barb is a little more than a diameter
     from the hinge. The surface of its last sphere touches the tip.
 
-    Source:
-        `dem.body.particle`.
+    Source: `dem.body.particle`.
     """
     lengths = link_lengths(vertices).mean(axis=0)
     parts = []

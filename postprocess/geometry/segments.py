@@ -5,8 +5,6 @@ segment, `body` an array (M,) with the number of the body that each segment belo
 in ascending order of these numbers.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
@@ -176,8 +174,7 @@ def nearest_points(first: Floats, second: Floats) -> tuple[Floats, Floats]:
 
     Parallel segments that face each other have many nearest points; one pair of them is returned.
 
-    Source:
-        Ericson, Real-Time Collision Detection (2005), section 5.1.9.
+    Source: Ericson, Real-Time Collision Detection (2005), section 5.1.9.
     """
     u, v, w = first[:, 1] - first[:, 0], second[:, 1] - second[:, 0], first[:, 0] - second[:, 0]
     uu, uv, vv, uw, vw = (np.einsum("pc,pc->p", a, b) for a, b in ((u, u), (u, v), (v, v), (u, w), (v, w)))

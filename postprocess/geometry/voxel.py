@@ -119,13 +119,8 @@ def _grid_points(
     """Yield indices (n, 3) of grid points inside the boxes of the links; an index may be repeated.
 
     The grid is rotated by `_TURN`. Each box is cut into pieces about as long as thick, so that few grid points must be
-    tested for each piece.
-
-    Args:
-        normal: t1, the thickness along the normal of the smarticle's plane [m].
-        in_plane: t2, the thickness in the smarticle's plane [m].
-        pitch: Distance of neighbouring points [m].
-        region: Region to whose neighbourhood points are restricted; None: no restriction.
+    tested for each piece. Thicknesses are t1 along the normal of the smarticle's plane and t2 in it, the pitch is the
+    distance of grid points [m]. Points are restricted to the neighbourhood of a region, if given.
     """
     lengths = link_lengths(vertices)
     # A link without length (l = 0) has no direction, and yields no piece.

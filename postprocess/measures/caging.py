@@ -8,8 +8,6 @@ contact on a body's sides can block, as of a rod along or about its axis, does n
 are left out. Tables have this measure for runs on links.
 """
 
-from __future__ import annotations
-
 from bisect import bisect_left
 from dataclasses import dataclass, field
 from typing import NamedTuple

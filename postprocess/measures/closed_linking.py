@@ -6,8 +6,6 @@ too, but it changes where a body passes through that line. `postprocess.measures
 curves.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass, field
 

@@ -290,10 +290,7 @@ def _fit(times: Floats, heights: Floats, start: float | None, end: float | None)
 
 
 def _error(fit: Any) -> float:
-    """Return the standard error of ln τ for a result of `_fit`.
-
-    It is infinite if the samples do not determine τ.
-    """
+    """Return the standard error of ln τ for a result of `_fit`; inf if the samples do not determine τ."""
     residuals, jacobian = fit.fun, fit.jac
     freedom = len(residuals) - len(fit.x)
     # The column of a parameter at its bound could make the matrix singular.

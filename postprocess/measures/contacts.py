@@ -4,8 +4,6 @@ A frame holds the number of contacts of each smarticle as counted by the engine,
 from the vertices. Recorded forces at contacts are the subject of `force_chains`.
 """
 
-from __future__ import annotations
-
 import math
 from typing import NamedTuple
 
@@ -78,8 +76,7 @@ def pairs_in_contact(frame: Frame, run: Run) -> ContactPairs:
     and spheres that still overlap while they move apart may have none. These percentages are from runs of 40 smarticles
     at draft, 60 at standard and 30 at reference fidelity.
 
-    Returns:
-        The pairs, with the least distance of two sphere centres or of two strands' axes.
+    The least distance is that of two sphere centres or of two strands' axes.
     """
     vertices, chain = checked_vertices(frame.vertices), chain_of(run)
     if chain.pitch > 0:
@@ -142,8 +139,7 @@ def _offsets(kind: Kind, rows: int) -> Floats:
 
     A bar with a flat side wider than a strand has n = `rows` strands; every other bar has one strand on its axis.
 
-    Source:
-        `dem.scene.scene.Scene.mixture`, `dem.engine.links.shapes.rigid_shape`.
+    Source: `dem.scene.scene.Scene.mixture`, `dem.engine.links.shapes.rigid_shape`.
     """
     reach = (kind.thickness_normal_m - kind.sphere_diameter_m) / 2
     return np.linspace(-reach, reach, rows) if rows > 1 and reach > 0 and not kind.round else np.zeros(1)
@@ -263,10 +259,6 @@ def at_wall(vertices: Vertices, *, diameter: float, wall_radius: float) -> Flags
     return touching
 
 
-def _statistics_of(frame: Frame, _: Run) -> tuple[float, float, float]:
-    return float(frame.contacts.std()), float(frame.contacts.max()), float((frame.contacts == 0).mean())
-
-
 def _rattlers_of(frame: Frame, run: Run) -> tuple[float]:
     loose = without_support(
         frame.vertices,
@@ -289,7 +281,11 @@ MEASURES = (
         name="contact statistics",
         place=51,
         quantities=(Quantity("contacts SD", "-"), Quantity("contacts most", "-"), Quantity("without contact", "-")),
-        take=_statistics_of,
+        take=lambda frame, _: (
+            float(frame.contacts.std()),
+            float(frame.contacts.max()),
+            float((frame.contacts == 0).mean()),
+        ),
     ),
     FrameMeasure(
         name="rattlers",

@@ -9,8 +9,6 @@ The ACN of two short segments falls with the square of their distance. A sum ove
 grows with the size of the pile; `crossing_field` counts only what lies within a ball.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass, field
 

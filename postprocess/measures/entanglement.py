@@ -12,8 +12,6 @@ polygon: a straight one, one that branches or has several pieces (a star, a cros
 a plane. The average crossing number is defined for these, too.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass, field
 from typing import NamedTuple
@@ -256,10 +254,8 @@ def _passing(vertices: Floats, i: Whole, j: Whole) -> Flags:
 def _passing_segments(corners: Floats, polygon: Whole, segments: Floats) -> Flags:
     """Return which segments pass through a polygon: (P,) bool.
 
-    Args:
-        corners: (N, n, 3) corners of N polygons [m]; the last one is joined to the first one.
-        polygon: (P,) index of the polygon that each segment is compared with.
-        segments: (P, 2, 3) ends of the segments [m].
+    Corners of N polygons are (N, n, 3) [m], the last one joined to the first. Segments are (P, 2, 3) [m], each compared
+    with the polygon whose index is in `polygon` (P,).
     """
     centres, radii = bounding_spheres(corners)
     frames = plane_frames(corners)

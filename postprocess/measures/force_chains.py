@@ -10,8 +10,6 @@ carries the whole load (Makse, Johnson & Schwartz, Phys. Rev. Lett. 84, 4160 (20
 exp(-f/⟨f⟩), the fraction e⁻¹ = 0.37 is strong and carries 2/e = 0.74 of the load; the participation is 0.5.
 """
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -5,8 +5,6 @@ a threshold, or one passing through the polygon of the other. The links' number 
 percolation follow from `postprocess.measures.clusters`.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field

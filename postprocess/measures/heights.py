@@ -1,7 +1,5 @@
 """Measure how high a pile stands above the container's floor."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -88,9 +86,7 @@ def material_height(vertices: Vertices, *, floor_z: float = 0.0, percentile: flo
 def _filled_height(ends: Floats, weights: Floats, percentile: float) -> float:
     """Return the height [m] below which a percentage of the material lies.
 
-    Args:
-        ends: (2, M) heights of both ends of all segments [m].
-        weights: (M,) material of each segment, in any unit.
+    Heights of both ends of all segments are (2, M) [m], weights (M,) are their material in any unit.
     """
     lower, upper = ends.min(axis=0), ends.max(axis=0)
     level = weights.sum() * percentile / 100

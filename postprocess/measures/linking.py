@@ -5,8 +5,6 @@ smarticles, is a real number: half the signed number of crossings in a projectio
 the crossings of `postprocess.measures.entanglement`, it is defined for straight smarticles, too.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field

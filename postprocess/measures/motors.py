@@ -34,10 +34,7 @@ def sampled_work(angles: Floats, torques: Floats) -> float:
     """Compute the sampled work [J]: the sum of τ Δα over all barbs and samples; NaN below two samples.
 
     Δα is the change of the angle since the previous sample. InputError if the arrays differ in shape.
-
-    Args:
-        angles: (samples, N, 2) angles of the barbs [rad].
-        torques: (samples, N, 2) torques of their motors [N m].
+    Angles are (samples, N, 2) [rad], torques of the motors (samples, N, 2) [N m].
     """
     if angles.shape != torques.shape:
         raise InputError(f"angles and torques must be of one shape: got {angles.shape} and {torques.shape}")

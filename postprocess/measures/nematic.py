@@ -4,8 +4,6 @@ For smarticles these are the nematic order of their middle links, and on request
 directions in which the mouths of bent smarticles point.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass, field
 

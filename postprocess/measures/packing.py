@@ -4,8 +4,6 @@ Values by two definitions differ by several per cent, so each result names its d
 container, unless the scene states another radius with `container.packing_radius_m`.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass

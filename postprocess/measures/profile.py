@@ -1,7 +1,5 @@
 """Measure the packing fraction φ(r, z) in concentric rings and horizontal layers of a cylinder."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass, field
 

@@ -176,16 +176,9 @@ def shown_quantities() -> tuple[tuple[Quantity, Shown], ...]:
 def frame_measures(definitions: Sequence[str], also: Collection[str] = ()) -> tuple[FrameMeasure, ...]:
     """Return the measures of frames in the order of their columns.
 
-    Quantities such as the packing fraction have several definitions, with one measure for each. These measures come
-    after all others.
-
-    Args:
-        definitions: Definitions whose measures are returned, in this order, see `FrameMeasure.definition`; measures
-            with other definitions are left out.
-        also: Names of measures with `FrameMeasure.on_request` to return; all other measures with it are left out.
-
-    Raises:
-        InputError: A name in `also` is not that of a measure with `on_request`.
+    Quantities such as the packing fraction have several definitions, with one measure for each; those of `definitions`
+    come after all other measures, in this order. Of the measures with `on_request` only those named in `also` are
+    returned; InputError if one does not exist.
     """
     asked = {m.name: m for m in registered() if isinstance(m, FrameMeasure) and m.on_request}
     for name in also:

@@ -1,7 +1,5 @@
 """Measure whole runs and return tables with one row per frame, or one row per phase."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass
@@ -197,12 +195,9 @@ def _rows(
 ) -> list[dict[str, object]]:
     """Return one row of a table for each of several successive frames of one phase.
 
-    Args:
-        part: The frames.
-        series: Series whose values at the time of a frame are added to its row; None: none are added.
-        known: Measures to compute, if they apply to the run.
-        costly: Frames for which costly measures are computed, see `measure_run`; rows of other frames have NaN.
-        offset: Number of the first frame, for the column "frame".
+    Values of `series`, if given, at the time of a frame are added. The measures `known` are computed if they apply to
+    the run; rows of frames for which `costly` measures are not computed have NaN, see `measure_run`. The first frame
+    has the number `offset` in the column "frame".
     """
     rows: list[dict[str, object]] = []
     measures = [measure for measure in known if measure.available_for(run)]

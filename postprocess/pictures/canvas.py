@@ -124,11 +124,9 @@ def visible_meshes(
 ) -> dict[str, pv.PolyData]:
     """Return the meshes of a frame by kind, [mm] above the floor, with lines as tubes.
 
-    A removed wall has the kind `ghost`.
-
-    Args:
-        forward: (3,) direction of view; the half of the wall in front is cut away, unless this vector is zero.
-        largest: Normal force of the thickest line of force [N]; the largest of the frame if not given.
+    A removed wall has the kind `ghost`. The half of the wall in front, by the direction of view `forward` (3,), is cut
+    away, unless this vector is zero. The thickest line has the normal force `largest` [N]; the largest of the frame if
+    not given.
     """
     made = bodies.at(frame)
     if "wall" in bodies.kinds and "wall" not in made and bodies.boundaries.removal is not None:
@@ -190,15 +188,9 @@ def add_bodies(plotter: Any, meshes: Mapping[str, pv.PolyData], frame: Frame, co
 class Canvas:
     """An off-screen window with one panel per run, one camera, one colour scale and one scale bar.
 
-    RunError if this machine lacks the libraries to draw without a display.
-
-    Args:
-        style: Coloured field, size of a panel and camera.
-        extent: (2, 2) extent in the camera's view [mm].
-        run: Run whose link size sets the range of the shading of corners (ambient occlusion).
-        columns: Number of panels.
-        scale: Colour scale; None: no colour bar.
-        quick: Whether to leave out the shading of corners, which takes most of the time of a picture.
+    RunError if this machine lacks the libraries to draw without a display. The extent (2, 2) in the camera's view is in
+    [mm]. The link size of `run` sets the range of the shading of corners (ambient occlusion), which takes most of the
+    time of a picture and is left out by `quick`. Without `scale` there is no colour bar.
     """
 
     def __init__(

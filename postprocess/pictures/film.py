@@ -52,13 +52,11 @@ class FilmTimes:
         """Choose the times of a film's pictures from the ascending times (m,) [s] of the recorded frames.
 
         Args:
-            recorded: (m,) simulated times of the frames, ascending [s].
             start: Simulated time of the first picture [s]; None: that of the first frame.
             end: Latest simulated time of a picture [s]; None: that of the last frame.
             every: Simulated time between two pictures [s]; None: the least multiple of the median time between frames
                 for which the film has at most `most` pictures.
             rate: Pictures per second of playing time [1/s].
-            most: Largest number of pictures if `every` is None.
 
         Raises:
             InputError: There are fewer than two frames or pictures, or an argument is out of its range.

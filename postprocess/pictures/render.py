@@ -193,13 +193,8 @@ def pictures(
 ) -> Iterator[Image.Image]:
     """Yield pictures of runs side by side, with one camera and one colour scale.
 
-    Args:
-        subjects: The runs, from left to right.
-        indices: For each run, the indices of its frames, one per picture.
-        style: Coloured field, size and camera.
-        limits: Ends of the colour scale, see `Limits`.
-        quick: Whether to leave out the shading of corners, which takes most of the time.
-        pace: Speed of a film as text for the caption; empty for a single picture.
+    Each of the subjects, from left to right, has `indices` of its frames, one per picture. `quick` leaves out the
+    shading of corners, which takes most of the time. `pace` is the speed of a film for the caption.
     """
     titles = titles_of([subject.run for subject in subjects])
     pairs = list(zip(subjects, indices, strict=True))

@@ -1,7 +1,5 @@
 """Write tables and other files so that no incomplete file is left, and format tables as Markdown."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -16,9 +14,8 @@ from dem.record.files import whole
 def whole_file(path: Path, *, overwrite: bool = True) -> Iterator[Path]:
     """Yield a temporary path, and rename this file to `path` when the block ends without an error.
 
-    Raises:
-        InputError: The file exists and must not be replaced, or its folder is missing or read-only.
-        RunError: Writing fails, for example because the disk is full.
+    InputError if the file exists and must not be replaced, or its folder is missing or read-only; RunError if writing
+    fails.
     """
     reject_existing(path, overwrite=overwrite)
     if not path.parent.is_dir():

@@ -4,8 +4,6 @@ Runs that differ in their seed alone are independent; their 95 % intervals are b
 error. Successive frames of one run are correlated, see `mean_with_error`.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Hashable, Iterable, Sequence
 from dataclasses import dataclass
@@ -135,8 +133,7 @@ def difference(mean: SeedMean, baseline: SeedMean, *, scatter: Scatter | None = 
 
     The interval follows from `scatter`, common to both means, or, without it, from the error of each mean by Welch.
 
-    Source:
-        Welch, Biometrika 34 (1947) 28; degrees of freedom after Satterthwaite.
+    Source: Welch, Biometrika 34 (1947) 28; degrees of freedom after Satterthwaite.
     """
     value = mean.value - baseline.value
     if scatter is not None:

@@ -188,13 +188,8 @@ class Profile:
 def profiles(x: Floats, having: Floats, groups: NDArray[np.int64]) -> dict[int, Profile]:
     """Compute the profile likelihood of the threshold x_c for each group of runs, by the group's number.
 
-    Args:
-        x: (n,) finite values of x of all runs.
-        having: (n,) 1 for a run that has the property, else 0.
-        groups: (n,) number of the group of each run, for example the size of the pile.
-
-    Returns:
-        The profile of each group; its key is the number of the group. All profiles have the same tried values of x_c.
+    Values of x (n,) are finite; `having` (n,) is 1 for a run that has the property, else 0; `groups` (n,) are numbers
+    of groups, for example sizes of piles. All profiles have the same tried values of x_c.
     """
     span = float(np.ptp(x)) or 1.0
     places = np.linspace(x.min() - span / 2, x.max() + span / 2, _PLACES)

@@ -103,13 +103,7 @@ def run_accuracy(arguments: argparse.Namespace) -> int:
 
 
 def _listing(ladder: Ladder, expected_s: Mapping[str, float], seeds: int, jobs: int | None) -> str:
-    """Return a table of the variants, with the expected wall time of one run [s] and of all runs [h].
-
-    Args:
-        expected_s: expected wall time of one run [s] by variant.
-        seeds: number of seeds.
-        jobs: number of simultaneous runs; None: one per core.
-    """
+    """Return a table of the variants, with the expected wall time of one run [s] and of all runs [h]."""
     from dem.engine.cores import usable_cores  # noqa: PLC0415
     from dem.plan.outlook import plan  # noqa: PLC0415
 

@@ -130,10 +130,7 @@ class SweepSimulator:
     def planned(self, wave: int) -> Array | None:
         """Return the parameters (n, d) of the points of a wave (counted from 1); None if it has no sweep yet.
 
-        The d columns are the free parameters, in the order of the calibration file.
-
-        Raises:
-            InputError: the sweep lacks a free parameter of the calibration.
+        The d columns are the free parameters, in the order of the calibration file; InputError if the sweep lacks one.
         """
         import numpy as np  # noqa: PLC0415
 
@@ -156,13 +153,8 @@ class SweepSimulator:
     def run(self, wave: int, theta: Array) -> Sequence[tuple[Mapping[str, Value], Measured | None]] | None:
         """Compute or submit the missing runs of a wave; return variables and measures of all its runs.
 
-        Args:
-            wave: number of the wave, from 1.
-            theta: parameters (n, d), a row for each point.
-
-        Returns:
-            For each run a pair, variables by name and measures by name; the measures of a failed run are None. The
-            whole result is None as long as some runs have neither finished nor failed.
+        The wave is counted from 1; `theta` (n, d) has a row of parameters for each point. The measures of a failed run
+        are None. The whole result is None as long as some runs have neither finished nor failed.
         """
         sweep, points = self.problem.sweep(wave, theta)
         folder = sweeps.folder_of(sweep, points, self._path(wave), self.arguments.command_line)

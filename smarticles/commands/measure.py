@@ -220,10 +220,7 @@ def _notes(table: pd.DataFrame) -> list[str]:
 def _legend(shown: Container[str], *, per_frame: bool, by: Sequence[str]) -> str:
     """Return the legend below the printed table: what a row is, and what the columns mean.
 
-    Args:
-        shown: names of the printed columns.
-        per_frame: whether a row is a frame instead of a phase.
-        by: columns whose values make groups of runs; empty: runs are not averaged.
+    `shown` are the printed columns; a row is a frame, or a phase; `by` are columns whose values make groups of runs.
     """
     from postprocess.measures.packing import COSTLY_DEFINITIONS, DEFINITIONS  # noqa: PLC0415
     from postprocess.measures.pull import WINDOW  # noqa: PLC0415

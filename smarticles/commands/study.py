@@ -106,20 +106,13 @@ def compute_and_analyse(
 ) -> int:
     """Compute the missing runs of a sweep, analyse its finished runs, and print the results; return 0.
 
-    With --analyse no run is computed.
+    With --analyse no run is computed. `load` returns the study; it is called after the runs, since it imports large
+    libraries. For the results, `note` says how the runs differ from the full study, `full` what that one found (empty
+    if these runs are the full study). The first finished run with the values `pictured` of variables is drawn. Runs of
+    an `earlier` analysis, by name, are not computed again.
 
-    Args:
-        folder: directory of the sweep; the results are written to its subfolder `results`.
-        arguments: parsed command line with --analyse and --jobs.
-        load: returns the study that analyses the runs. It is called after the runs, since it imports large libraries.
-        note: how the runs differ from the full study, for the results.
-        full: what the full study found, for the results; empty if these runs are the full study.
-        pictured: values of variables by name; the first finished run with these values is drawn.
-        earlier: measured runs of an earlier analysis by name of the run; they are not computed again.
-
-    Raises:
-        InputError: --analyse is given, and no run is finished.
-        RunError: a run failed; the finished runs have been analysed.
+    InputError if --analyse is given and no run is finished; RunError if a run failed: the finished ones have been
+    analysed.
     """
     missing = folder.only([entry for entry in folder.entries if entry.name not in earlier])
     outcomes = [] if arguments.analyse else compute(missing, jobs=arguments.jobs, command=arguments.command_line)

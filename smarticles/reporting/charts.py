@@ -21,11 +21,7 @@ Groups = Mapping[str, tuple[Sequence[object], Sequence[float], Sequence[float]]]
 def against_time(times: Array, values: Array, label: str, phases: Sequence[tuple[float, float, str]]) -> str:
     """Draw a quantity against time; return the chart as a data URL.
 
-    Args:
-        times: (n,) [s].
-        values: (n,) in the unit of the label.
-        label: label of the vertical axis, with unit.
-        phases: start [s], end [s] and type of each phase.
+    Times (n,) are in [s], values (n,) in the unit of the label; phases are start [s], end [s] and type.
     """
     with style():
         figure, axes = _axes("time [s]", label)
@@ -45,11 +41,8 @@ def against_time(times: Array, values: Array, label: str, phases: Sequence[tuple
 def against_variable(variable: str, label: str, groups: Groups) -> str:
     """Draw means with error bars against a variable; return the chart as a data URL.
 
-    Args:
-        variable: title of the x-axis.
-        label: title of the y-axis.
-        groups: a curve for each name in the legend: values of the variable (numbers or words), means, and half-lengths
-            of the error bars, of equal length; an error may be NaN.
+    Groups have, for each name in the legend, values of the variable (numbers or words), means, and half-lengths of the
+    error bars, which may be NaN.
     """
     values = [x for xs, _, _ in groups.values() for x in xs]
     numeric = all(isinstance(x, int | float) for x in values)

@@ -33,14 +33,10 @@ _blocks: Any = _environment.get_template("blocks.html.j2").module
 
 
 def page(title: str, about: str, lead: Iterable[tuple[str, str]], sections: Iterable[Section], source: Path) -> str:
-    """Return an HTML page.
+    """Return an HTML page about a directory, `source`, of the kind `about`, such as "run" or "sweep".
 
-    Args:
-        title: title of the page.
-        about: kind of directory: "run", "sweep", "study" or "results of a study".
-        lead: label and value of each of the most important facts, which come first.
-        sections: title and HTML blocks of each section; a section without blocks is left out.
-        source: directory that the page is about; its name is in the last line of the page.
+    `lead` are label and value of the most important facts, which come first. Sections have title and blocks; a section
+    without blocks is left out.
     """
     try:
         made = f"smarticles {version('smarticles')}"
@@ -63,7 +59,8 @@ def words(*lines: str, tone: str = "plain") -> Markup:
 def table(caption: str, header: Sequence[Any], rows: Iterable[Sequence[Any]], *, folded: bool = False) -> Markup:
     """Return a table of at most `MAX_ROWS` rows; `folded`: show only its caption until a click."""
     cells = [[format_cell(value) for value in row] for row in rows]
-    numeric = [all_numbers([row[k] for row in cells]) for k in range(len(header))]
+    # Dashes and numbers, with or without error and percent sign.
+    numeric = [bool(cells) and all(_NUMBER.fullmatch(row[k].strip()) for row in cells) for k in range(len(header))]
     left_out = max(len(cells) - MAX_ROWS, 0)
     return Markup(_blocks.table(caption, header, cells[:MAX_ROWS], numeric, left_out, folded))
 
@@ -76,10 +73,8 @@ def listing(caption: str, text: str, *, folded: bool = False) -> Markup:
 def figure(caption: str, alt: str, picture: str, kind: str) -> Markup:
     """Return a picture with caption.
 
-    Args:
-        alt: description for readers who cannot see the picture.
-        picture: the picture as a data URL.
-        kind: "chart" (colours are inverted on a dark page), "card" (light background) or "card wide".
+    `alt` describes the picture, a data URL, for readers who cannot see it. The kind is "chart" (colours are inverted on
+    a dark page), "card" (light background) or "card wide".
     """
     return Markup(_blocks.figure(caption, alt, picture, kind))
 
@@ -87,19 +82,11 @@ def figure(caption: str, alt: str, picture: str, kind: str) -> Markup:
 def turntable(caption: str, alt: str, views: Sequence[str]) -> Markup:
     """Return a picture that the reader turns by pointer, touch or arrow keys.
 
-    The HTML is a group of radio buttons, one per view, so that the page needs no script.
-
-    Args:
-        alt: description for readers who cannot see the picture.
-        views: data URLs of pictures from equally spaced angles.
+    `views` are data URLs from equally spaced angles. The HTML is a group of radio buttons, one per view, so that the
+    page needs no script.
     """
     angles = [round(360 * number / len(views)) for number in range(len(views))]
     return Markup(_blocks.turntable(caption, alt, list(zip(views, angles, strict=True))))
-
-
-def all_numbers(cells: Sequence[str]) -> bool:
-    """Return whether every cell is a dash or a number, with or without error and percent sign."""
-    return bool(cells) and all(_NUMBER.fullmatch(cell.strip()) for cell in cells)
 
 
 def embedded(path: Path) -> str:

@@ -106,11 +106,9 @@ def _measures(directory: Path) -> list[Markup]:
 
 
 def short_table(found: pd.DataFrame, named: Sequence[str], caption: str) -> Markup:
-    """Return a table of the main quantities as `mean ± SE`.
+    """Return a table of the main quantities of `measured` or `grouped` as `mean ± SE`.
 
-    Args:
-        found: table of `measured` or `grouped`.
-        named: columns that identify a row.
+    The columns `named` identify a row.
     """
     present = found.columns[found.notna().any()]
     wanted = [(quantity.header, shown) for quantity, shown in shown_quantities() if quantity.header in present]
@@ -140,10 +138,8 @@ def picture_blocks(
 
     There is a note with the reason if pictures cannot be drawn, and no block if the run has no frames.
 
-    Args:
-        name: name of the run in captions; empty on the page of a single run.
-        turn: add views from all sides.
-        limits: lower and upper end of the colour scale of the picture; None: the extremes in it.
+    Captions have the `name` of the run, except on its own page. `turn` adds views from all sides. `limits` are the ends
+    of the colour scale of the picture; None: the extremes in it.
     """
     from postprocess.pictures.render import render_run  # noqa: PLC0415  (imports PyVista)
     from postprocess.pictures.render import turntable as draw_views  # noqa: PLC0415
@@ -202,10 +198,8 @@ def _curves(run: Run) -> list[Markup]:
 def scene_blocks(directory: Path, scene: Scene | None, scene_error: str) -> list[Markup]:
     """Return HTML blocks about a scene: table of phases, warnings of the plan, and text of the scene file.
 
-    Args:
-        directory: folder that has the scene file.
-        scene: the scene, or None if this version cannot read it.
-        scene_error: text that replaces phases and warnings if `scene` is None.
+    The folder has the scene file. `scene_error` replaces phases and warnings if this version cannot read the scene
+    (None).
     """
     blocks = [words(scene_error, tone="warning")] if scene is None else []
     if scene is not None:
@@ -247,8 +241,7 @@ def effect_blocks(scenes: Sequence[Scene]) -> list[Markup]:
 def accuracy_blocks(scene: Scene | None, path: Path | None) -> list[Markup]:
     """Return tables of a scene's numerical parameters, and of the measured errors of the named fidelities.
 
-    Args:
-        path: table of measured errors by `smarticles accuracy`; None: the table that ships.
+    `path` is a table of measured errors by `smarticles accuracy`; None: the table that ships.
     """
     if scene is None:
         return []
@@ -309,12 +302,7 @@ def warning_blocks(directories: Mapping[str, Path]) -> list[Markup]:
 
 
 def provenance_table(facts: Sequence[Sequence[Any]], versions: Mapping[str, str]) -> Markup:
-    """Return a table on the origin of a run or sweep.
-
-    Args:
-        facts: rows of two cells, the name of a fact and its value.
-        versions: versions by name of the package; they follow below the facts.
-    """
+    """Return a table on the origin of a run or sweep: rows of fact and value, then versions of packages."""
     rows = [*facts, *([f"version of {name}", version] for name, version in versions.items())]
     return table("Origin", ["fact", "value"], rows)
 

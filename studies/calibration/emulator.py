@@ -5,8 +5,6 @@ made exactly at the conditions of the data, so that nothing needs to be interpol
 length scale nor one noise has to hold at all of them. (A condition may also change the count and the pour.)
 """
 
-from __future__ import annotations
-
 import math
 import warnings
 from collections.abc import Callable
@@ -61,14 +59,9 @@ def fit(inputs: Array, values: Array, label: str) -> Emulator:
     log-normal priors. Without priors the emulator would pass exactly through few runs in several dimensions, scatter
     included.
 
-    Args:
-        inputs: parameters (n, d) of the runs, scaled from 0 to 1 over the ranges of their priors. Runs with equal
-            parameters and different seeds have a row each.
-        values: measured values (n,).
-        label: name of the datum, for messages.
-
-    Raises:
-        InputError: there are fewer than `LEAST_RUNS` runs, or all values are equal.
+    Parameters of the runs (n, d) are scaled from 0 to 1 over the ranges of their priors; runs with equal parameters and
+    different seeds have a row each. The label names the datum in messages. InputError if there are fewer than
+    `LEAST_RUNS` runs, or all n values are equal.
 
     Source:
         Rasmussen and Williams, Gaussian Processes for Machine Learning, 2006, chapters 2 and 5. Prior of the length

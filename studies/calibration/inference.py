@@ -10,8 +10,6 @@ Sources:
     Bayesian Analysis 5, 619 (2010): history matching. Foreman-Mackey et al., PASP 125, 306 (2013): emcee.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Protocol
@@ -147,11 +145,8 @@ def calibrate(problem: Problem, simulator: Simulator, say: Callable[[str], None]
     that the runs so far do not rule out. A condition is a combination of the data's variables, such as l/w and count;
     conditions without data to fit are run in the last wave only.
 
-    Args:
-        say: function that is called with a line of text about each wave.
-
-    Raises:
-        InputError: The budget is too small, or too few runs finished for an emulator.
+    `say` prints a line about each wave. InputError if the budget is too small, or too few runs finished for an
+    emulator.
     """
     size = problem.points_per_wave
     emulators: list[Emulator | None] = []
@@ -162,7 +157,12 @@ def calibrate(problem: Problem, simulator: Simulator, say: Callable[[str], None]
     for wave in range(1, problem.content.waves + 1):
         theta = simulator.planned(wave)
         if theta is None:
-            theta = first_points(problem, size) if wave == 1 else _next(candidates, distances, size)
+            theta = first_points(problem, size)
+            if wave > 1:
+                # The first candidates that are not ruled out, evenly in their region as parts of a Sobol sequence are;
+                # if too few are left, the least implausible ones.
+                limit = max(CUTOFF, float(np.partition(distances, size - 1)[size - 1]))
+                theta = _rounded(candidates[distances <= limit][:size])
         found = simulator.run(wave, theta)
         if found is None:
             return None
@@ -214,21 +214,6 @@ def first_points(problem: Problem, size: int) -> Array:
     return _rounded(problem.from_unit(sequence.random_base2((size - 1).bit_length())[:size]))
 
 
-def _next(candidates: Array, distances: Array, size: int) -> Array:
-    """Return the points of the next wave: the first `size` candidates that are not ruled out, (size, d).
-
-    If fewer than `size` are not ruled out, the `size` least implausible candidates are returned. A candidate is ruled
-    out if its implausibility is above `CUTOFF`.
-
-    Args:
-        candidates: parameters (n, d), a Sobol sequence. Its part within a region fills the region evenly.
-        distances: implausibilities (n,) of the candidates [-].
-        size: number of points.
-    """
-    limit = max(CUTOFF, float(np.partition(distances, size - 1)[size - 1]))
-    return _rounded(candidates[distances <= limit][:size])
-
-
 def _rounded(theta: Array) -> Array:
     """Return parameters with five significant digits, which scene files show in full."""
     return np.array([[float(f"{value:.5g}") for value in row] for row in theta])
@@ -252,9 +237,8 @@ def emulate(problem: Problem, runs: pd.DataFrame) -> list[Emulator | None]:
 def _residuals(problem: Problem, emulators: Sequence[Emulator | None], theta: Array) -> tuple[Array, Array, Array]:
     """Return deviations of the J fitted data from the emulators at parameters (n, d), and variances.
 
-    Returns:
-        Data less emulator means, (n, J); variances of measurement and emulator together, (n, J); mean sizes s_j of the
-        measures, (J,).
+    Returns data less emulator means (n, J), variances of measurement and emulator together (n, J), and mean sizes s_j
+    of the measures (J,).
     """
     inputs, sizes = problem.scaled(theta), problem.sizes
     used = [(d, e, s) for d, e, s in zip(problem.data, emulators, sizes, strict=True) if d.fitted and e is not None]
@@ -292,9 +276,8 @@ def log_posterior(problem: Problem, emulators: Sequence[Emulator | None], draws:
 def sample(problem: Problem, emulators: Sequence[Emulator | None]) -> tuple[Array, Array, dict[str, float]]:
     """Sample the posterior by emcee.
 
-    Returns:
-        Thinned draws (m, d + 1) of the parameters and σ; the draw with the largest posterior density, (d + 1,);
-        diagnostics by name: autocorrelation time in steps, steps over it, acceptance, and number of effective draws.
+    Returns thinned draws (m, d + 1) of the parameters and σ; the draw with the largest posterior density, (d + 1,); and
+    diagnostics by name: autocorrelation time in steps, steps over it, acceptance, and number of effective draws.
     """
     import emcee  # noqa: PLC0415  (an extra)
 

@@ -3,8 +3,6 @@
 `smarticles calibrate --help` shows a calibration file with all its keys.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -181,10 +179,7 @@ class Problem:
         return found
 
     def log_prior(self, theta: Array) -> Array:
-        """Return ln of the prior density (n,), up to a constant, of parameters (n, d).
-
-        It is -inf outside the ranges.
-        """
+        """Return ln of the prior density (n,) of parameters (n, d), up to a constant; -inf out of range."""
         low, high = self.bounds
         found: Array = np.where(np.all((low <= theta) & (theta <= high), axis=1), 0.0, -np.inf)
         for k, prior in enumerate(self.content.free.values()):
@@ -211,8 +206,7 @@ class Problem:
     def sweep(self, wave: int, theta: Array) -> tuple[Sweep, list[Point]]:
         """Return a wave (counted from 1) at parameters (n, d) as a sweep with its points.
 
-        Raises:
-            InputError: the file names no scene, the scene cannot be read, or a run's scene is not valid.
+        InputError if the file names no scene, the scene cannot be read, or a run's scene is not valid.
         """
         content = self.content
         source = content.template or content.scene

@@ -1,7 +1,5 @@
 """Write the results of a calibration: tables, figures, a text, and a preset of contact parameters."""
 
-from __future__ import annotations
-
 import hashlib
 import importlib.metadata
 from pathlib import Path

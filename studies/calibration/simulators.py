@@ -3,8 +3,6 @@
 `smarticles.commands.calibrate` computes runs as sweeps of scenes.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -92,12 +90,9 @@ class TableSimulator:
 def measured(run: Run, names: Sequence[str]) -> dict[str, float]:
     """Return measures of a run by their names, as means over the last frames of a phase.
 
-    Args:
-        names: `COLUMN` or `COLUMN @ PHASE`: a column of the table that `smarticles measure` prints, and the index of a
-            phase, from 0, or from the end as -1; default: the last phase.
-
-    Raises:
-        InputError: There is no such phase or column, or a file of the run is missing or damaged.
+    Names are `COLUMN` or `COLUMN @ PHASE`: a column of the table that `smarticles measure` prints, and the index of a
+    phase, from 0, or from the end as -1; default: the last phase. InputError if there is no such phase or column, or a
+    file is damaged.
     """
     count = len(run.phases)
     wanted: dict[str, tuple[str, int]] = {}

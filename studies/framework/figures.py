@@ -444,9 +444,7 @@ class Scatter:
 def one_by_one(column: str, label: Callable[[Any], str], *, last: float = 0.85) -> SplitBy:
     """Return a split of tables into one series per value of a column, in colours from dark to light.
 
-    Args:
-        label: makes the text in the legend from a value.
-        last: position of the lightest colour in the colour map, from 0 to 1.
+    `label` makes the text in the legend from a value; `last` is the position of the lightest colour in the map, 0 to 1.
     """
 
     def split(table: pd.DataFrame) -> list[Series]:
@@ -578,9 +576,7 @@ def draw_fits(
 ) -> None:
     """Draw curves of one colour over points x (n,), with bands.
 
-    Args:
-        fits: for each curve, by its label in the legend, values (n,) and 95 % half-widths (n,) of the band.
-        lines: line style of each curve.
+    Fits are values (n,) and 95 % half-widths (n,) of the band by the label of the curve; `lines` are line styles.
     """
     for (label, (values, half_widths)), line in zip(fits.items(), lines, strict=False):
         axes.plot(x, values, color=colour, linewidth=0.9, linestyle=line, label=label)
@@ -600,12 +596,8 @@ def draw_means(
 ) -> None:
     """Draw means y (n,) at positions x (n,) with their error bars.
 
-    Args:
-        half_widths: half-widths (n,) of the 95 % intervals of y, NaN where unknown; None: no vertical bars.
-        properties: arguments of Matplotlib's `Axes.errorbar`.
-        label: text in the legend.
-        across: half-widths of the 95 % intervals of x: (n,), or (2, n) for the lower and the upper side; None: no
-            horizontal bars.
+    Half-widths of the 95 % intervals are those of y (n,), and `across` those of x, (n,), or (2, n) for the lower and
+    the upper side; NaN where unknown, None for no bars. `properties` are arguments of Matplotlib's `Axes.errorbar`.
     """
     bars = axes.errorbar(
         x, y, yerr=half_widths, xerr=across, **{"markersize": 3.4, "linewidth": 0.7, **properties}, label=label
@@ -635,11 +627,7 @@ def finish(figure: Canvas, path: Path, notes: Sequence[str], footer: Sequence[st
 
     The limits of the axes are widened until they show everything.
 
-    Args:
-        path: path of the files without suffix.
-        notes: first lines of the footer, below the figure.
-        footer: last lines of the footer.
-        bars: explanation of the error bars, a line between `notes` and `footer` if there are error bars.
+    The path has no suffix. The footer has `notes` first; then, if there are error bars, their explanation `bars`.
     """
     legends = [
         {label: handle for handle, label in zip(*axes.get_legend_handles_labels(), strict=True)} for axes in figure.axes

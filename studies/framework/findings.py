@@ -234,20 +234,10 @@ def above(
 ) -> Finding:
     """Make the finding that a procedure is above others in a quantity, paired by aspect ratio and seed.
 
-    Args:
-        name: id of the finding.
-        says: the statement.
-        quantities: column, or several columns with a sign each: +1 if the statement says above, −1 if below.
-        one: procedure of the statement.
-        others: procedures that it is compared with.
-        sign: sign of `quantities` if it is one column.
-        beside: procedures whose difference from `one` is shown but not judged.
-        beside_quantity: column of the differences that are not judged; None: those of `quantities`.
-        bounds: column that is above 0 in runs whose first quantity is a lower bound, and whose other quantities are
-            unknown.
-        rows: selects the rows that the finding is judged by.
-        shown: columns whose means are shown but not judged.
-        found_if: criterion in words; empty: all effects beyond their thresholds.
+    `quantities` is a column, or several with a sign each: +1 if the statement says above, −1 if below. The difference
+    of `one` from the procedures `beside`, in the column `beside_quantity` if given, and means of the columns `shown`
+    are not judged. The column `bounds` is above 0 in runs whose first quantity is a lower bound, and whose other
+    quantities are unknown.
     """
     signs = {quantities: sign} if isinstance(quantities, str) else quantities
 
@@ -296,14 +286,7 @@ def slope(
 ) -> Finding:
     """Make the finding that a quantity rises (sign +1) or falls (−1) with a variable, by straight lines.
 
-    Args:
-        name: id of the finding.
-        says: the statement.
-        quantity: column of the quantity.
-        against: column of the variable.
-        within: columns whose values make blocks of rows; all blocks have one slope, and each has its own intercept.
-        rows: selects the rows that the finding is judged by.
-        label: name of the quantity in texts; empty: its symbol.
+    All blocks, rows with equal values in the columns `within`, have one slope, and each has its own intercept.
     """
     label = f"{label or symbol(quantity)} against {symbol(against)}"
 
@@ -330,15 +313,8 @@ def mean(
 ) -> Finding:
     """Make the finding that the mean of a value is above a threshold (sign +1) or below it (−1).
 
-    Args:
-        name: id of the finding.
-        says: the statement.
-        values: computes the value of each row of a table.
-        label: name of the value in texts.
-        rows: selects the rows that the finding is judged by.
-        threshold: in the unit of the value.
-        shown: columns whose means are shown but not judged.
-        by: column; the means of the columns `shown` are taken at each of its values.
+    `values` computes the value of each row, in the unit of the threshold. Means of the columns `shown`, at each value
+    of the column `by`, are shown but not judged.
     """
 
     def outcome(table: pd.DataFrame) -> Outcome:
@@ -366,16 +342,8 @@ def ranks(
     Ranks are used since peak forces do not follow a straight line: a pile that held fast gives a lower bound, which
     ranks above all other values, and a pile that a single smarticle braces has a peak many times those of other piles.
 
-    Args:
-        name: id of the finding.
-        says: the statement.
-        x: column of the first quantity.
-        y: column of the second quantity.
-        within: columns whose values make blocks of rows; ranks are taken within each block.
-        bounds: column that is above 0 if y is a lower bound.
-        found_if: criterion in words.
-        unit: unit of the slope of y against x, which is shown but not judged.
-        rows: selects the rows that the finding is judged by.
+    Ranks are taken within blocks, rows with equal values in the columns `within`. The column `bounds` is above 0 if y
+    is a lower bound. The slope of y against x, in `unit`, is shown but not judged.
     """
 
     def outcome(table: pd.DataFrame) -> Outcome:

@@ -132,10 +132,8 @@ def height_history(run: Run) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Return the height of the centre of mass over h0 (n,) [-], and the times of its samples (n,) [s].
 
     h0 is the mean height in the rest before the activity, with which the samples begin; the time is 0 at the beginning
-    of the activity. Samples without a height are left out.
-
-    Raises:
-        InputError: the phases are not one activity between two rests, or no sample of the first rest has a height.
+    of the activity. Samples without a height are left out. InputError if the phases are not one activity between two
+    rests, or no sample of the first rest has a height.
     """
     series, active = run.series, activity(run)
     height = np.asarray(series["com_height_m"], dtype=np.float64)
@@ -150,10 +148,7 @@ def height_history(run: Run) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
 def _of_series(run: Run, active: Phase, straight_until: float | None) -> dict[str, float]:
     """Measure heights [-] and energy per smarticle [J] from the series, by column; NaN if not recorded.
 
-    Args:
-        active: phase of the activity.
-        straight_until: time [s] since the beginning of a shape change at which the barbs, straight until then, start to
-            close again; None for other activities.
+    In a shape change barbs, straight until `straight_until`, then start to close again: time [s] since it began.
     """
     found = {STRAIGHT: math.nan, LOWEST: math.nan, HALF: math.nan, ENERGY: math.nan}
     if not (run.path / "series.h5").exists():

@@ -114,12 +114,9 @@ class Origin:
     ) -> dict[str, Path]:
         """Write tables, text and provenance into a folder; return the paths of the files by their names.
 
-        Args:
-            output: folder.
-            footer: lines on the origin. They are written below the text, and below CSV tables as comments, so that
-                readers need `comment="#"`.
-            tables: tables by the name of the file without `.csv`.
-            text: name of a Markdown file and its lines; a list of the missing runs follows below them.
+        The footer is written below the text, and below CSV tables as comments, so that readers need `comment="#"`.
+        Tables are by the name of their file without `.csv`; `text` is the name of a Markdown file and its lines, below
+        which missing runs are listed.
         """
         missing = pd.DataFrame([asdict(run) for run in self.found.missing], columns=["directory", "status", "cause"])
         below = "".join(f"# {line}\n" for line in footer)

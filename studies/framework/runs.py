@@ -242,11 +242,8 @@ class Collected:
     ) -> None:
         """Raise InputError if a value differs between runs that must be alike, such as runs averaged together.
 
-        Args:
-            quantity: name of the value in the message.
-            value: returns the value of a run.
-            within: returns the group of a run; only runs of one group must have equal values. Default: all runs are one
-                group.
+        `value` returns the value of a run, `within` its group; only runs of one group must have equal values. By
+        default all runs are one group.
         """
         firsts: dict[Hashable, MeasuredRun] = {}
         for run in self.runs:
@@ -281,13 +278,8 @@ def collect_runs(
 ) -> Collected:
     """Measure the finished runs among given run directories, and list the others as missing.
 
-    Args:
-        study: name of the study, for messages.
-        measure: measures a run. If it raises InputError, the run is missing, with the status "unusable".
-        earlier: measured runs of an earlier analysis by name; they replace directories that do not exist.
-
-    Raises:
-        InputError: no run is finished.
+    If `measure` raises InputError, the run is missing, with the status "unusable". Measured runs of an `earlier`
+    analysis, by name, replace directories that do not exist. InputError if no run is finished.
     """
     runs: list[MeasuredRun] = []
     missing: list[MissingRun] = []

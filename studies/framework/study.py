@@ -115,11 +115,8 @@ class Study:
         InputError if no run is done, `reject_unlike` rejects the runs, or the folder cannot be made.
 
         Args:
-            run_dirs: directories of the runs; runs that are not done or cannot be read are listed as missing.
-            output: folder for the files; it is made if it does not exist.
             note: how the runs differ from the full study, for footers.
             full: what the full study found, for footers; empty if these runs are the full study.
-            command: command line, for footers.
             earlier: runs of an earlier analysis by name, which replace directories that do not exist.
         """
         output = make_folder(output)

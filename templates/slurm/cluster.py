@@ -36,8 +36,7 @@ Option = Annotated[str, Field(max_length=200), AfterValidator(_plain_option)]
 def parse_time(text: str) -> int:
     """Return a time [s] from Slurm's notation: `M`, `M:S`, `H:M:S`, `D-H`, `D-H:M` or `D-H:M:S`.
 
-    Raises:
-        ValueError: The text is no such time, or the time is 0.
+    ValueError if the text is no such time, or the time is 0.
     """
     days, dash, rest = text.rpartition("-")
     parts = rest.split(":")

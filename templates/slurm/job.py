@@ -176,12 +176,8 @@ def render_script(
 ) -> str:
     """Return the text of the script of an array job; raise InputError if it cannot be rendered.
 
-    Args:
-        sweep: Directory of the sweep.
-        number: Name of the submission's folder in `jobs/`.
-        name: Name of the job.
-        count: Number of runs.
-        command: Command that starts `smarticles`, as words.
+    `number` is the name of the submission's folder in `jobs/`, `name` that of the job, `count` the number of runs, and
+    `command` starts `smarticles`.
     """
     folder = f"jobs/{number}"
     where = str(sweep.resolve())

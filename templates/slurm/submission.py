@@ -90,13 +90,8 @@ def draft(
 ) -> Draft:
     """Plan and render a submission without writing it.
 
-    Args:
-        path: Directory of the sweep, which may be absent.
-        name: Name of the sweep.
-        entries: Runs to be submitted.
-        reference: Name of a cluster in this package, or a file that ends in .toml.
-        wishes: Options of the user.
-        token: Text that makes the name of the job unique; random if not given.
+    `path` is the directory of the sweep, which may be absent; `reference` the name of a cluster in this package, or a
+    file that ends in .toml. The token makes the name of the job unique; it is random if not given.
     """
     cluster = load_cluster(reference)
     request = plan_request([entry.expected_s for entry in entries], cluster, wishes)
@@ -142,8 +137,7 @@ def write(folder: Folder, draft: Draft) -> Path:
 def submit(folder: Folder, draft: Draft) -> Submission:
     """Submit a written submission to Slurm, and store the number of the job.
 
-    Raises:
-        RunError: Slurm rejects the job, or its answer is no job number.
+    RunError if Slurm rejects the job, or its answer is no job number.
     """
     # The stored name finds the job in the queue even if this process is killed before it stores the number.
     script = folder.path / draft.submission.script
@@ -168,10 +162,7 @@ def tasks_of_runs(found: Sequence[Submission]) -> dict[str, Task]:
     """Return the task that computes each run, by the name of the run.
 
     `found` are the submissions of a sweep, oldest first. If a run is in several tasks, the newest one that has not
-    ended is taken, or the newest one if all have ended.
-
-    Raises:
-        QueueError: Slurm's queue cannot be queried.
+    ended is taken, or the newest one if all have ended. QueueError if Slurm's queue cannot be queried.
     """
     by_name = {submission.job_name: submission for submission in found}
     order = {submission.job_name: place for place, submission in enumerate(found)}

@@ -48,9 +48,8 @@ def expand(sweep: Sweep, *, max_points: int = MAX_POINTS) -> list[Point]:
 def points_of(sweep: Sweep, rows: Sequence[Mapping[str, Value]], *, again_from: int | None = None) -> list[Point]:
     """Make the points of a sweep from the values of all its variables; InputError if a scene is not valid.
 
-    Args:
-        rows: Values of the variables of each point, with the seed.
-        again_from: Index of the first point that repeats another one, see `Again`; None: no point does.
+    Rows are values with the seed. From the index `again_from` on, points repeat other ones, see `Again`; None: none
+    does.
     """
     points = []
     for index, values in enumerate(rows):

@@ -148,10 +148,7 @@ class Folder:
         """Lock the sweep, and yield the file descriptor that the processes of its runs must inherit.
 
         The lock lasts until the last process with this descriptor ends, so that runs which outlive a killed parent
-        process keep the sweep locked.
-
-        Raises:
-            InputError: Another process holds the lock.
+        process keep the sweep locked. InputError if another process holds the lock.
         """
         with (self.path / ".lock").open("a") as file:
             try:
@@ -187,15 +184,11 @@ def create_folder(
 ) -> Folder:
     """Create the directory of a sweep, or open a directory that already holds this sweep.
 
-    Args:
-        path: The directory, which is absent, empty, or holds this sweep.
-        command: Command that makes it, for the record.
-        versions: Version of each package that expands a sweep, for the record.
-        expected_s: Expected wall time of each point [s].
-        extend: Whether to add the missing runs to a directory that holds some of these runs and no others.
+    The directory is absent, empty, or holds this sweep; with `extend` it may hold some of these runs and no others, and
+    the missing ones are added. Command and versions are for the record; the wall times of the points are expected ones
+    [s].
 
-    Raises:
-        InputError: The directory holds something else, or its runs are being computed while it is to be extended.
+    InputError if it holds something else, or its runs are being computed while it is to be extended.
     """
     # Names relative to the sweep file, which do not depend on this machine.
     files = {sweep.path.name: sweep.text, sweep.content.template: sweep.template_text}

@@ -12,13 +12,8 @@ from dem.scene.reading import apply_override
 def as_template(data: Any, names: Mapping[str, str], source: str) -> str:
     """Return the text of a template for a sweep: a scene in YAML with variables in place of some values.
 
-    InputError if the scene has text that a template would execute.
-
-    Args:
-        data: content of the scene; it is changed in place.
-        names: name of the variable by the key whose value it replaces; dots separate nested keys, as in
-            `motor.law`.
-        source: scene or its file, for messages.
+    InputError if the scene, `data`, which is changed in place, has text that a template would execute. `names` are
+    those of variables by the key whose value they replace; dots separate nested keys, as in `motor.law`.
     """
     text = _dumped(data)
     for mark in ("{{", "{%", "{#"):

@@ -90,10 +90,7 @@ def _plain(value: Value) -> bool:
 
 
 def _check(value: Value, rule: str) -> None:
-    """Raise an error of Jinja2 if a value is undefined, no plain data, or too long.
-
-    Its message ends with `rule`.
-    """
+    """Raise an error of Jinja2, ending with `rule`, if a value is undefined, no plain data, or too long."""
     if isinstance(value, jinja2.Undefined):
         str(value)  # StrictUndefined raises, with the name
     if not _plain(value):

@@ -252,8 +252,7 @@ def with_constants(sweep: Sweep, constants: Mapping[str, Value]) -> Sweep:
 def on_engine(sweep: Sweep, engine: str) -> Sweep:
     """Return a sweep with all runs on one engine; repetitions on another engine are left out.
 
-    Raises:
-        InputError: The sweep has no constant `engine`, or `engine` is a variable of its points.
+    InputError if the sweep has no constant `engine`, or `engine` is a variable of its points.
     """
     content = sweep.content
     points = content.points
@@ -290,8 +289,7 @@ def read_text(path: Path, what: str) -> str:
 def parse_table(text: str, source: str) -> list[dict[str, int | float | str]]:
     """Return the rows of a CSV text whose first line names the columns; cells become numbers if possible.
 
-    Raises:
-        InputError: No row, an invalid column name, a row of another length, or an empty cell.
+    InputError for no row, an invalid column name, a row of another length, or an empty cell.
     """
     rows = [row for row in csv.reader(io.StringIO(text)) if row]
     if len(rows) < 2:
@@ -341,11 +339,8 @@ def matching(
 ) -> list[dict[str, Value]]:
     """Return the rows that have, in each variable named in `only`, one of the values listed there.
 
-    InputError if no row is left, or a variable or a value of `only` occurs in no row.
-
-    Args:
-        where: Place of `only`, for messages.
-        nouns: Words for a variable and for a row, for messages.
+    InputError if no row is left, or a variable or a value of `only` occurs in no row; it has the place of `only`,
+    `where`, and words for a variable and for a row, `nouns`.
     """
     variable, row_ = nouns
     kept = list(rows)

@@ -130,13 +130,6 @@ def soft(access: EngineAccess, out: Path, *, stiffness: float) -> list[Check]:
     return [says(run.text, "at t = ", "raise fidelity.stiffness_N_per_m")]
 
 
-def _too_long(scene: Scene, factor: float) -> float:
-    """Return a time step [s] that divides the control period and is about `factor` times the stable step."""
-    control = scene.fidelity.control_interval_s
-    step: float = control / max(1, math.floor(control / (factor * stable_step(scene))))
-    return step
-
-
 @hard("spoilt: time step 2 of the stable one", {"factor": 2.0, "count": 6, "seconds": 0.3}, {"count": 40})
 # A long case: welded smarticles chatter and never settle, so that the pour waits until its time limit.
 @hard("spoilt: time step 4 of the stable one", None, {"factor": 4.0, "count": 6, "seconds": 0.3})
@@ -145,7 +138,12 @@ def wrong_step(access: EngineAccess, out: Path, *, factor: float, count: int, se
     fidelity = "draft" if access.name == "yade" else {"base": "draft", "control_interval_s": LONG_CONTROL}
     recording = {"checkpoint_interval_s": 0.02}
     data = scene_data(access, swing(seconds), count=count, fidelity=fidelity, recording=recording)
-    run = whole(data, out, steps=lambda scene: (_too_long(scene, factor),) * len(scene.phases))
+
+    def steps(scene: Scene) -> list[float]:
+        control = scene.fidelity.control_interval_s  # a multiple of the time step
+        return [control / max(1, math.floor(control / (factor * stable_step(scene))))] * len(scene.phases)
+
+    run = whole(data, out, steps=steps)
     kind = run.error[0] if run.error else "none"
     return [Check("kind of error", kind, "RunError", kind == "RunError"), says(run.text, "(last good checkpoint: ")]
 

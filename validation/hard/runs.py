@@ -125,13 +125,9 @@ def whole(
 ) -> Watched:
     """Run a scene and return the outcome.
 
-    Args:
-        data: the scene as a dictionary.
-        out: run directory to be written.
-        note: record the largest fraction of each limit of the watchdog, which then examines all contacts at every
-            check.
-        steps: returns the time step of each phase [s]; default: those of `smarticles run`.
-        spoil: changes the engine before each sample of the series.
+    `note` records the largest fraction of each limit of the watchdog, which then examines all contacts at every check.
+    `steps` returns the time step of each phase [s], by default those of `smarticles run`. `spoil` changes the engine
+    before each sample of the series.
     """
     nearest: dict[str, float] = {}
     checks: list[float] = []  # processor time of each check of the watchdog [s]

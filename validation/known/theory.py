@@ -92,17 +92,10 @@ def falling_on_springs(
 ) -> tuple[Array, float]:
     """Integrate the impact of a horizontal rigid body on springs and dashpots, for small tilts.
 
-    Args:
-        points: x and y of the contacts relative to the centre of mass, (n, 2) [m].
-        stiffness: of one contact [N/m].
-        damping: of one contact [N s/m].
-        mass: [kg].
-        inertia: moments of inertia about x and y, (2,) [kg m²].
-        speed: downward speed at first touch [m/s].
-
-    Returns:
-        Upward velocity [m/s] and angular velocities about x and y [rad/s] after the impact, (3,), and the time from
-        first touch to the end of the last contact [s].
+    Contacts are at x and y relative to the centre of mass, (n, 2) [m]; stiffness [N/m] and damping [N s/m] are those of
+    one. Mass [kg], moments of inertia about x and y (2,) [kg m²], downward speed at first touch [m/s]. Returns upward
+    velocity [m/s] and angular velocities about x and y [rad/s] after the impact, (3,), and the time until the last
+    contact ends [s].
     """
     lift = np.stack([np.ones(len(points)), points[:, 1], -points[:, 0]], axis=1)  # heights of the points
     masses = np.array([mass, *inertia])

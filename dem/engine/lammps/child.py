@@ -30,8 +30,7 @@ _OPTIONS = (*"--bind-to none --mca btl_vader_single_copy_mechanism none --mca mp
 def lammps_version() -> str:
     """Return LAMMPS's version.
 
-    Raises:
-        RunError: LAMMPS or mpirun is not installed, LAMMPS does not start, or it was built without a style in `NEEDED`.
+    RunError if LAMMPS or mpirun is missing or does not start, or LAMMPS lacks a style in `NEEDED`.
     """
     for program, what in ((LMP, "LAMMPS"), (MPIRUN, "Open MPI")):
         if shutil.which(program) is None:
@@ -66,8 +65,7 @@ def _version(program: str) -> str:
 class Child:
     """A process of LAMMPS on some ranks, which reads commands until it is closed or this process ends.
 
-    Raises:
-        RunError: mpirun does not start.
+    RunError if mpirun does not start.
     """
 
     def __init__(self, ranks: int) -> None:
@@ -144,10 +142,7 @@ class Child:
 def explain(log: str, output: str, status: int | None) -> tuple[str, str]:
     """Return the cause of LAMMPS's end, and advice to the user.
 
-    Args:
-        log: content of LAMMPS's log file.
-        output: output of mpirun.
-        status: exit status of mpirun; None if it is unknown.
+    `status` is the exit status of mpirun; None if it is unknown.
     """
     errors = re.findall(r"^ERROR(?: on proc \d+)?: (.+)", f"{log}\n{output}", re.MULTILINE)
     if errors:

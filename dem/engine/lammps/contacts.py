@@ -27,9 +27,7 @@ class Contacts:
     def of(cls, spheres: Iterable[Array], radius: float | Array, boundaries: LammpsBoundaries) -> Self:
         """Find the contacts of spheres of different bodies, and of spheres with floor and wall.
 
-        Args:
-            spheres: (S, 3) centres of the spheres of each of N bodies [m].
-            radius: radius of the spheres: a number for all bodies, or (N,) [m].
+        Spheres (S, 3) of each of N bodies are centres [m]; the radius [m] is a number for all bodies, or (N,).
         """
         bodies = list(spheres)
         count, sizes = len(bodies), [len(body) for body in bodies]

@@ -80,9 +80,7 @@ class NoStrings:
 class LammpsLedger:
     """`dem.engine.interface.EnergyLedger` without the work of boundaries and the dissipation of contacts.
 
-    Args:
-        moving: function that returns whether a boundary moves.
-        stored: function that returns the elastic energy of contacts [J].
+    `moving` returns whether a boundary moves, `stored` the elastic energy of contacts [J].
     """
 
     container_work = 0.0
@@ -155,8 +153,7 @@ class LammpsEngine:
     def _scene(self, box: str) -> Iterator[str]:
         """Yield all commands that a new LAMMPS process needs before those of the rigid bodies.
 
-        Args:
-            box: command that makes the simulation box with its spheres, `read_data` or `read_restart` with a file.
+        `box` is the command that makes the simulation box with its spheres, `read_data` or `read_restart` with a file.
         """
         between, at_wall = text.contact_terms(self._law, self._reference.mass)
         yield from text.before_box(self.particle)

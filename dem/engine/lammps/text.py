@@ -68,10 +68,8 @@ def sphere_lines(
     A line has number, type, position, diameter and density of a sphere, and the number of its body.
 
     Args:
-        bodies: the N bodies.
         cylinder: the container, in which all spheres lie up to a margin.
         spheres: (S, 3) centres of the spheres of each body [m].
-        title: first line of the file.
         first: number of bodies that LAMMPS has already.
         first_sphere: number of spheres that LAMMPS has already.
     """
@@ -166,9 +164,7 @@ def container(cylinder: Cylinder, at_wall: str, *, walled: bool = True) -> Itera
 def body_dump(dump: str, *, when: str) -> Iterator[str]:
     """Yield the commands that write all bodies to files.
 
-    Args:
-        dump: name of the files, in which `*` is replaced by the step.
-        when: steps at which files are written, as an argument of `dump_modify every`.
+    In the name `dump`, `*` is replaced by the step. `when` are the steps, as an argument of `dump_modify every`.
     """
     count = len(WRITTEN.split())
     yield f"compute          where all rigid/local bodies {WRITTEN}"

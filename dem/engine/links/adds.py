@@ -3,8 +3,6 @@
 A kernel that no effect needs is not compiled.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 
 from dem.engine.effect import Adds, EffectName

@@ -1,7 +1,5 @@
 """Rigid boundaries on the engine links: floor, round wall of one or more tiers, hooks, or a channel."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 
@@ -45,11 +43,8 @@ def ground_for(cylinder: Cylinder, hooks: tuple[Cross, Cross] | None, channel: C
 class LinksBoundaries:
     """`dem.engine.interface.Boundaries` on links.
 
-    Args:
-        cylinder: the container.
-        shaken: whether the scene shakes the container.
-        removed: `LinksLedger.removed`. It calls its argument, a function that removes contacts, and counts the energy
-            of these contacts as dissipated.
+    `removed` is `LinksLedger.removed`, which calls its argument, a function that removes contacts, and counts the
+    energy of these contacts as dissipated.
     """
 
     def __init__(
@@ -191,9 +186,8 @@ class LinksBoundaries:
     def parts(self) -> dict[str, tuple[int, float]]:
         """Return index and rise of the boundaries between which bodies can be squeezed.
 
-        Returns:
-            Keys are "the lower hook", "the upper hook" and, if there is a wall, "the wall". A value is the boundary's
-            index in `Ground.place` and its rise relative to the floor since the start [m]. Empty without hooks.
+        Keys are "the lower hook", "the upper hook" and, if there is a wall, "the wall"; values the index in
+        `Ground.place` and the rise relative to the floor since the start [m]. Empty without hooks.
         """
         if self._world.hooks is None:
             return {}

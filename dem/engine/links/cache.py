@@ -8,8 +8,6 @@ loads the code. A file's name states the types of arguments, and the fields that
 compiled. A checksum rejects damaged files. If the cache cannot be used, a run compiles without it.
 """
 
-from __future__ import annotations
-
 import hashlib
 import logging
 import math
@@ -99,9 +97,7 @@ def folder() -> Path | None:
 def is_kept(without: frozenset[str]) -> bool:
     """Return whether the cache has the code for simulations that lack some groups of arrays.
 
-    Args:
-        without: names of the arguments of kernels, or of their fields, that are None in these simulations, such as
-            "hooks" or "motors".
+    These are arguments of kernels, or fields of them, that are None in these simulations, such as "hooks" or "motors".
     """
     where = folder()
     return where is not None and any(where.glob(f"{_title(LONGEST, without)}.*.code"))
@@ -114,9 +110,7 @@ def _title(kernel: str, without: frozenset[str]) -> str:
 def _lacking(kind: Any, name: str) -> Iterator[str]:
     """Yield the names of all fields of a kernel's argument that are None, including fields of fields.
 
-    Args:
-        kind: Numba's type of the argument.
-        name: name of the argument. If the argument itself is None, this name is yielded.
+    `kind` is Numba's type of the argument, `name` its name, which is yielded if the argument itself is None.
     """
     if isinstance(kind, types.NoneType):
         yield name
@@ -146,11 +140,7 @@ class KernelCache(NullCache):
 
     @contextmanager
     def turn(self, types_: Any) -> Iterator[None]:
-        """Return a context manager in which this process compiles while others that need the code wait.
-
-        Args:
-            types_: types of the kernel's arguments for which the code is compiled.
-        """
+        """Return a context manager in which this process compiles while others that need the code wait."""
         path = self.path(types_)
         if path is None or path.exists():
             yield
@@ -226,8 +216,7 @@ def _locked(path: Path) -> Iterator[None]:
 def _wait_for(file: int) -> None:
     """Wait for the lock of an open file, at most for `PATIENCE`; then go on without it.
 
-    Raises:
-        OSError: the file system has no locks.
+    OSError if the file system has no locks.
     """
     begun = time.monotonic()
     while True:
@@ -245,8 +234,7 @@ def _wait_for(file: int) -> None:
 def announce(seconds: float = math.nan) -> None:
     """Log that this process compiles the engine; only the first call in a process has an effect.
 
-    Args:
-        seconds: expected processor time [s], which the message states; NaN: unknown.
+    The message states the expected processor time `seconds`; NaN: unknown.
     """
     if not _ANNOUNCED.is_set():
         _ANNOUNCED.set()

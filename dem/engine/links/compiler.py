@@ -5,8 +5,6 @@ Numba optimises and translates each function separately, then links it into the 
 those again, level by level. Here all functions that a kernel calls are linked into the kernel, which is optimised once.
 """
 
-from __future__ import annotations
-
 import gc
 from collections.abc import Callable
 from typing import Any, TypeVar

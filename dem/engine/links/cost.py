@@ -8,8 +8,6 @@ Source: results/accuracy-links/cost.csv: one to three strands, 500 to 4000 N/m, 
 AMD EPYC virtual machine; results/scaling: N up to 10 000.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import NamedTuple
 
@@ -51,13 +49,7 @@ COMPILE_FIRST, COMPILE_MORE = 13.0, 7.0
 
 
 def seconds_per_second(scene: Demand, time_step: float, activity: Activity) -> float:
-    """Return the estimated wall time on one core per simulated time [1].
-
-    Args:
-        scene: sizes and settings of the simulation.
-        time_step: time step [s].
-        activity: what goes on: pouring, rest, shaking, or motors that move.
-    """
+    """Return the estimated wall time on one core per simulated time [1]."""
     count, recording, mixture = scene.count, scene.recording, scene.mixture
     rates = RATES[activity]
     if mixture is None:

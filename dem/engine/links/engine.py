@@ -1,7 +1,5 @@
 """A running simulation on the engine links, behind the interface of all engines."""
 
-from __future__ import annotations
-
 import io
 import json
 import math
@@ -53,12 +51,6 @@ class LinksEngine:
     """`dem.engine.interface.Engine` on links.
 
     Args:
-        particle: one smarticle, or a mixture of rigid bodies, of filaments or of linkages.
-        cylinder: the container; its floor is at z = 0 at the start.
-        law: contact law.
-        gravity: g, downwards [m/s²].
-        time_step: dt of the first steps [s].
-        shaken: whether the container will be shaken.
         motor_law: law of the motors; None if smarticles stay welded.
         keep_ledger: whether to sum the energy that contacts dissipate.
         hooks: the lower and the upper hook; None: no hooks.
@@ -262,9 +254,6 @@ class LinksEngine:
         """Return extremes over all bodies; None if an overlap is so large that a full check is needed.
 
         `Extremes.gap` is the widest gap at a joint of a linkage; 0 for other bodies, since hinges are rigid.
-
-        Args:
-            state: present state of the bodies.
         """
         if state.bodies is None:
             velocities = state.smarticles.link_velocities.reshape(-1, 3)
@@ -287,10 +276,8 @@ class LinksEngine:
     def _held(self, held: NDArray[np.bool_], deep: NDArray[np.bool_], least: float) -> tuple[Held, ...]:
         """Return the deep bodies that touch two boundaries whose distance has changed.
 
-        Args:
-            held: (N, 7) whether each body touches each boundary.
-            deep: (N,) whether each body has a deep contact.
-            least: smallest change of distance that counts [m].
+        For each body, `held` (N, 7) says whether it touches each boundary, `deep` (N,) whether it has a deep contact;
+        `least` is the smallest change of distance that counts [m].
         """
         parts = self.boundaries.parts() if deep.any() else {}
         touched = {int(k): [name for name, (part, _) in parts.items() if held[k, part]] for k in np.flatnonzero(deep)}
@@ -314,8 +301,7 @@ class LinksEngine:
     def load(self, saved: Saved, scratch: Path) -> None:
         """Replace the state by a saved one; this engine needs no files in `scratch`.
 
-        Raises:
-            InputError: another engine or version saved the state, or it is damaged.
+        InputError if another engine or version saved the state, or it is damaged.
         """
         if saved.memory.get("format") != FORMAT:
             raise InputError(

@@ -1,7 +1,5 @@
 """Grips, active bending and energies of filaments on the engine links."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
@@ -39,19 +37,16 @@ class LinksFilaments(FlexibleBodies):
     def grip(self, nodes: Mapping[int, Sequence[int]], *, directions: str = "xyz") -> int:
         """Hold nodes by a new grip, which is at rest; return its number.
 
-        Args:
-            nodes: numbers of the held nodes, by the number of their filament; -1 is a filament's last node. If two
-                neighbouring nodes are held in all directions, the segment between them does not roll either.
-            directions: letters of the directions in which nodes are held; in other directions nodes are free.
+        -1 is a filament's last node. If two neighbouring nodes are held in all directions, the segment between them
+        does not roll either. In other directions than those of the letters in `directions` nodes are free.
         """
         return self._hold(nodes, sum(1 << "xyz".index(each) for each in directions))
 
     def act(self, activity: Activity | Undulation | None, *, ramp: float = 0.0) -> None:
         """Set the preferred curvature of all filaments from now on; the present angle ψ of each wave is kept.
 
-        Args:
-            activity: wave of preferred curvature; None: the filaments' own preferred curvature.
-            ramp: time in which the new preferred curvature grows from 0 [s].
+        Without an activity it is the filaments' own preferred curvature. The new one grows from 0 in the time `ramp`
+        [s].
         """
         assert not isinstance(activity, Undulation)  # the scene was checked
         gait = self._all.gait

@@ -1,7 +1,5 @@
 """Grips, ramp and energies, which filaments and linkages have in common on the engine links."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -50,9 +48,8 @@ class FlexibleBodies:
     def _hold(self, members: Mapping[int, Sequence[int]], directions: int) -> int:
         """Hold members by a new grip, which is at rest; return its number.
 
-        Args:
-            members: numbers of the held members, by the number of their body; negative numbers count from its end.
-            directions: addition to the entries in `grip`, from 1 to `PER_GRIP`.
+        Members are given by the number of their body; negative numbers count from its end. `directions`, from 1 to
+        `PER_GRIP`, is added to the entries in `grip`.
         """
         all_, number = self._all, len(self._all.grip_speed)
         for body, held in members.items():

@@ -1,7 +1,5 @@
 """Grips that hold rigid bodies on the engine links."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Make the arrays of linkages for the kernels of `dem.engine.links.motion.joining`."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from typing import Any
@@ -100,10 +98,6 @@ def linkages_at(
     """Return arrays of the linkages of `old` and of a new one.
 
     Args:
-        old: arrays of the linkages so far.
-        linkage: links and joints of the new linkage.
-        body: number of the new linkage among all bodies.
-        links: links of the new linkage, with positions, turns, velocities and shapes.
         law: contact law, from which stiffness and damping of pins follow.
         start: initial angle ψ of the waves of its motors [rad].
         seed: seed of the times at which waves reverse.

@@ -1,7 +1,5 @@
 """Facts about the engine links, and the function that builds its simulations."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import numba

@@ -1,7 +1,5 @@
 """Energy ledger of the engine links, from sums that kernels add up in every step."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 from dem.body.filament import FilamentEnergies

@@ -1,7 +1,5 @@
 """Grips, gaits and energies of linkages on the engine links."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -39,17 +37,14 @@ class LinksLinkages(FlexibleBodies):
     def grip(self, links: Mapping[int, Sequence[int]]) -> int:
         """Hold links by a new grip, which is at rest; return its number. Held links do not turn.
 
-        Args:
-            links: numbers of the held links, which do not turn, by the number of their linkage; -1 is its last link.
+        Links are given by the number of their linkage; -1 is its last link.
         """
         return self._hold(links, 1)
 
     def act(self, activity: Activity | Undulation | None, *, ramp: float = 0.0) -> None:
         """Set the gait of the motors of all linkages from now on.
 
-        Args:
-            activity: swings of the motors; None: they return to the angles at the start.
-            ramp: time in which the swings grow from 0 [s].
+        Without an activity they return to the angles at the start. Swings grow from 0 in the time `ramp` [s].
         """
         assert not isinstance(activity, Activity)  # the scene was checked
         own, gait = self._all, self._all.gait

@@ -1,7 +1,5 @@
 """Motors on the engine links; `dem.engine.links.motion.motoring` describes how they act."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np
@@ -22,12 +20,8 @@ UPDATES = 64  # control updates planned at once, so many that the cost of a kern
 class LinksMotors:
     """`dem.engine.interface.Motors` on links.
 
-    Args:
-        law: law of the motors; None if smarticles stay welded.
-        strengths: (N, 2) factors on torque limit and stiffness [1]; None: 1 for all motors.
-
-    Raises:
-        InputError: the engine does not know the law.
+    Without a law smarticles stay welded; InputError if the engine does not know it. `strengths` (N, 2) are factors on
+    torque limit and stiffness [1]; None: 1 for all motors.
     """
 
     def __init__(self, world: World, law: MotorLaw | None, strengths: Array | None) -> None:

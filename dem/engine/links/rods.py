@@ -1,7 +1,5 @@
 """Make the arrays of filaments for the kernels of `dem.engine.links.motion.bending`."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np
@@ -37,13 +35,9 @@ def rod_of(filament: Filament) -> Array:
 
 
 def wave_of(filament: Filament, curvature: PreferredCurvature | None) -> Array:
-    """Return the wave of preferred κ along one filament, as in `Filaments.wave`.
+    """Return the wave (nodes, 3) of preferred κ along one filament, as in `Filaments.wave`.
 
-    Args:
-        curvature: preferred curvature; None: the filament has none.
-
-    Returns:
-        (nodes, 3) amplitude, cosine and sine of the phase at each node [1].
+    It has amplitude, cosine and sine of the phase at each node [1]. Without a curvature the filament has none.
     """
     wave = np.zeros((filament.nodes, 3))
     if curvature is not None:
@@ -91,8 +85,6 @@ def filaments_at(
     """Return arrays of the filaments of `old` and of F new ones.
 
     Args:
-        old: arrays of the filaments so far.
-        filament: shape of the new filaments.
         bodies: (F,) numbers of the new filaments among all bodies.
         points: (F, nodes, 3) positions of the nodes [m].
         velocities: (F, nodes, 3) velocities of the nodes [m/s]; None: at rest.
@@ -135,13 +127,9 @@ def filaments_at(
 
 
 def _untwisted(tangents: Array) -> Array:
-    """Return first directors of filaments without twist, unit vectors across each segment.
+    """Return first directors (F, S, 3) of untwisted filaments, unit vectors across each segment.
 
-    Args:
-        tangents: (F, S, 3) unit vectors along the S segments of each of F filaments [1].
-
-    Returns:
-        (F, S, 3) first directors [1].
+    `tangents` (F, S, 3) are unit vectors along the S segments of each of F filaments [1].
     """
     found = np.zeros_like(tangents)
     for f, own in enumerate(tangents):

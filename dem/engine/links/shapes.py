@@ -5,8 +5,6 @@ A flat link consists of several parallel swept segments, its strands. Strands ar
 two hinges; other shapes are rigid bodies, or filaments, which `dem.engine.links.motion.bending` moves.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
@@ -185,10 +183,8 @@ def link_shapes(kind: Kind) -> list[Shape]:
 def rigid_shape(bars: Bars, rows: int = 1, radius: float | None = None) -> Shape:
     """Return the shape of a rigid body of bars.
 
-    Args:
-        rows: number of strands of each bar. The diameter of a single strand is the mean width of the section; that of
-            several strands is the bar's thickness in the plane.
-        radius: radius of the strands [m]; None: from `Bars.radius`.
+    Each bar has `rows` strands. The diameter of a single strand is the mean width of the section; that of several
+    strands is the bar's thickness in the plane. The radius of the strands is in [m]; None: from `Bars.radius`.
     """
     radius = bars.radius(rows) if radius is None else radius
     reach = 0.0 if rows == 1 else bars.thickness_normal / 2 - radius

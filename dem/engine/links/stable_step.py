@@ -4,8 +4,6 @@ Leapfrog takes the velocities of dashpots half a step late. With the matrices M 
 of a body in a mode, a step dt is stable while K dt² + 2 C dt - 4 M has no positive eigenvalue.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import replace
@@ -53,11 +51,8 @@ def links_stable_time_step(
     - a flat pile in which links rub against links above and below;
     - a tip with a string.
 
-    If motors may turn the barbs, the angles are free, which reduces the effective mass of a tip.
-
-    Args:
-        articulated: whether motors may turn the barbs.
-        strings: stiffness [N/m] and damping [N s/m] of each string.
+    If motors may turn the barbs (`articulated`), the angles are free, which reduces the effective mass of a tip.
+    Strings have a stiffness [N/m] and a damping [N s/m] each.
     """
     boxes = particle.boxes
     angles = [boxes.angles]
@@ -72,12 +67,8 @@ def filament_stable_time_step(filament: Filament, law: ContactLaw, effective_mas
 
     In these modes neighbouring nodes move in opposite directions: along the filament, across it, or about its axis. The
     stiffness is that of stretching, bending or twisting plus that of contacts. Two cases of contacts are considered:
-    contacts at a tip, and contacts along both sides of the filament, one per diameter. The bodies that touch a node
-    are assumed to move opposite to it.
-
-    Args:
-        law: law of the contacts.
-        effective_mass: effective mass of a body [kg] for which the damping in `law` was computed.
+    contacts at a tip, and contacts along both sides of the filament, one per diameter. The bodies that touch a node are
+    assumed to move opposite to it. The damping in `law` was computed for the `effective_mass` of a body [kg].
     """
     length, mass = filament.segment_length, filament.mass / (filament.nodes - 1)
     share = math.sqrt(filament_shape(filament).effective_mass / effective_mass)
@@ -136,9 +127,6 @@ def linkage_stable_time_step(linkage: Linkage, links: Sequence[Shape], law: Cont
 
     They are those of rigid bodies, with the joints at both ends of a link, which the neighbours move against it: since
     |a + b|² ≤ 2 (|a|² + |b|²), a joint of stiffness k is never stiffer than 2 k on each of its links by itself.
-
-    Args:
-        links: shapes of the links.
     """
     known: dict[bytes, float] = {}
     for number, shape in enumerate(links):
@@ -204,9 +192,8 @@ def _rigid_step(shape: Shape, law: ContactLaw, joints: Mode | None = None) -> fl
 def _modes_of_end(law: ContactLaw, tips: Array) -> list[Mode]:
     """Return the modes of a bar's end against another end, and against a boundary.
 
-    Args:
-        tips: (k, k) sum of Jᵀ J over the strands at the end; J is the matrix from the k velocities of the body to the
-            velocity of a strand's end.
+    `tips` (k, k) is the sum of Jᵀ J over the strands at the end; J is the matrix from the k velocities of the body to
+    the velocity of a strand's end.
     """
     kn, cn, cw = law.normal_stiffness, law.normal_damping, law.wall_damping
     return [
@@ -218,11 +205,8 @@ def _modes_of_end(law: ContactLaw, tips: Array) -> list[Mode]:
 def _modes_of_pile(law: ContactLaw, heave: Array, rub: Array) -> list[Mode]:
     """Return the modes of a pile of bodies that lie on their broad side.
 
-    J is the matrix from the k velocities of a body to the velocity of a point of contact.
-
-    Args:
-        heave: (k, k) sum of Jᵀ J over all contacts, with the rows of J across the broad side.
-        rub: (k, k) sum of Jᵀ J over all contacts, with the rows of J along the broad side.
+    J is the matrix from the k velocities of a body to the velocity of a point of contact; `heave` and `rub` (k, k) are
+    sums of Jᵀ J over all contacts, with the rows of J across and along the broad side.
     """
     kn, ks, cs = law.normal_stiffness, law.tangential_stiffness, law.tangential_damping
     damping = max(law.normal_damping, law.wall_damping / 2)
@@ -281,11 +265,8 @@ def _motion_of(shape: Shape, row: Array, link: int, place: tuple[float, float, f
     """Return the matrix (3, 6) that maps a smarticle's velocity and spin to a point's velocity.
 
     If `free`, the matrix is (3, 8): two more columns are for the rates of both angles.
-
-    Args:
-        row: plane geometry of the smarticle.
-        link: number of the link to which the point belongs.
-        place: position of the point from the centre of mass [m].
+    The row is the plane geometry of the smarticle; `place` is that of the point on its link, from the centre of mass
+    [m].
     """
     planar, (x, y, z) = shape.planar, place
     assert planar is not None
@@ -304,10 +285,7 @@ def _motion_of(shape: Shape, row: Array, link: int, place: tuple[float, float, f
 def _stable_step(mass: Array, stiffness: Array, damping: Array) -> float:
     """Return the largest step [s] up to which 4 M - K dt² - 2 C dt is positive definite for all modes.
 
-    Args:
-        mass: (k, k) M.
-        stiffness: (n, k, k) K of each mode.
-        damping: (n, k, k) C of each mode.
+    M is (k, k); K and C of each mode are (n, k, k).
     """
     # Degrees of freedom of one scale each: elimination then loses no digits.
     scale = 1 / np.sqrt(np.diag(mass))

@@ -1,7 +1,5 @@
 """Make many time steps in one call; `advance` and `act` show all that happens in a step, in order."""
 
-from __future__ import annotations
-
 import math
 from typing import Any, NamedTuple
 

@@ -1,7 +1,5 @@
 """The two strings of a chain on the engine links."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 

@@ -1,7 +1,5 @@
 """Vectors as tuples of three numbers, which need no allocation, and nearest points of two segments."""
 
-from __future__ import annotations
-
 from typing import NamedTuple, TypeAlias
 
 from dem.engine.links.arrays import Array, Bodies
