@@ -12,11 +12,11 @@ import pandas as pd
 from dem.record.run import Run
 from postprocess.report import figures as style
 from postprocess.statistics.points import SEED, paired_differences
-from postprocess.statistics.seeds import SeedMean, mean_over_seeds
-from studies.blob_lift import ACTIVE, OTHERS, QUANTITIES, RISE, SHARE, WHOLE
+from postprocess.statistics.seeds import mean_over_seeds
+from studies.blob_lift import ACTIVE, LEFT, OTHERS, QUANTITIES, RISE, SHARE, WHOLE
 from studies.blob_lift import measure as measure_lift
 from studies.framework.figures import Rows, Series, marker
-from studies.framework.findings import Effect, Finding, unit_of
+from studies.framework.findings import Effect, Finding, Outcome, Verdict, all_of, unit_of
 from studies.framework.runs import Key, Row
 from studies.framework.study import Study
 
@@ -49,36 +49,39 @@ def point_name(row: pd.Series) -> str:
     return ", ".join(f"{key.label} {key.text(row[key.column])}" for key in shown)
 
 
-def at_each_point(
-    table: pd.DataFrame,
-    label: str,
-    value: Callable[[pd.DataFrame], SeedMean],
-    *,
-    threshold: float = 0.0,
-    unit: str = "",
-) -> list[Effect]:
-    """Compute one effect from the runs of each point; the first one has a label, all have their points' names."""
-    names = table.apply(point_name, axis=1)
-    return [
-        Effect(
-            label=f"{label} at {name}" if number == 0 else f"at {name}",
-            value=value(table[names == name]),
-            threshold=threshold,
-            unit=unit,
-        )
-        for number, name in enumerate(names.unique())
-    ]
+def at_each_point(table: pd.DataFrame, effect: Callable[[pd.DataFrame], Effect]) -> Outcome:
+    """Judge an effect at each point; the outcome names the points by their verdict, and the weakest effect."""
+    runs = {name: rows for name, rows in table.groupby(table.apply(point_name, axis=1), sort=False)}
+    effects = {name: effect(rows) for name, rows in runs.items()}
+    parts = []
+    for verdict in Verdict:
+        names = [str(name) for name, one in effects.items() if one.verdict == verdict]
+        if names:
+            where = "" if len(names) == len(effects) else f" ({'; '.join(names)})"
+            parts.append(f"{verdict} at {len(names)} of {len(effects)} points{where}")
+    if effects:
+        name, least = min(effects.items(), key=lambda one: one[1].value.value)
+        parts.append(f"least at {name}: {least}")
+    return Outcome(note="; ".join(parts), verdict=all_of(one.verdict for one in effects.values()))
 
 
-def quiet_above_active(column: str) -> Callable[[pd.DataFrame], list[Effect]]:
+def quiet_above_active(column: str) -> Callable[[pd.DataFrame], Outcome]:
     """Return the outcome of comparing the quiet with the active blob, pair by pair of a seed, at each point."""
 
-    def difference(runs: pd.DataFrame) -> SeedMean:
+    def effect(runs: pd.DataFrame) -> Effect:
         ends = runs[ACTIVE].max(), runs[ACTIVE].min()
-        return mean_over_seeds(paired_differences(runs, column, ACTIVE, ends, [SEED])[column])
+        value = mean_over_seeds(paired_differences(runs, column, ACTIVE, ends, [SEED])[column])
+        label = f"{QUANTITIES[column].label} of the quiet blob less that of the active one"
+        return Effect(label=label, value=value, unit=unit_of(column))
 
-    label = f"{QUANTITIES[column].label} of the quiet blob less that of the active one,"
-    return lambda table: at_each_point(table, label, difference, unit=unit_of(column))
+    return lambda table: at_each_point(table, effect)
+
+
+def mean_above(values: Callable[[pd.DataFrame], pd.Series], label: str, threshold: float) -> Callable[..., Outcome]:
+    """Return the outcome of comparing the mean of a value with a threshold at each point."""
+    return lambda table: at_each_point(
+        table, lambda runs: Effect(label=label, value=mean_over_seeds(values(runs)), threshold=threshold)
+    )
 
 
 def _by_activity(points: pd.DataFrame) -> list[Series]:
@@ -107,23 +110,21 @@ STUDY = Study(
         Finding(
             id="as-a-whole",
             says="A quiet blob is entangled tightly enough to be lifted as a whole, at every point",
-            outcome=lambda quiet: at_each_point(
-                quiet,
-                "share of worms of the quiet blob that are lifted",
-                lambda runs: mean_over_seeds(runs[SHARE]),
-                threshold=WHOLE,
-            ),
+            outcome=mean_above(lambda quiet: quiet[SHARE], "share of worms of the quiet blob that are lifted", WHOLE),
+            found_if=f"share of worms of the quiet blob that are lifted > {WHOLE:g} at every point",
             rows=lambda table: table[table[ACTIVE] == 0],
         ),
         Finding(
             id="quiet-above-active",
             says="A quiet blob is lifted farther than an active one, at every point",
             outcome=quiet_above_active(RISE),
+            found_if="rise of the quiet blob less that of the active one > 0 at every point",
         ),
         Finding(
             id="more-come-along",
             says="More of the worms that are not gripped come along with a quiet blob, at every point",
             outcome=quiet_above_active(OTHERS),
+            found_if="share lifted of those not gripped, quiet less active > 0 at every point",
         ),
     ),
     figures=(
@@ -132,6 +133,7 @@ STUDY = Study(
             quantities=[QUANTITIES[SHARE], QUANTITIES[OTHERS]],
             row=point_name,
             split=_by_activity,
+            levels={SHARE: WHOLE, OTHERS: LEFT},
         ),
     ),
     remarks=("Worms and phases are those of the study blob-lift, but for what a point's name says.",),

@@ -29,6 +29,7 @@ from studies.framework.runs import Key, Row, declare, last_columns, phase_of, ru
 from studies.framework.study import COUNT, Study
 
 FALL, AWAY, CLUSTER = "fall of the centre of mass [m]", "way sideways [m]", "largest cluster [-]"
+SIDEWAYS = "way sideways over the fall [-]"
 BEFORE, SLENDER, AFTER = "height before [m]", "slenderness before [-]", "slenderness after [-]"
 TOUCHING = 1.05  #: Largest distance of the axes of worms that touch, in diameters
 SIDE = 0.5  #: Least horizontal way of the centre of mass, over its fall, if a blob falls onto its side [-]
@@ -39,11 +40,13 @@ QUANTITIES = declare(
         BEFORE: ("height [mm]", ".2f", "height of the centre of mass while tails are held and the glass is gone"),
         FALL: ("fall [mm]", ".2f", "by how much the centre of mass is lower at the end"),
         AWAY: ("sideways [mm]", ".2f", "horizontal way of the centre of mass from the release to the end"),
+        SIDEWAYS: ("sideways/fall", ".2f", "this way over the fall"),
         SLENDER: ("slender before", ".2f", "spread of all segments along z over that along x and y, tails held"),
         AFTER: ("after", ".2f", "this ratio at the end"),
         CLUSTER: ("one cluster", ".2f", "share of worms in the largest cluster of worms that touch, at the end"),
     },
     scales={BEFORE: 1e3, FALL: 1e3, AWAY: 1e3},
+    axes={CLUSTER: "share of worms in one cluster [-]"},
 )
 
 
@@ -57,11 +60,13 @@ def measure(run: Run) -> Row:
     place = phase_of(run, "release")
     held, last = run.frames.in_phase(place - 1)[-1], run.frames[-1]
     one, other = centre(held), centre(last)
+    fall, away = one[2] - other[2], float(np.hypot(*(other - one)[:2]))
     return {
         **{name: cell for name, cell in run_columns(run).items() if name != ASPECT},
         BEFORE: one[2] - held.floor_z,
-        FALL: one[2] - other[2],
-        AWAY: float(np.hypot(*(other - one)[:2])),
+        FALL: fall,
+        AWAY: away,
+        SIDEWAYS: away / fall,
         SLENDER: slenderness(held),
         AFTER: slenderness(last),
         CLUSTER: largest_cluster(last, run.manifest.sphere_diameter_m),
@@ -131,7 +136,7 @@ STUDY = Study(
         mean(
             "sideways",
             "It falls onto its side",
-            lambda tallest: tallest[AWAY] / tallest[FALL],
+            lambda tallest: tallest[SIDEWAYS],
             "way sideways over the fall, of the tallest blob",
             rows=lambda table: table[table[COUNT] == table[COUNT].max()],
             threshold=SIDE,

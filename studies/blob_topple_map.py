@@ -4,17 +4,14 @@ The study `blob-topple` with other values of Young's modulus of a worm, of frict
 number of segments. A statement is found if it holds at every point.
 """
 
-import pandas as pd
-
 from dem.record.run import Run
 from postprocess.report import figures as style
 from postprocess.statistics.points import SEED
-from postprocess.statistics.seeds import mean_over_seeds
-from studies.blob_lift_map import COLUMNS, KEYS, at_each_point, point_name, settings
-from studies.blob_topple import AWAY, BEFORE, CLUSTER, FALL, QUANTITIES, SIDE, WHOLE
+from studies.blob_lift_map import COLUMNS, KEYS, mean_above, point_name, settings
+from studies.blob_topple import BEFORE, CLUSTER, FALL, QUANTITIES, SIDE, SIDEWAYS, WHOLE
 from studies.blob_topple import measure as measure_fall
 from studies.framework.figures import Rows, Series, marker
-from studies.framework.findings import Effect, Finding
+from studies.framework.findings import Finding
 from studies.framework.runs import Row
 from studies.framework.study import Study
 
@@ -22,26 +19,6 @@ from studies.framework.study import Study
 def measure(run: Run) -> Row:
     """Measure how a blob fell, and whether it stayed in one piece."""
     return {**settings(run), **measure_fall(run)}
-
-
-def _falls(table: pd.DataFrame) -> list[Effect]:
-    return at_each_point(
-        table,
-        "height before over height after",
-        lambda runs: mean_over_seeds(runs[BEFORE] / (runs[BEFORE] - runs[FALL])),
-        threshold=1.0,
-    )
-
-
-def _in_one_piece(table: pd.DataFrame) -> list[Effect]:
-    label = "share of worms in one cluster"
-    return at_each_point(table, label, lambda runs: mean_over_seeds(runs[CLUSTER]), threshold=WHOLE)
-
-
-def _sideways(table: pd.DataFrame) -> list[Effect]:
-    return at_each_point(
-        table, "way sideways over the fall", lambda runs: mean_over_seeds(runs[AWAY] / runs[FALL]), threshold=SIDE
-    )
 
 
 STUDY = Study(
@@ -54,16 +31,34 @@ STUDY = Study(
     order=(*COLUMNS, SEED),
     quantities=tuple(QUANTITIES.values()),
     findings=(
-        Finding(id="falls", says="The blob falls when its tails let go, at every point", outcome=_falls),
-        Finding(id="in-one-piece", says="It stays in one piece, at every point", outcome=_in_one_piece),
-        Finding(id="sideways", says="It falls onto its side, at every point", outcome=_sideways),
+        Finding(
+            id="falls",
+            says="The blob falls when its tails let go, at every point",
+            outcome=mean_above(
+                lambda table: table[BEFORE] / (table[BEFORE] - table[FALL]), "height before over height after", 1.0
+            ),
+            found_if="height before over height after > 1 at every point",
+        ),
+        Finding(
+            id="in-one-piece",
+            says="It stays in one piece, at every point",
+            outcome=mean_above(lambda table: table[CLUSTER], "share of worms in one cluster", WHOLE),
+            found_if=f"share of worms in one cluster > {WHOLE:g} at every point",
+        ),
+        Finding(
+            id="sideways",
+            says="It falls onto its side, at every point",
+            outcome=mean_above(lambda table: table[SIDEWAYS], "way sideways over the fall", SIDE),
+            found_if=f"way sideways over the fall > {SIDE:g} at every point",
+        ),
     ),
     figures=(
         Rows(
             name="map",
-            quantities=[QUANTITIES[CLUSTER]],
+            quantities=[QUANTITIES[SIDEWAYS], QUANTITIES[CLUSTER]],
             row=point_name,
             split=lambda points: [Series(rows=points, label="", properties=marker("o", style.BLACK, style.BLACK))],
+            levels={SIDEWAYS: SIDE, CLUSTER: WHOLE},
         ),
     ),
     remarks=("Worms and phases are those of the study blob-topple with 40 worms, but for what a point's name says.",),
