@@ -134,6 +134,7 @@ STUDY = Study(
             row=point_name,
             split=_by_activity,
             levels={SHARE: WHOLE, OTHERS: LEFT},
+            notes=("Vertical lines: thresholds of the findings.",),
         ),
     ),
     remarks=("Worms and phases are those of the study blob-lift, but for what a point's name says.",),

@@ -59,6 +59,7 @@ STUDY = Study(
             row=point_name,
             split=lambda points: [Series(rows=points, label="", properties=marker("o", style.BLACK, style.BLACK))],
             levels={SIDEWAYS: SIDE, CLUSTER: WHOLE},
+            notes=("Vertical lines: thresholds of the findings.",),
         ),
     ),
     remarks=("Worms and phases are those of the study blob-topple with 40 worms, but for what a point's name says.",),
