@@ -255,7 +255,9 @@ def table_of(results: Sequence[Result]) -> pd.DataFrame:
 def main(arguments: Sequence[str] | None = None) -> int:
     """Compute cells anew, print and write the table; return 0 if all agree, otherwise 1."""
     parser = argparse.ArgumentParser(prog="python -m studies.reproduce", description=(__doc__ or "").split("\n\n")[0])
-    parser.add_argument("tables", nargs="*", metavar="TABLE", help="folders under results/ (default: all of cells.yaml)")
+    parser.add_argument(
+        "tables", nargs="*", metavar="TABLE", help="folders under results/ (default: all of cells.yaml)"
+    )
     parser.add_argument("--out", type=Path, required=True, help="new folder for the runs and for cells.csv")
     parser.add_argument("--jobs", type=int, default=usable_cores(), help="simultaneous runs (default: one per core)")
     given, cells, reasons = parser.parse_args(arguments), chosen(), left_out()

@@ -35,14 +35,13 @@ def refer(*ids: str) -> dict[str, str] | list[dict[str, str]]:
     return found[0] if len(found) == 1 else found
 
 
-def file_entity(folder: Path, path: Path, **more: Any) -> Entity:
-    """Make the entity of a file, or of a folder, below the folder of the crate."""
+def part(folder: Path, path: Path, **more: Any) -> Entity:
+    """Make the entity of a file or folder below the folder of the crate."""
     name = path.relative_to(folder).as_posix()
     if path.is_dir():
         return {"@id": f"{name}/", "@type": "Dataset", "name": name, **more}
     kind = _TYPES.get(path.suffix) or mimetypes.guess_type(path.name)[0] or "text/plain"
-    size = str(path.stat().st_size)
-    return {"@id": name, "@type": "File", "name": name, "encodingFormat": kind, "contentSize": size, **more}
+    return {"@id": name, "@type": "File", "name": name, "encodingFormat": kind, **more}
 
 
 def write_crate(path: Path, root: Entity, parts: Sequence[Entity], others: Iterable[Entity]) -> None:
@@ -110,9 +109,9 @@ def describe_run(directory: Path | str) -> Path:
     if path.exists():
         raise InputError(f"{path}: exists and is left as it is; delete it to write it anew")
     parts = [
-        file_entity(folder, one)
+        part(folder, one, **({} if one.is_dir() else {"contentSize": str(one.stat().st_size)}))
         for one in sorted(folder.iterdir())
-        if one.name not in (NAME, LOCK) and not is_partial(one.name)
+        if one.name != LOCK and not is_partial(one.name)
     ]
     manifest = run.manifest
     versions = dict(manifest.versions)
