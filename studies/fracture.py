@@ -15,7 +15,19 @@ import pandas as pd
 from dem.errors import InputError
 from dem.record.run import Run
 from postprocess.geometry.links import centres_of_mass
-from postprocess.measures.pull import END, FREE, PULL, WINDOW, freed, held_at, held_fast, lost_after, peak, read_pull, weight_of_one
+from postprocess.measures.pull import (
+    END,
+    FREE,
+    PULL,
+    WINDOW,
+    freed,
+    held_at,
+    held_fast,
+    lost_after,
+    peak,
+    read_pull,
+    weight_of_one,
+)
 from postprocess.measures.table import summarise_run
 from postprocess.statistics.points import ASPECT, SEED
 from studies.framework.figures import (

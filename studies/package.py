@@ -1,8 +1,8 @@
 """Describe the published results for archives: `python -m studies.package`.
 
-It writes `results/SHA256SUMS`, which `sha256sum --check` reads, and `ro-crate-metadata.json`, which makes the repository
-a Workflow Run RO-Crate: each folder of results is the result of an action, whose instrument is the script of a study.
-`provenance.json` in each folder has the runs one by one.
+It writes `results/SHA256SUMS`, which `sha256sum --check` reads, and `ro-crate-metadata.json`, which makes the
+repository a Workflow Run RO-Crate: each folder of results is the result of an action, whose instrument is the script of
+a study. `provenance.json` in each folder has the runs one by one.
 """
 
 import hashlib

@@ -57,7 +57,6 @@ class Chosen:
     study: str = ""  #: Shipped study that measures the run; empty: that of the table's name
     engine: str = ""  #: Engine of all runs of the table; empty: that of the study's sweep
     quick: bool = False  #: Whether the table is of the study's quick variant
-    sweep: str = ""  #: Sweep file beside the table; empty: that of the study
     ladder: str = ""  #: Scene beside the table whose ladder it is (`smarticles accuracy`); empty: it is of no ladder
 
     @property
@@ -80,8 +79,7 @@ class Chosen:
         if self.ladder:
             scene = load_scene(RESULTS / self.table / self.ladder)
             return accuracy.ladder_sweep(scene, self._ladder, _LADDER_SEEDS)
-        own = shipped(self.study or self.table).sweep_file(quick=self.quick)
-        sweep = load_sweep(RESULTS / self.table / self.sweep if self.sweep else own)
+        sweep = load_sweep(shipped(self.study or self.table).sweep_file(quick=self.quick))
         return on_engine(sweep, self.engine) if self.engine else sweep
 
 
@@ -268,6 +266,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     out: Path = given.out
     if out.exists():
         parser.error(f"--out {out}: exists; give a new folder")
+    out.mkdir(parents=True)
 
     def start(one: Chosen) -> Path:
         return compute(scene_of(one), out / one.table / "runs" / one.run)
@@ -282,10 +281,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     table = table_of(results).sort_values("table")
     table.to_csv(out / "cells.csv", index=False, float_format="%.6g")
     print("\n" + table.to_string(index=False, float_format="{:.4g}".format))
-    print(
-        f"\nerror: half-width of the interval in which a further seed lies, {100 * (1 - CHANCE):g} % for all columns of "
-        "the table together. same: all columns equal the published ones to six digits; within: all are in the interval."
-    )
+    print(f"\nerror: half-width of the interval of a further seed ({100 * (1 - CHANCE):g} %, all columns together)")
+    print("same: all columns are the published ones to six digits; within: all are in the interval")
     if not given.tables:
         print("Left out:", *(f"  {name}: {reason}" for name, reason in reasons.items()), sep="\n")
     failed = sum(not one.agrees for one in results)

@@ -38,7 +38,17 @@ from dem.errors import InputError
 from dem.record.run import Run
 from postprocess.geometry.links import centres_of_mass
 from postprocess.measures.heights import heights
-from postprocess.measures.pull import PULL, WINDOW, held_at, held_fast, lost_after, moving_mean, peak, read_pull, weight_of_one
+from postprocess.measures.pull import (
+    PULL,
+    WINDOW,
+    held_at,
+    held_fast,
+    lost_after,
+    moving_mean,
+    peak,
+    read_pull,
+    weight_of_one,
+)
 from postprocess.measures.table import summarise_run
 from postprocess.statistics.points import ASPECT, SEED
 from studies.framework.figures import CROSSINGS_LABEL, Histories, History, Means, Scatter, by_procedure
@@ -182,8 +192,8 @@ def order_findings(rows: Rows) -> tuple[Finding, Finding]:
             bounds=HELD_FAST,
             rows=rows,
             shown=(RAISED,),
-            found_if="peak force above, and a larger share of it lost over w/2 beyond the peak, seed by seed; the paper "
-            "says that its fracture tests support this, not by which measure (ours: studies/strength.py)",
+            found_if="peak force above, and a larger share of it lost over w/2 beyond the peak, seed by seed; the "
+            "paper says that its fracture tests support this, not by which measure (ours: studies/strength.py)",
         ),
     )
 

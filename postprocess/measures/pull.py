@@ -131,8 +131,8 @@ def peak(pull: HookPull, window: float = WINDOW) -> Peak:
 def lost_after(pull: HookPull, highest: Peak, way: float) -> float:
     """Return the share of the peak force that is lost, on average over a `way` [m] of the hook beyond the peak [-].
 
-    It is 1 − ∫ F dz / (F_peak way): 0 if the force stays, 1/2 if it falls linearly to 0 over the way, 1 if it is gone at
-    once. NaN if the hook is raised by less than the way after the peak.
+    It is 1 − ∫ F dz / (F_peak way): 0 if the force stays, 1/2 if it falls linearly to 0 over the way, 1 if it is gone
+    at once. NaN if the hook is raised by less than the way after the peak.
     """
     begin, end = highest.raised, highest.raised + way
     if end > pull.raised[-1]:

@@ -95,8 +95,8 @@ def records(found: Sequence[Claim], results: Path) -> ClaimsRecord:
     return ClaimsRecord(
         paper="10.1039/d2sm01573k",
         made_by="make claims",
-        tolerance=f"{CRITERION}. Reproduced: found under all rules that it was tested under; partly: under one of them; "
-        "not: under none, and the opposite under one at least.",
+        tolerance=f"{CRITERION}. Reproduced: found under all rules that it was tested under; partly: under one of "
+        "them; not: under none, and the opposite under one at least.",
         claims=[
             ClaimRecord(
                 id=f"savoie2023-{claim.number:02d}",

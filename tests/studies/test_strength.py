@@ -15,7 +15,21 @@ from dem.record.run import open_run
 from postprocess.measures.pull import WINDOW
 from postprocess.statistics.points import SEED
 from studies.framework.procedures import EXTERNAL, INTERNAL, SHAPE, STATIC
-from studies.strength import ABOVE, BEFORE, BREAK, CARRIED, HELD_FAST, KEPT, LIMIT, LOST, PEAK, RAISED, STUDY, THROUGH, WORK
+from studies.strength import (
+    ABOVE,
+    BEFORE,
+    BREAK,
+    CARRIED,
+    HELD_FAST,
+    KEPT,
+    LIMIT,
+    LOST,
+    PEAK,
+    RAISED,
+    STUDY,
+    THROUGH,
+    WORK,
+)
 
 ORIGIN = {"note": "the full study as shipped", "command": "smarticles study strength --out strength"}
 ACTIVITY = {EXTERNAL: "shake", SHAPE: "shape-change", INTERNAL: "internal-oscillation"}

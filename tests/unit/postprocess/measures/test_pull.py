@@ -53,7 +53,7 @@ def test_a_triangle_has_its_peak_and_its_area(pulled):
 @pytest.mark.parametrize(
     ("after", "share"),
     [
-        (lambda since: np.ones_like(since), 0.0),
+        (np.ones_like, 0.0),
         (lambda since: np.clip(1 - since / 0.5, 0, None), 0.5),
         (lambda since: np.clip(1 - since / 0.25, 0, None), 0.75),
         (lambda since: np.where(since < 0, 1.0, 0.0), 1.0),
