@@ -1,6 +1,6 @@
 """A cell of each table of the reproduction, run anew: is what stands in results/ what this version finds?
 
-The cells are those of `make reproduce` (`studies/cells.yaml`). The cheapest run by default, all of them with
+The cells are those of `make reproduce` (`studies/cells.yaml`). Six run by default, all of them with
 `pytest -m "long or not long" tests/links/test_cells_of_results.py`.
 """
 
@@ -30,8 +30,8 @@ from studies.reproduce import (
     table_of,
 )
 
-QUICK = 6.0
-"""Processor time of cells that run by default [s]."""
+BY_DEFAULT = ("chain", "chain-bodies", "engines", "finite-size", "rods", "shaft")
+"""Cheap ones of all kinds: robots, YADE, three activities, other bodies, motors."""
 
 ALL = chosen()
 CELLS = [
@@ -39,7 +39,7 @@ CELLS = [
         one,
         id=one.table,
         marks=[
-            *([pytest.mark.long] if one.cpu_s > QUICK else []),
+            *([pytest.mark.long] if one.table not in BY_DEFAULT else []),
             *([pytest.mark.engine] if one.engine == "yade" or one.table == "chain-bodies" else []),
         ],
     )
