@@ -12,7 +12,7 @@ from pathlib import Path
 
 import yaml
 
-from postprocess.report.crate import NAME, Entity, part, refer, software, write_crate
+from postprocess.report.crate import NAME, Entity, part, refer, write_crate
 from studies.claims.records import REPOSITORY, files_of
 from studies.registry import FOLDER, STUDIES
 
@@ -41,7 +41,7 @@ def write_package(repository: Path, output: Path) -> None:
     parts = [
         *(part(repository, folder) for folder in folders),
         *(part(repository, results / name) for name in ("claims.yaml", SUMS)),
-        *(_source(repository, repository / name) for name in sorted(files)),
+        *(_source(repository, name, citation["version"]) for name in sorted(files)),
     ]
     root = {
         "name": citation["title"],
@@ -55,7 +55,6 @@ def write_package(repository: Path, output: Path) -> None:
     others: list[Entity] = [
         {"@id": _LICENCE, "@type": "CreativeWork", "name": "MIT licence", "description": "File LICENSE"},
         {"@id": _AUTHORS, "@type": "Organization", "name": citation["authors"][0]["name"]},
-        *software(citation["version"], {}),
         *actions,
     ]
     write_crate(output / NAME, root, parts, others)
@@ -65,11 +64,12 @@ def _listed(references: dict[str, str] | list[dict[str, str]]) -> list[dict[str,
     return references if isinstance(references, list) else [references]
 
 
-def _source(repository: Path, path: Path) -> Entity:
-    if path.suffix != ".py":
-        return part(repository, path)
-    kinds = {"@type": ["File", "SoftwareSourceCode"], "programmingLanguage": "Python"}
-    return {**part(repository, path), **kinds}
+def _source(repository: Path, name: str, version: str) -> Entity:
+    found = part(repository, repository / name)
+    if not name.endswith(".py"):
+        return found
+    kind = ["File", "SoftwareSourceCode"]
+    return {**found, "@type": kind, "programmingLanguage": "Python", "version": version}
 
 
 def _action(repository: Path, folder: Path) -> Entity:

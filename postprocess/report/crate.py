@@ -25,7 +25,7 @@ Entity = Mapping[str, Any]  #: One JSON-LD object
 
 _CONTEXT = ["https://w3id.org/ro/crate/1.1/context", "https://w3id.org/ro/terms/workflow-run/context"]
 _TYPES = {".vtu": "model/vnd.vtk", ".pvd": "application/xml", ".h5": "application/x-hdf5", ".yaml": "application/yaml"}
-SMARTICLES = "#smarticles"  #: Id of the entity of this program
+_SMARTICLES = "#smarticles"
 _UNSTATED = "none stated; whoever publishes this run states one here"
 
 
@@ -79,23 +79,6 @@ def write_crate(path: Path, root: Entity, parts: Sequence[Entity], others: Itera
         temporary.write_text(json.dumps(content, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
 
 
-def software(version: str, versions: Mapping[str, str]) -> list[Entity]:
-    """Make the entities of this program and of the versions of what it ran with, by name; the program is the first."""
-    with_it = [
-        {"@id": f"#version-{name}", "@type": "PropertyValue", "name": name, "value": value}
-        for name, value in versions.items()
-    ]
-    program = {
-        "@id": SMARTICLES,
-        "@type": "SoftwareApplication",
-        "name": "smarticles",
-        "description": "Discrete-element simulation of entangled and active granular matter",
-        "softwareVersion": version,
-        "additionalProperty": refer(*(str(one["@id"]) for one in with_it)),
-    }
-    return [program, *with_it]
-
-
 def describe_run(directory: Path | str) -> Path:
     """Write the metadata that make a run directory an RO-Crate; return the path of the file.
 
@@ -115,7 +98,7 @@ def describe_run(directory: Path | str) -> Path:
     ]
     manifest = run.manifest
     versions = dict(manifest.versions)
-    programs = software(versions.pop("smarticles", "unknown"), versions)
+    programs = _software(versions.pop("smarticles", "unknown"), versions)
     made = [one["@id"] for one in parts if one["@id"] != SCENE]
     root = {
         "name": f"{manifest.name}, seed {manifest.seed}",
@@ -126,6 +109,23 @@ def describe_run(directory: Path | str) -> Path:
     }
     write_crate(path, root, parts, [*programs, _action(run, made)])
     return path
+
+
+def _software(version: str, versions: Mapping[str, str]) -> list[Entity]:
+    """Make the entities of this program and of the versions of what it ran with, by name; the program is the first."""
+    with_it = [
+        {"@id": f"#version-{name}", "@type": "PropertyValue", "name": name, "value": value}
+        for name, value in versions.items()
+    ]
+    program = {
+        "@id": _SMARTICLES,
+        "@type": "SoftwareApplication",
+        "name": "smarticles",
+        "description": "Discrete-element simulation of entangled and active granular matter",
+        "softwareVersion": version,
+        "additionalProperty": refer(*(str(one["@id"]) for one in with_it)),
+    }
+    return [program, *with_it]
 
 
 def _action(run: Run, made: Sequence[str]) -> Entity:
@@ -139,7 +139,7 @@ def _action(run: Run, made: Sequence[str]) -> Entity:
         "@type": "CreateAction",
         "name": f"smarticles run, scene {run.manifest.scene_sha256[:12]}",
         "description": run.manifest.command,
-        "instrument": {"@id": SMARTICLES},
+        "instrument": {"@id": _SMARTICLES},
         "object": refer(SCENE),
         "result": refer(*made),
         "startTime": started,
