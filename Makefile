@@ -38,7 +38,7 @@ claims: setup ## from the tables in results/: CLAIMS.md, claims.yaml, SHA256SUMS
 	$(BIN)/python -m studies.claims results
 	$(BIN)/python -m studies.package
 
-reproduce: setup ## one cell of each table in results/ computed anew and compared with the table (MINUTES on two idle cores)
+reproduce: setup ## one cell of each table in results/ computed anew and compared with the table (5 min)
 	$(BIN)/python -m studies.reproduce --out out/reproduce-$(STAMP)
 
 verify: setup ## known answers against theory, and orders of convergence, on both engines (3 min)
