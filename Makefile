@@ -2,7 +2,7 @@
 # Times: two cores, packages from a near mirror.
 
 .DEFAULT_GOAL := help
-.PHONY: help setup setup-mpi demo validate paper claims verify bench rivals stability test lint types unit engine docs format lock clean
+.PHONY: help setup setup-mpi demo validate paper claims reproduce verify bench rivals stability test lint types unit engine docs format lock clean
 
 BIN := .venv/bin
 STAMP := $(shell date +%Y%m%d-%H%M%S)
@@ -34,8 +34,12 @@ paper: setup ## the paper's studies by its text and by its code, and what they s
 	$(BIN)/python -m studies.claims out/paper
 	$(BIN)/python -m studies.hours out/paper $(PAPER)
 
-claims: setup ## results/CLAIMS.md: every claim of the paper with its verdict, from the tables in results/ (seconds)
+claims: setup ## from the tables in results/: CLAIMS.md, claims.yaml, SHA256SUMS and ro-crate-metadata.json (seconds)
 	$(BIN)/python -m studies.claims results
+	$(BIN)/python -m studies.package
+
+reproduce: setup ## one cell of each table in results/ computed anew and compared with the table (5 min)
+	$(BIN)/python -m studies.reproduce --out out/reproduce-$(STAMP)
 
 verify: setup ## known answers against theory, and orders of convergence, on both engines (3 min)
 	OMP_NUM_THREADS=1 $(BIN)/python -m pytest -p no:xdist -q validation/known --results out/verify-$(STAMP)

@@ -15,7 +15,19 @@ import pandas as pd
 from dem.errors import InputError
 from dem.record.run import Run
 from postprocess.geometry.links import centres_of_mass
-from postprocess.measures.pull import END, FREE, PULL, WINDOW, freed, held_at, held_fast, peak, read_pull, weight_of_one
+from postprocess.measures.pull import (
+    END,
+    FREE,
+    PULL,
+    WINDOW,
+    freed,
+    held_at,
+    held_fast,
+    lost_after,
+    peak,
+    read_pull,
+    weight_of_one,
+)
 from postprocess.measures.table import summarise_run
 from postprocess.statistics.points import ASPECT, SEED
 from studies.framework.figures import (
@@ -54,6 +66,7 @@ from studies.strength import (
     BEFORE,
     HELD_FAST,
     LIMIT,
+    LOST,
     PEAK,
     RAISED,
     WORK,
@@ -84,6 +97,7 @@ QUANTITIES = declare(
         NET: ("peak less lower hook", ".3f", "largest mean of the force on the upper hook less that on the lower"),
         PEAK_TIME: ("", ".3g", "time since the pull began at which the peak is"),
         RAISED: ("raised at it [mm]", ".1f", "displacement of the hook at the peak"),
+        LOST: ("lost beyond it", ".2f", "1 − mean force over w/2 of displacement beyond the peak, over the peak force"),
         WORK: ("work / n W_s w", ".3f", "∫ F dz over the whole pull"),
         CAME_FREE: ("came free", ".2f", f"1 where the force came below {FREE:g} of its peak for good, 0 elsewhere"),
         FREE_TIME: ("", ".3g", "time since the pull began at which it came free; empty where it did not"),
@@ -122,6 +136,7 @@ def measure(run: Run) -> Row:
         NET: peak(pull.net).force / total,
         PEAK_TIME: highest.time,
         RAISED: highest.raised,
+        LOST: lost_after(pull, highest, run.manifest.middle_length_m / 2),
         WORK: pull.work / total / run.manifest.middle_length_m,
         CAME_FREE: float(math.isfinite(free)),
         FREE_TIME: free,

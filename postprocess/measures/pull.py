@@ -128,6 +128,20 @@ def peak(pull: HookPull, window: float = WINDOW) -> Peak:
     return Peak(force=float(means[highest]), time=time, raised=float(np.interp(time, pull.edges, pull.raised)))
 
 
+def lost_after(pull: HookPull, highest: Peak, way: float) -> float:
+    """Return the share of the peak force that is lost, on average over a `way` [m] of the hook beyond the peak [-].
+
+    It is 1 − ∫ F dz / (F_peak way): 0 if the force stays, 1/2 if it falls linearly to 0 over the way, 1 if it is gone
+    at once. NaN if the hook is raised by less than the way after the peak.
+    """
+    begin, end = highest.raised, highest.raised + way
+    if end > pull.raised[-1]:
+        return math.nan
+    work = np.concatenate([[0.0], np.cumsum(pull.force * np.diff(pull.raised))])
+    done = np.interp([begin, end], pull.raised, work)
+    return float(1 - (done[1] - done[0]) / highest.force / way)
+
+
 def held_at(pull: HookPull, time: float) -> float:
     """Return the mean force on the lower hook [N] over a window around a time since the pull began [s]."""
     times, means = moving_mean(replace(pull, force=pull.held))

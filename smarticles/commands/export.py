@@ -1,4 +1,4 @@
-"""Command `export`: write the bodies of a run for other programs, or a scene for LAMMPS."""
+"""Command `export`: write a run for other programs and archives, or a scene for LAMMPS."""
 
 import argparse
 import sys
@@ -10,6 +10,7 @@ from smarticles.command_line import Commands, add_options, names
 
 _FORMATS = ("vtp", "gsd", "stl", "obj", "gltf", "glb")
 _LAMMPS = "lammps"
+_CRATE = "ro-crate"
 
 # Kept here because `postprocess.export`, which has this table too, is slow to import; a test compares both.
 _FIELDS = """\
@@ -41,7 +42,7 @@ def add(commands: Commands) -> None:
     export = commands.add(
         "export",
         export_run,
-        summary="write the bodies of a run for ParaView, OVITO, Blender or 3D printers, or a scene for LAMMPS",
+        summary="write a run for ParaView, OVITO, Blender, 3D printers or an archive, or a scene for LAMMPS",
         text=f"""
 Writes the boxes of all links, and wall, tiers, floor, hooks and strings at one time, in metres.
 Existing files are never replaced. Formats:
@@ -56,6 +57,8 @@ Existing files are never replaced. Formats:
   lammps     folder with a commented input deck. DIR must be a scene file whose first phase is take-over.
              The deck has the poses at rest, the contact law, the time step, and the phases relax, shake
              and remove-container (at once). Other features of a scene are rejected by name.
+  ro-crate   DIR/ro-crate-metadata.json, which makes the run directory a Workflow Run RO-Crate (profile
+             Process Run Crate 0.5) for archives: program with versions, command, scene, times, files
 
 Bodies: smarticles, wall, floor, hooks, strings. --with crossings adds a point and a direction where a
 link passes through another smarticle's plane. --with forces adds lines through the contacts, for runs
@@ -69,10 +72,11 @@ Fields of each box:
   smarticles export runs/a --to gsd --all                  all frames, runs/a/export.gsd
   smarticles export runs/a --to stl --time 1.5 --without wall,floor --output pile.stl
   smarticles export on.yaml --to lammps                    on-lammps/in.lammps and its data files
+  smarticles export runs/a --to ro-crate                   runs/a/ro-crate-metadata.json
 """,
     )
     add_options(export, "directory", help="run directory; for lammps a scene file")
-    export.add_argument("--to", required=True, metavar="FORMAT", help=", ".join((*_FORMATS, _LAMMPS)))
+    export.add_argument("--to", required=True, metavar="FORMAT", help=", ".join((*_FORMATS, _LAMMPS, _CRATE)))
     default = "default: DIR/export.FORMAT or DIR/export-FORMAT; for lammps SCENE-lammps next to the scene"
     add_options(export, "--output", metavar="PATH", help=default)
     add_options(export, "--time")
@@ -92,17 +96,7 @@ def _export_scene(arguments: argparse.Namespace) -> int:
     from smarticles.commands.run import read_scene  # noqa: PLC0415
 
     scene: Path = arguments.directory
-    for name, value in (
-        ("--time", arguments.time),
-        ("--all", arguments.all or None),
-        ("--with", arguments.wanted or None),
-        ("--without", arguments.unwanted or None),
-        ("--color-by", arguments.color_by),
-    ):
-        if value is not None:
-            raise InputError(
-                f"{name}: selects from the frames of a run, and --to {_LAMMPS} writes a scene; leave it out"
-            )
+    _reject_selection(arguments, "a scene")
     folder: Path = arguments.output or scene.with_name(f"{scene.stem}-{_LAMMPS}")
     try:
         write_deck(read_scene(scene, ()), folder)
@@ -113,10 +107,36 @@ def _export_scene(arguments: argparse.Namespace) -> int:
     return 0
 
 
+def _reject_selection(arguments: argparse.Namespace, written: str) -> None:
+    for name, value in (
+        ("--time", arguments.time),
+        ("--all", arguments.all or None),
+        ("--with", arguments.wanted or None),
+        ("--without", arguments.unwanted or None),
+        ("--color-by", arguments.color_by),
+    ):
+        if value is not None:
+            raise InputError(
+                f"{name}: selects from the frames of a run, and --to {arguments.to} writes {written}; leave it out"
+            )
+
+
+def _export_crate(arguments: argparse.Namespace) -> int:
+    from postprocess.report.crate import describe_run  # noqa: PLC0415
+
+    _reject_selection(arguments, "metadata of the run")
+    if arguments.output is not None:
+        raise InputError(f"--output: --to {_CRATE} writes into the run directory, which is the crate; leave it out")
+    print(describe_run(arguments.directory))
+    return 0
+
+
 def export_run(arguments: argparse.Namespace) -> int:
     """Export a run, or a scene for LAMMPS; return the exit status."""
     if arguments.to == _LAMMPS:
         return _export_scene(arguments)
+    if arguments.to == _CRATE:
+        return _export_crate(arguments)
     from postprocess import export  # noqa: PLC0415  (imports PyVista)
 
     def show_progress(done: int, count: int) -> None:

@@ -1,4 +1,4 @@
-"""Write `CLAIMS.md` and `claims.csv` into a folder of results: `python -m studies.claims [RESULTS]`."""
+"""Write `CLAIMS.md`, `claims.yaml` and its schema into a folder of results: `python -m studies.claims [RESULTS]`."""
 
 import argparse
 from collections import Counter
@@ -6,9 +6,8 @@ from collections.abc import Sequence
 from itertools import groupby
 from pathlib import Path
 
-import pandas as pd
-
 from postprocess.report.tables import table_lines
+from studies.claims.records import write_records
 from studies.claims.verdicts import Claim, Tested, claims
 
 HEAD = """\
@@ -71,31 +70,15 @@ def engines(found: Sequence[Claim]) -> str:
 _HOW = ("opposite", "links alone", "YADE alone")
 
 
-def table(found: Sequence[Claim]) -> pd.DataFrame:
-    """Make the table `claims.csv`: a row per claim, with verdict and numbers by protocol and engine."""
-    rows = []
-    for claim in found:
-        row = {"number": claim.number, "part": claim.part, "claim": claim.says, "verdict": claim.verdict}
-        row["why"] = claim.why
-        for name in ("text", "code", "text on YADE", "code on YADE"):
-            tested = claim.tested[name]
-            for key in ("study", "verdict", "ours", "criterion", "basis"):
-                row[f"by the {name}: {key}"] = "" if tested is None else getattr(tested, key)
-            if tested is not None and tested.instead is not None:
-                row[f"by the {name}: by a test of ours"] = _numbers(tested.instead)
-        rows.append(row)
-    return pd.DataFrame(rows)
-
-
 def main(arguments: Sequence[str] | None = None) -> None:
-    """Write `CLAIMS.md` and `claims.csv`."""
+    """Write `CLAIMS.md`, `claims.yaml` and its schema."""
     parser = argparse.ArgumentParser(prog="python -m studies.claims", description=__doc__)
     parser.add_argument("results", type=Path, nargs="?", default=Path("results"), help="folder of the studies' results")
     folder: Path = parser.parse_args(arguments).results
     found = claims(folder)
     (folder / "CLAIMS.md").write_text(text(found), encoding="utf-8")
-    table(found).to_csv(folder / "claims.csv", index=False)
-    print(f"{folder / 'CLAIMS.md'}: {len(found)} claims")
+    write_records(found, folder)
+    print(f"{folder / 'CLAIMS.md'}, {folder / 'claims.yaml'}: {len(found)} claims")
 
 
 if __name__ == "__main__":

@@ -34,6 +34,7 @@ class Tested:
     """Verdict of one study on a claim."""
 
     study: str  #: Folder under `results/`
+    finding: str  #: Id of the finding in that study
     verdict: str  #: `reproduced`, `not`, `not resolved` or `no data`
     ours: str  #: Our numbers, as text
     criterion: str  #: Criterion for the verdict `reproduced`
@@ -147,6 +148,7 @@ def _tested(
     row = findings[finding]
     return Tested(
         study=study,
+        finding=finding,
         verdict=_FOUND[row["verdict"]],
         ours=row["ours"],
         criterion=row["criterion"],

@@ -24,6 +24,7 @@ from studies.fracture import (
     HELD_FAST,
     LEFT,
     LIMIT,
+    LOST,
     NET,
     PEAK,
     PEAK_TIME,
@@ -63,6 +64,8 @@ def test_measures_are_those_put_in(tmp_path: Path) -> None:
         assert row[column] == pytest.approx(TOP * (1 - window / BASE / 4), rel=5e-3)
     assert (row[HELD], row[NET]) == pytest.approx((GOES_ON * row[PEAK], (1 - GOES_ON) * row[PEAK]), rel=1e-3)
     assert (row[PEAK_TIME], row[RAISED]) == pytest.approx((APEX, APEX * W), abs=0.005)
+    # A hook at w per second is w/2 beyond the peak after 0.5 s; the force has come to 0 by then.
+    assert row[LOST] == pytest.approx(1 - BASE / 2 / 0.5 / (1 - WINDOW / BASE / 4), abs=2e-3)
     assert row[WORK] == pytest.approx(TOP * BASE, rel=1e-3)
     assert row[BEFORE] == pytest.approx(1 / row["smarticles [-]"], rel=1e-5)
     assert (row[CAME_FREE], row[LEFT], row[HELD_FAST], row[LIMIT]) == (1, 0, 0, math.inf)
@@ -80,11 +83,12 @@ def test_a_hook_that_stops_on_the_way_was_held_fast(tmp_path: Path) -> None:
     force = {"limit": 1.5 * total, "stops": 0.8}
     row = row_of(write_hooked_run(tmp_path, run, lambda time: 1.5 * total * (time > 0.8), **force))
     assert (row[HELD_FAST], row[LIMIT], row[PEAK]) == (1, pytest.approx(1.5), pytest.approx(1.5, rel=1e-3))
+    assert math.isnan(row[LOST])
 
 
 def sample(procedure: str, seed: int, peak: float, crossings: float, **others: float) -> dict[str, object]:
     named = {PROCEDURE: procedure, SEED: seed, PEAK: peak, NET: peak, CROSSINGS: crossings}
-    return named | {THETA: math.nan, ASPECT: 0.7, RAISED: 0.01, HELD_FAST: 0.0} | others
+    return named | {THETA: math.nan, ASPECT: 0.7, RAISED: 0.01, LOST: 0.3, HELD_FAST: 0.0} | others
 
 
 def as_in_the_paper() -> pd.DataFrame:
@@ -92,18 +96,27 @@ def as_in_the_paper() -> pd.DataFrame:
     rows = []
     for seed in range(1, 9):
         rows += [sample(STATIC, seed, 0.3, 2.0), sample(EXTERNAL, seed, 0.6, 3.0)]
-        rows += [sample(SHAPE, seed, 1.5, 6.0, **{RAISED: 0.005})]
+        rows += [sample(SHAPE, seed, 1.5, 6.0, **{LOST: 0.6})]
         # More entangled than the shaken pile, and weaker.
         for theta, crossings in ((5.0, 3.8), (10.0, 4.0), (15.0, 4.2), (30.0, 3.4)):
             rows.append(sample(INTERNAL, seed, 0.5 + 0.1 * (crossings - 4), crossings, **{THETA: theta}))
     table, generator = pd.DataFrame(rows), np.random.default_rng(0)
-    for name, scale in ((PEAK, 1.0), (CROSSINGS, 1.0), (RAISED, 0.05)):
+    for name, scale in ((PEAK, 1.0), (CROSSINGS, 1.0), (LOST, 1.0)):
         table[name] += 0.01 * scale * generator.normal(size=len(table))
     return table
 
 
 def verdicts(table: pd.DataFrame) -> list[str]:
     return [str(finding.judge(table).verdict) for finding in STUDY.findings]
+
+
+def test_brittle_is_what_loses_more_of_its_peak_and_is_unknown_where_a_pile_held_fast() -> None:
+    table = as_in_the_paper()
+    assert verdicts(table)[-1] == "found"
+    gentle = table.assign(**{LOST: 0.9 - table[LOST]})
+    assert verdicts(gentle)[-1] == "not found"
+    table.loc[table.index[table[PROCEDURE] == INTERNAL][1], HELD_FAST] = 1.0  # at θ = 10°
+    assert verdicts(table)[-1] == "not resolved"
 
 
 def test_a_lower_bound_is_enough_to_be_above_another_and_not_to_be_below() -> None:

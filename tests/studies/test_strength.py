@@ -15,7 +15,21 @@ from dem.record.run import open_run
 from postprocess.measures.pull import WINDOW
 from postprocess.statistics.points import SEED
 from studies.framework.procedures import EXTERNAL, INTERNAL, SHAPE, STATIC
-from studies.strength import ABOVE, BEFORE, BREAK, CARRIED, HELD_FAST, KEPT, LIMIT, PEAK, RAISED, STUDY, THROUGH, WORK
+from studies.strength import (
+    ABOVE,
+    BEFORE,
+    BREAK,
+    CARRIED,
+    HELD_FAST,
+    KEPT,
+    LIMIT,
+    LOST,
+    PEAK,
+    RAISED,
+    STUDY,
+    THROUGH,
+    WORK,
+)
 
 ORIGIN = {"note": "the full study as shipped", "command": "smarticles study strength --out strength"}
 ACTIVITY = {EXTERNAL: "shake", SHAPE: "shape-change", INTERNAL: "internal-oscillation"}
@@ -47,6 +61,7 @@ def test_measures_are_those_put_in(tmp_path: Path) -> None:
     blunt = 1 - WINDOW / BASE / 4
     assert row[PEAK] == pytest.approx(0.5 * blunt, rel=1e-3)
     assert row[RAISED] == pytest.approx(APEX * W, abs=0.005 * W)
+    assert row[LOST] == pytest.approx(1 - BASE / 2 / 0.5 / blunt, abs=2e-3)
     assert row[WORK] == pytest.approx(0.5 * BASE, rel=1e-3)
     # Before the pull one smarticle rests on the hook, and nothing goes through.
     assert row[BEFORE] == pytest.approx(1 / run.manifest.count, rel=1e-5)

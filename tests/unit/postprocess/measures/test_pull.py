@@ -11,7 +11,7 @@ from synthetic.hooked import AFTER_REST, INTERVAL, SPEED, write_hooked_run
 from dem.errors import InputError
 from dem.record.run import Run, open_run
 from dem.record.series import read_series
-from postprocess.measures.pull import FREE, WINDOW, freed, held_fast, moving_mean, peak, read_pull
+from postprocess.measures.pull import FREE, WINDOW, freed, held_fast, lost_after, moving_mean, peak, read_pull
 from postprocess.measures.table import summarise_run
 
 HEIGHT, APEX, BASE = 0.02, 0.6, 0.5  # N; s; s to either side
@@ -48,6 +48,23 @@ def test_a_triangle_has_its_peak_and_its_area(pulled):
     # The midpoint rule is exact but for the three kinks.
     assert pull.work == pytest.approx(HEIGHT * BASE * SPEED, rel=1e-4)
     assert pull.raised[[0, -1]] == pytest.approx([0, DISTANCE])
+
+
+@pytest.mark.parametrize(
+    ("after", "share"),
+    [
+        (np.ones_like, 0.0),
+        (lambda since: np.clip(1 - since / 0.5, 0, None), 0.5),
+        (lambda since: np.clip(1 - since / 0.25, 0, None), 0.75),
+        (lambda since: np.where(since < 0, 1.0, 0.0), 1.0),
+    ],
+)
+def test_the_share_of_the_peak_that_is_lost_is_one_less_the_mean_force_beyond_it(pulled, after, share):
+    pull = pulled(lambda time: HEIGHT * np.where(time < APEX, time / APEX, after(time - APEX)))
+    highest = peak(pull)
+    # The mean over the window is lower than a sharp peak, and lies before one that breaks off.
+    assert lost_after(pull, highest, 0.5 * SPEED) == pytest.approx(share, abs=0.06)
+    assert math.isnan(lost_after(pull, highest, DISTANCE))
 
 
 def test_the_work_of_a_constant_force_is_force_times_distance(pulled):
