@@ -95,6 +95,11 @@ def _reasons(scene: Scene) -> Mapping[EffectName, tuple[bool, str]]:
     energies = f"recording.energy is {str(recording.energy).lower()}"
     if recording.energies and not recording.energy:
         energies = "recording.dissipation_interval_s is given, and the energy ledger needs them"
+    waits = [
+        f"; phase {index} waits until all are slower than {limit:g} m/s"
+        for index, phase in enumerate(scene.phases)
+        if (limit := phase.settled_below(gravity, scene.model.size)) is not None
+    ]
     return {
         EffectName.CONTACT: (True, "every scene has bodies that touch each other and a floor"),
         EffectName.CONTAINER: (True, f"a wall {1e3 * scene.cylinder.height:.0f} mm high")
@@ -104,7 +109,9 @@ def _reasons(scene: Scene) -> Mapping[EffectName, tuple[bool, str]]:
         EffectName.STRINGS: phases(EffectName.STRINGS, "no phase of type strain"),
         EffectName.GRAVITY: (
             gravity > 0,
-            f"g = {gravity:g} m/s²" if plane is None else "the table carries it, and nothing moves along it",
+            f"g = {gravity:g} m/s²{''.join(waits)}"
+            if plane is None
+            else "the table carries it, and nothing moves along it",
         ),
         EffectName.FRICTION: (
             contact.friction_smarticle > 0 or contact.friction_wall > 0,
@@ -160,7 +167,7 @@ def _motors(scene: Scene, numbers: list[str]) -> dict[EffectName, tuple[bool, st
         ),
         EffectName.MOTORS: (
             True,
-            f"ω = {motor.speed_limit_rad_per_s:g} rad/s, shafts of {motor.stiffness_N_m_per_rad:g} N m/rad, a control "
+            f"ω = {motor.speed_limit_rad_per_s:g} rad/s, shafts of {scene.shaft_stiffness:g} N m/rad, a control "
             f"update every {fidelity.control_interval_s:g} s",
         ),
         EffectName.TORQUE_CAP: (True, f"τ_max = {scene.torque_limit:.3g} N m, law {motor.law}{beyond}"),

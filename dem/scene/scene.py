@@ -33,8 +33,8 @@ from dem.setting.container import Container, Cylinder
 from dem.setting.fidelity import FIDELITIES, Fidelity, fidelities
 from dem.setting.hooks import Hooks, with_hook_defaults
 from dem.setting.liquid import Liquid
-from dem.setting.motor import Motor
-from dem.setting.part import REFERENCE_ASPECT_RATIO, Part
+from dem.setting.motor import SHAFT_STIFFNESS, Motor
+from dem.setting.part import EARTH_GRAVITY, REFERENCE_ASPECT_RATIO, Part
 from dem.setting.plane import Channel, Plane
 from dem.setting.protocol import Protocol, with_protocol
 from dem.setting.recording import Recording
@@ -100,7 +100,7 @@ class Scene(Part):
     liquid: Liquid | None = Field(None, description="liquid around filaments; default: none")
     contact: Contact = Field(default_factory=Contact, description="friction and restitution")
     motor: Motor = Field(default_factory=Motor, description="the motors of the hinges, for phases that actuate")
-    gravity_m_per_s2: float = Field(9.81, ge=0, le=1000, description="g, downwards [m/s²]; 0 or from 1e-6")
+    gravity_m_per_s2: float = Field(EARTH_GRAVITY, ge=0, le=1000, description="g, downwards [m/s²]; 0 or from 1e-6")
     fidelity: Fidelity = Field(
         default_factory=lambda given: Fidelity(base="standard", **_named("standard", given)),
         description="a name (draft, standard, reference) or a mapping: base and the knobs that differ from it",
@@ -298,8 +298,16 @@ class Scene(Part):
         """Torque limit τ_max [N m]: `motor.torque_limit_N_m`, or the default that its description states."""
         if self.motor.torque_limit_N_m is not None:
             return self.motor.torque_limit_N_m
-        paper = self.smarticle.model_copy(update={"aspect_ratio": REFERENCE_ASPECT_RATIO}).boxes
-        return paper.mass * self.gravity_m_per_s2 * paper.middle_length
+        return _usual_torque(self.smarticle, self.gravity_m_per_s2)
+
+    @property
+    def shaft_stiffness(self) -> float:
+        """Stiffness of the shafts [N m/rad]: `motor.stiffness_N_m_per_rad`, or the default of its description."""
+        if self.motor.stiffness_N_m_per_rad is not None:
+            return self.motor.stiffness_N_m_per_rad
+        torque = _usual_torque(self.smarticle, self.gravity_m_per_s2 or EARTH_GRAVITY)
+        stiffness = SHAFT_STIFFNESS * torque / _usual_torque(Smarticle(), EARTH_GRAVITY)
+        return float(f"{min(max(stiffness, 1e-12), 1e6):.3g}")
 
     @cached_property
     def motor_strengths(self) -> Array | None:
@@ -402,6 +410,12 @@ class Scene(Part):
     def bodies(self) -> tuple[Particle | Kind, ...]:
         """One body of each kind. The damping in the contact law is computed from the effective mass of the first."""
         return bodies_of(self.model)
+
+
+def _usual_torque(smarticle: Smarticle, gravity: float) -> float:
+    """Return the default torque limit [N m] of a smarticle's motors; `gravity` in [m/s²]."""
+    paper = smarticle.model_copy(update={"aspect_ratio": REFERENCE_ASPECT_RATIO}).boxes
+    return paper.mass * gravity * paper.middle_length
 
 
 def _sizes(given: Mapping[str, Any]) -> tuple[float, float]:
