@@ -57,8 +57,8 @@ def measure(run: Run) -> Row:
     """Measure the pile, the torques of the motors and the residual of the energy ledger; return the row."""
     row, scene, series = procedure_row(run), load_scene(run.path / "scene.yaml"), run.series
     active = series["phase"] == activity(run).index
-    row |= {SHAFT: scene.shaft_stiffness, CONTACT: scene.fidelity.stiffness_N_per_m}
-    row[DECADES] = math.log10(scene.shaft_stiffness)
+    row |= {SHAFT: scene.motor.stiffness_N_m_per_rad, CONTACT: scene.fidelity.stiffness_N_per_m}
+    row[DECADES] = math.log10(scene.motor.stiffness_N_m_per_rad)
     torque = np.sqrt(np.nanmean(np.square(series["motor_torque_N_m"][active])))
     row[TORQUE] = float(torque / scene.torque_limit)
     work = row[ENERGY]

@@ -66,8 +66,6 @@ class Demand(Protocol):
     @property
     def torque_limit(self) -> float: ...
     @property
-    def shaft_stiffness(self) -> float: ...
-    @property
     def motor_strengths(self) -> Array | None: ...
     @property
     def wave_seed(self) -> int: ...
@@ -98,7 +96,7 @@ def motor_law_of(scene: Demand) -> MotorLaw | None:
     return MotorLaw(
         torque_limit=scene.torque_limit,
         speed_limit=scene.motor.speed_limit_rad_per_s,
-        stiffness=scene.shaft_stiffness,
+        stiffness=scene.motor.stiffness_N_m_per_rad,
         law=scene.motor.law,
         damping=scene.motor.damping_N_m_s_per_rad,
     )

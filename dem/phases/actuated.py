@@ -222,7 +222,7 @@ def overshoot(scene: SceneView) -> float:
     The laws "slip" and "servo" cap the torque; for them 0 is returned.
     """
     motor = scene.motor
-    added = scene.shaft_stiffness * motor.speed_limit_rad_per_s * scene.fidelity.control_interval_s
+    added = motor.stiffness_N_m_per_rad * motor.speed_limit_rad_per_s * scene.fidelity.control_interval_s
     return 0.0 if motor.law in ("slip", "servo") else added / scene.torque_limit
 
 
@@ -242,7 +242,7 @@ def actuation_warnings(scene: SceneView) -> tuple[str, ...]:
         f"fidelity.control_interval_s = {scene.fidelity.control_interval_s:g} s at motor.speed_limit_rad_per_s = "
         f"{motor.speed_limit_rad_per_s:g} rad/s a motor can exceed it by {excess:.3g} τ_max; use "
         f"control_interval_s: {interval} or stiffness_N_m_per_rad: "
-        f"{_down(scene.shaft_stiffness * less)}, or law: slip",
+        f"{_down(motor.stiffness_N_m_per_rad * less)}, or law: slip",
     )
 
 

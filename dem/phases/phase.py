@@ -6,7 +6,6 @@ recorder writes. The memory of a stage is plain data, so that a run can stop bet
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -26,7 +25,6 @@ from dem.setting.vibration import Vibration
 
 CHECK_INTERVAL = 0.01  # s between checks whether a layer has come down, a pile has settled, or a force is too large
 SETTLE_SECONDS = 0.35  # s, typical time in which a poured pile settles
-STILL = 0.059034  # largest speed of a settled pile, over √(g w) [1]: 0.02 m/s for the paper's smarticle
 CALMER = 0.9  # a pile comes to rest while its kinetic energy falls below this part of itself in half a longest wait
 
 Memory = dict[str, Any]
@@ -98,16 +96,6 @@ class Phase:
     def vibrated_by(self) -> Vibration | None:
         """Vibration of the container while the phase does something else; None without it."""
         return getattr(self, "vibration", None)
-
-    def settled_below(self, gravity: float, size: float) -> float | None:
-        """Return the speed [m/s] below which the phase takes a pile for settled; None if it does not wait for that.
-
-        Args:
-            gravity: acceleration of gravity [m/s²].
-            size: w of a smarticle, or longest bar of other bodies [m].
-        """
-        settle: Settle | None = getattr(self, "settle", None)
-        return None if settle is None else settle.speed_limit(gravity, size)
 
     def check(self, scene: SceneView, index: int) -> Iterator[str]:
         """Yield the errors of this phase, `scene.phases[index]`, one line each: key, value and what to do.
@@ -259,10 +247,10 @@ def time_left(engine: Engine, end: float) -> float:
 class Settle(Part):
     """Criterion for a settled pile: both limits hold at all checks for the time `hold_s`."""
 
-    speed_m_per_s: Speed | None = Field(
-        None,
-        description="largest speed of any smarticle [m/s]; default: 0.059 √(g w), or of other bodies with the longest "
-        "bar in place of w; for the paper's smarticle 0.02 m/s",
+    speed_m_per_s: Speed = Field(
+        0.02,
+        description="largest speed of any smarticle [m/s]; the default is that of the paper's smarticle at 9.81 m/s², "
+        "0.059 √(g w), and the same for others, with the longest bar of other bodies in place of w",
     )
     unbalanced_force: float = Field(
         0.05, ge=1e-9, le=1e6, description="mean net force on a smarticle over its weight [1]"
@@ -272,17 +260,6 @@ class Settle(Part):
         5.0,
         description="longest wait [s] while the pile loses little energy; then the run fails with the residuals",
     )
-
-    def speed_limit(self, gravity: float, size: float) -> float:
-        """Return `speed_m_per_s`, or the default that its description states [m/s].
-
-        Args:
-            gravity: acceleration of gravity [m/s²].
-            size: w of a smarticle, or longest bar of other bodies [m].
-        """
-        if self.speed_m_per_s is not None:
-            return self.speed_m_per_s
-        return float(f"{STILL * math.sqrt(gravity * size):.3g}")
 
 
 def begin_wait(memory: Memory) -> None:
@@ -328,9 +305,10 @@ def has_settled(settle: Settle, memory: Memory, engine: Engine) -> bool:
         RunError: the pile has not settled within `settle.timeout_s`, and no longer comes nearer to rest.
     """
     state = engine.state()
-    speed = float(np.linalg.norm(state.velocities, axis=1).max())
+    speeds = np.linalg.norm(state.velocities, axis=1)
+    speed = float(speeds.max())
     unbalanced = engine.unbalanced_force()
-    limit = settle.speed_limit(engine.gravity, engine.particle.size)
+    limit = settle.speed_m_per_s
     still = speed < limit and unbalanced < settle.unbalanced_force
     memory["still"] = memory["still"] + CHECK_INTERVAL if still else 0.0
     memory["slow"] = memory.get("slow", 0.0) + CHECK_INTERVAL if speed < limit else 0.0
@@ -342,8 +320,9 @@ def has_settled(settle: Settle, memory: Memory, engine: Engine) -> bool:
     mean = 2 * limit / (engine.gravity * max(memory["slow"], settle.timeout_s / 2))
     if memory["slow"] < settle.timeout_s / 2 or mean > settle.unbalanced_force:
         raise RunError(
-            f"the pile has not settled after {memory['judged']:g} s: speed {speed:.3g} m/s (limit {limit:g} m/s), "
-            f"{forces}; raise phases.0.settle.timeout_s or its limits"
+            f"the pile has not settled after {memory['judged']:g} s: speed {speed:.3g} m/s (limit {limit:g} m/s) of "
+            f"smarticle {speeds.argmax()}, {forces}; raise phases.0.settle.timeout_s or its limits (contacts do not "
+            "resist rolling, so that a body that hangs or rocks can swing on)"
         )
     memory["warning"] = (
         f"contact forces still fluctuate, {forces}, but for {memory['slow']:.3g} s no smarticle was faster than "

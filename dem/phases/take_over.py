@@ -196,7 +196,7 @@ class TakeOver(Part, Phase):
             taken = self.taken
         except InputError:
             return ()
-        limit = self.settle.speed_limit(scene.gravity_m_per_s2, scene.model.size)
+        limit = self.settle.speed_m_per_s
         if taken.fastest < limit:
             return ()
         return (
@@ -234,12 +234,11 @@ class TakeOver(Part, Phase):
             return stride
         if memory["task"] == "let apart":
             fastest = float(engine.state().speeds.max())
-            limit = settle.speed_limit(engine.gravity, engine.particle.size)
-            if fastest > limit + stride * engine.gravity:
+            if fastest > settle.speed_m_per_s + stride * engine.gravity:
                 if memory["waited"] > settle.timeout_s:
                     raise RunError(
                         f"the smarticles still push each other apart {settle.timeout_s:g} s after they were put in, up "
-                        f"to {fastest:.3g} m/s in {STRIDE} steps (limit {limit:g} m/s); raise "
+                        f"to {fastest:.3g} m/s in {STRIDE} steps (limit {settle.speed_m_per_s:g} m/s); raise "
                         "phases.0.settle.speed_m_per_s, or pour on this engine"
                     )
                 engine.still()

@@ -7,6 +7,8 @@ from dem.engine.effect import Adds, EffectName
 from dem.engine.kinds import engine_kind
 from dem.phases.actuated import overshoot
 from dem.phases.arrange import chain_of
+from dem.phases.deposit import Deposit
+from dem.phases.take_over import TakeOver
 from dem.record import columns
 from dem.record.names import VTKHDF
 from dem.scene.scene import Scene
@@ -96,9 +98,9 @@ def _reasons(scene: Scene) -> Mapping[EffectName, tuple[bool, str]]:
     if recording.energies and not recording.energy:
         energies = "recording.dissipation_interval_s is given, and the energy ledger needs them"
     waits = [
-        f"; phase {index} waits until all are slower than {limit:g} m/s"
+        f"; phase {index} waits until all are slower than {phase.settle.speed_m_per_s:g} m/s"
         for index, phase in enumerate(scene.phases)
-        if (limit := phase.settled_below(gravity, scene.model.size)) is not None
+        if isinstance(phase, Deposit | TakeOver)
     ]
     return {
         EffectName.CONTACT: (True, "every scene has bodies that touch each other and a floor"),
@@ -167,7 +169,7 @@ def _motors(scene: Scene, numbers: list[str]) -> dict[EffectName, tuple[bool, st
         ),
         EffectName.MOTORS: (
             True,
-            f"ω = {motor.speed_limit_rad_per_s:g} rad/s, shafts of {scene.shaft_stiffness:g} N m/rad, a control "
+            f"ω = {motor.speed_limit_rad_per_s:g} rad/s, shafts of {motor.stiffness_N_m_per_rad:g} N m/rad, a control "
             f"update every {fidelity.control_interval_s:g} s",
         ),
         EffectName.TORQUE_CAP: (True, f"τ_max = {scene.torque_limit:.3g} N m, law {motor.law}{beyond}"),

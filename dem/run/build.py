@@ -41,8 +41,8 @@ MISSED_LIMIT = 0.05
 # Limit of an unexplained rise of the energy: what lifts all smarticles by so many sphere diameters, a height below the
 # resolution of all results.
 RISE_LIMIT = 0.5
-# The limit is at least this fraction of the kinetic energy at the greatest speed that a phase gives to smarticles,
-# since collisions without loss conserve it to that accuracy only.
+# The limit is at least this fraction of the kinetic energy at the greatest speed that a phase or a motor gives to
+# smarticles, since collisions without loss, and fast barbs, conserve it to that accuracy only.
 KEPT_WITHIN = 0.01
 
 DAMP_SHAFTS = (
@@ -127,10 +127,11 @@ def build_watchdog(scene: Scene) -> Watchdog:
     """Return the watchdog of a scene, with its limits."""
     gravity, diameter = scene.gravity_m_per_s2, scene.sphere_diameter
     fall = math.sqrt(2 * gravity * (scene.cylinder.height + sum(phase.raises for phase in scene.phases)))
-    fastest, mass = max(phase.peak_speed(gravity) for phase in scene.phases), scene.count * scene.model.mass
+    fastest = max(speed_by_motors(scene), *(phase.peak_speed(gravity) for phase in scene.phases))
+    mass = scene.count * scene.model.mass
     return Watchdog(
         cylinder=scene.cylinder,
-        speed=SPEED_MARGIN * max(fall, fastest, speed_by_motors(scene)),
+        speed=SPEED_MARGIN * max(fall, fastest),
         way_out=DAMP_SHAFTS if _rings(scene) else LOWER_STEP,
         gap=(PIN_LIMIT if scene.mixture is not None and scene.mixture.jointed else GAP_LIMIT) * diameter,
         depth=(BARRIER_LIMIT if scene.smooth else DEPTH_LIMIT) * diameter,
@@ -160,7 +161,7 @@ def speed_by_motors(scene: Scene) -> float:
     elif scene.actuates:
         boxes, speed = scene.smarticle.boxes, scene.motor.speed_limit_rad_per_s
         mass = float(boxes.link_masses[[*BARB_LINKS]].min())
-        motors = [(speed, boxes.barb_length, scene.shaft_stiffness, scene.torque_limit, mass)]
+        motors = [(speed, boxes.barb_length, scene.motor.stiffness_N_m_per_rad, scene.torque_limit, mass)]
     interval = scene.fidelity.control_interval_s
     return max(
         (

@@ -138,14 +138,10 @@ def _plain(scene: Scene) -> dict[str, Any]:
 
     Without such keys, among them `ADDED_KEYS` and `NEWER_KEYS`, the hashes of older scenes do not change. A scene with
     a protocol keeps `packing_radius_m` and `ADDED_KEYS`, since the protocol may have filled them in. A scene of other
-    bodies than smarticles has no key `smarticle`. Defaults that once were the same for all bodies are given as numbers.
+    bodies than smarticles has no key `smarticle`.
     """
     data = scene.model_dump(mode="json")
     smarticle = data["smarticle"]
-    data["motor"]["stiffness_N_m_per_rad"] = scene.shaft_stiffness
-    for dumped, phase in zip(data["phases"], scene.phases, strict=True):
-        if (limit := phase.settled_below(scene.gravity_m_per_s2, scene.model.size)) is not None:
-            dumped["settle"]["speed_m_per_s"] = limit
     optional: list[tuple[dict[str, Any], Mapping[str, Any]]] = [
         (data, {"engine": DEFAULT_ENGINE, "particle": None, "liquid": None}),
         (data["recording"], {"contact_forces": False, "frames": "vtu"}),

@@ -5,7 +5,7 @@ import math
 from collections.abc import Mapping
 from functools import cached_property
 from itertools import pairwise
-from typing import Any, Literal, Self
+from typing import Any, Literal, Self, TypeVar
 
 import numpy as np
 from pydantic import (
@@ -24,8 +24,10 @@ from dem.body.particle import Particle, SphereChain, chain_mean_width, mean_widt
 from dem.engine.demand import Activity
 from dem.engine.effect import EffectName
 from dem.errors import InputError, nearest, shown
+from dem.phases.deposit import Deposit
 from dem.phases.kinds import AnyPhase
 from dem.phases.pull_hook import with_pull_defaults
+from dem.phases.take_over import TakeOver
 from dem.scene.rules import problems
 from dem.scene.stiffness import stiffness_for
 from dem.setting.contact import Contact, with_preset
@@ -33,7 +35,7 @@ from dem.setting.container import Container, Cylinder
 from dem.setting.fidelity import FIDELITIES, Fidelity, fidelities
 from dem.setting.hooks import Hooks, with_hook_defaults
 from dem.setting.liquid import Liquid
-from dem.setting.motor import SHAFT_STIFFNESS, Motor
+from dem.setting.motor import Motor
 from dem.setting.part import EARTH_GRAVITY, REFERENCE_ASPECT_RATIO, Part
 from dem.setting.plane import Channel, Plane
 from dem.setting.protocol import Protocol, with_protocol
@@ -45,6 +47,7 @@ from dem.strict import explained
 # Distance of neighbouring spheres, in diameters, of the chains that represent smooth links in pours and pictures. Where
 # such chains do not overlap, the links themselves overlap by a thirtieth of a diameter at most.
 SMOOTH_PITCH = 0.35
+P = TypeVar("P", bound=Part)
 _LEAST_GRAVITY = 1e-6  # m/s²; below it motors, whose torque limit is proportional to gravity, cannot move anything
 
 
@@ -194,6 +197,22 @@ class Scene(Part):
             raise ValueError(problem)
         return self
 
+    @model_validator(mode="after")
+    def _filled_by_size(self) -> Self:
+        """Scale defaults that are those of the paper's smarticle at 9.81 m/s²; see their descriptions."""
+        gravity, paper = self.gravity_m_per_s2 or EARTH_GRAVITY, Smarticle()
+        if self.shapes is None:
+            ratio = _usual_torque(self.smarticle, gravity) / _usual_torque(paper, EARTH_GRAVITY)
+            vars(self)["motor"] = _scaled(self.motor, "stiffness_N_m_per_rad", ratio)
+        root = math.sqrt(gravity * _sizes(dict(self))[0] / (EARTH_GRAVITY * paper.middle_length_m))
+        vars(self)["phases"] = tuple(
+            _filled(phase, settle=_scaled(phase.settle, "speed_m_per_s", root))
+            if isinstance(phase, Deposit | TakeOver)
+            else phase
+            for phase in self.phases
+        )
+        return self
+
     @cached_property
     def cylinder(self) -> Cylinder:
         """The container of the simulation; its height is `ample_height` if the scene gives none."""
@@ -300,15 +319,6 @@ class Scene(Part):
             return self.motor.torque_limit_N_m
         return _usual_torque(self.smarticle, self.gravity_m_per_s2)
 
-    @property
-    def shaft_stiffness(self) -> float:
-        """Stiffness of the shafts [N m/rad]: `motor.stiffness_N_m_per_rad`, or the default of its description."""
-        if self.motor.stiffness_N_m_per_rad is not None:
-            return self.motor.stiffness_N_m_per_rad
-        torque = _usual_torque(self.smarticle, self.gravity_m_per_s2 or EARTH_GRAVITY)
-        stiffness = SHAFT_STIFFNESS * torque / _usual_torque(Smarticle(), EARTH_GRAVITY)
-        return float(f"{min(max(stiffness, 1e-12), 1e6):.3g}")
-
     @cached_property
     def motor_strengths(self) -> Array | None:
         """(N, 2) factors on τ_max and stiffness of the motors [1]; None where all motors are equal."""
@@ -414,8 +424,24 @@ class Scene(Part):
 
 def _usual_torque(smarticle: Smarticle, gravity: float) -> float:
     """Return the default torque limit [N m] of a smarticle's motors; `gravity` in [m/s²]."""
-    paper = smarticle.model_copy(update={"aspect_ratio": REFERENCE_ASPECT_RATIO}).boxes
-    return paper.mass * gravity * paper.middle_length
+    boxes = smarticle.model_copy(update={"aspect_ratio": REFERENCE_ASPECT_RATIO}).boxes
+    return boxes.mass * gravity * boxes.middle_length
+
+
+def _filled(part: P, **values: Any) -> P:
+    """Return a copy of a part of a scene with other values, which do not count as given by the user."""
+    copied = part.model_copy(update=values)
+    copied.model_fields_set.intersection_update(part.model_fields_set)
+    return copied
+
+
+def _scaled(part: P, key: str, factor: float) -> P:
+    """Return a part with the default of a key multiplied by a factor, to three digits; a given value is kept."""
+    if key in part.model_fields_set:
+        return part
+    field = type(part).model_fields[key]
+    low, high = field.metadata
+    return _filled(part, **{key: min(max(float(f"{field.default * factor:.3g}"), low.ge), high.le)})
 
 
 def _sizes(given: Mapping[str, Any]) -> tuple[float, float]:

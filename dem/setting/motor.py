@@ -6,8 +6,6 @@ from pydantic import Field, model_validator
 
 from dem.setting.part import Part, Turning
 
-SHAFT_STIFFNESS = 3e-3  # N m/rad, of the paper's smarticle; at the default torque limit such a shaft twists by 0.3°
-
 
 class Motor(Part):
     """The motor of each hinge, velocity-controlled and with a torque limit."""
@@ -28,13 +26,13 @@ class Motor(Part):
         "own code; slip: it gives way like a spring whose torque is capped at τ_max; servo: proportional and "
         "derivative gain, with the total torque capped at τ_max",
     )
-    stiffness_N_m_per_rad: float | None = Field(
-        None,
+    stiffness_N_m_per_rad: float = Field(
+        3e-3,
         ge=1e-12,
         le=1e6,
-        description="twist stiffness of the shaft between motor and barb, a servo's gain [N m/rad]; default: in "
-        "proportion to the default of torque_limit_N_m (without gravity, to that at 9.81 m/s²), with 0.003 N m/rad for "
-        "the paper's smarticle",
+        description="twist stiffness of the shaft between motor and barb, a servo's gain [N m/rad]; the default is "
+        "that of the paper's smarticle at 9.81 m/s², and in proportion to the default of torque_limit_N_m for others "
+        "(without gravity, to that at 9.81 m/s²), so that all shafts twist equally",
     )
     damping_N_m_s_per_rad: float = Field(
         0.0,

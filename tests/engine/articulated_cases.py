@@ -294,5 +294,7 @@ def blocked(data: dict[str, Any], *, freed: bool, back: float) -> dict[str, Any]
         "halted": np.array(halted),
         "angles": engine.state().angles[0],
         "limit": scene.torque_limit,
-        "advance": scene.shaft_stiffness * scene.motor.speed_limit_rad_per_s * scene.fidelity.control_interval_s,
+        "advance": scene.motor.stiffness_N_m_per_rad
+        * scene.motor.speed_limit_rad_per_s
+        * scene.fidelity.control_interval_s,
     }

@@ -110,7 +110,7 @@ def droop(access: EngineAccess, *, aspect_ratio: float = 0.7, fidelity: str = "s
     parting, error = (VIBRATION, 0.01) if expected else ("rounding: hinges cannot part", 1e-12)
     return [
         Answer("torque of a motor [N m]", -moment, torque, 0.01, VIBRATION),
-        Answer("sag of a barb [rad]", moment / one.shaft_stiffness, sag, 0.01, VIBRATION),
+        Answer("sag of a barb [rad]", moment / one.motor.stiffness_N_m_per_rad, sag, 0.01, VIBRATION),
         Answer("gap of a hinge [m]", expected, gap, error, parting, scale=expected or lever),
     ]
 
@@ -207,7 +207,7 @@ def shaft_mode(one: Scene, pin: float, *, held: bool) -> tuple[float, Array]:
     masses = np.diag([float(boxes.link_masses[1]), float(boxes.link_inertias[1, 2]), 2 * own, 0.0, 0.0])
     masses += 2 * mass * (np.outer(along, along) + np.outer(across, across))
     twist, parts = np.array([0.0, -1.0, 1.0, 0.0, 0.0]), pin < math.inf
-    stiffness = 2 * one.shaft_stiffness * np.outer(twist, twist)
+    stiffness = 2 * one.motor.stiffness_N_m_per_rad * np.outer(twist, twist)
     stiffness += np.diag([0, 0, 0, 2 * pin, 2 * pin] if parts else np.zeros(5))
     pins = [] if not parts else [3] if held else [3, 4]
     free = [2, *pins] if held else [0, 1, 2, *pins]

@@ -73,7 +73,7 @@ def hinge_law(scene: Demand, time_step: float = 0.0) -> HingeLaw:
         pin_stiffness=pin,
         # That of two pins of half the stiffness, at both faces of the links.
         tilt_stiffness=pin * (scene.smarticle.thickness_normal_m / 2) ** 2,
-        shaft_stiffness=scene.shaft_stiffness,
+        shaft_stiffness=motor.stiffness_N_m_per_rad,
         torque_cap=scene.torque_limit if motor.law in ("slip", "servo") else None,
         shaft_damping=motor.damping_N_m_s_per_rad,
         damper_time=max(DAMPER_TIME, time_step),
