@@ -1,5 +1,6 @@
 """Decide which effects a scene needs and why, and list what each effect adds to a run."""
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
@@ -98,9 +99,10 @@ def _reasons(scene: Scene) -> Mapping[EffectName, tuple[bool, str]]:
     if recording.energies and not recording.energy:
         energies = "recording.dissipation_interval_s is given, and the energy ledger needs them"
     waits = [
-        f"; phase {index} waits until all are slower than {phase.settle.speed_m_per_s:g} m/s"
+        f"; phase {index} waits until all are slower than {speed:g} m/s, "
+        f"{speed / math.sqrt(gravity * scene.model.size):.2g} √(g {'w' if scene.shapes is None else 'longest bar'})"
         for index, phase in enumerate(scene.phases)
-        if isinstance(phase, Deposit | TakeOver)
+        if isinstance(phase, Deposit | TakeOver) and (speed := phase.settle.speed_m_per_s)
     ]
     return {
         EffectName.CONTACT: (True, "every scene has bodies that touch each other and a floor"),
@@ -169,8 +171,9 @@ def _motors(scene: Scene, numbers: list[str]) -> dict[EffectName, tuple[bool, st
         ),
         EffectName.MOTORS: (
             True,
-            f"ω = {motor.speed_limit_rad_per_s:g} rad/s, shafts of {motor.stiffness_N_m_per_rad:g} N m/rad, a control "
-            f"update every {fidelity.control_interval_s:g} s",
+            f"ω = {motor.speed_limit_rad_per_s:g} rad/s, shafts of {motor.stiffness_N_m_per_rad:g} N m/rad, twisted by "
+            f"{math.degrees(scene.torque_limit / motor.stiffness_N_m_per_rad):.2g}° at τ_max, a control update every "
+            f"{fidelity.control_interval_s:g} s",
         ),
         EffectName.TORQUE_CAP: (True, f"τ_max = {scene.torque_limit:.3g} N m, law {motor.law}{beyond}"),
     }
