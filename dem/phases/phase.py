@@ -292,9 +292,9 @@ def waits_in_vain(memory: Memory, energy: float, longest: float) -> bool:
 def has_settled(settle: Settle, memory: Memory, engine: Engine) -> bool:
     """Return whether the pile has settled; to be called every `CHECK_INTERVAL`.
 
-    Contact forces may fluctuate for ever although nothing moves, e.g. in weak gravity. When the wait ends in vain, a
-    pile that was slower than its limit v for a time t, at least half of `timeout_s`, counts as settled, with a warning:
-    mean net forces in that time are below 2 m v/t, which must be within the limit of the unbalanced force.
+    Contact forces may fluctuate for ever although nothing moves, e.g. in weak gravity. After `timeout_s`, a pile that
+    was slower than its limit v for half of this time, t, counts as settled, with a warning: mean net forces in that
+    time were below 2 m v/t, which must be within the limit of the unbalanced force.
 
     Args:
         memory: memory of the stage, see `begin_wait`. Its `waited` is the time since the wait began [s], which the
@@ -314,18 +314,19 @@ def has_settled(settle: Settle, memory: Memory, engine: Engine) -> bool:
     memory["slow"] = memory.get("slow", 0.0) + CHECK_INTERVAL if speed < limit else 0.0
     if memory["still"] > settle.hold_s:
         return True
-    if not waits_in_vain(memory, state.kinetic_energy, settle.timeout_s):
-        return False
     forces = f"unbalanced force {unbalanced:.3g} (limit {settle.unbalanced_force:g})"
-    mean = 2 * limit / (engine.gravity * max(memory["slow"], settle.timeout_s / 2))
-    if memory["slow"] < settle.timeout_s / 2 or mean > settle.unbalanced_force:
+    long = settle.timeout_s / 2
+    balanced = 2 * limit / (engine.gravity * long) <= settle.unbalanced_force
+    if balanced and memory["slow"] >= long and memory["waited"] >= settle.timeout_s:
+        memory["warning"] = (
+            f"contact forces still fluctuate, {forces}, but for {memory['slow']:.3g} s no smarticle was faster than "
+            f"{limit:g} m/s, so that the pile counts as settled"
+        )
+        return True
+    if waits_in_vain(memory, state.kinetic_energy, settle.timeout_s):
         raise RunError(
             f"the pile has not settled after {memory['judged']:g} s: speed {speed:.3g} m/s (limit {limit:g} m/s) of "
             f"smarticle {speeds.argmax()}, {forces}; raise phases.0.settle.timeout_s or its limits (contacts do not "
             "resist rolling, so that a body that hangs or rocks can swing on)"
         )
-    memory["warning"] = (
-        f"contact forces still fluctuate, {forces}, but for {memory['slow']:.3g} s no smarticle was faster than "
-        f"{limit:g} m/s, so that the pile counts as settled"
-    )
-    return True
+    return False
