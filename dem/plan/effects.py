@@ -1,5 +1,6 @@
 """Decide which effects a scene needs and why, and list what each effect adds to a run."""
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
@@ -7,6 +8,8 @@ from dem.engine.effect import Adds, EffectName
 from dem.engine.kinds import engine_kind
 from dem.phases.actuated import overshoot
 from dem.phases.arrange import chain_of
+from dem.phases.deposit import Deposit
+from dem.phases.take_over import TakeOver
 from dem.record import columns
 from dem.record.names import VTKHDF
 from dem.scene.scene import Scene
@@ -95,6 +98,12 @@ def _reasons(scene: Scene) -> Mapping[EffectName, tuple[bool, str]]:
     energies = f"recording.energy is {str(recording.energy).lower()}"
     if recording.energies and not recording.energy:
         energies = "recording.dissipation_interval_s is given, and the energy ledger needs them"
+    waits = [
+        f"; phase {index} waits until all are slower than {speed:g} m/s, "
+        f"{speed / math.sqrt(gravity * scene.model.size):.2g} √(g {'w' if scene.shapes is None else 'longest bar'})"
+        for index, phase in enumerate(scene.phases)
+        if isinstance(phase, Deposit | TakeOver) and (speed := phase.settle.speed_m_per_s)
+    ]
     return {
         EffectName.CONTACT: (True, "every scene has bodies that touch each other and a floor"),
         EffectName.CONTAINER: (True, f"a wall {1e3 * scene.cylinder.height:.0f} mm high")
@@ -104,7 +113,9 @@ def _reasons(scene: Scene) -> Mapping[EffectName, tuple[bool, str]]:
         EffectName.STRINGS: phases(EffectName.STRINGS, "no phase of type strain"),
         EffectName.GRAVITY: (
             gravity > 0,
-            f"g = {gravity:g} m/s²" if plane is None else "the table carries it, and nothing moves along it",
+            f"g = {gravity:g} m/s²{''.join(waits)}"
+            if plane is None
+            else "the table carries it, and nothing moves along it",
         ),
         EffectName.FRICTION: (
             contact.friction_smarticle > 0 or contact.friction_wall > 0,
@@ -160,8 +171,9 @@ def _motors(scene: Scene, numbers: list[str]) -> dict[EffectName, tuple[bool, st
         ),
         EffectName.MOTORS: (
             True,
-            f"ω = {motor.speed_limit_rad_per_s:g} rad/s, shafts of {motor.stiffness_N_m_per_rad:g} N m/rad, a control "
-            f"update every {fidelity.control_interval_s:g} s",
+            f"ω = {motor.speed_limit_rad_per_s:g} rad/s, shafts of {motor.stiffness_N_m_per_rad:g} N m/rad, twisted by "
+            f"{math.degrees(scene.torque_limit / motor.stiffness_N_m_per_rad):.2g}° at τ_max, a control update every "
+            f"{fidelity.control_interval_s:g} s",
         ),
         EffectName.TORQUE_CAP: (True, f"τ_max = {scene.torque_limit:.3g} N m, law {motor.law}{beyond}"),
     }

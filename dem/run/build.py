@@ -14,6 +14,7 @@ from dem.body.state import PileState, spheres_of
 from dem.engine.effect import EffectName
 from dem.engine.interface import Engine
 from dem.engine.kinds import engine_kind
+from dem.phases.actuated import BARB_LINKS, MOST_OVERSHOOT, overshoot
 from dem.plan.effects import called_for
 from dem.plan.steps import time_steps
 from dem.record.frames import FrameWriter, OneFileWriter
@@ -22,14 +23,14 @@ from dem.record.progress import ProgressWriter
 from dem.record.series import SeriesWriter
 from dem.run.recorder import Recorder
 from dem.run.sampler import Sampler
-from dem.run.watchdog import Watchdog
+from dem.run.watchdog import LOWER_STEP, Watchdog
 from dem.scene.reading import scene_hash
 from dem.scene.scene import Scene
 
 GAP_LIMIT = 0.2  # gap of a hinge in sphere diameters; it is up to 0.01 in a pile and 0.02 at an impact of 3 m/s
 # The same at a joint of chains, whose pins give way about as much as contacts; links could pass through wider gaps.
 PIN_LIMIT = 0.5
-SPEED_MARGIN = 5.0  # limit of speeds, over the speed of a fall over the container's height or of the shaking
+SPEED_MARGIN = 5.0  # limit of speeds, over the speed of a fall over the container's height, of the shaking or of motors
 # Overlap in sphere diameters, from which on the forces of wall and floor decrease or point outwards, and chains slip
 # through each other. Shaking at Γ = 10 with the fidelity draft reaches 0.4.
 DEPTH_LIMIT = 0.5
@@ -40,9 +41,14 @@ MISSED_LIMIT = 0.05
 # Limit of an unexplained rise of the energy: what lifts all smarticles by so many sphere diameters, a height below the
 # resolution of all results.
 RISE_LIMIT = 0.5
-# The limit is at least this fraction of the kinetic energy at the greatest speed that a phase gives to smarticles,
-# since collisions without loss conserve it to that accuracy only.
+# The limit is at least this fraction of the kinetic energy at the greatest speed that a phase or a motor gives to
+# smarticles, since collisions without loss, and fast barbs, conserve it to that accuracy only.
 KEPT_WITHIN = 0.01
+
+DAMP_SHAFTS = (
+    "damp the shafts by motor.damping_N_m_s_per_rad (engine: links) or lower motor.stiffness_N_m_per_rad, since a "
+    "control update turns an undamped shaft far beyond its torque limit, and barbs ring on it"
+)
 
 
 def build_engine(scene: Scene, dt: float) -> Engine:
@@ -115,15 +121,48 @@ def build_watchdog(scene: Scene) -> Watchdog:
     """Return the watchdog of a scene, with its limits."""
     gravity, diameter = scene.gravity_m_per_s2, scene.sphere_diameter
     fall = math.sqrt(2 * gravity * (scene.cylinder.height + sum(phase.raises for phase in scene.phases)))
-    fastest, mass = max(phase.peak_speed(gravity) for phase in scene.phases), scene.count * scene.model.mass
+    fastest = max(speed_by_motors(scene), *(phase.peak_speed(gravity) for phase in scene.phases))
+    mass = scene.count * scene.model.mass
     return Watchdog(
         cylinder=scene.cylinder,
         speed=SPEED_MARGIN * max(fall, fastest),
+        way_out=DAMP_SHAFTS if _rings(scene) else LOWER_STEP,
         gap=(PIN_LIMIT if scene.mixture is not None and scene.mixture.jointed else GAP_LIMIT) * diameter,
         depth=(BARRIER_LIMIT if scene.smooth else DEPTH_LIMIT) * diameter,
         missed=MISSED_LIMIT if scene.smooth else math.inf,
         # Without gravity no height corresponds to an energy.
         energy=mass * max(RISE_LIMIT * diameter * gravity, KEPT_WITHIN * fastest**2 / 2) if gravity else math.inf,
+    )
+
+
+def _rings(scene: Scene) -> bool:
+    """Return whether control updates may make the barbs ring on their shafts."""
+    return scene.actuates and scene.motor.damping_N_m_s_per_rad == 0 and overshoot(scene) > MOST_OVERSHOOT
+
+
+def speed_by_motors(scene: Scene) -> float:
+    """Return the greatest speed [m/s] that a motor gives to a link: by turning it, and when the shaft springs back.
+
+    A shaft is twisted by its torque limit, half a turn at most, and by what the motor turns in a control period. One
+    link may receive all its energy: a light link on a stiff shaft becomes faster than the motor.
+    """
+    motors: list[tuple[float, float, float, float, float]] = []  # speed, length, stiffness, torque limit, mass
+    if scene.mixture is not None:
+        for linkage in (kind.linkage for kind in scene.mixture.kinds if kind.linkage is not None):
+            length, mass = max(link.lengths[0] for link in linkage.links), min(link.mass for link in linkage.links)
+            joints = [joint for joint in linkage.joints if joint.law == "motor"]
+            motors += [(joint.speed, length, joint.stiffness, joint.most, mass) for joint in joints]
+    elif scene.actuates:
+        boxes, speed = scene.smarticle.boxes, scene.motor.speed_limit_rad_per_s
+        mass = float(boxes.link_masses[[*BARB_LINKS]].min())
+        motors = [(speed, boxes.barb_length, scene.motor.stiffness_N_m_per_rad, scene.torque_limit, mass)]
+    interval = scene.fidelity.control_interval_s
+    return max(
+        (
+            float(speed * length + (min(limit / stiffness, math.pi) + speed * interval) * math.sqrt(stiffness / mass))
+            for speed, length, stiffness, limit, mass in motors
+        ),
+        default=0.0,
     )
 
 

@@ -26,7 +26,8 @@ class Watchdog:
     #: The container. A smarticle has escaped if a sphere's centre or a link's axis is beyond the wall or under the
     #: floor, or if its centre of mass is above the wall
     cylinder: Cylinder
-    speed: float  #: Largest speed of a link's centre [m/s]; falls and shaking in the scene cause lower speeds
+    speed: float  #: Largest speed of a link's centre [m/s]; falls, shaking and motors of the scene cause lower speeds
+    way_out: str = LOWER_STEP  #: Advice where a speed is larger
     gap: float = math.inf  #: Largest gap of a hinge [m]; beyond it the hinge is broken
     depth: float = math.inf  #: Largest overlap [m]; beyond it contacts no longer keep bodies apart
     energy: float = math.inf  #: Largest increase of the energy without work [J]; beyond it the simulation is unstable
@@ -82,7 +83,7 @@ class Watchdog:
             time,
             f"a speed above {self.speed:.3g} m/s (fastest {speeds.max(initial=0):.3g} m/s), "
             "which nothing in this scene explains",
-            LOWER_STEP,
+            self.way_out,
         )
         if gaps is not None:
             # A gap that is NaN fails as well.

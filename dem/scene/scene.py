@@ -5,7 +5,7 @@ import math
 from collections.abc import Mapping
 from functools import cached_property
 from itertools import pairwise
-from typing import Any, Literal, Self
+from typing import Any, Literal, Self, TypeVar
 
 import numpy as np
 from pydantic import (
@@ -24,8 +24,10 @@ from dem.body.particle import Particle, SphereChain, chain_mean_width, mean_widt
 from dem.engine.demand import Activity
 from dem.engine.effect import EffectName
 from dem.errors import InputError, nearest, shown
+from dem.phases.deposit import Deposit
 from dem.phases.kinds import AnyPhase
 from dem.phases.pull_hook import with_pull_defaults
+from dem.phases.take_over import TakeOver
 from dem.scene.rules import problems
 from dem.scene.stiffness import stiffness_for
 from dem.setting.contact import Contact, with_preset
@@ -34,7 +36,7 @@ from dem.setting.fidelity import FIDELITIES, Fidelity, fidelities
 from dem.setting.hooks import Hooks, with_hook_defaults
 from dem.setting.liquid import Liquid
 from dem.setting.motor import Motor
-from dem.setting.part import REFERENCE_ASPECT_RATIO, Part
+from dem.setting.part import EARTH_GRAVITY, REFERENCE_ASPECT_RATIO, Part
 from dem.setting.plane import Channel, Plane
 from dem.setting.protocol import Protocol, with_protocol
 from dem.setting.recording import Recording
@@ -45,6 +47,7 @@ from dem.strict import explained
 # Distance of neighbouring spheres, in diameters, of the chains that represent smooth links in pours and pictures. Where
 # such chains do not overlap, the links themselves overlap by a thirtieth of a diameter at most.
 SMOOTH_PITCH = 0.35
+P = TypeVar("P", bound=Part)
 _LEAST_GRAVITY = 1e-6  # m/s²; below it motors, whose torque limit is proportional to gravity, cannot move anything
 
 
@@ -97,7 +100,7 @@ class Scene(Part):
     liquid: Liquid | None = Field(None, description="liquid around filaments; default: none")
     contact: Contact = Field(default_factory=Contact, description="friction and restitution")
     motor: Motor = Field(default_factory=Motor, description="the motors of the hinges, for phases that actuate")
-    gravity_m_per_s2: float = Field(9.81, ge=0, le=1000, description="g, downwards [m/s²]; 0 or from 1e-6")
+    gravity_m_per_s2: float = Field(EARTH_GRAVITY, ge=0, le=1000, description="g, downwards [m/s²]; 0 or from 1e-6")
     fidelity: Fidelity = Field(
         default_factory=lambda given: Fidelity(base="standard", **_named("standard", given)),
         description="a name (draft, standard, reference) or a mapping: base and the knobs that differ from it",
@@ -189,6 +192,22 @@ class Scene(Part):
     def _consistent(self) -> Self:
         for problem in problems(self, self.engine):
             raise ValueError(problem)
+        return self
+
+    @model_validator(mode="after")
+    def _filled_by_size(self) -> Self:
+        """Scale defaults that are those of the paper's smarticle at 9.81 m/s²; see their descriptions."""
+        gravity, paper = self.gravity_m_per_s2 or EARTH_GRAVITY, Smarticle()
+        if self.shapes is None:
+            ratio = _usual_torque(self.smarticle, gravity) / _usual_torque(paper, EARTH_GRAVITY)
+            vars(self)["motor"] = _scaled(self.motor, "stiffness_N_m_per_rad", ratio)
+        root = math.sqrt(gravity * _sizes(dict(self))[0] / (EARTH_GRAVITY * paper.middle_length_m))
+        vars(self)["phases"] = tuple(
+            _filled(phase, settle=_scaled(phase.settle, "speed_m_per_s", root))
+            if isinstance(phase, Deposit | TakeOver)
+            else phase
+            for phase in self.phases
+        )
         return self
 
     @cached_property
@@ -289,8 +308,7 @@ class Scene(Part):
         """Torque limit τ_max [N m]: `motor.torque_limit_N_m`, or the default that its description states."""
         if self.motor.torque_limit_N_m is not None:
             return self.motor.torque_limit_N_m
-        paper = self.smarticle.model_copy(update={"aspect_ratio": REFERENCE_ASPECT_RATIO}).boxes
-        return paper.mass * self.gravity_m_per_s2 * paper.middle_length
+        return _usual_torque(self.smarticle, self.gravity_m_per_s2)
 
     @cached_property
     def motor_strengths(self) -> Array | None:
@@ -393,6 +411,28 @@ class Scene(Part):
     def bodies(self) -> tuple[Particle | Kind, ...]:
         """One body of each kind. The damping in the contact law is computed from the effective mass of the first."""
         return bodies_of(self.model)
+
+
+def _usual_torque(smarticle: Smarticle, gravity: float) -> float:
+    """Return the default torque limit [N m] of a smarticle's motors; `gravity` in [m/s²]."""
+    boxes = smarticle.model_copy(update={"aspect_ratio": REFERENCE_ASPECT_RATIO}).boxes
+    return boxes.mass * gravity * boxes.middle_length
+
+
+def _filled(part: P, **values: Any) -> P:
+    """Return a copy of a part of a scene with other values, which do not count as given by the user."""
+    copied = part.model_copy(update=values)
+    copied.model_fields_set.intersection_update(part.model_fields_set)
+    return copied
+
+
+def _scaled(part: P, key: str, factor: float) -> P:
+    """Return a part with the default of a key multiplied by a factor, to three digits; a given value is kept."""
+    if key in part.model_fields_set:
+        return part
+    field = type(part).model_fields[key]
+    low, high = field.metadata
+    return _filled(part, **{key: min(max(float(f"{field.default * factor:.3g}"), low.ge), high.le)})
 
 
 def _sizes(given: Mapping[str, Any]) -> tuple[float, float]:

@@ -3,7 +3,7 @@
 Four loads are estimated:
 
 - the hardest impact: of the typical effective mass, at the greatest speed that a phase or a motor causes plus the speed
-  of a fall from the height w;
+  of a fall from the height w, or from the top of the slab that a layer is poured into where that is higher;
 - the pile's weight times 1 + Γ, shared by two contacts of each smarticle that can lie on the floor;
 - the pile's weight on the four contacts of a hook that lifts it;
 - the greatest force of a plate, shared by two contacts of each smarticle that can lie on the floor.
@@ -16,6 +16,7 @@ from typing import NamedTuple
 
 from dem.body.particle import mean_width
 from dem.phases.compress import Compress
+from dem.phases.deposit import Deposit
 from dem.phases.phase import SceneView
 from dem.phases.pull_hook import PullHook
 from dem.physics.contact import typical_effective_mass
@@ -41,7 +42,8 @@ def expected_overlaps(scene: SceneView) -> tuple[Overlap, ...]:
     speeds = [phase.peak_speed(gravity) for phase in scene.phases]
     if scene.actuates and scene.mixture is None:
         speeds.append(scene.motor.speed_limit_rad_per_s * scene.particle.boxes.barb_length)
-    speed = math.sqrt(max(speeds) ** 2 + 2 * gravity * width)
+    slabs = [phase.layer_height_w for phase in scene.phases if isinstance(phase, Deposit) and phase.every_s is None]
+    speed = math.sqrt(max(speeds) ** 2 + 2 * gravity * width * max([1.0, *slabs]))
     mass = max(map(typical_effective_mass, scene.bodies))
     impact = speed * math.sqrt(mass / stiffness) / thickness
     shaken = max(phase.peak_acceleration for phase in scene.phases)

@@ -30,7 +30,9 @@ class Motor(Part):
         3e-3,
         ge=1e-12,
         le=1e6,
-        description="twist stiffness of the shaft between motor and barb, a servo's gain [N m/rad]",
+        description="twist stiffness of the shaft between motor and barb, a servo's gain [N m/rad]; the default is "
+        "that of the paper's smarticle at 9.81 m/s², and in proportion to the default of torque_limit_N_m for others "
+        "(without gravity, to that at 9.81 m/s²), so that all shafts twist equally",
     )
     damping_N_m_s_per_rad: float = Field(
         0.0,

@@ -9,6 +9,7 @@ from dem.strict import Strict
 
 HINGE_RANGE = (-15.0, 105.0)  # deg
 LONGEST_LENGTH = 1.0  # m; longer smarticles or containers are taken for lengths in millimetres
+EARTH_GRAVITY = 9.81  # m/s²
 REFERENCE_ASPECT_RATIO = 0.7  # l/w of the smarticle for which the paper states torques and swings
 
 

@@ -142,7 +142,7 @@ def test_a_layer_that_does_not_land_is_reported_with_what_keeps_it(
 
 @pytest.mark.parametrize(
     ("drift", "unbalanced", "said"),
-    [(0.1, 0.0, "speed 0.1 m/s (limit 0.02 m/s)"), (0.0, 0.3, "unbalanced force 0.3 (limit 0.05)")],
+    [(0.1, 0.0, "speed 0.1 m/s (limit 0.02 m/s) of smarticle 0"), (0.0, 0.3, "unbalanced force 0.3 (limit 0.05)")],
 )
 def test_a_pile_that_does_not_settle_is_reported_with_its_residuals(
     monkeypatch: pytest.MonkeyPatch, drift: float, unbalanced: float, said: str
@@ -155,6 +155,19 @@ def test_a_pile_that_does_not_settle_is_reported_with_its_residuals(
     with pytest.raises(RunError, match=r"not settled after 0\.1 s: .*; raise phases\.0\.settle\.timeout_s") as caught:
         run_phase(scene, engine, 0)
     assert said in str(caught.value)
+
+
+def test_a_pile_at_rest_whose_forces_fluctuate_counts_as_settled_in_the_end(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(EngineDouble, "unbalanced_force", lambda _: 0.3)
+    scene = small({"phases.0.settle.timeout_s": 1})
+    engine = EngineDouble.of(scene, DT)
+    memory = perform(scene.phases[0].begin(scene, 0), engine)
+    assert engine.time > 1
+    assert memory["warning"].startswith("contact forces still fluctuate, unbalanced force 0.3 (limit 0.05), but for 1")
+    # Mean net forces of 2 m (0.02 m/s) over half a second are 0.8 % of the weight.
+    scene = small({"phases.0.settle": {"timeout_s": 1, "unbalanced_force": 3e-3}})
+    with pytest.raises(RunError, match=r"unbalanced force 0\.3 \(limit 0\.003\)"):
+        run_phase(scene, EngineDouble.of(scene, DT), 0)
 
 
 @pytest.mark.parametrize(("halved_every", "waited"), [(0.05, 0.25), (0.5, 0.1)])

@@ -107,3 +107,50 @@ def test_seeds_for_purposes_come_from_the_seed_alone() -> None:
     drawn = {scene.seed_for(purpose) for scene in scenes for purpose in ("deposit", "shake")}
     assert len(drawn) == 1000
     assert max(drawn) > 2**63  # all 64 bits are used: seeds of a sweep do not collide
+
+
+@pytest.mark.parametrize(
+    ("changes", "stiffness", "speed"),
+    [
+        ({}, 3e-3, 0.02),
+        ({"smarticle.aspect_ratio": 1.8}, 3e-3, 0.02),
+        ({"gravity_m_per_s2": 4 * 9.81}, 12e-3, 0.04),
+        # Twice as large in every direction: 8 times the mass and 16 times the torque.
+        (
+            {
+                "smarticle.middle_length_m": 0.0234,
+                "smarticle.thickness_normal_m": 2.54e-3,
+                "smarticle.thickness_in_plane_m": 1e-3,
+                "container.radius_m": 0.05,
+            },
+            48e-3,
+            0.0283,
+        ),
+        (
+            {"motor.stiffness_N_m_per_rad": 3e-3, "phases.0.settle.speed_m_per_s": 0.02, "gravity_m_per_s2": 1},
+            3e-3,
+            0.02,
+        ),
+        (
+            {"particle": {"shape": "rod", "length_m": 0.0468, "diameter_m": 1e-3}, "container.radius_m": 0.05},
+            3e-3,
+            0.04,
+        ),
+    ],
+)
+def test_shafts_and_the_speed_of_a_settled_pile_follow_the_size_of_the_body(
+    changes: dict[str, Any], stiffness: float, speed: float
+) -> None:
+    scene = small(changes)
+    assert scene.motor.stiffness_N_m_per_rad == stiffness
+    assert scene.phases[0].settle.speed_m_per_s == speed
+    again = parse_scene(yaml.safe_load(dump_scene(scene)), source="dump")
+    assert (again.motor, again.phases) == (scene.motor, scene.phases)
+    assert scene_hash(again) == scene_hash(scene)
+
+
+def test_scaled_defaults_do_not_count_as_given_so_that_a_changed_scene_scales_anew() -> None:
+    scene = small({"motor.law": "stall", "gravity_m_per_s2": 1})
+    kept = scene.model_dump(exclude_unset=True)
+    assert kept["motor"] == {"law": "stall"}
+    assert "settle" not in kept["phases"][0]

@@ -43,6 +43,14 @@ def test_hard_scenes_get_what_they_need(changes: dict[str, Any], base: str) -> N
     assert again.fidelity == scene.fidelity
 
 
+def test_a_layer_that_falls_from_a_high_slab_needs_as_much_as_its_fall() -> None:
+    speeds = []
+    for height in (0.5, 1.0, 4.0):
+        impact, _ = expected_overlaps(links(phases=[{"type": "deposit", "layer_height_w": height}]))
+        speeds.append(float(re.findall(r"[\d.]+", impact.cause)[0]))
+    assert speeds == [0.48, 0.48, 0.96]  # √(2 g w), and twice that
+
+
 def test_a_given_stiffness_is_kept_or_rejected_with_the_number_that_is_needed() -> None:
     needed = links(phases=[THROWN]).fidelity.stiffness_N_per_m
     softer = links(phases=[THROWN], fidelity={"base": "draft", "stiffness_N_per_m": needed / 2})
