@@ -117,16 +117,16 @@ class Cells(NamedTuple):
     centres: Array  #: (N, 3) centres of mass at the search [m]
     own: Array  #: (L, 6) lower and upper corner of the box about each link [m]
     boxes: Array  #: (6, L) corners of `own`, in the order of `order`; a row has one coordinate of all boxes [m]
-    strands: Indices  #: (L + 1,) index in `lines` of the first segment of each link, in the order of `order`
-    lines: Array  #: (Q, LINE + 1) segments and their skins [m], in the order of `order`
-    numbers: Indices  #: (Q,) number of the segment in each row of `lines`
+    #: (L, LINE + 1) middles of links and their skins [m], in the order of `order`; see `search.copy_by_bin`
+    lines: Array
     close: Indices  #: (2 L,) indices in `order` of links whose boxes overlap one link's box; second half: scratch
     places: Indices  #: (Q,) number of the group of each segment
     rows: Indices  #: (Q + 2,) index of the first pair of each group
     lower: Indices  #: (P,) segment with the lower number of each pair, in the order in which pairs are found
     upper: Indices  #: (P,) segment with the higher number of each pair, in the order in which pairs are found
-    first: Indices  #: (P,) segment with the lower number of each pair, group by group
-    second: Indices  #: (P,) segment with the higher number of each pair, group by group
+    #: (P,) segment with the lower number of each pair, group by group; during the search, link with the lower number
+    first: Indices
+    second: Indices  #: (P,) the same for the higher number
     slip: Array  #: (P, SLOTS, 4) `Pairs.slip` of the contacts in the previous list
     used: NDArray[np.uint8]  #: (P,) `Pairs.used` of the contacts in the previous list
 
@@ -405,9 +405,7 @@ def cells_for(bodies: int, links: int, segments: int, capacity: int) -> Cells:
         np.zeros((bodies, 3)),
         np.zeros((links, 6)),
         np.zeros((6, links)),
-        np.zeros(links + 1, np.int32),
-        np.zeros((segments, LINE + 1)),
-        np.zeros(segments, np.int32),
+        np.zeros((links, LINE + 1)),
         np.zeros(2 * links, np.int32),
         np.zeros(segments, np.int32),
         np.zeros(segments + 2, np.int32),

@@ -142,6 +142,22 @@ def contacts_of_segment(
 
 
 @inlined
+def _is_clear(link: Array, ground: Ground, channel: Any, hooks: Any, rims: Any) -> bool:
+    """Return whether a segment touches no boundary, as found by one comparison; False where this is not known."""
+    if channel is not None or hooks is not None or rims is not None:
+        return False
+    x, y, z = vector(link, 0)
+    x1, y1, z1 = add((x, y, z), vector(link, 3))
+    radius = link[RADIUS]
+    inner = ground.radii[ground.radii.shape[0] - 1] - radius
+    return bool(
+        (radius - (min(z, z1) - ground.place[FLOOR]) <= 0.0)
+        & (radius - (ground.place[PLATE] - max(z, z1)) <= 0.0)
+        & ((ground.flags[0] == 0) | (max(x * x + y * y, x1 * x1 + y1 * y1) <= inner * inner))
+    )
+
+
+@inlined
 def _contacts_with_wall(radius: float, ground: Ground, slot: int, point: Vector, rows: Array, count: int) -> int:
     """Append the contacts of one end of a link with the wall, its edges and its ceilings to `rows`.
 
@@ -327,6 +343,8 @@ def push_boundaries(
     """
     lost = 0.0
     for p in range(segments.line.shape[0]):
+        if kept.contacts[p] == 0 and _is_clear(segments.line[p], ground, channel, hooks, rims):
+            continue
         count = contacts_of_segment(segments, ground, channel, hooks, rims, p, rows, met)
         if count == 0 and kept.contacts[p] == 0:
             continue

@@ -1,12 +1,13 @@
 """Find all pairs of segments that are nearer to each other than a limit.
 
 The limit is the sum of both radii, both skins (distances by which segments may move until the next search) and a
-constant distance, the bare reach.
+constant distance, the bare reach. First all pairs of links are found. In this, the strands of a link, its segments side
+by side, count as one segment in their middle, whose radius is larger by the distance of the outer strands' axes.
 
 Every link has a box about all its segments, enlarged by their radii, their skins and half the bare reach. Boxes are
 sorted by their lower corners into strips along y and, within a strip, into short bins along x. All boxes that can
 overlap a given box then lie in a few contiguous ranges of memory, from the bin of its lower corner to the bin of its
-upper corner. Boxes and segments are copied in this order.
+upper corner. Boxes and middles are copied in this order.
 
 Up to `FEW` segments, the list of pairs is in the order of the segments' numbers. More segments do not fit into a
 processor's cache; their list is in the order of the bins, so that a step reads near segments one after the other.
@@ -19,8 +20,8 @@ from typing import Any, NamedTuple
 
 from dem.engine.links.arrays import Array, Cells, Indices, Segments
 from dem.engine.links.compiler import inlined, part
-from dem.engine.links.shapes import LINE, RADIUS
-from dem.engine.links.vectors import between, cross, dot, lines, nearest, sub, vector
+from dem.engine.links.shapes import INVERSE, LINE, RADIUS
+from dem.engine.links.vectors import add, between, cross, dot, lines, nearest, put, scale, sub, vector
 
 FEW = 3000  # segments; up to so many the list is in the order of their numbers
 SKIN = LINE  # place in a row of `Cells.lines`
@@ -90,6 +91,8 @@ def search(segments: Segments, cells: Cells, bare: float, piece: float) -> int:
     sort_bins(cells, grid)
     copy_by_bin(segments, cells)
     number = find_pairs(segments, cells, grid)
+    if number >= 0:
+        number = find_strands(segments, cells, number, bare)
     if number < 0:
         return -1
     for p in range(count + 2):
@@ -180,23 +183,24 @@ def sort_bins(cells: Cells, grid: Grid) -> None:
 
 @inlined
 def copy_by_bin(segments: Segments, cells: Cells) -> None:
-    """Copy boxes and segments of links in the order of the bins, and number the groups of pairs.
+    """Copy boxes and middles of links in the order of the bins, and number the groups of pairs.
 
-    A group has all pairs with the same first segment. All fields of `cells` from `boxes` to `numbers`, and `places`,
-    are written.
+    A group has all pairs with the same first segment. The fields `boxes`, `lines` and `places` of `cells` are written.
     """
-    few, n = cells.marks.shape[0] <= FEW, 0
+    line, few, n = segments.line, cells.marks.shape[0] <= FEW, 0
     for m in range(cells.keys.shape[0]):
         link = cells.order[m]
         for d in range(6):
             cells.boxes[d, m] = cells.own[link, d]
-        cells.strands[m] = n
-        for p in range(segments.first[link], segments.first[link + 1]):
-            for d in range(LINE):
-                cells.lines[n, d] = segments.line[p, d]
-            cells.lines[n, SKIN], cells.numbers[n], cells.places[p] = cells.marks[p, 6], p, p if few else n
+        p, last, skin = segments.first[link], segments.first[link + 1] - 1, 0.0
+        for q in range(p, last + 1):
+            cells.places[q], skin = q if few else n, max(skin, cells.marks[q, 6])
             n += 1
-    cells.strands[cells.keys.shape[0]] = n
+        middle, across = cells.lines[m], sub(vector(line[last], 0), vector(line[p], 0))
+        put(middle, 0, scale(0.5, add(vector(line[p], 0), vector(line[last], 0))))
+        put(middle, 3, vector(line[p], 3))
+        middle[INVERSE], middle[RADIUS] = line[p, INVERSE], line[p, RADIUS] + 0.5 * math.sqrt(dot(across, across))
+        middle[SKIN] = skin
 
 
 @inlined
@@ -241,24 +245,25 @@ def _boxed(
 
 @part
 def find_pairs(segments: Segments, cells: Cells, grid: Grid) -> int:
-    """Write all near pairs of segments that can touch into `cells.lower` and `cells.upper`.
+    """Write all near pairs of links that can touch into `cells.first` and `cells.second`.
 
     Args:
-        segments: the segments, with their bodies.
-        cells: links sorted into bins, with boxes and segments from `copy_by_bin`.
+        segments: the segments, with their links and bodies.
+        cells: links sorted into bins, with boxes and middles from `copy_by_bin`.
         grid: the bins.
 
     Returns:
         Number of pairs, or -1 if there is no room for all.
     """
-    number, capacity = 0, cells.lower.shape[0]
-    rows, starts, keys, boxes, strands = cells.lines, cells.starts, cells.keys, cells.boxes, cells.strands
-    numbers, close, lower, upper = cells.numbers, cells.close, cells.lower, cells.upper
+    number, capacity = 0, cells.first.shape[0]
+    rows, starts, keys, boxes, order = cells.lines, cells.starts, cells.keys, cells.boxes, cells.order
+    close, lower, upper = cells.close, cells.first, cells.second
     nx, ny, x0, y0, size, width = grid.columns, grid.strips, grid.x, grid.y, grid.size, grid.width
     for m in range(keys.shape[0]):
         ly, lz, hx, hy, hz = boxes[1, m], boxes[2, m], boxes[3, m], boxes[4, m], boxes[5, m]
-        key = keys[cells.order[m]]
-        own, mine = segments.body[numbers[strands[m]]], key // nx
+        link = order[m]
+        key, p = keys[link], segments.first[link]
+        own, mine = segments.body[p], key // nx
         column, last = key - mine * nx, _bin(hx - x0, size, nx - 1)
         boxed = 0
         for strip in range(_bin(ly - grid.tallest - y0, width, ny - 1), _bin(hy - y0, width, ny - 1) + 1):
@@ -267,21 +272,63 @@ def find_pairs(segments: Segments, cells: Cells, grid: Grid) -> int:
             if strip == mine:
                 start = m + 1
             boxed = _boxed(boxes, close, boxed, start, starts[strip * nx + last + 2], ly, lz, hx, hy, hz)
-        for a in range(strands[m], strands[m + 1]):
-            p, skin, hits = numbers[a], grid.bare + rows[a, RADIUS] + rows[a, SKIN], number
-            for k in range(boxed):
-                for b in range(strands[close[k]], strands[close[k] + 1]):
-                    if hits == capacity:
-                        return -1
-                    reach = skin + rows[b, RADIUS] + rows[b, SKIN]
-                    upper[hits] = b
-                    q = numbers[b]
-                    hits += not (
-                        off_lines(rows, a, b, reach) | ((segments.body[q] == own) & _cannot_touch(segments.bends, p, q))
-                    )
-            for k in range(number, hits):
-                b = upper[k]
-                q = numbers[b]
-                lower[number], upper[number] = min(p, q), max(p, q)
-                number += near_each_other(rows, a, b, skin + rows[b, RADIUS] + rows[b, SKIN])
+        skin, hits = grid.bare + rows[m, RADIUS] + rows[m, SKIN], number
+        for k in range(boxed):
+            if hits == capacity:
+                return -1
+            b = close[k]
+            upper[hits] = b
+            q = segments.first[order[b]]
+            hits += not (
+                off_lines(rows, m, b, skin + rows[b, RADIUS] + rows[b, SKIN])
+                | ((segments.body[q] == own) & _cannot_touch(segments.bends, p, q))
+            )
+        for k in range(number, hits):
+            b = upper[k]
+            other = order[b]
+            lower[number], upper[number] = min(link, other), max(link, other)
+            number += near_each_other(rows, m, b, skin + rows[b, RADIUS] + rows[b, SKIN])
+    return number
+
+
+@part
+def find_strands(segments: Segments, cells: Cells, found: int, bare: float) -> int:
+    """Write the segments of near links that can touch into `cells.lower` and `cells.upper`.
+
+    Args:
+        segments: the segments, with their links.
+        cells: the pairs of links from `find_pairs`.
+        found: number of these pairs.
+        bare: distance that is added to radii and skins of a pair [m].
+
+    Returns:
+        Number of pairs of segments, or -1 if there is no room for all.
+    """
+    line, begin, marks, lower, upper, number = segments.line, segments.first, cells.marks, cells.lower, cells.upper, 0
+    for k in range(found):
+        i, j = cells.first[k], cells.second[k]
+        p0, q0, p1, q1 = begin[i], begin[j], begin[i + 1], begin[j + 1]
+        if number + (p1 - p0) * (q1 - q0) > lower.shape[0]:
+            return -1
+        if p1 - p0 == 1 and q1 - q0 == 1:
+            lower[number], upper[number] = p0, q0
+            number += 1
+            continue
+        # Strands of a link have one direction, so that one normal is for all. See `off_lines`.
+        start, normal = vector(line[p0], 0), cross(vector(line[p0], 3), vector(line[q0], 3))
+        squared = dot(normal, normal)
+        for p in range(p0, p1):
+            one, skin = dot(sub(vector(line[p], 0), start), normal), bare + line[p, RADIUS] + marks[p, 6]
+            for q in range(q0, q1):
+                across, reach = one - dot(sub(vector(line[q], 0), start), normal), skin + line[q, RADIUS] + marks[q, 6]
+                lower[number], upper[number] = p, q
+                number += across * across <= reach * reach * squared
+    if number == found:
+        return number
+    tried, number = number, 0
+    for k in range(tried):
+        p, q = lower[k], upper[k]
+        lower[number], upper[number] = p, q
+        reach = bare + line[p, RADIUS] + marks[p, 6] + line[q, RADIUS] + marks[q, 6]
+        number += near_each_other(line, p, q, reach)
     return number

@@ -24,7 +24,7 @@ def moved(bodies: Bodies, segments: Segments, marks: Array, centres: Array) -> b
         centres: (N, 3) recorded centres of mass [m], from which the mean motion follows.
     """
     mean, line = (0.0, 0.0, 0.0), segments.line
-    n, over = bodies.position.shape[0], False
+    n = bodies.position.shape[0]
     for i in range(n):
         mean = add(mean, sub(vector(bodies.position[i], 0), vector(centres[i], 0)))
     mean = mean[0] / n, mean[1] / n, mean[2] / n
@@ -32,8 +32,9 @@ def moved(bodies: Bodies, segments: Segments, marks: Array, centres: Array) -> b
         at = sub(vector(line[p], 0), mean)
         start = _square(sub(at, vector(marks[p], 0)))
         end = _square(sub(add(at, vector(line[p], 3)), vector(marks[p], 3)))
-        over |= max(start, end) > marks[p, 6] * marks[p, 6]
-    return over
+        if max(start, end) > marks[p, 6] * marks[p, 6]:
+            return True
+    return False
 
 
 @inlined
