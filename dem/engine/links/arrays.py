@@ -372,20 +372,12 @@ def pairs_for(bodies: int, segments: int, capacity: int) -> Pairs:
         segments: number of segments of all bodies.
         capacity: largest number of pairs.
     """
+    f, indices = np.zeros, np.int32
     return Pairs(
-        np.zeros(capacity, np.int32),
-        np.zeros(capacity, np.int32),
-        np.zeros((capacity, SLOTS, 4)),
-        np.zeros(capacity, np.uint8),
-        np.zeros(capacity, np.int32),
-        np.zeros(capacity, np.int32),
-        np.zeros((capacity, 2)),
-        np.zeros(4, np.int64),
-        np.zeros((segments, 7)),
-        np.zeros((segments, 7)),
-        np.zeros((bodies, 3)),
-        np.zeros((bodies, 3)),
-    )
+        f(capacity, indices), f(capacity, indices), f((capacity, SLOTS, 4)), f(capacity, np.uint8),
+        f(capacity, indices), f(capacity, indices), f((capacity, 2)), f(4, np.int64),
+        f((segments, 7)), f((segments, 7)), f((bodies, 3)), f((bodies, 3)),
+    )  # fmt: skip
 
 
 def cells_for(bodies: int, links: int, segments: int, capacity: int) -> Cells:
@@ -397,22 +389,10 @@ def cells_for(bodies: int, links: int, segments: int, capacity: int) -> Cells:
         segments: number of segments of all bodies.
         capacity: largest number of pairs.
     """
+    f, indices = np.zeros, np.int32
     return Cells(
-        np.zeros(links, np.int32),
-        np.zeros(links, np.int32),
-        np.zeros(BINS * links + 66, np.int32),
-        np.zeros((segments, 7)),
-        np.zeros((bodies, 3)),
-        np.zeros((links, 6)),
-        np.zeros((6, links)),
-        np.zeros((links, LINE + 1)),
-        np.zeros(2 * links, np.int32),
-        np.zeros(segments, np.int32),
-        np.zeros(segments + 2, np.int32),
-        np.zeros(capacity, np.int32),
-        np.zeros(capacity, np.int32),
-        np.zeros(capacity, np.int32),
-        np.zeros(capacity, np.int32),
-        np.zeros((capacity, SLOTS, 4)),
-        np.zeros(capacity, np.uint8),
-    )
+        f(links, indices), f(links, indices), f(BINS * links + 66, indices), f((segments, 7)), f((bodies, 3)),
+        f((links, 6)), f((6, links)), f((links, LINE + 1)), f(2 * links, indices), f(segments, indices),
+        f(segments + 2, indices), *(f(capacity, indices) for _ in range(4)), f((capacity, SLOTS, 4)),
+        f(capacity, np.uint8),
+    )  # fmt: skip

@@ -103,22 +103,16 @@ def _planar_line(planar: Planar, plane: Array, link: int) -> tuple[float, float,
 def place_segments(shapes: Shapes, bodies: Bodies, segments: Segments, i: int) -> None:
     """Write the positions of the segments of body `i` into `segments.line`."""
     k, position = bodies.shape[i], vector(bodies.position[i], 0)
-    first, link, along = shapes.first[k], -1, (0.0, 0.0, 0.0)
-    own_x, own_y = 0.0, 0.0
+    first = shapes.first[k]
     for p in range(segments.begin[i], segments.begin[i + 1]):
         m = first + p - segments.begin[i]
         own = shapes.lines[m]
         x, y, z = vector(own, 0)
-        if shapes.link[m] != link:  # strands of a link differ only in where they begin
-            link = shapes.link[m]
-            ux, uy, uz = vector(own, 3)
-            if shapes.hinged[k]:
-                own_x, own_y, ux, uy = _planar_line(planar_at(shapes, k), bodies.plane[i], link)
-            along = turned(bodies, i, ux, uy, uz)
+        ux, uy, uz = vector(own, 3)
         if shapes.hinged[k]:
-            x, y = own_x, own_y
+            x, y, ux, uy = _planar_line(planar_at(shapes, k), bodies.plane[i], shapes.link[m])
         put(segments.line[p], 0, add(position, turned(bodies, i, x, y, z)))
-        put(segments.line[p], 3, along)
+        put(segments.line[p], 3, turned(bodies, i, ux, uy, uz))
 
 
 @inlined

@@ -322,13 +322,5 @@ def find_strands(segments: Segments, cells: Cells, found: int, bare: float) -> i
             for q in range(q0, q1):
                 across, reach = one - dot(sub(vector(line[q], 0), start), normal), skin + line[q, RADIUS] + marks[q, 6]
                 lower[number], upper[number] = p, q
-                number += across * across <= reach * reach * squared
-    if number == found:
-        return number
-    tried, number = number, 0
-    for k in range(tried):
-        p, q = lower[k], upper[k]
-        lower[number], upper[number] = p, q
-        reach = bare + line[p, RADIUS] + marks[p, 6] + line[q, RADIUS] + marks[q, 6]
-        number += near_each_other(line, p, q, reach)
+                number += across * across <= reach * reach * squared and near_each_other(line, p, q, reach)
     return number
