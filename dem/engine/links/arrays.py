@@ -124,9 +124,8 @@ class Cells(NamedTuple):
     rows: Indices  #: (Q + 2,) index of the first pair of each group
     lower: Indices  #: (P,) segment with the lower number of each pair, in the order in which pairs are found
     upper: Indices  #: (P,) segment with the higher number of each pair, in the order in which pairs are found
-    #: (P,) segment with the lower number of each pair, group by group; during the search, link with the lower number
-    first: Indices
-    second: Indices  #: (P,) the same for the higher number
+    first: Indices  #: (P,) segment with the lower number of each pair, group by group
+    second: Indices  #: (P,) segment with the higher number of each pair, group by group
     slip: Array  #: (P, SLOTS, 4) `Pairs.slip` of the contacts in the previous list
     used: NDArray[np.uint8]  #: (P,) `Pairs.used` of the contacts in the previous list
 
@@ -227,9 +226,8 @@ class Motoring(NamedTuple):
     schedule: Array  #: (N, 2) angles of the schedule at the last control update [rad]
     torque: Array  #: (N, 2) mean torques on the barbs between the last two control updates [N m]
     work: Array  #: (N, 2) work on the links up to now [J]
-    halted: NDArray[
-        np.bool_
-    ]  #: (N, 2) whether the last update halted the motor, or under slip and servo found it at its limit
+    #: (N, 2) whether the last update halted the motor, or under slip and servo found it at its limit
+    halted: NDArray[np.bool_]
     momentum: Array  #: (N, 2) momenta p conjugate to the angles, see `motion.planar` [kg m²/s]
     impulse: Array  #: (N, 2) time integral of the torques since the last control update [N m s]
     elapsed: Array  #: (1,) time since the last control update [s]

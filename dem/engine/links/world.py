@@ -74,8 +74,7 @@ from dem.setting.hooks import Bar
 Array = NDArray[np.float64]
 
 # Thinnest and thickest skins of both lists, and the width of a strip of the search, in diameters of the thickest
-# segment. Measured on a shaken pile of 270, see `benchmarks/`. Strands are thinner than their links, whose lists pay to
-# last longer: `STRANDS` are skins for bodies with several strands in a link.
+# segment; `STRANDS` are skins where links have several strands. Measured on a shaken pile of 270, see `benchmarks/`.
 NEAR_SKINS, WIDE_SKINS, STRIP = (0.04, 0.15), (0.05, 2.0), 4.0
 STRANDS = (0.06, 0.225), (0.225, 3.0)
 NEAR_STEPS, WIDE_STEPS = 6, 40  # steps that a skin of the tight and of the wide list should last

@@ -143,7 +143,7 @@ def contacts_of_segment(
 
 @inlined
 def _is_clear(link: Array, ground: Ground, channel: Any, hooks: Any, rims: Any) -> bool:
-    """Return whether a segment touches no boundary, as found by one comparison; False where this is not known."""
+    """Return whether a segment touches no boundary, in one comparison; False where this is not known."""
     if channel is not None or hooks is not None or rims is not None:
         return False
     x, y, z = vector(link, 0)
@@ -286,12 +286,8 @@ def _contacts_with_hooks(link: Array, ground: Ground, hooks: Hooks, rows: Array,
     return count
 
 
-@part
-def contacts_with_boundaries(
-    segments: Segments, ground: Ground, channel: Any, hooks: Any, rims: Any, p: int, rows: Array, met: Array
-) -> int:
-    """Call `contacts_of_segment`, not inlined, for queries, in which speed matters less."""
-    return contacts_of_segment(segments, ground, channel, hooks, rims, p, rows, met)
+# Not inlined, for queries, in which speed matters less.
+contacts_with_boundaries = part(contacts_of_segment.py_func)  # type: ignore[attr-defined] # Numba's, once compiled
 
 
 # -- forces ------------------------------------------------------------------------------------------------------
@@ -356,8 +352,7 @@ def push_boundaries(
         for slot in range(kept.used.shape[1]):
             if kept.used[p, slot] == 1:
                 lost += kept.slip[p, slot, 3]
-                for d in range(4):
-                    kept.slip[p, slot, d] = 0.0
+                kept.slip[p, slot] = 0.0
             kept.used[p, slot] >>= 1
         kept.contacts[p] = count
     return lost

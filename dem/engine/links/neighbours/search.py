@@ -1,8 +1,8 @@
 """Find all pairs of segments that are nearer to each other than a limit.
 
 The limit is the sum of both radii, both skins (distances by which segments may move until the next search) and a
-constant distance, the bare reach. First all pairs of links are found. In this, the strands of a link, its segments side
-by side, count as one segment in their middle, whose radius is larger by the distance of the outer strands' axes.
+constant distance, the bare reach. First near links are found, then their strands, which are segments side by side. A
+link counts as one segment in the middle of its strands, with a radius that encloses them.
 
 Every link has a box about all its segments, enlarged by their radii, their skins and half the bare reach. Boxes are
 sorted by their lower corners into strips along y and, within a strip, into short bins along x. All boxes that can
@@ -91,8 +91,6 @@ def search(segments: Segments, cells: Cells, bare: float, piece: float) -> int:
     sort_bins(cells, grid)
     copy_by_bin(segments, cells)
     number = find_pairs(segments, cells, grid)
-    if number >= 0:
-        number = find_strands(segments, cells, number, bare)
     if number < 0:
         return -1
     for p in range(count + 2):
@@ -245,7 +243,7 @@ def _boxed(
 
 @part
 def find_pairs(segments: Segments, cells: Cells, grid: Grid) -> int:
-    """Write all near pairs of links that can touch into `cells.first` and `cells.second`.
+    """Write all near pairs of segments that can touch into `cells.lower` and `cells.upper`.
 
     Args:
         segments: the segments, with their links and bodies.
@@ -255,72 +253,46 @@ def find_pairs(segments: Segments, cells: Cells, grid: Grid) -> int:
     Returns:
         Number of pairs, or -1 if there is no room for all.
     """
-    number, capacity = 0, cells.first.shape[0]
+    number, capacity, line, first, marks = 0, cells.lower.shape[0], segments.line, segments.first, cells.marks
     rows, starts, keys, boxes, order = cells.lines, cells.starts, cells.keys, cells.boxes, cells.order
-    close, lower, upper = cells.close, cells.first, cells.second
+    close, lower, upper = cells.close, cells.lower, cells.upper
     nx, ny, x0, y0, size, width = grid.columns, grid.strips, grid.x, grid.y, grid.size, grid.width
     for m in range(keys.shape[0]):
         ly, lz, hx, hy, hz = boxes[1, m], boxes[2, m], boxes[3, m], boxes[4, m], boxes[5, m]
         link = order[m]
-        key, p = keys[link], segments.first[link]
-        own, mine = segments.body[p], key // nx
+        key, p0 = keys[link], first[link]
+        own, mine = segments.body[p0], key // nx
         column, last = key - mine * nx, _bin(hx - x0, size, nx - 1)
-        boxed = 0
+        boxed, hits = 0, 0
         for strip in range(_bin(ly - grid.tallest - y0, width, ny - 1), _bin(hy - y0, width, ny - 1) + 1):
             # Of two links that begin in the same bins along x, the one in the lower strip finds the other.
             start = starts[strip * nx + column + (1 if strip >= mine else 2)]
             if strip == mine:
                 start = m + 1
             boxed = _boxed(boxes, close, boxed, start, starts[strip * nx + last + 2], ly, lz, hx, hy, hz)
-        skin, hits = grid.bare + rows[m, RADIUS] + rows[m, SKIN], number
+        skin = grid.bare + rows[m, RADIUS] + rows[m, SKIN]
         for k in range(boxed):
-            if hits == capacity:
-                return -1
             b = close[k]
-            upper[hits] = b
-            q = segments.first[order[b]]
+            close[hits] = b
+            q = first[order[b]]
             hits += not (
                 off_lines(rows, m, b, skin + rows[b, RADIUS] + rows[b, SKIN])
-                | ((segments.body[q] == own) & _cannot_touch(segments.bends, p, q))
+                | ((segments.body[q] == own) & _cannot_touch(segments.bends, p0, q))
             )
-        for k in range(number, hits):
-            b = upper[k]
-            other = order[b]
-            lower[number], upper[number] = min(link, other), max(link, other)
-            number += near_each_other(rows, m, b, skin + rows[b, RADIUS] + rows[b, SKIN])
-    return number
-
-
-@part
-def find_strands(segments: Segments, cells: Cells, found: int, bare: float) -> int:
-    """Write the segments of near links that can touch into `cells.lower` and `cells.upper`.
-
-    Args:
-        segments: the segments, with their links.
-        cells: the pairs of links from `find_pairs`.
-        found: number of these pairs.
-        bare: distance that is added to radii and skins of a pair [m].
-
-    Returns:
-        Number of pairs of segments, or -1 if there is no room for all.
-    """
-    line, begin, marks, lower, upper, number = segments.line, segments.first, cells.marks, cells.lower, cells.upper, 0
-    for k in range(found):
-        i, j = cells.first[k], cells.second[k]
-        p0, q0, p1, q1 = begin[i], begin[j], begin[i + 1], begin[j + 1]
-        if number + (p1 - p0) * (q1 - q0) > lower.shape[0]:
-            return -1
-        if p1 - p0 == 1 and q1 - q0 == 1:
-            lower[number], upper[number] = p0, q0
-            number += 1
-            continue
-        # Strands of a link have one direction, so that one normal is for all. See `off_lines`.
-        start, normal = vector(line[p0], 0), cross(vector(line[p0], 3), vector(line[q0], 3))
-        squared = dot(normal, normal)
-        for p in range(p0, p1):
-            one, skin = dot(sub(vector(line[p], 0), start), normal), bare + line[p, RADIUS] + marks[p, 6]
-            for q in range(q0, q1):
-                across, reach = one - dot(sub(vector(line[q], 0), start), normal), skin + line[q, RADIUS] + marks[q, 6]
-                lower[number], upper[number] = p, q
-                number += across * across <= reach * reach * squared and near_each_other(line, p, q, reach)
+        for k in range(hits):
+            b = close[k]
+            i, j = min(link, order[b]), max(link, order[b])
+            strands = (first[i + 1] - first[i]) * (first[j + 1] - first[j])
+            if number + strands > capacity:
+                return -1
+            lower[number], upper[number] = first[i], first[j]
+            near = near_each_other(rows, m, b, skin + rows[b, RADIUS] + rows[b, SKIN])
+            if strands == 1:
+                number += near
+            elif near:
+                for p in range(first[i], first[i + 1]):
+                    for q in range(first[j], first[j + 1]):
+                        lower[number], upper[number] = p, q
+                        reach = grid.bare + line[p, RADIUS] + marks[p, 6] + line[q, RADIUS] + marks[q, 6]
+                        number += near_each_other(line, p, q, reach)
     return number

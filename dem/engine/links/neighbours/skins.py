@@ -12,7 +12,7 @@ from typing import Any
 
 from dem.engine.links.arrays import Array, Bodies, Segments
 from dem.engine.links.compiler import inlined, part
-from dem.engine.links.vectors import Vector, add, dot, moving, put, sub, vector
+from dem.engine.links.vectors import Vector, add, dot, moving, put, square, sub, vector
 
 
 @part
@@ -30,16 +30,11 @@ def moved(bodies: Bodies, segments: Segments, marks: Array, centres: Array) -> b
     mean = mean[0] / n, mean[1] / n, mean[2] / n
     for p in range(line.shape[0]):
         at = sub(vector(line[p], 0), mean)
-        start = _square(sub(at, vector(marks[p], 0)))
-        end = _square(sub(add(at, vector(line[p], 3)), vector(marks[p], 3)))
+        start = square(sub(at, vector(marks[p], 0)))
+        end = square(sub(add(at, vector(line[p], 3)), vector(marks[p], 3)))
         if max(start, end) > marks[p, 6] * marks[p, 6]:
             return True
     return False
-
-
-@inlined
-def _square(a: Vector) -> float:
-    return a[0] ** 2 + a[1] ** 2 + a[2] ** 2
 
 
 @inlined
