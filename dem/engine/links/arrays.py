@@ -391,6 +391,6 @@ def cells_for(bodies: int, links: int, segments: int, capacity: int) -> Cells:
     return Cells(
         f(links, indices), f(links, indices), f(BINS * links + 66, indices), f((segments, 7)), f((bodies, 3)),
         f((links, 6)), f((6, links)), f((links, LINE + 1)), f(2 * links, indices), f(segments, indices),
-        f(segments + 2, indices), *(f(capacity, indices) for _ in range(4)), f((capacity, SLOTS, 4)),
-        f(capacity, np.uint8),
+        f(segments + 2, indices), f(capacity, indices), f(capacity, indices), f(capacity, indices),
+        f(capacity, indices), f((capacity, SLOTS, 4)), f(capacity, np.uint8),
     )  # fmt: skip
